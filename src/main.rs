@@ -1,0 +1,3 @@
+//! The `mrol` program.
+
+fn main() {}

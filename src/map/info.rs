@@ -1,0 +1,110 @@
+//! What a map says of itself: sizes, and false positive rates as expected and as measured.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{MapView, MultiResolutionMap};
+use crate::voxel::VoxelKey;
+
+/// Size and filter of one level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelInfo {
+    /// 0 is the finest.
+    pub level: u32,
+    /// Side of its voxels, metres.
+    pub resolution_m: f64,
+    /// Occupied voxels.
+    pub voxels: usize,
+    /// Bytes of the filter's bit plane, which look-ups read.
+    pub plane_bytes: usize,
+    /// Bytes of the filter's counters, which only changes read.
+    pub counter_bytes: usize,
+    /// Counters in use: neither zero nor saturated.
+    pub counters_in_use: usize,
+    /// Counters that saturated, and stay until their filter is rebuilt.
+    pub counters_saturated: usize,
+    /// False positive rate by the closed form of the filter's layout: the mean over shards, weighted by voxels.
+    pub expected_rate: f64,
+    /// The same by eq. (1) of the paper.
+    pub unblocked_rate: f64,
+    /// The share of absent neighbours of occupied voxels that the filter lets through; none of an empty level.
+    pub measured_rate: Option<f64>,
+}
+
+impl MultiResolutionMap {
+    /// Describes every level, finest first, at one revision: (revision, levels, bytes of the exact sets).
+    ///
+    /// False positives are measured on `samples` absent neighbours of occupied voxels a level, drawn from `seed`.
+    pub fn describe(&self, samples: usize, seed: u64) -> (u64, Vec<LevelInfo>, usize) {
+        let view = self.view();
+        let levels = (0..self.settings.levels).map(|level| self.describe_level(&view, level, samples, seed));
+        let levels = levels.collect();
+        let set_bytes = self.shards.iter().map(|shard| shard.read().set_bytes()).sum();
+        (view.revision(), levels, set_bytes)
+    }
+
+    fn describe_level(&self, view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> LevelInfo {
+        let mut info = LevelInfo {
+            level,
+            resolution_m: self.lattice.resolution_m(level),
+            voxels: 0,
+            plane_bytes: 0,
+            counter_bytes: 0,
+            counters_in_use: 0,
+            counters_saturated: 0,
+            expected_rate: 0.0,
+            unblocked_rate: 0.0,
+            measured_rate: measured_rate(view, level, samples, seed),
+        };
+        for list in view.lists(level) {
+            let filter = list.filter();
+            let (plane, counters) = filter.bytes();
+            let (in_use, saturated) = filter.counters_in_use();
+            info.voxels += filter.len();
+            info.plane_bytes += plane;
+            info.counter_bytes += counters;
+            info.counters_in_use += in_use;
+            info.counters_saturated += saturated;
+            info.expected_rate += filter.expected_rate() * filter.len() as f64;
+            info.unblocked_rate += filter.unblocked_rate() * filter.len() as f64;
+        }
+        let voxels = info.voxels.max(1) as f64;
+        info.expected_rate /= voxels;
+        info.unblocked_rate /= voxels;
+        info
+    }
+}
+
+/// The share of about `samples` absent neighbours of occupied voxels that the filter takes for occupied.
+///
+/// Queries near surfaces are what planners and alignments ask, so this is the rate they meet; neighbours of
+/// occupied voxels are drawn evenly over shards in proportion to their voxels.
+fn measured_rate(view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> Option<f64> {
+    let total: usize = view.lists(level).map(|list| list.len()).sum();
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ u64::from(level));
+    let (mut absent, mut let_through) = (0usize, 0usize);
+    for list in view.lists(level) {
+        // Every n-th voxel from a random start: an even sample in one walk.
+        let wish = (samples * list.len()).div_ceil(total.max(1));
+        let stride = (list.len() / wish.max(1)).max(1);
+        let start = random.random_range(0..stride);
+        for voxel in list.iter().skip(start).step_by(stride) {
+            let Some(neighbour) = random_neighbour(voxel, &mut random) else {
+                continue;
+            };
+            if !view.contains(neighbour, level) {
+                absent += 1;
+                let_through += usize::from(view.may_contain(neighbour, level));
+            }
+        }
+    }
+    (absent > 0).then(|| let_through as f64 / absent as f64)
+}
+
+/// One of the 26 voxels around `voxel`.
+fn random_neighbour(voxel: VoxelKey, random: &mut ChaCha8Rng) -> Option<VoxelKey> {
+    let step = random.random_range(0..26);
+    let step = if step < 13 { step } else { step + 1 };
+    let [x, y, z] = voxel.index();
+    VoxelKey::new([x + step % 3 - 1, y + step / 3 % 3 - 1, z + step / 9 - 1])
+}

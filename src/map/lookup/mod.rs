@@ -1,0 +1,118 @@
+//! The critical path of everything (paper II): rotate, translate, quantise, look up.
+//!
+//! One operation: points and a pose in, a bit a point out. [`scalar`] defines it; the wide twins agree with it
+//! bit for bit and are chosen at run time.
+
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod scalar;
+#[cfg(test)]
+mod tests;
+
+use super::OccupiedVoxelList;
+use super::sharding::SHARDS;
+use crate::geometry::Point;
+use crate::voxel::{BlockMask, LatticeFromPoints, VACANT};
+
+/// Which of the two structures of a level answers (paper II).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Lookup {
+    /// The exact set.
+    #[default]
+    Exact,
+    /// The counting Bloom filter alone: now and then "occupied" of a free voxel, never "free" of an occupied one.
+    Bloom,
+}
+
+impl Lookup {
+    /// `exact` or `bloom`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Bloom => "bloom",
+        }
+    }
+}
+
+/// What a look-up at one level reads: plain slices, shard by shard.
+#[derive(Debug, Clone)]
+pub struct LevelView<'a> {
+    /// Bit planes of the level's filters.
+    planes: [&'a [u64]; SHARDS],
+    /// Keys and masks of the tables that serve the level.
+    blocks: [(&'a [u64], &'a [BlockMask]); SHARDS],
+    hashes: u32,
+    level: u32,
+    /// How many levels up in its block a voxel of the level is.
+    up: u32,
+    /// From an index of the level to its region.
+    region_shift: u32,
+}
+
+impl<'a> LevelView<'a> {
+    /// A view of the lists that `list` gives; a shard without one is read as empty.
+    pub(super) fn new(
+        level: u32,
+        up: u32,
+        region_shift: u32,
+        hashes: u32,
+        list: impl Fn(usize) -> Option<OccupiedVoxelList<'a>>,
+    ) -> Self {
+        const NO_PLANE: &[u64] = &[0];
+        const NO_KEYS: &[u64] = &[VACANT];
+        const NO_MASKS: &[BlockMask] = &[BlockMask::EMPTY];
+        Self {
+            planes: std::array::from_fn(|i| list(i).map_or(NO_PLANE, |list| list.filter().plane())),
+            blocks: std::array::from_fn(|i| {
+                list(i).map_or((NO_KEYS, NO_MASKS), |list| list.blocks().slots())
+            }),
+            hashes,
+            level,
+            up,
+            region_shift,
+        }
+    }
+}
+
+/// Points that [`count`] looks up at a time: their bits fit in a cache line or two.
+const COUNT_CHUNK: usize = 2048;
+
+/// Says of each point whether its voxel is occupied: point i is bit i % 64 of `occupied[i / 64]`, and bits past
+/// the last point are zero. True when every point has a voxel; one that has none is not occupied.
+///
+/// # Panics
+/// When `occupied` is not one word for each 64 points.
+pub fn occupied(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    lookup: Lookup,
+    occupied: &mut [u64],
+) -> bool {
+    assert_eq!(
+        occupied.len(),
+        points.len().div_ceil(64),
+        "one word of answers for each 64 points"
+    );
+    #[cfg(target_arch = "x86_64")]
+    if avx512::is_available() {
+        return avx512::occupied(points, lattice_from_points, view, lookup, occupied);
+    }
+    scalar::occupied(points, lattice_from_points, view, lookup, occupied)
+}
+
+/// Number of points whose voxel is occupied.
+pub fn count(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    lookup: Lookup,
+) -> usize {
+    let mut bits = [0; COUNT_CHUNK / 64];
+    let counts = points.chunks(COUNT_CHUNK).map(|chunk| {
+        let bits = &mut bits[..chunk.len().div_ceil(64)];
+        occupied(chunk, lattice_from_points, view, lookup, bits);
+        bits.iter().map(|word| word.count_ones() as usize).sum::<usize>()
+    });
+    counts.sum()
+}

@@ -1,0 +1,59 @@
+//! The look-up as it is defined, point by point; the oracle of its wide twins, and their stand-in where the
+//! machine has none.
+
+use super::{LevelView, Lookup};
+use crate::bloom::Probe;
+use crate::geometry::Point;
+use crate::map::sharding::shard_of_region;
+use crate::voxel::{BlockTable, Cell, LatticeFromPoints, VACANT, VoxelKey};
+
+/// See [`super::occupied`].
+pub(super) fn occupied(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    lookup: Lookup,
+    occupied: &mut [u64],
+) -> bool {
+    let look_up = match lookup {
+        Lookup::Exact => exact,
+        Lookup::Bloom => bloom,
+    };
+    let mut all_have_a_voxel = true;
+    for (points, word) in points.chunks(64).zip(occupied) {
+        *word = 0;
+        for (bit, &point) in points.iter().enumerate() {
+            match lattice_from_points.index(point) {
+                Some(index) => *word |= u64::from(look_up(view, index.map(|i| i >> view.level))) << bit,
+                None => all_have_a_voxel = false,
+            }
+        }
+    }
+    all_have_a_voxel
+}
+
+#[inline(always)]
+fn shard(view: &LevelView<'_>, index: [i32; 3]) -> usize {
+    shard_of_region(index.map(|i| i >> view.region_shift))
+}
+
+#[inline(always)]
+fn bloom(view: &LevelView<'_>, index: [i32; 3]) -> bool {
+    let plane = view.planes[shard(view, index)];
+    let probe = Probe::of(VoxelKey::pack(index).to_bits(), view.hashes, plane.len());
+    plane[probe.word] & probe.mask == probe.mask
+}
+
+#[inline(always)]
+fn exact(view: &LevelView<'_>, index: [i32; 3]) -> bool {
+    let (keys, masks) = view.blocks[shard(view, index)];
+    let (block, cell) = Cell::of(index.map(|i| i << view.up));
+    let mut slot = BlockTable::home(block.to_bits(), keys.len());
+    loop {
+        match keys[slot] {
+            key if key == block.to_bits() => return masks[slot].contains(cell, view.up),
+            VACANT => return false,
+            _ => slot = if slot + 1 == keys.len() { 0 } else { slot + 1 },
+        }
+    }
+}

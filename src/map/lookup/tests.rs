@@ -1,0 +1,111 @@
+//! Every wide path against its scalar twin, bit for bit.
+
+use proptest::prelude::*;
+
+use super::{LevelView, Lookup, scalar};
+use crate::bloom::FilterSettings;
+use crate::geometry::{Point, Pose};
+use crate::map::{MapSettings, MultiResolutionMap};
+use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
+
+type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64]) -> bool;
+
+/// The wide kernels that this machine can run.
+fn wide_kernels() -> Vec<(&'static str, Kernel)> {
+    let mut kernels: Vec<(&'static str, Kernel)> = vec![("dispatched", super::occupied)];
+    #[cfg(target_arch = "x86_64")]
+    if super::avx512::is_available() {
+        kernels.push(("avx512", super::avx512::occupied));
+    }
+    kernels
+}
+
+fn assert_twins(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
+    let quantise = map.lattice().from_points(pose);
+    let view = map.view();
+    for (name, kernel) in wide_kernels() {
+        for level in 0..map.settings().levels {
+            for lookup in [Lookup::Exact, Lookup::Bloom] {
+                let (mut expected, mut found) = (
+                    vec![0; points.len().div_ceil(64)],
+                    vec![7; points.len().div_ceil(64)],
+                );
+                let level_view = view.level_view(level);
+                let all = scalar::occupied(points, &quantise, &level_view, lookup, &mut expected);
+                assert_eq!(
+                    kernel(points, &quantise, &level_view, lookup, &mut found),
+                    all,
+                    "{name}"
+                );
+                assert_eq!(found, expected, "{name}, level {level}, {lookup:?}");
+            }
+        }
+    }
+}
+
+fn map_of(keys: impl IntoIterator<Item = [i32; 3]>, settings: MapSettings) -> MultiResolutionMap {
+    let voxels: VoxelSet = keys.into_iter().filter_map(VoxelKey::new).collect();
+    MultiResolutionMap::restore(settings, 1, &voxels, []).unwrap()
+}
+
+/// Indices crowded enough to hit, near the origin, at region borders, and at the ends of the range.
+fn index() -> impl Strategy<Value = [i32; 3]> {
+    let axis = prop_oneof![
+        8 => -20i32..20,
+        2 => prop::sample::select(vec![-65, -64, -1, 0, 63, 64, 127, 128]),
+        1 => prop::sample::select(vec![INDEX_MIN, INDEX_MIN + 1, INDEX_MAX - 1, INDEX_MAX]),
+    ];
+    prop::array::uniform3(axis)
+}
+
+/// Points in, on the borders of and beside the voxels of 0.5 m, and some that no voxel holds.
+fn point() -> impl Strategy<Value = Point> {
+    let on_lattice = (
+        index(),
+        prop::array::uniform3(prop::sample::select(vec![0.0f32, 0.25, 0.499_999])),
+    );
+    prop_oneof![
+        20 => on_lattice.prop_map(|(i, d)| Point::new(
+            i[0] as f32 * 0.5 + d[0], i[1] as f32 * 0.5 + d[1], i[2] as f32 * 0.5 + d[2])),
+        1 => prop::sample::select(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 524_288.0, -524_288.5, 1e30])
+            .prop_map(|bad| Point::new(bad, 0.0, 0.0)),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn wide_kernels_agree_with_the_scalar_one(
+        keys in prop::collection::vec(index(), 0..600),
+        points in prop::collection::vec(point(), 0..150),
+        levels in 1u32..=12,
+        hashes in 1u32..=5,
+        bits_per_key in 2.0f64..20.0,
+        turned in any::<bool>(),
+    ) {
+        let filter = FilterSettings { hashes, bits_per_key };
+        let map = map_of(keys, MapSettings { resolution_m: 0.5, levels, filter });
+        let pose = match turned {
+            true => Pose::new([0.3, -7.0, 1.0].into(), [0.4, -0.2, 2.0].into()),
+            false => Pose::identity(),
+        };
+        assert_twins(&map, &points, &pose);
+    }
+}
+
+#[test]
+fn bits_past_the_last_point_are_zero() {
+    let map = map_of([[0, 0, 0]], MapSettings::new(1.0, 3));
+    let points = vec![Point::new(0.5, 0.5, 0.5); 67];
+    let mut bits = [u64::MAX; 2];
+    let view = map.view();
+    assert!(super::occupied(
+        &points,
+        &map.lattice().from_map(),
+        &view.level_view(0),
+        Lookup::Exact,
+        &mut bits
+    ));
+    assert_eq!(bits, [u64::MAX, 0b111]);
+}

@@ -1,0 +1,126 @@
+//! The map: occupied voxel lists at many resolutions behind counting Bloom filters (paper II, III), in shards
+//! behind locks.
+//!
+//! Reading order: [`OccupiedVoxelList`] is one level of the paper, [`shard`] all levels of one part of space,
+//! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
+
+pub mod commit;
+mod info;
+pub mod lookup;
+mod name;
+mod occupied_voxel_list;
+mod region;
+mod restore;
+mod settings;
+mod shard;
+mod sharding;
+mod trajectory;
+pub mod view;
+
+pub use commit::{Committed, Committer};
+pub use info::LevelInfo;
+pub use lookup::Lookup;
+pub use name::{MapName, NAME_LENGTH_MAX, NameError, RobotName};
+pub use occupied_voxel_list::OccupiedVoxelList;
+pub use region::{Region, RegionError};
+pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
+pub use sharding::SHARDS;
+pub use trajectory::{ScanRecord, Trajectory, TrajectoryPose};
+pub use view::MapView;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use parking_lot::{Mutex, RwLock, RwLockReadGuard};
+
+use crate::geometry::{Point, Pose};
+use crate::voxel::Lattice;
+use shard::Shard;
+use sharding::{Sharding, ShardsTouched};
+
+/// A multi-resolution occupied voxel list (MROL, paper III): level n holds the occupied voxels of
+/// r_n = r_0 * 2^n, with the trajectory of the poses from which they were seen.
+///
+/// Space is cut into regions, and each region belongs to one of [`SHARDS`] shards with a lock of its own:
+/// readers hold the read locks of the shards they need, all at once, and so see one revision. Changes are made
+/// one at a time by a [`Committer`], which holds the write locks of the shards it touches until the new
+/// revision is published.
+#[derive(Debug)]
+pub struct MultiResolutionMap {
+    settings: MapSettings,
+    lattice: Lattice,
+    sharding: Sharding,
+    shards: [RwLock<Shard>; SHARDS],
+    trajectory: RwLock<Trajectory>,
+    revision: AtomicU64,
+    committing: Mutex<()>,
+}
+
+impl MultiResolutionMap {
+    /// An empty map at revision 0.
+    ///
+    /// # Errors
+    /// When a setting is out of range; the error names it and the range.
+    pub fn new(settings: MapSettings) -> Result<Self, MapSettingsError> {
+        let lattice = settings.lattice()?;
+        Ok(Self {
+            settings,
+            lattice,
+            sharding: Sharding::new(settings.levels),
+            shards: std::array::from_fn(|_| RwLock::new(Shard::new(&settings))),
+            trajectory: RwLock::default(),
+            revision: AtomicU64::new(0),
+            committing: Mutex::new(()),
+        })
+    }
+
+    /// What the map was made with.
+    pub fn settings(&self) -> &MapSettings {
+        &self.settings
+    }
+
+    /// Its lattices.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// Committed changes so far.
+    pub fn revision(&self) -> u64 {
+        self.revision.load(Ordering::Acquire)
+    }
+
+    /// Number of occupied voxels of `level`.
+    pub fn voxels(&self, level: u32) -> usize {
+        self.shards
+            .iter()
+            .map(|shard| shard.read().level(level).len())
+            .sum()
+    }
+
+    /// True without an occupied voxel.
+    pub fn is_empty(&self) -> bool {
+        self.shards.iter().all(|shard| shard.read().is_empty())
+    }
+
+    /// The poses of the accepted scans.
+    pub fn trajectory(&self) -> RwLockReadGuard<'_, Trajectory> {
+        self.trajectory.read()
+    }
+
+    /// Locks the whole map for reading, at one revision.
+    pub fn view(&self) -> MapView<'_> {
+        MapView::lock(self, ShardsTouched::all())
+    }
+
+    /// Locks what `points`, placed at `map_from_points`, can fall in.
+    pub fn view_of(&self, points: &[Point], map_from_points: &Pose) -> MapView<'_> {
+        MapView::lock(
+            self,
+            self.sharding.touched_by(points, map_from_points, &self.lattice),
+        )
+    }
+
+    /// Waits for the turn to change the map.
+    pub fn committer(&self) -> Committer<'_> {
+        Committer::begin(self)
+    }
+}

@@ -1,0 +1,126 @@
+//! Names that are safe as file names, metric labels and path segments.
+
+use std::sync::Arc;
+
+/// Characters a name may have, at most.
+pub const NAME_LENGTH_MAX: usize = 64;
+
+/// Why a text is not a name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NameError {
+    /// Not a map's name.
+    #[error("map must match [a-z0-9][a-z0-9_-]{{0,63}}, got {0:?}")]
+    Map(String),
+    /// Not a robot's name.
+    #[error("robot must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
+    Robot(String),
+}
+
+/// The name of a map: `[a-z0-9][a-z0-9_-]{0,63}`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MapName(Arc<str>);
+
+impl MapName {
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// Names the text and what a name looks like.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        let first = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();
+        let rest = |c: u8| first(c) || c == b'_' || c == b'-';
+        let bytes = text.as_bytes();
+        let fits = bytes.len() <= NAME_LENGTH_MAX
+            && bytes.first().is_some_and(|&c| first(c))
+            && bytes.iter().all(|&c| rest(c));
+        if fits {
+            Ok(Self(text.into()))
+        } else {
+            Err(NameError::Map(excerpt(text)))
+        }
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// The name of a robot: 1 to 64 of `[A-Za-z0-9_.-]`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RobotName(Arc<str>);
+
+impl RobotName {
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// Names the text and what a name looks like.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        let fits = |c: u8| c.is_ascii_alphanumeric() || b"_.-".contains(&c);
+        if (1..=NAME_LENGTH_MAX).contains(&text.len()) && text.bytes().all(fits) {
+            Ok(Self(text.into()))
+        } else {
+            Err(NameError::Robot(excerpt(text)))
+        }
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl std::fmt::Display for MapName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::fmt::Display for RobotName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// A hostile name need not be repeated in full.
+fn excerpt(text: &str) -> String {
+    let mut start: String = text.chars().take(NAME_LENGTH_MAX + 1).collect();
+    if start.len() < text.len() {
+        start.push('…');
+    }
+    start
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_name_can_be_no_path() {
+        for good in ["a", "0", "floor-2_b", &"x".repeat(64)] {
+            assert!(MapName::new(good).is_ok(), "{good}");
+        }
+        for bad in [
+            "",
+            "A",
+            "-a",
+            "_a",
+            "a/b",
+            "..",
+            "a.b",
+            "ä",
+            "a b",
+            "a\0",
+            &"x".repeat(65),
+        ] {
+            assert!(MapName::new(bad).is_err(), "{bad}");
+        }
+        assert!(MapName::new(&"x".repeat(1 << 20)).unwrap_err().to_string().len() < 200);
+    }
+
+    #[test]
+    fn a_robot_name_is_letters_digits_and_three_signs() {
+        assert!(RobotName::new("Robot_1.arm-left").is_ok());
+        assert!(RobotName::new("").is_err());
+        assert!(RobotName::new("r 1").is_err());
+    }
+}

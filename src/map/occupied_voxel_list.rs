@@ -1,0 +1,70 @@
+//! One level of a map: the paper's occupied voxel list (OVL) with its filter (II).
+
+use crate::bloom::CountingBloomFilter;
+use crate::voxel::{BLOCK_LEVELS, BlockTable, VoxelKey};
+
+/// The occupied voxels of one level, of one shard: an exact set and the counting Bloom filter in front of it,
+/// which always hold the same keys.
+///
+/// The exact set is a table of 8^3 blocks that serves three levels at once, so this is a view: which table, and
+/// how many levels up in its blocks.
+#[derive(Debug, Clone, Copy)]
+pub struct OccupiedVoxelList<'a> {
+    level: u32,
+    blocks: &'a BlockTable,
+    filter: &'a CountingBloomFilter,
+}
+
+/// The table that serves `level`, and how many levels up in its blocks: (tier, levels up).
+pub(super) fn tier_of(level: u32) -> (usize, u32) {
+    ((level / BLOCK_LEVELS) as usize, level % BLOCK_LEVELS)
+}
+
+impl<'a> OccupiedVoxelList<'a> {
+    pub(super) fn new(level: u32, blocks: &'a BlockTable, filter: &'a CountingBloomFilter) -> Self {
+        Self {
+            level,
+            blocks,
+            filter,
+        }
+    }
+
+    /// True when `voxel` of this level is occupied: the filter, then the set for what it lets through.
+    pub fn contains(&self, voxel: VoxelKey) -> bool {
+        self.may_contain(voxel) && self.blocks.contains(voxel.index(), tier_of(self.level).1)
+    }
+
+    /// False only when `voxel` of this level is certainly not occupied: the filter alone.
+    pub fn may_contain(&self, voxel: VoxelKey) -> bool {
+        self.filter.contains(voxel.to_bits())
+    }
+
+    /// Number of occupied voxels.
+    pub fn len(&self) -> usize {
+        self.filter.len()
+    }
+
+    /// True without an occupied voxel.
+    pub fn is_empty(&self) -> bool {
+        self.filter.is_empty()
+    }
+
+    /// The occupied voxels, in no order.
+    pub fn iter(&self) -> impl Iterator<Item = VoxelKey> + use<'a> {
+        let up = tier_of(self.level).1;
+        let voxels = move |(block, mask): (VoxelKey, crate::voxel::BlockMask)| {
+            mask.cells(up).map(move |cell| cell.voxel(block).ancestor(up))
+        };
+        self.blocks.iter().flat_map(voxels)
+    }
+
+    /// The filter.
+    pub fn filter(&self) -> &'a CountingBloomFilter {
+        self.filter
+    }
+
+    /// The exact set, shared with up to two other levels.
+    pub(super) fn blocks(&self) -> &'a BlockTable {
+        self.blocks
+    }
+}

@@ -1,0 +1,53 @@
+//! What a map is made with.
+
+use crate::bloom::{FilterSettings, FilterSettingsError};
+use crate::voxel::{Lattice, SettingError};
+
+/// Settings of a map, fixed for its life.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapSettings {
+    /// Side of a finest voxel, r_0, metres.
+    pub resolution_m: f64,
+    /// Number of levels; level n has r_n = r_0 * 2^n.
+    pub levels: u32,
+    /// The counting Bloom filter in front of each level.
+    pub filter: FilterSettings,
+}
+
+/// Levels of a map where its maker does not say: the paper's number (III-B).
+pub const LEVELS_DEFAULT: u32 = 4;
+
+/// Why settings cannot make a map.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum MapSettingsError {
+    /// Of the lattice.
+    #[error(transparent)]
+    Lattice(#[from] SettingError),
+    /// Of the filter.
+    #[error(transparent)]
+    Filter(#[from] FilterSettingsError),
+}
+
+impl MapSettings {
+    /// Settings of a map of `resolution_m` with `levels` levels and the default filter.
+    pub fn new(resolution_m: f64, levels: u32) -> Self {
+        Self {
+            resolution_m,
+            levels,
+            filter: FilterSettings::default(),
+        }
+    }
+
+    /// Checks all ranges.
+    ///
+    /// # Errors
+    /// Names the number out of range and the range.
+    pub fn checked(self) -> Result<Self, MapSettingsError> {
+        self.lattice().map(|_| self)
+    }
+
+    pub(super) fn lattice(&self) -> Result<Lattice, MapSettingsError> {
+        self.filter.checked()?;
+        Ok(Lattice::new(self.resolution_m, self.levels)?)
+    }
+}

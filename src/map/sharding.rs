@@ -1,0 +1,183 @@
+//! Which shard a voxel belongs to.
+
+use crate::geometry::{Point, Pose};
+use crate::voxel::Lattice;
+
+/// Number of shards of a map; a power of two, so that the wide kernels keep all descriptors in registers.
+pub const SHARDS: usize = 16;
+
+/// Side of a region is at least 2^6 = 64 voxels: a scan then touches few shards, and a block lies in one.
+const REGION_SHIFT_MIN: u32 = 6;
+
+/// Space cut into cubic regions, each of one shard.
+///
+/// A region is at least as large as a coarsest voxel, so that parents share their children's shard. Shards are
+/// dealt out as colours, (x + z + 4 (y + z)) mod 16 of the region's indices: neighbours never share a lock,
+/// any 4 x 4 regions of a horizontal plane lie in 16 shards, and the wide kernels need no multiplication.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sharding {
+    region_shift: u32,
+}
+
+/// The shards that something needs, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ShardsTouched(u32);
+
+impl ShardsTouched {
+    pub(super) fn all() -> Self {
+        Self((1 << SHARDS) - 1)
+    }
+
+    pub(super) fn none() -> Self {
+        Self(0)
+    }
+
+    pub(super) fn add(&mut self, shard: usize) {
+        self.0 |= 1 << shard;
+    }
+
+    pub(super) fn contains(self, shard: usize) -> bool {
+        self.0 >> shard & 1 == 1
+    }
+}
+
+/// How far f32 arithmetic may move a point, as a fraction of the coordinates that entered it.
+const ROUNDING: f64 = 1e-5;
+
+impl Sharding {
+    pub(super) fn new(levels: u32) -> Self {
+        Self {
+            region_shift: REGION_SHIFT_MIN.max(levels - 1),
+        }
+    }
+
+    /// How many levels a voxel of `level` lies below a region.
+    pub(super) fn shift_at(self, level: u32) -> u32 {
+        self.region_shift - level
+    }
+
+    /// The shard of the voxel at `index` of `level`, at most the region's own.
+    pub(super) fn shard_of(self, index: [i32; 3], level: u32) -> usize {
+        shard_of_region(index.map(|i| i >> self.shift_at(level)))
+    }
+
+    /// The shards that `points` placed at `map_from_points` can fall in: those of the regions that their
+    /// bounding box meets, with room for rounding.
+    pub(super) fn touched_by(
+        self,
+        points: &[Point],
+        map_from_points: &Pose,
+        lattice: &Lattice,
+    ) -> ShardsTouched {
+        let Some((min, max)) = bounds(points) else {
+            return ShardsTouched::none();
+        };
+        let rotation = map_from_points.rotation.to_rotation_matrix();
+        let mut regions = [(0i64, 0i64); 3];
+        for (row, range) in regions.iter_mut().enumerate() {
+            let translation = map_from_points.translation.vector[row];
+            let (mut low, mut high, mut size) = (translation, translation, translation.abs());
+            for column in 0..3 {
+                let r = rotation[(row, column)];
+                let (a, b) = (r * f64::from(min[column]), r * f64::from(max[column]));
+                low += a.min(b);
+                high += a.max(b);
+                size += a.abs().max(b.abs());
+            }
+            let margin = lattice.resolution_m(0) + size * ROUNDING;
+            let region_m = lattice.resolution_m(0) * (1u64 << self.region_shift) as f64;
+            *range = (
+                ((low - margin) / region_m).floor() as i64,
+                ((high + margin) / region_m).floor() as i64,
+            );
+        }
+        touched_in(regions)
+    }
+}
+
+/// The shards of all regions with indices in the inclusive ranges.
+fn touched_in(ranges: [(i64, i64); 3]) -> ShardsTouched {
+    // Sixteen regions in a row meet every shard that more of them would.
+    let span = |(low, high): (i64, i64)| low..=high.min(low.saturating_add(SHARDS as i64 - 1));
+    let mut touched = ShardsTouched::none();
+    for z in span(ranges[2]) {
+        for y in span(ranges[1]) {
+            for x in span(ranges[0]) {
+                touched.add(shard_of_region([x as i32, y as i32, z as i32]));
+            }
+            if touched == ShardsTouched::all() {
+                return touched;
+            }
+        }
+    }
+    touched
+}
+
+#[inline(always)]
+pub(super) fn shard_of_region([x, y, z]: [i32; 3]) -> usize {
+    let colour = x.wrapping_add(z).wrapping_add(y.wrapping_add(z) << 2);
+    colour as usize & (SHARDS - 1)
+}
+
+/// Smallest and largest coordinates of the points. NaN is passed over.
+fn bounds(points: &[Point]) -> Option<([f32; 3], [f32; 3])> {
+    let none = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    let (min, max) = points.iter().fold(none, |(mut min, mut max), point| {
+        for (axis, c) in point.xyz().into_iter().enumerate() {
+            // Not f32::min: this form compiles to one instruction and passes over NaN as well.
+            min[axis] = if c < min[axis] { c } else { min[axis] };
+            max[axis] = if c > max[axis] { c } else { max[axis] };
+        }
+        (min, max)
+    });
+    (0..3).all(|axis| min[axis] <= max[axis]).then_some((min, max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn neighbouring_regions_never_share_a_shard() {
+        for d in [
+            [1, 0, 0],
+            [0, 1, 0],
+            [0, 0, 1],
+            [1, 1, 0],
+            [1, 0, 1],
+            [0, 1, 1],
+            [1, -1, 0],
+            [0, 1, -1],
+        ] {
+            assert_ne!(shard_of_region([0; 3]), shard_of_region(d), "{d:?}");
+        }
+        let plane: std::collections::BTreeSet<_> = (0..4)
+            .flat_map(|x| (0..4).map(move |y| shard_of_region([x, y, 0])))
+            .collect();
+        assert_eq!(plane.len(), SHARDS);
+    }
+
+    proptest! {
+        #[test]
+        fn every_point_falls_in_a_shard_that_was_foreseen(
+            points in prop::collection::vec(prop::array::uniform3(-3000f32..3000.0), 1..50),
+            spread in 0.001f32..1.0,
+            translation in prop::array::uniform3(-20_000f64..20_000.0),
+            angles in prop::array::uniform3(-3.0f64..3.0),
+            levels in 1u32..=12,
+        ) {
+            let points: Vec<Point> = points.iter().map(|p| Point::from(p.map(|c| c * spread))).collect();
+            let pose = Pose::new(translation.into(), nalgebra::Vector3::from(angles));
+            let lattice = Lattice::new(0.05, levels).unwrap();
+            let sharding = Sharding::new(levels);
+            let touched = sharding.touched_by(&points, &pose, &lattice);
+            let quantise = lattice.from_points(&pose);
+            for point in points {
+                if let Some(index) = quantise.index(point) {
+                    prop_assert!(touched.contains(sharding.shard_of(index, 0)));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! The poses from which a map was seen (paper III-B: the map is stored along with the trajectory).
+
+use std::collections::HashMap;
+
+use super::RobotName;
+use crate::geometry::Pose;
+use crate::voxel::VoxelSet;
+
+/// A scan as it enters a map: everything that replaying the insertion needs, nothing that would have to be
+/// computed again in floating point.
+#[derive(Debug, Clone)]
+pub struct ScanRecord {
+    /// What is kept of it in the trajectory; its revision and new voxels are filled in by the commit.
+    pub pose: TrajectoryPose,
+    /// Every distinct finest voxel that the scan touches, known before or not.
+    pub voxels: VoxelSet,
+}
+
+/// One accepted scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrajectoryPose {
+    /// Who sent it.
+    pub robot: RobotName,
+    /// The robot's own number of the scan.
+    pub scan_id: Option<u64>,
+    /// When it was taken, nanoseconds since the Unix epoch.
+    pub timestamp_ns: Option<i64>,
+    /// Where it was taken.
+    pub map_from_sensor: Pose,
+    /// The revision that it made.
+    pub revision: u64,
+    /// Fraction of its points in occupied voxels before it was added, level by level, finest first.
+    pub level_overlaps: Vec<f64>,
+    /// Steps of its alignment.
+    pub iterations: u32,
+    /// Points that were not finite or out of range.
+    pub points_skipped: usize,
+    /// Finest voxels that it added.
+    pub new_voxels: usize,
+    /// Of the request, so that the same scan sent again is told from another under its id.
+    pub digest: u64,
+}
+
+impl TrajectoryPose {
+    /// Fraction of the points in occupied voxels of level 0, before the scan was added.
+    pub fn overlap(&self) -> f64 {
+        self.level_overlaps.first().copied().unwrap_or(0.0)
+    }
+}
+
+/// The accepted scans of all robots, in the order of their revisions.
+#[derive(Debug, Clone, Default)]
+pub struct Trajectory {
+    poses: Vec<TrajectoryPose>,
+    last: HashMap<RobotName, usize>,
+    by_id: HashMap<(RobotName, u64), usize>,
+}
+
+impl Trajectory {
+    /// In the order of acceptance.
+    pub fn poses(&self) -> &[TrajectoryPose] {
+        &self.poses
+    }
+
+    /// A robot's last accepted scan.
+    pub fn last_of(&self, robot: &RobotName) -> Option<&TrajectoryPose> {
+        self.last.get(robot).map(|&i| &self.poses[i])
+    }
+
+    /// A robot's accepted scan of that number.
+    pub fn find(&self, robot: &RobotName, scan_id: u64) -> Option<&TrajectoryPose> {
+        self.by_id.get(&(robot.clone(), scan_id)).map(|&i| &self.poses[i])
+    }
+
+    /// The robots with an accepted scan, by name.
+    pub fn robots(&self) -> Vec<RobotName> {
+        let mut robots: Vec<_> = self.last.keys().cloned().collect();
+        robots.sort_unstable();
+        robots
+    }
+
+    pub(super) fn push(&mut self, pose: TrajectoryPose) {
+        let place = self.poses.len();
+        self.last.insert(pose.robot.clone(), place);
+        if let Some(id) = pose.scan_id {
+            self.by_id.insert((pose.robot.clone(), id), place);
+        }
+        self.poses.push(pose);
+    }
+}
+
+impl FromIterator<TrajectoryPose> for Trajectory {
+    fn from_iter<I: IntoIterator<Item = TrajectoryPose>>(poses: I) -> Self {
+        let mut trajectory = Self::default();
+        poses.into_iter().for_each(|pose| trajectory.push(pose));
+        trajectory
+    }
+}

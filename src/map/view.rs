@@ -1,0 +1,190 @@
+//! How a map is read: all the locks it takes, at once, and so one revision.
+
+use parking_lot::RwLockReadGuard;
+
+use super::lookup::{self, LevelView, Lookup};
+use super::occupied_voxel_list::tier_of;
+use super::shard::Shard;
+use super::sharding::{SHARDS, ShardsTouched};
+use super::{MultiResolutionMap, OccupiedVoxelList, Region};
+use crate::geometry::Point;
+use crate::voxel::{
+    BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
+};
+
+/// Read locks on some or all shards of a map. While it lives, what it covers does not change.
+#[derive(Debug)]
+pub struct MapView<'a> {
+    map: &'a MultiResolutionMap,
+    shards: [Option<RwLockReadGuard<'a, Shard>>; SHARDS],
+    revision: u64,
+}
+
+impl<'a> MapView<'a> {
+    /// Takes the locks in ascending order, as committers do, so that nobody waits in a circle. The revision is
+    /// read once they are held: a change that is published later touches none of these shards.
+    pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
+        let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
+        Self {
+            map,
+            shards,
+            revision: map.revision(),
+        }
+    }
+
+    /// The revision that everything read through this view belongs to.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Says of each point whether its voxel of `level` is occupied: point i is bit i % 64 of `occupied[i / 64]`.
+    /// Points in no voxel are not occupied; true when there were none of them.
+    ///
+    /// The view must cover the points.
+    pub fn query(
+        &self,
+        points: &[Point],
+        lattice_from_points: &LatticeFromPoints,
+        level: u32,
+        lookup: Lookup,
+        occupied: &mut [u64],
+    ) -> bool {
+        lookup::occupied(
+            points,
+            lattice_from_points,
+            &self.level_view(level),
+            lookup,
+            occupied,
+        )
+    }
+
+    /// Number of points whose voxel of `level` is occupied. The view must cover the points.
+    pub fn count(
+        &self,
+        points: &[Point],
+        lattice_from_points: &LatticeFromPoints,
+        level: u32,
+        lookup: Lookup,
+    ) -> usize {
+        lookup::count(points, lattice_from_points, &self.level_view(level), lookup)
+    }
+
+    /// What the look-up kernels read of `level`.
+    pub fn level_view(&self, level: u32) -> LevelView<'_> {
+        let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
+        let (_, up) = tier_of(level);
+        LevelView::new(
+            level,
+            up,
+            self.map.sharding.shift_at(level),
+            self.map.settings.filter.hashes,
+            list,
+        )
+    }
+
+    /// The lists of `level`, one a shard that the view covers.
+    pub fn lists(&self, level: u32) -> impl Iterator<Item = OccupiedVoxelList<'_>> {
+        self.shards.iter().flatten().map(move |shard| shard.level(level))
+    }
+
+    /// True when `voxel` of `level` is occupied, exactly. False where the view does not cover it.
+    pub fn contains(&self, voxel: VoxelKey, level: u32) -> bool {
+        let shard = self.map.sharding.shard_of(voxel.index(), level);
+        self.shards[shard]
+            .as_deref()
+            .is_some_and(|shard| shard.level(level).contains(voxel))
+    }
+
+    /// True when the filter lets `voxel` of `level` through.
+    pub fn may_contain(&self, voxel: VoxelKey, level: u32) -> bool {
+        let shard = self.map.sharding.shard_of(voxel.index(), level);
+        self.shards[shard]
+            .as_deref()
+            .is_some_and(|shard| shard.level(level).may_contain(voxel))
+    }
+
+    /// All finest voxels that the view covers.
+    pub fn voxels(&self) -> VoxelSet {
+        self.shards
+            .iter()
+            .flatten()
+            .flat_map(|shard| shard.blocks())
+            .collect()
+    }
+
+    /// The finest voxels at and below the voxels `keys` of `level`, of those that are there.
+    pub fn descendants_of(&self, keys: impl IntoIterator<Item = VoxelKey>, level: u32) -> VoxelSet {
+        let (tier, up) = tier_of(level);
+        let mut by_shard: [Vec<(VoxelKey, BlockMask)>; SHARDS] = Default::default();
+        for key in keys {
+            let (block, cell) = Cell::of(key.index().map(|i| i << up));
+            let mut mask = BlockMask::EMPTY;
+            mask.fill(cell, up);
+            by_shard[self.map.sharding.shard_of(key.index(), level)].push((block, mask));
+        }
+        let found = self.shards.iter().zip(by_shard).flat_map(|(shard, blocks)| {
+            let wanted: VoxelSet = blocks.into_iter().collect();
+            let found = shard
+                .as_deref()
+                .map(|shard| shard.descendants(tier, wanted.blocks()));
+            found.unwrap_or_default().blocks().to_vec()
+        });
+        found.collect()
+    }
+
+    /// The voxels of `level` whose centres lie in `region`, shard by shard.
+    ///
+    /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer.
+    pub fn voxels_in(&self, region: &Region, level: u32) -> Vec<VoxelKey> {
+        let (_, up) = tier_of(level);
+        let candidates = block_bounds(region, self.map.lattice.resolution_m(level - up));
+        let volume: f64 = candidates
+            .iter()
+            .map(|(low, high)| (f64::from(*high) - f64::from(*low) + 1.0).max(0.0))
+            .product();
+        let mut found = Vec::new();
+        for list in self.lists(level) {
+            let blocks = list.blocks();
+            if volume < blocks.len() as f64 {
+                let candidates = grid(candidates).map(|block| (block, blocks.get(block)));
+                candidates.for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
+            } else {
+                blocks
+                    .iter()
+                    .for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
+            }
+        }
+        found
+    }
+
+    fn collect(
+        &self,
+        block: VoxelKey,
+        mask: &BlockMask,
+        region: &Region,
+        level: u32,
+        found: &mut Vec<VoxelKey>,
+    ) {
+        let up = tier_of(level).1;
+        let voxels = mask.cells(up).map(|cell| cell.voxel(block).ancestor(up));
+        found.extend(voxels.filter(|&voxel| region.contains(self.map.lattice.center_m(voxel, level))));
+    }
+}
+
+/// The inclusive ranges of block indices that a region's bounds meet, for blocks of voxels of `resolution_m`.
+fn block_bounds(region: &Region, resolution_m: f64) -> [(i32, i32); 3] {
+    let (min_m, max_m) = region.bounds_m();
+    let block_m = resolution_m * f64::from(BLOCK_SIDE);
+    let clamp = |c: f64| {
+        (c / block_m)
+            .floor()
+            .clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32
+    };
+    std::array::from_fn(|axis| (clamp(min_m[axis]), clamp(max_m[axis])))
+}
+
+fn grid([x, y, z]: [(i32, i32); 3]) -> impl Iterator<Item = VoxelKey> {
+    let span = |(low, high): (i32, i32)| low..=high;
+    span(z)
+        .flat_map(move |z| span(y).flat_map(move |y| span(x).filter_map(move |x| VoxelKey::new([x, y, z]))))
+}

@@ -1,0 +1,20 @@
+//! Scans: point clouds and trajectories in files, and simulated sensors in a simulated building.
+//!
+//! A scan is a `Vec<Point>` in its sensor's frame, metres; a point with a NaN or infinite coordinate means "no
+//! return", and readers and sensors alike keep it.
+
+mod reader;
+mod ride;
+mod route;
+mod scene;
+mod sensor;
+mod tour;
+mod tum;
+mod writer;
+
+pub use reader::{ReadError, read_points, scan_files};
+pub use scene::Scene;
+pub use sensor::{DepthCamera, Sensor, SpinningLidar};
+pub use tour::{Tour, tours};
+pub use tum::{StampedPose, read_trajectory, write_trajectory};
+pub use writer::{write_f32, write_ply};

@@ -1,0 +1,127 @@
+//! Points of `.ply` files: the x, y, z of element `vertex`.
+//!
+//! ply-rs-bw reads the header and the binary elements.
+
+mod ascii;
+mod binary;
+
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyType, ScalarType};
+
+use super::{HEADER_BYTES_MAX, Problem, check_count, quoted};
+use crate::geometry::Point;
+
+const VERTEX: &str = "vertex";
+/// Fewest bytes of one ascii value: a digit and what divides it from the next.
+const ASCII_VALUE_BYTES_MIN: u64 = 2;
+
+/// The points of a `.ply` file.
+pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
+    let (header, payload, first_line) = header(bytes)?;
+    let vertex = vertex(&header)?;
+    if header.encoding == Encoding::Ascii {
+        ascii::points(&header, vertex, payload, first_line)
+    } else {
+        binary::points(&header, vertex, payload)
+    }
+}
+
+/// The header, the bytes after it, and the number of the first line after it.
+fn header(bytes: &[u8]) -> Result<(Header, &[u8], usize), Problem> {
+    let start = &bytes[..bytes.len().min(HEADER_BYTES_MAX)];
+    let mut reader = Reader::new(start);
+    let header = Parser::<binary::Vertex>::new()
+        .read_header(&mut reader)
+        .map_err(|error| header_problem(start, &error))?;
+    let first_line = reader.line();
+    let header_bytes = start.len() - reader.into_inner().len();
+    check_names(&header, &start[..header_bytes])?;
+    Ok((header, &bytes[header_bytes..], first_line))
+}
+
+fn header_problem(start: &[u8], error: &ParseError) -> Problem {
+    let text = error.to_string();
+    let summary = text.lines().next().unwrap_or_default();
+    let Some(number) = error.line() else {
+        return Problem::new(format!("not a ply header: {summary}"));
+    };
+    let summary = summary.trim_start_matches(&format!("Line {number}: "));
+    let line = start
+        .split(|byte| *byte == b'\n')
+        .nth(number - 1)
+        .unwrap_or_default();
+    let line = quoted(&String::from_utf8_lossy(line));
+    Problem::at_line(number, format!("not a ply header: {summary} {line}"))
+}
+
+/// Refuses a name given twice: the parser keeps only one of them, and would misplace all that follows.
+fn check_names(header: &Header, header_bytes: &[u8]) -> Result<(), Problem> {
+    let written = |keyword: &[u8]| {
+        header_bytes
+            .split(|byte| *byte == b'\n')
+            .filter(|line| line.starts_with(keyword))
+            .count()
+    };
+    let properties: usize = header
+        .elements
+        .values()
+        .map(|element| element.properties.len())
+        .sum();
+    if header.elements.len() != written(b"element") || properties != written(b"property") {
+        return Err(Problem::new(
+            "the header declares an element or property name twice",
+        ));
+    }
+    Ok(())
+}
+
+/// Element `vertex`, which has x, y and z as float or double.
+fn vertex(header: &Header) -> Result<&ElementDef, Problem> {
+    let vertex = header
+        .elements
+        .get(VERTEX)
+        .ok_or_else(|| Problem::new("no element vertex in the header"))?;
+    for name in ["x", "y", "z"] {
+        match vertex.properties.get(name).map(|property| &property.data_type) {
+            Some(PropertyType::Scalar(ScalarType::Float | ScalarType::Double)) => {}
+            Some(other) => {
+                return Err(Problem::new(format!(
+                    "property {name} of element vertex is {other:?}, float or double is needed"
+                )));
+            }
+            None => return Err(Problem::new(format!("element vertex has no property {name}"))),
+        }
+    }
+    Ok(vertex)
+}
+
+/// The elements before `vertex`, whose entries lie before its own.
+fn before_vertex(header: &Header) -> impl Iterator<Item = &ElementDef> {
+    header
+        .elements
+        .values()
+        .take_while(|element| element.name != VERTEX)
+}
+
+fn check_element(element: &ElementDef, encoding: Encoding, have: usize) -> Result<(), Problem> {
+    let types = element.properties.values().map(|property| &property.data_type);
+    let entry_bytes = types.map(|data_type| value_bytes_min(data_type, encoding)).sum();
+    check_count(
+        &format!("{} elements", quoted(&element.name)),
+        element.count as u64,
+        entry_bytes,
+        have,
+    )
+}
+
+/// Fewest bytes that a property takes; a list may be empty.
+fn value_bytes_min(data_type: &PropertyType, encoding: Encoding) -> u64 {
+    let (PropertyType::Scalar(scalar) | PropertyType::List(scalar, _)) = data_type;
+    match scalar {
+        _ if encoding == Encoding::Ascii => ASCII_VALUE_BYTES_MIN,
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}

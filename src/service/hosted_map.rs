@@ -1,0 +1,293 @@
+//! A map under a name: what the service keeps about it besides the map itself.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+use parking_lot::Mutex;
+use tokio::sync::{OwnedMutexGuard, watch};
+use uuid::Uuid;
+
+use super::{
+    Deletion, DeletionAnswer, DeletionTarget, ErrorCode, MapInfo, MapState, PointAnswer, PointQuery,
+    ServiceError, TrajectoryAnswer, VoxelListing,
+};
+use crate::geometry::{Point, Pose};
+use crate::map::{MapName, MultiResolutionMap, Region, RobotName, TrajectoryPose};
+use crate::store::Snapshot;
+use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
+
+/// A named map and who waits for it.
+#[derive(Debug)]
+pub(super) struct HostedMap {
+    pub(super) name: MapName,
+    pub(super) uuid: Uuid,
+    pub(super) map: MultiResolutionMap,
+    /// The last revision that readers were told of.
+    announced: watch::Sender<u64>,
+    /// Of the file on disk.
+    saved: AtomicU64,
+    /// One robot's scans are taken in order.
+    turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
+}
+
+/// Robots whose turns are remembered before those that nobody waits for are dropped.
+const TURNS_KEPT: usize = 1024;
+/// Of the sample on which false positives are measured: the same map gives the same figures.
+const RATE_SEED: u64 = 1;
+
+impl HostedMap {
+    pub(super) fn new(name: MapName, uuid: Uuid, map: MultiResolutionMap) -> Self {
+        let revision = map.revision();
+        Self {
+            name,
+            uuid,
+            map,
+            announced: watch::Sender::new(revision),
+            saved: AtomicU64::new(revision),
+            turns: Mutex::default(),
+        }
+    }
+
+    pub(super) fn state(&self, revision: u64) -> MapState {
+        MapState {
+            revision,
+            map_uuid: self.uuid,
+        }
+    }
+
+    /// Waits until the robot's earlier scans are done.
+    pub(super) async fn turn_of(&self, robot: &RobotName) -> OwnedMutexGuard<()> {
+        let turn = {
+            let mut turns = self.turns.lock();
+            if turns.len() >= TURNS_KEPT {
+                turns.retain(|_, turn| Arc::strong_count(turn) > 1);
+            }
+            Arc::clone(turns.entry(robot.clone()).or_default())
+        };
+        turn.lock_owned().await
+    }
+
+    /// Tells those who wait for `revision`.
+    pub(super) fn announce(&self, revision: u64) {
+        self.announced.send_if_modified(|announced| {
+            let newer = revision > *announced;
+            *announced = revision.max(*announced);
+            newer
+        });
+    }
+
+    /// Waits until `revision` is there.
+    pub(super) async fn reached(&self, revision: u64, wait_max: Duration) -> Result<(), ServiceError> {
+        let mut announced = self.announced.subscribe();
+        let reached = announced.wait_for(|announced| *announced >= revision);
+        match tokio::time::timeout(wait_max, reached).await {
+            Ok(_) => Ok(()),
+            Err(_) => {
+                let message = format!(
+                    "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
+                    self.name,
+                    self.map.revision()
+                );
+                Err(ServiceError::new(
+                    ErrorCode::DeadlineExceeded,
+                    "revision_not_reached",
+                    message,
+                ))
+            }
+        }
+    }
+
+    pub(super) fn check_level(&self, level: u32) -> Result<(), ServiceError> {
+        let levels = self.map.settings().levels;
+        if level < levels {
+            return Ok(());
+        }
+        let message = format!(
+            "level must lie in 0..={} of map {}, got {level}",
+            levels - 1,
+            self.name
+        );
+        Err(ServiceError::invalid("level_out_of_range", message))
+    }
+
+    pub(super) fn check_uuid(&self, uuid: Option<Uuid>) -> Result<(), ServiceError> {
+        if uuid.is_none_or(|uuid| uuid == self.uuid) {
+            return Ok(());
+        }
+        let message = format!(
+            "map_uuid of map {} is {}: it was deleted and made again",
+            self.name, self.uuid
+        );
+        Err(ServiceError::new(
+            ErrorCode::FailedPrecondition,
+            "map_replaced",
+            message,
+        ))
+    }
+
+    pub(super) fn query(&self, query: &PointQuery) -> Result<PointAnswer, ServiceError> {
+        let points = query.points.as_slice();
+        let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
+        let quantise = self.map.lattice().from_points(&map_from_points);
+        let mut occupied = vec![0; points.len().div_ceil(64)];
+        let view = self.map.view_of(points, &map_from_points);
+        let all_have_a_voxel = view.query(points, &quantise, query.level, query.lookup, &mut occupied);
+        let state = self.state(view.revision());
+        drop(view);
+        if !all_have_a_voxel {
+            return Err(self.point_without_voxel(points, &quantise));
+        }
+        Ok(PointAnswer {
+            points: points.len(),
+            points_occupied: occupied.iter().map(|word| word.count_ones() as usize).sum(),
+            occupied: bitmap(occupied, points.len()),
+            state,
+        })
+    }
+
+    /// Names the first point that falls in no voxel.
+    fn point_without_voxel(&self, points: &[Point], quantise: &LatticeFromPoints) -> ServiceError {
+        let place = points
+            .iter()
+            .position(|&point| quantise.index(point).is_none())
+            .unwrap_or_default();
+        let point = points[place];
+        let (min_m, end_m) = self.map.lattice().range_m();
+        let (reason, what) = match point.is_finite() {
+            true => (
+                "point_out_of_range",
+                format!("outside the map's range of {min_m} to {end_m} m"),
+            ),
+            false => ("point_not_finite", "not finite".to_owned()),
+        };
+        ServiceError::invalid(reason, format!("points[{place}] is {what}: {point:?}"))
+    }
+
+    pub(super) fn delete(&self, deletion: &Deletion) -> Result<DeletionAnswer, ServiceError> {
+        // Which voxels are meant is decided when nobody else can change the map.
+        let committer = self.map.committer();
+        let voxels = self.targets_of(deletion)?;
+        let committed = committer.remove(&voxels);
+        self.announce(committed.revision);
+        Ok(DeletionAnswer {
+            removed: committed.voxels,
+            state: self.state(committed.revision),
+        })
+    }
+
+    fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
+        let level = deletion.level;
+        let keys = match &deletion.target {
+            DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
+            DeletionTarget::Keys(keys) => keys
+                .iter()
+                .map(|&key| in_range(key, level))
+                .collect::<Result<_, _>>()?,
+            DeletionTarget::Region(region) => self.map.view().voxels_in(region, level),
+        };
+        Ok(self.map.view().descendants_of(keys, level))
+    }
+
+    fn keys_of(&self, points: &[Point], level: u32) -> Result<Vec<VoxelKey>, ServiceError> {
+        let quantise = self.map.lattice().from_map();
+        let keys: Option<Vec<_>> = points
+            .iter()
+            .map(|&point| Some(quantise.key(point)?.ancestor(level)))
+            .collect();
+        keys.ok_or_else(|| self.point_without_voxel(points, &quantise))
+    }
+
+    pub(super) fn list(
+        &self,
+        level: u32,
+        region: Option<&Region>,
+        most: usize,
+    ) -> Result<VoxelListing, ServiceError> {
+        let view = self.map.view();
+        let keys: Vec<_> = match region {
+            Some(region) => view.voxels_in(region, level),
+            None => view.lists(level).flat_map(|list| list.iter()).collect(),
+        };
+        if keys.len() > most {
+            let message = format!(
+                "level {level} has {} voxels there, listed_voxels_max is {most}: ask for a region or a coarser level",
+                keys.len()
+            );
+            return Err(ServiceError::new(
+                ErrorCode::ResourceExhausted,
+                "listing_too_large",
+                message,
+            ));
+        }
+        Ok(VoxelListing {
+            keys,
+            state: self.state(view.revision()),
+        })
+    }
+
+    pub(super) fn trajectory(&self, robot: Option<&RobotName>) -> TrajectoryAnswer {
+        let trajectory = self.map.trajectory();
+        let wanted = |pose: &&TrajectoryPose| robot.is_none_or(|robot| *robot == pose.robot);
+        TrajectoryAnswer {
+            poses: trajectory.poses().iter().filter(wanted).cloned().collect(),
+            state: self.state(self.map.revision()),
+        }
+    }
+
+    pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
+        let (revision, levels, set_bytes) = self.map.describe(rate_samples, RATE_SEED);
+        let trajectory = self.map.trajectory();
+        MapInfo {
+            name: self.name.clone(),
+            state: self.state(revision),
+            settings: *self.map.settings(),
+            levels,
+            scans: trajectory.poses().len(),
+            robots: trajectory.robots(),
+            set_bytes,
+        }
+    }
+
+    /// The picture to write to disk, where the map changed since the last one was.
+    pub(super) fn unsaved(&self) -> Option<Snapshot> {
+        let changed = self.map.revision() != self.saved.load(Ordering::Acquire);
+        changed.then(|| Snapshot::of(&self.map, self.uuid))
+    }
+
+    /// Notes that `revision` is on disk.
+    pub(super) fn saved(&self, revision: u64) {
+        self.saved.store(revision, Ordering::Release);
+    }
+}
+
+fn in_range(key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
+    let range = INDEX_MIN >> level..=INDEX_MAX >> level;
+    if key.index().iter().all(|i| range.contains(i)) {
+        return Ok(key);
+    }
+    let message = format!(
+        "keys has {key:?}, whose indices must lie in {}..={} at level {level}",
+        range.start(),
+        range.end()
+    );
+    Err(ServiceError::invalid("key_out_of_range", message))
+}
+
+/// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.
+fn bitmap(words: Vec<u64>, points: usize) -> Bytes {
+    struct Owner(Vec<u64>);
+    impl AsRef<[u8]> for Owner {
+        fn as_ref(&self) -> &[u8] {
+            bytemuck::cast_slice(&self.0)
+        }
+    }
+    let words = if cfg!(target_endian = "big") {
+        words.into_iter().map(u64::to_le).collect()
+    } else {
+        words
+    };
+    Bytes::from_owner(Owner(words)).slice(..points.div_ceil(8))
+}

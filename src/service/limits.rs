@@ -1,0 +1,94 @@
+//! Every limit of the server, by name, with its default.
+
+use std::time::Duration;
+
+use super::ServiceError;
+
+/// Bounds on what callers may ask. Each is named in the error of a request beyond it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Points of one query, deletion or scan. 2,000,000.
+    pub points_per_request_max: usize,
+    /// Keys of one deletion. 2,000,000.
+    pub keys_per_request_max: usize,
+    /// Maps at once. 64.
+    pub maps_max: usize,
+    /// Finest voxels of one map. 200,000,000.
+    pub voxels_per_map_max: usize,
+    /// Voxels that one listing may return. 20,000,000.
+    pub listed_voxels_max: usize,
+    /// Jobs that may wait for a query thread, and as many for a mapping thread. 256.
+    pub jobs_waiting_max: usize,
+    /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
+    pub min_revision_wait_max: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            points_per_request_max: 2_000_000,
+            keys_per_request_max: 2_000_000,
+            maps_max: 64,
+            voxels_per_map_max: 200_000_000,
+            listed_voxels_max: 20_000_000,
+            jobs_waiting_max: 256,
+            min_revision_wait_max: Duration::from_secs(10),
+        }
+    }
+}
+
+impl Limits {
+    /// # Errors
+    /// When a request has no point, or more than `points_per_request_max`.
+    pub(super) fn check_points(&self, points: usize) -> Result<(), ServiceError> {
+        within(
+            "points",
+            "points_per_request_max",
+            points,
+            self.points_per_request_max,
+        )
+    }
+
+    /// # Errors
+    /// When a request has no key, or more than `keys_per_request_max`.
+    pub(super) fn check_keys(&self, keys: usize) -> Result<(), ServiceError> {
+        within("keys", "keys_per_request_max", keys, self.keys_per_request_max)
+    }
+}
+
+fn within(field: &str, limit: &str, count: usize, most: usize) -> Result<(), ServiceError> {
+    match count {
+        0 => Err(ServiceError::invalid(
+            "empty_batch",
+            format!("{field} must not be empty"),
+        )),
+        n if n > most => Err(ServiceError::invalid(
+            "batch_too_large",
+            format!("{field} has {n} entries, {limit} is {most}"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_batch_is_bounded_on_both_sides_and_the_error_names_the_limit() {
+        let limits = Limits {
+            points_per_request_max: 10,
+            ..Limits::default()
+        };
+        assert!(limits.check_points(1).is_ok() && limits.check_points(10).is_ok());
+        assert!(
+            limits
+                .check_points(0)
+                .unwrap_err()
+                .message
+                .contains("points must not be empty")
+        );
+        let error = limits.check_points(11).unwrap_err();
+        assert!(error.message.contains("11") && error.message.contains("points_per_request_max is 10"));
+    }
+}

@@ -1,0 +1,239 @@
+//! The operations of the server, once for every protocol: domain types in, domain types out.
+//!
+//! Limits are checked here and before any work is done; every failure is a [`ServiceError`].
+
+mod catalogue;
+mod error;
+mod hosted_map;
+mod limits;
+mod mapping;
+mod pool;
+mod request;
+mod settings;
+
+pub use error::{ErrorCode, ServiceError};
+pub use limits::Limits;
+pub use request::{
+    Deletion, DeletionAnswer, DeletionTarget, MapInfo, MapState, PointAnswer, PointCloud, PointQuery,
+    ScanAnswer, ScanRequest, TrajectoryAnswer, VoxelListing,
+};
+pub use settings::ServiceSettings;
+
+use std::sync::Arc;
+
+use crate::map::{MapName, MapSettings, Region, RobotName};
+use catalogue::Catalogue;
+use hosted_map::HostedMap;
+use pool::Pool;
+
+/// All operations on all maps. A clone is another handle on the same maps.
+#[derive(Debug, Clone)]
+pub struct MapService(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    settings: ServiceSettings,
+    catalogue: Catalogue,
+    /// For queries, listings and descriptions, so that no alignment starves them.
+    queries: Pool,
+    /// For alignments, insertions and deletions.
+    mapping: Pool,
+}
+
+/// Absent neighbours of occupied voxels on which a description measures each level's false positives.
+const RATE_SAMPLES: usize = 4096;
+
+impl MapService {
+    /// Opens the service with the maps of its data folder. Reads files: not for an async thread.
+    ///
+    /// # Errors
+    /// When a setting is out of range, or a map on disk cannot be read: the error names the file.
+    pub fn open(settings: ServiceSettings) -> Result<Self, ServiceError> {
+        settings
+            .alignment
+            .checked()
+            .map_err(|e| ServiceError::invalid("bad_settings", e.to_string()))?;
+        settings.filter.checked()?;
+        let waiting = settings.limits.jobs_waiting_max;
+        Ok(Self(Arc::new(Inner {
+            catalogue: Catalogue::open(settings.data_dir.clone())?,
+            queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
+            mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
+            settings,
+        })))
+    }
+
+    /// The bounds on what callers may ask.
+    pub fn limits(&self) -> &Limits {
+        &self.0.settings.limits
+    }
+
+    /// The filter of maps whose makers do not say.
+    pub fn default_filter(&self) -> crate::bloom::FilterSettings {
+        self.0.settings.filter
+    }
+
+    /// Makes a map; true when it was not there. The same settings again are fine.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for settings out of range, `Conflict` where it exists with others, `ResourceExhausted`
+    /// beyond `maps_max`.
+    pub async fn create_map(
+        &self,
+        name: MapName,
+        settings: MapSettings,
+    ) -> Result<(MapInfo, bool), ServiceError> {
+        let (map, created) = self
+            .0
+            .catalogue
+            .create(name, settings, self.limits().maps_max)
+            .await?;
+        Ok((self.describe(map).await?, created))
+    }
+
+    /// Describes a map.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
+        self.describe(self.map(name)?).await
+    }
+
+    /// Describes all maps, by name.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` when too many jobs wait.
+    pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
+        let maps = self.0.catalogue.all();
+        let describe = move || maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
+        self.0.queries.run(describe).await
+    }
+
+    /// Takes a map out, in memory and on disk.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `Internal` when its file cannot be removed.
+    pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
+        self.0.catalogue.delete(name).await
+    }
+
+    /// Says of each point whether its voxel is occupied, all at one revision.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a point in no voxel (named by its place), a level that is none, too many points;
+    /// `NotFound`; `DeadlineExceeded` when `min_revision` does not come; `FailedPrecondition` when the map has
+    /// another uuid.
+    pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ServiceError> {
+        let map = self.map(map)?;
+        self.limits().check_points(query.points.len())?;
+        map.check_level(query.level)?;
+        map.check_uuid(query.map_uuid)?;
+        if let Some(revision) = query.min_revision {
+            map.reached(revision, self.limits().min_revision_wait_max).await?;
+        }
+        if query.points.len() <= pool::INLINE_POINTS {
+            return map.query(&query);
+        }
+        self.0.queries.run(move || map.query(&query)).await?
+    }
+
+    /// Aligns a scan and, where it fits, adds it.
+    ///
+    /// # Errors
+    /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
+    /// `InvalidArgument` for a scan without a usable point or with too many.
+    pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        let map = self.map(map)?;
+        self.limits().check_points(scan.points.len())?;
+        let turn = map.turn_of(&scan.robot).await;
+        let inner = Arc::clone(&self.0);
+        let insert = move || {
+            let _turn = turn;
+            map.insert_scan(&scan, &inner.settings)
+        };
+        self.0.mapping.run(insert).await?
+    }
+
+    /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
+    ///
+    /// # Errors
+    /// As for an insertion.
+    pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        let map = self.map(map)?;
+        self.limits().check_points(scan.points.len())?;
+        let inner = Arc::clone(&self.0);
+        self.0
+            .mapping
+            .run(move || map.align_scan(&scan, &inner.settings))
+            .await?
+    }
+
+    /// Takes voxels out, with all their descendants.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a point in no voxel, a key out of the level's range, a level that is none, too many
+    /// of them; `NotFound`.
+    pub async fn delete_voxels(
+        &self,
+        map: &MapName,
+        deletion: Deletion,
+    ) -> Result<DeletionAnswer, ServiceError> {
+        let map = self.map(map)?;
+        map.check_level(deletion.level)?;
+        match &deletion.target {
+            DeletionTarget::Points(points) => self.limits().check_points(points.len())?,
+            DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
+            DeletionTarget::Region(_) => {}
+        }
+        self.0.mapping.run(move || map.delete(&deletion)).await?
+    }
+
+    /// The poses of the accepted scans, of one robot or of all.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn trajectory(
+        &self,
+        map: &MapName,
+        robot: Option<&RobotName>,
+    ) -> Result<TrajectoryAnswer, ServiceError> {
+        Ok(self.map(map)?.trajectory(robot))
+    }
+
+    /// The occupied voxels of a level, in a region or everywhere, all at one revision.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a level that is none; `ResourceExhausted` when there are more than
+    /// `listed_voxels_max`; `NotFound`.
+    pub async fn list_voxels(
+        &self,
+        map: &MapName,
+        level: u32,
+        region: Option<Region>,
+    ) -> Result<VoxelListing, ServiceError> {
+        let map = self.map(map)?;
+        map.check_level(level)?;
+        let most = self.limits().listed_voxels_max;
+        self.0
+            .queries
+            .run(move || map.list(level, region.as_ref(), most))
+            .await?
+    }
+
+    /// Writes the maps that changed since they were written last, each beside its old file and renamed; the
+    /// number of them.
+    ///
+    /// # Errors
+    /// `Internal` when a file cannot be written; the others are written all the same.
+    pub async fn save(&self) -> Result<usize, ServiceError> {
+        self.0.catalogue.save().await
+    }
+
+    fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
+        self.0.catalogue.get(name)
+    }
+
+    async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
+        self.0.queries.run(move || map.describe(RATE_SAMPLES)).await
+    }
+}

@@ -1,0 +1,222 @@
+//! Requests and answers of the service, in domain types.
+
+use bytes::Bytes;
+use uuid::Uuid;
+
+use super::ServiceError;
+use crate::align::{Guess, Verdict};
+use crate::geometry::{Point, Pose};
+use crate::map::{LevelInfo, Lookup, MapName, MapSettings, Region, RobotName, TrajectoryPose};
+use crate::voxel::VoxelKey;
+
+/// Points as they came from the wire: 12 bytes each, shared, never copied.
+#[derive(Clone, PartialEq, Eq, Default)]
+pub struct PointCloud(Bytes);
+
+impl PointCloud {
+    /// Points from little-endian f32 x y z.
+    ///
+    /// # Errors
+    /// When the bytes are not a whole number of points.
+    pub fn from_bytes(bytes: Bytes) -> Result<Self, ServiceError> {
+        if !bytes.len().is_multiple_of(Point::BYTES) {
+            let message = format!(
+                "points must be a whole number of {}-byte points (x y z, little-endian f32), got {} bytes",
+                Point::BYTES,
+                bytes.len()
+            );
+            return Err(ServiceError::invalid("truncated_points", message));
+        }
+        Ok(Self(bytes))
+    }
+
+    /// The points.
+    pub fn as_slice(&self) -> &[Point] {
+        bytemuck::cast_slice(&self.0)
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.0.len() / Point::BYTES
+    }
+
+    /// True without a point.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl From<Vec<Point>> for PointCloud {
+    fn from(points: Vec<Point>) -> Self {
+        struct Owner(Vec<Point>);
+        impl AsRef<[u8]> for Owner {
+            fn as_ref(&self) -> &[u8] {
+                bytemuck::cast_slice(&self.0)
+            }
+        }
+        Self(Bytes::from_owner(Owner(points)))
+    }
+}
+
+impl std::fmt::Debug for PointCloud {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} points", self.len())
+    }
+}
+
+/// Which state of which map an answer speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MapState {
+    /// Committed changes so far.
+    pub revision: u64,
+    /// Of this incarnation of the map.
+    pub map_uuid: Uuid,
+}
+
+/// Are these points in occupied voxels?
+#[derive(Debug, Clone)]
+pub struct PointQuery {
+    /// In the frame of `map_from_points`.
+    pub points: PointCloud,
+    /// Places the points in the map; identity where none.
+    pub map_from_points: Option<Pose>,
+    /// 0 is the finest.
+    pub level: u32,
+    /// By the exact set or by the filter alone.
+    pub lookup: Lookup,
+    /// Wait for this revision.
+    pub min_revision: Option<u64>,
+    /// The incarnation that `min_revision` belongs to.
+    pub map_uuid: Option<Uuid>,
+}
+
+/// The answer to a [`PointQuery`], all at one revision.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PointAnswer {
+    /// Point i is bit i % 8 (lowest first) of byte i / 8.
+    pub occupied: Bytes,
+    /// Number of points answered.
+    pub points: usize,
+    /// How many of them are occupied.
+    pub points_occupied: usize,
+    /// At this state.
+    pub state: MapState,
+}
+
+/// A scan to align or insert.
+#[derive(Debug, Clone)]
+pub struct ScanRequest {
+    /// Who sends it.
+    pub robot: RobotName,
+    /// The robot's own number of the scan; makes insertion idempotent.
+    pub scan_id: Option<u64>,
+    /// In the sensor frame; not finite = no return.
+    pub points: PointCloud,
+    /// When it was taken, nanoseconds since the Unix epoch.
+    pub timestamp_ns: Option<i64>,
+    /// Where it is thought to have been taken.
+    pub guess: Guess,
+    /// Take the guess as it is, without aligning.
+    pub at_guess: bool,
+    /// Refuse the scan instead of skipping points that are not finite.
+    pub strict: bool,
+}
+
+/// What became of a scan, or would have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanAnswer {
+    /// Whether the map took it, or would.
+    pub verdict: Verdict,
+    /// Where it was taken.
+    pub map_from_sensor: Pose,
+    /// Fraction of its points in occupied voxels, level by level, finest first; before it was added.
+    pub level_overlaps: Vec<f64>,
+    /// Steps of the ascent.
+    pub iterations: u32,
+    /// Points that were not finite or fell out of the map's range.
+    pub points_skipped: usize,
+    /// Finest voxels added; 0 where nothing was.
+    pub new_voxels: usize,
+    /// After it, or where it was refused, before.
+    pub state: MapState,
+    /// It was accepted before, and this is that answer.
+    pub replayed: bool,
+}
+
+impl ScanAnswer {
+    /// True when the map took it, or would.
+    pub fn accepted(&self) -> bool {
+        self.verdict == Verdict::Accepted
+    }
+
+    /// Fraction of the points in occupied voxels of level 0.
+    pub fn overlap(&self) -> f64 {
+        self.level_overlaps.first().copied().unwrap_or(0.0)
+    }
+}
+
+/// Which voxels to take out.
+#[derive(Debug, Clone)]
+pub struct Deletion {
+    /// Which.
+    pub target: DeletionTarget,
+    /// At this level: all descendants go.
+    pub level: u32,
+}
+
+/// The ways to name voxels.
+#[derive(Debug, Clone)]
+pub enum DeletionTarget {
+    /// Those that these points (map frame) fall in.
+    Points(PointCloud),
+    /// By key, of the deletion's level.
+    Keys(Vec<VoxelKey>),
+    /// Those whose centres lie inside.
+    Region(Region),
+}
+
+/// What a deletion did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeletionAnswer {
+    /// Finest voxels removed.
+    pub removed: usize,
+    /// After it.
+    pub state: MapState,
+}
+
+/// The accepted scans' poses.
+#[derive(Debug, Clone)]
+pub struct TrajectoryAnswer {
+    /// In the order of acceptance.
+    pub poses: Vec<TrajectoryPose>,
+    /// At this state.
+    pub state: MapState,
+}
+
+/// The occupied voxels of a level.
+#[derive(Debug, Clone)]
+pub struct VoxelListing {
+    /// Ascending by block.
+    pub keys: Vec<VoxelKey>,
+    /// At this state.
+    pub state: MapState,
+}
+
+/// A description of a map.
+#[derive(Debug, Clone)]
+pub struct MapInfo {
+    /// Its name.
+    pub name: MapName,
+    /// Its state.
+    pub state: MapState,
+    /// What it was made with.
+    pub settings: MapSettings,
+    /// Finest first.
+    pub levels: Vec<LevelInfo>,
+    /// Accepted scans.
+    pub scans: usize,
+    /// Who sent them, by name.
+    pub robots: Vec<RobotName>,
+    /// Bytes of memory of the exact sets of all levels.
+    pub set_bytes: usize,
+}

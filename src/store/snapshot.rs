@@ -1,0 +1,321 @@
+//! A whole map in one file.
+//!
+//! ```text
+//! offset  bytes
+//!      0  8      magic "MROL-MAP"
+//!      8  4      format version, u32 little-endian: 1
+//!     12  4      CRC-32C of everything from offset 16, u32 little-endian
+//!     16  8      bytes of the body before compression, u64 little-endian
+//!     24  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto
+//! ```
+
+use std::path::Path;
+
+use prost::Message;
+use uuid::Uuid;
+
+use super::{StoreError, write_beside_and_rename};
+use crate::bloom::FilterSettings;
+use crate::geometry::{self, rotation_xyzw, translation_m};
+use crate::map::{MapSettings, MultiResolutionMap, RobotName, TrajectoryPose};
+use crate::voxel::{BlockMask, VoxelSet};
+
+/// The version that this build writes; it reads this one and all before.
+pub const FORMAT_VERSION: u32 = 1;
+const MAGIC: &[u8; 8] = b"MROL-MAP";
+const HEADER_BYTES: usize = 24;
+const CHECKED_FROM: usize = 16;
+/// Bodies beyond this are refused before memory is taken: 4 billion voxels of a surface.
+const BODY_BYTES_MAX: u64 = 8 << 30;
+const ZSTD_LEVEL: i32 = 3;
+
+#[expect(unreachable_pub, reason = "generated; the .proto is its documentation")]
+mod pb {
+    include!(concat!(env!("OUT_DIR"), "/mrol.store.v1.rs"));
+}
+
+/// A map at one revision.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    /// Of this incarnation of the map.
+    pub uuid: Uuid,
+    /// What it was made with.
+    pub settings: MapSettings,
+    /// At this revision.
+    pub revision: u64,
+    /// The finest voxels; all else follows from them.
+    pub voxels: VoxelSet,
+    /// The accepted scans.
+    pub trajectory: Vec<TrajectoryPose>,
+}
+
+impl Snapshot {
+    /// Takes the picture of `map`, at one revision.
+    pub fn of(map: &MultiResolutionMap, uuid: Uuid) -> Self {
+        let view = map.view();
+        let trajectory = map.trajectory();
+        Self {
+            uuid,
+            settings: *map.settings(),
+            revision: view.revision(),
+            voxels: view.voxels(),
+            trajectory: trajectory.poses().to_vec(),
+        }
+    }
+
+    /// The map again.
+    ///
+    /// # Errors
+    /// When its settings are out of range.
+    pub fn restore(self) -> Result<MultiResolutionMap, crate::map::MapSettingsError> {
+        MultiResolutionMap::restore(self.settings, self.revision, &self.voxels, self.trajectory)
+    }
+
+    /// Writes it to `path`, beside the old file and renamed.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn write(&self, path: &Path) -> Result<(), StoreError> {
+        let bytes = self.encode().map_err(StoreError::io(path))?;
+        write_beside_and_rename(path, &bytes)
+    }
+
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read, is no map, is damaged, or was written by a newer version.
+    pub fn read(path: &Path) -> Result<Self, StoreError> {
+        let bytes = std::fs::read(path).map_err(StoreError::io(path))?;
+        Self::decode(&bytes).map_err(|reason| StoreError::Damaged {
+            path: path.to_owned(),
+            reason,
+        })
+    }
+
+    /// The file's bytes.
+    ///
+    /// # Errors
+    /// When compression fails, for want of memory.
+    pub fn encode(&self) -> std::io::Result<Vec<u8>> {
+        let body = self.to_message().encode_to_vec();
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + body.len() / 2);
+        bytes.extend_from_slice(MAGIC);
+        bytes.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
+        bytes.extend_from_slice(&[0; 4]);
+        bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        bytes.extend(zstd::bulk::compress(&body, ZSTD_LEVEL)?);
+        let checksum = crc32c::crc32c(&bytes[CHECKED_FROM..]);
+        bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
+        Ok(bytes)
+    }
+
+    /// The inverse of [`Snapshot::encode`].
+    ///
+    /// # Errors
+    /// What is wrong with the bytes, and where.
+    pub fn decode(bytes: &[u8]) -> Result<Self, String> {
+        let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
+            format!(
+                "{} bytes are too few for a map file's header of {HEADER_BYTES}",
+                bytes.len()
+            )
+        })?;
+        if &header[..8] != MAGIC {
+            return Err("not a map file: it does not begin with MROL-MAP".into());
+        }
+        let version = u32_at(header, 8);
+        if version == 0 || version > FORMAT_VERSION {
+            return Err(format!(
+                "format version {version}, this build reads 1 to {FORMAT_VERSION}: use a newer one"
+            ));
+        }
+        let (stored, computed) = (u32_at(header, 12), crc32c::crc32c(&bytes[CHECKED_FROM..]));
+        if stored != computed {
+            return Err(format!(
+                "checksum {computed:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
+            ));
+        }
+        let length = u64::from(u32_at(header, 16)) | u64::from(u32_at(header, 20)) << 32;
+        if length > BODY_BYTES_MAX {
+            return Err(format!(
+                "a body of {length} bytes, at most {BODY_BYTES_MAX} are read"
+            ));
+        }
+        let body = zstd::bulk::decompress(&bytes[HEADER_BYTES..], length as usize)
+            .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;
+        let message = pb::Snapshot::decode(&body[..]).map_err(|e| format!("the body: {e}"))?;
+        Self::from_message(message)
+    }
+
+    fn to_message(&self) -> pb::Snapshot {
+        let masks = self
+            .voxels
+            .blocks()
+            .iter()
+            .flat_map(|(_, mask)| mask.to_le_bytes());
+        pb::Snapshot {
+            uuid: self.uuid.as_bytes().to_vec().into(),
+            resolution_m: self.settings.resolution_m,
+            levels: self.settings.levels,
+            filter_hashes: self.settings.filter.hashes,
+            filter_bits_per_voxel: self.settings.filter.bits_per_key,
+            revision: self.revision,
+            block_keys: self
+                .voxels
+                .blocks()
+                .iter()
+                .map(|(key, _)| key.to_bits())
+                .collect(),
+            block_masks: masks.collect::<Vec<u8>>().into(),
+            trajectory: self.trajectory.iter().map(pose_to_message).collect(),
+        }
+    }
+
+    fn from_message(message: pb::Snapshot) -> Result<Self, String> {
+        let filter = FilterSettings {
+            hashes: message.filter_hashes,
+            bits_per_key: message.filter_bits_per_voxel,
+        };
+        let settings = MapSettings {
+            resolution_m: message.resolution_m,
+            levels: message.levels,
+            filter,
+        };
+        Ok(Self {
+            uuid: Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?,
+            settings: settings.checked().map_err(|e| e.to_string())?,
+            revision: message.revision,
+            voxels: voxels_from(&message.block_keys, &message.block_masks)?,
+            trajectory: message
+                .trajectory
+                .into_iter()
+                .map(pose_from_message)
+                .collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+fn voxels_from(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, String> {
+    let (masks, rest) = masks.as_chunks::<{ BlockMask::BYTES }>();
+    if masks.len() != keys.len() || !rest.is_empty() {
+        return Err(format!(
+            "{} block keys with {} bytes of masks",
+            keys.len(),
+            masks.len() * BlockMask::BYTES
+        ));
+    }
+    let block = |(&key, mask): (&u64, &[u8; BlockMask::BYTES])| {
+        let key = VoxelSet::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
+        Ok((key, BlockMask::from_le_bytes(mask)))
+    };
+    keys.iter().zip(masks).map(block).collect()
+}
+
+fn pose_to_message(pose: &TrajectoryPose) -> pb::ScanPose {
+    let [x, y, z] = translation_m(&pose.map_from_sensor);
+    let [qx, qy, qz, qw] = rotation_xyzw(&pose.map_from_sensor);
+    pb::ScanPose {
+        robot: pose.robot.as_str().to_owned(),
+        scan_id: pose.scan_id,
+        timestamp_ns: pose.timestamp_ns,
+        map_from_sensor: vec![x, y, z, qx, qy, qz, qw],
+        revision: pose.revision,
+        level_overlaps: pose.level_overlaps.clone(),
+        iterations: pose.iterations,
+        points_skipped: pose.points_skipped as u64,
+        new_voxels: pose.new_voxels as u64,
+        digest: pose.digest,
+    }
+}
+
+fn pose_from_message(message: pb::ScanPose) -> Result<TrajectoryPose, String> {
+    let [x, y, z, qx, qy, qz, qw] = message.map_from_sensor[..] else {
+        return Err(format!(
+            "a pose of {} numbers instead of 7",
+            message.map_from_sensor.len()
+        ));
+    };
+    let map_from_sensor = geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?;
+    Ok(TrajectoryPose {
+        robot: RobotName::new(&message.robot).map_err(|e| e.to_string())?,
+        scan_id: message.scan_id,
+        timestamp_ns: message.timestamp_ns,
+        map_from_sensor,
+        revision: message.revision,
+        level_overlaps: message.level_overlaps,
+        iterations: message.iterations,
+        points_skipped: message.points_skipped as usize,
+        new_voxels: message.new_voxels as usize,
+        digest: message.digest,
+    })
+}
+
+fn u32_at(bytes: &[u8], offset: usize) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|i| bytes[offset + i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::voxel::VoxelKey;
+
+    fn snapshot() -> Snapshot {
+        let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
+        let pose = TrajectoryPose {
+            robot: RobotName::new("r1").unwrap(),
+            scan_id: Some(7),
+            timestamp_ns: Some(-5),
+            map_from_sensor: geometry::pose([1.0, -2.0, 0.5], [0.0, 0.6, 0.0, 0.8]).unwrap(),
+            revision: 41,
+            level_overlaps: vec![0.5, 0.75],
+            iterations: 12,
+            points_skipped: 3,
+            new_voxels: 5000,
+            digest: u64::MAX,
+        };
+        Snapshot {
+            uuid: Uuid::from_bytes([7; 16]),
+            settings: MapSettings::new(0.05, 4),
+            revision: 42,
+            voxels: keys.collect(),
+            trajectory: vec![pose],
+        }
+    }
+
+    #[test]
+    fn a_snapshot_survives_its_file() {
+        let bytes = snapshot().encode().unwrap();
+        assert_eq!(Snapshot::decode(&bytes).unwrap(), snapshot());
+    }
+
+    #[test]
+    fn a_flipped_bit_anywhere_is_an_error() {
+        let bytes = snapshot().encode().unwrap();
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1 << (at % 8);
+            assert!(Snapshot::decode(&damaged).is_err(), "bit {} of byte {at}", at % 8);
+        }
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_an_error() {
+        let bytes = snapshot().encode().unwrap();
+        for length in 0..bytes.len() {
+            assert!(Snapshot::decode(&bytes[..length]).is_err(), "cut at {length}");
+        }
+    }
+
+    #[test]
+    fn a_newer_version_is_refused_by_name() {
+        let mut bytes = snapshot().encode().unwrap();
+        bytes[8] = 2;
+        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 2"));
+    }
+
+    #[test]
+    fn a_restored_map_is_the_map() {
+        let map = snapshot().restore().unwrap();
+        assert_eq!(Snapshot::of(&map, snapshot().uuid), snapshot());
+    }
+}

@@ -1,0 +1,233 @@
+//! Blocks of 8 x 8 x 8 voxels: three levels of the map in one 512-bit mask.
+
+use super::VoxelKey;
+
+/// Levels that one block's mask holds.
+pub const BLOCK_LEVELS: u32 = 3;
+/// Voxels along a block's side.
+pub const BLOCK_SIDE: i32 = 1 << BLOCK_LEVELS;
+const WORDS: usize = 8;
+
+/// Position of a voxel in its block, 0..512, in Morton order.
+///
+/// ```text
+/// bit 8 7 6 | 5 4 3 | 2 1 0
+///     z y x | z y x | z y x
+///     word  | byte  | bit      of the block's mask
+/// ```
+///
+/// So the eight children of one voxel of the next level are one byte of the mask, and the 64 descendants of
+/// one voxel two levels up are one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Cell(u16);
+
+impl Cell {
+    /// Spreads three bits b2 b1 b0 to bits 6, 3 and 0: one byte an entry.
+    pub(crate) const SPREAD: u64 = 0x4948_4140_0908_0100;
+
+    /// The block (a key three levels coarser) and the cell of the voxel at `index`.
+    #[inline(always)]
+    pub fn of(index: [i32; 3]) -> (VoxelKey, Self) {
+        let spread = |i: i32| (Self::SPREAD >> ((i & 7) * 8)) as u16 & 0xff;
+        let cell = spread(index[0]) | spread(index[1]) << 1 | spread(index[2]) << 2;
+        (VoxelKey::pack(index.map(|i| i >> BLOCK_LEVELS)), Self(cell))
+    }
+
+    /// The key of this cell's voxel in `block`: the inverse of [`Cell::of`].
+    #[inline(always)]
+    pub fn voxel(self, block: VoxelKey) -> VoxelKey {
+        let gather = |axis: u32| {
+            let c = i32::from(self.0) >> axis;
+            c & 1 | (c >> 2) & 2 | (c >> 4) & 4
+        };
+        let [x, y, z] = block.index().map(|b| b << BLOCK_LEVELS);
+        VoxelKey::pack([x | gather(0), y | gather(1), z | gather(2)])
+    }
+
+    /// Which word of the mask holds this cell.
+    #[inline(always)]
+    pub(crate) fn word(self) -> usize {
+        usize::from(self.0 >> 6)
+    }
+
+    /// Which bit of its word it is.
+    #[inline(always)]
+    pub(crate) fn bit(self) -> u32 {
+        u32::from(self.0 & 63)
+    }
+
+    /// The cell whose 0 <= `n` < 512.
+    #[cfg(test)]
+    pub(super) fn from_bits(n: u16) -> Self {
+        debug_assert!(n < 512);
+        Self(n)
+    }
+}
+
+/// The occupied voxels of one block, at three levels: level 0 a bit, level 1 a byte that is not zero, level 2
+/// a word that is not zero. That a parent goes with its last child holds by construction.
+#[derive(Clone, Copy, PartialEq, Eq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct BlockMask(pub(crate) [u64; WORDS]);
+
+impl BlockMask {
+    /// No voxel.
+    pub const EMPTY: Self = Self([0; WORDS]);
+
+    /// Bytes of a mask.
+    pub const BYTES: usize = WORDS * 8;
+
+    /// Its words, each little-endian.
+    pub fn to_le_bytes(self) -> [u8; Self::BYTES] {
+        bytemuck::cast(self.0.map(u64::to_le_bytes))
+    }
+
+    /// The inverse of [`BlockMask::to_le_bytes`].
+    pub fn from_le_bytes(bytes: &[u8; Self::BYTES]) -> Self {
+        Self(bytemuck::cast::<_, [[u8; 8]; WORDS]>(*bytes).map(u64::from_le_bytes))
+    }
+
+    /// Adds a cell; true when it was absent.
+    #[inline]
+    pub fn insert(&mut self, cell: Cell) -> bool {
+        let word = &mut self.0[cell.word()];
+        let bit = 1 << cell.bit();
+        let absent = *word & bit == 0;
+        *word |= bit;
+        absent
+    }
+
+    /// True when a voxel within the ancestor of `cell`, `level` (0, 1 or 2) levels up, is occupied.
+    #[inline(always)]
+    pub fn contains(&self, cell: Cell, level: u32) -> bool {
+        self.0[cell.word()] & Self::within(cell, level) != 0
+    }
+
+    /// The bits of `cell`'s word that share its ancestor `level` levels up.
+    #[inline(always)]
+    fn within(cell: Cell, level: u32) -> u64 {
+        match level {
+            0 => 1 << cell.bit(),
+            1 => 0xff << (cell.bit() & 0b11_1000),
+            _ => u64::MAX,
+        }
+    }
+
+    /// Fills the whole ancestor of `cell`, `level` levels up.
+    pub(crate) fn fill(&mut self, cell: Cell, level: u32) {
+        self.0[cell.word()] |= Self::within(cell, level);
+    }
+
+    /// True when no voxel is occupied.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.0 == [0; WORDS]
+    }
+
+    /// Number of occupied voxels at `level` (0, 1 or 2).
+    pub fn count(&self, level: u32) -> usize {
+        self.0
+            .iter()
+            .map(|&word| first_of_each(word, level).count_ones() as usize)
+            .sum()
+    }
+
+    /// The occupied voxels at `level` (0, 1 or 2), each as the first cell it covers, ascending.
+    #[inline]
+    pub fn cells(&self, level: u32) -> impl Iterator<Item = Cell> + use<> {
+        let words = self.0;
+        (0..WORDS).flat_map(move |w| {
+            let mut rest = first_of_each(words[w], level);
+            std::iter::from_fn(move || {
+                let bit = (rest != 0).then(|| rest.trailing_zeros())?;
+                rest &= rest - 1;
+                Some(Cell((w as u16) << 6 | bit as u16))
+            })
+        })
+    }
+
+    /// This with the voxels of `other` as well.
+    #[inline]
+    pub fn union(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|w| self.0[w] | other.0[w]))
+    }
+
+    /// The voxels in both.
+    #[inline]
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|w| self.0[w] & other.0[w]))
+    }
+
+    /// The voxels of this that are not in `other`.
+    #[inline]
+    pub fn difference(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|w| self.0[w] & !other.0[w]))
+    }
+
+    /// The voxels of `level` that `after` has and `self` has not, each as the first cell it covers.
+    #[inline]
+    pub(crate) fn gained<'a>(&'a self, after: &'a Self, level: u32) -> impl Iterator<Item = Cell> + 'a {
+        let gained: [u64; WORDS] =
+            std::array::from_fn(|w| first_of_each(after.0[w], level) & !first_of_each(self.0[w], level));
+        BlockMask(gained).cells(0)
+    }
+}
+
+/// One bit for each voxel of `level` with an occupied descendant in `word`: the lowest bit it covers.
+#[inline(always)]
+fn first_of_each(word: u64, level: u32) -> u64 {
+    const BYTE_LOW: u64 = 0x0101_0101_0101_0101;
+    match level {
+        0 => word,
+        1 => {
+            let word = word | word >> 4;
+            let word = word | word >> 2;
+            (word | word >> 1) & BYTE_LOW
+        }
+        _ => u64::from(word != 0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn a_voxel_is_its_block_and_cell(index: [i16; 3]) {
+            let index = index.map(i32::from);
+            let (block, cell) = Cell::of(index);
+            prop_assert_eq!(cell.voxel(block), VoxelKey::pack(index));
+        }
+
+        #[test]
+        fn a_mask_holds_three_levels(cells in prop::collection::btree_set(0u16..512, 0..80)) {
+            let mut mask = BlockMask::EMPTY;
+            for &c in &cells {
+                prop_assert!(mask.insert(Cell(c)));
+                prop_assert!(!mask.insert(Cell(c)));
+            }
+            for level in 0..3 {
+                let parents: BTreeSet<u16> = cells.iter().map(|c| c >> (3 * level)).collect();
+                let found: Vec<u16> = mask.cells(level).map(|c| c.0 >> (3 * level)).collect();
+                prop_assert_eq!(&found, &parents.iter().copied().collect::<Vec<_>>());
+                prop_assert_eq!(mask.count(level), parents.len());
+                for c in 0..512 {
+                    prop_assert_eq!(mask.contains(Cell(c), level), parents.contains(&(c >> (3 * level))));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_gained_at_a_level_is_what_had_no_voxel_before() {
+        let before = BlockMask([0b1, 0, 0, 0, 0, 0, 0, 0]);
+        let after = BlockMask([0b11 | 1 << 8, 1 << 63, 0, 0, 0, 0, 0, 0]);
+        let gained = |level| before.gained(&after, level).map(|c| c.0).collect::<Vec<_>>();
+        assert_eq!(gained(0), [1, 8, 127]);
+        assert_eq!(gained(1), [8, 64 + 56]);
+        assert_eq!(gained(2), [64]);
+    }
+}

@@ -1,0 +1,17 @@
+//! Voxels: packed keys (paper II-B), the lattice that quantises points (II, III) and volumetric sampling
+//! (III-A).
+
+mod block;
+mod block_table;
+mod key;
+mod lattice;
+mod sample;
+mod set;
+
+pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
+pub use block_table::BlockTable;
+pub(crate) use block_table::VACANT;
+pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
+pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
+pub use sample::{VolumetricSample, volumetric_sample};
+pub use set::VoxelSet;
