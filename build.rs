@@ -13,10 +13,10 @@ fn generate() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=proto");
     let descriptors = protox::compile(&protos, ["proto"])?;
     let out = std::path::PathBuf::from(std::env::var("OUT_DIR")?);
-    std::fs::write(
-        out.join("mrol.v1.bin"),
-        prost::Message::encode_to_vec(&descriptors),
-    )?;
+    // What reflection shows: the API, not the map files.
+    let mut api = descriptors.clone();
+    api.file.retain(|file| file.package() == "mrol.v1");
+    std::fs::write(out.join("mrol.v1.bin"), prost::Message::encode_to_vec(&api))?;
     tonic_prost_build::configure()
         .bytes(".")
         .build_server(std::env::var_os("CARGO_FEATURE_SERVER").is_some())

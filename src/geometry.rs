@@ -97,10 +97,7 @@ pub fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Pose, Po
         return Err(PoseError::Rotation(rotation_xyzw, norm));
     }
     let rotation = UnitQuaternion::new_normalize(quaternion);
-    Ok(Pose::from_parts(
-        Translation3::from(Vector3::from(translation_m)),
-        rotation,
-    ))
+    Ok(Pose::from_parts(Translation3::from(Vector3::from(translation_m)), rotation))
 }
 
 /// The translation in metres of a pose.
@@ -116,10 +113,7 @@ pub fn rotation_xyzw(pose: &Pose) -> [f64; 4] {
 /// How far two poses lie apart: (metres, degrees).
 pub fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let a_from_b = a.inv_mul(b);
-    (
-        a_from_b.translation.vector.norm(),
-        a_from_b.rotation.angle().to_degrees(),
-    )
+    (a_from_b.translation.vector.norm(), a_from_b.rotation.angle().to_degrees())
 }
 
 #[cfg(test)]

@@ -33,22 +33,13 @@ impl Steps {
 
     pub(super) fn halved(self, times: u32) -> Self {
         let scale = 0.5f64.powi(times as i32);
-        Self {
-            translation_m: self.translation_m * scale,
-            rotation_rad: self.rotation_rad * scale,
-        }
+        Self { translation_m: self.translation_m * scale, rotation_rad: self.rotation_rad * scale }
     }
 }
 
 /// Moves along and about one axis, both ways.
-const SINGLE_AXIS: [[f64; 3]; 6] = [
-    [1.0, 0.0, 0.0],
-    [-1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, -1.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [0.0, 0.0, -1.0],
-];
+const SINGLE_AXIS: [[f64; 3]; 6] =
+    [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
 
 /// The state of a climb.
 #[derive(Debug, Clone, Copy)]
@@ -60,11 +51,7 @@ pub(super) struct Ascent {
 
 impl From<Pose> for Ascent {
     fn from(guess: Pose) -> Self {
-        Self {
-            pose: guess,
-            iterations: 0,
-            lookups: 0,
-        }
+        Self { pose: guess, iterations: 0, lookups: 0 }
     }
 }
 
@@ -108,11 +95,7 @@ fn neighbours(pose: &Pose, steps: Steps) -> Vec<Pose> {
     let mut poses = Vec::with_capacity(48);
     poses.extend(shifts.iter().map(|shift| moved(shift, &straight)));
     poses.extend(turns.iter().map(|turn| moved(&stay, turn)));
-    poses.extend(
-        shifts
-            .iter()
-            .flat_map(|shift| turns.iter().map(move |turn| moved(shift, turn))),
-    );
+    poses.extend(shifts.iter().flat_map(|shift| turns.iter().map(move |turn| moved(shift, turn))));
     poses
 }
 
@@ -124,10 +107,7 @@ mod tests {
     #[test]
     fn a_pose_has_48_neighbours_one_step_away() {
         let pose = Pose::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.3, -0.2, 0.1));
-        let steps = Steps {
-            translation_m: 0.1,
-            rotation_rad: 0.02,
-        };
+        let steps = Steps { translation_m: 0.1, rotation_rad: 0.02 };
         let neighbours = neighbours(&pose, steps);
         assert_eq!(neighbours.len(), 48);
         for (i, neighbour) in neighbours.iter().enumerate() {
@@ -144,11 +124,7 @@ mod tests {
                 (shift - expected.0).abs() < 1e-12 && (turn - expected.1).abs() < 1e-7,
                 "{i}: {shift} {turn}"
             );
-            assert!(
-                neighbours[..i]
-                    .iter()
-                    .all(|other| pose_difference(other, neighbour) != (0.0, 0.0))
-            );
+            assert!(neighbours[..i].iter().all(|other| pose_difference(other, neighbour) != (0.0, 0.0)));
         }
     }
 

@@ -87,11 +87,7 @@ pub fn align(
     // 2) - 4) Align iteratively at each level, coarse to fine, each from where the coarser one ended.
     for level in (0..map.settings().levels).rev() {
         let overlap = Overlap::new(map, &sample.points, level, settings.lookup);
-        ascent.climb(
-            &overlap,
-            Steps::of_level(level, map, settings),
-            settings.iterations_per_level_max,
-        );
+        ascent.climb(&overlap, Steps::of_level(level, map, settings), settings.iterations_per_level_max);
     }
 
     // 5) Sub-voxel alignment with all points and small steps.
@@ -123,11 +119,7 @@ fn judge(
     let fits = level_overlaps[0] >= settings.overlap_min;
     Alignment {
         map_from_sensor: ascent.pose,
-        verdict: if fits {
-            Verdict::Accepted
-        } else {
-            Verdict::LowOverlap
-        },
+        verdict: if fits { Verdict::Accepted } else { Verdict::LowOverlap },
         level_overlaps,
         iterations: ascent.iterations,
         lookups: ascent.lookups,

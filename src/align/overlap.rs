@@ -17,12 +17,7 @@ const LOOKUPS_PER_LOCK: usize = 50_000;
 
 impl<'a> Overlap<'a> {
     pub(super) fn new(map: &'a MultiResolutionMap, points: &'a [Point], level: u32, lookup: Lookup) -> Self {
-        Self {
-            map,
-            points,
-            level,
-            lookup,
-        }
+        Self { map, points, level, lookup }
     }
 
     /// Points whose voxel is occupied, for each candidate pose.
@@ -31,12 +26,7 @@ impl<'a> Overlap<'a> {
         let counts = poses.chunks(poses_per_lock).flat_map(|poses| {
             let view = self.map.view();
             let count = |pose: &Pose| {
-                view.count(
-                    self.points,
-                    &self.map.lattice().from_points(pose),
-                    self.level,
-                    self.lookup,
-                )
+                view.count(self.points, &self.map.lattice().from_points(pose), self.level, self.lookup)
             };
             poses.iter().map(count).collect::<Vec<_>>()
         });
@@ -58,7 +48,5 @@ pub fn overlap(map: &MultiResolutionMap, points: &[Point], map_from_sensor: &Pos
 
 /// The [`overlap`] at every level, finest first.
 pub fn level_overlaps(map: &MultiResolutionMap, points: &[Point], map_from_sensor: &Pose) -> Vec<f64> {
-    (0..map.settings().levels)
-        .map(|level| overlap(map, points, map_from_sensor, level))
-        .collect()
+    (0..map.settings().levels).map(|level| overlap(map, points, map_from_sensor, level)).collect()
 }

@@ -18,10 +18,7 @@ pub struct FilterSettings {
 
 impl Default for FilterSettings {
     fn default() -> Self {
-        Self {
-            hashes: 2,
-            bits_per_key: 14.0,
-        }
+        Self { hashes: 2, bits_per_key: 14.0 }
     }
 }
 
@@ -75,11 +72,7 @@ pub fn expected_rate(keys: usize, words: usize, hashes: u32) -> f64 {
     let distinct = distinct_draws(hashes);
     let rate_given = |i: f64| {
         let p = 1.0 - (1.0 - 1.0 / WORD_BITS).powf(f64::from(hashes) * i);
-        distinct
-            .iter()
-            .enumerate()
-            .map(|(d, chance)| chance * p.powi(d as i32))
-            .sum::<f64>()
+        distinct.iter().enumerate().map(|(d, chance)| chance * p.powi(d as i32)).sum::<f64>()
     };
     // The Poisson terms in logarithms, so that a crowded word (a mean of hundreds) does not underflow.
     let last = (mean + 12.0 * mean.sqrt() + 20.0) as usize;
@@ -99,11 +92,7 @@ fn distinct_draws(hashes: u32) -> Vec<f64> {
     for _ in 0..hashes {
         for d in (0..chances.len()).rev() {
             let repeat = chances[d] * d as f64 / WORD_BITS;
-            let fresh = if d > 0 {
-                chances[d - 1] * (1.0 - (d as f64 - 1.0) / WORD_BITS)
-            } else {
-                0.0
-            };
+            let fresh = if d > 0 { chances[d - 1] * (1.0 - (d as f64 - 1.0) / WORD_BITS) } else { 0.0 };
             chances[d] = repeat + fresh;
         }
     }
@@ -128,10 +117,7 @@ mod tests {
             let words = FilterSettings { hashes, bits_per_key }.words(keys);
             let blocked = expected_rate(keys, words, hashes);
             let free = unblocked_rate(keys, words * 64, hashes);
-            assert!(
-                blocked > free,
-                "k {hashes}, {bits_per_key} bits: {blocked} against {free}"
-            );
+            assert!(blocked > free, "k {hashes}, {bits_per_key} bits: {blocked} against {free}");
         }
     }
 
@@ -145,19 +131,9 @@ mod tests {
 
     #[test]
     fn settings_out_of_range_are_named() {
-        let hashes = FilterSettings {
-            hashes: 11,
-            ..Default::default()
-        }
-        .checked()
-        .unwrap_err();
+        let hashes = FilterSettings { hashes: 11, ..Default::default() }.checked().unwrap_err();
         assert!(hashes.to_string().contains("filter_hashes"));
-        let bits = FilterSettings {
-            bits_per_key: f64::NAN,
-            ..Default::default()
-        }
-        .checked()
-        .unwrap_err();
+        let bits = FilterSettings { bits_per_key: f64::NAN, ..Default::default() }.checked().unwrap_err();
         assert!(bits.to_string().contains("filter_bits_per_voxel"));
     }
 }

@@ -27,10 +27,7 @@ pub struct Committed {
 
 impl<'a> Committer<'a> {
     pub(super) fn begin(map: &'a MultiResolutionMap) -> Self {
-        Self {
-            map,
-            _turn: map.committing.lock(),
-        }
+        Self { map, _turn: map.committing.lock() }
     }
 
     /// The map, which nobody else changes meanwhile.
@@ -43,16 +40,9 @@ impl<'a> Committer<'a> {
         let by_shard = self.group(&scan.voxels);
         let mut shards = self.lock_with_room_for(&by_shard);
         let mut trajectory = self.map.trajectory.write();
-        let voxels = shards
-            .iter_mut()
-            .map(|(i, shard)| shard.insert(&by_shard[*i]))
-            .sum();
+        let voxels = shards.iter_mut().map(|(i, shard)| shard.insert(&by_shard[*i])).sum();
         let revision = self.map.revision() + 1;
-        trajectory.push(TrajectoryPose {
-            revision,
-            new_voxels: voxels,
-            ..scan.pose
-        });
+        trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose });
         self.publish(revision, voxels)
     }
 
@@ -70,19 +60,11 @@ impl<'a> Committer<'a> {
     pub fn remove(self, voxels: &VoxelSet) -> Committed {
         let by_shard = self.group(voxels);
         let mut shards = self.lock(&by_shard);
-        let removed = shards
-            .iter_mut()
-            .map(|(i, shard)| shard.remove(&by_shard[*i]))
-            .sum();
+        let removed = shards.iter_mut().map(|(i, shard)| shard.remove(&by_shard[*i])).sum();
         if removed == 0 {
-            return Committed {
-                revision: self.map.revision(),
-                voxels: 0,
-            };
+            return Committed { revision: self.map.revision(), voxels: 0 };
         }
-        shards
-            .iter_mut()
-            .for_each(|(_, shard)| shard.reset_if_empty(&self.map.settings));
+        shards.iter_mut().for_each(|(_, shard)| shard.reset_if_empty(&self.map.settings));
         self.publish(self.map.revision() + 1, removed)
     }
 

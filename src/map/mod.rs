@@ -90,10 +90,7 @@ impl MultiResolutionMap {
 
     /// Number of occupied voxels of `level`.
     pub fn voxels(&self, level: u32) -> usize {
-        self.shards
-            .iter()
-            .map(|shard| shard.read().level(level).len())
-            .sum()
+        self.shards.iter().map(|shard| shard.read().level(level).len()).sum()
     }
 
     /// True without an occupied voxel.
@@ -113,10 +110,7 @@ impl MultiResolutionMap {
 
     /// Locks what `points`, placed at `map_from_points`, can fall in.
     pub fn view_of(&self, points: &[Point], map_from_points: &Pose) -> MapView<'_> {
-        MapView::lock(
-            self,
-            self.sharding.touched_by(points, map_from_points, &self.lattice),
-        )
+        MapView::lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
     }
 
     /// Waits for the turn to change the map.

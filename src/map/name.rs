@@ -32,11 +32,7 @@ impl MapName {
         let fits = bytes.len() <= NAME_LENGTH_MAX
             && bytes.first().is_some_and(|&c| first(c))
             && bytes.iter().all(|&c| rest(c));
-        if fits {
-            Ok(Self(text.into()))
-        } else {
-            Err(NameError::Map(excerpt(text)))
-        }
+        if fits { Ok(Self(text.into())) } else { Err(NameError::Map(excerpt(text))) }
     }
 
     /// The text.
@@ -99,19 +95,7 @@ mod tests {
         for good in ["a", "0", "floor-2_b", &"x".repeat(64)] {
             assert!(MapName::new(good).is_ok(), "{good}");
         }
-        for bad in [
-            "",
-            "A",
-            "-a",
-            "_a",
-            "a/b",
-            "..",
-            "a.b",
-            "ä",
-            "a b",
-            "a\0",
-            &"x".repeat(65),
-        ] {
+        for bad in ["", "A", "-a", "_a", "a/b", "..", "a.b", "ä", "a b", "a\0", &"x".repeat(65)] {
             assert!(MapName::new(bad).is_err(), "{bad}");
         }
         assert!(MapName::new(&"x".repeat(1 << 20)).unwrap_err().to_string().len() < 200);

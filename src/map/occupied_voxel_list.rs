@@ -22,11 +22,7 @@ pub(super) fn tier_of(level: u32) -> (usize, u32) {
 
 impl<'a> OccupiedVoxelList<'a> {
     pub(super) fn new(level: u32, blocks: &'a BlockTable, filter: &'a CountingBloomFilter) -> Self {
-        Self {
-            level,
-            blocks,
-            filter,
-        }
+        Self { level, blocks, filter }
     }
 
     /// True when `voxel` of this level is occupied: the filter, then the set for what it lets through.

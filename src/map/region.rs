@@ -37,11 +37,7 @@ impl Region {
     /// When a coordinate is NaN or a smallest one exceeds its largest.
     pub fn cuboid(min_m: [f64; 3], max_m: [f64; 3]) -> Result<Self, RegionError> {
         let ordered = (0..3).all(|axis| min_m[axis] <= max_m[axis]);
-        if ordered {
-            Ok(Self::Box { min_m, max_m })
-        } else {
-            Err(RegionError::Box(min_m, max_m))
-        }
+        if ordered { Ok(Self::Box { min_m, max_m }) } else { Err(RegionError::Box(min_m, max_m)) }
     }
 
     /// The ball about `center_m`.

@@ -31,11 +31,7 @@ pub enum MapSettingsError {
 impl MapSettings {
     /// Settings of a map of `resolution_m` with `levels` levels and the default filter.
     pub fn new(resolution_m: f64, levels: u32) -> Self {
-        Self {
-            resolution_m,
-            levels,
-            filter: FilterSettings::default(),
-        }
+        Self { resolution_m, levels, filter: FilterSettings::default() }
     }
 
     /// Checks all ranges.

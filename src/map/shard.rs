@@ -49,11 +49,7 @@ impl Shard {
     }
 
     pub(super) fn level(&self, level: u32) -> OccupiedVoxelList<'_> {
-        OccupiedVoxelList::new(
-            level,
-            &self.tiers[tier_of(level).0],
-            &self.filters[level as usize],
-        )
+        OccupiedVoxelList::new(level, &self.tiers[tier_of(level).0], &self.filters[level as usize])
     }
 
     /// Bytes of memory of the exact sets.
@@ -88,9 +84,7 @@ impl Shard {
             if before.is_empty() {
                 created.push(block);
             }
-            for_each_gained(block, &before, entry, filters.len(), |up, key| {
-                filters[up].insert(key)
-            });
+            for_each_gained(block, &before, entry, filters.len(), |up, key| filters[up].insert(key));
         }
         created
     }
@@ -121,9 +115,7 @@ impl Shard {
             if after.is_empty() {
                 emptied.push(block);
             }
-            for_each_gained(block, &after, &before, filters.len(), |up, key| {
-                filters[up].remove(key)
-            });
+            for_each_gained(block, &after, &before, filters.len(), |up, key| filters[up].remove(key));
         }
         emptied
     }
@@ -134,10 +126,7 @@ impl Shard {
             |&(block, mask): &(VoxelKey, BlockMask)| (block, self.tiers[tier].get(block).intersection(&mask));
         let mut found: VoxelSet = blocks.iter().map(present).collect();
         for below in (0..tier).rev() {
-            found = found
-                .iter()
-                .map(|voxel| (voxel, self.tiers[below].get(voxel)))
-                .collect();
+            found = found.iter().map(|voxel| (voxel, self.tiers[below].get(voxel))).collect();
         }
         found
     }
@@ -145,10 +134,7 @@ impl Shard {
     /// Makes larger tables and filters for what adding `blocks` would not leave room for. Reads only: the
     /// caller swaps them in with [`Shard::adopt`] under the write lock, so that no reader waits for a rebuild.
     pub(super) fn growth_for(&self, blocks: &Blocks) -> Growth {
-        let mut growth = Growth {
-            tiers: Vec::new(),
-            filters: Vec::new(),
-        };
+        let mut growth = Growth { tiers: Vec::new(), filters: Vec::new() };
         let mut parents: VoxelSet;
         let mut blocks = blocks;
         for (tier, table) in self.tiers.iter().enumerate() {
@@ -165,9 +151,7 @@ impl Shard {
                 }
             }
             let need = table.len() + created.len();
-            growth
-                .tiers
-                .push((need > table.capacity()).then(|| table.resized(need)));
+            growth.tiers.push((need > table.capacity()).then(|| table.resized(need)));
             for (up, gained) in gained.into_iter().enumerate() {
                 let level = tier * BLOCK_LEVELS as usize + up;
                 if level < self.filters.len() {
@@ -188,9 +172,7 @@ impl Shard {
         (need > filter.capacity()).then(|| {
             let capacity = need.max(filter.capacity() * 5 / 4);
             let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
-            self.level(level as u32)
-                .iter()
-                .for_each(|voxel| larger.insert(voxel.to_bits()));
+            self.level(level as u32).iter().for_each(|voxel| larger.insert(voxel.to_bits()));
             larger
         })
     }

@@ -46,9 +46,7 @@ const ROUNDING: f64 = 1e-5;
 
 impl Sharding {
     pub(super) fn new(levels: u32) -> Self {
-        Self {
-            region_shift: REGION_SHIFT_MIN.max(levels - 1),
-        }
+        Self { region_shift: REGION_SHIFT_MIN.max(levels - 1) }
     }
 
     /// How many levels a voxel of `level` lies below a region.
@@ -86,10 +84,8 @@ impl Sharding {
             }
             let margin = lattice.resolution_m(0) + size * ROUNDING;
             let region_m = lattice.resolution_m(0) * (1u64 << self.region_shift) as f64;
-            *range = (
-                ((low - margin) / region_m).floor() as i64,
-                ((high + margin) / region_m).floor() as i64,
-            );
+            *range =
+                (((low - margin) / region_m).floor() as i64, ((high + margin) / region_m).floor() as i64);
         }
         touched_in(regions)
     }
@@ -140,21 +136,11 @@ mod tests {
 
     #[test]
     fn neighbouring_regions_never_share_a_shard() {
-        for d in [
-            [1, 0, 0],
-            [0, 1, 0],
-            [0, 0, 1],
-            [1, 1, 0],
-            [1, 0, 1],
-            [0, 1, 1],
-            [1, -1, 0],
-            [0, 1, -1],
-        ] {
+        for d in [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, -1, 0], [0, 1, -1]] {
             assert_ne!(shard_of_region([0; 3]), shard_of_region(d), "{d:?}");
         }
-        let plane: std::collections::BTreeSet<_> = (0..4)
-            .flat_map(|x| (0..4).map(move |y| shard_of_region([x, y, 0])))
-            .collect();
+        let plane: std::collections::BTreeSet<_> =
+            (0..4).flat_map(|x| (0..4).map(move |y| shard_of_region([x, y, 0]))).collect();
         assert_eq!(plane.len(), SHARDS);
     }
 

@@ -42,6 +42,22 @@ pub struct TrajectoryPose {
 }
 
 impl TrajectoryPose {
+    /// A robot's scan at `map_from_sensor`, of which nothing else is known.
+    pub fn new(robot: RobotName, map_from_sensor: Pose) -> Self {
+        Self {
+            robot,
+            scan_id: None,
+            timestamp_ns: None,
+            map_from_sensor,
+            revision: 0,
+            level_overlaps: Vec::new(),
+            iterations: 0,
+            points_skipped: 0,
+            new_voxels: 0,
+            digest: 0,
+        }
+    }
+
     /// Fraction of the points in occupied voxels of level 0, before the scan was added.
     pub fn overlap(&self) -> f64 {
         self.level_overlaps.first().copied().unwrap_or(0.0)

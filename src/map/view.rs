@@ -25,11 +25,7 @@ impl<'a> MapView<'a> {
     /// read once they are held: a change that is published later touches none of these shards.
     pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
         let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
-        Self {
-            map,
-            shards,
-            revision: map.revision(),
-        }
+        Self { map, shards, revision: map.revision() }
     }
 
     /// The revision that everything read through this view belongs to.
@@ -49,13 +45,7 @@ impl<'a> MapView<'a> {
         lookup: Lookup,
         occupied: &mut [u64],
     ) -> bool {
-        lookup::occupied(
-            points,
-            lattice_from_points,
-            &self.level_view(level),
-            lookup,
-            occupied,
-        )
+        lookup::occupied(points, lattice_from_points, &self.level_view(level), lookup, occupied)
     }
 
     /// Number of points whose voxel of `level` is occupied. The view must cover the points.
@@ -73,13 +63,7 @@ impl<'a> MapView<'a> {
     pub fn level_view(&self, level: u32) -> LevelView<'_> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
         let (_, up) = tier_of(level);
-        LevelView::new(
-            level,
-            up,
-            self.map.sharding.shift_at(level),
-            self.map.settings.filter.hashes,
-            list,
-        )
+        LevelView::new(level, up, self.map.sharding.shift_at(level), self.map.settings.filter.hashes, list)
     }
 
     /// The lists of `level`, one a shard that the view covers.
@@ -90,26 +74,18 @@ impl<'a> MapView<'a> {
     /// True when `voxel` of `level` is occupied, exactly. False where the view does not cover it.
     pub fn contains(&self, voxel: VoxelKey, level: u32) -> bool {
         let shard = self.map.sharding.shard_of(voxel.index(), level);
-        self.shards[shard]
-            .as_deref()
-            .is_some_and(|shard| shard.level(level).contains(voxel))
+        self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).contains(voxel))
     }
 
     /// True when the filter lets `voxel` of `level` through.
     pub fn may_contain(&self, voxel: VoxelKey, level: u32) -> bool {
         let shard = self.map.sharding.shard_of(voxel.index(), level);
-        self.shards[shard]
-            .as_deref()
-            .is_some_and(|shard| shard.level(level).may_contain(voxel))
+        self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).may_contain(voxel))
     }
 
     /// All finest voxels that the view covers.
     pub fn voxels(&self) -> VoxelSet {
-        self.shards
-            .iter()
-            .flatten()
-            .flat_map(|shard| shard.blocks())
-            .collect()
+        self.shards.iter().flatten().flat_map(|shard| shard.blocks()).collect()
     }
 
     /// The finest voxels at and below the voxels `keys` of `level`, of those that are there.
@@ -124,9 +100,7 @@ impl<'a> MapView<'a> {
         }
         let found = self.shards.iter().zip(by_shard).flat_map(|(shard, blocks)| {
             let wanted: VoxelSet = blocks.into_iter().collect();
-            let found = shard
-                .as_deref()
-                .map(|shard| shard.descendants(tier, wanted.blocks()));
+            let found = shard.as_deref().map(|shard| shard.descendants(tier, wanted.blocks()));
             found.unwrap_or_default().blocks().to_vec()
         });
         found.collect()
@@ -149,9 +123,7 @@ impl<'a> MapView<'a> {
                 let candidates = grid(candidates).map(|block| (block, blocks.get(block)));
                 candidates.for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
             } else {
-                blocks
-                    .iter()
-                    .for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
+                blocks.iter().for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
             }
         }
         found
@@ -175,11 +147,7 @@ impl<'a> MapView<'a> {
 fn block_bounds(region: &Region, resolution_m: f64) -> [(i32, i32); 3] {
     let (min_m, max_m) = region.bounds_m();
     let block_m = resolution_m * f64::from(BLOCK_SIDE);
-    let clamp = |c: f64| {
-        (c / block_m)
-            .floor()
-            .clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32
-    };
+    let clamp = |c: f64| (c / block_m).floor().clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32;
     std::array::from_fn(|axis| (clamp(min_m[axis]), clamp(max_m[axis])))
 }
 

@@ -24,13 +24,7 @@ pub(super) const LIDAR_ROUTE: Route = Route {
 
 /// The northern rooms and the corridor: 22 m, half a metre beside the other route and less.
 pub(super) const CAMERA_ROUTE: Route = Route {
-    corners: &[
-        [4.0, 6.75],
-        [10.8, 6.75],
-        [10.8, 4.45],
-        [2.65, 4.45],
-        [2.65, 6.75],
-    ],
+    corners: &[[4.0, 6.75], [10.8, 6.75], [10.8, 4.45], [2.65, 4.45], [2.65, 6.75]],
     cornering_m: 1.4,
     turning_m: 2.3,
 };
@@ -133,10 +127,7 @@ mod tests {
                 let turn = wrapped(route.yaw(next_m) - route.yaw(way_m)).to_degrees();
                 assert!(turn.abs() < 2.0, "{turn} degrees at {way_m} m");
                 let chord = heading((route.position(way_m - 0.7), route.position(way_m + 0.7)));
-                assert!(
-                    wrapped(chord - route.yaw(way_m)).to_degrees().abs() < 25.0,
-                    "at {way_m} m"
-                );
+                assert!(wrapped(chord - route.yaw(way_m)).to_degrees().abs() < 25.0, "at {way_m} m");
             }
         }
     }

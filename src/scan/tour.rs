@@ -26,16 +26,8 @@ pub fn tours(steps: usize) -> [Tour; 2] {
     let lidar = Sensor::SpinningLidar(SpinningLidar::default());
     let camera = Sensor::DepthCamera(DepthCamera::default());
     [
-        Tour {
-            name: "lidar",
-            sensor: lidar,
-            poses: LIDAR_RIDE.poses(steps),
-        },
-        Tour {
-            name: "camera",
-            sensor: camera,
-            poses: CAMERA_RIDE.poses(steps),
-        },
+        Tour { name: "lidar", sensor: lidar, poses: LIDAR_RIDE.poses(steps) },
+        Tour { name: "camera", sensor: camera, poses: CAMERA_RIDE.poses(steps) },
     ]
 }
 
@@ -81,23 +73,13 @@ mod tests {
 
     #[test]
     fn steps_are_short_enough_to_align_and_long_enough_to_get_around() {
-        for (tour, limits, mean_m) in tours(STEPS)
-            .iter()
-            .zip([(0.35, 9.0), (0.16, 5.5)])
-            .zip([0.25, 0.1])
-            .map(|((t, l), m)| (t, l, m))
+        for (tour, limits, mean_m) in
+            tours(STEPS).iter().zip([(0.35, 9.0), (0.16, 5.5)]).zip([0.25, 0.1]).map(|((t, l), m)| (t, l, m))
         {
             assert_eq!(tour.poses.len(), STEPS);
-            let steps: Vec<_> = tour
-                .poses
-                .windows(2)
-                .map(|pair| pose_difference(&pair[0], &pair[1]))
-                .collect();
-            assert!(
-                steps
-                    .iter()
-                    .all(|(m, deg)| *m <= limits.0 && *deg <= limits.1 && *m > 0.05)
-            );
+            let steps: Vec<_> =
+                tour.poses.windows(2).map(|pair| pose_difference(&pair[0], &pair[1])).collect();
+            assert!(steps.iter().all(|(m, deg)| *m <= limits.0 && *deg <= limits.1 && *m > 0.05));
             let mean = steps.iter().map(|(metres, _)| metres).sum::<f64>() / steps.len() as f64;
             assert!(mean > mean_m, "{mean} m a step");
         }
@@ -125,9 +107,7 @@ mod tests {
             let (sin, cos) = (f64::from(i) * TAU / 180.0).sin_cos();
             [-0.5, 0.0, 0.5].map(|up| Vector3::new(cos, sin, up).normalize())
         });
-        directions
-            .filter_map(|direction| scene.cast(center, direction, 5.0))
-            .fold(f64::INFINITY, f64::min)
+        directions.filter_map(|direction| scene.cast(center, direction, 5.0)).fold(f64::INFINITY, f64::min)
     }
 
     #[test]
@@ -139,11 +119,7 @@ mod tests {
                     for z in [0.3, 0.6, place(pose).z] {
                         let center = Point3::new(place(pose).x, place(pose).y, z);
                         let clearance = clearance_m(&scene, center);
-                        assert!(
-                            clearance >= 0.25,
-                            "{} {step}, seed {seed}: {clearance} m",
-                            tour.name
-                        );
+                        assert!(clearance >= 0.25, "{} {step}, seed {seed}: {clearance} m", tour.name);
                     }
                 }
             }
@@ -166,31 +142,19 @@ mod tests {
     fn conditioning(scene: &Scene, tour: &Tour, pose: &Pose) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let (sensor, row) = match &tour.sensor {
-            Sensor::DepthCamera(c) => (
-                Sensor::DepthCamera(DepthCamera {
-                    noise_at_1m_m: 0.0,
-                    ..c.clone()
-                }),
-                c.width_px,
-            ),
-            Sensor::SpinningLidar(l) => (
-                Sensor::SpinningLidar(SpinningLidar {
-                    noise_m: 0.0,
-                    ..l.clone()
-                }),
-                l.rings,
-            ),
+            Sensor::DepthCamera(c) => {
+                (Sensor::DepthCamera(DepthCamera { noise_at_1m_m: 0.0, ..c.clone() }), c.width_px)
+            }
+            Sensor::SpinningLidar(l) => {
+                (Sensor::SpinningLidar(SpinningLidar { noise_m: 0.0, ..l.clone() }), l.rings)
+            }
         };
         let points = sensor.scan(scene, pose, &mut rng);
         hessian_ratio(&points, row as usize)
     }
 
     fn hessian_ratio(points: &[Point], row: usize) -> f64 {
-        let finite: Vec<_> = points
-            .iter()
-            .filter(|p| p.is_finite())
-            .map(|p| p.to_f64().coords)
-            .collect();
+        let finite: Vec<_> = points.iter().filter(|p| p.is_finite()).map(|p| p.to_f64().coords).collect();
         let center = finite.iter().sum::<Vector3<f64>>() / finite.len() as f64;
         let scale = finite.iter().map(|p| (p - center).norm()).sum::<f64>() / finite.len() as f64;
         let mut hessian = Matrix6::zeros();

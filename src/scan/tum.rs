@@ -24,14 +24,9 @@ impl Display for StampedPose {
     /// The pose's line: plain decimal numbers, each with the digits it takes to read the same f64 again.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.id)?;
-        let [translation, rotation] = [
-            translation_m(&self.map_from_sensor).to_vec(),
-            rotation_xyzw(&self.map_from_sensor).to_vec(),
-        ];
-        translation
-            .iter()
-            .chain(&rotation)
-            .try_for_each(|number| write!(f, " {number}"))
+        let [translation, rotation] =
+            [translation_m(&self.map_from_sensor).to_vec(), rotation_xyzw(&self.map_from_sensor).to_vec()];
+        translation.iter().chain(&rotation).try_for_each(|number| write!(f, " {number}"))
     }
 }
 
@@ -66,15 +61,9 @@ fn trajectory(bytes: &[u8]) -> Result<Vec<StampedPose>, Problem> {
 }
 
 fn stamped_pose(text: &str) -> Result<StampedPose, String> {
-    let numbers: Vec<f64> = text
-        .split_ascii_whitespace()
-        .map(number)
-        .collect::<Result<_, _>>()?;
+    let numbers: Vec<f64> = text.split_ascii_whitespace().map(number).collect::<Result<_, _>>()?;
     let [id, tx, ty, tz, qx, qy, qz, qw] = numbers[..] else {
-        return Err(format!(
-            "{} numbers, {COLUMNS} are needed: id tx ty tz qx qy qz qw",
-            numbers.len()
-        ));
+        return Err(format!("{} numbers, {COLUMNS} are needed: id tx ty tz qx qy qz qw", numbers.len()));
     };
     if !id.is_finite() {
         return Err(format!("the id must be finite, got {id}"));
@@ -115,17 +104,9 @@ mod tests {
 
     #[test]
     fn a_whole_id_is_written_without_a_point() {
-        let line = StampedPose {
-            id: 12.0,
-            map_from_sensor: Pose::identity(),
-        }
-        .to_string();
+        let line = StampedPose { id: 12.0, map_from_sensor: Pose::identity() }.to_string();
         assert_eq!(line, "12 0 0 0 0 0 0 1");
-        let line = StampedPose {
-            id: 1_630_577_771.070493,
-            map_from_sensor: Pose::identity(),
-        }
-        .to_string();
+        let line = StampedPose { id: 1_630_577_771.070493, map_from_sensor: Pose::identity() }.to_string();
         assert!(line.starts_with("1630577771.070493 "), "{line}");
     }
 
@@ -149,14 +130,8 @@ mod tests {
         ] {
             std::fs::write(&path, format!("# comment\n0 0 0 0 0 0 0 1\n{line}\n")).unwrap();
             let error = read_trajectory(&path).unwrap_err().to_string();
-            assert!(
-                error.contains("poses.txt:3: ") && error.contains(problem),
-                "{error}"
-            );
+            assert!(error.contains("poses.txt:3: ") && error.contains(problem), "{error}");
         }
-        assert!(matches!(
-            read_trajectory(&directory.path().join("none")),
-            Err(ReadError::Io { .. })
-        ));
+        assert!(matches!(read_trajectory(&directory.path().join("none")), Err(ReadError::Io { .. })));
     }
 }

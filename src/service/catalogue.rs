@@ -25,10 +25,7 @@ pub(super) struct Catalogue {
 impl Catalogue {
     /// Reads the maps of `data_dir`; without one, nothing outlives the process.
     pub(super) fn open(data_dir: Option<PathBuf>) -> Result<Self, ServiceError> {
-        let data_dir = data_dir
-            .map(|path| DataDir::open(&path))
-            .transpose()
-            .map_err(not_stored)?;
+        let data_dir = data_dir.map(|path| DataDir::open(&path)).transpose().map_err(not_stored)?;
         let mut maps = BTreeMap::new();
         if let Some(data_dir) = &data_dir {
             for name in data_dir.names().map_err(not_stored)? {
@@ -36,11 +33,7 @@ impl Catalogue {
                 maps.insert(name, Arc::new(map));
             }
         }
-        Ok(Self {
-            maps: RwLock::new(maps),
-            data_dir: data_dir.map(Arc::new),
-            writing: Default::default(),
-        })
+        Ok(Self { maps: RwLock::new(maps), data_dir: data_dir.map(Arc::new), writing: Default::default() })
     }
 
     pub(super) fn get(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
@@ -68,17 +61,9 @@ impl Catalogue {
         let count = self.maps.read().len();
         if count >= maps_max {
             let message = format!("there are {count} maps, maps_max is {maps_max}: delete one first");
-            return Err(ServiceError::new(
-                ErrorCode::ResourceExhausted,
-                "too_many_maps",
-                message,
-            ));
+            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message));
         }
-        let map = Arc::new(HostedMap::new(
-            name.clone(),
-            Uuid::new_v4(),
-            MultiResolutionMap::new(settings)?,
-        ));
+        let map = Arc::new(HostedMap::new(name.clone(), Uuid::new_v4(), MultiResolutionMap::new(settings)?));
         let snapshot = Snapshot::of(&map.map, map.uuid);
         self.on_disk({
             let name = name.clone();
@@ -160,12 +145,8 @@ fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<Hoste
             s.resolution_m, s.levels
         )
     };
-    let message = format!(
-        "map {} exists with {}, not with {}",
-        map.name,
-        describe(there),
-        describe(&settings)
-    );
+    let message =
+        format!("map {} exists with {}, not with {}", map.name, describe(there), describe(&settings));
     Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message))
 }
 

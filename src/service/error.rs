@@ -41,11 +41,7 @@ pub struct ServiceError {
 impl ServiceError {
     /// A failure of kind `code`.
     pub fn new(code: ErrorCode, reason: &'static str, message: impl Into<String>) -> Self {
-        Self {
-            code,
-            reason,
-            message: message.into(),
-        }
+        Self { code, reason, message: message.into() }
     }
 
     /// The request is wrong in itself.

@@ -52,10 +52,7 @@ impl HostedMap {
     }
 
     pub(super) fn state(&self, revision: u64) -> MapState {
-        MapState {
-            revision,
-            map_uuid: self.uuid,
-        }
+        MapState { revision, map_uuid: self.uuid }
     }
 
     /// Waits until the robot's earlier scans are done.
@@ -91,11 +88,7 @@ impl HostedMap {
                     self.name,
                     self.map.revision()
                 );
-                Err(ServiceError::new(
-                    ErrorCode::DeadlineExceeded,
-                    "revision_not_reached",
-                    message,
-                ))
+                Err(ServiceError::new(ErrorCode::DeadlineExceeded, "revision_not_reached", message))
             }
         }
     }
@@ -105,11 +98,7 @@ impl HostedMap {
         if level < levels {
             return Ok(());
         }
-        let message = format!(
-            "level must lie in 0..={} of map {}, got {level}",
-            levels - 1,
-            self.name
-        );
+        let message = format!("level must lie in 0..={} of map {}, got {level}", levels - 1, self.name);
         Err(ServiceError::invalid("level_out_of_range", message))
     }
 
@@ -117,15 +106,9 @@ impl HostedMap {
         if uuid.is_none_or(|uuid| uuid == self.uuid) {
             return Ok(());
         }
-        let message = format!(
-            "map_uuid of map {} is {}: it was deleted and made again",
-            self.name, self.uuid
-        );
-        Err(ServiceError::new(
-            ErrorCode::FailedPrecondition,
-            "map_replaced",
-            message,
-        ))
+        let message =
+            format!("map_uuid of map {} is {}: it was deleted and made again", self.name, self.uuid);
+        Err(ServiceError::new(ErrorCode::FailedPrecondition, "map_replaced", message))
     }
 
     pub(super) fn query(&self, query: &PointQuery) -> Result<PointAnswer, ServiceError> {
@@ -150,17 +133,11 @@ impl HostedMap {
 
     /// Names the first point that falls in no voxel.
     fn point_without_voxel(&self, points: &[Point], quantise: &LatticeFromPoints) -> ServiceError {
-        let place = points
-            .iter()
-            .position(|&point| quantise.index(point).is_none())
-            .unwrap_or_default();
+        let place = points.iter().position(|&point| quantise.index(point).is_none()).unwrap_or_default();
         let point = points[place];
         let (min_m, end_m) = self.map.lattice().range_m();
         let (reason, what) = match point.is_finite() {
-            true => (
-                "point_out_of_range",
-                format!("outside the map's range of {min_m} to {end_m} m"),
-            ),
+            true => ("point_out_of_range", format!("outside the map's range of {min_m} to {end_m} m")),
             false => ("point_not_finite", "not finite".to_owned()),
         };
         ServiceError::invalid(reason, format!("points[{place}] is {what}: {point:?}"))
@@ -172,20 +149,16 @@ impl HostedMap {
         let voxels = self.targets_of(deletion)?;
         let committed = committer.remove(&voxels);
         self.announce(committed.revision);
-        Ok(DeletionAnswer {
-            removed: committed.voxels,
-            state: self.state(committed.revision),
-        })
+        Ok(DeletionAnswer { removed: committed.voxels, state: self.state(committed.revision) })
     }
 
     fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
         let level = deletion.level;
         let keys = match &deletion.target {
             DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
-            DeletionTarget::Keys(keys) => keys
-                .iter()
-                .map(|&key| in_range(key, level))
-                .collect::<Result<_, _>>()?,
+            DeletionTarget::Keys(keys) => {
+                keys.iter().map(|&key| in_range(key, level)).collect::<Result<_, _>>()?
+            }
             DeletionTarget::Region(region) => self.map.view().voxels_in(region, level),
         };
         Ok(self.map.view().descendants_of(keys, level))
@@ -193,10 +166,8 @@ impl HostedMap {
 
     fn keys_of(&self, points: &[Point], level: u32) -> Result<Vec<VoxelKey>, ServiceError> {
         let quantise = self.map.lattice().from_map();
-        let keys: Option<Vec<_>> = points
-            .iter()
-            .map(|&point| Some(quantise.key(point)?.ancestor(level)))
-            .collect();
+        let keys: Option<Vec<_>> =
+            points.iter().map(|&point| Some(quantise.key(point)?.ancestor(level))).collect();
         keys.ok_or_else(|| self.point_without_voxel(points, &quantise))
     }
 
@@ -216,16 +187,9 @@ impl HostedMap {
                 "level {level} has {} voxels there, listed_voxels_max is {most}: ask for a region or a coarser level",
                 keys.len()
             );
-            return Err(ServiceError::new(
-                ErrorCode::ResourceExhausted,
-                "listing_too_large",
-                message,
-            ));
+            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "listing_too_large", message));
         }
-        Ok(VoxelListing {
-            keys,
-            state: self.state(view.revision()),
-        })
+        Ok(VoxelListing { keys, state: self.state(view.revision()) })
     }
 
     pub(super) fn trajectory(&self, robot: Option<&RobotName>) -> TrajectoryAnswer {
@@ -284,10 +248,6 @@ fn bitmap(words: Vec<u64>, points: usize) -> Bytes {
             bytemuck::cast_slice(&self.0)
         }
     }
-    let words = if cfg!(target_endian = "big") {
-        words.into_iter().map(u64::to_le).collect()
-    } else {
-        words
-    };
+    let words = if cfg!(target_endian = "big") { words.into_iter().map(u64::to_le).collect() } else { words };
     Bytes::from_owner(Owner(words)).slice(..points.div_ceil(8))
 }

@@ -41,12 +41,7 @@ impl Limits {
     /// # Errors
     /// When a request has no point, or more than `points_per_request_max`.
     pub(super) fn check_points(&self, points: usize) -> Result<(), ServiceError> {
-        within(
-            "points",
-            "points_per_request_max",
-            points,
-            self.points_per_request_max,
-        )
+        within("points", "points_per_request_max", points, self.points_per_request_max)
     }
 
     /// # Errors
@@ -58,10 +53,7 @@ impl Limits {
 
 fn within(field: &str, limit: &str, count: usize, most: usize) -> Result<(), ServiceError> {
     match count {
-        0 => Err(ServiceError::invalid(
-            "empty_batch",
-            format!("{field} must not be empty"),
-        )),
+        0 => Err(ServiceError::invalid("empty_batch", format!("{field} must not be empty"))),
         n if n > most => Err(ServiceError::invalid(
             "batch_too_large",
             format!("{field} has {n} entries, {limit} is {most}"),
@@ -76,18 +68,9 @@ mod tests {
 
     #[test]
     fn a_batch_is_bounded_on_both_sides_and_the_error_names_the_limit() {
-        let limits = Limits {
-            points_per_request_max: 10,
-            ..Limits::default()
-        };
+        let limits = Limits { points_per_request_max: 10, ..Limits::default() };
         assert!(limits.check_points(1).is_ok() && limits.check_points(10).is_ok());
-        assert!(
-            limits
-                .check_points(0)
-                .unwrap_err()
-                .message
-                .contains("points must not be empty")
-        );
+        assert!(limits.check_points(0).unwrap_err().message.contains("points must not be empty"));
         let error = limits.check_points(11).unwrap_err();
         assert!(error.message.contains("11") && error.message.contains("points_per_request_max is 10"));
     }

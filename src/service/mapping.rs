@@ -91,20 +91,12 @@ impl HostedMap {
         } else {
             align(&self.map, &scan.points, &guess, &settings.alignment)
         };
-        Ok(Placement {
-            alignment,
-            as_first: first && !request.at_guess,
-        })
+        Ok(Placement { alignment, as_first: first && !request.at_guess })
     }
 
     /// The pose that a guess stands for.
     fn resolve(&self, guess: &Guess, robot: &RobotName, first: bool) -> Result<Pose, ServiceError> {
-        let last = || {
-            self.map
-                .trajectory()
-                .last_of(robot)
-                .map(|pose| pose.map_from_sensor)
-        };
+        let last = || self.map.trajectory().last_of(robot).map(|pose| pose.map_from_sensor);
         let last_or_origin = || match last() {
             Some(pose) => Ok(pose),
             None if first => Ok(Pose::identity()),
@@ -113,11 +105,7 @@ impl HostedMap {
                     "guess required: robot {robot} has no accepted scan in map {}, which is not empty",
                     self.name
                 );
-                Err(ServiceError::new(
-                    ErrorCode::FailedPrecondition,
-                    "guess_required",
-                    message,
-                ))
+                Err(ServiceError::new(ErrorCode::FailedPrecondition, "guess_required", message))
             }
         };
         match guess {
@@ -148,15 +136,8 @@ impl HostedMap {
         if voxels < most {
             return Ok(());
         }
-        let message = format!(
-            "map {} has {voxels} voxels, voxels_per_map_max is {most}",
-            self.name
-        );
-        Err(ServiceError::new(
-            ErrorCode::ResourceExhausted,
-            "map_full",
-            message,
-        ))
+        let message = format!("map {} has {voxels} voxels, voxels_per_map_max is {most}", self.name);
+        Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message))
     }
 
     fn commit(
@@ -179,10 +160,7 @@ impl HostedMap {
             new_voxels: 0,
             digest: scan.digest,
         };
-        let committed = committer.insert_scan(ScanRecord {
-            pose: pose.clone(),
-            voxels,
-        });
+        let committed = committer.insert_scan(ScanRecord { pose: pose.clone(), voxels });
         self.announce(committed.revision);
         (pose.revision, pose.new_voxels) = (committed.revision, committed.voxels);
         self.answer_of(&pose, false)
@@ -219,13 +197,7 @@ impl HostedMap {
 
 /// An alignment that nobody had to find: the caller's word, or the first scan of the map.
 fn trusted(map_from_sensor: Pose, level_overlaps: Vec<f64>) -> Alignment {
-    Alignment {
-        map_from_sensor,
-        verdict: Verdict::Accepted,
-        level_overlaps,
-        iterations: 0,
-        lookups: 0,
-    }
+    Alignment { map_from_sensor, verdict: Verdict::Accepted, level_overlaps, iterations: 0, lookups: 0 }
 }
 
 impl<'a> UsableScan<'a> {
@@ -238,10 +210,7 @@ impl<'a> UsableScan<'a> {
         let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
         let not_finite = all.len() - points.len();
         if request.strict && not_finite > 0 {
-            let place = all
-                .iter()
-                .position(|point| !point.is_finite())
-                .unwrap_or_default();
+            let place = all.iter().position(|point| !point.is_finite()).unwrap_or_default();
             let message = format!("strict: points[{place}] is not finite, and {not_finite} points are not");
             return Err(ServiceError::invalid("point_not_finite", message));
         }
@@ -249,12 +218,7 @@ impl<'a> UsableScan<'a> {
             let message = format!("none of the scan's {not_finite} points is finite: nothing but no-returns");
             return Err(ServiceError::invalid("no_returns", message));
         }
-        Ok(Self {
-            request,
-            points,
-            not_finite,
-            digest: digest(request),
-        })
+        Ok(Self { request, points, not_finite, digest: digest(request) })
     }
 }
 
@@ -266,10 +230,7 @@ fn digest(request: &ScanRequest) -> u64 {
             [&translation_m(pose)[..], &rotation_xyzw(pose)[..]].concat()
         }
     };
-    let kind = [
-        u8::from(request.at_guess),
-        u8::from(matches!(request.guess, Guess::Motion(_))),
-    ];
+    let kind = [u8::from(request.at_guess), u8::from(matches!(request.guess, Guess::Motion(_)))];
     let checksum = crc32c::crc32c(bytemuck::cast_slice(request.points.as_slice()));
     let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(&guess));
     let checksum = crc32c::crc32c_append(checksum, &kind);

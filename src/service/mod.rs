@@ -49,10 +49,7 @@ impl MapService {
     /// # Errors
     /// When a setting is out of range, or a map on disk cannot be read: the error names the file.
     pub fn open(settings: ServiceSettings) -> Result<Self, ServiceError> {
-        settings
-            .alignment
-            .checked()
-            .map_err(|e| ServiceError::invalid("bad_settings", e.to_string()))?;
+        settings.alignment.checked().map_err(|e| ServiceError::invalid("bad_settings", e.to_string()))?;
         settings.filter.checked()?;
         let waiting = settings.limits.jobs_waiting_max;
         Ok(Self(Arc::new(Inner {
@@ -83,11 +80,7 @@ impl MapService {
         name: MapName,
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
-        let (map, created) = self
-            .0
-            .catalogue
-            .create(name, settings, self.limits().maps_max)
-            .await?;
+        let (map, created) = self.0.catalogue.create(name, settings, self.limits().maps_max).await?;
         Ok((self.describe(map).await?, created))
     }
 
@@ -162,10 +155,7 @@ impl MapService {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let inner = Arc::clone(&self.0);
-        self.0
-            .mapping
-            .run(move || map.align_scan(&scan, &inner.settings))
-            .await?
+        self.0.mapping.run(move || map.align_scan(&scan, &inner.settings)).await?
     }
 
     /// Takes voxels out, with all their descendants.
@@ -214,10 +204,7 @@ impl MapService {
         let map = self.map(map)?;
         map.check_level(level)?;
         let most = self.limits().listed_voxels_max;
-        self.0
-            .queries
-            .run(move || map.list(level, region.as_ref(), most))
-            .await?
+        self.0.queries.run(move || map.list(level, region.as_ref(), most)).await?
     }
 
     /// Writes the maps that changed since they were written last, each beside its old file and renamed; the

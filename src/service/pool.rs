@@ -30,11 +30,7 @@ impl Pool {
             .build()
             .map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
         let places = threads.current_num_threads() + jobs_waiting_max;
-        Ok(Self {
-            threads,
-            places: Semaphore::new(places).into(),
-            jobs_waiting_max,
-        })
+        Ok(Self { threads, places: Semaphore::new(places).into(), jobs_waiting_max })
     }
 
     /// Runs `job` on a thread of the pool, first come first served.
@@ -46,15 +42,9 @@ impl Pool {
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
         let Ok(place) = self.places.clone().try_acquire_owned() else {
-            let message = format!(
-                "jobs_waiting_max is {}: all places are taken, try again",
-                self.jobs_waiting_max
-            );
-            return Err(ServiceError::new(
-                ErrorCode::ResourceExhausted,
-                "overloaded",
-                message,
-            ));
+            let message =
+                format!("jobs_waiting_max is {}: all places are taken, try again", self.jobs_waiting_max);
+            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "overloaded", message));
         };
         let (answer, answered) = oneshot::channel();
         let span = tracing::Span::current();
@@ -67,11 +57,7 @@ impl Pool {
             }
         });
         answered.await.map_err(|_| {
-            ServiceError::new(
-                ErrorCode::Internal,
-                "job_panicked",
-                "the job failed by a defect of the server",
-            )
+            ServiceError::new(ErrorCode::Internal, "job_panicked", "the job failed by a defect of the server")
         })
     }
 }
@@ -110,11 +96,7 @@ mod tests {
     #[tokio::test]
     async fn a_job_that_panics_is_an_error_of_its_own() {
         let pool = Pool::new("test", 1, 1).unwrap();
-        let failed = pool
-            .run(|| panic!("a defect"))
-            .await
-            .map(|(): ()| ())
-            .unwrap_err();
+        let failed = pool.run(|| panic!("a defect")).await.map(|(): ()| ()).unwrap_err();
         assert_eq!(failed.code, ErrorCode::Internal);
         assert_eq!(pool.run(|| 1).await.unwrap(), 1);
     }

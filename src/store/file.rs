@@ -63,10 +63,7 @@ impl DataDir {
         let mut names = Vec::new();
         for entry in fs::read_dir(&self.maps).map_err(StoreError::io(&self.maps))? {
             let path = entry.map_err(StoreError::io(&self.maps))?.path();
-            let stem = path
-                .file_stem()
-                .and_then(|stem| stem.to_str())
-                .unwrap_or_default();
+            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
             if path.extension().is_some_and(|extension| extension == EXTENSION) {
                 names.extend(MapName::new(stem).ok());
             }

@@ -86,10 +86,7 @@ impl Snapshot {
     /// When it cannot be read, is no map, is damaged, or was written by a newer version.
     pub fn read(path: &Path) -> Result<Self, StoreError> {
         let bytes = std::fs::read(path).map_err(StoreError::io(path))?;
-        Self::decode(&bytes).map_err(|reason| StoreError::Damaged {
-            path: path.to_owned(),
-            reason,
-        })
+        Self::decode(&bytes).map_err(|reason| StoreError::Damaged { path: path.to_owned(), reason })
     }
 
     /// The file's bytes.
@@ -115,10 +112,7 @@ impl Snapshot {
     /// What is wrong with the bytes, and where.
     pub fn decode(bytes: &[u8]) -> Result<Self, String> {
         let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
-            format!(
-                "{} bytes are too few for a map file's header of {HEADER_BYTES}",
-                bytes.len()
-            )
+            format!("{} bytes are too few for a map file's header of {HEADER_BYTES}", bytes.len())
         })?;
         if &header[..8] != MAGIC {
             return Err("not a map file: it does not begin with MROL-MAP".into());
@@ -137,9 +131,7 @@ impl Snapshot {
         }
         let length = u64::from(u32_at(header, 16)) | u64::from(u32_at(header, 20)) << 32;
         if length > BODY_BYTES_MAX {
-            return Err(format!(
-                "a body of {length} bytes, at most {BODY_BYTES_MAX} are read"
-            ));
+            return Err(format!("a body of {length} bytes, at most {BODY_BYTES_MAX} are read"));
         }
         let body = zstd::bulk::decompress(&bytes[HEADER_BYTES..], length as usize)
             .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;
@@ -148,11 +140,7 @@ impl Snapshot {
     }
 
     fn to_message(&self) -> pb::Snapshot {
-        let masks = self
-            .voxels
-            .blocks()
-            .iter()
-            .flat_map(|(_, mask)| mask.to_le_bytes());
+        let masks = self.voxels.blocks().iter().flat_map(|(_, mask)| mask.to_le_bytes());
         pb::Snapshot {
             uuid: self.uuid.as_bytes().to_vec().into(),
             resolution_m: self.settings.resolution_m,
@@ -160,37 +148,22 @@ impl Snapshot {
             filter_hashes: self.settings.filter.hashes,
             filter_bits_per_voxel: self.settings.filter.bits_per_key,
             revision: self.revision,
-            block_keys: self
-                .voxels
-                .blocks()
-                .iter()
-                .map(|(key, _)| key.to_bits())
-                .collect(),
+            block_keys: self.voxels.blocks().iter().map(|(key, _)| key.to_bits()).collect(),
             block_masks: masks.collect::<Vec<u8>>().into(),
             trajectory: self.trajectory.iter().map(pose_to_message).collect(),
         }
     }
 
     fn from_message(message: pb::Snapshot) -> Result<Self, String> {
-        let filter = FilterSettings {
-            hashes: message.filter_hashes,
-            bits_per_key: message.filter_bits_per_voxel,
-        };
-        let settings = MapSettings {
-            resolution_m: message.resolution_m,
-            levels: message.levels,
-            filter,
-        };
+        let filter =
+            FilterSettings { hashes: message.filter_hashes, bits_per_key: message.filter_bits_per_voxel };
+        let settings = MapSettings { resolution_m: message.resolution_m, levels: message.levels, filter };
         Ok(Self {
             uuid: Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?,
             settings: settings.checked().map_err(|e| e.to_string())?,
             revision: message.revision,
             voxels: voxels_from(&message.block_keys, &message.block_masks)?,
-            trajectory: message
-                .trajectory
-                .into_iter()
-                .map(pose_from_message)
-                .collect::<Result<_, _>>()?,
+            trajectory: message.trajectory.into_iter().map(pose_from_message).collect::<Result<_, _>>()?,
         })
     }
 }
@@ -230,10 +203,7 @@ fn pose_to_message(pose: &TrajectoryPose) -> pb::ScanPose {
 
 fn pose_from_message(message: pb::ScanPose) -> Result<TrajectoryPose, String> {
     let [x, y, z, qx, qy, qz, qw] = message.map_from_sensor[..] else {
-        return Err(format!(
-            "a pose of {} numbers instead of 7",
-            message.map_from_sensor.len()
-        ));
+        return Err(format!("a pose of {} numbers instead of 7", message.map_from_sensor.len()));
     };
     let map_from_sensor = geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?;
     Ok(TrajectoryPose {

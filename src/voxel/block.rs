@@ -126,10 +126,7 @@ impl BlockMask {
 
     /// Number of occupied voxels at `level` (0, 1 or 2).
     pub fn count(&self, level: u32) -> usize {
-        self.0
-            .iter()
-            .map(|&word| first_of_each(word, level).count_ones() as usize)
-            .sum()
+        self.0.iter().map(|&word| first_of_each(word, level).count_ones() as usize).sum()
     }
 
     /// The occupied voxels at `level` (0, 1 or 2), each as the first cell it covers, ascending.

@@ -55,16 +55,12 @@ impl Lattice {
 
     /// The map-frame range of coordinates a voxel index can hold, metres: (inclusive, exclusive).
     pub fn range_m(&self) -> (f64, f64) {
-        (
-            f64::from(INDEX_MIN) * self.resolution_m,
-            (f64::from(INDEX_MAX) + 1.0) * self.resolution_m,
-        )
+        (f64::from(INDEX_MIN) * self.resolution_m, (f64::from(INDEX_MAX) + 1.0) * self.resolution_m)
     }
 
     /// Centre of voxel `key` of `level` in the map frame, metres.
     pub fn center_m(&self, key: VoxelKey, level: u32) -> [f64; 3] {
-        key.index()
-            .map(|i| (f64::from(i) + 0.5) * self.resolution_m(level))
+        key.index().map(|i| (f64::from(i) + 0.5) * self.resolution_m(level))
     }
 
     /// The transform from points of a frame placed at `map_from_points` to voxel indices.
@@ -115,9 +111,7 @@ impl LatticeFromPoints {
         };
         let q: [f32; 3] = std::array::from_fn(quantise);
         // Comparisons with NaN are false, so this refuses what is not finite too.
-        let in_range = q
-            .iter()
-            .all(|c| (Self::QUANTISED_MIN..Self::QUANTISED_END).contains(c));
+        let in_range = q.iter().all(|c| (Self::QUANTISED_MIN..Self::QUANTISED_END).contains(c));
         in_range.then(|| q.map(|c| c as i32))
     }
 
@@ -143,10 +137,7 @@ mod tests {
     fn points_that_no_voxel_holds_have_no_index() {
         let quantise = Lattice::new(1.0, 1).unwrap().from_map();
         let end = 1_048_576.0f32;
-        assert_eq!(
-            quantise.index(Point::new(-end, end - 1.0, 0.0)),
-            Some([INDEX_MIN, INDEX_MAX, 0])
-        );
+        assert_eq!(quantise.index(Point::new(-end, end - 1.0, 0.0)), Some([INDEX_MIN, INDEX_MAX, 0]));
         for bad in [end, -end - 1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             assert_eq!(quantise.index(Point::new(0.0, bad, 0.0)), None);
         }
@@ -154,12 +145,7 @@ mod tests {
 
     #[test]
     fn settings_out_of_range_are_named() {
-        assert!(
-            Lattice::new(0.0, 4)
-                .unwrap_err()
-                .to_string()
-                .contains("resolution_m")
-        );
+        assert!(Lattice::new(0.0, 4).unwrap_err().to_string().contains("resolution_m"));
         assert!(Lattice::new(f64::NAN, 4).is_err());
         assert!(Lattice::new(0.05, 13).unwrap_err().to_string().contains("levels"));
     }

@@ -10,7 +10,7 @@ mod set;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
 pub use block_table::BlockTable;
-pub(crate) use block_table::VACANT;
+pub(crate) use block_table::{BUCKET, Bucket, Slots};
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
 pub use sample::{VolumetricSample, volumetric_sample};

@@ -29,10 +29,7 @@ const BISECTIONS: usize = 16;
 /// a scan of at most `wish` points is returned whole.
 pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> VolumetricSample {
     if points.len() <= wish {
-        return VolumetricSample {
-            points: points.to_vec(),
-            resolution_m: 0.0,
-        };
+        return VolumetricSample { points: points.to_vec(), resolution_m: 0.0 };
     }
     let (mut fine_m, mut coarse_m) = (RESOLUTION_MIN_M, RESOLUTION_MAX_M);
     let mut best = Vec::new();
@@ -47,17 +44,10 @@ pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> Volumetric
         if count.abs_diff(wish) as f64 <= TOLERANCE * wish as f64 {
             break;
         }
-        if count > wish {
-            fine_m = middle_m
-        } else {
-            coarse_m = middle_m
-        }
+        if count > wish { fine_m = middle_m } else { coarse_m = middle_m }
     }
     best.sort_unstable();
-    VolumetricSample {
-        points: best.into_iter().map(|i| points[i as usize]).collect(),
-        resolution_m,
-    }
+    VolumetricSample { points: best.into_iter().map(|i| points[i as usize]).collect(), resolution_m }
 }
 
 /// The place in the scan of one point of each voxel of a lattice of `resolution_m`.
@@ -112,10 +102,7 @@ mod tests {
         };
         assert!(near(&wall()) > 0.8);
         let sampled = near(&volumetric_sample(&wall(), 1000, 1).points);
-        assert!(
-            (0.4..0.65).contains(&sampled),
-            "{sampled} of the sample lies in the near half"
-        );
+        assert!((0.4..0.65).contains(&sampled), "{sampled} of the sample lies in the near half");
     }
 
     #[test]

@@ -71,9 +71,7 @@ impl VoxelSet {
 
     /// The finest voxels, block by block.
     pub fn iter(&self) -> impl Iterator<Item = VoxelKey> + '_ {
-        self.blocks
-            .iter()
-            .flat_map(|(block, mask)| mask.cells(0).map(|cell| cell.voxel(*block)))
+        self.blocks.iter().flat_map(|(block, mask)| mask.cells(0).map(|cell| cell.voxel(*block)))
     }
 }
 
@@ -135,11 +133,7 @@ mod tests {
 
     #[test]
     fn points_without_a_voxel_are_counted() {
-        let points = [
-            Point::new(f32::NAN, 0.0, 0.0),
-            Point::new(0.1, 0.1, 0.1),
-            Point::new(1e9, 0.0, 0.0),
-        ];
+        let points = [Point::new(f32::NAN, 0.0, 0.0), Point::new(0.1, 0.1, 0.1), Point::new(1e9, 0.0, 0.0)];
         let (set, skipped) = VoxelSet::of_points(&points, &Lattice::new(1.0, 1).unwrap().from_map());
         assert_eq!((set.len(), skipped), (1, 2));
     }

@@ -11,14 +11,11 @@ use super::{LevelView, Lookup};
 use crate::bloom::{HASH_A, HASH_B, HASH_C};
 use crate::geometry::Point;
 use crate::map::sharding::SHARDS;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, Cell, LatticeFromPoints, VACANT};
+use crate::voxel::{BLOCK_LEVELS, BUCKET, BlockMask, Bucket, Cell, LatticeFromPoints, Slots};
 
 /// Points a step: one f32 register an axis.
 const LANES: usize = 16;
-const _: () = assert!(
-    SHARDS == LANES,
-    "descriptors of all shards fill two registers of eight"
-);
+const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
 
 /// True when the machine can run this module.
 pub(super) fn is_available() -> bool {
@@ -34,36 +31,69 @@ pub(super) fn occupied(
     occupied: &mut [u64],
 ) -> bool {
     debug_assert!(is_available());
+    let far = view.bytes(lookup) > NEAR_BYTES;
     // SAFETY: the caller checked for the features; `occupied` holds a bit a point (asserted by our caller).
     unsafe {
-        match (lookup, view.hashes) {
-            (Lookup::Exact, _) => run::<Exact>(points, lattice_from_points, view, occupied),
-            (Lookup::Bloom, 2) => run::<Bloom<2>>(points, lattice_from_points, view, occupied),
-            (Lookup::Bloom, _) => run::<Bloom<0>>(points, lattice_from_points, view, occupied),
+        match (lookup, view.hashes, far) {
+            (Lookup::Exact, _, false) => run::<Exact, false>(points, lattice_from_points, view, occupied),
+            (Lookup::Exact, _, true) => run::<Exact, true>(points, lattice_from_points, view, occupied),
+            (Lookup::Bloom, 2, false) => run::<Bloom<2>, false>(points, lattice_from_points, view, occupied),
+            (Lookup::Bloom, 2, true) => run::<Bloom<2>, true>(points, lattice_from_points, view, occupied),
+            (Lookup::Bloom, _, _) => run::<Bloom<0>, true>(points, lattice_from_points, view, occupied),
         }
     }
 }
 
-/// How the voxels of eight points are looked up.
+/// Structures up to this size are taken to lie in the core's own caches, where a prefetch only costs.
+const NEAR_BYTES: usize = 1 << 20;
+
+/// How the voxels of sixteen points are looked up, in steps with at most one cache miss a point each.
+///
+/// Where the structure is far larger than the caches, [`run`] takes the steps of different points in turn, 64
+/// points apart, and each step only starts the fetch that the next one needs: some hundred misses are on their
+/// way at once. Out-of-order execution alone reaches over two or three groups of sixteen.
 trait Probe {
     /// What the probe keeps in registers.
-    type Registers;
+    type Registers<'a>;
+    /// Where to look first.
+    type Located: Copy;
+    /// Where the answers are.
+    type Found: Copy;
 
     /// # Safety
     /// Needs AVX-512 F and DQ.
-    unsafe fn load(view: &LevelView<'_>) -> Self::Registers;
+    unsafe fn load<'a>(view: &'a LevelView<'_>) -> Self::Registers<'a>;
 
-    /// A bit for each of sixteen voxels of the view's level: is it occupied?
+    /// Computes where to look for sixteen voxels of the view's level.
     ///
     /// # Safety
-    /// Needs AVX-512 F and DQ; `registers` must come from a view that still lives.
-    unsafe fn look_up(registers: &Self::Registers, index: [__m512i; 3], shard: __m512i) -> u16;
+    /// Needs AVX-512 F and DQ.
+    unsafe fn locate<const FAR: bool>(
+        r: &Self::Registers<'_>,
+        index: [__m512i; 3],
+        shard: __m512i,
+    ) -> Self::Located;
+
+    /// Looks there for where the answers are.
+    ///
+    /// # Safety
+    /// Needs AVX-512 F and DQ; the view must still live.
+    unsafe fn find<const FAR: bool>(r: &Self::Registers<'_>, located: Self::Located) -> Self::Found;
+
+    /// A bit for each of the sixteen: is it occupied?
+    ///
+    /// # Safety
+    /// Needs AVX-512 F and DQ; the view must still live.
+    unsafe fn answer(r: &Self::Registers<'_>, found: Self::Found) -> u16;
 }
+
+/// Sixteens of points in a word of answers.
+const GROUPS: usize = 64 / LANES;
 
 /// # Safety
 /// Needs AVX-512 F and DQ, and a word of `occupied` for each 64 points.
 #[target_feature(enable = "avx512f,avx512dq")]
-unsafe fn run<P: Probe>(
+unsafe fn run<P: Probe, const FAR: bool>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
@@ -71,26 +101,107 @@ unsafe fn run<P: Probe>(
 ) -> bool {
     // SAFETY: loads stay within `points` or the padded tail; the rest needs only the features.
     unsafe {
-        let quantise = Quantise::load(lattice_from_points);
-        let registers = P::load(view);
-        let level = _mm_cvtsi32_si128(view.level as i32);
-        let region_shift = _mm_cvtsi32_si128(view.region_shift as i32);
-        let mut all_valid = true;
-        for (points, word) in points.chunks(64).zip(occupied) {
-            let mut bits = 0;
+        let place = Place::load(lattice_from_points, view);
+        let r = P::load(view);
+        let mut all_have_a_voxel = true;
+        let mut locate = |points: &[Point]| {
+            let mut has_voxel = 0;
+            let mut located = [None; GROUPS];
             for (group, points) in points.chunks(LANES).enumerate() {
-                let [a, b, c] = load(points);
-                let (index, valid) = quantise.index(deinterleave(a, b, c));
-                let index = index.map(|i| _mm512_sra_epi32(i, level));
-                let shard = shard(index.map(|i| _mm512_sra_epi32(i, region_shift)));
+                let (index, shard, valid) = place.of(points);
                 let present = ((1u32 << points.len()) - 1) as u16;
-                all_valid &= valid & present == present;
-                let hits = P::look_up(&registers, index, shard) & valid & present;
-                bits |= u64::from(hits) << (group * LANES);
+                all_have_a_voxel &= valid & present == present;
+                has_voxel |= u64::from(valid & present) << (group * LANES);
+                located[group] = Some(P::locate::<FAR>(&r, index, shard));
             }
-            *word = bits;
+            (located, has_voxel)
+        };
+        let find = |(located, has_voxel): ([Option<P::Located>; GROUPS], u64)| {
+            let mut found = [None; GROUPS];
+            for (found, located) in found.iter_mut().zip(located) {
+                if let Some(located) = located {
+                    *found = Some(P::find::<FAR>(&r, located));
+                }
+            }
+            (found, has_voxel)
+        };
+        let answer = |(found, has_voxel): ([Option<P::Found>; GROUPS], u64)| {
+            let mut hits = 0;
+            for (group, found) in found.into_iter().enumerate() {
+                if let Some(found) = found {
+                    hits |= u64::from(P::answer(&r, found)) << (group * LANES);
+                }
+            }
+            hits & has_voxel
+        };
+        let mut words = points.chunks(64);
+        if !FAR {
+            for (word, points) in occupied.iter_mut().zip(words) {
+                *word = answer(find(locate(points)));
+            }
+            return all_have_a_voxel;
         }
-        all_valid
+        let mut located = words.next().map(&mut locate);
+        let mut found = located.take().map(&find);
+        located = words.next().map(&mut locate);
+        for word in occupied {
+            let Some(ready) = found else { break };
+            let next = words.next().map(&mut locate);
+            found = located.map(&find);
+            located = next;
+            *word = answer(ready);
+        }
+        all_have_a_voxel
+    }
+}
+
+/// From points to indices of a level and shards.
+struct Place {
+    quantise: Quantise,
+    level: __m128i,
+    region_shift: __m128i,
+}
+
+impl Place {
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn load(lattice_from_points: &LatticeFromPoints, view: &LevelView<'_>) -> Self {
+        Self {
+            quantise: Quantise::load(lattice_from_points),
+            level: _mm_cvtsi32_si128(view.level as i32),
+            region_shift: _mm_cvtsi32_si128(view.region_shift as i32),
+        }
+    }
+
+    /// Indices, shards, and a bit for each of up to sixteen points that has them.
+    ///
+    /// # Safety
+    /// Needs AVX-512 F.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    unsafe fn of(&self, points: &[Point]) -> ([__m512i; 3], __m512i, u16) {
+        // SAFETY: the feature is there.
+        let [a, b, c] = unsafe { load(points) };
+        let (index, valid) = self.quantise.index(deinterleave(a, b, c));
+        let index = index.map(|i| _mm512_sra_epi32(i, self.level));
+        (index, shard(index.map(|i| _mm512_sra_epi32(i, self.region_shift))), valid)
+    }
+}
+
+/// Starts fetching the lines at eight addresses.
+///
+/// # Safety
+/// Needs AVX-512 F. Any address will do: a prefetch never faults.
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn prefetch(addresses: __m512i) {
+    let mut each = [0u64; 8];
+    // SAFETY: a register is eight u64.
+    unsafe {
+        _mm512_storeu_si512(each.as_mut_ptr().cast(), addresses);
+        for address in each {
+            _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(address as usize));
+        }
     }
 }
 
@@ -129,11 +240,8 @@ const fn deinterleave_index(axis: usize) -> [[i32; LANES]; 2] {
     index
 }
 
-const DEINTERLEAVE: [[[i32; LANES]; 2]; 3] = [
-    deinterleave_index(0),
-    deinterleave_index(1),
-    deinterleave_index(2),
-];
+const DEINTERLEAVE: [[[i32; LANES]; 2]; 3] =
+    [deinterleave_index(0), deinterleave_index(1), deinterleave_index(2)];
 
 /// x y z x y z ... in three registers to x, y and z in one each.
 #[inline]
@@ -276,11 +384,14 @@ struct BloomRegisters {
 }
 
 impl<const HASHES: u32> Probe for Bloom<HASHES> {
-    type Registers = BloomRegisters;
+    type Registers<'a> = BloomRegisters;
+    /// Addresses of words of the planes, and the bits that count there; eight voxels a register.
+    type Located = ([__m512i; 2], [__m512i; 2]);
+    type Found = Self::Located;
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
+    unsafe fn load<'a>(view: &'a LevelView<'_>) -> BloomRegisters {
         BloomRegisters {
             plane: PerShard::load(addresses(view.planes)),
             words: PerShard::load(lengths(view.planes)),
@@ -290,78 +401,223 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn look_up(r: &BloomRegisters, index: [__m512i; 3], shard: __m512i) -> u16 {
+    unsafe fn locate<const FAR: bool>(
+        r: &BloomRegisters,
+        index: [__m512i; 3],
+        shard: __m512i,
+    ) -> Self::Located {
         let (keys, shards) = (pack(index), widen(shard));
         let hashes = if HASHES == 0 { r.hashes } else { HASHES };
-        let half = |i: usize| {
-            let h = mix(keys[i], HASH_A, HASH_B);
-            let word = scale(h, r.words.of(shards[i]));
-            let address = _mm512_add_epi64(r.plane.of(shards[i]), _mm512_slli_epi64::<3>(word));
-            // SAFETY: word < words of the shard's plane, which the view keeps alive.
-            let plane = unsafe { _mm512_i64gather_epi64::<1>(address, std::ptr::null()) };
-            let one = _mm512_set1_epi64(1);
-            let mut g = _mm512_mul_epu32(h, _mm512_set1_epi64(HASH_C as i64));
-            let mut mask = _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g));
-            for _ in 1..hashes {
-                g = _mm512_slli_epi64::<6>(g);
-                mask = _mm512_or_si512(mask, _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g)));
+        let (a, b) = (r.word_of(keys[0], shards[0], hashes), r.word_of(keys[1], shards[1], hashes));
+        if FAR {
+            // SAFETY: a prefetch never faults.
+            unsafe {
+                prefetch(a.0);
+                prefetch(b.0);
             }
-            u16::from(_mm512_cmpeq_epi64_mask(_mm512_and_si512(plane, mask), mask))
-        };
-        half(0) | half(1) << 8
+        }
+        ([a.0, b.0], [a.1, b.1])
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn find<const FAR: bool>(_: &BloomRegisters, located: Self::Located) -> Self::Found {
+        located
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn answer(_: &BloomRegisters, (addresses, masks): Self::Found) -> u16 {
+        // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
+        let words = unsafe { gather(addresses) };
+        let hit =
+            |half: usize| _mm512_cmpeq_epi64_mask(_mm512_and_si512(words[half], masks[half]), masks[half]);
+        u16::from(hit(0)) | u16::from(hit(1)) << 8
+    }
+}
+
+impl BloomRegisters {
+    /// The twin of `bloom::Probe::of` for eight keys: addresses of words, and masks.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn word_of(&self, key: __m512i, shard: __m512i, hashes: u32) -> (__m512i, __m512i) {
+        let h = mix(key, HASH_A, HASH_B);
+        let word = scale(h, self.words.of(shard));
+        let address = _mm512_add_epi64(self.plane.of(shard), _mm512_slli_epi64::<3>(word));
+        let one = _mm512_set1_epi64(1);
+        let mut g = _mm512_mul_epu32(h, _mm512_set1_epi64(HASH_C as i64));
+        let mut mask = _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g));
+        for _ in 1..hashes {
+            g = _mm512_slli_epi64::<6>(g);
+            mask = _mm512_or_si512(mask, _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g)));
+        }
+        (address, mask)
+    }
+}
+
+/// The u64 at each of sixteen addresses.
+///
+/// # Safety
+/// Needs AVX-512 F; each address must be of a u64 that may be read.
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn gather([a, b]: [__m512i; 2]) -> [__m512i; 2] {
+    // SAFETY: as for this function.
+    unsafe {
+        let base = std::ptr::null();
+        [_mm512_i64gather_epi64::<1>(a, base), _mm512_i64gather_epi64::<1>(b, base)]
     }
 }
 
 /// The table of blocks.
 struct Exact;
 
-struct ExactRegisters {
+struct ExactRegisters<'a> {
+    view: &'a LevelView<'a>,
     keys: PerShard,
     masks: PerShard,
-    slots: PerShard,
-    up: u32,
+    buckets: PerShard,
 }
 
+/// Sixteen voxels on their way through the table; one at a time from here on, since each is compared with all
+/// eight keys of its bucket at once.
+#[derive(Clone, Copy)]
+struct LocatedBlocks {
+    blocks: [u64; LANES],
+    shards: [u64; LANES],
+    /// Addresses of the home buckets.
+    buckets: [u64; LANES],
+    /// Addresses of the voxels' words in the masks of the first slots of those buckets.
+    words: [u64; LANES],
+    /// The bits that count in those words.
+    within: [__m512i; 2],
+}
+
+/// What a voxel of an absent block reads.
+static NO_VOXELS: u64 = 0;
+
 impl Probe for Exact {
-    type Registers = ExactRegisters;
+    type Registers<'a> = ExactRegisters<'a>;
+    type Located = LocatedBlocks;
+    /// Addresses of words of masks, and the bits that count there.
+    type Found = ([u64; LANES], [__m512i; 2]);
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn load(view: &LevelView<'_>) -> ExactRegisters {
+    unsafe fn load<'a>(view: &'a LevelView<'_>) -> ExactRegisters<'a> {
         ExactRegisters {
-            keys: PerShard::load(addresses(view.blocks.map(|(keys, _)| keys))),
-            masks: PerShard::load(addresses(view.blocks.map(|(_, masks)| masks))),
-            slots: PerShard::load(lengths(view.blocks.map(|(keys, _)| keys))),
-            up: view.up,
+            view,
+            keys: PerShard::load(addresses(view.blocks.map(|slots| slots.keys))),
+            masks: PerShard::load(addresses(view.blocks.map(|slots| slots.masks))),
+            buckets: PerShard::load(lengths(view.blocks.map(|slots| slots.keys))),
         }
     }
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn look_up(r: &ExactRegisters, index: [__m512i; 3], shard: __m512i) -> u16 {
-        let up = _mm_cvtsi32_si128(r.up as i32);
-        let to_block = _mm_cvtsi32_si128((BLOCK_LEVELS - r.up) as i32);
-        let blocks = pack(index.map(|i| _mm512_sra_epi32(i, to_block)));
-        let (cells, shards) = (widen(cell(index.map(|i| _mm512_sll_epi32(i, up)))), widen(shard));
-        let half = |i: usize| {
-            let slots = r.slots.of(shards[i]);
-            let keys = r.keys.of(shards[i]);
-            // SAFETY: `keys` and `slots` describe the tables of the view, each with a vacant slot.
-            let (slot, found) = unsafe { find(blocks[i], keys, slots) };
-            let word = _mm512_srli_epi64::<6>(cells[i]);
-            let offset = _mm512_add_epi64(_mm512_slli_epi64::<6>(slot), _mm512_slli_epi64::<3>(word));
-            let address = _mm512_add_epi64(r.masks.of(shards[i]), offset);
-            // SAFETY: a found slot has a mask of eight words, of which this is one.
-            let voxels = unsafe {
-                _mm512_mask_i64gather_epi64::<1>(_mm512_setzero_si512(), found, address, std::ptr::null())
-            };
-            u16::from(_mm512_test_epi64_mask(voxels, within(cells[i], r.up)))
+    unsafe fn locate<const FAR: bool>(
+        r: &ExactRegisters<'_>,
+        index: [__m512i; 3],
+        shard: __m512i,
+    ) -> LocatedBlocks {
+        let up = r.view.up;
+        let (left, right) = (_mm_cvtsi32_si128(up as i32), _mm_cvtsi32_si128((BLOCK_LEVELS - up) as i32));
+        let blocks = pack(index.map(|i| _mm512_sra_epi32(i, right)));
+        let cells = widen(cell(index.map(|i| _mm512_sll_epi32(i, left))));
+        let shards = widen(shard);
+        let bucket = |half: usize| {
+            let h = mix(blocks[half], Slots::HASH_A, Slots::HASH_B);
+            let bucket = scale(h, r.buckets.of(shards[half]));
+            let keys = _mm512_add_epi64(r.keys.of(shards[half]), _mm512_slli_epi64::<6>(bucket));
+            // A bucket's masks are 8 x 64 bytes.
+            let masks = _mm512_add_epi64(r.masks.of(shards[half]), _mm512_slli_epi64::<9>(bucket));
+            let word = _mm512_slli_epi64::<3>(_mm512_srli_epi64::<6>(cells[half]));
+            (keys, _mm512_add_epi64(masks, word))
         };
-        half(0) | half(1) << 8
+        let (a, b) = (bucket(0), bucket(1));
+        if FAR {
+            // SAFETY: a prefetch never faults.
+            unsafe {
+                prefetch(a.0);
+                prefetch(b.0);
+            }
+        }
+        LocatedBlocks {
+            blocks: to_array(blocks),
+            shards: to_array(shards),
+            buckets: to_array([a.0, b.0]),
+            words: to_array([a.1, b.1]),
+            within: [within(cells[0], up), within(cells[1], up)],
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn find<const FAR: bool>(r: &ExactRegisters<'_>, located: LocatedBlocks) -> Self::Found {
+        let mut words = located.words;
+        for lane in 0..LANES {
+            let block = located.blocks[lane];
+            // SAFETY: the address is of a bucket of a shard's table, which the view keeps alive.
+            let keys = unsafe {
+                _mm512_loadu_si512(std::ptr::with_exposed_provenance(located.buckets[lane] as usize))
+            };
+            let equal = _mm512_cmpeq_epi64_mask(keys, _mm512_set1_epi64(block as i64));
+            let in_slot =
+                located.words[lane] + u64::from(equal.trailing_zeros()) * size_of::<BlockMask>() as u64;
+            let absent = (&raw const NO_VOXELS).expose_provenance() as u64;
+            words[lane] = if equal != 0 { in_slot } else { absent };
+            let full = _mm512_movepi64_mask(keys) & 0x80 == 0;
+            if equal == 0 && full {
+                words[lane] =
+                    r.find_beyond(block, located.shards[lane], located.words[lane]).unwrap_or(absent);
+            }
+            if FAR {
+                _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(words[lane] as usize));
+            }
+        }
+        (words, located.within)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn answer(_: &ExactRegisters<'_>, (words, within): Self::Found) -> u16 {
+        // SAFETY: sixteen u64 are two registers; each is the address of a word of a mask that the view keeps alive,
+        // or of `NO_VOXELS`.
+        let voxels = unsafe {
+            let [a, b] = [0, 8].map(|i| _mm512_loadu_si512(words[i..].as_ptr().cast()));
+            gather([a, b])
+        };
+        let hit = |half: usize| _mm512_test_epi64_mask(voxels[half], within[half]);
+        u16::from(hit(0)) | u16::from(hit(1)) << 8
     }
 }
 
-const _: () = assert!(size_of::<BlockMask>() == 64, "a slot's mask starts at slot << 6");
+impl ExactRegisters<'_> {
+    /// The address of a voxel's word where its block is not in its home bucket, which is full. `home_word` is what
+    /// it would be in the home bucket's first slot.
+    #[cold]
+    fn find_beyond(&self, block: u64, shard: u64, home_word: u64) -> Option<u64> {
+        let slots = self.view.blocks[shard as usize];
+        let first_slot = Slots::home(block, slots.keys.len()) * BUCKET;
+        let slot = slots.find(block)?;
+        let moved = (slot as u64).wrapping_sub(first_slot as u64).wrapping_mul(size_of::<BlockMask>() as u64);
+        Some(home_word.wrapping_add(moved))
+    }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn to_array(registers: [__m512i; 2]) -> [u64; LANES] {
+    let mut array = [0; LANES];
+    for (half, register) in array.chunks_exact_mut(8).zip(registers) {
+        // SAFETY: eight u64 are one register.
+        unsafe { _mm512_storeu_si512(half.as_mut_ptr().cast(), register) };
+    }
+    array
+}
+
+const _: () =
+    assert!(size_of::<Bucket>() == 64 && size_of::<BlockMask>() == 64, "as the shifts above take them");
 
 /// The twin of [`Cell::of`], for sixteen indices.
 #[inline]
@@ -378,10 +634,7 @@ fn cell(index: [__m512i; 3]) -> __m512i {
         spread
     };
     let [x, y, z] = index.map(|i| _mm512_permutexvar_epi32(i, lanes(&SPREAD)));
-    _mm512_or_si512(
-        x,
-        _mm512_or_si512(_mm512_slli_epi32::<1>(y), _mm512_slli_epi32::<2>(z)),
-    )
+    _mm512_or_si512(x, _mm512_or_si512(_mm512_slli_epi32::<1>(y), _mm512_slli_epi32::<2>(z)))
 }
 
 /// The twin of `BlockMask::within`.
@@ -389,41 +642,8 @@ fn cell(index: [__m512i; 3]) -> __m512i {
 #[target_feature(enable = "avx512f")]
 fn within(cell: __m512i, up: u32) -> __m512i {
     match up {
-        0 => _mm512_sllv_epi64(
-            _mm512_set1_epi64(1),
-            _mm512_and_si512(cell, _mm512_set1_epi64(63)),
-        ),
-        1 => _mm512_sllv_epi64(
-            _mm512_set1_epi64(0xff),
-            _mm512_and_si512(cell, _mm512_set1_epi64(0b11_1000)),
-        ),
+        0 => _mm512_sllv_epi64(_mm512_set1_epi64(1), _mm512_and_si512(cell, _mm512_set1_epi64(63))),
+        1 => _mm512_sllv_epi64(_mm512_set1_epi64(0xff), _mm512_and_si512(cell, _mm512_set1_epi64(0b11_1000))),
         _ => _mm512_set1_epi64(-1),
-    }
-}
-
-/// The slots of eight blocks in tables of `slots` slots at addresses `keys`, and which of them were found: the
-/// twin of `BlockTable::find`.
-///
-/// # Safety
-/// Needs the features; each table must have its `slots` keys and at least one vacant slot.
-#[inline]
-#[target_feature(enable = "avx512f,avx512dq")]
-unsafe fn find(block: __m512i, keys: __m512i, slots: __m512i) -> (__m512i, __mmask8) {
-    let vacant = _mm512_set1_epi64(VACANT as i64);
-    let mut slot = scale(mix(block, BlockTable::HASH_A, BlockTable::HASH_B), slots);
-    let mut found = 0;
-    let mut searching = 0xff;
-    loop {
-        let address = _mm512_add_epi64(keys, _mm512_slli_epi64::<3>(slot));
-        // SAFETY: slot < slots in every lane that is still searching.
-        let key = unsafe { _mm512_mask_i64gather_epi64::<1>(vacant, searching, address, std::ptr::null()) };
-        found |= _mm512_mask_cmpeq_epi64_mask(searching, key, block);
-        searching &= _mm512_cmpneq_epi64_mask(key, block) & _mm512_cmpneq_epi64_mask(key, vacant);
-        if searching == 0 {
-            return (slot, found);
-        }
-        let next = _mm512_add_epi64(slot, _mm512_set1_epi64(1));
-        let next = _mm512_maskz_mov_epi64(_mm512_cmpneq_epi64_mask(next, slots), next);
-        slot = _mm512_mask_mov_epi64(slot, searching, next);
     }
 }

@@ -12,7 +12,7 @@ mod tests;
 use super::OccupiedVoxelList;
 use super::sharding::SHARDS;
 use crate::geometry::Point;
-use crate::voxel::{BlockMask, LatticeFromPoints, VACANT};
+use crate::voxel::{LatticeFromPoints, Slots};
 
 /// Which of the two structures of a level answers (paper II).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,8 +39,8 @@ impl Lookup {
 pub struct LevelView<'a> {
     /// Bit planes of the level's filters.
     planes: [&'a [u64]; SHARDS],
-    /// Keys and masks of the tables that serve the level.
-    blocks: [(&'a [u64], &'a [BlockMask]); SHARDS],
+    /// Slots of the tables that serve the level.
+    blocks: [Slots<'a>; SHARDS],
     hashes: u32,
     level: u32,
     /// How many levels up in its block a voxel of the level is.
@@ -59,17 +59,23 @@ impl<'a> LevelView<'a> {
         list: impl Fn(usize) -> Option<OccupiedVoxelList<'a>>,
     ) -> Self {
         const NO_PLANE: &[u64] = &[0];
-        const NO_KEYS: &[u64] = &[VACANT];
-        const NO_MASKS: &[BlockMask] = &[BlockMask::EMPTY];
         Self {
             planes: std::array::from_fn(|i| list(i).map_or(NO_PLANE, |list| list.filter().plane())),
-            blocks: std::array::from_fn(|i| {
-                list(i).map_or((NO_KEYS, NO_MASKS), |list| list.blocks().slots())
-            }),
+            blocks: std::array::from_fn(|i| list(i).map_or(Slots::NONE, |list| list.blocks().slots())),
             hashes,
             level,
             up,
             region_shift,
+        }
+    }
+}
+
+impl LevelView<'_> {
+    /// Bytes that look-ups of this kind may read.
+    fn bytes(&self, lookup: Lookup) -> usize {
+        match lookup {
+            Lookup::Bloom => self.planes.iter().map(|plane| size_of_val(*plane)).sum(),
+            Lookup::Exact => self.blocks.iter().map(|slots| size_of_val(slots.masks)).sum(),
         }
     }
 }
@@ -89,11 +95,7 @@ pub fn occupied(
     lookup: Lookup,
     occupied: &mut [u64],
 ) -> bool {
-    assert_eq!(
-        occupied.len(),
-        points.len().div_ceil(64),
-        "one word of answers for each 64 points"
-    );
+    assert_eq!(occupied.len(), points.len().div_ceil(64), "one word of answers for each 64 points");
     #[cfg(target_arch = "x86_64")]
     if avx512::is_available() {
         return avx512::occupied(points, lattice_from_points, view, lookup, occupied);

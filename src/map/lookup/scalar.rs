@@ -5,7 +5,7 @@ use super::{LevelView, Lookup};
 use crate::bloom::Probe;
 use crate::geometry::Point;
 use crate::map::sharding::shard_of_region;
-use crate::voxel::{BlockTable, Cell, LatticeFromPoints, VACANT, VoxelKey};
+use crate::voxel::{Cell, LatticeFromPoints, VoxelKey};
 
 /// See [`super::occupied`].
 pub(super) fn occupied(
@@ -46,14 +46,6 @@ fn bloom(view: &LevelView<'_>, index: [i32; 3]) -> bool {
 
 #[inline(always)]
 fn exact(view: &LevelView<'_>, index: [i32; 3]) -> bool {
-    let (keys, masks) = view.blocks[shard(view, index)];
     let (block, cell) = Cell::of(index.map(|i| i << view.up));
-    let mut slot = BlockTable::home(block.to_bits(), keys.len());
-    loop {
-        match keys[slot] {
-            key if key == block.to_bits() => return masks[slot].contains(cell, view.up),
-            VACANT => return false,
-            _ => slot = if slot + 1 == keys.len() { 0 } else { slot + 1 },
-        }
-    }
+    view.blocks[shard(view, index)].contains(block, cell, view.up)
 }

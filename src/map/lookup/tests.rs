@@ -26,17 +26,11 @@ fn assert_twins(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
     for (name, kernel) in wide_kernels() {
         for level in 0..map.settings().levels {
             for lookup in [Lookup::Exact, Lookup::Bloom] {
-                let (mut expected, mut found) = (
-                    vec![0; points.len().div_ceil(64)],
-                    vec![7; points.len().div_ceil(64)],
-                );
+                let (mut expected, mut found) =
+                    (vec![0; points.len().div_ceil(64)], vec![7; points.len().div_ceil(64)]);
                 let level_view = view.level_view(level);
                 let all = scalar::occupied(points, &quantise, &level_view, lookup, &mut expected);
-                assert_eq!(
-                    kernel(points, &quantise, &level_view, lookup, &mut found),
-                    all,
-                    "{name}"
-                );
+                assert_eq!(kernel(points, &quantise, &level_view, lookup, &mut found), all, "{name}");
                 assert_eq!(found, expected, "{name}, level {level}, {lookup:?}");
             }
         }
@@ -60,10 +54,7 @@ fn index() -> impl Strategy<Value = [i32; 3]> {
 
 /// Points in, on the borders of and beside the voxels of 0.5 m, and some that no voxel holds.
 fn point() -> impl Strategy<Value = Point> {
-    let on_lattice = (
-        index(),
-        prop::array::uniform3(prop::sample::select(vec![0.0f32, 0.25, 0.499_999])),
-    );
+    let on_lattice = (index(), prop::array::uniform3(prop::sample::select(vec![0.0f32, 0.25, 0.499_999])));
     prop_oneof![
         20 => on_lattice.prop_map(|(i, d)| Point::new(
             i[0] as f32 * 0.5 + d[0], i[1] as f32 * 0.5 + d[1], i[2] as f32 * 0.5 + d[2])),

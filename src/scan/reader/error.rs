@@ -76,18 +76,12 @@ pub(in crate::scan) struct Problem {
 impl Problem {
     /// A problem of the whole content, or one that `text` places by byte or element.
     pub(in crate::scan) fn new(text: impl Into<String>) -> Self {
-        Self {
-            line: None,
-            text: text.into(),
-        }
+        Self { line: None, text: text.into() }
     }
 
     /// A problem of `line`, counted from 1.
     pub(in crate::scan) fn at_line(line: usize, text: impl Into<String>) -> Self {
-        Self {
-            line: Some(line),
-            text: text.into(),
-        }
+        Self { line: Some(line), text: text.into() }
     }
 
     /// The error that names the file at `path`.

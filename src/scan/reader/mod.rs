@@ -37,10 +37,8 @@ const EXTENSIONS: [&str; 4] = [".ply", ".pcd", ".xyz", ".f32"];
 /// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
 /// the error names the file and the line, byte or element.
 pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
-    let format = Format::of(path).ok_or_else(|| ReadError::Extension {
-        path: path.to_owned(),
-        extension: extension(path),
-    })?;
+    let format = Format::of(path)
+        .ok_or_else(|| ReadError::Extension { path: path.to_owned(), extension: extension(path) })?;
     let bytes = read_file(path)?;
     format.points(&bytes).map_err(|problem| problem.in_file(path))
 }
@@ -70,9 +68,7 @@ fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
         }
     }
     if files.is_empty() {
-        return Err(ReadError::Empty {
-            path: directory.to_owned(),
-        });
+        return Err(ReadError::Empty { path: directory.to_owned() });
     }
     files.sort();
     Ok(files)
@@ -80,30 +76,20 @@ fn files_of_directory(directory: &Path) -> Result<Vec<PathBuf>, ReadError> {
 
 /// The content of the file at `path`, at most [`FILE_BYTES_MAX`] whatever its metadata says.
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let too_large = || ReadError::TooLarge {
-        path: path.to_owned(),
-    };
+    let too_large = || ReadError::TooLarge { path: path.to_owned() };
     let file = File::open(path).map_err(ReadError::io(path))?;
     let length = file.metadata().map_err(ReadError::io(path))?.len();
     if length > FILE_BYTES_MAX {
         return Err(too_large());
     }
     let mut bytes = Vec::with_capacity(length as usize + 1);
-    file.take(FILE_BYTES_MAX + 1)
-        .read_to_end(&mut bytes)
-        .map_err(ReadError::io(path))?;
-    if bytes.len() as u64 > FILE_BYTES_MAX {
-        Err(too_large())
-    } else {
-        Ok(bytes)
-    }
+    file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(ReadError::io(path))?;
+    if bytes.len() as u64 > FILE_BYTES_MAX { Err(too_large()) } else { Ok(bytes) }
 }
 
 /// The extension of `path` without its dot, in lower case.
 fn extension(path: &Path) -> String {
-    path.extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default()
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -159,13 +145,9 @@ fn axis(name: &str) -> Option<usize> {
 /// Refuses `count` entries of at least `entry_bytes` each where only `have` bytes follow, or too many entries.
 fn check_count(what: &str, count: u64, entry_bytes: u64, have: usize) -> Result<(), Problem> {
     if count > POINTS_MAX {
-        return Err(Problem::new(format!(
-            "the header declares {count} {what}, the limit is {POINTS_MAX}"
-        )));
+        return Err(Problem::new(format!("the header declares {count} {what}, the limit is {POINTS_MAX}")));
     }
-    let fits = count
-        .checked_mul(entry_bytes)
-        .is_some_and(|need| need <= have as u64);
+    let fits = count.checked_mul(entry_bytes).is_some_and(|need| need <= have as u64);
     if !fits || (entry_bytes == 0 && count > 0) {
         return Err(Problem::new(format!(
             "the header declares {count} {what} of at least {entry_bytes} bytes each, but {have} bytes follow: \

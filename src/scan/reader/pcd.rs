@@ -28,11 +28,7 @@ pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
     let records = Reader::<Record, _>::from_reader(bytes).map_err(|e| Problem::new(e.to_string()))?;
     let point = |(i, record): (usize, pcd_rs::Result<Record>)| match record {
         Ok(record) => Ok(Point::from(record.0)),
-        Err(error) => Err(Problem::new(format!(
-            "point {i} of {}: {}",
-            meta.num_points,
-            message(error)
-        ))),
+        Err(error) => Err(Problem::new(format!("point {i} of {}: {}", meta.num_points, message(error)))),
     };
     records.enumerate().map(point).collect()
 }
@@ -60,9 +56,7 @@ fn check_size(meta: &PcdMeta, data: &[u8]) -> Result<(), Problem> {
     let record_bytes = meta
         .field_defs
         .iter()
-        .try_fold(0u64, |sum, field| {
-            sum.checked_add(value_bytes(field.kind).checked_mul(field.count)?)
-        })
+        .try_fold(0u64, |sum, field| sum.checked_add(value_bytes(field.kind).checked_mul(field.count)?))
         .ok_or_else(|| Problem::new("the header declares fields of more than 2^64 bytes"))?;
     match meta.data {
         // The last line need not end.
@@ -74,18 +68,10 @@ fn check_size(meta: &PcdMeta, data: &[u8]) -> Result<(), Problem> {
 
 fn check_compressed(points: u64, record_bytes: u64, data: &[u8]) -> Result<(), Problem> {
     let Some((sizes, data)) = data.split_at_checked(SIZES_BYTES) else {
-        return Err(Problem::new(
-            "truncated: the sizes of the compressed data are missing",
-        ));
+        return Err(Problem::new("truncated: the sizes of the compressed data are missing"));
     };
-    let size = |at: usize| {
-        u64::from(u32::from_le_bytes([
-            sizes[at],
-            sizes[at + 1],
-            sizes[at + 2],
-            sizes[at + 3],
-        ]))
-    };
+    let size =
+        |at: usize| u64::from(u32::from_le_bytes([sizes[at], sizes[at + 1], sizes[at + 2], sizes[at + 3]]));
     let (compressed, whole) = (size(0), size(4));
     if compressed > data.len() as u64 {
         return Err(Problem::new(format!(

@@ -19,14 +19,10 @@ pub(in crate::scan) fn lines(
     first: usize,
 ) -> impl Iterator<Item = Result<(usize, &str), Problem>> {
     let numbered = bytes.split(|byte| *byte == b'\n').enumerate();
-    numbered
-        .map(move |(i, line)| (first + i, line.trim_ascii()))
-        .filter(is_content)
-        .map(|(number, line)| {
-            let text = std::str::from_utf8(line);
-            text.map(|text| (number, text))
-                .map_err(|_| Problem::at_line(number, "not text but binary data"))
-        })
+    numbered.map(move |(i, line)| (first + i, line.trim_ascii())).filter(is_content).map(|(number, line)| {
+        let text = std::str::from_utf8(line);
+        text.map(|text| (number, text)).map_err(|_| Problem::at_line(number, "not text but binary data"))
+    })
 }
 
 fn is_content((_, line): &(usize, &[u8])) -> bool {
@@ -35,26 +31,18 @@ fn is_content((_, line): &(usize, &[u8])) -> bool {
 
 /// The number that `token` writes: any that the type parses, so `nan` and `inf` are numbers too.
 pub(in crate::scan) fn number<T: std::str::FromStr>(token: &str) -> Result<T, String> {
-    token
-        .parse()
-        .map_err(|_| format!("{} is not a number (a comment starts with #)", quoted(token)))
+    token.parse().map_err(|_| format!("{} is not a number (a comment starts with #)", quoted(token)))
 }
 
 fn point(text: &str) -> Result<Point, String> {
     // A comma divides even where nothing stands before it: an empty cell is an error, not a shifted column.
-    if text.contains(',') {
-        xyz(text.split(',').map(str::trim))
-    } else {
-        xyz(text.split_ascii_whitespace())
-    }
+    if text.contains(',') { xyz(text.split(',').map(str::trim)) } else { xyz(text.split_ascii_whitespace()) }
 }
 
 fn xyz<'a>(mut cells: impl Iterator<Item = &'a str>) -> Result<Point, String> {
     let mut xyz = [0.0; 3];
     for (have, coordinate) in xyz.iter_mut().enumerate() {
-        let cell = cells
-            .next()
-            .ok_or_else(|| format!("{have} columns, x y z are needed"))?;
+        let cell = cells.next().ok_or_else(|| format!("{have} columns, x y z are needed"))?;
         *coordinate = number(cell)?;
     }
     Ok(xyz.into())

@@ -43,35 +43,17 @@ const HALF_WALL_M: f64 = WALL_M / 2.0;
 const NORTH_Y: (f64, f64) = (NORTH_M + HALF_WALL_M, WIDTH_M);
 const SOUTH_Y: (f64, f64) = (0.0, SOUTH_M - HALF_WALL_M);
 
-pub(super) const STUDY: Room = Room {
-    x: (0.0, NORTH_DIVIDE_M - HALF_WALL_M),
-    y: NORTH_Y,
-};
-pub(super) const LOUNGE: Room = Room {
-    x: (NORTH_DIVIDE_M + HALF_WALL_M, LENGTH_M),
-    y: NORTH_Y,
-};
-pub(super) const WORKSHOP: Room = Room {
-    x: (0.0, SOUTH_DIVIDE_M - HALF_WALL_M),
-    y: SOUTH_Y,
-};
-pub(super) const ARCHIVE: Room = Room {
-    x: (SOUTH_DIVIDE_M + HALF_WALL_M, LENGTH_M),
-    y: SOUTH_Y,
-};
-pub(super) const CORRIDOR: Room = Room {
-    x: (0.0, LENGTH_M),
-    y: (SOUTH_M + HALF_WALL_M, NORTH_M - HALF_WALL_M),
-};
+pub(super) const STUDY: Room = Room { x: (0.0, NORTH_DIVIDE_M - HALF_WALL_M), y: NORTH_Y };
+pub(super) const LOUNGE: Room = Room { x: (NORTH_DIVIDE_M + HALF_WALL_M, LENGTH_M), y: NORTH_Y };
+pub(super) const WORKSHOP: Room = Room { x: (0.0, SOUTH_DIVIDE_M - HALF_WALL_M), y: SOUTH_Y };
+pub(super) const ARCHIVE: Room = Room { x: (SOUTH_DIVIDE_M + HALF_WALL_M, LENGTH_M), y: SOUTH_Y };
+pub(super) const CORRIDOR: Room =
+    Room { x: (0.0, LENGTH_M), y: (SOUTH_M + HALF_WALL_M, NORTH_M - HALF_WALL_M) };
 
 /// Floor, ceiling, walls, the pilasters of the corridor and the lamps that hang from the ceiling.
 pub(super) fn building() -> Vec<Object> {
     let parts = [slabs(), outer_walls(), inner_walls(), pilasters()].concat();
-    parts
-        .into_iter()
-        .map(|part| Object::new(vec![part]))
-        .chain(hanging_lamps())
-        .collect()
+    parts.into_iter().map(|part| Object::new(vec![part])).chain(hanging_lamps()).collect()
 }
 
 fn slabs() -> Vec<Shape> {
@@ -140,16 +122,8 @@ fn pilasters() -> Vec<Shape> {
 }
 
 fn hanging_lamps() -> impl Iterator<Item = Object> {
-    let places = [
-        (1.7, 7.6),
-        (5.2, 6.6),
-        (8.6, 7.8),
-        (12.4, 7.1),
-        (3.4, 4.6),
-        (9.8, 4.6),
-        (4.1, 1.3),
-        (11.6, 1.6),
-    ];
+    let places =
+        [(1.7, 7.6), (5.2, 6.6), (8.6, 7.8), (12.4, 7.1), (3.4, 4.6), (9.8, 4.6), (4.1, 1.3), (11.6, 1.6)];
     places.into_iter().map(|(x, y)| {
         let rod = Shape::cylinder([x, y, 2.35], 0.015, CEILING_M - 2.35);
         Object::new(vec![rod, Shape::sphere([x, y, 2.25], 0.15)])

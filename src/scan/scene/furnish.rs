@@ -23,29 +23,12 @@ const DRAWS_MAX: usize = 400;
 const FURNITURE: [(Room, &[Kind]); 5] = {
     use Kind::*;
     [
-        (
-            STUDY,
-            &[
-                Table, Table, Shelf, Shelf, Cupboard, Column, Crates, Chair, Chair, Plant, Lamp, Ball,
-            ],
-        ),
-        (
-            LOUNGE,
-            &[
-                Sofa, Table, Shelf, Cupboard, Crates, Column, Chair, Chair, Plant, Plant, Lamp, Ball,
-            ],
-        ),
-        (
-            WORKSHOP,
-            &[
-                Table, Table, Shelf, Cupboard, Crates, Crates, Column, Chair, Chair, Lamp, Ball,
-            ],
-        ),
+        (STUDY, &[Table, Table, Shelf, Shelf, Cupboard, Column, Crates, Chair, Chair, Plant, Lamp, Ball]),
+        (LOUNGE, &[Sofa, Table, Shelf, Cupboard, Crates, Column, Chair, Chair, Plant, Plant, Lamp, Ball]),
+        (WORKSHOP, &[Table, Table, Shelf, Cupboard, Crates, Crates, Column, Chair, Chair, Lamp, Ball]),
         (
             ARCHIVE,
-            &[
-                Shelf, Shelf, Shelf, Table, Cupboard, Crates, Crates, Column, Column, Chair, Plant, Ball,
-            ],
+            &[Shelf, Shelf, Shelf, Table, Cupboard, Crates, Crates, Column, Column, Chair, Plant, Ball],
         ),
         (CORRIDOR, &[Sideboard, Sideboard, Sideboard, Shelf, Ball, Ball]),
     ]
@@ -75,11 +58,7 @@ fn place(
     rng: &mut ChaCha8Rng,
 ) -> Option<Object> {
     let mut draws = (0..DRAWS_MAX).map(|_| {
-        if kind.is_against_wall() {
-            against_wall(piece, room, rng)
-        } else {
-            anywhere(piece, room, rng)
-        }
+        if kind.is_against_wall() { against_wall(piece, room, rng) } else { anywhere(piece, room, rng) }
     });
     draws.find(|piece| {
         is_inside(piece, room) && is_off(piece, route) && !others.iter().any(|other| overlap(piece, other))
@@ -87,19 +66,13 @@ fn place(
 }
 
 fn anywhere(piece: &Object, room: Room, rng: &mut ChaCha8Rng) -> Object {
-    let (x, y) = (
-        rng.random_range(room.x.0..room.x.1),
-        rng.random_range(room.y.0..room.y.1),
-    );
+    let (x, y) = (rng.random_range(room.x.0..room.x.1), rng.random_range(room.y.0..room.y.1));
     piece.placed(x, y, rng.random_range(0.0..TAU))
 }
 
 fn against_wall(piece: &Object, room: Room, rng: &mut ChaCha8Rng) -> Object {
     let from_wall = GAP_M - piece.bounds.min.y + 1e-6;
-    let (x, y) = (
-        rng.random_range(room.x.0..room.x.1),
-        rng.random_range(room.y.0..room.y.1),
-    );
+    let (x, y) = (rng.random_range(room.x.0..room.x.1), rng.random_range(room.y.0..room.y.1));
     match rng.random_range(0..4) {
         0 => piece.placed(x, room.y.0 + from_wall, 0.0),
         1 => piece.placed(x, room.y.1 - from_wall, PI),
@@ -118,9 +91,7 @@ fn is_inside(piece: &Object, room: Room) -> bool {
 fn is_off(piece: &Object, route: &[[f64; 2]]) -> bool {
     let (min, max) = (piece.bounds.min, piece.bounds.max);
     let outside = |c: f64, low: f64, high: f64| (low - c).max(c - high).max(0.0);
-    route
-        .iter()
-        .all(|[x, y]| outside(*x, min.x, max.x).hypot(outside(*y, min.y, max.y)) >= ROUTE_CLEARANCE_M)
+    route.iter().all(|[x, y]| outside(*x, min.x, max.x).hypot(outside(*y, min.y, max.y)) >= ROUTE_CLEARANCE_M)
 }
 
 /// True when the footprints' bounds come closer than the gap.
@@ -133,9 +104,7 @@ fn overlap(a: &Object, b: &Object) -> bool {
 fn route_places() -> Vec<[f64; 2]> {
     let places = |route: &Route| {
         let count = (route.length_m() / ROUTE_SPACING_M).ceil() as usize;
-        (0..count)
-            .map(|i| route.position(i as f64 * ROUTE_SPACING_M))
-            .collect::<Vec<_>>()
+        (0..count).map(|i| route.position(i as f64 * ROUTE_SPACING_M)).collect::<Vec<_>>()
     };
     [places(&LIDAR_ROUTE), places(&CAMERA_ROUTE)].concat()
 }

@@ -58,12 +58,7 @@ fn legs(width: f64, depth: f64, height: f64, side: f64) -> impl Iterator<Item = 
 
 /// A table with a screen turned a little and a vase on it.
 fn table(rng: &mut ChaCha8Rng) -> Vec<Shape> {
-    let (width, depth, height, top) = (
-        rng.random_range(1.0..1.5),
-        rng.random_range(0.6..0.75),
-        0.72,
-        0.04,
-    );
+    let (width, depth, height, top) = (rng.random_range(1.0..1.5), rng.random_range(0.6..0.75), 0.72, 0.04);
     let on_top = height + top;
     let screen = Shape::cuboid([0.0, 0.0, on_top], [0.5, 0.06, 0.36]);
     let mut parts = vec![
@@ -98,11 +93,7 @@ fn shelf(rng: &mut ChaCha8Rng) -> Vec<Shape> {
     for level in (0..5).map(f64::from) {
         parts.push(Shape::cuboid([0.0, 0.0, level * gap], [width, depth, board]));
         if level < 4.0 {
-            let books = [
-                rng.random_range(0.2..0.7) * width,
-                0.2,
-                rng.random_range(0.2..0.34),
-            ];
+            let books = [rng.random_range(0.2..0.7) * width, 0.2, rng.random_range(0.2..0.34)];
             let x = (width - 2.0 * board - books[0]) * rng.random_range(-0.5..0.5);
             parts.push(Shape::cuboid([x, -0.03, level * gap + board], books));
         }

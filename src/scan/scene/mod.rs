@@ -26,9 +26,7 @@ impl Scene {
     ///
     /// Seeds differ in the furniture's sizes and places; none of it ever stands in the robots' way.
     pub fn furnished(seed: u64) -> Self {
-        Self {
-            objects: [building::building(), furnish::furniture(seed)].concat(),
-        }
+        Self { objects: [building::building(), furnish::furniture(seed)].concat() }
     }
 
     /// Distance from `origin` (map frame, metres) to the first surface along `direction`, none beyond
@@ -57,10 +55,7 @@ struct Object {
 
 impl Object {
     fn new(parts: Vec<Shape>) -> Self {
-        let bounds = parts
-            .iter()
-            .map(Shape::bounds)
-            .fold(Bounds::NONE, |all, part| all.union(&part));
+        let bounds = parts.iter().map(Shape::bounds).fold(Bounds::NONE, |all, part| all.union(&part));
         Self { parts, bounds }
     }
 
@@ -71,11 +66,7 @@ impl Object {
 
     /// The nearest of `nearest` and the distances to the parts, within `range_max`.
     fn nearer_hit(&self, ray: &Ray, nearest: Option<f64>, range_max: f64) -> Option<f64> {
-        let hits = self
-            .parts
-            .iter()
-            .filter_map(|part| part.hit(ray))
-            .filter(|hit| *hit <= range_max);
+        let hits = self.parts.iter().filter_map(|part| part.hit(ray)).filter(|hit| *hit <= range_max);
         hits.chain(nearest).reduce(f64::min)
     }
 }
@@ -90,9 +81,7 @@ mod tests {
 
     #[test]
     fn rays_in_the_empty_building_meet_its_walls_at_known_distances() {
-        let empty = Scene {
-            objects: building::building(),
-        };
+        let empty = Scene { objects: building::building() };
         for (origin, direction, expected) in [
             ([1.0, 7.0, 1.0], [0.0, 0.0, -1.0], 1.0),
             ([1.0, 7.0, 1.0], [0.0, 0.0, 1.0], 1.7),
@@ -105,19 +94,14 @@ mod tests {
             ([2.5, 8.0, 1.0], [0.0, -1.0, 0.0], 8.0),
         ] {
             let distance = cast(&empty, origin, direction).unwrap();
-            assert!(
-                (distance - expected).abs() < 1e-9,
-                "{distance} from {origin:?}, not {expected}"
-            );
+            assert!((distance - expected).abs() < 1e-9, "{distance} from {origin:?}, not {expected}");
         }
     }
 
     #[test]
     fn the_nearest_of_several_shapes_counts_and_only_within_range() {
         let sphere = |x: f64| Object::new(vec![Shape::sphere([x, 0.0, 0.0], 1.0)]);
-        let scene = Scene {
-            objects: vec![sphere(9.0), sphere(5.0), sphere(-3.0)],
-        };
+        let scene = Scene { objects: vec![sphere(9.0), sphere(5.0), sphere(-3.0)] };
         let (origin, direction) = (Point3::origin(), Vector3::x());
         assert_eq!(scene.cast(origin, direction, 30.0), Some(4.0));
         assert_eq!(scene.cast(origin, direction, 4.0), Some(4.0));
@@ -128,11 +112,7 @@ mod tests {
     #[test]
     fn bounds_change_no_distance() {
         let scene = Scene::furnished(3);
-        let parts: Vec<Shape> = scene
-            .objects
-            .iter()
-            .flat_map(|object| object.parts.clone())
-            .collect();
+        let parts: Vec<Shape> = scene.objects.iter().flat_map(|object| object.parts.clone()).collect();
         for i in 0..20_000 {
             let (a, b) = (f64::from(i) * 0.377, f64::from(i) * 0.0113);
             let direction = Vector3::new(a.cos() * b.cos(), a.sin() * b.cos(), b.sin());
@@ -148,9 +128,7 @@ mod tests {
         let look = |seed: u64| {
             let scene = Scene::furnished(seed);
             let ray = |i: u32| [f64::from(i).cos(), f64::from(i).sin(), 0.0];
-            (0..100)
-                .map(|i| cast(&scene, [4.6, 6.9, 0.5], ray(i)))
-                .collect::<Vec<_>>()
+            (0..100).map(|i| cast(&scene, [4.6, 6.9, 0.5], ray(i))).collect::<Vec<_>>()
         };
         assert_eq!(look(1), look(1));
         assert_ne!(look(1), look(2));

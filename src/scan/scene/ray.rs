@@ -14,11 +14,7 @@ pub(super) struct Ray {
 
 impl Ray {
     pub(super) fn new(origin: Point3<f64>, direction: Vector3<f64>) -> Self {
-        Self {
-            origin,
-            direction,
-            inverse: direction.map(f64::recip),
-        }
+        Self { origin, direction, inverse: direction.map(f64::recip) }
     }
 }
 
@@ -40,11 +36,8 @@ pub(super) fn slab(origin: f64, inverse: f64, half: f64) -> Interval {
 /// Where `origin + t * direction` lies within `radius` of zero, for the dimensions given.
 pub(super) fn ball<const N: usize>(origin: [f64; N], direction: [f64; N], radius: f64) -> Option<Interval> {
     let dot = |a: [f64; N], b: [f64; N]| (0..N).map(|i| a[i] * b[i]).sum::<f64>();
-    let (a, half_b, c) = (
-        dot(direction, direction),
-        dot(origin, direction),
-        dot(origin, origin) - radius * radius,
-    );
+    let (a, half_b, c) =
+        (dot(direction, direction), dot(origin, direction), dot(origin, origin) - radius * radius);
     if a == 0.0 {
         return (c <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
     }
@@ -68,17 +61,11 @@ impl Bounds {
     };
 
     pub(super) fn around(center: Point3<f64>, half: Vector3<f64>) -> Self {
-        Self {
-            min: center - half,
-            max: center + half,
-        }
+        Self { min: center - half, max: center + half }
     }
 
     pub(super) fn union(&self, other: &Self) -> Self {
-        Self {
-            min: self.min.inf(&other.min),
-            max: self.max.sup(&other.max),
-        }
+        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
     }
 
     /// True when `ray` is somewhere inside at a distance in 0..=`range_max`.

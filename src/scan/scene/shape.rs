@@ -8,18 +8,9 @@ use super::ray::{Bounds, Interval, Ray, ball, intersection, slab};
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
     /// A box turned by `yaw` about its vertical axis.
-    Box {
-        center: Point3<f64>,
-        half: Vector3<f64>,
-        yaw: f64,
-        cos_sin: (f64, f64),
-    },
+    Box { center: Point3<f64>, half: Vector3<f64>, yaw: f64, cos_sin: (f64, f64) },
     /// An upright cylinder.
-    Cylinder {
-        center: Point3<f64>,
-        radius: f64,
-        half_height: f64,
-    },
+    Cylinder { center: Point3<f64>, radius: f64, half_height: f64 },
     /// A sphere.
     Sphere { center: Point3<f64>, radius: f64 },
 }
@@ -39,19 +30,12 @@ impl Shape {
     /// The upright cylinder whose bottom's centre is `bottom`.
     pub(super) fn cylinder(bottom: [f64; 3], radius: f64, height: f64) -> Self {
         let half_height = height / 2.0;
-        Self::Cylinder {
-            center: Point3::from(bottom) + Vector3::z() * half_height,
-            radius,
-            half_height,
-        }
+        Self::Cylinder { center: Point3::from(bottom) + Vector3::z() * half_height, radius, half_height }
     }
 
     /// The sphere about `center`.
     pub(super) fn sphere(center: [f64; 3], radius: f64) -> Self {
-        Self::Sphere {
-            center: center.into(),
-            radius,
-        }
+        Self::Sphere { center: center.into(), radius }
     }
 
     /// The shape turned by `turn` radians about the origin's vertical, then moved by (x, y).
@@ -60,50 +44,27 @@ impl Shape {
             Rotation3::from_axis_angle(&Vector3::z_axis(), turn) * center + Vector3::new(x, y, 0.0)
         };
         match self {
-            Self::Box {
-                center, half, yaw, ..
-            } => {
+            Self::Box { center, half, yaw, .. } => {
                 let yaw = yaw + turn;
-                Self::Box {
-                    center: moved(center),
-                    half,
-                    yaw,
-                    cos_sin: (yaw.cos(), yaw.sin()),
-                }
+                Self::Box { center: moved(center), half, yaw, cos_sin: (yaw.cos(), yaw.sin()) }
             }
-            Self::Cylinder {
-                center,
-                radius,
-                half_height,
-            } => Self::Cylinder {
-                center: moved(center),
-                radius,
-                half_height,
-            },
-            Self::Sphere { center, radius } => Self::Sphere {
-                center: moved(center),
-                radius,
-            },
+            Self::Cylinder { center, radius, half_height } => {
+                Self::Cylinder { center: moved(center), radius, half_height }
+            }
+            Self::Sphere { center, radius } => Self::Sphere { center: moved(center), radius },
         }
     }
 
     pub(super) fn bounds(&self) -> Bounds {
         match *self {
-            Self::Box {
-                center,
-                half,
-                cos_sin: (cos, sin),
-                ..
-            } => {
+            Self::Box { center, half, cos_sin: (cos, sin), .. } => {
                 let (cos, sin) = (cos.abs(), sin.abs());
                 let turned = Vector3::new(cos * half.x + sin * half.y, sin * half.x + cos * half.y, half.z);
                 Bounds::around(center, turned)
             }
-            Self::Cylinder {
-                center,
-                radius,
-                half_height,
-            } => Bounds::around(center, Vector3::new(radius, radius, half_height)),
+            Self::Cylinder { center, radius, half_height } => {
+                Bounds::around(center, Vector3::new(radius, radius, half_height))
+            }
             Self::Sphere { center, radius } => Bounds::around(center, Vector3::repeat(radius)),
         }
     }
@@ -116,28 +77,16 @@ impl Shape {
 
     fn interval(&self, ray: &Ray) -> Option<Interval> {
         match *self {
-            Self::Box {
-                center,
-                half,
-                cos_sin: (cos, sin),
-                ..
-            } => {
+            Self::Box { center, half, cos_sin: (cos, sin), .. } => {
                 let (o, d) = (ray.origin - center, ray.direction);
                 let turned = |v: Vector3<f64>| (cos * v.x + sin * v.y, cos * v.y - sin * v.x);
                 let ((ox, oy), (dx, dy)) = (turned(o), turned(d));
                 let xy = intersection(slab(ox, dx.recip(), half.x), slab(oy, dy.recip(), half.y))?;
                 intersection(xy, slab(o.z, ray.inverse.z, half.z))
             }
-            Self::Cylinder {
-                center,
-                radius,
-                half_height,
-            } => {
+            Self::Cylinder { center, radius, half_height } => {
                 let (o, d) = (ray.origin - center, ray.direction);
-                intersection(
-                    ball([o.x, o.y], [d.x, d.y], radius)?,
-                    slab(o.z, ray.inverse.z, half_height),
-                )
+                intersection(ball([o.x, o.y], [d.x, d.y], radius)?, slab(o.z, ray.inverse.z, half_height))
             }
             Self::Sphere { center, radius } => {
                 ball((ray.origin - center).into(), ray.direction.into(), radius)
@@ -155,10 +104,7 @@ mod tests {
     }
 
     fn assert_near(distance: Option<f64>, expected: f64) {
-        assert!(
-            distance.is_some_and(|d| (d - expected).abs() < 1e-12),
-            "{distance:?}, not {expected}"
-        );
+        assert!(distance.is_some_and(|d| (d - expected).abs() < 1e-12), "{distance:?}, not {expected}");
     }
 
     #[test]
@@ -197,10 +143,8 @@ mod tests {
 
     #[test]
     fn a_hit_lies_on_the_edge_of_the_bounds_or_inside() {
-        let shapes = [
-            Shape::cuboid([0.1, 0.2, 0.0], [1.0, 0.4, 0.7]),
-            Shape::cylinder([0.5, 0.0, 0.1], 0.2, 1.0),
-        ];
+        let shapes =
+            [Shape::cuboid([0.1, 0.2, 0.0], [1.0, 0.4, 0.7]), Shape::cylinder([0.5, 0.0, 0.1], 0.2, 1.0)];
         for shape in shapes.map(|shape| shape.placed(2.0, -1.0, 0.7)) {
             let bounds = shape.bounds();
             for i in 0..2000 {

@@ -54,18 +54,13 @@ impl DepthCamera {
                 Vector3::new(tangent(column, self.width_px, self.horizontal_fov_deg), y, 1.0)
             })
         });
-        pixels
-            .map(|direction| self.measure(direction, scene, map_from_sensor, rng))
-            .collect()
+        pixels.map(|direction| self.measure(direction, scene, map_from_sensor, rng)).collect()
     }
 
     fn measure(&self, direction: Vector3<f64>, scene: &Scene, pose: &Pose, rng: &mut ChaCha8Rng) -> Point {
         let depth = cast(scene, pose, direction, (self.range_min_m, self.range_max_m));
         let depth = depth.filter(|_| !is_lost(self.dropout, rng));
-        point(
-            direction,
-            depth.map(|depth| depth + self.noise_at_1m_m * depth * depth * gaussian(rng)),
-        )
+        point(direction, depth.map(|depth| depth + self.noise_at_1m_m * depth * depth * gaussian(rng)))
     }
 }
 

@@ -55,9 +55,7 @@ fn ascii_point(columns: &[Column], text: &str) -> Result<Point, String> {
     let mut tokens = text.split_ascii_whitespace();
     let mut xyz = [f32::NAN; 3];
     for column in columns {
-        let token = tokens
-            .next()
-            .ok_or_else(|| format!("fewer values than {} properties", columns.len()))?;
+        let token = tokens.next().ok_or_else(|| format!("fewer values than {} properties", columns.len()))?;
         match column {
             Column::Axis(axis) => xyz[*axis] = number(token)?,
             Column::Other => {}

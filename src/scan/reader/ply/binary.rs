@@ -38,11 +38,7 @@ fn read_binary<E: PropertyAccess>(
         _ => parser.read_little_endian_element(payload, element),
     };
     read.map_err(|error| {
-        Problem::new(format!(
-            "element {} {index} of {}: {error}",
-            quoted(&element.name),
-            element.count
-        ))
+        Problem::new(format!("element {} {index} of {}: {error}", quoted(&element.name), element.count))
     })
 }
 

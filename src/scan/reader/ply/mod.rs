@@ -46,10 +46,7 @@ fn header_problem(start: &[u8], error: &ParseError) -> Problem {
         return Problem::new(format!("not a ply header: {summary}"));
     };
     let summary = summary.trim_start_matches(&format!("Line {number}: "));
-    let line = start
-        .split(|byte| *byte == b'\n')
-        .nth(number - 1)
-        .unwrap_or_default();
+    let line = start.split(|byte| *byte == b'\n').nth(number - 1).unwrap_or_default();
     let line = quoted(&String::from_utf8_lossy(line));
     Problem::at_line(number, format!("not a ply header: {summary} {line}"))
 }
@@ -57,30 +54,19 @@ fn header_problem(start: &[u8], error: &ParseError) -> Problem {
 /// Refuses a name given twice: the parser keeps only one of them, and would misplace all that follows.
 fn check_names(header: &Header, header_bytes: &[u8]) -> Result<(), Problem> {
     let written = |keyword: &[u8]| {
-        header_bytes
-            .split(|byte| *byte == b'\n')
-            .filter(|line| line.starts_with(keyword))
-            .count()
+        header_bytes.split(|byte| *byte == b'\n').filter(|line| line.starts_with(keyword)).count()
     };
-    let properties: usize = header
-        .elements
-        .values()
-        .map(|element| element.properties.len())
-        .sum();
+    let properties: usize = header.elements.values().map(|element| element.properties.len()).sum();
     if header.elements.len() != written(b"element") || properties != written(b"property") {
-        return Err(Problem::new(
-            "the header declares an element or property name twice",
-        ));
+        return Err(Problem::new("the header declares an element or property name twice"));
     }
     Ok(())
 }
 
 /// Element `vertex`, which has x, y and z as float or double.
 fn vertex(header: &Header) -> Result<&ElementDef, Problem> {
-    let vertex = header
-        .elements
-        .get(VERTEX)
-        .ok_or_else(|| Problem::new("no element vertex in the header"))?;
+    let vertex =
+        header.elements.get(VERTEX).ok_or_else(|| Problem::new("no element vertex in the header"))?;
     for name in ["x", "y", "z"] {
         match vertex.properties.get(name).map(|property| &property.data_type) {
             Some(PropertyType::Scalar(ScalarType::Float | ScalarType::Double)) => {}
@@ -97,21 +83,13 @@ fn vertex(header: &Header) -> Result<&ElementDef, Problem> {
 
 /// The elements before `vertex`, whose entries lie before its own.
 fn before_vertex(header: &Header) -> impl Iterator<Item = &ElementDef> {
-    header
-        .elements
-        .values()
-        .take_while(|element| element.name != VERTEX)
+    header.elements.values().take_while(|element| element.name != VERTEX)
 }
 
 fn check_element(element: &ElementDef, encoding: Encoding, have: usize) -> Result<(), Problem> {
     let types = element.properties.values().map(|property| &property.data_type);
     let entry_bytes = types.map(|data_type| value_bytes_min(data_type, encoding)).sum();
-    check_count(
-        &format!("{} elements", quoted(&element.name)),
-        element.count as u64,
-        entry_bytes,
-        have,
-    )
+    check_count(&format!("{} elements", quoted(&element.name)), element.count as u64, entry_bytes, have)
 }
 
 /// Fewest bytes that a property takes; a list may be empty.

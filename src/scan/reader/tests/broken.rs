@@ -13,11 +13,7 @@ fn a_file_cut_anywhere_is_an_error_or_fewer_points_but_never_a_panic() {
             if let Ok(points) = format.points(&bytes[..end]) {
                 let declared = matches!(format, Format::Ply | Format::Pcd);
                 let last_line = end + 8 > bytes.len();
-                assert!(
-                    !declared || last_line,
-                    "{end} of {} bytes of {extension}",
-                    bytes.len()
-                );
+                assert!(!declared || last_line, "{end} of {} bytes of {extension}", bytes.len());
                 assert!(points.len() <= sample().len());
             }
         }
@@ -32,11 +28,7 @@ fn garbage_in_any_place_never_panics() {
         for _ in 0..2000 {
             let mut broken = bytes.clone();
             // Mostly in the header, where a byte does most harm.
-            let end = if rng.random_bool(0.7) {
-                bytes.len().min(300)
-            } else {
-                bytes.len()
-            };
+            let end = if rng.random_bool(0.7) { bytes.len().min(300) } else { bytes.len() };
             for _ in 0..rng.random_range(1..6) {
                 broken[rng.random_range(0..end)] = garbage(&mut rng);
             }
@@ -47,11 +39,7 @@ fn garbage_in_any_place_never_panics() {
 
 /// A byte, a digit as often as any other, so that counts grow.
 fn garbage(rng: &mut ChaCha8Rng) -> u8 {
-    if rng.random_bool(0.5) {
-        rng.random_range(b'0'..=b'9')
-    } else {
-        rng.random()
-    }
+    if rng.random_bool(0.5) { rng.random_range(b'0'..=b'9') } else { rng.random() }
 }
 
 #[test]
@@ -68,17 +56,8 @@ fn bytes_of_no_format_never_panic() {
 
 #[test]
 fn a_header_that_declares_more_than_the_file_holds_is_refused_before_anything_is_allocated() {
-    for count in [
-        "51",
-        "99999999",
-        "100000001",
-        "1000000000000",
-        "18446744073709551615",
-    ] {
-        for (extension, bytes) in every_format()
-            .into_iter()
-            .filter(|(e, _)| ["ply", "pcd"].contains(e))
-        {
+    for count in ["51", "99999999", "100000001", "1000000000000", "18446744073709551615"] {
+        for (extension, bytes) in every_format().into_iter().filter(|(e, _)| ["ply", "pcd"].contains(e)) {
             let text = bytes.iter().map(|b| *b as char).collect::<String>();
             let text = text.replace("vertex 50", &format!("vertex {count}"));
             let text = text.replace("POINTS 50", &format!("POINTS {count}"));
@@ -97,9 +76,6 @@ fn compressed_sizes_that_contradict_the_header_are_refused() {
         let mut broken = bytes.clone();
         broken[sizes + at..sizes + at + 4].copy_from_slice(&value.to_le_bytes());
         let error = error("pcd", &broken);
-        assert!(
-            error.contains("compressed data") || error.contains("LZF"),
-            "{error}"
-        );
+        assert!(error.contains("compressed data") || error.contains("LZF"), "{error}");
     }
 }

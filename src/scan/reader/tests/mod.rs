@@ -8,9 +8,8 @@ use crate::scan::{write_f32, write_ply};
 
 /// Points with every kind of number that must survive: fractions, exponents, "no return".
 fn sample() -> Vec<Point> {
-    let mut points: Vec<Point> = (0..50)
-        .map(|i| Point::new(i as f32 / 3.0, -0.1 * i as f32, 1e-7 * i as f32))
-        .collect();
+    let mut points: Vec<Point> =
+        (0..50).map(|i| Point::new(i as f32 / 3.0, -0.1 * i as f32, 1e-7 * i as f32)).collect();
     points[7] = Point::new(f32::NAN, f32::NAN, f32::NAN);
     points[8] = Point::new(f32::INFINITY, f32::NEG_INFINITY, 0.0);
     points
@@ -57,12 +56,7 @@ fn mixed_ply(format: &str, entry: impl Fn(&Point) -> Vec<u8>, before: &[u8]) -> 
          end_header\r\n",
         points.len()
     );
-    [
-        header.as_bytes(),
-        before,
-        &points.iter().flat_map(entry).collect::<Vec<u8>>(),
-    ]
-    .concat()
+    [header.as_bytes(), before, &points.iter().flat_map(entry).collect::<Vec<u8>>()].concat()
 }
 
 fn mixed_ascii_ply() -> Vec<u8> {
@@ -105,11 +99,7 @@ fn pcd_header(kind: &str) -> Vec<u8> {
 }
 
 fn ascii_pcd() -> Vec<u8> {
-    [
-        pcd_header("ascii"),
-        text_lines(&sample(), "1234 ", " 0 0").into_bytes(),
-    ]
-    .concat()
+    [pcd_header("ascii"), text_lines(&sample(), "1234 ", " 0 0").into_bytes()].concat()
 }
 
 fn binary_pcd() -> Vec<u8> {
@@ -129,13 +119,8 @@ fn compressed_pcd() -> Vec<u8> {
     columns.extend(points.iter().flat_map(|p| f64::from(p.xyz()[1]).to_le_bytes()));
     columns.extend(points.iter().flat_map(|p| p.xyz()[2].to_le_bytes()));
     columns.extend([0, 0].repeat(points.len()));
-    let lzf: Vec<u8> = columns
-        .chunks(32)
-        .flat_map(|run| [&[run.len() as u8 - 1], run].concat())
-        .collect();
-    let sizes = [lzf.len() as u32, columns.len() as u32]
-        .map(u32::to_le_bytes)
-        .concat();
+    let lzf: Vec<u8> = columns.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
+    let sizes = [lzf.len() as u32, columns.len() as u32].map(u32::to_le_bytes).concat();
     [pcd_header("binary_compressed"), sizes, lzf].concat()
 }
 
@@ -179,14 +164,8 @@ fn what_the_writers_write_is_read_again() {
 #[test]
 fn an_unsupported_extension_lists_the_supported_ones() {
     let error = read("las", b"").unwrap_err().to_string();
-    assert!(
-        error.contains("\"las\"") && error.contains(".ply .pcd .xyz .f32"),
-        "{error}"
-    );
-    assert!(matches!(
-        read_points(Path::new("scan")),
-        Err(ReadError::Extension { .. })
-    ));
+    assert!(error.contains("\"las\"") && error.contains(".ply .pcd .xyz .f32"), "{error}");
+    assert!(matches!(read_points(Path::new("scan")), Err(ReadError::Extension { .. })));
     assert_eq!(Format::of(Path::new("SCAN.PLY")), Some(Format::Ply));
 }
 
