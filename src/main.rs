@@ -1,3 +1,7 @@
-//! The `mrol` program.
+//! The `mrol` program; see [`mrol::cli`].
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    mrol::cli::run()
+}

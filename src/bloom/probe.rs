@@ -32,7 +32,7 @@ impl Probe {
     pub fn of(key: u64, hashes: u32, words: usize) -> Self {
         let h = key.wrapping_mul(HASH_A);
         let h = (h ^ h >> 32).wrapping_mul(HASH_B);
-        let word = ((h >> 32) * words as u64 >> 32) as usize;
+        let word = (((h >> 32) * words as u64) >> 32) as usize;
         let mut g = (h & 0xffff_ffff) * HASH_C;
         let mut mask = 0;
         for _ in 0..hashes {

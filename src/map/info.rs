@@ -19,10 +19,6 @@ pub struct LevelInfo {
     pub plane_bytes: usize,
     /// Bytes of the filter's counters, which only changes read.
     pub counter_bytes: usize,
-    /// Counters in use: neither zero nor saturated.
-    pub counters_in_use: usize,
-    /// Counters that saturated, and stay until their filter is rebuilt.
-    pub counters_saturated: usize,
     /// False positive rate by the closed form of the filter's layout: the mean over shards, weighted by voxels.
     pub expected_rate: f64,
     /// The same by eq. (1) of the paper.
@@ -50,8 +46,6 @@ impl MultiResolutionMap {
             voxels: 0,
             plane_bytes: 0,
             counter_bytes: 0,
-            counters_in_use: 0,
-            counters_saturated: 0,
             expected_rate: 0.0,
             unblocked_rate: 0.0,
             measured_rate: measured_rate(view, level, samples, seed),
@@ -59,12 +53,9 @@ impl MultiResolutionMap {
         for list in view.lists(level) {
             let filter = list.filter();
             let (plane, counters) = filter.bytes();
-            let (in_use, saturated) = filter.counters_in_use();
             info.voxels += filter.len();
             info.plane_bytes += plane;
             info.counter_bytes += counters;
-            info.counters_in_use += in_use;
-            info.counters_saturated += saturated;
             info.expected_rate += filter.expected_rate() * filter.len() as f64;
             info.unblocked_rate += filter.unblocked_rate() * filter.len() as f64;
         }
@@ -77,18 +68,15 @@ impl MultiResolutionMap {
 
 /// The share of about `samples` absent neighbours of occupied voxels that the filter takes for occupied.
 ///
-/// Queries near surfaces are what planners and alignments ask, so this is the rate they meet; neighbours of
-/// occupied voxels are drawn evenly over shards in proportion to their voxels.
+/// Queries near surfaces are what planners and alignments ask, so this is the rate they meet. Occupied voxels are
+/// drawn from every n-th block of each shard, so that the cost does not grow with the map.
 fn measured_rate(view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> Option<f64> {
     let total: usize = view.lists(level).map(|list| list.len()).sum();
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ u64::from(level));
     let (mut absent, mut let_through) = (0usize, 0usize);
-    for list in view.lists(level) {
-        // Every n-th voxel from a random start: an even sample in one walk.
-        let wish = (samples * list.len()).div_ceil(total.max(1));
-        let stride = (list.len() / wish.max(1)).max(1);
-        let start = random.random_range(0..stride);
-        for voxel in list.iter().skip(start).step_by(stride) {
+    for list in view.lists(level).filter(|list| !list.is_empty()) {
+        let wish = (samples * list.len()).div_ceil(total);
+        for voxel in list.sample(wish, &mut random) {
             let Some(neighbour) = random_neighbour(voxel, &mut random) else {
                 continue;
             };

@@ -1,5 +1,8 @@
 //! One level of a map: the paper's occupied voxel list (OVL) with its filter (II).
 
+use rand::seq::IndexedRandom;
+use rand::{Rng, RngExt};
+
 use crate::bloom::CountingBloomFilter;
 use crate::voxel::{BLOCK_LEVELS, BlockTable, VoxelKey};
 
@@ -52,6 +55,22 @@ impl<'a> OccupiedVoxelList<'a> {
             mask.cells(up).map(move |cell| cell.voxel(block).ancestor(up))
         };
         self.blocks.iter().flat_map(voxels)
+    }
+
+    /// About `wish` occupied voxels, spread over the blocks: some of every n-th block, from a random start.
+    pub fn sample(&self, wish: usize, random: &mut impl Rng) -> Vec<VoxelKey> {
+        let up = tier_of(self.level).1;
+        let blocks = self.blocks.len().max(1);
+        let stride = (blocks / wish.max(1)).max(1);
+        let of_each = wish.div_ceil(blocks);
+        let start = random.random_range(0..stride);
+        let mut sample = Vec::with_capacity(wish + of_each);
+        for (block, mask) in self.blocks.iter().skip(start).step_by(stride) {
+            let cells: Vec<_> = mask.cells(up).collect();
+            let chosen = cells.sample(random, of_each);
+            sample.extend(chosen.map(|cell| cell.voxel(block).ancestor(up)));
+        }
+        sample
     }
 
     /// The filter.

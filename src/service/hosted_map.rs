@@ -189,7 +189,8 @@ impl HostedMap {
             );
             return Err(ServiceError::new(ErrorCode::ResourceExhausted, "listing_too_large", message));
         }
-        Ok(VoxelListing { keys, state: self.state(view.revision()) })
+        let resolution_m = self.map.lattice().resolution_m(level);
+        Ok(VoxelListing { resolution_m, keys, state: self.state(view.revision()) })
     }
 
     pub(super) fn trajectory(&self, robot: Option<&RobotName>) -> TrajectoryAnswer {

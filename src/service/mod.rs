@@ -80,7 +80,10 @@ impl MapService {
         name: MapName,
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
-        let (map, created) = self.0.catalogue.create(name, settings, self.limits().maps_max).await?;
+        let inner = Arc::clone(&self.0);
+        let create =
+            async move { inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await };
+        let (map, created) = to_its_end(create).await?;
         Ok((self.describe(map).await?, created))
     }
 
@@ -107,7 +110,8 @@ impl MapService {
     /// # Errors
     /// `NotFound` without such a map; `Internal` when its file cannot be removed.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
-        self.0.catalogue.delete(name).await
+        let (inner, name) = (Arc::clone(&self.0), name.clone());
+        to_its_end(async move { inner.catalogue.delete(&name).await }).await
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -223,4 +227,12 @@ impl MapService {
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
         self.0.queries.run(move || map.describe(RATE_SAMPLES)).await
     }
+}
+
+/// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
+async fn to_its_end<T: Send + 'static>(
+    change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
+) -> Result<T, ServiceError> {
+    let done = tokio::spawn(change).await;
+    done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
 }

@@ -35,6 +35,11 @@ impl PointCloud {
         bytemuck::cast_slice(&self.0)
     }
 
+    /// The points' bytes, shared.
+    pub fn into_bytes(self) -> Bytes {
+        self.0
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.0.len() / Point::BYTES
@@ -196,7 +201,9 @@ pub struct TrajectoryAnswer {
 /// The occupied voxels of a level.
 #[derive(Debug, Clone)]
 pub struct VoxelListing {
-    /// Ascending by block.
+    /// Their side, metres.
+    pub resolution_m: f64,
+    /// In no order.
     pub keys: Vec<VoxelKey>,
     /// At this state.
     pub state: MapState,

@@ -206,7 +206,7 @@ impl Slots<'_> {
     pub(crate) fn home(key: u64, buckets: usize) -> usize {
         let h = key.wrapping_mul(Self::HASH_A);
         let h = (h ^ h >> 32).wrapping_mul(Self::HASH_B);
-        ((h >> 32) * buckets as u64 >> 32) as usize
+        (((h >> 32) * buckets as u64) >> 32) as usize
     }
 
     /// The slot of `key`.

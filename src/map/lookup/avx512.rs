@@ -5,6 +5,7 @@
 //! its key and mask of the table).
 #![expect(unsafe_code, reason = "vector intrinsics and gathers from raw addresses")]
 
+
 use std::arch::x86_64::*;
 
 use super::{LevelView, Lookup};
@@ -391,7 +392,7 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn load<'a>(view: &'a LevelView<'_>) -> BloomRegisters {
+    unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
         BloomRegisters {
             plane: PerShard::load(addresses(view.planes)),
             words: PerShard::load(lengths(view.planes)),
@@ -555,7 +556,7 @@ impl Probe for Exact {
     #[target_feature(enable = "avx512f,avx512dq")]
     unsafe fn find<const FAR: bool>(r: &ExactRegisters<'_>, located: LocatedBlocks) -> Self::Found {
         let mut words = located.words;
-        for lane in 0..LANES {
+        for (lane, word) in words.iter_mut().enumerate() {
             let block = located.blocks[lane];
             // SAFETY: the address is of a bucket of a shard's table, which the view keeps alive.
             let keys = unsafe {
@@ -565,14 +566,13 @@ impl Probe for Exact {
             let in_slot =
                 located.words[lane] + u64::from(equal.trailing_zeros()) * size_of::<BlockMask>() as u64;
             let absent = (&raw const NO_VOXELS).expose_provenance() as u64;
-            words[lane] = if equal != 0 { in_slot } else { absent };
+            *word = if equal != 0 { in_slot } else { absent };
             let full = _mm512_movepi64_mask(keys) & 0x80 == 0;
             if equal == 0 && full {
-                words[lane] =
-                    r.find_beyond(block, located.shards[lane], located.words[lane]).unwrap_or(absent);
+                *word = r.find_beyond(block, located.shards[lane], located.words[lane]).unwrap_or(absent);
             }
             if FAR {
-                _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(words[lane] as usize));
+                _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(*word as usize));
             }
         }
         (words, located.within)

@@ -38,7 +38,7 @@ fn shard(view: &LevelView<'_>, index: [i32; 3]) -> usize {
 }
 
 #[inline(always)]
-fn bloom(view: &LevelView<'_>, index: [i32; 3]) -> bool {
+pub(super) fn bloom(view: &LevelView<'_>, index: [i32; 3]) -> bool {
     let plane = view.planes[shard(view, index)];
     let probe = Probe::of(VoxelKey::pack(index).to_bits(), view.hashes, plane.len());
     plane[probe.word] & probe.mask == probe.mask

@@ -51,7 +51,7 @@ fn is_lost(dropout: f64, rng: &mut ChaCha8Rng) -> bool {
 }
 
 /// A number from the normal distribution of mean 0 and deviation 1, by Box and Muller.
-fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
     let (radius, angle): (f64, f64) = (rng.random(), rng.random());
     // 1 - radius lies in (0, 1], where the logarithm is finite.
     (-2.0 * (1.0 - radius).ln()).sqrt() * (TAU * angle).cos()

@@ -1,0 +1,57 @@
+//! A robot: streams scans into a map and says what became of each. The scans are those of a folder, or simulated.
+//!
+//! ```text
+//! mrol serve
+//! cargo run --release --example robot -- http://127.0.0.1:7334 office path/to/scans
+//! ```
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use mrol::align::Guess;
+use mrol::client::{Client, NewMap};
+use mrol::geometry::{Point, translation_m};
+use mrol::map::{MapName, RobotName};
+use mrol::scan::{Scene, read_points, scan_files, tours};
+use mrol::service::ScanRequest;
+use rand::SeedableRng;
+
+#[tokio::main]
+async fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let url = arguments.next().unwrap_or("http://127.0.0.1:7334".into());
+    let map = MapName::new(&arguments.next().unwrap_or("office".into()))?;
+    let robot = RobotName::new("example")?;
+    let scans = match arguments.next() {
+        Some(folder) => {
+            let files = scan_files(&[PathBuf::from(folder)])?;
+            files.iter().map(|file| read_points(file)).collect::<Result<Vec<_>, _>>()?
+        }
+        None => simulated(),
+    };
+
+    let client = Client::connect(&url).await?;
+    client.create_map(&map, NewMap::of(0.05)).await?;
+    let requests = scans.into_iter().map(move |points| ScanRequest {
+        robot: robot.clone(),
+        scan_id: None,
+        points: points.into(),
+        timestamp_ns: None,
+        guess: Guess::Last,
+        at_guess: false,
+        strict: false,
+    });
+    let mut answers = client.insert_scans(&map, tokio_stream::iter(requests)).await?;
+    while let Some(answer) = answers.next().await {
+        let answer = answer?;
+        let ([x, y, z], overlap) = (translation_m(&answer.map_from_sensor), answer.overlap());
+        println!("{:<12} at {x:>7.3} {y:>7.3} {z:>7.3} m, overlap {overlap:.3}", answer.verdict.as_str());
+    }
+    Ok(())
+}
+
+fn simulated() -> Vec<Vec<Point>> {
+    let (scene, [_, tour]) = (Scene::furnished(1), tours(20));
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    tour.poses.iter().map(|pose| tour.sensor.scan(&scene, pose, &mut rng)).collect()
+}

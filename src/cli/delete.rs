@@ -1,0 +1,97 @@
+//! `mrol delete`: take voxels out of a map.
+
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::count;
+use super::output::Output;
+use super::parse;
+use super::query::points_of;
+use super::remote::MapOptions;
+use crate::geometry::Point;
+use crate::map::Region;
+use crate::service::{Deletion, DeletionAnswer, DeletionTarget};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol delete --map office --box \"0 0 0 2.5 2.5 2\"              what was there before the wall came down
+  mrol delete --map office --sphere \"1.5 2 0.8 0.4\"
+  mrol delete --map office --point 1.0,2.5,0.3 --level 2        a coarse voxel with all it contains
+  mrol delete --map office --points gone.ply
+
+A box or sphere takes the voxels whose centres lie inside. Voxels that are not there are no error.";
+
+/// Take voxels out of a map on a server
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Delete {
+    #[command(flatten)]
+    map: MapOptions,
+    #[command(flatten)]
+    target: Target,
+    /// Level of the voxels that are meant: all their descendants go
+    #[arg(long, default_value_t = 0)]
+    level: u32,
+}
+
+#[derive(Debug, clap::Args)]
+#[group(required = true, multiple = false)]
+struct Target {
+    /// The voxels of a file's points: .ply .pcd .xyz .f32
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
+    /// The voxel of a point, metres; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
+    point: Vec<Point>,
+    /// The voxels in a box: smallest and largest corner, metres
+    #[arg(long = "box", value_name = "X Y Z X Y Z", allow_hyphen_values = true, value_parser = parse::cuboid)]
+    cuboid: Option<Region>,
+    /// The voxels in a sphere: centre and radius, metres
+    #[arg(long, value_name = "X Y Z R", allow_hyphen_values = true, value_parser = parse::ball)]
+    sphere: Option<Region>,
+}
+
+impl Delete {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let deletion = Deletion { target: self.target.resolve()?, level: self.level };
+        let client = self.map.server.connect().await?;
+        let answer = client.delete_voxels(&self.map.name, deletion).await?;
+        output.print(&Deleted::from(answer))
+    }
+}
+
+impl Target {
+    fn resolve(self) -> Result<DeletionTarget, CliError> {
+        if let Some(region) = self.cuboid.or(self.sphere) {
+            return Ok(DeletionTarget::Region(region));
+        }
+        let points = match self.points {
+            Some(path) => points_of(&path)?,
+            None => self.point,
+        };
+        Ok(DeletionTarget::Points(points.into()))
+    }
+}
+
+#[derive(Serialize)]
+struct Deleted {
+    removed: usize,
+    revision: u64,
+    map_uuid: String,
+}
+
+impl From<DeletionAnswer> for Deleted {
+    fn from(answer: DeletionAnswer) -> Self {
+        let (revision, map_uuid) = (answer.state.revision, answer.state.map_uuid.to_string());
+        Self { removed: answer.removed, revision, map_uuid }
+    }
+}
+
+impl Display for Deleted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} voxels removed; revision {}", count(self.removed), self.revision)
+    }
+}

@@ -1,0 +1,81 @@
+//! Is all as it should be?
+
+use std::fmt::{self, Display};
+
+use super::planner::Told;
+use super::report::{Journal, RobotSummary};
+use crate::cli::error::CliError;
+use crate::cli::map_report::count;
+use crate::service::MapInfo;
+
+/// What the method keeps to over a tour of 60 scans without odometry, with room for the order in which the two
+/// robots' scans happen to arrive.
+const MEDIAN_ERROR_MAX_VOXELS: f64 = 1.5;
+const MEDIAN_ERROR_MAX_DEG: f64 = 1.0;
+/// Beyond this a robot is lost.
+const ERROR_MAX_VOXELS: f64 = 5.0;
+
+/// What was looked at, and whether it is as it should be.
+pub(super) struct Checks(Vec<(bool, String)>);
+
+impl Checks {
+    pub(super) fn of(journal: &Journal, queries: &Told, info: &MapInfo) -> Self {
+        Self(vec![
+            all_accepted(&journal.robots()),
+            close_to_the_truth(&journal.robots(), info.settings.resolution_m),
+            (
+                queries.occupied > 0 && queries.occupied < queries.points,
+                "the planner met occupied and free voxels".to_owned(),
+            ),
+            same_voxels(info.levels.first().map_or(0, |finest| finest.voxels), journal.voxels()),
+        ])
+    }
+
+    /// What is not as it should be.
+    pub(super) fn problems(&self) -> Vec<&str> {
+        self.0.iter().filter(|(good, _)| !good).map(|(_, text)| text.as_str()).collect()
+    }
+
+    /// An error where something is not as it should be.
+    pub(super) fn verdict(&self) -> Result<(), CliError> {
+        match self.problems().as_slice() {
+            [] => Ok(()),
+            problems => Err(CliError::failed(problems.join("; "))),
+        }
+    }
+}
+
+fn all_accepted(robots: &[RobotSummary]) -> (bool, String) {
+    let refused: usize = robots.iter().map(|robot| robot.refused).sum();
+    let accepted: usize = robots.iter().map(|robot| robot.accepted).sum();
+    (refused == 0 && accepted > 0, format!("{accepted} scans accepted, {refused} refused"))
+}
+
+fn close_to_the_truth(robots: &[RobotSummary], resolution_m: f64) -> (bool, String) {
+    let worst = |error: fn(&RobotSummary) -> f64| robots.iter().map(error).fold(0.0, f64::max);
+    let (median_m, median_deg) = (worst(|robot| robot.metres.median), worst(|robot| robot.degrees.median));
+    let max_m = worst(|robot| robot.metres.max);
+    let (median_max_m, max_max_m) = (MEDIAN_ERROR_MAX_VOXELS * resolution_m, ERROR_MAX_VOXELS * resolution_m);
+    let good = median_m < median_max_m && median_deg < MEDIAN_ERROR_MAX_DEG && max_m < max_max_m;
+    let text = format!(
+        "median error {:.1} mm {median_deg:.2} deg, largest {:.1} mm; bounds {:.1} mm {MEDIAN_ERROR_MAX_DEG:.2} deg, {:.1} mm",
+        median_m * 1e3,
+        max_m * 1e3,
+        median_max_m * 1e3,
+        max_max_m * 1e3
+    );
+    (good, text)
+}
+
+fn same_voxels(held: usize, told: usize) -> (bool, String) {
+    (held == told, format!("the map holds {} voxels, the answers spoke of {}", count(held), count(told)))
+}
+
+impl Display for Checks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut lines =
+            self.0.iter().map(|(good, text)| format!("{}  {text}", if *good { "ok  " } else { "FAIL" }));
+        write!(f, "{}", lines.next().unwrap_or_default())?;
+        lines.try_for_each(|line| write!(f, "\n{line}"))
+    }
+}

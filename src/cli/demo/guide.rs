@@ -1,0 +1,23 @@
+//! Where to look next.
+
+use crate::cli::serve::Serving;
+
+/// Commands that look around in the demonstration's daemon, and where to read on.
+pub(super) fn text(serving: &Serving, once: bool) -> String {
+    let Serving { http, grpc } = serving;
+    let lead = match once {
+        true => "Without --once the daemon stays up for a look around:",
+        false => "Look around, in another terminal:",
+    };
+    format!(
+        r#"
+{lead}
+  curl http://{http}/v1/maps/demo
+  curl --json '{{"points":[[4.6,6.9,0.9],[4.6,6.9,0.0]]}}' http://{http}/v1/maps/demo/occupancy
+  curl http://{http}/metrics
+  grpcurl -plaintext -d '{{"map":"demo","robot":"lidar"}}' {grpc} mrol.v1.Mapping/GetTrajectory
+  mrol maps show demo --server http://{grpc}
+  mrol delete --map demo --sphere "4.6 6.9 0 0.5" --server http://{grpc}
+Then: README.md, "A tour of the API"; `mrol serve --help`; your own scans with `mrol map --help`."#
+    )
+}

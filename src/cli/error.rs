@@ -1,0 +1,91 @@
+//! Why a command failed, and with which exit code.
+
+use std::fmt::Display;
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+use crate::client::ClientError;
+use crate::scan::ReadError;
+use crate::server::ServerError;
+use crate::store::StoreError;
+
+/// A command that did not succeed.
+#[derive(Debug)]
+pub(super) enum CliError {
+    /// The command line makes no sense: exit code 2.
+    Usage(String),
+    /// It could not be done: exit code 1.
+    Failed(String),
+    /// Nobody reads the output any more (`mrol ... | head`): no failure, and nothing to say.
+    OutputClosed,
+}
+
+impl CliError {
+    pub(super) fn usage(message: impl Display) -> Self {
+        Self::Usage(message.to_string())
+    }
+
+    pub(super) fn failed(message: impl Display) -> Self {
+        Self::Failed(message.to_string())
+    }
+
+    /// A file could not be written.
+    pub(super) fn writing(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |error| Self::Failed(format!("{}: cannot be written: {error}", path.display()))
+    }
+
+    /// Standard output could not be written.
+    pub(super) fn printing(error: io::Error) -> Self {
+        match error.kind() {
+            ErrorKind::BrokenPipe => Self::OutputClosed,
+            _ => Self::Failed(format!("standard output cannot be written: {error}")),
+        }
+    }
+
+    /// Says it on standard error; the process's exit code.
+    pub(super) fn report(self) -> ExitCode {
+        let (message, code) = match self {
+            Self::Usage(message) => (message, 2),
+            Self::Failed(message) => (message, 1),
+            Self::OutputClosed => return ExitCode::SUCCESS,
+        };
+        // Where standard error is closed too, the exit code says it all.
+        let _ = writeln!(io::stderr(), "error: {message}");
+        ExitCode::from(code)
+    }
+}
+
+impl From<ClientError> for CliError {
+    fn from(error: ClientError) -> Self {
+        match error {
+            ClientError::Url { .. } => Self::usage(error),
+            _ => Self::failed(error),
+        }
+    }
+}
+
+impl From<ReadError> for CliError {
+    fn from(error: ReadError) -> Self {
+        Self::failed(error)
+    }
+}
+
+impl From<StoreError> for CliError {
+    fn from(error: StoreError) -> Self {
+        Self::failed(error)
+    }
+}
+
+impl From<ServerError> for CliError {
+    fn from(error: ServerError) -> Self {
+        match &error {
+            ServerError::Listen { protocol, error: cause, .. } if cause.kind() == ErrorKind::AddrInUse => {
+                Self::failed(format!(
+                    "{error}: stop whoever listens there, or choose another address with --{protocol}-listen"
+                ))
+            }
+            _ => Self::failed(error),
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! `mrol insert`: scans into a map of a server.
+
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+use serde::Serialize;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+
+use super::error::CliError;
+use super::map_report::count;
+use super::maps::OptionalSettings;
+use super::output::Output;
+use super::parse;
+use super::remote::MapOptions;
+use super::scan_report::{PLACE_HEAD, name_of, name_width, place, seven};
+use super::truth::true_poses;
+use crate::align::Guess;
+use crate::client::{Client, ClientError};
+use crate::geometry::Pose;
+use crate::map::RobotName;
+use crate::scan::{read_points, scan_files};
+use crate::service::{ScanAnswer, ScanRequest};
+
+/// Scans read ahead of the one that is being sent.
+const SCANS_AHEAD: usize = 2;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol insert scans/ --map office --create --resolution 0.05 --levels 5
+  mrol insert new/*.ply --map office --robot r2 --guess \"3.1 0.4 0 0 0 0.7071 0.7071\"
+  mrol insert scans/ --map office --truth poses.txt         at known poses, without aligning
+  mrol insert scans/ --map office --json | jq .verdict
+
+Each scan is aligned to the map from the robot's last accepted pose; the first from --guess. The first scan of
+an empty map goes in at its guess, or at the origin. A scan that does not align is reported, and left out.";
+
+/// Send scans to a map on a server, which aligns and adds them
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Insert {
+    /// Scan files, or folders of them: .ply .pcd .xyz .f32
+    #[arg(required = true)]
+    scans: Vec<PathBuf>,
+    #[command(flatten)]
+    map: MapOptions,
+    /// Who sends them
+    #[arg(long, value_name = "NAME", default_value = "mrol", value_parser = parse::robot_name)]
+    robot: RobotName,
+    /// Where the first scan was taken: "x y z qx qy qz qw"
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
+    guess: Option<Pose>,
+    /// Take --guess as it is, without aligning the first scan
+    #[arg(long, requires = "guess")]
+    at_guess: bool,
+    /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
+    #[arg(long, value_name = "FILE", conflicts_with = "guess")]
+    truth: Option<PathBuf>,
+    /// Number the scans from here on: sent again, they are not added twice
+    #[arg(long, value_name = "N")]
+    first_scan_id: Option<u64>,
+    /// Make the map first
+    #[arg(long, requires = "resolution")]
+    create: bool,
+    /// With --create: side of a finest voxel, metres
+    #[arg(long, value_name = "METRES", requires = "create")]
+    resolution: Option<f64>,
+    #[command(flatten)]
+    settings: OptionalSettings,
+}
+
+impl Insert {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        if !self.create && self.settings.is_any() {
+            return Err(CliError::usage("settings of a map to make are given: say --create too"));
+        }
+        let files = scan_files(&self.scans)?;
+        let poses = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
+        let client = self.map.server.connect().await?;
+        self.create_map(&client).await?;
+
+        let (sender, scans) = mpsc::channel(SCANS_AHEAD);
+        let plan =
+            Plan { robot: self.robot.clone(), first: self.first_guess(), poses, ids: self.first_scan_id };
+        let reader = tokio::task::spawn_blocking({
+            let files = files.clone();
+            move || plan.send(&files, &sender)
+        });
+        let output = output.with_bar(files.len());
+        let answered = self.print_answers(&client, scans, &files, &output).await?;
+        reader.await.map_err(CliError::failed)??;
+        match answered == files.len() {
+            true => Ok(()),
+            false => {
+                Err(CliError::failed(format!("the server answered {answered} of {} scans", files.len())))
+            }
+        }
+    }
+
+    async fn create_map(&self, client: &Client) -> Result<(), CliError> {
+        if let Some(resolution_m) = self.resolution {
+            client.create_map(&self.map.name, self.settings.with_resolution(resolution_m)).await?;
+        }
+        Ok(())
+    }
+
+    fn first_guess(&self) -> (Guess, bool) {
+        (self.guess.map_or(Guess::Last, Guess::Pose), self.at_guess)
+    }
+
+    /// Prints a line for each scan; the number of them.
+    async fn print_answers(
+        &self,
+        client: &Client,
+        scans: mpsc::Receiver<ScanRequest>,
+        files: &[PathBuf],
+        output: &Output,
+    ) -> Result<usize, CliError> {
+        let width = name_width(files);
+        let mut answers = client.insert_scans(&self.map.name, ReceiverStream::new(scans)).await?;
+        let mut answered = 0;
+        while let Some(answer) = answers.next().await {
+            let name = files.get(answered).map(|file| name_of(file)).unwrap_or_default();
+            let answer = answer.map_err(|error| not_inserted(&name, &error))?;
+            if answered == 0 {
+                output.say(ScanLine::head(width))?;
+            }
+            output.print(&ScanLine::of(name, &answer, width))?;
+            output.step();
+            answered += 1;
+        }
+        output.clear_bar();
+        Ok(answered)
+    }
+}
+
+fn not_inserted(name: &str, error: &ClientError) -> CliError {
+    let advice = match error.reason() {
+        Some("guess_required") => "; --guess says where the first scan was taken",
+        Some("map_not_found") => "; --create --resolution METRES makes it",
+        _ => "",
+    };
+    CliError::failed(format!("{name}: {error}{advice}"))
+}
+
+/// How the scans of files are sent.
+struct Plan {
+    robot: RobotName,
+    /// Guess of the first scan, and whether to take it as it is.
+    first: (Guess, bool),
+    /// Where each scan goes, if that is known.
+    poses: Option<Vec<Pose>>,
+    /// Number of the first scan, if they are numbered.
+    ids: Option<u64>,
+}
+
+impl Plan {
+    /// Reads the files one by one, until nobody takes the scans any more.
+    fn send(&self, files: &[PathBuf], sender: &mpsc::Sender<ScanRequest>) -> Result<(), CliError> {
+        for (k, file) in files.iter().enumerate() {
+            let (guess, at_guess) = self.guess(k);
+            let scan = ScanRequest {
+                robot: self.robot.clone(),
+                scan_id: self.ids.map(|first| first.saturating_add(k as u64)),
+                points: read_points(file)?.into(),
+                timestamp_ns: None,
+                guess,
+                at_guess,
+                strict: false,
+            };
+            if sender.blocking_send(scan).is_err() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn guess(&self, k: usize) -> (Guess, bool) {
+        match (&self.poses, k) {
+            (Some(poses), k) => (Guess::Pose(poses[k]), true),
+            (None, 0) => self.first,
+            (None, _) => (Guess::Last, false),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct ScanLine {
+    scan: String,
+    accepted: bool,
+    verdict: &'static str,
+    map_from_sensor: [f64; 7],
+    overlap: f64,
+    new_voxels: usize,
+    points_skipped: usize,
+    revision: u64,
+    map_uuid: String,
+    replayed: bool,
+    #[serde(skip)]
+    width: usize,
+}
+
+impl ScanLine {
+    fn of(scan: String, answer: &ScanAnswer, width: usize) -> Self {
+        Self {
+            scan,
+            accepted: answer.accepted(),
+            verdict: answer.verdict.as_str(),
+            map_from_sensor: seven(&answer.map_from_sensor),
+            overlap: answer.overlap(),
+            new_voxels: answer.new_voxels,
+            points_skipped: answer.points_skipped,
+            revision: answer.state.revision,
+            map_uuid: answer.state.map_uuid.to_string(),
+            replayed: answer.replayed,
+            width,
+        }
+    }
+
+    fn head(width: usize) -> String {
+        format!("{:<width$}  verdict      overlap  {PLACE_HEAD}  new voxels  revision", "scan")
+    }
+}
+
+impl Display for ScanLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:<width$}  {:<11}  {:>7.3}  {}  {:>10}  {:>8}",
+            self.scan,
+            self.verdict,
+            self.overlap,
+            place(&self.map_from_sensor),
+            count(self.new_voxels),
+            self.revision,
+            width = self.width
+        )?;
+        if self.replayed { write!(f, "  (was there already)") } else { Ok(()) }
+    }
+}

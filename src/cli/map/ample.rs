@@ -1,0 +1,56 @@
+//! Are the filters ample? How many of a run's look-ups they are expected to have answered wrongly.
+
+use serde::Serialize;
+
+/// Expected false positives, summed over scans.
+///
+/// Every look-up is counted as one of an absent voxel, at the rate of the worst level: an upper bound. Below
+/// one, the filters are ample, and the poses are those of the exact sets (paper IV-B).
+#[derive(Debug, Default)]
+pub(super) struct FalsePositives {
+    lookups: u64,
+    expected: f64,
+}
+
+impl FalsePositives {
+    /// Counts the look-ups of one alignment, made at that false positive rate.
+    pub(super) fn add(&mut self, lookups: u64, rate: f64) {
+        self.lookups += lookups;
+        self.expected += lookups as f64 * rate;
+    }
+
+    /// What it comes to; `rate` is that at the end.
+    pub(super) fn summary(&self, rate: f64) -> FilterSummary {
+        FilterSummary {
+            lookups: self.lookups,
+            expected_false_positive_rate: rate,
+            expected_false_positives: self.expected,
+            ample: self.expected < 1.0,
+        }
+    }
+}
+
+/// See [`FalsePositives`].
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct FilterSummary {
+    pub(super) lookups: u64,
+    pub(super) expected_false_positive_rate: f64,
+    pub(super) expected_false_positives: f64,
+    pub(super) ample: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_are_ample_below_one_expected_false_positive() {
+        let mut run = FalsePositives::default();
+        run.add(1_000_000, 4e-7);
+        assert!(run.summary(4e-7).ample);
+        run.add(1_000_000, 7e-7);
+        let summary = run.summary(7e-7);
+        assert!(!summary.ample && summary.lookups == 2_000_000);
+        assert!((summary.expected_false_positives - 1.1).abs() < 1e-9);
+    }
+}

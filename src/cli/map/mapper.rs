@@ -1,0 +1,128 @@
+//! Scans into a map, one after the other.
+
+use std::time::{Duration, Instant};
+
+use crate::align::{Alignment, AlignmentSettings, Verdict, align, judge_at};
+use crate::cli::error::CliError;
+use crate::geometry::{Point, Pose};
+use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::voxel::VoxelSet;
+
+/// Whose scans they are, in the map's trajectory.
+const ROBOT: &str = "mrol";
+
+/// A map that grows scan by scan.
+pub(super) struct Mapper {
+    map: MultiResolutionMap,
+    settings: AlignmentSettings,
+    robot: RobotName,
+    /// The last accepted pose, the paper's guess.
+    last: Pose,
+}
+
+/// What became of a scan.
+pub(super) struct Mapped {
+    pub(super) alignment: Alignment,
+    /// Finest voxels that it added.
+    pub(super) new_voxels: usize,
+    /// Finest voxels after it.
+    pub(super) voxels: usize,
+    /// What the filters were expected to let through while it was aligned.
+    pub(super) false_positive_rate: f64,
+    pub(super) align_time: Duration,
+    pub(super) insert_time: Duration,
+}
+
+impl Mapped {
+    pub(super) fn accepted(&self) -> bool {
+        self.alignment.verdict == Verdict::Accepted
+    }
+}
+
+impl Mapper {
+    pub(super) fn new(map: MapSettings, settings: AlignmentSettings) -> Result<Self, CliError> {
+        Ok(Self {
+            map: MultiResolutionMap::new(map).map_err(CliError::usage)?,
+            settings,
+            robot: RobotName::new(ROBOT).map_err(CliError::failed)?,
+            last: Pose::identity(),
+        })
+    }
+
+    pub(super) fn map(&self) -> &MultiResolutionMap {
+        &self.map
+    }
+
+    /// True when the alignment asks the filters alone.
+    pub(super) fn asks_filters(&self) -> bool {
+        self.settings.lookup == Lookup::Bloom
+    }
+
+    /// Aligns scan `k` to the map, or takes `known` as its pose, and adds it where it fits.
+    ///
+    /// # Errors
+    /// When no point of it lies within the map's range.
+    pub(super) fn add(&mut self, k: usize, points: &[Point], known: Option<Pose>) -> Result<Mapped, String> {
+        let false_positive_rate = if self.asks_filters() { self.false_positive_rate() } else { 0.0 };
+        let start = Instant::now();
+        let alignment = self.place(points, known);
+        let align_time = start.elapsed();
+
+        let start = Instant::now();
+        let accepted = alignment.verdict == Verdict::Accepted;
+        let new_voxels = if accepted { self.commit(k, points, &alignment)? } else { 0 };
+        let insert_time = start.elapsed();
+        let voxels = self.map.voxels(0);
+        Ok(Mapped { alignment, new_voxels, voxels, false_positive_rate, align_time, insert_time })
+    }
+
+    fn place(&self, points: &[Point], known: Option<Pose>) -> Alignment {
+        let guess = known.unwrap_or(self.last);
+        if self.map.is_empty() || known.is_some() {
+            // Nothing to align to, or nothing to find out.
+            let judged = judge_at(&self.map, points, &guess, &self.settings);
+            return Alignment { verdict: Verdict::Accepted, ..judged };
+        }
+        align(&self.map, points, &guess, &self.settings)
+    }
+
+    /// Adds a scan where it was found to be; the number of new voxels.
+    fn commit(&mut self, k: usize, points: &[Point], alignment: &Alignment) -> Result<usize, String> {
+        let map_from_sensor = alignment.map_from_sensor;
+        let (voxels, out_of_range) =
+            VoxelSet::of_points(points, &self.map.lattice().from_points(&map_from_sensor));
+        if voxels.is_empty() {
+            let (min_m, end_m) = self.map.lattice().range_m();
+            return Err(format!("no point of the scan lies within the map's range of {min_m} to {end_m} m"));
+        }
+        let pose = TrajectoryPose {
+            robot: self.robot.clone(),
+            scan_id: Some(k as u64),
+            timestamp_ns: None,
+            map_from_sensor,
+            revision: 0,
+            level_overlaps: alignment.level_overlaps.clone(),
+            iterations: alignment.iterations,
+            points_skipped: out_of_range,
+            new_voxels: 0,
+            digest: 0,
+        };
+        self.last = map_from_sensor;
+        Ok(self.map.committer().insert_scan(ScanRecord { pose, voxels }).voxels)
+    }
+
+    /// The largest of the levels' expected false positive rates, as the filters are filled now.
+    pub(super) fn false_positive_rate(&self) -> f64 {
+        let view = self.map.view();
+        let of_level = |level| {
+            let (mut voxels, mut expected) = (0.0, 0.0);
+            for list in view.lists(level) {
+                let filter = list.filter();
+                voxels += filter.len() as f64;
+                expected += filter.expected_rate() * filter.len() as f64;
+            }
+            if voxels > 0.0 { expected / voxels } else { 0.0 }
+        };
+        (0..self.map.settings().levels).map(of_level).fold(0.0, f64::max)
+    }
+}

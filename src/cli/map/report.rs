@@ -1,0 +1,158 @@
+//! What `mrol map` prints.
+
+use std::fmt::{self, Display};
+
+use serde::{Serialize, Serializer};
+
+use super::ample::FilterSummary;
+use super::mapper::Mapped;
+use super::truth_errors::ErrorSummary;
+use crate::cli::map_report::count;
+use crate::cli::scan_report::{PLACE_HEAD, place, seven};
+
+/// What became of a scan.
+#[derive(Serialize)]
+pub(super) struct ScanLine {
+    scan: String,
+    accepted: bool,
+    verdict: &'static str,
+    map_from_sensor: [f64; 7],
+    overlap: f64,
+    new_voxels: usize,
+    voxels: usize,
+    align_ms: f64,
+    insert_ms: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_deg: Option<f64>,
+    #[serde(skip)]
+    name_width: usize,
+}
+
+impl ScanLine {
+    pub(super) fn of(scan: String, mapped: &Mapped, error: Option<(f64, f64)>, name_width: usize) -> Self {
+        Self {
+            scan,
+            accepted: mapped.accepted(),
+            verdict: mapped.alignment.verdict.as_str(),
+            map_from_sensor: seven(&mapped.alignment.map_from_sensor),
+            overlap: mapped.alignment.overlap(),
+            new_voxels: mapped.new_voxels,
+            voxels: mapped.voxels,
+            align_ms: mapped.align_time.as_secs_f64() * 1e3,
+            insert_ms: mapped.insert_time.as_secs_f64() * 1e3,
+            error_m: error.map(|(metres, _)| metres),
+            error_deg: error.map(|(_, degrees)| degrees),
+            name_width,
+        }
+    }
+
+    /// The line above those of the scans.
+    pub(super) fn head(name_width: usize, with_errors: bool) -> String {
+        let errors = if with_errors { "   error m      deg" } else { "" };
+        format!(
+            "{:<name_width$}  verdict      overlap  {PLACE_HEAD}  new voxels        voxels  align ms  insert ms{errors}",
+            "scan"
+        )
+    }
+}
+
+impl Display for ScanLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:<width$}  {:<11}  {:>7.3}  {}  {:>10}  {:>12}  {:>8.1}  {:>9.1}",
+            self.scan,
+            self.verdict,
+            self.overlap,
+            place(&self.map_from_sensor),
+            count(self.new_voxels),
+            count(self.voxels),
+            self.align_ms,
+            self.insert_ms,
+            width = self.name_width
+        )?;
+        match (self.error_m, self.error_deg) {
+            (Some(metres), Some(degrees)) => write!(f, "  {metres:>8.4}  {degrees:>7.3}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What the run comes to.
+#[derive(Debug, Clone)]
+pub(super) struct Summary {
+    pub(super) scans: usize,
+    pub(super) accepted: usize,
+    pub(super) refused: usize,
+    pub(super) voxels: usize,
+    pub(super) resolution_m: f64,
+    pub(super) levels: u32,
+    pub(super) seconds: f64,
+    pub(super) error: Option<ErrorSummary>,
+    pub(super) filter: Option<FilterSummary>,
+}
+
+impl Serialize for Summary {
+    /// As `{"summary": {...}}`, to be told from a scan.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let summary = serde_json::json!({
+            "summary": {
+                "scans": self.scans,
+                "accepted": self.accepted,
+                "refused": self.refused,
+                "voxels": self.voxels,
+                "seconds": self.seconds,
+                "error_m": self.error.map(|error| error.metres),
+                "error_deg": self.error.map(|error| error.degrees),
+                "filter": self.filter,
+            }
+        });
+        summary.serialize(serializer)
+    }
+}
+
+impl Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "\n{} scans, {} accepted, {} refused: {} voxels of {} m, {} levels, in {:.1} s",
+            self.scans,
+            self.accepted,
+            self.refused,
+            count(self.voxels),
+            self.resolution_m,
+            self.levels,
+            self.seconds
+        )?;
+        if let Some(error) = &self.error {
+            write!(f, "\n{error}")?;
+        }
+        self.filter.iter().try_for_each(|filter| write!(f, "\n{filter}"))
+    }
+}
+
+impl Display for ErrorSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { metres: m, degrees: d } = self;
+        write!(f, "error: max {:.4} m {:.3} deg, ", m.max, d.max)?;
+        write!(f, "median {:.4} m {:.3} deg, rms {:.4} m {:.3} deg", m.median, d.median, m.rms, d.rms)
+    }
+}
+
+impl Display for FilterSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "filters: {} look-ups, expected false positive rate {:.3e}, at most {:.3e} false positives expected: ",
+            count(self.lookups as usize),
+            self.expected_false_positive_rate,
+            self.expected_false_positives
+        )?;
+        match self.ample {
+            true => write!(f, "ample (below 1), poses are those of the exact sets"),
+            false => write!(f, "not ample (below 1); --filter-hashes and --filter-bits-per-voxel make it so"),
+        }
+    }
+}

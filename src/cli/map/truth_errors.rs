@@ -1,0 +1,72 @@
+//! Errors of found poses against true ones.
+
+use serde::Serialize;
+
+use crate::cli::statistics::Statistics;
+use crate::geometry::{Pose, pose_difference};
+
+/// True poses, and the errors against them so far.
+///
+/// The error of scan k is that of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first scan that was
+/// accepted: it does not matter where the map's origin lies.
+pub(super) struct TruthErrors {
+    truth: Vec<Pose>,
+    /// E_0 and T_0.
+    first: Option<(Pose, Pose)>,
+    metres: Vec<f64>,
+    degrees: Vec<f64>,
+}
+
+/// What the errors come to.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct ErrorSummary {
+    pub(super) metres: Statistics,
+    pub(super) degrees: Statistics,
+}
+
+impl TruthErrors {
+    pub(super) fn new(truth: Vec<Pose>) -> Self {
+        Self { truth, first: None, metres: Vec::new(), degrees: Vec::new() }
+    }
+
+    /// T_k.
+    pub(super) fn pose(&self, k: usize) -> Pose {
+        self.truth[k]
+    }
+
+    /// Notes that scan `k` was found at `map_from_sensor`; its error, metres and degrees.
+    pub(super) fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
+        let (found_first, true_first) = *self.first.get_or_insert((*map_from_sensor, self.truth[k]));
+        let found = found_first.inv_mul(map_from_sensor);
+        let error = pose_difference(&true_first.inv_mul(&self.truth[k]), &found);
+        self.metres.push(error.0);
+        self.degrees.push(error.1);
+        error
+    }
+
+    /// None before the first scan.
+    pub(super) fn summary(&self) -> Option<ErrorSummary> {
+        let metres = Statistics::of(self.metres.clone())?;
+        Some(ErrorSummary { metres, degrees: Statistics::of(self.degrees.clone())? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn an_error_does_not_depend_on_the_origin() {
+        let pose = |x: f64, yaw: f64| Pose::new(Vector3::new(x, 0.0, 0.0), Vector3::new(0.0, 0.0, yaw));
+        let truth = [pose(0.0, 0.0), pose(1.0, 0.2), pose(2.0, 0.4)];
+        let elsewhere = Pose::new(Vector3::new(5.0, -3.0, 1.0), Vector3::new(0.1, 0.2, 2.0));
+        let mut errors = TruthErrors::new(truth.to_vec());
+        // The first scan was refused.
+        assert!(errors.add(1, &(elsewhere * truth[1])).0 < 1e-9);
+        let off = pose(0.3, 0.01);
+        let (metres, degrees) = errors.add(2, &(elsewhere * truth[2] * off));
+        assert!((metres - 0.3).abs() < 1e-9 && (degrees - 0.01f64.to_degrees()).abs() < 1e-6);
+        assert_eq!(errors.summary().unwrap().metres.max, metres);
+    }
+}

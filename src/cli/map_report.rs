@@ -1,0 +1,142 @@
+//! What is printed of a map: the same object as over HTTP, or a table.
+
+use std::fmt::{self, Display};
+
+use indicatif::{BinaryBytes, HumanCount};
+use serde::Serialize;
+
+use crate::map::LevelInfo;
+use crate::service::MapInfo;
+
+/// A map's description.
+#[derive(Serialize)]
+pub(super) struct MapReport {
+    map: String,
+    revision: u64,
+    map_uuid: String,
+    settings: Settings,
+    levels: Vec<Level>,
+    scans: usize,
+    robots: Vec<String>,
+    set_bytes: usize,
+}
+
+#[derive(Serialize)]
+struct Settings {
+    resolution_m: f64,
+    levels: u32,
+    filter: Filter,
+}
+
+#[derive(Serialize)]
+struct Filter {
+    hashes: u32,
+    bits_per_voxel: f64,
+}
+
+#[derive(Serialize)]
+struct Level {
+    level: u32,
+    resolution_m: f64,
+    voxels: usize,
+    plane_bytes: usize,
+    counter_bytes: usize,
+    false_positives_expected: f64,
+    false_positives_equation_1: f64,
+    false_positives_measured: Option<f64>,
+}
+
+impl MapReport {
+    /// A map in one line of a list.
+    pub(super) fn line(info: &MapInfo) -> String {
+        let voxels = info.levels.first().map_or(0, |level| level.voxels);
+        format!(
+            "{:<24} {:>9} m {:>3} levels {:>14} voxels {:>8} scans   revision {}",
+            info.name.as_str(),
+            info.settings.resolution_m,
+            info.settings.levels,
+            count(voxels),
+            count(info.scans),
+            info.state.revision,
+        )
+    }
+}
+
+impl From<&MapInfo> for MapReport {
+    fn from(info: &MapInfo) -> Self {
+        let filter =
+            Filter { hashes: info.settings.filter.hashes, bits_per_voxel: info.settings.filter.bits_per_key };
+        let settings =
+            Settings { resolution_m: info.settings.resolution_m, levels: info.settings.levels, filter };
+        Self {
+            map: info.name.to_string(),
+            revision: info.state.revision,
+            map_uuid: info.state.map_uuid.to_string(),
+            settings,
+            levels: info.levels.iter().map(Level::from).collect(),
+            scans: info.scans,
+            robots: info.robots.iter().map(ToString::to_string).collect(),
+            set_bytes: info.set_bytes,
+        }
+    }
+}
+
+impl From<&LevelInfo> for Level {
+    fn from(info: &LevelInfo) -> Self {
+        Self {
+            level: info.level,
+            resolution_m: info.resolution_m,
+            voxels: info.voxels,
+            plane_bytes: info.plane_bytes,
+            counter_bytes: info.counter_bytes,
+            false_positives_expected: info.expected_rate,
+            false_positives_equation_1: info.unblocked_rate,
+            false_positives_measured: info.measured_rate,
+        }
+    }
+}
+
+impl Display for MapReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "map {} at revision {}, uuid {}", self.map, self.revision, self.map_uuid)?;
+        let robots = if self.robots.is_empty() { "nobody".into() } else { self.robots.join(", ") };
+        writeln!(f, "{} scans from {robots}; exact sets {}", count(self.scans), bytes(self.set_bytes))?;
+        let Filter { hashes, bits_per_voxel } = self.settings.filter;
+        writeln!(f, "filters of {hashes} hashes, {bits_per_voxel} bits a voxel at least\n")?;
+        write!(f, "level  resolution          voxels   filter plane      counters   false positives:")?;
+        write!(f, " expected   eq. (1)   measured")?;
+        self.levels.iter().try_for_each(|level| write!(f, "\n{level}"))
+    }
+}
+
+impl Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let measured = self.false_positives_measured.map_or("-".into(), percent);
+        write!(
+            f,
+            "{:>5} {:>9} m {:>15} {:>14} {:>13} {:>26} {:>9} {measured:>10}",
+            self.level,
+            self.resolution_m,
+            count(self.voxels),
+            bytes(self.plane_bytes),
+            bytes(self.counter_bytes),
+            percent(self.false_positives_expected),
+            percent(self.false_positives_equation_1),
+        )
+    }
+}
+
+/// `1,234,567`.
+pub(super) fn count(n: usize) -> String {
+    HumanCount(n as u64).to_string()
+}
+
+/// `1.23 MiB`.
+pub(super) fn bytes(n: usize) -> String {
+    BinaryBytes(n as u64).to_string()
+}
+
+/// `2.10 %`.
+pub(super) fn percent(share: f64) -> String {
+    format!("{:.2} %", share * 100.0)
+}

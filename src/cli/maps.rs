@@ -1,0 +1,168 @@
+//! `mrol maps`: make, list, describe and delete the maps of a server.
+
+use std::fmt::{self, Display};
+
+use clap::Subcommand;
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::MapReport;
+use super::output::Output;
+use super::parse;
+use super::remote::ServerOptions;
+use crate::client::NewMap;
+use crate::map::MapName;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol maps create office --resolution 0.05 --levels 5
+  mrol maps list
+  mrol maps show office                          voxels, memory and false positives of each level
+  mrol maps show office --json
+  mrol maps delete office
+  mrol maps list --server http://robot-7:7334    MROL_SERVER sets another default";
+
+/// Make, list, describe and delete the maps of a server
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Maps {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// List all maps
+    List {
+        #[command(flatten)]
+        server: ServerOptions,
+    },
+    /// Make a map; the same settings again are fine
+    Create {
+        #[command(flatten)]
+        map: Named,
+        #[command(flatten)]
+        settings: NewMapOptions,
+    },
+    /// Describe a map, level by level
+    Show {
+        #[command(flatten)]
+        map: Named,
+    },
+    /// Delete a map for good
+    Delete {
+        #[command(flatten)]
+        map: Named,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+struct Named {
+    /// The map's name: [a-z0-9][a-z0-9_-]{0,63}
+    #[arg(value_parser = parse::map_name)]
+    name: MapName,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// Settings of a map to make; what is not given is the server's default.
+#[derive(Debug, clap::Args)]
+pub(super) struct NewMapOptions {
+    /// Side of a finest voxel, metres
+    #[arg(long, value_name = "METRES")]
+    resolution: f64,
+    #[command(flatten)]
+    rest: OptionalSettings,
+}
+
+/// What the server has defaults for.
+#[derive(Debug, clap::Args)]
+pub(super) struct OptionalSettings {
+    /// Number of levels, each twice as coarse as the one before: 1 to 12 [default: 4]
+    #[arg(long)]
+    levels: Option<u32>,
+    /// Hash functions of the counting Bloom filters, k of eq. (1): 1 to 10
+    #[arg(long, value_name = "K")]
+    filter_hashes: Option<u32>,
+    /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
+    #[arg(long, value_name = "BITS")]
+    filter_bits_per_voxel: Option<f64>,
+}
+
+impl OptionalSettings {
+    /// True when one is given.
+    pub(super) fn is_any(&self) -> bool {
+        self.levels.is_some() || self.filter_hashes.is_some() || self.filter_bits_per_voxel.is_some()
+    }
+
+    pub(super) fn with_resolution(&self, resolution_m: f64) -> NewMap {
+        NewMap {
+            resolution_m,
+            levels: self.levels,
+            filter_hashes: self.filter_hashes,
+            filter_bits_per_voxel: self.filter_bits_per_voxel,
+        }
+    }
+}
+
+impl Maps {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        match self.action {
+            Action::List { server } => list(server, output).await,
+            Action::Create { map, settings } => create(map, settings, output).await,
+            Action::Show { map } => {
+                let info = map.server.connect().await?.map_info(&map.name).await?;
+                output.print(&MapReport::from(&info))
+            }
+            Action::Delete { map } => {
+                map.server.connect().await?.delete_map(&map.name).await?;
+                output.print(&Deleted { deleted: map.name.to_string() })
+            }
+        }
+    }
+}
+
+async fn list(server: ServerOptions, output: Output) -> Result<(), CliError> {
+    let maps = server.connect().await?.list_maps().await?;
+    if maps.is_empty() {
+        output.say("no maps yet: `mrol maps create NAME --resolution 0.05` makes one")?;
+    }
+    maps.iter().try_for_each(|info| {
+        if output.is_json() {
+            output.print(&MapReport::from(info))
+        } else {
+            output.say(MapReport::line(info))
+        }
+    })
+}
+
+async fn create(map: Named, settings: NewMapOptions, output: Output) -> Result<(), CliError> {
+    let new = settings.rest.with_resolution(settings.resolution);
+    let (info, created) = map.server.connect().await?.create_map(&map.name, new).await?;
+    output.print(&Made { created, map: MapReport::from(&info) })
+}
+
+#[derive(Serialize)]
+struct Made {
+    created: bool,
+    #[serde(flatten)]
+    map: MapReport,
+}
+
+impl Display for Made {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = if self.created { "created" } else { "was there already" };
+        write!(f, "{what}\n{}", self.map)
+    }
+}
+
+#[derive(Serialize)]
+struct Deleted {
+    deleted: String,
+}
+
+impl Display for Deleted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "map {} deleted", self.deleted)
+    }
+}

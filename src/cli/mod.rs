@@ -1,0 +1,115 @@
+//! The command line: the daemon, a demonstration of it, mapping without it, and calls to it.
+//!
+//! Results go to standard output, a line each, as text or (`--json`) as JSON objects; everything else goes to
+//! standard error. The exit code is 0 when all went well, 1 when something failed, 2 for a command line that
+//! makes no sense.
+
+mod delete;
+mod demo;
+mod error;
+mod health;
+mod insert;
+mod map;
+mod map_report;
+mod maps;
+mod output;
+mod parse;
+mod query;
+mod remote;
+mod runtime;
+mod scan_report;
+mod serve;
+mod statistics;
+mod truth;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use error::CliError;
+use output::Output;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol demo                     see it work: two simulated robots, a planner, the real daemon
+  mrol serve                    run the daemon: HTTP on 127.0.0.1:7333, gRPC on 127.0.0.1:7334
+  mrol maps create office --resolution 0.05 --levels 5
+  mrol insert scans/ --map office
+  mrol query --map office --point 1.0,2.5,0.3
+  mrol map scans/ --resolution 0.05 --out office.mrol      no daemon needed
+
+`mrol COMMAND --help` explains a command, with examples.";
+
+/// A networked multi-resolution voxel map: robots send scans, planners ask about points
+#[derive(Debug, Parser)]
+#[command(name = "mrol", version, after_help = EXAMPLES)]
+struct CommandLine {
+    /// Print results as JSON, an object a line, for programs
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Serve(serve::Serve),
+    Demo(demo::Demo),
+    Map(map::Map),
+    Insert(insert::Insert),
+    Query(query::Query),
+    Delete(delete::Delete),
+    Maps(maps::Maps),
+    Health(health::Health),
+}
+
+/// Does what the process was called for, and says how that went.
+pub fn run() -> ExitCode {
+    let CommandLine { json, command } = match CommandLine::try_parse() {
+        Ok(parsed) => parsed,
+        Err(unparsed) => {
+            // Help for a pipe that was closed is no failure.
+            let _ = unparsed.print();
+            return ExitCode::from(unparsed.exit_code().clamp(0, 2) as u8);
+        }
+    };
+    match command.run(Output::new(json)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => error.report(),
+    }
+}
+
+impl Command {
+    fn run(self, output: Output) -> Result<(), CliError> {
+        match self {
+            Self::Serve(serve) => runtime::block_on(serve.run(output)),
+            Self::Demo(demo) => runtime::block_on(demo.run(output)),
+            Self::Map(map) => map.run(output),
+            Self::Insert(insert) => runtime::block_on(insert.run(output)),
+            Self::Query(query) => runtime::block_on(query.run(output)),
+            Self::Delete(delete) => runtime::block_on(delete.run(output)),
+            Self::Maps(maps) => runtime::block_on(maps.run(output)),
+            Self::Health(health) => runtime::block_on(health.run(output)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        CommandLine::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_says_what_it_does_and_shows_examples() {
+        for command in CommandLine::command().get_subcommands() {
+            assert!(command.get_about().is_some(), "{}", command.get_name());
+            let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(examples.starts_with("EXAMPLES:\n"), "{}", command.get_name());
+        }
+    }
+}

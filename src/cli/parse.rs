@@ -1,0 +1,88 @@
+//! Values of options: poses, points, regions, names.
+
+use clap::ValueEnum;
+
+use crate::geometry::{self, Point, Pose};
+use crate::map::{Lookup, MapName, Region, RobotName};
+
+/// What decides whether a voxel is occupied: the exact set, or the counting Bloom filter alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum LookupName {
+    Exact,
+    Bloom,
+}
+
+impl From<LookupName> for Lookup {
+    fn from(name: LookupName) -> Self {
+        match name {
+            LookupName::Exact => Self::Exact,
+            LookupName::Bloom => Self::Bloom,
+        }
+    }
+}
+
+/// "x y z qx qy qz qw", metres and a unit quaternion.
+pub(super) fn pose(text: &str) -> Result<Pose, String> {
+    let [x, y, z, qx, qy, qz, qw] = numbers(text, "x y z qx qy qz qw")?;
+    geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|error| error.to_string())
+}
+
+/// "x,y,z", metres.
+pub(super) fn point(text: &str) -> Result<Point, String> {
+    let [x, y, z] = numbers(text, "x,y,z")?;
+    Ok(Point::from(nalgebra::Point3::new(x, y, z)))
+}
+
+/// "x y z x y z": smallest and largest corner, metres.
+pub(super) fn cuboid(text: &str) -> Result<Region, String> {
+    let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
+    Region::cuboid([x0, y0, z0], [x1, y1, z1]).map_err(|error| error.to_string())
+}
+
+/// "x y z r": centre and radius, metres.
+pub(super) fn ball(text: &str) -> Result<Region, String> {
+    let [x, y, z, radius_m] = numbers(text, "x y z r")?;
+    Region::ball([x, y, z], radius_m).map_err(|error| error.to_string())
+}
+
+/// A map's name.
+pub(super) fn map_name(text: &str) -> Result<MapName, String> {
+    MapName::new(text).map_err(|error| error.to_string())
+}
+
+/// A robot's name.
+pub(super) fn robot_name(text: &str) -> Result<RobotName, String> {
+    RobotName::new(text).map_err(|error| error.to_string())
+}
+
+/// `N` numbers, divided by spaces or commas.
+fn numbers<const N: usize>(text: &str, form: &str) -> Result<[f64; N], String> {
+    let words = text.split([' ', ',']).filter(|word| !word.is_empty());
+    let number =
+        |word: &str| word.parse().map_err(|_| format!("{word:?} is no number; the form is \"{form}\""));
+    let numbers: Vec<f64> = words.map(number).collect::<Result<_, String>>()?;
+    <[f64; N]>::try_from(numbers)
+        .map_err(|numbers| format!("{N} numbers are needed, \"{form}\", got {}", numbers.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_may_be_divided_by_spaces_or_commas() {
+        for text in ["1 -2 3 0 0 0 1", "1,-2,3,0,0,0,1", " 1, -2, 3,  0 0 0 1 "] {
+            assert_eq!(geometry::translation_m(&pose(text).unwrap()), [1.0, -2.0, 3.0]);
+        }
+        assert_eq!(point("1e-3,2,-3").unwrap(), Point::new(0.001, 2.0, -3.0));
+    }
+
+    #[test]
+    fn an_error_repeats_the_word_or_the_form() {
+        assert!(pose("1 2 3").unwrap_err().contains("7 numbers are needed, \"x y z qx qy qz qw\", got 3"));
+        assert!(pose("1 2 x 0 0 0 1").unwrap_err().contains("\"x\" is no number"));
+        assert!(pose("1 2 3 0 0 0 2").unwrap_err().contains("norm 2"));
+        assert!(cuboid("1 0 0 0 1 1").unwrap_err().contains("must not exceed"));
+        assert!(ball("0 0 0 -1").unwrap_err().contains("radius"));
+    }
+}

@@ -1,0 +1,184 @@
+//! `mrol query`: which points are in occupied voxels?
+
+use std::fmt::{self, Display};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::{count, percent};
+use super::output::Output;
+use super::parse::{self, LookupName};
+use super::remote::MapOptions;
+use crate::geometry::{Point, Pose};
+use crate::scan::read_points;
+use crate::service::{MapState, PointAnswer, PointQuery};
+
+/// Points of one message. A multiple of 8, so that the bitmaps of messages follow each other without a gap.
+const BATCH_POINTS: usize = 1_000_000;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol query --map office --point 1.0,2.5,0.3 --point -1,0,0
+  mrol query candidates.xyz --map office                       how many of a file's points are occupied
+  mrol query body.ply --map office --pose \"3 2 0.1 0 0 0 1\"     a robot's body, at a pose in the map
+  mrol query candidates.f32 --map office --lookup bloom --level 1 --out occupied.bin
+
+--out writes a bit a point: point i is bit i % 8 (lowest first) of byte i / 8.";
+
+/// Ask a server which points are in occupied voxels
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Query {
+    /// Points to ask about: .ply .pcd .xyz .f32
+    #[arg(required_unless_present = "point", conflicts_with = "point")]
+    points_file: Option<PathBuf>,
+    /// A point to ask about, metres; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
+    point: Vec<Point>,
+    #[command(flatten)]
+    map: MapOptions,
+    /// Level to ask: 0 is the finest
+    #[arg(long, default_value_t = 0)]
+    level: u32,
+    /// What decides: the exact set, or the Bloom filter alone, which may say "occupied" of a free voxel
+    #[arg(long, value_enum, default_value_t = LookupName::Exact)]
+    lookup: LookupName,
+    /// Where the points' frame lies in the map: "x y z qx qy qz qw" [default: the map's own frame]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
+    pose: Option<Pose>,
+    /// Write the answers as a bitmap
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Query {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let points = match &self.points_file {
+            Some(path) => points_of(path)?,
+            None => self.point.clone(),
+        };
+        let answer = self.ask(&points).await?;
+        if let Some(path) = &self.out {
+            fs::write(path, &answer.bitmap).map_err(CliError::writing(path))?;
+        }
+        if self.point.is_empty() {
+            return output.print(&answer);
+        }
+        points.iter().enumerate().try_for_each(|(i, point)| output.print(&answer.of_point(i, *point)))
+    }
+
+    /// Asks about all points, in batches on one stream.
+    async fn ask(&self, points: &[Point]) -> Result<Answer, CliError> {
+        let batches: Vec<_> = points.chunks(BATCH_POINTS).map(|points| self.query(points)).collect();
+        let client = self.map.server.connect().await?;
+        let start = Instant::now();
+        let mut answers = client.query_stream(&self.map.name, tokio_stream::iter(batches)).await?;
+        let mut all = Answer::default();
+        while let Some(answer) = answers.next().await {
+            all.add(&answer?);
+        }
+        if all.points != points.len() {
+            let message = format!("the server answered {} of {} points: try again", all.points, points.len());
+            return Err(CliError::failed(message));
+        }
+        all.took(start);
+        Ok(all)
+    }
+
+    fn query(&self, points: &[Point]) -> PointQuery {
+        PointQuery {
+            points: points.to_vec().into(),
+            map_from_points: self.pose,
+            level: self.level,
+            lookup: self.lookup.into(),
+            min_revision: None,
+            map_uuid: None,
+        }
+    }
+}
+
+/// The points of a file, of which there must be one.
+pub(super) fn points_of(path: &Path) -> Result<Vec<Point>, CliError> {
+    let points = read_points(path)?;
+    if points.is_empty() {
+        return Err(CliError::failed(format!("{}: no point in this file", path.display())));
+    }
+    Ok(points)
+}
+
+/// The answers to all points.
+#[derive(Default, Serialize)]
+struct Answer {
+    points: usize,
+    occupied: usize,
+    /// Share of the points that are occupied.
+    share: f64,
+    /// Of the last batch.
+    revision: u64,
+    map_uuid: String,
+    seconds: f64,
+    points_per_s: f64,
+    #[serde(skip)]
+    bitmap: Vec<u8>,
+    #[serde(skip)]
+    revision_first: Option<u64>,
+}
+
+impl Answer {
+    fn add(&mut self, answer: &PointAnswer) {
+        let MapState { revision, map_uuid } = answer.state;
+        self.points += answer.points;
+        self.occupied += answer.points_occupied;
+        self.bitmap.extend_from_slice(&answer.occupied);
+        self.revision_first.get_or_insert(revision);
+        self.revision = revision;
+        self.map_uuid = map_uuid.to_string();
+    }
+
+    fn took(&mut self, start: Instant) {
+        self.seconds = start.elapsed().as_secs_f64();
+        self.points_per_s = self.points as f64 / self.seconds;
+        self.share = self.occupied as f64 / self.points as f64;
+    }
+
+    fn of_point(&self, i: usize, point: Point) -> PointLine {
+        let occupied = self.bitmap.get(i / 8).is_some_and(|byte| byte >> (i % 8) & 1 == 1);
+        PointLine { point: point.xyz(), occupied, revision: self.revision }
+    }
+}
+
+impl Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} of {} points are occupied ({}), at revision ",
+            count(self.occupied),
+            count(self.points),
+            percent(self.share)
+        )?;
+        match self.revision_first {
+            Some(first) if first != self.revision => write!(f, "{first} to {}", self.revision)?,
+            _ => write!(f, "{}", self.revision)?,
+        }
+        write!(f, "; {:.3} s, {:.1} M points/s", self.seconds, self.points_per_s / 1e6)
+    }
+}
+
+/// The answer to one point of the command line.
+#[derive(Serialize)]
+struct PointLine {
+    point: [f32; 3],
+    occupied: bool,
+    revision: u64,
+}
+
+impl Display for PointLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.point;
+        let what = if self.occupied { "occupied" } else { "free" };
+        write!(f, "{x:>10} {y:>10} {z:>10}   {what}")
+    }
+}

@@ -1,0 +1,110 @@
+//! `mrol serve`: the daemon.
+
+use std::fmt::{self, Display};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::pin::pin;
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::error::CliError;
+use super::output::Output;
+use crate::config::{Config, ConfigError};
+use crate::server::{Server, shutdown_signal};
+use crate::telemetry::start_logging;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol serve                                     maps are kept in ./mrol-data
+  mrol serve --data-dir /var/lib/mrol --http-listen 0.0.0.0:7333 --grpc-listen 0.0.0.0:7334
+  mrol serve --data-dir \"\"                       keep maps in memory only
+  mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
+                                                 take free ports and print them as JSON
+  MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable
+
+The first line on standard output says where it serves; the log goes to standard error. Settings come from
+defaults, then the file of --config (TOML), then MROL_... variables, then the options here. SIGTERM and Ctrl-C
+end it: requests in flight are finished, maps are saved.";
+
+/// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Serve {
+    /// Settings to start from, TOML
+    #[arg(long, env = "MROL_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Where maps are kept across restarts; "" keeps them in memory only [default: ./mrol-data]
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<String>,
+    /// Address of HTTP; port 0 takes a free one [default: 127.0.0.1:7333]
+    #[arg(long, value_name = "ADDRESS")]
+    http_listen: Option<SocketAddr>,
+    /// Address of gRPC; port 0 takes a free one [default: 127.0.0.1:7334]
+    #[arg(long, value_name = "ADDRESS")]
+    grpc_listen: Option<SocketAddr>,
+    /// How log lines are written: text or json [default: text]
+    #[arg(long, value_name = "FORMAT", value_parser = ["text", "json"])]
+    log_format: Option<String>,
+    /// Least level of log lines, or a list of target=level [default: info]
+    #[arg(long, value_name = "LEVEL")]
+    log_level: Option<String>,
+    /// Seconds between two savings of changed maps [default: 60]
+    #[arg(long, value_name = "SECONDS")]
+    save_interval_s: Option<u64>,
+    /// Seconds that requests in flight may take when it ends [default: 10]
+    #[arg(long, value_name = "SECONDS")]
+    drain_seconds: Option<u64>,
+}
+
+impl Serve {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let config = self.config().map_err(CliError::usage)?;
+        start_logging(config.log.format, &config.log.level).map_err(CliError::usage)?;
+        let server = Server::bind(config).await?;
+        let mut shutdown = pin!(shutdown_signal());
+        // Heard from now on: who reads the addresses may send the signal right away.
+        tokio::select! {
+            biased;
+            () = &mut shutdown => return Ok(()),
+            () = std::future::ready(()) => {}
+        }
+        match output.print(&Serving::of(&server)) {
+            // A daemon need not have a reader.
+            Ok(()) | Err(CliError::OutputClosed) => {}
+            Err(error) => return Err(error),
+        }
+        Ok(server.run(shutdown).await?)
+    }
+
+    fn config(&self) -> Result<Config, ConfigError> {
+        let options = json!({
+            "data_dir": self.data_dir,
+            "http": {"listen": self.http_listen},
+            "grpc": {"listen": self.grpc_listen},
+            "log": {"format": self.log_format, "level": self.log_level},
+            "save_interval_s": self.save_interval_s,
+            "drain_seconds": self.drain_seconds,
+        });
+        Config::load(self.config.as_deref(), options)
+    }
+}
+
+/// Where a server is to be found.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Serving {
+    pub(super) http: SocketAddr,
+    pub(super) grpc: SocketAddr,
+}
+
+impl Serving {
+    pub(super) fn of(server: &Server) -> Self {
+        Self { http: server.http_address(), grpc: server.grpc_address() }
+    }
+}
+
+impl Display for Serving {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "mrol serves http://{} (HTTP) and http://{} (gRPC)", self.http, self.grpc)
+    }
+}

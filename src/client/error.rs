@@ -1,0 +1,134 @@
+//! Why a call failed.
+
+use std::error::Error;
+
+use tonic::{Code, Status};
+
+use crate::service::ServiceError;
+
+/// The metadata that holds the server's word for programs.
+const REASON: &str = "mrol-reason";
+
+/// A call that failed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ClientError {
+    /// The address is none.
+    #[error("{url:?} is no server address: {problem}; it looks like http://127.0.0.1:7334")]
+    Url {
+        /// As it was given.
+        url: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Nobody answers at the address.
+    #[error("cannot connect to {url}: {cause}; is `mrol serve` running there?")]
+    Unreachable {
+        /// The server's address.
+        url: String,
+        /// What the system said.
+        cause: String,
+    },
+    /// The connection broke in the middle of a call.
+    #[error("lost the connection to {url}: {cause}; is that the gRPC address of a running `mrol serve`?")]
+    Lost {
+        /// The server's address.
+        url: String,
+        /// What the system said.
+        cause: String,
+    },
+    /// Somebody answers at the address who is no gRPC server of ours, or one of another version.
+    #[error("{url} does not answer as mrol's gRPC does: {cause}; is that the gRPC address of `mrol serve`?")]
+    Foreign {
+        /// The address.
+        url: String,
+        /// What the answer was.
+        cause: String,
+    },
+    /// The server refused.
+    #[error("{message}{}", in_brackets(reason.as_deref()))]
+    Refused {
+        /// What kind of failure.
+        code: Code,
+        /// The word for programs: `guess_required`, `map_not_found`, ...
+        reason: Option<String>,
+        /// The sentence for people.
+        message: String,
+    },
+    /// The server's answer makes no sense to this version of the client.
+    #[error("the server's answer cannot be understood: {0}")]
+    Answer(ServiceError),
+}
+
+impl ClientError {
+    /// The server's word for programs, where it said one.
+    pub fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Refused { reason, .. } => reason.as_deref(),
+            _ => None,
+        }
+    }
+
+    pub(super) fn unreachable(url: String, error: &dyn Error) -> Self {
+        Self::Unreachable { url, cause: root_cause(error) }
+    }
+
+    /// What a status says: those that came over the wire have no source, those made on this side have.
+    pub(super) fn of(url: &str, status: &Status) -> Self {
+        if let Some(cause) = status.source() {
+            return Self::Lost { url: url.to_owned(), cause: root_cause(cause) };
+        }
+        let reason = status.metadata().get(REASON).and_then(|reason| reason.to_str().ok());
+        let message = match status.message() {
+            "" => status.code().description(),
+            message => message,
+        };
+        match (reason, status.code()) {
+            (None, Code::Internal | Code::Unknown | Code::Unimplemented) => {
+                Self::Foreign { url: url.to_owned(), cause: message.to_owned() }
+            }
+            (reason, code) => {
+                Self::Refused { code, reason: reason.map(str::to_owned), message: message.to_owned() }
+            }
+        }
+    }
+}
+
+fn in_brackets(reason: Option<&str>) -> String {
+    reason.map(|reason| format!(" ({reason})")).unwrap_or_default()
+}
+
+/// The innermost cause: "connection refused" rather than "transport error".
+fn root_cause(error: &dyn Error) -> String {
+    let mut cause = error;
+    while let Some(inner) = cause.source() {
+        cause = inner;
+    }
+    cause.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_keeps_the_servers_message_and_word() {
+        let mut status = Status::new(Code::NotFound, "map a does not exist");
+        status.metadata_mut().insert(REASON, "map_not_found".parse().unwrap());
+        let error = ClientError::of("http://a", &status);
+        assert_eq!(error.reason(), Some("map_not_found"));
+        assert_eq!(error.to_string(), "map a does not exist (map_not_found)");
+    }
+
+    #[test]
+    fn an_answer_that_is_none_of_ours_is_told_as_such() {
+        let error = ClientError::of("http://a", &Status::unimplemented("")).to_string();
+        assert!(error.starts_with("http://a does not answer as mrol's gRPC does"), "{error}");
+    }
+
+    #[test]
+    fn a_broken_connection_is_told_from_a_refusal() {
+        let broken = Status::from_error(Box::new(std::io::Error::other("reset by peer")));
+        let error = ClientError::of("http://a", &broken).to_string();
+        assert!(error.starts_with("lost the connection to http://a: reset by peer"), "{error}");
+    }
+}

@@ -1,0 +1,201 @@
+//! A client of the server, in domain types: a method for each call, and nothing of the daemon.
+//!
+//! ```no_run
+//! use mrol::client::Client;
+//! use mrol::geometry::Point;
+//! use mrol::map::{Lookup, MapName};
+//! use mrol::service::PointQuery;
+//!
+//! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+//! let client = Client::connect("http://127.0.0.1:7334").await?;
+//! let query = PointQuery {
+//!     points: vec![Point::new(1.0, 2.0, 0.5), Point::new(1.0, 2.0, 0.6)].into(),
+//!     map_from_points: None,
+//!     level: 0,
+//!     lookup: Lookup::Exact,
+//!     min_revision: None,
+//!     map_uuid: None,
+//! };
+//! let answer = client.query_points(&MapName::new("demo")?, query).await?;
+//! println!("{} of {} points are occupied", answer.points_occupied, answer.points);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A [`Client`] is a handle on one connection: clones share it, and calls on it run at the same time.
+
+mod answers;
+mod connection;
+mod error;
+mod new_map;
+mod streams;
+
+pub use answers::Answers;
+pub use error::ClientError;
+pub use new_map::NewMap;
+
+use std::time::Duration;
+
+use tonic::{Request, Response, Status};
+
+use crate::map::{MapName, Region, RobotName};
+use crate::service::{
+    Deletion, DeletionAnswer, MapInfo, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
+    TrajectoryAnswer, VoxelListing,
+};
+use crate::wire::pb;
+use connection::Connection;
+
+/// A connection to a server.
+#[derive(Debug, Clone)]
+pub struct Client {
+    connection: Connection,
+    timeout: Option<Duration>,
+}
+
+impl Client {
+    /// Connects to the gRPC address of a server: `http://127.0.0.1:7334`, or without the scheme.
+    ///
+    /// # Errors
+    /// When the address is none, or nobody listens there.
+    pub async fn connect(url: &str) -> Result<Self, ClientError> {
+        Ok(Self { connection: Connection::open(url).await?, timeout: None })
+    }
+
+    /// The same connection, with a deadline for every call that is not a stream: the server gives up at it, and
+    /// waits for a `min_revision` until it.
+    pub fn with_timeout(self, timeout: Duration) -> Self {
+        Self { timeout: Some(timeout), ..self }
+    }
+
+    /// Makes a map; true when it was not there. The same settings again are fine.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn create_map(&self, map: &MapName, settings: NewMap) -> Result<(MapInfo, bool), ClientError> {
+        let request = self.request((map, settings));
+        self.domain(self.connection.maps().create_map(request).await)
+    }
+
+    /// Describes a map.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn map_info(&self, map: &MapName) -> Result<MapInfo, ClientError> {
+        let request = self.request(pb::GetMapRequest { map: map.to_string() });
+        self.domain(self.connection.maps().get_map(request).await)
+    }
+
+    /// Describes all maps, by name.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ClientError> {
+        let request = self.request(pb::ListMapsRequest {});
+        self.domain(self.connection.maps().list_maps(request).await)
+    }
+
+    /// Takes a map out, in memory and on disk.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn delete_map(&self, map: &MapName) -> Result<(), ClientError> {
+        let request = self.request(pb::DeleteMapRequest { map: map.to_string() });
+        let answer = self.connection.maps().delete_map(request).await;
+        answer.map(|_| ()).map_err(|status| self.connection.failure(&status))
+    }
+
+    /// Says of each point whether its voxel is occupied, all at one revision.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ClientError> {
+        let request = self.request((map, query));
+        self.domain(self.connection.occupancy().query_points(request).await)
+    }
+
+    /// The occupied voxels of a level, in a region or everywhere, all at one revision.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn list_voxels(
+        &self,
+        map: &MapName,
+        level: u32,
+        region: Option<Region>,
+    ) -> Result<VoxelListing, ClientError> {
+        let request = self.request((map, level, region));
+        let chunks = self.connection.occupancy().list_voxels(request).await;
+        let mut chunks = self.connection.answers::<_, VoxelListing>(chunks)?;
+        let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_listing()))?;
+        while let Some(chunk) = chunks.next().await {
+            listing.keys.extend(chunk?.keys);
+        }
+        Ok(listing)
+    }
+
+    /// Aligns a scan and, where it fits, adds it. A scan that does not align is an answer, not an error.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ClientError> {
+        let request = self.request((map, scan));
+        self.domain(self.connection.mapping().insert_scan(request).await)
+    }
+
+    /// Aligns a scan and says what [`Client::insert_scan`] would; changes nothing.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ClientError> {
+        let request = self.request((map, scan));
+        self.domain(self.connection.mapping().align_scan(request).await)
+    }
+
+    /// Takes voxels out, with all their descendants.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn delete_voxels(
+        &self,
+        map: &MapName,
+        deletion: Deletion,
+    ) -> Result<DeletionAnswer, ClientError> {
+        let request = self.request((map, deletion));
+        self.domain(self.connection.mapping().delete_voxels(request).await)
+    }
+
+    /// The poses of the accepted scans, of one robot or of all.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn trajectory(
+        &self,
+        map: &MapName,
+        robot: Option<&RobotName>,
+    ) -> Result<TrajectoryAnswer, ClientError> {
+        let request = self.request((map, robot));
+        self.domain(self.connection.mapping().get_trajectory(request).await)
+    }
+
+    fn request<M>(&self, message: impl Into<M>) -> Request<M> {
+        let mut request = Request::new(message.into());
+        if let Some(timeout) = self.timeout {
+            request.set_timeout(timeout);
+        }
+        request
+    }
+
+    fn domain<M, T>(&self, answer: Result<Response<M>, Status>) -> Result<T, ClientError>
+    where
+        M: TryInto<T, Error = ServiceError>,
+    {
+        let answer = answer.map_err(|status| self.connection.failure(&status))?;
+        answer.into_inner().try_into().map_err(ClientError::Answer)
+    }
+}
+
+/// A listing has at least one message, so that its state is told.
+fn missing_listing() -> ClientError {
+    ClientError::Answer(ServiceError::invalid("missing_field", "the listing has no message"))
+}

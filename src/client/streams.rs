@@ -1,0 +1,42 @@
+//! Many requests on one call, answered in order.
+
+use tokio_stream::{Stream, StreamExt};
+
+use super::{Answers, Client, ClientError};
+use crate::map::MapName;
+use crate::service::{PointAnswer, PointQuery, ScanAnswer, ScanRequest};
+use crate::wire::pb;
+
+impl Client {
+    /// Inserts scans one after the other, an answer a scan: as [`Client::insert_scan`] without a round trip
+    /// between two. `scans` is read as fast as the server takes them.
+    ///
+    /// # Errors
+    /// When the server cannot be reached; a refused request ends the answers.
+    pub async fn insert_scans(
+        &self,
+        map: &MapName,
+        scans: impl Stream<Item = ScanRequest> + Send + 'static,
+    ) -> Result<Answers<ScanAnswer>, ClientError> {
+        let map = map.clone();
+        let requests = scans.map(move |scan| pb::InsertScanRequest::from((&map, scan)));
+        let answers = self.connection.mapping().insert_scan_stream(requests).await;
+        self.connection.answers(answers)
+    }
+
+    /// Asks batch after batch, an answer a batch: as [`Client::query_points`] without a round trip between two.
+    /// Each batch is answered at one revision of its own.
+    ///
+    /// # Errors
+    /// When the server cannot be reached; a refused request ends the answers.
+    pub async fn query_stream(
+        &self,
+        map: &MapName,
+        queries: impl Stream<Item = PointQuery> + Send + 'static,
+    ) -> Result<Answers<PointAnswer>, ClientError> {
+        let map = map.clone();
+        let requests = queries.map(move |query| pb::QueryPointsRequest::from((&map, query)));
+        let answers = self.connection.occupancy().query_points_stream(requests).await;
+        self.connection.answers(answers)
+    }
+}

@@ -1,0 +1,320 @@
+//! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use figment::Figment;
+use figment::providers::{Env, Format, Serialized, Toml};
+use serde::{Deserialize, Serialize};
+
+use crate::align::AlignmentSettings;
+use crate::bloom::FilterSettings;
+use crate::service::{Limits, ServiceSettings};
+use crate::telemetry::LogFormat;
+
+/// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
+const VARIABLE_PREFIX: &str = "MROL_";
+
+/// All settings of the daemon.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Where maps are kept across restarts; an empty path keeps them in memory only. `./mrol-data`.
+    pub data_dir: PathBuf,
+    /// Seconds between two savings of the maps that changed. 60.
+    pub save_interval_s: u64,
+    /// Seconds that requests in flight may take when the server goes down. 10.
+    pub drain_seconds: u64,
+    /// The HTTP listener; 127.0.0.1:7333.
+    pub http: ListenerConfig,
+    /// The gRPC listener; 127.0.0.1:7334.
+    pub grpc: ListenerConfig,
+    /// The log.
+    pub log: LogConfig,
+    /// Threads for work that uses the CPU.
+    pub threads: ThreadsConfig,
+    /// The filter of maps whose makers do not say.
+    pub filter: FilterConfig,
+    /// Bounds on what callers may ask.
+    pub limits: LimitsConfig,
+}
+
+/// Where a protocol is served.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListenerConfig {
+    /// Address and port; port 0 takes a free one.
+    pub listen: SocketAddr,
+}
+
+/// The log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LogConfig {
+    /// `text` or `json`.
+    pub format: LogFormat,
+    /// A level, or a list of `target=level`. `info`.
+    pub level: String,
+}
+
+/// Threads for work that uses the CPU; 0 = one a core.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ThreadsConfig {
+    /// For queries, listings and descriptions.
+    pub query: usize,
+    /// For alignments and changes.
+    pub mapping: usize,
+}
+
+/// A counting Bloom filter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FilterConfig {
+    /// Hash functions, k of eq. (1).
+    pub hashes: u32,
+    /// Bits of the plane a voxel, m / n of eq. (1).
+    pub bits_per_voxel: f64,
+}
+
+/// The service's [`Limits`], and that of a message.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LimitsConfig {
+    /// Bytes of one HTTP body or one gRPC message. 32 MiB.
+    pub message_bytes_max: usize,
+    /// See [`Limits::points_per_request_max`].
+    pub points_per_request_max: usize,
+    /// See [`Limits::keys_per_request_max`].
+    pub keys_per_request_max: usize,
+    /// See [`Limits::maps_max`].
+    pub maps_max: usize,
+    /// See [`Limits::voxels_per_map_max`].
+    pub voxels_per_map_max: usize,
+    /// See [`Limits::listed_voxels_max`].
+    pub listed_voxels_max: usize,
+    /// See [`Limits::jobs_waiting_max`].
+    pub jobs_waiting_max: usize,
+    /// See [`Limits::min_revision_wait_max`]; seconds.
+    pub min_revision_wait_max_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into() };
+        Self {
+            data_dir: "./mrol-data".into(),
+            save_interval_s: 60,
+            drain_seconds: 10,
+            http: listener(7333),
+            grpc: listener(7334),
+            log: LogConfig::default(),
+            threads: ThreadsConfig::default(),
+            filter: FilterConfig::default(),
+            limits: LimitsConfig::default(),
+        }
+    }
+}
+
+impl Default for LogConfig {
+    fn default() -> Self {
+        Self { format: LogFormat::Text, level: "info".into() }
+    }
+}
+
+impl Default for FilterConfig {
+    fn default() -> Self {
+        let FilterSettings { hashes, bits_per_key } = FilterSettings::default();
+        Self { hashes, bits_per_voxel: bits_per_key }
+    }
+}
+
+impl Default for LimitsConfig {
+    fn default() -> Self {
+        let limits = Limits::default();
+        Self {
+            message_bytes_max: crate::wire::transport::MESSAGE_BYTES_MAX,
+            points_per_request_max: limits.points_per_request_max,
+            keys_per_request_max: limits.keys_per_request_max,
+            maps_max: limits.maps_max,
+            voxels_per_map_max: limits.voxels_per_map_max,
+            listed_voxels_max: limits.listed_voxels_max,
+            jobs_waiting_max: limits.jobs_waiting_max,
+            min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
+        }
+    }
+}
+
+/// Why there is no configuration.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// A key that is none, or a value that does not fit; the message names both and where they stand.
+    #[error("{0}")]
+    Value(Box<figment::Error>),
+    /// The file named on the command line is not there.
+    #[error("configuration file {} cannot be read", .0.display())]
+    File(PathBuf),
+    /// A number out of its range.
+    #[error("{key} must be {range}, got {value}")]
+    Range {
+        /// The setting.
+        key: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        value: String,
+    },
+}
+
+impl Config {
+    /// Loads the settings: defaults < `file` < `MROL_...` variables < `overrides`, whose nulls (an option that
+    /// was not given) do not count.
+    ///
+    /// A variable counts when it names a setting at the top (`MROL_DATA_DIR`) or holds the `__` between section
+    /// and key (`MROL_HTTP__LISTEN`). Others are left alone: container platforms set names such as
+    /// `MROL_SERVICE_HOST` for every service called mrol.
+    ///
+    /// # Errors
+    /// For a key that is none, a value of the wrong kind or out of range, or a file that is not there.
+    pub fn load(file: Option<&Path>, overrides: impl Serialize) -> Result<Self, ConfigError> {
+        let mut figment = Figment::from(Serialized::defaults(Self::default()));
+        if let Some(file) = file {
+            if !file.is_file() {
+                return Err(ConfigError::File(file.to_owned()));
+            }
+            figment = figment.merge(Toml::file_exact(file));
+        }
+        let overrides = serde_json::to_value(overrides)
+            .map_err(|error| ConfigError::Value(Box::new(error.to_string().into())))?;
+        let given = Serialized::globals(without_nulls(overrides));
+        let config: Self =
+            figment.merge(variables()).merge(given).extract().map_err(|e| ConfigError::Value(Box::new(e)))?;
+        config.checked()
+    }
+
+    /// Refuses numbers that would stop the server from working at all.
+    fn checked(self) -> Result<Self, ConfigError> {
+        let range = |key, range, value: String| Err(ConfigError::Range { key, range, value });
+        if self.save_interval_s == 0 {
+            return range("save_interval_s", "at least 1", "0".into());
+        }
+        if self.limits.message_bytes_max == 0 {
+            return range("limits.message_bytes_max", "at least 1", "0".into());
+        }
+        let wait = self.limits.min_revision_wait_max_s;
+        if !(0.0..=86_400.0).contains(&wait) {
+            return range("limits.min_revision_wait_max_s", "0 to 86400", wait.to_string());
+        }
+        Ok(self)
+    }
+
+    /// What to open the service with.
+    pub fn service_settings(&self) -> ServiceSettings {
+        let FilterConfig { hashes, bits_per_voxel } = self.filter;
+        ServiceSettings {
+            data_dir: (!self.data_dir.as_os_str().is_empty()).then(|| self.data_dir.clone()),
+            limits: self.limits.service_limits(),
+            query_threads: self.threads.query,
+            mapping_threads: self.threads.mapping,
+            alignment: AlignmentSettings::default(),
+            filter: FilterSettings { hashes, bits_per_key: bits_per_voxel },
+        }
+    }
+
+    /// Time between two savings.
+    pub fn save_interval(&self) -> Duration {
+        Duration::from_secs(self.save_interval_s)
+    }
+
+    /// Time that requests in flight may take when the server goes down.
+    pub fn drain(&self) -> Duration {
+        Duration::from_secs(self.drain_seconds)
+    }
+}
+
+impl LimitsConfig {
+    fn service_limits(&self) -> Limits {
+        Limits {
+            points_per_request_max: self.points_per_request_max,
+            keys_per_request_max: self.keys_per_request_max,
+            maps_max: self.maps_max,
+            voxels_per_map_max: self.voxels_per_map_max,
+            listed_voxels_max: self.listed_voxels_max,
+            jobs_waiting_max: self.jobs_waiting_max,
+            min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
+        }
+    }
+}
+
+/// The variables that mean this program; see [`Config::load`].
+fn variables() -> Env {
+    let top = ["data_dir", "save_interval_s", "drain_seconds"];
+    Env::prefixed(VARIABLE_PREFIX)
+        .filter(move |key| key.as_str().contains("__") || top.iter().any(|name| key == *name))
+        .split("__")
+}
+
+/// The same object without its nulls, at any depth.
+fn without_nulls(value: serde_json::Value) -> serde_json::Value {
+    match value {
+        serde_json::Value::Object(fields) => {
+            let given = fields.into_iter().filter(|(_, value)| !value.is_null());
+            given.map(|(key, value)| (key, without_nulls(value))).collect()
+        }
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+    use std::io::Write;
+
+    fn load(toml: &str, overrides: serde_json::Value) -> Result<Config, ConfigError> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(toml.as_bytes()).unwrap();
+        Config::load(Some(file.path()), overrides)
+    }
+
+    #[test]
+    fn the_command_line_wins_over_the_file_and_the_file_over_defaults() {
+        let toml = "drain_seconds = 3\n[http]\nlisten = \"127.0.0.1:1\"\n[limits]\nmaps_max = 2";
+        let given = json!({"drain_seconds": null, "http": {"listen": "0.0.0.0:2"}, "grpc": {"listen": null}});
+        let config = load(toml, given).unwrap();
+        assert_eq!(config.drain_seconds, 3);
+        assert_eq!(config.http.listen.to_string(), "0.0.0.0:2");
+        assert_eq!(config.grpc.listen.to_string(), "127.0.0.1:7334");
+        let limits = config.service_settings().limits;
+        assert_eq!(limits, Limits { maps_max: 2, ..Limits::default() });
+    }
+
+    #[test]
+    fn a_key_that_is_none_is_named() {
+        for (toml, key) in
+            [("colour = 1", "colour"), ("[http]\nlisen = \"a\"", "lisen"), ("[limits]\nx = 1", "x")]
+        {
+            let error = load(toml, json!({})).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
+        }
+        assert!(load("", json!({"http": {"port": 1}})).unwrap_err().to_string().contains("port"));
+    }
+
+    #[test]
+    fn values_that_do_not_fit_are_named() {
+        let error = |toml| load(toml, json!({})).unwrap_err().to_string();
+        assert!(error("save_interval_s = 0").contains("save_interval_s must be at least 1, got 0"));
+        assert!(error("[limits]\nmin_revision_wait_max_s = -1").contains("min_revision_wait_max_s"));
+        assert!(error("[log]\nformat = \"xml\"").contains("xml"));
+        let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();
+        assert!(missing.to_string().contains("no-such-file.toml"));
+    }
+
+    #[test]
+    fn an_empty_data_dir_keeps_maps_in_memory() {
+        let config = load("data_dir = \"\"", json!({})).unwrap();
+        assert_eq!(config.service_settings().data_dir, None);
+        assert!(Config::default().service_settings().data_dir.is_some());
+    }
+}

@@ -1,0 +1,68 @@
+//! The Mapping service: what robots do.
+
+use tonic::{Request, Response, Status, Streaming};
+
+use super::Adapter;
+use super::stream::{Answers, Message};
+use crate::map::{MapName, RobotName};
+use crate::wire::pb;
+use pb::mapping_server::Mapping;
+
+#[tonic::async_trait]
+impl Mapping for Adapter {
+    type InsertScanStreamStream = Answers<pb::InsertScanResponse>;
+
+    async fn insert_scan(
+        &self,
+        request: Request<pb::InsertScanRequest>,
+    ) -> Result<Response<pb::InsertScanResponse>, Status> {
+        let (map, scan) = request.into_inner().try_into()?;
+        let answer = self.service.insert_scan(&map, scan).await?;
+        Ok(Response::new(answer.into()))
+    }
+
+    async fn insert_scan_stream(
+        &self,
+        requests: Request<Streaming<pb::InsertScanRequest>>,
+    ) -> Result<Response<Self::InsertScanStreamStream>, Status> {
+        let answers = self.answer_in_order("InsertScanStream", requests, |service, request| async move {
+            let (map, scan) = request.try_into()?;
+            let answer = service.insert_scan(&map, scan).await?;
+            Ok(answer.into())
+        });
+        Ok(Response::new(answers))
+    }
+
+    async fn align_scan(
+        &self,
+        request: Request<pb::AlignScanRequest>,
+    ) -> Result<Response<pb::AlignScanResponse>, Status> {
+        let (map, scan) = request.into_inner().try_into()?;
+        let answer = self.service.maps().align_scan(&map, scan).await?;
+        Ok(Response::new(answer.into()))
+    }
+
+    async fn delete_voxels(
+        &self,
+        request: Request<pb::DeleteVoxelsRequest>,
+    ) -> Result<Response<pb::DeleteVoxelsResponse>, Status> {
+        let (map, deletion) = request.into_inner().try_into()?;
+        let answer = self.service.delete_voxels(&map, deletion).await?;
+        Ok(Response::new(answer.into()))
+    }
+
+    async fn get_trajectory(
+        &self,
+        request: Request<pb::GetTrajectoryRequest>,
+    ) -> Result<Response<pb::GetTrajectoryResponse>, Status> {
+        let (map, robot): (MapName, Option<RobotName>) = request.into_inner().try_into()?;
+        let answer = self.service.maps().trajectory(&map, robot.as_ref()).await?;
+        Ok(Response::new(answer.into()))
+    }
+}
+
+impl Message for pb::InsertScanRequest {
+    fn map_mut(&mut self) -> &mut String {
+        &mut self.map
+    }
+}

@@ -1,0 +1,88 @@
+//! The gRPC adapters: convert in, call the service, convert out.
+
+mod around;
+mod deadline;
+mod mapping;
+mod maps;
+mod occupancy;
+mod status;
+mod stream;
+
+use tonic::codec::CompressionEncoding;
+use tonic::service::Routes;
+use tonic_health::ServingStatus;
+use tonic_health::server::HealthReporter;
+
+use crate::lifecycle::Lifecycle;
+use crate::telemetry::MeteredService;
+use crate::wire::pb;
+use pb::mapping_server::{self, MappingServer};
+use pb::maps_server::{self, MapsServer};
+use pb::occupancy_server::{self, OccupancyServer};
+
+/// What every handler has at hand.
+#[derive(Debug, Clone)]
+struct Adapter {
+    service: MeteredService,
+    lifecycle: Lifecycle,
+}
+
+/// The three services, health and reflection. Messages of more than `message_bytes_max` are refused.
+///
+/// # Errors
+/// When the contract that was compiled in cannot be read.
+pub fn routes(
+    service: MeteredService,
+    lifecycle: Lifecycle,
+    message_bytes_max: usize,
+) -> Result<(Routes, Health), tonic_reflection::server::Error> {
+    let adapter = Adapter { service, lifecycle };
+    // Each generated server has the same methods, but no trait names them.
+    macro_rules! configured {
+        ($server:ident) => {
+            $server::new(adapter.clone())
+                .max_decoding_message_size(message_bytes_max)
+                .max_encoding_message_size(message_bytes_max)
+                .accept_compressed(CompressionEncoding::Gzip)
+                .accept_compressed(CompressionEncoding::Zstd)
+                .send_compressed(CompressionEncoding::Gzip)
+                .send_compressed(CompressionEncoding::Zstd)
+        };
+    }
+    let api = Routes::new(configured!(OccupancyServer))
+        .add_service(configured!(MappingServer))
+        .add_service(configured!(MapsServer));
+    let api = around::routes(api.into_axum_router(), &adapter);
+
+    let (reporter, health) = tonic_health::server::health_reporter();
+    let reflection = tonic_reflection::server::Builder::configure()
+        .register_encoded_file_descriptor_set(pb::FILE_DESCRIPTOR_SET)
+        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        .build_v1()?;
+    Ok((Routes::from(api).add_service(health).add_service(reflection), Health(reporter)))
+}
+
+/// Says by gRPC's health protocol whether the server serves: as a whole (the empty name) and each service.
+#[derive(Debug)]
+pub struct Health(HealthReporter);
+
+impl Health {
+    const SERVICES: [&str; 4] =
+        ["", occupancy_server::SERVICE_NAME, mapping_server::SERVICE_NAME, maps_server::SERVICE_NAME];
+
+    /// From now on it serves.
+    pub async fn set_serving(&self) {
+        self.set(ServingStatus::Serving).await;
+    }
+
+    /// From now on it does not.
+    pub async fn set_not_serving(&self) {
+        self.set(ServingStatus::NotServing).await;
+    }
+
+    async fn set(&self, status: ServingStatus) {
+        for service in Self::SERVICES {
+            self.0.set_service_status(service, status).await;
+        }
+    }
+}

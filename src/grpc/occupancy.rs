@@ -1,0 +1,56 @@
+//! The Occupancy service: what planners ask.
+
+use tonic::codegen::BoxStream;
+use tonic::{Request, Response, Status, Streaming};
+
+use super::Adapter;
+use super::stream::{Answers, Message};
+use crate::wire::{pb, voxel_chunks};
+use pb::occupancy_server::Occupancy;
+
+#[tonic::async_trait]
+impl Occupancy for Adapter {
+    type QueryPointsStreamStream = Answers<pb::QueryPointsResponse>;
+    type ListVoxelsStream = BoxStream<pb::ListVoxelsResponse>;
+
+    async fn query_points(
+        &self,
+        request: Request<pb::QueryPointsRequest>,
+    ) -> Result<Response<pb::QueryPointsResponse>, Status> {
+        let (map, query) = request.into_inner().try_into()?;
+        let answer = self.service.query_points(&map, query).await?;
+        Ok(Response::new(answer.into()))
+    }
+
+    async fn query_points_stream(
+        &self,
+        requests: Request<Streaming<pb::QueryPointsRequest>>,
+    ) -> Result<Response<Self::QueryPointsStreamStream>, Status> {
+        let answers = self.answer_in_order("QueryPointsStream", requests, |service, request| async move {
+            let (map, query) = request.try_into()?;
+            let answer = service.query_points(&map, query).await?;
+            Ok(answer.into())
+        });
+        Ok(Response::new(answers))
+    }
+
+    async fn list_voxels(
+        &self,
+        request: Request<pb::ListVoxelsRequest>,
+    ) -> Result<Response<Self::ListVoxelsStream>, Status> {
+        let (map, level, region) = request.into_inner().try_into()?;
+        let listing = self.service.maps().list_voxels(&map, level, region).await?;
+        let held = self.lifecycle.hold();
+        let chunks = voxel_chunks(listing).map(move |chunk| {
+            let _until_sent = &held;
+            Ok(chunk)
+        });
+        Ok(Response::new(Box::pin(tokio_stream::iter(chunks))))
+    }
+}
+
+impl Message for pb::QueryPointsRequest {
+    fn map_mut(&mut self) -> &mut String {
+        &mut self.map
+    }
+}

@@ -1,0 +1,67 @@
+//! What a failure is called in gRPC.
+
+use tonic::metadata::MetadataValue;
+use tonic::{Code, Status};
+
+use crate::service::{ErrorCode, ServiceError};
+
+/// The metadata that holds the word for programs.
+pub(super) const REASON: &str = "mrol-reason";
+
+/// The gRPC code of a failure.
+fn code(code: ErrorCode) -> Code {
+    match code {
+        ErrorCode::InvalidArgument => Code::InvalidArgument,
+        ErrorCode::NotFound => Code::NotFound,
+        ErrorCode::Conflict => Code::AlreadyExists,
+        ErrorCode::FailedPrecondition => Code::FailedPrecondition,
+        ErrorCode::ResourceExhausted => Code::ResourceExhausted,
+        ErrorCode::DeadlineExceeded => Code::DeadlineExceeded,
+        ErrorCode::Unavailable => Code::Unavailable,
+        ErrorCode::Internal => Code::Internal,
+    }
+}
+
+impl From<ServiceError> for Status {
+    fn from(error: ServiceError) -> Self {
+        let mut status = Self::new(code(error.code), error.message);
+        status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason));
+        status
+    }
+}
+
+/// A code as a metric's label.
+pub(super) fn label(code: Code) -> &'static str {
+    match code {
+        Code::Ok => "ok",
+        Code::Cancelled => "cancelled",
+        Code::Unknown => "unknown",
+        Code::InvalidArgument => "invalid_argument",
+        Code::DeadlineExceeded => "deadline_exceeded",
+        Code::NotFound => "not_found",
+        Code::AlreadyExists => "already_exists",
+        Code::PermissionDenied => "permission_denied",
+        Code::ResourceExhausted => "resource_exhausted",
+        Code::FailedPrecondition => "failed_precondition",
+        Code::Aborted => "aborted",
+        Code::OutOfRange => "out_of_range",
+        Code::Unimplemented => "unimplemented",
+        Code::Internal => "internal",
+        Code::Unavailable => "unavailable",
+        Code::DataLoss => "data_loss",
+        Code::Unauthenticated => "unauthenticated",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_keeps_its_message_and_its_word() {
+        let error = ServiceError::new(ErrorCode::FailedPrecondition, "guess_required", "no guess");
+        let status = Status::from(error);
+        assert_eq!((status.code(), status.message()), (Code::FailedPrecondition, "no guess"));
+        assert_eq!(status.metadata().get(REASON).unwrap(), "guess_required");
+    }
+}

@@ -1,0 +1,129 @@
+//! Streams of requests, answered in order.
+
+use std::time::Instant;
+
+use tokio::sync::mpsc::{self, Receiver, Sender};
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Request, Status, Streaming};
+
+use super::{Adapter, status};
+use crate::lifecycle;
+use crate::service::ServiceError;
+use crate::telemetry::MeteredService;
+
+/// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
+const MESSAGES_AHEAD_MAX: usize = 4;
+
+/// The answers to a stream of requests.
+pub(super) type Answers<T> = ReceiverStream<Result<T, Status>>;
+
+/// A request of a stream.
+pub(super) trait Message: Send + 'static {
+    /// The map's name: where it is empty, the former request's map is meant.
+    fn map_mut(&mut self) -> &mut String;
+}
+
+impl Adapter {
+    /// Answers each request by `handle`, in order, while the next ones are read. The stream ends with the first
+    /// failure's status, or `Unavailable` once the server is going down and the request in hand is answered.
+    pub(super) fn answer_in_order<M, A, H, F>(
+        &self,
+        operation: &'static str,
+        requests: Request<Streaming<M>>,
+        handle: H,
+    ) -> Answers<A>
+    where
+        M: Message,
+        A: Send + 'static,
+        H: Fn(MeteredService, M) -> F + Send + 'static,
+        F: Future<Output = Result<A, ServiceError>> + Send,
+    {
+        let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
+        let (outbox, answers) = mpsc::channel(MESSAGES_AHEAD_MAX);
+        let worker = Worker { adapter: self.clone(), operation, handle, map: String::new() };
+        tokio::spawn(async move {
+            tokio::select! {
+                // The worker's end ends the reader too.
+                () = worker.run(read, outbox) => {}
+                () = read_into(inbox, requests.into_inner()) => {}
+            }
+        });
+        ReceiverStream::new(answers)
+    }
+}
+
+/// Moves what the client sends to `inbox`; when the client is done, the inbox is closed, and this never ends.
+async fn read_into<M>(inbox: Sender<Result<M, Status>>, mut requests: Streaming<M>) {
+    while let Some(request) = requests.message().await.transpose() {
+        let last = request.is_err();
+        if inbox.send(request).await.is_err() || last {
+            break;
+        }
+    }
+    drop(inbox);
+    std::future::pending().await
+}
+
+struct Worker<H> {
+    adapter: Adapter,
+    operation: &'static str,
+    handle: H,
+    /// The last request's.
+    map: String,
+}
+
+impl<H> Worker<H> {
+    async fn run<M, A, F>(mut self, mut inbox: Receiver<Result<M, Status>>, outbox: Sender<Result<A, Status>>)
+    where
+        M: Message,
+        H: Fn(MeteredService, M) -> F,
+        F: Future<Output = Result<A, ServiceError>>,
+    {
+        loop {
+            let answer = tokio::select! {
+                biased;
+                () = self.adapter.lifecycle.draining() => Err(lifecycle::draining().into()),
+                request = inbox.recv() => match request {
+                    Some(request) => self.answer(request).await,
+                    None => return,
+                },
+            };
+            let last = answer.is_err();
+            if outbox.send(answer).await.is_err() || last {
+                return;
+            }
+        }
+    }
+
+    /// Answers one request, timed and counted as a request of its own.
+    async fn answer<M, A, F>(&mut self, request: Result<M, Status>) -> Result<A, Status>
+    where
+        M: Message,
+        H: Fn(MeteredService, M) -> F,
+        F: Future<Output = Result<A, ServiceError>>,
+    {
+        let start = Instant::now();
+        let answer = match request {
+            Ok(request) => self.handled(request).await.map_err(Status::from),
+            Err(unreadable) => Err(unreadable),
+        };
+        let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
+        let metrics = self.adapter.service.metrics();
+        metrics.request("grpc", self.operation, status::label(code), start.elapsed());
+        answer
+    }
+
+    async fn handled<M, A, F>(&mut self, mut request: M) -> Result<A, ServiceError>
+    where
+        M: Message,
+        H: Fn(MeteredService, M) -> F,
+        F: Future<Output = Result<A, ServiceError>>,
+    {
+        match request.map_mut() {
+            map if map.is_empty() => map.clone_from(&self.map),
+            map => self.map.clone_from(map),
+        }
+        let handled = (self.handle)(self.adapter.service.clone(), request);
+        self.adapter.lifecycle.admit(handled).await?
+    }
+}

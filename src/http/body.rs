@@ -1,0 +1,112 @@
+//! Bodies: JSON, or points as bytes with the rest of the request in the query.
+
+use axum::body::Bytes;
+use axum::extract::{FromRequest, Request};
+use axum::http::{HeaderMap, StatusCode, header};
+use serde::de::DeserializeOwned;
+
+use super::error::{HttpError, excerpt};
+use super::{Adapter, parameters};
+use crate::service::{ErrorCode, PointCloud, ServiceError};
+use crate::wire::InField;
+
+const JSON: &str = "application/json";
+const OCTET_STREAM: &str = "application/octet-stream";
+
+/// JSON of more bytes than this is parsed away from the threads that serve connections.
+const PARSED_INLINE_MAX: usize = 64 << 10;
+
+/// A body that is all of the request.
+pub(super) struct Json<T>(pub(super) T);
+
+impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for Json<T> {
+    type Rejection = HttpError;
+
+    async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
+        match content_type(request.headers()).as_str() {
+            JSON => parse_all(request, adapter).await.map(Self),
+            other => Err(unsupported(other, JSON)),
+        }
+    }
+}
+
+/// A body with points: as JSON `J` with everything, or as bytes with the rest, `Q`, in the query.
+pub(super) enum Points<J, Q> {
+    Json(J),
+    Bytes(PointCloud, Q),
+}
+
+impl<J, Q> FromRequest<Adapter> for Points<J, Q>
+where
+    J: DeserializeOwned + Send + 'static,
+    Q: DeserializeOwned + Send,
+{
+    type Rejection = HttpError;
+
+    async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
+        match content_type(request.headers()).as_str() {
+            JSON => parse_all(request, adapter).await.map(Self::Json),
+            OCTET_STREAM => {
+                let rest = parameters::from_query(request.uri())?;
+                let points = PointCloud::from_bytes(read(request, adapter).await?).in_field("body")?;
+                Ok(Self::Bytes(points, rest))
+            }
+            other => Err(unsupported(other, "application/json or application/octet-stream")),
+        }
+    }
+}
+
+/// The media type without its parameters, in lower case; empty where none is said.
+fn content_type(headers: &HeaderMap) -> String {
+    let value = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or_default();
+    value.split(';').next().unwrap_or_default().trim().to_ascii_lowercase()
+}
+
+fn unsupported(got: &str, supported: &str) -> HttpError {
+    let message = format!("content-type must be {supported}, got {:?}", excerpt(got));
+    HttpError::with_status(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_content_type", message)
+}
+
+/// Parses a body that holds the whole request; parameters beside it would go unheard.
+async fn parse_all<T: DeserializeOwned + Send + 'static>(
+    request: Request,
+    adapter: &Adapter,
+) -> Result<T, HttpError> {
+    if let Some(query) = request.uri().query().filter(|query| !query.is_empty()) {
+        let message =
+            format!("with {JSON} the body holds everything, got the query {:?} too", excerpt(query));
+        return Err(ServiceError::invalid("unexpected_query", message).into());
+    }
+    let body = read(request, adapter).await?;
+    if body.len() <= PARSED_INLINE_MAX {
+        return parse(&body);
+    }
+    tokio::task::spawn_blocking(move || parse(&body)).await.unwrap_or_else(|_| {
+        Err(ServiceError::new(ErrorCode::Internal, "parser_failed", "the body could not be parsed").into())
+    })
+}
+
+fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
+    let not_json = |error| ServiceError::invalid("bad_json", format!("body: {error}"));
+    Ok(serde_json::from_slice(body).map_err(not_json)?)
+}
+
+async fn read(request: Request, adapter: &Adapter) -> Result<Bytes, HttpError> {
+    let most = adapter.message_bytes_max;
+    let too_large = |bytes: String| {
+        let message = format!("body must be at most {most} bytes (message_bytes_max), got {bytes}");
+        HttpError::with_status(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large", message)
+    };
+    let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
+    if let Some(bytes) = declared.and_then(|length| length.parse().ok()).filter(|&bytes: &usize| bytes > most)
+    {
+        return Err(too_large(bytes.to_string()));
+    }
+    Bytes::from_request(request, adapter).await.map_err(|rejection| {
+        if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
+            too_large("more".into())
+        } else {
+            ServiceError::invalid("body_unreadable", format!("body: {}", rejection.body_text())).into()
+        }
+    })
+}

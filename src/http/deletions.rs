@@ -1,0 +1,115 @@
+//! `POST /v1/maps/{map}/deletions`: take voxels out.
+
+use axum::extract::State;
+use axum::response::Json;
+use serde::{Deserialize, Serialize};
+
+use super::Adapter;
+use super::body::Points;
+use super::error::HttpError;
+use super::json::{JsonPoints, JsonState};
+use super::parameters::Map;
+use crate::map::Region;
+use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
+use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DeletionJson {
+    points: Option<JsonPoints>,
+    voxels: Option<Vec<[i32; 3]>>,
+    r#box: Option<BoxJson>,
+    sphere: Option<SphereJson>,
+    #[serde(default)]
+    level: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxJson {
+    min_m: [f64; 3],
+    max_m: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SphereJson {
+    center_m: [f64; 3],
+    radius_m: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DeletionQuery {
+    #[serde(default)]
+    level: u32,
+}
+
+type DeletionBody = Points<DeletionJson, DeletionQuery>;
+
+#[derive(Serialize)]
+pub(super) struct DeletionOut {
+    removed: usize,
+    #[serde(flatten)]
+    state: JsonState,
+}
+
+pub(super) async fn delete(
+    State(adapter): State<Adapter>,
+    Map(map): Map,
+    deletion: DeletionBody,
+) -> Result<Json<DeletionOut>, HttpError> {
+    let answer = adapter.service.delete_voxels(&map, deletion.try_into()?).await?;
+    Ok(Json(answer.into()))
+}
+
+impl TryFrom<DeletionBody> for Deletion {
+    type Error = ServiceError;
+
+    fn try_from(body: DeletionBody) -> Result<Self, ServiceError> {
+        match body {
+            Points::Json(json) => Ok(Self { level: json.level, target: json.try_into()? }),
+            Points::Bytes(points, rest) => {
+                Ok(Self { level: rest.level, target: DeletionTarget::Points(points) })
+            }
+        }
+    }
+}
+
+impl TryFrom<DeletionJson> for DeletionTarget {
+    type Error = ServiceError;
+
+    fn try_from(json: DeletionJson) -> Result<Self, ServiceError> {
+        match (json.points, json.voxels, json.r#box, json.sphere) {
+            (Some(points), None, None, None) => Ok(Self::Points(points.into())),
+            (None, Some(voxels), None, None) => Ok(Self::Keys(keys_of(&voxels)?)),
+            (None, None, Some(BoxJson { min_m, max_m }), None) => {
+                Ok(Self::Region(Region::cuboid(min_m, max_m)?))
+            }
+            (None, None, None, Some(SphereJson { center_m, radius_m })) => {
+                Ok(Self::Region(Region::ball(center_m, radius_m)?))
+            }
+            _ => {
+                let message = "exactly one of points, voxels, box and sphere must be given";
+                Err(ServiceError::invalid("ambiguous_target", message))
+            }
+        }
+    }
+}
+
+fn keys_of(voxels: &[[i32; 3]]) -> Result<Vec<VoxelKey>, ServiceError> {
+    let key = |(i, &voxel): (usize, &[i32; 3])| {
+        VoxelKey::new(voxel).ok_or_else(|| {
+            let message =
+                format!("voxels[{i}] must lie in {INDEX_MIN}..={INDEX_MAX} in each axis, got {voxel:?}");
+            ServiceError::invalid("bad_key", message)
+        })
+    };
+    voxels.iter().enumerate().map(key).collect()
+}
+
+impl From<DeletionAnswer> for DeletionOut {
+    fn from(answer: DeletionAnswer) -> Self {
+        Self { removed: answer.removed, state: answer.state.into() }
+    }
+}

@@ -1,0 +1,79 @@
+//! What a failure looks like in HTTP: a status and
+//! `{"error":{"code":"invalid_argument","reason":"bad_pose","message":"..."}}`.
+
+use axum::Json;
+use axum::extract::Request;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+use crate::service::{ErrorCode, ServiceError};
+
+/// A failed request.
+#[derive(Debug)]
+pub(super) struct HttpError {
+    status: StatusCode,
+    error: ServiceError,
+}
+
+/// The status of a failure, and its code as a word.
+fn status_of(code: ErrorCode) -> (StatusCode, &'static str) {
+    match code {
+        ErrorCode::InvalidArgument => (StatusCode::BAD_REQUEST, "invalid_argument"),
+        ErrorCode::NotFound => (StatusCode::NOT_FOUND, "not_found"),
+        ErrorCode::Conflict => (StatusCode::CONFLICT, "conflict"),
+        ErrorCode::FailedPrecondition => (StatusCode::PRECONDITION_FAILED, "failed_precondition"),
+        ErrorCode::ResourceExhausted => (StatusCode::TOO_MANY_REQUESTS, "resource_exhausted"),
+        ErrorCode::DeadlineExceeded => (StatusCode::GATEWAY_TIMEOUT, "deadline_exceeded"),
+        ErrorCode::Unavailable => (StatusCode::SERVICE_UNAVAILABLE, "unavailable"),
+        ErrorCode::Internal => (StatusCode::INTERNAL_SERVER_ERROR, "internal"),
+    }
+}
+
+impl From<ServiceError> for HttpError {
+    fn from(error: ServiceError) -> Self {
+        Self { status: status_of(error.code).0, error }
+    }
+}
+
+impl HttpError {
+    /// A request that is wrong in itself, in a way that HTTP has a status of its own for.
+    pub(super) fn with_status(status: StatusCode, reason: &'static str, message: impl Into<String>) -> Self {
+        Self { status, error: ServiceError::invalid(reason, message) }
+    }
+}
+
+impl IntoResponse for HttpError {
+    fn into_response(self) -> Response {
+        let ServiceError { code, reason, message } = self.error;
+        let (_, word) = status_of(code);
+        let body = json!({"error": {"code": word, "reason": reason, "message": message}});
+        let mut response = (self.status, Json(body)).into_response();
+        if code == ErrorCode::ResourceExhausted {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        }
+        response
+    }
+}
+
+/// The answer where no route is.
+pub(super) async fn no_such_route(request: Request) -> HttpError {
+    let message = format!("no route {}", excerpt(request.uri().path()));
+    ServiceError::new(ErrorCode::NotFound, "route_not_found", message).into()
+}
+
+/// The answer of a route that has other methods.
+pub(super) async fn no_such_method(request: Request) -> HttpError {
+    let message = format!("{} does not take {}", excerpt(request.uri().path()), request.method());
+    HttpError::with_status(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", message)
+}
+
+/// What a client sent, short enough to be repeated to it.
+pub(super) fn excerpt(text: &str) -> String {
+    const LENGTH_MAX: usize = 80;
+    let mut start: String = text.chars().take(LENGTH_MAX).collect();
+    if start.len() < text.len() {
+        start.push('…');
+    }
+    start
+}

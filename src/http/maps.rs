@@ -1,0 +1,151 @@
+//! `/v1/maps`: make, describe, list and delete maps.
+
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Json;
+use serde::{Deserialize, Serialize};
+
+use super::Adapter;
+use super::body;
+use super::error::HttpError;
+use super::json::JsonState;
+use super::parameters::Map;
+use crate::bloom::FilterSettings;
+use crate::map::{LEVELS_DEFAULT, LevelInfo, MapSettings};
+use crate::service::MapInfo;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SettingsIn {
+    resolution_m: f64,
+    levels: Option<u32>,
+    #[serde(default)]
+    filter: FilterIn,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FilterIn {
+    hashes: Option<u32>,
+    bits_per_voxel: Option<f64>,
+}
+
+impl SettingsIn {
+    fn or(self, filter: FilterSettings) -> MapSettings {
+        MapSettings {
+            resolution_m: self.resolution_m,
+            levels: self.levels.unwrap_or(LEVELS_DEFAULT),
+            filter: FilterSettings {
+                hashes: self.filter.hashes.unwrap_or(filter.hashes),
+                bits_per_key: self.filter.bits_per_voxel.unwrap_or(filter.bits_per_key),
+            },
+        }
+    }
+}
+
+#[derive(Serialize)]
+pub(super) struct MapOut {
+    map: String,
+    #[serde(flatten)]
+    state: JsonState,
+    settings: SettingsOut,
+    levels: Vec<LevelOut>,
+    scans: usize,
+    robots: Vec<String>,
+    set_bytes: usize,
+}
+
+#[derive(Serialize)]
+struct SettingsOut {
+    resolution_m: f64,
+    levels: u32,
+    filter: FilterOut,
+}
+
+#[derive(Serialize)]
+struct FilterOut {
+    hashes: u32,
+    bits_per_voxel: f64,
+}
+
+#[derive(Serialize)]
+struct LevelOut {
+    level: u32,
+    resolution_m: f64,
+    voxels: usize,
+    plane_bytes: usize,
+    counter_bytes: usize,
+    false_positives_expected: f64,
+    false_positives_equation_1: f64,
+    false_positives_measured: Option<f64>,
+}
+
+#[derive(Serialize)]
+pub(super) struct MapsOut {
+    maps: Vec<MapOut>,
+}
+
+pub(super) async fn create(
+    State(adapter): State<Adapter>,
+    Map(name): Map,
+    body::Json(settings): body::Json<SettingsIn>,
+) -> Result<(StatusCode, Json<MapOut>), HttpError> {
+    let service = adapter.service.maps();
+    let (info, created) = service.create_map(name, settings.or(service.default_filter())).await?;
+    let status = if created { StatusCode::CREATED } else { StatusCode::OK };
+    Ok((status, Json(info.into())))
+}
+
+pub(super) async fn describe(
+    State(adapter): State<Adapter>,
+    Map(name): Map,
+) -> Result<Json<MapOut>, HttpError> {
+    let info = adapter.service.maps().map_info(&name).await?;
+    Ok(Json(info.into()))
+}
+
+pub(super) async fn list(State(adapter): State<Adapter>) -> Result<Json<MapsOut>, HttpError> {
+    let maps = adapter.service.maps().list_maps().await?;
+    Ok(Json(MapsOut { maps: maps.into_iter().map(Into::into).collect() }))
+}
+
+pub(super) async fn delete(State(adapter): State<Adapter>, Map(name): Map) -> Result<StatusCode, HttpError> {
+    adapter.service.maps().delete_map(&name).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+impl From<MapInfo> for MapOut {
+    fn from(info: MapInfo) -> Self {
+        Self {
+            map: info.name.to_string(),
+            state: info.state.into(),
+            settings: info.settings.into(),
+            levels: info.levels.iter().map(Into::into).collect(),
+            scans: info.scans,
+            robots: info.robots.iter().map(ToString::to_string).collect(),
+            set_bytes: info.set_bytes,
+        }
+    }
+}
+
+impl From<MapSettings> for SettingsOut {
+    fn from(MapSettings { resolution_m, levels, filter }: MapSettings) -> Self {
+        let filter = FilterOut { hashes: filter.hashes, bits_per_voxel: filter.bits_per_key };
+        Self { resolution_m, levels, filter }
+    }
+}
+
+impl From<&LevelInfo> for LevelOut {
+    fn from(info: &LevelInfo) -> Self {
+        Self {
+            level: info.level,
+            resolution_m: info.resolution_m,
+            voxels: info.voxels,
+            plane_bytes: info.plane_bytes,
+            counter_bytes: info.counter_bytes,
+            false_positives_expected: info.expected_rate,
+            false_positives_equation_1: info.unblocked_rate,
+            false_positives_measured: info.measured_rate,
+        }
+    }
+}

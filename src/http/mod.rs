@@ -1,0 +1,64 @@
+//! The HTTP adapters, with the same meaning as gRPC: JSON for people, bytes for programs.
+
+mod around;
+mod body;
+mod deletions;
+mod error;
+mod json;
+mod maps;
+mod occupancy;
+mod parameters;
+mod probes;
+mod scans;
+mod trajectory;
+mod voxels;
+
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::middleware::from_fn_with_state;
+use axum::routing::{get, post, put};
+use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
+use tower_http::timeout::RequestBodyTimeoutLayer;
+
+use crate::lifecycle::Lifecycle;
+use crate::telemetry::MeteredService;
+
+/// How long a client may be silent in the middle of a body.
+const BODY_SILENCE_MAX: Duration = Duration::from_secs(30);
+
+/// What every handler has at hand.
+#[derive(Debug, Clone)]
+struct Adapter {
+    service: MeteredService,
+    lifecycle: Lifecycle,
+    message_bytes_max: usize,
+}
+
+/// All routes. Bodies of more than `message_bytes_max` are refused.
+pub fn router(service: MeteredService, lifecycle: Lifecycle, message_bytes_max: usize) -> Router {
+    let adapter = Adapter { service, lifecycle, message_bytes_max };
+    let api = Router::new()
+        .route("/v1/maps", get(maps::list))
+        .route("/v1/maps/{map}", put(maps::create).get(maps::describe).delete(maps::delete))
+        .route("/v1/maps/{map}/scans", post(scans::insert))
+        .route("/v1/maps/{map}/alignment", post(scans::align))
+        .route("/v1/maps/{map}/occupancy", post(occupancy::query))
+        .route("/v1/maps/{map}/deletions", post(deletions::delete))
+        .route("/v1/maps/{map}/trajectory", get(trajectory::get))
+        .route("/v1/maps/{map}/voxels", get(voxels::list))
+        .fallback(error::no_such_route)
+        .method_not_allowed_fallback(error::no_such_method)
+        .layer(RequestBodyTimeoutLayer::new(BODY_SILENCE_MAX))
+        .layer(DefaultBodyLimit::max(message_bytes_max))
+        .layer(from_fn_with_state(adapter.clone(), around::request))
+        .layer(PropagateRequestIdLayer::x_request_id())
+        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid));
+    let probes = Router::new()
+        .route("/livez", get(probes::live))
+        .route("/readyz", get(probes::ready))
+        .route("/metrics", get(probes::metrics))
+        .method_not_allowed_fallback(error::no_such_method);
+    probes.merge(api).with_state(adapter)
+}

@@ -1,0 +1,115 @@
+//! `POST /v1/maps/{map}/occupancy`: are these points in occupied voxels?
+
+use axum::extract::State;
+use axum::http::{HeaderName, HeaderValue, header};
+use axum::response::{IntoResponse, Json, Response};
+use serde::{Deserialize, Serialize};
+
+use super::Adapter;
+use super::body::Points;
+use super::error::HttpError;
+use super::json::{JsonLookup, JsonPoints, JsonPose, JsonState};
+use super::parameters::{self, Map};
+use crate::geometry::Pose;
+use crate::service::{PointAnswer, PointCloud, PointQuery, ServiceError};
+use crate::wire::{InField, uuid_from};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct QueryJson {
+    points: JsonPoints,
+    map_from_points: Option<JsonPose>,
+    #[serde(default)]
+    level: u32,
+    #[serde(default)]
+    lookup: JsonLookup,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct QueryParameters {
+    pose: Option<String>,
+    #[serde(default)]
+    level: u32,
+    #[serde(default)]
+    lookup: JsonLookup,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+#[derive(Serialize)]
+struct AnswerJson {
+    occupied: Vec<bool>,
+    points_occupied: usize,
+    #[serde(flatten)]
+    state: JsonState,
+}
+
+/// Answers in the form of the question: JSON, or a bitmap.
+pub(super) async fn query(
+    State(adapter): State<Adapter>,
+    Map(map): Map,
+    body: Points<QueryJson, QueryParameters>,
+) -> Result<Response, HttpError> {
+    let (query, answer_with): (_, fn(PointAnswer) -> Response) = match body {
+        Points::Json(query) => (query.try_into()?, as_json),
+        Points::Bytes(points, rest) => (rest.with(points)?, as_bitmap),
+    };
+    let answer = adapter.service.query_points(&map, query).await?;
+    Ok(answer_with(answer))
+}
+
+impl TryFrom<QueryJson> for PointQuery {
+    type Error = ServiceError;
+
+    fn try_from(query: QueryJson) -> Result<Self, ServiceError> {
+        let pose = query.map_from_points.map(|pose| Pose::try_from(pose).in_field("map_from_points"));
+        Ok(Self {
+            points: query.points.into(),
+            map_from_points: pose.transpose()?,
+            level: query.level,
+            lookup: query.lookup.into(),
+            min_revision: query.min_revision,
+            map_uuid: query.map_uuid.map(|uuid| uuid_from(&uuid)).transpose()?,
+        })
+    }
+}
+
+impl QueryParameters {
+    fn with(self, points: PointCloud) -> Result<PointQuery, ServiceError> {
+        Ok(PointQuery {
+            points,
+            map_from_points: self.pose.map(|text| parameters::pose(&text, "pose")).transpose()?,
+            level: self.level,
+            lookup: self.lookup.into(),
+            min_revision: self.min_revision,
+            map_uuid: self.map_uuid.map(|uuid| uuid_from(&uuid)).transpose()?,
+        })
+    }
+}
+
+fn as_json(answer: PointAnswer) -> Response {
+    let bit = |i: usize| answer.occupied[i / 8] >> (i % 8) & 1 == 1;
+    Json(AnswerJson {
+        occupied: (0..answer.points).map(bit).collect(),
+        points_occupied: answer.points_occupied,
+        state: answer.state.into(),
+    })
+    .into_response()
+}
+
+fn as_bitmap(answer: PointAnswer) -> Response {
+    let mut response = answer.occupied.into_response();
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream"));
+    let mut number = |name, value: usize| headers.insert(HeaderName::from_static(name), value.into());
+    number("mrol-points", answer.points);
+    number("mrol-points-occupied", answer.points_occupied);
+    headers.insert(HeaderName::from_static("mrol-revision"), answer.state.revision.into());
+    if let Ok(uuid) = HeaderValue::try_from(answer.state.map_uuid.to_string()) {
+        headers.insert(HeaderName::from_static("mrol-map-uuid"), uuid);
+    }
+    response
+}

@@ -1,0 +1,78 @@
+//! What stands in the address: the map's name, and the parameters of the query.
+
+use axum::extract::{FromRequestParts, Path, Query};
+use axum::http::Uri;
+use axum::http::request::Parts;
+use serde::de::DeserializeOwned;
+
+use super::Adapter;
+use super::error::{HttpError, excerpt};
+use crate::geometry::{self, Pose};
+use crate::map::MapName;
+use crate::service::ServiceError;
+use crate::wire::InField;
+
+/// The `{map}` of a route.
+pub(super) struct Map(pub(super) MapName);
+
+impl FromRequestParts<Adapter> for Map {
+    type Rejection = HttpError;
+
+    async fn from_request_parts(parts: &mut Parts, adapter: &Adapter) -> Result<Self, HttpError> {
+        let path = Path::<String>::from_request_parts(parts, adapter).await;
+        let text = path.map_err(|rejection| ServiceError::invalid("bad_name", rejection.body_text()))?;
+        Ok(Self(MapName::new(&text).map_err(ServiceError::from)?))
+    }
+}
+
+/// The parameters of a request without a body.
+pub(super) struct Parameters<T>(pub(super) T);
+
+impl<T: DeserializeOwned> FromRequestParts<Adapter> for Parameters<T> {
+    type Rejection = HttpError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &Adapter) -> Result<Self, HttpError> {
+        from_query(&parts.uri).map(Self)
+    }
+}
+
+/// Parses the query of an address.
+pub(super) fn from_query<T: DeserializeOwned>(uri: &Uri) -> Result<T, HttpError> {
+    let parsed = Query::try_from_uri(uri);
+    let Query(parameters) =
+        parsed.map_err(|rejection| ServiceError::invalid("bad_query", rejection.body_text()))?;
+    Ok(parameters)
+}
+
+/// `N` numbers with commas between them.
+pub(super) fn numbers<const N: usize>(text: &str, field: &str) -> Result<[f64; N], ServiceError> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
+    numbers.ok().and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
+        let message =
+            format!("{field} must be {N} numbers with commas between them, got {:?}", excerpt(text));
+        ServiceError::invalid("bad_numbers", message)
+    })
+}
+
+/// A pose as `x,y,z,qx,qy,qz,qw`.
+pub(super) fn pose(text: &str, field: &str) -> Result<Pose, ServiceError> {
+    let [x, y, z, qx, qy, qz, qw] = numbers(text, field)?;
+    geometry::pose([x, y, z], [qx, qy, qz, qw]).in_field(field)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_is_seven_numbers() {
+        let placed = pose("1,2, 3,0,0,0,1", "guess").unwrap();
+        assert_eq!(geometry::translation_m(&placed), [1.0, 2.0, 3.0]);
+        for bad in ["", "1,2,3", "1,2,3,0,0,0,x", "1,2,3,0,0,0,1,1"] {
+            assert!(pose(bad, "guess").unwrap_err().message.starts_with("guess must be 7 numbers"), "{bad}");
+        }
+        let zero = pose("0,0,0,0,0,0,0", "guess").unwrap_err();
+        assert!(zero.message.starts_with("guess: rotation_xyzw must be a unit quaternion"), "{zero}");
+        assert!(pose("inf,0,0,0,0,0,1", "pose").unwrap_err().message.contains("finite"));
+    }
+}

@@ -1,0 +1,34 @@
+//! What orchestrators and Prometheus ask: answered whatever the pools are doing.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::IntoResponse;
+use serde_json::{Value, json};
+
+use super::Adapter;
+
+/// `GET /livez`: 200 while the process lives.
+pub(super) async fn live() -> &'static str {
+    "ok"
+}
+
+/// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not.
+pub(super) async fn ready(State(adapter): State<Adapter>) -> (StatusCode, Json<Value>) {
+    if adapter.lifecycle.is_draining() {
+        (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
+    } else {
+        (StatusCode::OK, Json(json!({"ready": true})))
+    }
+}
+
+/// `GET /metrics`: Prometheus' text form.
+pub(super) async fn metrics(State(adapter): State<Adapter>) -> impl IntoResponse {
+    let maps = adapter.service.maps().list_maps().await.unwrap_or_else(|error| {
+        // The counters say most when the server is overloaded, so they are told without the maps.
+        tracing::warn!(%error, "metrics without gauges of the maps");
+        Vec::new()
+    });
+    let text = adapter.service.metrics().render(&maps);
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text)
+}

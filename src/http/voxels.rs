@@ -1,0 +1,113 @@
+//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z`: the occupied voxels of a level.
+
+use std::convert::Infallible;
+use std::fmt::Write;
+
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+
+use super::Adapter;
+use super::error::HttpError;
+use super::json::JsonState;
+use super::parameters::{Map, Parameters, numbers};
+use crate::map::Region;
+use crate::service::ServiceError;
+use crate::voxel::VoxelKey;
+
+/// Voxels that are written to JSON at once: about half a MiB.
+const VOXELS_PER_CHUNK: usize = 32_768;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct VoxelsQuery {
+    #[serde(default)]
+    level: u32,
+    min: Option<String>,
+    max: Option<String>,
+}
+
+/// What stands before the voxels.
+#[derive(Serialize)]
+struct Head {
+    level: u32,
+    resolution_m: f64,
+    #[serde(flatten)]
+    state: JsonState,
+}
+
+pub(super) async fn list(
+    State(adapter): State<Adapter>,
+    Map(map): Map,
+    Parameters(query): Parameters<VoxelsQuery>,
+) -> Result<Response, HttpError> {
+    let (level, region) = (query.level, query.region()?);
+    let listing = adapter.service.maps().list_voxels(&map, level, region).await?;
+    let head = Head { level, resolution_m: listing.resolution_m, state: listing.state.into() };
+    let held = adapter.lifecycle.hold();
+    let chunks = chunks(head, listing.keys)?.map(move |chunk| {
+        let _until_sent = &held;
+        Ok::<_, Infallible>(Bytes::from(chunk))
+    });
+    let body = Body::from_stream(tokio_stream::iter(chunks));
+    Ok(([(header::CONTENT_TYPE, "application/json")], body).into_response())
+}
+
+impl VoxelsQuery {
+    fn region(&self) -> Result<Option<Region>, ServiceError> {
+        match (&self.min, &self.max) {
+            (None, None) => Ok(None),
+            (Some(min), Some(max)) => Ok(Some(Region::cuboid(numbers(min, "min")?, numbers(max, "max")?)?)),
+            _ => Err(ServiceError::invalid("half_a_box", "min and max go together, got one of them")),
+        }
+    }
+}
+
+/// `{<head>,"voxels":[[i,j,k],...]}` in pieces, each made when it is asked for: a listing may be larger than any
+/// other answer.
+fn chunks(head: Head, keys: Vec<VoxelKey>) -> Result<impl Iterator<Item = String> + Send, ServiceError> {
+    let head = serde_json::to_string(&head).map_err(|error| {
+        ServiceError::new(crate::service::ErrorCode::Internal, "not_written", error.to_string())
+    })?;
+    let first = format!("{},\"voxels\":[", head.trim_end_matches('}'));
+    let pieces = (0..keys.len()).step_by(VOXELS_PER_CHUNK).map(move |start| {
+        let end = keys.len().min(start + VOXELS_PER_CHUNK);
+        piece(&keys[start..end], start == 0)
+    });
+    Ok(std::iter::once(first).chain(pieces).chain(std::iter::once("]}".to_owned())))
+}
+
+fn piece(keys: &[VoxelKey], first: bool) -> String {
+    let mut text = String::with_capacity(keys.len() * 16);
+    for (i, key) in keys.iter().enumerate() {
+        let [x, y, z] = key.index();
+        let comma = if first && i == 0 { "" } else { "," };
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{comma}[{x},{y},{z}]");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::MapState;
+
+    #[test]
+    fn the_pieces_are_one_json_object() {
+        let state = MapState { revision: 3, map_uuid: uuid::Uuid::nil() };
+        for count in [0, 1, VOXELS_PER_CHUNK, VOXELS_PER_CHUNK + 2] {
+            let keys: Vec<_> = (0..count as i32).map(|i| VoxelKey::new([i, -1, 2]).unwrap()).collect();
+            let head = Head { level: 1, resolution_m: 0.1, state: state.into() };
+            let text: String = chunks(head, keys).unwrap().collect();
+            let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let voxels = json["voxels"].as_array().unwrap();
+            assert_eq!(voxels.len(), count);
+            assert_eq!((json["level"].as_u64(), json["revision"].as_u64()), (Some(1), Some(3)));
+            let last = voxels.last().map(|voxel| voxel.to_string());
+            assert_eq!(last, count.checked_sub(1).map(|i| format!("[{i},-1,2]")));
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The log: one line an event on standard error, for people or for programs.
+
+use serde::{Deserialize, Serialize};
+use std::io::IsTerminal;
+
+use tracing_subscriber::EnvFilter;
+
+/// How log lines are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// One object a line, for programs.
+    Json,
+}
+
+/// Why telemetry could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum TelemetryError {
+    /// The filter is none.
+    #[error("log.level must be a level (info) or a filter (info,mrol=debug), got {0:?}: {1}")]
+    Level(String, tracing_subscriber::filter::ParseError),
+    /// Somebody else writes the log already.
+    #[error("the log is started already")]
+    Started,
+    /// The metrics cannot be kept.
+    #[error("metrics cannot be kept: {0}")]
+    Metrics(#[from] metrics_exporter_prometheus::BuildError),
+}
+
+/// Starts the process's log at `level`: a level or a list of `target=level`.
+///
+/// # Errors
+/// When `level` is no filter, or the log was started before.
+pub fn start_logging(format: LogFormat, level: &str) -> Result<(), TelemetryError> {
+    let filter = EnvFilter::try_new(level).map_err(|error| TelemetryError::Level(level.to_owned(), error))?;
+    let colours = std::io::stderr().is_terminal();
+    let lines =
+        tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colours).with_writer(std::io::stderr);
+    let started = match format {
+        LogFormat::Text => lines.try_init(),
+        LogFormat::Json => lines.json().flatten_event(true).try_init(),
+    };
+    started.map_err(|_| TelemetryError::Started)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_that_is_none_is_named() {
+        let error = start_logging(LogFormat::Text, "mrol=loud").unwrap_err();
+        assert!(error.to_string().contains("mrol=loud"), "{error}");
+    }
+}

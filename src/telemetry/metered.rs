@@ -1,0 +1,69 @@
+//! The service with its work counted, once for every protocol.
+
+use super::Metrics;
+use crate::map::MapName;
+use crate::service::{
+    Deletion, DeletionAnswer, MapService, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
+};
+
+/// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
+/// [`MeteredService::maps`].
+#[derive(Debug, Clone)]
+pub struct MeteredService {
+    service: MapService,
+    metrics: Metrics,
+}
+
+impl MeteredService {
+    /// `service`, counted in `metrics`.
+    pub fn new(service: MapService, metrics: Metrics) -> Self {
+        Self { service, metrics }
+    }
+
+    /// The service itself.
+    pub fn maps(&self) -> &MapService {
+        &self.service
+    }
+
+    /// Where its work is counted.
+    pub fn metrics(&self) -> &Metrics {
+        &self.metrics
+    }
+
+    /// [`MapService::query_points`], counted.
+    ///
+    /// # Errors
+    /// Those of the service.
+    pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ServiceError> {
+        let lookup = query.lookup;
+        let answer = self.service.query_points(map, query).await?;
+        self.metrics.points_queried(map, lookup, answer.points);
+        Ok(answer)
+    }
+
+    /// [`MapService::insert_scan`], counted unless it is a replay.
+    ///
+    /// # Errors
+    /// Those of the service.
+    pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        let answer = self.service.insert_scan(map, scan).await?;
+        if !answer.replayed {
+            self.metrics.scan(map, answer.verdict);
+        }
+        Ok(answer)
+    }
+
+    /// [`MapService::delete_voxels`], counted.
+    ///
+    /// # Errors
+    /// Those of the service.
+    pub async fn delete_voxels(
+        &self,
+        map: &MapName,
+        deletion: Deletion,
+    ) -> Result<DeletionAnswer, ServiceError> {
+        let answer = self.service.delete_voxels(map, deletion).await?;
+        self.metrics.voxels_removed(map, answer.removed);
+        Ok(answer)
+    }
+}

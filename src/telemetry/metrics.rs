@@ -1,0 +1,138 @@
+//! Counters and latencies, kept by one server and rendered for Prometheus.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use metrics::{SharedString, counter, describe_counter, describe_histogram, histogram, with_local_recorder};
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
+
+use super::exposition;
+use super::log::TelemetryError;
+use crate::align::Verdict;
+use crate::map::{Lookup, MapName};
+use crate::service::MapInfo;
+
+/// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds.
+const SECONDS_BUCKETS: [f64; 14] =
+    [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+
+const REQUESTS: &str = "mrol_requests_total";
+const REQUEST_SECONDS: &str = "mrol_request_seconds";
+const POINTS_QUERIED: &str = "mrol_points_queried_total";
+const SCANS: &str = "mrol_scans_total";
+const VOXELS_REMOVED: &str = "mrol_voxels_removed_total";
+
+/// The metrics of one server. A clone is another handle on the same ones.
+///
+/// The recorder is the server's own and not the process's, so that several servers in one process (tests, a
+/// demo) count apart.
+#[derive(Debug, Clone)]
+pub struct Metrics(Arc<PrometheusRecorder>);
+
+impl Metrics {
+    /// Metrics that are all zero.
+    ///
+    /// # Errors
+    /// When the recorder refuses the buckets.
+    pub fn new() -> Result<Self, TelemetryError> {
+        let latency = Matcher::Full(REQUEST_SECONDS.to_owned());
+        let builder = PrometheusBuilder::new().set_buckets_for_metric(latency, &SECONDS_BUCKETS)?;
+        let metrics = Self(Arc::new(builder.build_recorder()));
+        metrics.record(describe);
+        Ok(metrics)
+    }
+
+    /// Counts a request, or a message of a stream, that was answered with `code` after `elapsed`.
+    pub fn request(
+        &self,
+        protocol: &'static str,
+        operation: &'static str,
+        code: impl Into<SharedString>,
+        elapsed: Duration,
+    ) {
+        self.record(|| {
+            counter!(REQUESTS, "protocol" => protocol, "operation" => operation, "code" => code.into())
+                .increment(1);
+            histogram!(REQUEST_SECONDS, "protocol" => protocol, "operation" => operation).record(elapsed);
+        });
+    }
+
+    /// Counts points that were answered.
+    pub fn points_queried(&self, map: &MapName, lookup: Lookup, points: usize) {
+        let lookup = match lookup {
+            Lookup::Exact => "exact",
+            Lookup::Bloom => "bloom",
+        };
+        self.record(|| {
+            counter!(POINTS_QUERIED, "map" => map.to_string(), "lookup" => lookup).increment(points as u64);
+        });
+    }
+
+    /// Counts a scan that was judged for insertion.
+    pub fn scan(&self, map: &MapName, verdict: Verdict) {
+        self.record(|| counter!(SCANS, "map" => map.to_string(), "verdict" => verdict.as_str()).increment(1));
+    }
+
+    /// Counts finest voxels that a deletion removed.
+    pub fn voxels_removed(&self, map: &MapName, voxels: usize) {
+        self.record(|| counter!(VOXELS_REMOVED, "map" => map.to_string()).increment(voxels as u64));
+    }
+
+    /// Everything in Prometheus' text form, with gauges of `maps` as they are now: a map that is gone leaves no
+    /// gauge behind.
+    pub fn render(&self, maps: &[MapInfo]) -> String {
+        let mut text = self.0.handle().render();
+        exposition::write_maps(&mut text, maps);
+        text
+    }
+
+    /// Folds what was recorded into the histograms; to be called now and then, lest it pile up between scrapes.
+    pub fn upkeep(&self) {
+        self.0.handle().run_upkeep();
+    }
+
+    fn record(&self, f: impl FnOnce()) {
+        with_local_recorder(&*self.0, f);
+    }
+}
+
+fn describe() {
+    describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
+    describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
+    describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
+    describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
+    describe_counter!(VOXELS_REMOVED, "Finest voxels removed by deletions, by map");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_counted_is_rendered_with_its_description() {
+        let metrics = Metrics::new().unwrap();
+        let map = MapName::new("a").unwrap();
+        metrics.request("grpc", "QueryPoints", "ok", Duration::from_millis(3));
+        metrics.points_queried(&map, Lookup::Bloom, 7);
+        metrics.points_queried(&map, Lookup::Bloom, 5);
+        metrics.scan(&map, Verdict::LowOverlap);
+        let text = metrics.render(&[]);
+        for line in [
+            r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
+            r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
+            r#"mrol_points_queried_total{map="a",lookup="bloom"} 12"#,
+            r#"mrol_scans_total{map="a",verdict="low_overlap"} 1"#,
+            "# TYPE mrol_request_seconds histogram",
+            "# HELP mrol_scans_total Scans judged",
+        ] {
+            assert!(text.contains(line), "{line} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn two_servers_count_apart() {
+        let (one, other) = (Metrics::new().unwrap(), Metrics::new().unwrap());
+        one.request("http", "GetMap", "200", Duration::ZERO);
+        assert!(!other.render(&[]).contains("GetMap"));
+    }
+}

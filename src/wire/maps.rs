@@ -1,0 +1,151 @@
+//! Maps, their settings and their descriptions (`maps.proto`).
+
+use super::types::count_from;
+use super::{InField, pb, required};
+use crate::bloom::FilterSettings;
+use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
+use crate::service::{MapInfo, ServiceError};
+
+/// The name and settings of a map to make; `filter` fills in what the request leaves to the server.
+///
+/// # Errors
+/// When the name is none or the settings are missing.
+pub fn create_map(
+    request: pb::CreateMapRequest,
+    filter: FilterSettings,
+) -> Result<(MapName, MapSettings), ServiceError> {
+    let settings = required(request.settings, "settings")?;
+    Ok((MapName::new(&request.map)?, settings_from(&settings, filter)))
+}
+
+fn settings_from(settings: &pb::MapSettings, default: FilterSettings) -> MapSettings {
+    let filter = settings.filter.unwrap_or_default();
+    MapSettings {
+        resolution_m: settings.resolution_m,
+        levels: settings.levels.unwrap_or(LEVELS_DEFAULT),
+        filter: FilterSettings {
+            hashes: filter.hashes.unwrap_or(default.hashes),
+            bits_per_key: filter.bits_per_voxel.unwrap_or(default.bits_per_key),
+        },
+    }
+}
+
+impl From<MapSettings> for pb::MapSettings {
+    fn from(settings: MapSettings) -> Self {
+        let filter = pb::FilterSettings {
+            hashes: Some(settings.filter.hashes),
+            bits_per_voxel: Some(settings.filter.bits_per_key),
+        };
+        Self { resolution_m: settings.resolution_m, levels: Some(settings.levels), filter: Some(filter) }
+    }
+}
+
+impl From<(&MapName, MapSettings)> for pb::CreateMapRequest {
+    fn from((map, settings): (&MapName, MapSettings)) -> Self {
+        Self { map: map.to_string(), settings: Some(settings.into()) }
+    }
+}
+
+impl From<(MapInfo, bool)> for pb::CreateMapResponse {
+    fn from((info, created): (MapInfo, bool)) -> Self {
+        Self { map: Some(info.into()), created }
+    }
+}
+
+impl TryFrom<pb::CreateMapResponse> for (MapInfo, bool) {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::CreateMapResponse) -> Result<Self, ServiceError> {
+        Ok((required(answer.map, "map")?.try_into()?, answer.created))
+    }
+}
+
+impl From<MapInfo> for pb::GetMapResponse {
+    fn from(info: MapInfo) -> Self {
+        Self { map: Some(info.into()) }
+    }
+}
+
+impl TryFrom<pb::GetMapResponse> for MapInfo {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::GetMapResponse) -> Result<Self, ServiceError> {
+        required(answer.map, "map")?.try_into()
+    }
+}
+
+impl From<Vec<MapInfo>> for pb::ListMapsResponse {
+    fn from(maps: Vec<MapInfo>) -> Self {
+        Self { maps: maps.into_iter().map(Into::into).collect() }
+    }
+}
+
+impl TryFrom<pb::ListMapsResponse> for Vec<MapInfo> {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::ListMapsResponse) -> Result<Self, ServiceError> {
+        answer.maps.into_iter().map(TryInto::try_into).collect()
+    }
+}
+
+impl From<MapInfo> for pb::MapInfo {
+    fn from(info: MapInfo) -> Self {
+        Self {
+            map: info.name.to_string(),
+            state: Some(info.state.into()),
+            settings: Some(info.settings.into()),
+            levels: info.levels.iter().map(Into::into).collect(),
+            scans: info.scans as u64,
+            robots: info.robots.iter().map(ToString::to_string).collect(),
+            set_bytes: info.set_bytes as u64,
+        }
+    }
+}
+
+impl TryFrom<pb::MapInfo> for MapInfo {
+    type Error = ServiceError;
+
+    fn try_from(info: pb::MapInfo) -> Result<Self, ServiceError> {
+        let settings = required(info.settings, "map.settings")?;
+        let robots = info.robots.iter().map(|robot| RobotName::new(robot)).collect::<Result<_, _>>();
+        Ok(Self {
+            name: MapName::new(&info.map)?,
+            state: required(info.state, "map.state")?.try_into()?,
+            settings: settings_from(&settings, FilterSettings::default()),
+            levels: info.levels.iter().map(Into::into).collect(),
+            scans: count_from(info.scans),
+            robots: robots.in_field("map.robots")?,
+            set_bytes: count_from(info.set_bytes),
+        })
+    }
+}
+
+impl From<&LevelInfo> for pb::LevelInfo {
+    fn from(info: &LevelInfo) -> Self {
+        Self {
+            level: info.level,
+            resolution_m: info.resolution_m,
+            voxels: info.voxels as u64,
+            plane_bytes: info.plane_bytes as u64,
+            counter_bytes: info.counter_bytes as u64,
+            false_positives_expected: info.expected_rate,
+            false_positives_equation_1: info.unblocked_rate,
+            false_positives_measured: info.measured_rate,
+        }
+    }
+}
+
+impl From<&pb::LevelInfo> for LevelInfo {
+    fn from(info: &pb::LevelInfo) -> Self {
+        Self {
+            level: info.level,
+            resolution_m: info.resolution_m,
+            voxels: count_from(info.voxels),
+            plane_bytes: count_from(info.plane_bytes),
+            counter_bytes: count_from(info.counter_bytes),
+            expected_rate: info.false_positives_expected,
+            unblocked_rate: info.false_positives_equation_1,
+            measured_rate: info.false_positives_measured,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Between the generated types and the domain: the only place that names both.
+//!
+//! A request converts into `(MapName, request of the service)` and back, an answer into the domain's answer and
+//! back, so that the daemon and the client share one definition. What cannot be converted is an error that
+//! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
+
+mod deletion;
+mod field;
+mod maps;
+mod occupancy;
+pub mod pb;
+mod scan;
+mod trajectory;
+pub mod transport;
+mod types;
+
+pub(crate) use field::{InField, required};
+pub use maps::create_map;
+pub use occupancy::{KEYS_PER_CHUNK, voxel_chunks};
+pub(crate) use types::uuid_from;

@@ -1,0 +1,169 @@
+//! Point queries and voxel listings (`occupancy.proto`).
+
+use super::types::{count_from, lookup_from};
+use super::{InField, pb, required, uuid_from};
+use crate::map::{MapName, Region};
+use crate::service::{PointAnswer, PointQuery, ServiceError, VoxelListing};
+use crate::voxel::VoxelKey;
+
+/// Keys of one message of a listing, at most: half a MiB.
+pub const KEYS_PER_CHUNK: usize = 65_536;
+
+impl TryFrom<pb::QueryPointsRequest> for (MapName, PointQuery) {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::QueryPointsRequest) -> Result<Self, ServiceError> {
+        let query = PointQuery {
+            points: required(request.points, "points")?.try_into().in_field("points")?,
+            map_from_points: request
+                .map_from_points
+                .map(|pose| pose.try_into().in_field("map_from_points"))
+                .transpose()?,
+            level: request.level,
+            lookup: lookup_from(request.lookup)?,
+            min_revision: request.min_revision,
+            map_uuid: (!request.map_uuid.is_empty()).then(|| uuid_from(&request.map_uuid)).transpose()?,
+        };
+        Ok((MapName::new(&request.map)?, query))
+    }
+}
+
+impl From<(&MapName, PointQuery)> for pb::QueryPointsRequest {
+    fn from((map, query): (&MapName, PointQuery)) -> Self {
+        Self {
+            map: map.to_string(),
+            points: Some(query.points.into()),
+            map_from_points: query.map_from_points.as_ref().map(Into::into),
+            level: query.level,
+            lookup: pb::Lookup::from(query.lookup).into(),
+            min_revision: query.min_revision,
+            map_uuid: query.map_uuid.map(|uuid| uuid.to_string()).unwrap_or_default(),
+        }
+    }
+}
+
+impl From<PointAnswer> for pb::QueryPointsResponse {
+    fn from(answer: PointAnswer) -> Self {
+        Self {
+            occupied: answer.occupied,
+            points: answer.points as u64,
+            points_occupied: answer.points_occupied as u64,
+            state: Some(answer.state.into()),
+        }
+    }
+}
+
+impl TryFrom<pb::QueryPointsResponse> for PointAnswer {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::QueryPointsResponse) -> Result<Self, ServiceError> {
+        Ok(Self {
+            occupied: answer.occupied,
+            points: count_from(answer.points),
+            points_occupied: count_from(answer.points_occupied),
+            state: required(answer.state, "state")?.try_into()?,
+        })
+    }
+}
+
+impl TryFrom<pb::ListVoxelsRequest> for (MapName, u32, Option<Region>) {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::ListVoxelsRequest) -> Result<Self, ServiceError> {
+        let region = request.region.map(Region::try_from).transpose()?;
+        Ok((MapName::new(&request.map)?, request.level, region))
+    }
+}
+
+impl From<(&MapName, u32, Option<Region>)> for pb::ListVoxelsRequest {
+    fn from((map, level, region): (&MapName, u32, Option<Region>)) -> Self {
+        Self { map: map.to_string(), level, region: region.map(Into::into) }
+    }
+}
+
+/// A listing as messages of at most [`KEYS_PER_CHUNK`] keys, each made when it is asked for; one without keys
+/// where there is no voxel, so that the state is told.
+pub fn voxel_chunks(listing: VoxelListing) -> impl Iterator<Item = pb::ListVoxelsResponse> + Send {
+    let VoxelListing { resolution_m, keys, state } = listing;
+    let chunks = keys.len().div_ceil(KEYS_PER_CHUNK).max(1);
+    (0..chunks).map(move |chunk| {
+        let start = chunk * KEYS_PER_CHUNK;
+        let end = keys.len().min(start + KEYS_PER_CHUNK);
+        pb::ListVoxelsResponse {
+            keys: keys[start..end].iter().map(|key| key.to_bits()).collect(),
+            state: Some(state.into()),
+            resolution_m,
+        }
+    })
+}
+
+impl TryFrom<pb::ListVoxelsResponse> for VoxelListing {
+    type Error = ServiceError;
+
+    fn try_from(chunk: pb::ListVoxelsResponse) -> Result<Self, ServiceError> {
+        Ok(Self {
+            resolution_m: chunk.resolution_m,
+            keys: keys_from(&chunk.keys)?,
+            state: required(chunk.state, "state")?.try_into()?,
+        })
+    }
+}
+
+/// Voxel keys from their packed form.
+pub(super) fn keys_from(bits: &[u64]) -> Result<Vec<VoxelKey>, ServiceError> {
+    let key = |(i, &bits): (usize, &u64)| {
+        VoxelKey::from_bits(bits).ok_or_else(|| {
+            ServiceError::invalid("bad_key", format!("keys[{i}] must have bit 63 clear, got {bits:#018x}"))
+        })
+    };
+    bits.iter().enumerate().map(key).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::MapState;
+    use uuid::Uuid;
+
+    #[test]
+    fn a_listing_is_cut_into_chunks_that_hold_all_of_it() {
+        let state = MapState { revision: 3, map_uuid: Uuid::from_u128(7) };
+        for count in [0, 1, KEYS_PER_CHUNK, KEYS_PER_CHUNK + 1] {
+            let keys: Vec<_> = (0..count as u64).map(|bits| VoxelKey::from_bits(bits).unwrap()).collect();
+            let chunks: Vec<_> =
+                voxel_chunks(VoxelListing { resolution_m: 0.1, keys: keys.clone(), state }).collect();
+            assert_eq!(chunks.len(), count.div_ceil(KEYS_PER_CHUNK).max(1));
+            let back = chunks.into_iter().flat_map(|chunk| VoxelListing::try_from(chunk).unwrap().keys);
+            assert_eq!(back.collect::<Vec<_>>(), keys);
+        }
+    }
+
+    #[test]
+    fn a_key_that_is_none_is_named() {
+        let error = keys_from(&[0, 1 << 63]).unwrap_err();
+        assert!(error.message.starts_with("keys[1] must have bit 63 clear"), "{error}");
+    }
+
+    #[test]
+    fn a_query_names_the_field_that_is_wrong() {
+        let good = pb::QueryPointsRequest {
+            map: "a".into(),
+            points: Some(pb::Points { xyz: vec![0.0; 3], ..Default::default() }),
+            ..Default::default()
+        };
+        let message = |change: fn(&mut pb::QueryPointsRequest)| {
+            let mut request = good.clone();
+            change(&mut request);
+            <(MapName, PointQuery)>::try_from(request).unwrap_err().message
+        };
+        assert_eq!(message(|r| r.points = None), "points is missing");
+        assert!(message(|r| r.map = "A".into()).starts_with("map must match"));
+        assert!(message(|r| r.lookup = 9).contains("got 9"));
+        assert!(message(|r| r.map_uuid = "x".into()).starts_with("map_uuid must be a uuid"));
+        let rotation = "map_from_points: rotation is missing";
+        let half = |r: &mut pb::QueryPointsRequest| {
+            r.map_from_points = Some(pb::Pose { translation_m: Some([0.0; 3].into()), rotation: None });
+        };
+        assert_eq!(message(half), rotation);
+    }
+}

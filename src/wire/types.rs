@@ -1,0 +1,206 @@
+//! Points, poses, regions, states: what several services share (`types.proto`).
+
+use uuid::Uuid;
+
+use super::{InField, pb, required};
+use crate::geometry::{self, Point, Pose};
+use crate::map::{Lookup, Region};
+use crate::service::{MapState, PointCloud, ServiceError};
+
+impl TryFrom<pb::Points> for PointCloud {
+    type Error = ServiceError;
+
+    fn try_from(points: pb::Points) -> Result<Self, ServiceError> {
+        match (points.xyz_f32le.is_empty(), points.xyz.is_empty()) {
+            (false, true) => Self::from_bytes(points.xyz_f32le),
+            (true, false) => from_floats(&points.xyz),
+            (true, true) => Err(ServiceError::invalid("empty_batch", "must hold at least one point, got 0")),
+            (false, false) => {
+                let message = format!(
+                    "must fill one of xyz_f32le and xyz, got both ({} bytes and {} numbers)",
+                    points.xyz_f32le.len(),
+                    points.xyz.len()
+                );
+                Err(ServiceError::invalid("ambiguous_points", message))
+            }
+        }
+    }
+}
+
+fn from_floats(numbers: &[f32]) -> Result<PointCloud, ServiceError> {
+    let (points, rest) = numbers.as_chunks::<3>();
+    if !rest.is_empty() {
+        let message = format!("xyz must hold three numbers a point, got {} numbers", numbers.len());
+        return Err(ServiceError::invalid("truncated_points", message));
+    }
+    Ok(points.iter().copied().map(Point::from).collect::<Vec<_>>().into())
+}
+
+impl From<PointCloud> for pb::Points {
+    fn from(points: PointCloud) -> Self {
+        let bytes = points.into_bytes();
+        Self { xyz_f32le: bytes, xyz: Vec::new() }
+    }
+}
+
+impl TryFrom<pb::Pose> for Pose {
+    type Error = ServiceError;
+
+    fn try_from(pose: pb::Pose) -> Result<Self, ServiceError> {
+        let translation_m = required(pose.translation_m, "translation_m")?;
+        let pb::Quaternion { x, y, z, w } = required(pose.rotation, "rotation")?;
+        Ok(geometry::pose(translation_m.into(), [x, y, z, w])?)
+    }
+}
+
+impl From<&Pose> for pb::Pose {
+    fn from(pose: &Pose) -> Self {
+        let [x, y, z, w] = geometry::rotation_xyzw(pose);
+        Self {
+            translation_m: Some(geometry::translation_m(pose).into()),
+            rotation: Some(pb::Quaternion { x, y, z, w }),
+        }
+    }
+}
+
+impl From<pb::Vector3> for [f64; 3] {
+    fn from(vector: pb::Vector3) -> Self {
+        [vector.x, vector.y, vector.z]
+    }
+}
+
+impl From<[f64; 3]> for pb::Vector3 {
+    fn from([x, y, z]: [f64; 3]) -> Self {
+        Self { x, y, z }
+    }
+}
+
+impl TryFrom<pb::Region> for Region {
+    type Error = ServiceError;
+
+    fn try_from(region: pb::Region) -> Result<Self, ServiceError> {
+        match required(region.shape, "region.shape")? {
+            pb::region::Shape::Box(pb::Box { min_m, max_m }) => {
+                let min_m = required(min_m, "region.box.min_m")?.into();
+                let max_m = required(max_m, "region.box.max_m")?.into();
+                Self::cuboid(min_m, max_m).in_field("region")
+            }
+            pb::region::Shape::Sphere(pb::Sphere { center_m, radius_m }) => {
+                let center_m = required(center_m, "region.sphere.center_m")?.into();
+                Self::ball(center_m, radius_m).in_field("region")
+            }
+        }
+    }
+}
+
+impl From<Region> for pb::Region {
+    fn from(region: Region) -> Self {
+        let shape = match region {
+            Region::Box { min_m, max_m } => {
+                pb::region::Shape::Box(pb::Box { min_m: Some(min_m.into()), max_m: Some(max_m.into()) })
+            }
+            Region::Sphere { center_m, radius_m } => {
+                pb::region::Shape::Sphere(pb::Sphere { center_m: Some(center_m.into()), radius_m })
+            }
+        };
+        Self { shape: Some(shape) }
+    }
+}
+
+impl TryFrom<pb::MapState> for MapState {
+    type Error = ServiceError;
+
+    fn try_from(state: pb::MapState) -> Result<Self, ServiceError> {
+        Ok(Self { revision: state.revision, map_uuid: uuid_from(&state.map_uuid)? })
+    }
+}
+
+impl From<MapState> for pb::MapState {
+    fn from(state: MapState) -> Self {
+        Self { revision: state.revision, map_uuid: state.map_uuid.to_string() }
+    }
+}
+
+/// The lookup of an enum field's number.
+pub(super) fn lookup_from(number: i32) -> Result<Lookup, ServiceError> {
+    match pb::Lookup::try_from(number) {
+        Ok(pb::Lookup::Unspecified | pb::Lookup::Exact) => Ok(Lookup::Exact),
+        Ok(pb::Lookup::Bloom) => Ok(Lookup::Bloom),
+        Err(_) => {
+            let message = format!("lookup must be 0, 1 (exact) or 2 (bloom), got {number}");
+            Err(ServiceError::invalid("bad_lookup", message))
+        }
+    }
+}
+
+impl From<Lookup> for pb::Lookup {
+    fn from(lookup: Lookup) -> Self {
+        match lookup {
+            Lookup::Exact => Self::Exact,
+            Lookup::Bloom => Self::Bloom,
+        }
+    }
+}
+
+/// A map's uuid from its text.
+pub(crate) fn uuid_from(text: &str) -> Result<Uuid, ServiceError> {
+    Uuid::parse_str(text).map_err(|error| {
+        let start: String = text.chars().take(64).collect();
+        ServiceError::invalid("bad_uuid", format!("map_uuid must be a uuid, got {start:?}: {error}"))
+    })
+}
+
+/// A count that came over the wire. Machines of less than 64 bits hold no map that would notice.
+pub(super) fn count_from(count: u64) -> usize {
+    usize::try_from(count).unwrap_or(usize::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_pose_survives_the_wire(t in prop::array::uniform3(-1e3..1e3f64), axis in prop::array::uniform3(-3.0..3.0f64)) {
+            let rotation = nalgebra::UnitQuaternion::from_scaled_axis(axis.into());
+            let pose = Pose::from_parts(nalgebra::Translation3::from(nalgebra::Vector3::from(t)), rotation);
+            let back = Pose::try_from(pb::Pose::from(&pose)).unwrap();
+            let (metres, degrees) = geometry::pose_difference(&pose, &back);
+            prop_assert!(metres < 1e-9 && degrees < 1e-5);
+        }
+
+        #[test]
+        fn both_encodings_give_the_same_points(numbers in prop::collection::vec(prop::array::uniform3(any::<f32>()), 1..50)) {
+            let xyz: Vec<f32> = numbers.iter().flatten().copied().collect();
+            let bytes: Vec<u8> = xyz.iter().flat_map(|c| c.to_le_bytes()).collect();
+            let floats = PointCloud::try_from(pb::Points { xyz, ..Default::default() }).unwrap();
+            let packed = pb::Points { xyz_f32le: bytes.into(), ..Default::default() };
+            prop_assert_eq!(&floats, &PointCloud::try_from(packed.clone()).unwrap());
+            prop_assert_eq!(pb::Points::from(floats), packed);
+        }
+    }
+
+    #[test]
+    fn points_that_are_none_say_why() {
+        let points = |bytes: usize, numbers: usize| pb::Points {
+            xyz_f32le: vec![0; bytes].into(),
+            xyz: vec![0.0; numbers],
+        };
+        let reason = |bytes, numbers| PointCloud::try_from(points(bytes, numbers)).unwrap_err().reason;
+        assert_eq!(reason(0, 0), "empty_batch");
+        assert_eq!(reason(12, 3), "ambiguous_points");
+        assert_eq!(reason(13, 0), "truncated_points");
+        assert_eq!(reason(0, 4), "truncated_points");
+    }
+
+    #[test]
+    fn regions_survive_the_wire_and_half_of_one_is_refused() {
+        for region in [Region::cuboid([0.0; 3], [1.0; 3]).unwrap(), Region::ball([1.0; 3], 2.0).unwrap()] {
+            assert_eq!(Region::try_from(pb::Region::from(region)).unwrap(), region);
+        }
+        let half = pb::Box { min_m: Some([0.0; 3].into()), max_m: None };
+        let error = Region::try_from(pb::Region { shape: Some(pb::region::Shape::Box(half)) }).unwrap_err();
+        assert_eq!(error.message, "region.box.max_m is missing");
+    }
+}

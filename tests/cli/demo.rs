@@ -1,0 +1,27 @@
+//! `mrol demo`: the whole story, made short.
+
+use super::objects;
+
+#[test]
+fn the_demonstration_succeeds_and_tells_what_it_measured() {
+    let lines = objects(&[
+        "demo",
+        "--once",
+        "--scans",
+        "4",
+        "--http-listen",
+        "127.0.0.1:0",
+        "--grpc-listen",
+        "127.0.0.1:0",
+    ]);
+    assert!(lines[0]["grpc"].is_string(), "{}", lines[0]);
+    assert_eq!(lines.len(), 2 + 2 * 4);
+    for line in &lines[1..9] {
+        assert_eq!(line["verdict"], "accepted");
+        assert!(line["error_m"].as_f64().unwrap() < 0.1, "{line}");
+    }
+    let summary = &lines[9]["summary"];
+    assert_eq!(summary["problems"], serde_json::json!([]));
+    assert!(summary["planner"]["points"].as_u64().unwrap() > 0);
+    assert_eq!(summary["robots"]["camera"]["accepted"], 4);
+}

@@ -1,0 +1,122 @@
+//! What goes wrong is said in a sentence, and told by the exit code.
+
+use super::{complaint, mrol};
+
+/// A folder with a file of that name and content; the file's path.
+fn file(name: &str, content: &[u8]) -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, content).unwrap();
+    (folder, path.to_str().unwrap().to_owned())
+}
+
+#[test]
+fn files_that_are_no_scans_are_named() {
+    let map = |path: &str| complaint(&["map", path, "--resolution", "0.1"], 1);
+    assert!(map("no-such-folder").contains("no-such-folder: "));
+    let (_folder, path) = file("scan.las", b"LASF");
+    assert!(map(&path).contains("unsupported extension \"las\""));
+    let (_folder, path) = file("scan.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n");
+    assert!(map(&path).contains("scan.ply"));
+    let (_folder, path) = file("scan.f32", &[0; 13]);
+    assert!(map(&path).contains("12 bytes"));
+    let (folder, _) = file("notes.txt", b"nothing");
+    assert!(map(folder.path().to_str().unwrap()).contains("no scan file"));
+}
+
+#[test]
+fn a_scan_of_nothing_but_no_returns_is_named() {
+    let (_folder, path) = file("scan.xyz", b"nan nan nan\nnan 0 0\n");
+    assert!(complaint(&["map", &path, "--resolution", "0.1"], 1).contains("none of its 2 points is finite"));
+}
+
+#[test]
+fn numbers_out_of_range_are_usage_errors_that_name_the_range() {
+    let (_folder, path) = file("scan.xyz", b"0 0 0\n");
+    for (option, value, text) in [
+        ("--resolution", "0", "resolution_m must lie in 0.001..=100"),
+        ("--levels", "13", "levels must lie in 1..=12"),
+        ("--filter-hashes", "11", "filter_hashes must lie in 1..=10"),
+        ("--min-overlap", "2", "overlap_min must lie in 0..=1"),
+        ("--first-pose", "1 2 3", "7 numbers are needed"),
+        ("--first-pose", "0 0 0 0 0 0 2", "norm 2"),
+    ] {
+        let mut arguments = vec!["map", &path, option, value];
+        if option != "--resolution" {
+            arguments.extend(["--resolution", "0.1"]);
+        }
+        let complaint = complaint(&arguments, 2);
+        assert!(complaint.contains(text), "{complaint}");
+    }
+}
+
+#[test]
+fn a_truth_with_too_few_poses_is_refused() {
+    let (folder, _) = file("0.xyz", b"0 0 0\n");
+    std::fs::write(folder.path().join("1.xyz"), b"0 0 0\n").unwrap();
+    let truth = folder.path().join("poses.txt");
+    std::fs::write(&truth, "0 0 0 0 0 0 0 1\n").unwrap();
+    let arguments =
+        ["map", folder.path().to_str().unwrap(), "--resolution", "1", "--truth", truth.to_str().unwrap()];
+    assert!(complaint(&arguments, 1).contains("1 poses for 2 scans"));
+}
+
+#[test]
+fn results_that_could_not_be_written_stop_the_run_before_it_begins() {
+    let (folder, path) = file("scan.xyz", b"0 0 0\n");
+    let out = folder.path().join("none/a.mrol");
+    let arguments = ["map", &path, "--resolution", "1", "--out", out.to_str().unwrap()];
+    assert!(complaint(&arguments, 1).contains("make it first"));
+}
+
+#[test]
+fn a_server_that_does_not_run_is_named_with_what_to_do() {
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let calls: [&[&str]; 4] = [
+        &["maps", "list"],
+        &["maps", "show", "a"],
+        &["query", "--map", "a", "--point", "0,0,0"],
+        &["delete", "--map", "a", "--sphere", "0 0 0 1"],
+    ];
+    for call in calls {
+        let complaint = complaint(&[call, &["--server", &free]].concat(), 1);
+        assert!(complaint.contains(&free) && complaint.contains("is `mrol serve` running"), "{complaint}");
+    }
+}
+
+#[test]
+fn a_call_that_makes_no_sense_is_a_usage_error() {
+    for arguments in [
+        &["query", "--map", "a"][..],
+        &["query", "--map", "A", "--point", "0,0,0"],
+        &["query", "points.xyz", "--map", "a", "--point", "0,0,0"],
+        &["delete", "--map", "a"],
+        &["delete", "--map", "a", "--point", "0,0,0", "--sphere", "0 0 0 1"],
+        &["delete", "--map", "a", "--box", "1 1 1 0 0 0"],
+        &["insert", "a.ply", "--map", "a", "--create"],
+        &["insert", "a.ply", "--map", "a", "--levels", "3"],
+        &["insert", "a.ply", "--map", "a", "--at-guess"],
+        &["map", "a.ply", "--resolution", "1", "--at-truth"],
+        &["maps", "list", "--server", "ftp://a"],
+        &["serve", "--http-listen", "nowhere"],
+        &["serve", "--config", "no-such-file.toml"],
+        &["serve", "--log-level", "a=b=c"],
+        &["demo", "--scans", "1"],
+    ] {
+        complaint(arguments, 2);
+    }
+}
+
+#[test]
+fn an_address_that_is_taken_is_named_with_what_to_do() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let output =
+        mrol(&["serve", "--data-dir", "", "--grpc-listen", "127.0.0.1:0", "--http-listen", &address])
+            .assert()
+            .code(1)
+            .get_output()
+            .clone();
+    let complaint = String::from_utf8(output.stderr).unwrap();
+    assert!(complaint.contains(&address) && complaint.contains("--http-listen"), "{complaint}");
+}

@@ -1,0 +1,144 @@
+//! `mrol map`: scans to a map, without a server.
+
+use mrol::geometry::pose_difference;
+use mrol::scan::read_trajectory;
+use mrol::store::Snapshot;
+
+use super::{Sequence, mrol, objects};
+
+const SCANS: usize = 4;
+
+#[test]
+fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
+    let sequence = Sequence::of(SCANS);
+    let (scans, trajectory, map) =
+        (sequence.path("scans"), sequence.path("out.txt"), sequence.path("out.mrol"));
+    let pose = sequence.first_pose();
+    let lines = objects(&[
+        "map",
+        &scans,
+        "--resolution",
+        "0.05",
+        "--levels",
+        "5",
+        "--first-pose",
+        &pose,
+        "--trajectory-out",
+        &trajectory,
+        "--out",
+        &map,
+    ]);
+    assert_eq!(lines.len(), SCANS);
+    for (k, line) in lines.iter().enumerate() {
+        assert_eq!(line["scan"], format!("{k:04}.ply"));
+        assert_eq!((line["accepted"].as_bool(), line["verdict"].as_str()), (Some(true), Some("accepted")));
+        assert_eq!(line["map_from_sensor"].as_array().unwrap().len(), 7);
+        for number in ["overlap", "align_ms", "insert_ms"] {
+            assert!(line[number].as_f64().unwrap() >= 0.0, "{number}");
+        }
+        assert_eq!(line.as_object().unwrap().len(), 9);
+    }
+    let added: u64 = lines.iter().map(|line| line["new_voxels"].as_u64().unwrap()).sum();
+    assert_eq!(lines[SCANS - 1]["voxels"].as_u64().unwrap(), added);
+
+    let poses = read_trajectory(trajectory.as_ref()).unwrap();
+    assert_eq!(poses.iter().map(|pose| pose.id).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 3.0]);
+    for (found, truth) in poses.iter().zip(&sequence.poses) {
+        let (metres, degrees) = pose_difference(&found.map_from_sensor, truth);
+        assert!(metres < 0.06 && degrees < 1.5, "{metres} m {degrees} degrees");
+    }
+    let snapshot = Snapshot::read(map.as_ref()).unwrap();
+    assert_eq!((snapshot.voxels.len() as u64, snapshot.trajectory.len()), (added, SCANS));
+}
+
+#[test]
+fn errors_are_against_the_first_pose_wherever_the_map_begins() {
+    let sequence = Sequence::of(SCANS);
+    let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));
+    let lines = objects(&["map", &scans, "--resolution", "0.05", "--levels", "5", "--truth", &truth]);
+    assert_eq!(lines[0]["error_m"], 0.0);
+    assert_eq!(lines[0]["map_from_sensor"], serde_json::json!([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+    let summary = &lines[SCANS]["summary"];
+    let errors = lines[..SCANS].iter().map(|line| line["error_m"].as_f64().unwrap());
+    assert_eq!(summary["error_m"]["max"].as_f64(), errors.reduce(f64::max));
+    assert!(summary["error_m"]["max"].as_f64().unwrap() < 0.06, "{summary}");
+    assert_eq!((summary["scans"].as_u64(), summary["refused"].as_u64()), (Some(4), Some(0)));
+}
+
+#[test]
+fn scans_at_their_true_poses_have_no_error() {
+    let sequence = Sequence::of(SCANS);
+    let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));
+    let lines = objects(&["map", &scans, "--resolution", "0.05", "--truth", &truth, "--at-truth"]);
+    assert!(lines[SCANS]["summary"]["error_m"]["max"].as_f64().unwrap() < 1e-9);
+    assert!(lines[SCANS - 1]["overlap"].as_f64().unwrap() > 0.5);
+}
+
+#[test]
+fn a_scan_that_does_not_fit_is_left_out_of_map_and_trajectory() {
+    let sequence = Sequence::of(2);
+    let (scans, trajectory) = (sequence.path("scans"), sequence.path("out.txt"));
+    let lines = objects(&[
+        "map",
+        &scans,
+        "--resolution",
+        "0.05",
+        "--min-overlap",
+        "1",
+        "--trajectory-out",
+        &trajectory,
+    ]);
+    assert_eq!(
+        (lines[1]["accepted"].as_bool(), lines[1]["verdict"].as_str()),
+        (Some(false), Some("low_overlap"))
+    );
+    assert_eq!(lines[1]["voxels"], lines[0]["voxels"]);
+    assert_eq!(read_trajectory(trajectory.as_ref()).unwrap().len(), 1);
+}
+
+#[test]
+fn ample_filters_are_told_from_small_ones_and_find_the_poses_of_the_exact_sets() {
+    let sequence = Sequence::of(3);
+    let scans = sequence.path("scans");
+    let run = |options: &[&str]| {
+        let common = ["map", &scans, "--resolution", "0.1", "--lookup"];
+        objects(&[&common, options].concat())
+    };
+    let ample = run(&["bloom", "--filter-hashes", "10", "--filter-bits-per-voxel", "2000"]);
+    let filter = &ample[3]["summary"]["filter"];
+    assert_eq!(filter["ample"], true, "{filter}");
+    assert!(filter["lookups"].as_u64().unwrap() > 1_000_000);
+    let small = run(&["bloom", "--filter-bits-per-voxel", "8"]);
+    assert_eq!(small[3]["summary"]["filter"]["ample"], false);
+    let exact = run(&["exact"]);
+    assert!(exact[3]["summary"]["filter"].is_null());
+    for k in 0..3 {
+        assert_eq!(ample[k]["map_from_sensor"], exact[k]["map_from_sensor"]);
+    }
+}
+
+#[test]
+fn people_get_a_table() {
+    let sequence = Sequence::of(2);
+    let output = mrol(&["map", &sequence.path("scans"), "--resolution", "0.1"]).assert().success();
+    let table = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+    assert!(table.starts_with("scan ") && table.contains("0001.ply  accepted"), "{table}");
+    assert!(table.contains("2 scans, 2 accepted, 0 refused"), "{table}");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    use std::process::{Command, Stdio};
+    let sequence = Sequence::of(2);
+    let scans = sequence.path("scans");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_mrol"))
+        .args(["map", &scans, "--resolution", "0.1", "--json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+}

@@ -1,0 +1,159 @@
+//! `mrol serve`, and what is done with it: maps, insert, query, delete.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use serde_json::{Value, json};
+
+use super::{Sequence, complaint, mrol, objects};
+
+/// A daemon in a process of its own, on free ports.
+struct Daemon {
+    process: Child,
+    http: String,
+    grpc: String,
+}
+
+impl Daemon {
+    fn start(data_dir: &str) -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_mrol"))
+            .args(["serve", "--json", "--data-dir", data_dir, "--log-level", "warn"])
+            .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let serving: Value = serde_json::from_str(&line).unwrap();
+        let address = |protocol: &str| format!("http://{}", serving[protocol].as_str().unwrap());
+        Self { process, http: address("http"), grpc: address("grpc") }
+    }
+
+    /// The objects that a call to it prints.
+    fn call(&self, arguments: &[&str]) -> Vec<Value> {
+        objects(&[arguments, &["--server", &self.grpc]].concat())
+    }
+
+    /// What a call to it complains about.
+    fn refuses(&self, arguments: &[&str]) -> String {
+        complaint(&[arguments, &["--server", &self.grpc]].concat(), 1)
+    }
+
+    /// Tells it to end, as a service manager does; its exit code.
+    fn stop(mut self) -> Option<i32> {
+        let told = Command::new("kill").arg(self.process.id().to_string()).status().unwrap();
+        assert!(told.success());
+        self.process.wait().unwrap().code()
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        // Where a test failed before it was stopped.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+#[test]
+fn a_map_is_made_listed_described_and_deleted() {
+    let daemon = Daemon::start("");
+    assert!(daemon.call(&["maps", "list"]).is_empty());
+    let create = ["maps", "create", "a", "--resolution", "0.05", "--levels", "3", "--filter-hashes", "3"];
+    let made = &daemon.call(&create)[0];
+    assert_eq!((&made["created"], &made["map"]), (&json!(true), &json!("a")));
+    assert_eq!(made["settings"]["filter"]["hashes"], 3);
+    assert_eq!(daemon.call(&create)[0]["created"], false);
+    assert!(daemon.refuses(&["maps", "create", "a", "--resolution", "0.1"]).contains("map_exists"));
+    assert_eq!(daemon.call(&["maps", "list"])[0]["map_uuid"], made["map_uuid"]);
+    assert_eq!(daemon.call(&["maps", "show", "a"])[0]["levels"].as_array().unwrap().len(), 3);
+    assert_eq!(daemon.call(&["maps", "delete", "a"]), [json!({"deleted": "a"})]);
+    assert!(daemon.refuses(&["maps", "show", "a"]).contains("map a does not exist"));
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_sequence_sent_to_a_daemon_gives_the_poses_of_one_mapped_here() {
+    let sequence = Sequence::of(3);
+    let (scans, pose) = (sequence.path("scans"), sequence.first_pose());
+    let settings = ["--resolution", "0.05", "--levels", "5"];
+    let here = objects(&[&["map", &scans, "--first-pose", &pose], &settings[..]].concat());
+
+    let daemon = Daemon::start("");
+    let insert = ["insert", &scans, "--map", "a", "--guess", &pose, "--first-scan-id", "0"];
+    let there = daemon.call(&[&insert[..], &["--create"], &settings].concat());
+    for (here, there) in here.iter().zip(&there) {
+        for field in ["scan", "verdict", "map_from_sensor", "overlap", "new_voxels"] {
+            assert_eq!(here[field], there[field]);
+        }
+    }
+    assert_eq!((there.len(), &there[2]["revision"]), (3, &json!(3)));
+    let again = daemon.call(&insert);
+    assert!(again.iter().all(|line| line["replayed"] == true), "{again:?}");
+    assert!(daemon.refuses(&["insert", &scans, "--map", "a", "--robot", "b"]).contains("--guess says where"));
+    assert!(daemon.refuses(&["insert", &scans, "--map", "b"]).contains("--create"));
+}
+
+#[test]
+fn what_was_inserted_is_found_and_what_was_deleted_is_not() {
+    let sequence = Sequence::of(2);
+    let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));
+    let points = "1 1 1\n-1 2 0.5\n1.02 1 1\n";
+    let (file, bitmap) = (sequence.path("points.xyz"), sequence.path("bitmap"));
+    std::fs::write(&file, points).unwrap();
+
+    let daemon = Daemon::start("");
+    daemon.call(&["insert", &scans, "--map", "a", "--truth", &truth, "--create", "--resolution", "0.1"]);
+    daemon.call(&["insert", &file, "--map", "b", "--create", "--resolution", "0.1"]);
+    let asked = &daemon.call(&["query", &file, "--map", "b", "--out", &bitmap])[0];
+    assert_eq!((&asked["points"], &asked["occupied"]), (&json!(3), &json!(3)));
+    assert_eq!(std::fs::read(&bitmap).unwrap(), [0b111]);
+
+    let of_points = |points: &[&str]| {
+        let options: Vec<_> = points.iter().flat_map(|point| ["--point", point]).collect();
+        let lines = daemon.call(&[&["query", "--map", "b"], &options[..]].concat());
+        lines.iter().map(|line| line["occupied"].as_bool().unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(of_points(&["1.01,1,1", "-1,2,0.5", "-1,2,0.7"]), [true, true, false]);
+    assert_eq!(daemon.call(&["delete", "--map", "b", "--box", "-2 0 0 0 3 1"])[0]["removed"], 1);
+    assert_eq!(of_points(&["1,1,1", "-1,2,0.5"]), [true, false]);
+    assert_eq!(daemon.call(&["delete", "--map", "b", "--points", &file])[0]["removed"], 1);
+    assert_eq!(of_points(&["1,1,1"]), [false]);
+    assert!(daemon.refuses(&["query", "--map", "b", "--point", "1e9,0,0"]).contains("points[0]"));
+    assert!(daemon.refuses(&["query", "--map", "b", "--point", "0,0,0", "--level", "4"]).contains("level"));
+}
+
+#[test]
+fn maps_survive_a_restart_and_one_made_without_a_daemon_is_served() {
+    let sequence = Sequence::of(2);
+    let (scans, data) = (sequence.path("scans"), sequence.path("data"));
+    let daemon = Daemon::start(&data);
+    daemon.call(&["insert", &scans, "--map", "a", "--create", "--resolution", "0.1"]);
+    let before = daemon.call(&["maps", "show", "a"]);
+    assert_eq!(daemon.stop(), Some(0));
+
+    objects(&["map", &scans, "--resolution", "0.1", "--out", &sequence.path("data/maps/here.mrol")]);
+    let daemon = Daemon::start(&data);
+    let after = daemon.call(&["maps", "show", "a"]);
+    assert_eq!(after[0]["map_uuid"], before[0]["map_uuid"]);
+    let voxels = |map: &Value| map["levels"][0]["voxels"].as_u64().unwrap();
+    assert_eq!(voxels(&after[0]), voxels(&before[0]));
+    assert_eq!(voxels(&daemon.call(&["maps", "show", "here"])[0]), voxels(&before[0]));
+}
+
+#[test]
+fn the_address_of_the_other_protocol_is_recognised_as_such() {
+    let daemon = Daemon::start("");
+    let said = complaint(&["maps", "list", "--server", &daemon.http], 1);
+    assert!(said.contains("is that the gRPC address"), "{said}");
+}
+
+#[test]
+fn the_server_may_come_from_the_environment_and_people_get_tables() {
+    let daemon = Daemon::start("");
+    daemon.call(&["maps", "create", "a", "--resolution", "0.25"]);
+    let list =
+        mrol(&["maps", "list"]).env("MROL_SERVER", &daemon.grpc).assert().success().get_output().clone();
+    let list = String::from_utf8(list.stdout).unwrap();
+    assert!(list.starts_with("a ") && list.contains("0.25 m"), "{list}");
+}

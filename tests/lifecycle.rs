@@ -1,0 +1,277 @@
+//! Start, health, metrics, going down and coming back.
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{Daemon, PATIENCE, bytes_of, client, identity_json, json_of, query_pb, row, scan_pb};
+use mrol::config::Config;
+use mrol::server::Server;
+use mrol::wire::pb;
+use reqwest::StatusCode;
+use serde_json::json;
+use tokio::io::AsyncWriteExt;
+use tokio::net::TcpStream;
+use tokio_stream::StreamExt;
+use tonic::Code;
+use tonic_health::pb::health_client::HealthClient;
+use tonic_health::pb::{HealthCheckRequest, HealthCheckResponse};
+
+/// A scan that takes a while to align: a floor, two walls and what stands about.
+fn large_scan(points: usize) -> Vec<[f32; 3]> {
+    let place = |i: usize| {
+        let (u, v) = ((i * 7919 % 10_007) as f32 / 1000.0, (i * 104_729 % 10_007) as f32 / 1000.0);
+        match i % 4 {
+            0 => [u, v, 0.0],
+            1 => [u, 0.0, v / 4.0],
+            2 => [0.0, u, v / 4.0],
+            _ => [u, (u * 3.0).sin() + 5.0, v / 10.0],
+        }
+    };
+    (0..points).map(place).collect()
+}
+
+async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
+    let start = Instant::now();
+    while !happened().await {
+        assert!(start.elapsed() < PATIENCE, "it never happened");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn idle_streams_and_half_open_connections_do_not_keep_it_from_going_down() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    // A stream whose client stays, one that was never used, connections that say nothing or half a sentence,
+    // and a watcher of its health.
+    let (send, requests) = tokio::sync::mpsc::channel(1);
+    send.send(query_pb("a", &row(1))).await.unwrap();
+    let requests = tokio_stream::wrappers::ReceiverStream::new(requests);
+    let mut answers = daemon.occupancy().await.query_points_stream(requests).await.unwrap().into_inner();
+    answers.message().await.unwrap().unwrap();
+    let silent = tokio_stream::pending();
+    let mut silent = daemon.mapping().await.insert_scan_stream(silent).await.unwrap().into_inner();
+    let _half_open = [TcpStream::connect(daemon.grpc).await, TcpStream::connect(daemon.http).await];
+    let mut half = TcpStream::connect(daemon.http).await.unwrap();
+    half.write_all(b"POST /v1/maps/a/occupancy HTTP/1.1\r\nHost: a\r\nContent-Le").await.unwrap();
+    let mut health = HealthClient::new(daemon.channel().await);
+    let watch = HealthCheckRequest { service: "mrol.v1.Mapping".into() };
+    let mut watched = health.watch(watch).await.unwrap().into_inner();
+    assert_eq!(watched.message().await.unwrap().unwrap().status, 1);
+
+    let start = Instant::now();
+    let stopping = daemon.tell_to_stop();
+    for answers in [answers.message().await.unwrap_err(), silent.message().await.unwrap_err()] {
+        assert_eq!((answers.code(), answers.message()), (Code::Unavailable, "server is draining"));
+    }
+    assert_eq!(watched.message().await.unwrap(), Some(HealthCheckResponse { status: 2 }));
+    stopping.stopped().await;
+    assert!(start.elapsed() < Duration::from_secs(3), "it took {:?}", start.elapsed());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_in_flight_is_finished_and_what_is_new_is_refused() {
+    let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = 1.5).await;
+    daemon.make_map("a").await;
+    assert_eq!(json_of(daemon.get("/readyz").await).await, json!({"ready": true}));
+    let waiting = json!({"points": row(1), "min_revision": 9});
+    let (waiting, url) = (client().post(daemon.url("/v1/maps/a/occupancy")).json(&waiting), daemon.url(""));
+    let waiting = tokio::spawn(waiting.send());
+    tokio::time::sleep(Duration::from_millis(300)).await;
+
+    let stopping = daemon.tell_to_stop();
+    let get = async |path: &str| client().get(format!("{url}{path}")).send().await.unwrap();
+    wait_until(async || get("/readyz").await.status() == StatusCode::SERVICE_UNAVAILABLE).await;
+    assert_eq!(json_of(get("/readyz").await).await, json!({"ready": false, "reason": "draining"}));
+    assert_eq!(get("/livez").await.status(), StatusCode::OK);
+    let refused = get("/v1/maps").await;
+    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+    let expected = json!({"code": "unavailable", "reason": "draining", "message": "server is draining"});
+    assert_eq!(json_of(refused).await["error"], expected);
+
+    // Its own bound ends it, not the server's end.
+    assert_eq!(waiting.await.unwrap().unwrap().status(), StatusCode::GATEWAY_TIMEOUT);
+    stopping.stopped().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_takes_longer_than_the_bound_is_cut() {
+    let daemon = Daemon::start_with(|config| {
+        config.limits.min_revision_wait_max_s = 600.0;
+        config.drain_seconds = 1;
+    });
+    let daemon = daemon.await;
+    daemon.make_map("a").await;
+    let forever = pb::QueryPointsRequest { min_revision: Some(9), ..query_pb("a", &row(1)) };
+    let mut planner = daemon.occupancy().await;
+    let unary = tokio::spawn(async move { planner.query_points(forever).await });
+    let forever = pb::QueryPointsRequest { min_revision: Some(9), ..query_pb("a", &row(1)) };
+    let requests = tokio_stream::once(forever).chain(tokio_stream::pending());
+    let mut stream = daemon.occupancy().await.query_points_stream(requests).await.unwrap().into_inner();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+
+    let start = Instant::now();
+    let stopping = daemon.tell_to_stop();
+    assert_eq!(unary.await.unwrap().unwrap_err().code(), Code::Unavailable);
+    assert_eq!(stream.message().await.unwrap_err().code(), Code::Unavailable);
+    stopping.stopped().await;
+    assert!(start.elapsed() < Duration::from_secs(4), "it took {:?}", start.elapsed());
+}
+
+#[tokio::test]
+async fn maps_survive_a_restart() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.make_map("gone").await;
+    let mut robot = daemon.mapping().await;
+    let mut scan = scan_pb("a", "r", &row(30));
+    scan.scan.as_mut().unwrap().scan_id = Some(7);
+    let first = robot.insert_scan(scan.clone()).await.unwrap().into_inner();
+    daemon.post("/v1/maps/a/deletions", json!({"points": row(3)})).await;
+    daemon.delete("/v1/maps/gone").await;
+    let before = daemon.contents("a").await;
+    let trajectory = json_of(daemon.get("/v1/maps/a/trajectory").await).await;
+
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("a").await, before);
+    assert_eq!(before.1.len(), 27);
+    assert_eq!(json_of(daemon.get("/v1/maps/a/trajectory").await).await, trajectory);
+    assert_eq!(daemon.get("/v1/maps/gone").await.status(), StatusCode::NOT_FOUND);
+    // It still knows the scans it has accepted.
+    let again = daemon.mapping().await.insert_scan(scan).await.unwrap().into_inner();
+    assert_eq!(again, pb::InsertScanResponse { replayed: true, ..first });
+}
+
+#[tokio::test]
+async fn changed_maps_are_saved_at_an_interval() {
+    let daemon = Daemon::start_with(|config| config.save_interval_s = 1).await;
+    daemon.make_map("a").await;
+    let file = daemon.data.path().join("maps/a.mrol");
+    let empty = std::fs::read(&file).unwrap();
+    daemon.put_in("a", &row(5)).await;
+    wait_until(async || std::fs::read(&file).unwrap() != empty).await;
+    // As after a power cut: what lies on disk is all there is.
+    let copied = tempfile::tempdir().unwrap();
+    std::fs::create_dir(copied.path().join("maps")).unwrap();
+    std::fs::copy(&file, copied.path().join("maps/a.mrol")).unwrap();
+    let other = Daemon::start_in(copied, |_| {}).await;
+    assert_eq!(other.contents("a").await, daemon.contents("a").await);
+}
+
+#[tokio::test]
+async fn metrics_count_what_was_done_and_forget_maps_that_are_gone() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &row(20)).await;
+    daemon.post_bytes("/v1/maps/a/occupancy", bytes_of(&row(7))).await;
+    daemon.post_bytes("/v1/maps/a/occupancy?level=9", bytes_of(&row(7))).await;
+    let far = json!({"robot": "r", "points": row(9), "guess": common::pose_json([500.0; 3])});
+    daemon.post("/v1/maps/a/scans", far).await;
+    daemon.post("/v1/maps/a/deletions", json!({"points": row(3)})).await;
+    daemon.get("/no/such/route").await;
+    let mut planner = daemon.occupancy().await;
+    let bloom = pb::QueryPointsRequest { lookup: pb::Lookup::Bloom.into(), ..query_pb("a", &row(5)) };
+    let stream = planner.query_points_stream(tokio_stream::iter([bloom.clone(), bloom])).await.unwrap();
+    assert_eq!(stream.into_inner().collect::<Vec<_>>().await.len(), 2);
+    planner.query_points(query_pb("b", &row(1))).await.unwrap_err();
+
+    let answer = daemon.get("/metrics").await;
+    assert!(answer.headers()["content-type"].to_str().unwrap().starts_with("text/plain"));
+    let text = answer.text().await.unwrap();
+    for line in [
+        r#"mrol_requests_total{protocol="http",operation="CreateMap",code="201"} 1"#,
+        r#"mrol_requests_total{protocol="http",operation="QueryPoints",code="200"} 1"#,
+        r#"mrol_requests_total{protocol="http",operation="QueryPoints",code="400"} 1"#,
+        r#"mrol_requests_total{protocol="http",operation="unknown",code="404"} 1"#,
+        r#"mrol_requests_total{protocol="grpc",operation="QueryPointsStream",code="ok"} 2"#,
+        r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="not_found"} 1"#,
+        r#"mrol_request_seconds_count{protocol="http",operation="InsertScan"} 2"#,
+        r#"mrol_points_queried_total{map="a",lookup="exact"} 7"#,
+        r#"mrol_points_queried_total{map="a",lookup="bloom"} 10"#,
+        r#"mrol_scans_total{map="a",verdict="accepted"} 1"#,
+        r#"mrol_scans_total{map="a",verdict="low_overlap"} 1"#,
+        r#"mrol_voxels_removed_total{map="a"} 3"#,
+        r#"mrol_map_voxels{map="a",level="0"} 17"#,
+        r#"mrol_map_revision{map="a"} 2"#,
+        r#"mrol_map_scans{map="a"} 1"#,
+        r#"mrol_map_set_bytes{map="a"} "#,
+        r#"mrol_map_filter_bytes{map="a",level="0",part="plane"} "#,
+        r#"mrol_filter_false_positive_rate{map="a",level="0",kind="expected"} "#,
+        r#"mrol_filter_false_positive_rate{map="a",level="0",kind="equation_1"} "#,
+        r#"mrol_filter_false_positive_rate{map="a",level="0",kind="measured"} "#,
+    ] {
+        assert!(text.contains(line), "{line} is not in\n{text}");
+    }
+    daemon.delete("/v1/maps/a").await;
+    let text = daemon.get("/metrics").await.text().await.unwrap();
+    assert!(!text.contains("mrol_map_voxels{map=\"a\""), "{text}");
+    assert!(text.contains("mrol_voxels_removed_total{map=\"a\"} 3"));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn probes_answer_while_every_pool_thread_is_busy() {
+    let daemon = Daemon::start_with(|config| {
+        config.threads.query = 2;
+        config.threads.mapping = 2;
+    });
+    let daemon = daemon.await;
+    daemon.put("/v1/maps/a", json!({"resolution_m": 0.02, "levels": 6})).await;
+    daemon.put_in("a", &large_scan(150_000)).await;
+    let scan =
+        json!({"robot": "r", "points": large_scan(150_000), "guess": common::pose_json([0.3, 0.2, 0.1])});
+    let align = client().post(daemon.url("/v1/maps/a/alignment")).json(&scan);
+    let busy: Vec<_> = (0..6).map(|_| tokio::spawn(align.try_clone().unwrap().send())).collect();
+    let mut health = HealthClient::new(daemon.channel().await);
+    let mut slowest = Duration::ZERO;
+    let mut asked = 0;
+    while !busy.iter().all(|aligned| aligned.is_finished()) {
+        let start = Instant::now();
+        assert_eq!(daemon.get("/livez").await.text().await.unwrap(), "ok");
+        assert_eq!(daemon.get("/readyz").await.status(), StatusCode::OK);
+        assert_eq!(health.check(HealthCheckRequest::default()).await.unwrap().into_inner().status, 1);
+        slowest = slowest.max(start.elapsed());
+        asked += 1;
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    for aligned in busy {
+        assert_eq!(aligned.await.unwrap().unwrap().status(), StatusCode::OK);
+    }
+    assert!(asked > 3, "the alignments were over before the probes were asked");
+    assert!(slowest < Duration::from_secs(1), "three probes took {slowest:?}");
+}
+
+#[tokio::test]
+async fn a_full_queue_refuses_and_says_when_to_come_again() {
+    let daemon = Daemon::start_with(|config| {
+        config.threads.mapping = 1;
+        config.limits.jobs_waiting_max = 1;
+    });
+    let daemon = daemon.await;
+    daemon.make_map("a").await;
+    let scan = json!({"robot": "r", "points": large_scan(20_000), "guess": identity_json()});
+    let align = client().post(daemon.url("/v1/maps/a/alignment")).json(&scan);
+    let sent: Vec<_> = (0..12).map(|_| tokio::spawn(align.try_clone().unwrap().send())).collect();
+    let mut refused = 0;
+    for answer in sent {
+        let answer = answer.await.unwrap().unwrap();
+        if answer.status() == StatusCode::TOO_MANY_REQUESTS {
+            assert_eq!(answer.headers()["retry-after"], "1");
+            let message = json_of(answer).await["error"]["message"].as_str().unwrap().to_owned();
+            assert!(message.contains("jobs_waiting_max is 1"), "{message}");
+            refused += 1;
+        }
+    }
+    assert!(refused > 0);
+    assert_eq!(daemon.get("/metrics").await.status(), StatusCode::OK);
+}
+
+#[tokio::test]
+async fn an_address_that_is_taken_is_named() {
+    let daemon = Daemon::start().await;
+    let mut config = Config { data_dir: "".into(), ..Config::default() };
+    config.http.listen.set_port(0);
+    config.grpc.listen = daemon.grpc;
+    let error = Server::bind(config).await.unwrap_err().to_string();
+    assert!(error.contains(&format!("grpc cannot listen on {}", daemon.grpc)), "{error}");
+}
