@@ -28,7 +28,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let query = PointQuery {
         points: points.into(),
         map_from_points: None,
-        level: 2,
+        level: 3,
         lookup: Lookup::Exact,
         min_revision: None,
         map_uuid: None,

@@ -1,7 +1,43 @@
 //! A networked multi-resolution voxel map: Ryde and Corso, *Fast Voxel Maps with Counting Bloom Filters*
 //! (IROS 2012), as a server.
+//!
+//! In reading order, which is also the order of the layers: no module names one above its own, and a test says so.
+//!
+//! * [`voxel`], [`bloom`], [`geometry`]: keys, lattice and blocks (paper II-B, III); counting Bloom filters (II-A);
+//!   points and poses.
+//! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
+//!   point-cloud files and simulated sensors.
+//! * `store`: map files. `service`: the operations, once for every protocol.
+//! * `wire`: between generated and domain types. `grpc`, `http`, `client`: adapters. `server`, `cli`: the daemon and
+//!   the program.
+//!
+//! The first three lines know no runtime, no protocol and no serialisation, and are there without any feature:
+//!
+//! ```
+//! use mrol::geometry::{Point, Pose};
+//! use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+//! use mrol::voxel::VoxelSet;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let map = MultiResolutionMap::new(MapSettings::new(0.05, 4))?;
+//! let scan = [Point::new(1.0, 2.0, 0.5), Point::new(1.0, 2.1, 0.5)];
+//! let map_from_sensor = Pose::translation(0.0, 0.0, 1.0);
+//!
+//! let (voxels, _out_of_range) = VoxelSet::of_points(&scan, &map.lattice().from_points(&map_from_sensor));
+//! let pose = TrajectoryPose::new(RobotName::new("r1")?, map_from_sensor);
+//! let committed = map.committer().insert_scan(ScanRecord { pose, voxels });
+//! assert_eq!((committed.revision, committed.voxels), (1, 2));
+//!
+//! let quantise = map.lattice().from_points(&map_from_sensor);
+//! let view = map.view_of(&scan, &map_from_sensor);
+//! assert_eq!(view.count(&scan, &quantise, 0, Lookup::Bloom), 2);
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod align;
+#[cfg(feature = "server")]
+pub mod bench;
 pub mod bloom;
 #[cfg(feature = "server")]
 pub mod cli;

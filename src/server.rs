@@ -106,7 +106,7 @@ impl Server {
     /// flight, saves the maps.
     ///
     /// Idle and half-open connections do not keep it from going down: after their requests connections have
-    /// [`CLOSING_MAX`] to close. The HTTP listener stays while requests are in flight, so that `/readyz` tells.
+    /// a second to close. The HTTP listener stays while requests are in flight, so that `/readyz` tells.
     ///
     /// # Errors
     /// When a listener stops by itself, or the maps cannot be saved at the end.

@@ -1,5 +1,7 @@
 //! Bad input: a clear error that names field, value and limit, and a map that did not change.
 
+#![cfg(feature = "server")]
+
 mod common;
 
 use common::{Daemon, bytes_of, client, guess_pb, identity_json, json_of, points_pb, query_pb, row, scan_pb};

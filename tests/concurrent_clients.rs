@@ -3,6 +3,7 @@
 //!
 //! Runs for `MROL_STRESS_SECONDS` (3 where not set; CI takes 60).
 
+#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod common;

@@ -1,5 +1,7 @@
 //! What the contract promises, over gRPC.
 
+#![cfg(feature = "server")]
+
 mod common;
 
 use std::time::Duration;

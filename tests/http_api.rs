@@ -1,5 +1,7 @@
 //! What the contract promises, over HTTP.
 
+#![cfg(feature = "server")]
+
 mod common;
 
 use common::{Daemon, bits_of, bytes_of, client, identity_json, json_of, pose_json, row};

@@ -9,7 +9,7 @@ const LAYERS: [&[&str]; 7] = [
     &["map", "align", "scan"],
     &["store"],
     &["service"],
-    &["wire", "config", "telemetry", "lifecycle"],
+    &["bench", "wire", "config", "telemetry", "lifecycle"],
     &["grpc", "http", "client"],
     &["server", "cli", "main"],
 ];

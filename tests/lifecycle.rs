@@ -1,5 +1,7 @@
 //! Start, health, metrics, going down and coming back.
 
+#![cfg(feature = "server")]
+
 mod common;
 
 use std::time::{Duration, Instant};

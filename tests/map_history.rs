@@ -1,5 +1,6 @@
 //! Long random histories of a map against a plain set of voxels, at every level.
 
+#![cfg(feature = "client")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use std::collections::BTreeSet;

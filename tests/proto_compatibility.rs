@@ -4,6 +4,7 @@
 //! `tests/released/mrol.v1.bin` is the descriptor set of the last release. On a release, after this test passed:
 //! `cargo test --test proto_compatibility -- --ignored`.
 
+#![cfg(feature = "client")]
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

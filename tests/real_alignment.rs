@@ -1,6 +1,7 @@
 //! Real panoramic scans, metres apart, aligned from the pose of the scan before: in process, and through the
 //! running daemon over both protocols, to the same poses.
 
+#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod common;

@@ -4,9 +4,11 @@
 //! standard error. The exit code is 0 when all went well, 1 when something failed, 2 for a command line that
 //! makes no sense.
 
+mod bench;
 mod delete;
 mod demo;
 mod error;
+mod experiment;
 mod health;
 mod insert;
 mod map;
@@ -60,6 +62,8 @@ enum Command {
     Query(query::Query),
     Delete(delete::Delete),
     Maps(maps::Maps),
+    Bench(bench::Bench),
+    Experiment(experiment::Experiment),
     Health(health::Health),
 }
 
@@ -89,6 +93,8 @@ impl Command {
             Self::Query(query) => runtime::block_on(query.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
+            Self::Bench(bench) => bench.run(output),
+            Self::Experiment(experiment) => experiment.run(output),
             Self::Health(health) => runtime::block_on(health.run(output)),
         }
     }

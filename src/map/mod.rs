@@ -1,7 +1,7 @@
 //! The map: occupied voxel lists at many resolutions behind counting Bloom filters (paper II, III), in shards
 //! behind locks.
 //!
-//! Reading order: [`OccupiedVoxelList`] is one level of the paper, [`shard`] all levels of one part of space,
+//! Reading order: [`OccupiedVoxelList`] is one level of the paper, `shard` all levels of one part of space,
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
 pub mod commit;

@@ -15,6 +15,7 @@ mod writer;
 pub use reader::{ReadError, read_points, scan_files};
 pub use scene::Scene;
 #[cfg(feature = "server")]
+pub(crate) use sensor::gaussian;
 pub use sensor::{DepthCamera, Sensor, SpinningLidar};
 pub use tour::{Tour, tours};
 pub use tum::{StampedPose, read_trajectory, write_trajectory};

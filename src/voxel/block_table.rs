@@ -209,6 +209,12 @@ impl Slots<'_> {
         (((h >> 32) * buckets as u64) >> 32) as usize
     }
 
+    /// True when a search must go on past the bucket: its vacant slots come last.
+    #[inline(always)]
+    pub(crate) fn is_full(bucket: &Bucket) -> bool {
+        bucket[BUCKET - 1] != VACANT
+    }
+
     /// The slot of `key`.
     #[inline(always)]
     pub(crate) fn find(self, key: u64) -> Option<usize> {
@@ -220,7 +226,7 @@ impl Slots<'_> {
             if equal != 0 {
                 return Some(bucket * BUCKET + equal.trailing_zeros() as usize);
             }
-            if keys[BUCKET - 1] == VACANT {
+            if !Self::is_full(keys) {
                 return None;
             }
             bucket = if bucket + 1 == self.keys.len() { 0 } else { bucket + 1 };

@@ -2,7 +2,8 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 7] = ["serve", "demo", "map", "insert", "query", "delete", "maps"];
+const COMMANDS: [&str; 9] =
+    ["serve", "demo", "map", "insert", "query", "delete", "maps", "bench", "experiment"];
 
 #[test]
 fn every_command_explains_itself_with_examples() {

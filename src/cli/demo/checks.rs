@@ -2,8 +2,8 @@
 
 use std::fmt::{self, Display};
 
+use super::journal::{Journal, RobotSummary};
 use super::planner::Told;
-use super::report::{Journal, RobotSummary};
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::service::MapInfo;

@@ -13,11 +13,12 @@ pub(super) fn text(serving: &Serving, once: bool) -> String {
         r#"
 {lead}
   curl http://{http}/v1/maps/demo
-  curl --json '{{"points":[[4.6,6.9,0.9],[4.6,6.9,0.0]]}}' http://{http}/v1/maps/demo/occupancy
+  curl --json '{{"points":[[4.6,9.0,1.0],[4.6,6.9,1.0]]}}' http://{http}/v1/maps/demo/occupancy
   curl http://{http}/metrics
   grpcurl -plaintext -d '{{"map":"demo","robot":"lidar"}}' {grpc} mrol.v1.Mapping/GetTrajectory
   mrol maps show demo --server http://{grpc}
-  mrol delete --map demo --sphere "4.6 6.9 0 0.5" --server http://{grpc}
+  cargo run --release --example planner -- http://{grpc} demo
+  mrol delete --map demo --sphere "4.6 9 1 0.5" --server http://{grpc}
 Then: README.md, "A tour of the API"; `mrol serve --help`; your own scans with `mrol map --help`."#
     )
 }

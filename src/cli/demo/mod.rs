@@ -6,9 +6,11 @@
 mod checks;
 mod daemon;
 mod guide;
+mod journal;
 mod planner;
 mod report;
 mod robot;
+mod summary;
 
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -22,14 +24,16 @@ use super::error::CliError;
 use super::output::Output;
 use super::serve::Serving;
 use crate::client::{Client, NewMap};
-use crate::map::MapName;
+use crate::map::{LEVELS_DEFAULT, MapName};
 use crate::scan::{Scene, tours};
 use crate::server::shutdown_signal;
 use checks::Checks;
 use daemon::Daemon;
+use journal::Journal;
 use planner::Planner;
-use report::{Beginning, Journal};
+use report::{Beginning, Line};
 use robot::Robot;
+use summary::Summary;
 
 /// The map that the robots make.
 const MAP: &str = "demo";
@@ -59,7 +63,7 @@ pub(super) struct Demo {
     #[arg(long, value_name = "METRES", default_value_t = 0.03)]
     resolution: f64,
     /// Levels of the map
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = LEVELS_DEFAULT)]
     levels: u32,
     /// Address of HTTP [default: 127.0.0.1:7333, or any free port where that is taken]
     #[arg(long, value_name = "ADDRESS")]
@@ -93,7 +97,7 @@ impl Demo {
         let (info, _) = operator.create_map(&map, new_map).await?;
         let robots = self.robots();
         output.print(&Beginning::new(serving, &info, self.seed, &robots))?;
-        output.say(Journal::head())?;
+        output.say(Line::head())?;
 
         let start = Instant::now();
         let planner = Planner::start(&serving, &map, self.seed).await?;
@@ -103,7 +107,7 @@ impl Demo {
 
         let info = operator.map_info(&map).await?;
         let checks = Checks::of(&journal, &queries, &info);
-        output.print(&journal.summary(&queries, &info, &checks))?;
+        output.print(&Summary::new(&journal, &queries, &info, &checks))?;
         output.say(guide::text(&serving, self.once))?;
         Ok(checks)
     }

@@ -32,7 +32,7 @@ EXAMPLES:
   mrol map scans/ --resolution 0.1 --levels 6 --trajectory-out poses.txt --out hall.mrol
   mrol map scans/ --resolution 0.1 --truth true.txt          errors against known poses
   mrol map scans/ --resolution 0.1 --truth true.txt --at-truth --out hall.mrol
-  mrol map scans/ --resolution 0.1 --json --lookup bloom --filter-hashes 8 --filter-bits-per-voxel 200
+  mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-voxel 4096
                                                              are the filters ample? (last line)
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map

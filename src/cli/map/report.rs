@@ -151,8 +151,8 @@ impl Display for FilterSummary {
             self.expected_false_positives
         )?;
         match self.ample {
-            true => write!(f, "ample (below 1), poses are those of the exact sets"),
-            false => write!(f, "not ample (below 1); --filter-hashes and --filter-bits-per-voxel make it so"),
+            true => write!(f, "ample (below 1), the poses are those of the exact sets"),
+            false => write!(f, "not ample (below 1); more --filter-hashes and --filter-bits-per-voxel are"),
         }
     }
 }

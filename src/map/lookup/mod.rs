@@ -1,11 +1,14 @@
 //! The critical path of everything (paper II): rotate, translate, quantise, look up.
 //!
-//! One operation: points and a pose in, a bit a point out. [`scalar`] defines it; the wide twins agree with it
+//! One operation: points and a pose in, a bit a point out. `scalar` defines it; the wide twins agree with it
 //! bit for bit and are chosen at run time.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 mod scalar;
+pub mod stages;
 #[cfg(test)]
 mod tests;
 
@@ -96,9 +99,54 @@ pub fn occupied(
     occupied: &mut [u64],
 ) -> bool {
     assert_eq!(occupied.len(), points.len().div_ceil(64), "one word of answers for each 64 points");
+    match lookup {
+        Lookup::Bloom => look_up(points, lattice_from_points, view, lookup, occupied),
+        Lookup::Exact => exactly(points, lattice_from_points, view, occupied),
+    }
+}
+
+/// Points that an exact look-up takes one way or the other.
+const EXACT_CHUNK: usize = 1024;
+/// One point in so many is occupied, at most, where asking the filter first pays.
+const SPARSE: usize = 8;
+
+/// Exact look-up (paper II: the filter, then the set for what it lets through). Where most points are occupied the
+/// filter lets them all through and only costs; so each chunk goes the way that suited the one before it.
+fn exactly(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    occupied: &mut [u64],
+) -> bool {
+    let (mut all_have_a_voxel, mut sparse) = (true, false);
+    for (points, words) in points.chunks(EXACT_CHUNK).zip(occupied.chunks_mut(EXACT_CHUNK / 64)) {
+        if sparse {
+            all_have_a_voxel &= look_up(points, lattice_from_points, view, Lookup::Bloom, words);
+            scalar::confirm(points, lattice_from_points, view, words);
+        } else {
+            all_have_a_voxel &= look_up(points, lattice_from_points, view, Lookup::Exact, words);
+        }
+        let hits: u32 = words.iter().map(|word| word.count_ones()).sum();
+        sparse = hits as usize * SPARSE < points.len();
+    }
+    all_have_a_voxel
+}
+
+/// Asks one structure, with the widest kernel that the machine has.
+fn look_up(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    lookup: Lookup,
+    occupied: &mut [u64],
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     if avx512::is_available() {
         return avx512::occupied(points, lattice_from_points, view, lookup, occupied);
+    }
+    #[cfg(target_arch = "x86_64")]
+    if avx2::is_available() {
+        return avx2::occupied(points, lattice_from_points, view, lookup, occupied);
     }
     scalar::occupied(points, lattice_from_points, view, lookup, occupied)
 }

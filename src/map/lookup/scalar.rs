@@ -32,6 +32,25 @@ pub(super) fn occupied(
     all_have_a_voxel
 }
 
+/// Takes back the bits of points that the filter let through and the set does not hold.
+pub(super) fn confirm(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    occupied: &mut [u64],
+) {
+    for (points, word) in points.chunks(64).zip(occupied) {
+        let mut let_through = *word;
+        while let_through != 0 {
+            let bit = let_through.trailing_zeros();
+            let_through &= let_through - 1;
+            let index = lattice_from_points.index(points[bit as usize]);
+            let occupied = index.is_some_and(|index| exact(view, index.map(|i| i >> view.level)));
+            *word &= !(u64::from(!occupied) << bit);
+        }
+    }
+}
+
 #[inline(always)]
 fn shard(view: &LevelView<'_>, index: [i32; 3]) -> usize {
     shard_of_region(index.map(|i| i >> view.region_shift))

@@ -17,6 +17,10 @@ fn wide_kernels() -> Vec<(&'static str, Kernel)> {
     if super::avx512::is_available() {
         kernels.push(("avx512", super::avx512::occupied));
     }
+    #[cfg(target_arch = "x86_64")]
+    if super::avx2::is_available() {
+        kernels.push(("avx2", super::avx2::occupied));
+    }
     kernels
 }
 
@@ -83,6 +87,19 @@ proptest! {
         };
         assert_twins(&map, &points, &pose);
     }
+}
+
+#[test]
+fn exact_answers_are_exact_whichever_way_they_are_found() {
+    // Chunks of few hits, of many, and of few again, with a filter that lets much through.
+    let filter = FilterSettings { hashes: 1, bits_per_key: 2.0 };
+    let floor = (0..1600).map(|i| [i % 40, i / 40, 0]);
+    let map = map_of(floor, MapSettings { resolution_m: 1.0, levels: 2, filter });
+    let at = |i: usize, height: f32| Point::new((i % 40) as f32 + 0.5, (i / 40 % 40) as f32 + 0.5, height);
+    let sparse = |i: usize| at(i, if i.is_multiple_of(50) { 0.5 } else { 3.5 });
+    let points: Vec<_> =
+        (0..3000).map(sparse).chain((0..2500).map(|i| at(i, 0.5))).chain((0..2999).map(sparse)).collect();
+    assert_twins(&map, &points, &Pose::identity());
 }
 
 #[test]

@@ -1,0 +1,56 @@
+//! Timing one piece of work again and again.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+/// The times of several runs of the same work, nanoseconds an item.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Runs(Vec<f64>);
+
+impl Runs {
+    /// Does `work` on `items` items once, and keeps how long that took; what it gives.
+    pub fn time<T>(&mut self, items: usize, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        // Neither begun before the clock nor left out because nobody looks at the result.
+        let result = black_box(work());
+        self.0.push(start.elapsed().as_nanos() as f64 / items.max(1) as f64);
+        result
+    }
+
+    /// The middle run, or the mean of the two middle ones: what another program does on the same core now and then
+    /// does not move it. 0 without a run.
+    pub fn median(&self) -> f64 {
+        let mut sorted = self.0.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        match (sorted.len(), sorted.len() / 2) {
+            (0, _) => 0.0,
+            (n, middle) if n % 2 == 1 => sorted[middle],
+            (_, middle) => (sorted[middle - 1] + sorted[middle]) / 2.0,
+        }
+    }
+
+    /// Every run, in order.
+    pub fn ns_per_item(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_middle_run_whatever_the_order() {
+        assert_eq!(Runs(vec![9.0, 1.0, 2.0]).median(), 2.0);
+        assert_eq!(Runs(vec![4.0, 1.0, 2.0, 100.0]).median(), 3.0);
+        assert_eq!(Runs::default().median(), 0.0);
+    }
+
+    #[test]
+    fn a_run_is_kept_for_each_time() {
+        let mut runs = Runs::default();
+        assert_eq!(runs.time(10, || 7), 7);
+        runs.time(10, || ());
+        assert_eq!(runs.ns_per_item().len(), 2);
+    }
+}

@@ -1,0 +1,93 @@
+//! A dense array: the paper's upper limit to query speed.
+
+use super::{CHUNK, Structure, bits, voxels};
+use crate::geometry::{Point, Pose};
+use crate::map::MultiResolutionMap;
+use crate::map::lookup::stages::{self, Grid};
+use crate::voxel::Lattice;
+
+/// Bytes that an array may have at most.
+pub const DENSE_BYTES_MAX: u64 = 4 << 30;
+const _: () = assert!(DENSE_BYTES_MAX <= 1 << 32, "offsets are u32");
+
+/// A byte for each voxel of the bounding box of those that are occupied, x first, then y, then z; and one for all
+/// that lie outside, so that no point needs a branch.
+#[derive(Debug)]
+pub struct Dense {
+    cells: Vec<u8>,
+    grid: Grid,
+    lattice: Lattice,
+    level: u32,
+}
+
+/// An array over the bounding box would not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a byte for each voxel of the bounding box would take {0} bytes, the limit is {DENSE_BYTES_MAX}")]
+pub struct DenseTooLarge(pub u128);
+
+impl Dense {
+    /// The occupied voxels of a map's `level`.
+    ///
+    /// # Errors
+    /// When the array would take more than [`DENSE_BYTES_MAX`].
+    pub fn of(map: &MultiResolutionMap, level: u32) -> Result<Self, DenseTooLarge> {
+        let view = map.view();
+        let grid = Grid::around(voxels(&view, level)).unwrap_or(Grid { min: [0; 3], size: [0; 3] });
+        let bytes = grid.size.iter().map(|&size| u128::from(size)).product::<u128>() + 1;
+        if bytes > u128::from(DENSE_BYTES_MAX) {
+            return Err(DenseTooLarge(bytes));
+        }
+        let mut cells = vec![0; bytes as usize];
+        voxels(&view, level).for_each(|voxel| cells[grid.offset(voxel.index()) as usize] = 1);
+        Ok(Self { cells, grid, lattice: *map.lattice(), level })
+    }
+
+    /// Where in the array each voxel is.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Answers by offset.
+    #[inline(always)]
+    pub fn contains(&self, offsets: &[u32], occupied: &mut [u64]) {
+        bits(offsets, occupied, |&offset| self.cells[offset as usize] != 0);
+    }
+}
+
+impl Structure for Dense {
+    fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
+        let quantise = self.lattice.from_points(map_from_points);
+        let mut offsets = [0; CHUNK];
+        for (points, words) in points.chunks(CHUNK).zip(occupied.chunks_mut(CHUNK / 64)) {
+            let offsets = &mut offsets[..points.len()];
+            stages::offsets(points, &quantise, self.level, &self.grid, offsets);
+            self.contains(offsets, words);
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.cells.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::MapSettings;
+    use crate::voxel::{VoxelKey, VoxelSet};
+
+    #[test]
+    fn an_array_that_would_not_fit_is_refused_with_its_size() {
+        let corners: VoxelSet = [[0; 3], [9999; 3]].into_iter().filter_map(VoxelKey::new).collect();
+        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), 1, &corners, []).unwrap();
+        assert_eq!(Dense::of(&map, 0).unwrap_err(), DenseTooLarge(1_000_000_000_001));
+    }
+
+    #[test]
+    fn an_empty_map_has_an_array_too() {
+        let map = MultiResolutionMap::new(MapSettings::new(0.1, 1)).unwrap();
+        let mut occupied = [1];
+        Dense::of(&map, 0).unwrap().occupied(&[Point::new(0.0, 0.0, 0.0)], &Pose::identity(), &mut occupied);
+        assert_eq!(occupied, [0]);
+    }
+}

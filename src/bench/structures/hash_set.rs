@@ -1,0 +1,44 @@
+//! A hash set of packed keys: the paper's "de facto method".
+
+use super::{Structure, occupied_by_key, voxels};
+use crate::geometry::{Point, Pose};
+use crate::map::MultiResolutionMap;
+use crate::voxel::{Lattice, VoxelKey};
+
+/// hashbrown's set of keys with its default hasher.
+#[derive(Debug)]
+pub struct HashSet {
+    keys: hashbrown::HashSet<u64>,
+    lattice: Lattice,
+    level: u32,
+}
+
+impl HashSet {
+    /// The occupied voxels of a map's `level`.
+    pub fn of(map: &MultiResolutionMap, level: u32) -> Self {
+        let mut keys = hashbrown::HashSet::with_capacity(map.voxels(level));
+        keys.extend(voxels(&map.view(), level).map(VoxelKey::to_bits));
+        Self { keys, lattice: *map.lattice(), level }
+    }
+
+    /// Its keys.
+    pub fn keys(&self) -> &hashbrown::HashSet<u64> {
+        &self.keys
+    }
+}
+
+impl Structure for HashSet {
+    fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
+        let quantise = self.lattice.from_points(map_from_points);
+        occupied_by_key(points, &quantise, self.level, occupied, |key| self.keys.contains(&key));
+    }
+
+    fn bytes(&self) -> usize {
+        hash_set_bytes(&self.keys)
+    }
+}
+
+/// Bytes of a set's table.
+pub fn hash_set_bytes(keys: &hashbrown::HashSet<u64>) -> usize {
+    keys.allocation_size()
+}

@@ -1,0 +1,75 @@
+//! The map's own structures.
+
+use super::Structure;
+use crate::geometry::{Point, Pose};
+use crate::map::lookup::{self, Lookup};
+use crate::map::{MapView, MultiResolutionMap};
+
+/// A level of a map as its users ask it: through the sharded map and its locks.
+#[derive(Debug)]
+pub struct ThroughMap<'a> {
+    map: &'a MultiResolutionMap,
+    level: u32,
+    lookup: Lookup,
+}
+
+/// Points of one question: what a spinning sensor sends in a tenth of a turn. For each the locks are taken anew.
+const QUESTION_POINTS: usize = 10_240;
+const _: () = assert!(QUESTION_POINTS.is_multiple_of(64), "a question's answers are whole words");
+
+impl<'a> ThroughMap<'a> {
+    /// `level` of `map`, asked by `lookup`.
+    pub fn new(map: &'a MultiResolutionMap, level: u32, lookup: Lookup) -> Self {
+        Self { map, level, lookup }
+    }
+}
+
+impl Structure for ThroughMap<'_> {
+    fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
+        let quantise = self.map.lattice().from_points(map_from_points);
+        for (points, words) in points.chunks(QUESTION_POINTS).zip(occupied.chunks_mut(QUESTION_POINTS / 64)) {
+            let view = self.map.view_of(points, map_from_points);
+            view.query(points, &quantise, self.level, self.lookup, words);
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        bytes(self.map, self.level, self.lookup)
+    }
+}
+
+/// A level of a map that is locked already: the bare kernel.
+#[derive(Debug)]
+pub struct Kernel<'a> {
+    map: &'a MultiResolutionMap,
+    view: MapView<'a>,
+    level: u32,
+    lookup: Lookup,
+}
+
+impl<'a> Kernel<'a> {
+    /// `level` of `map`, asked by `lookup`; the map cannot be changed while it lives.
+    pub fn new(map: &'a MultiResolutionMap, level: u32, lookup: Lookup) -> Self {
+        Self { map, view: map.view(), level, lookup }
+    }
+}
+
+impl Structure for Kernel<'_> {
+    fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
+        let quantise = self.map.lattice().from_points(map_from_points);
+        lookup::occupied(points, &quantise, &self.view.level_view(self.level), self.lookup, occupied);
+    }
+
+    fn bytes(&self) -> usize {
+        bytes(self.map, self.level, self.lookup)
+    }
+}
+
+/// Of a filter its plane and its counters; of the exact set the tables of all levels, since three levels share one.
+fn bytes(map: &MultiResolutionMap, level: u32, lookup: Lookup) -> usize {
+    let (_, levels, set_bytes) = map.describe(0, 0);
+    match lookup {
+        Lookup::Exact => set_bytes,
+        Lookup::Bloom => levels[level as usize].plane_bytes + levels[level as usize].counter_bytes,
+    }
+}

@@ -1,0 +1,63 @@
+//! A room.
+
+use nalgebra::{Translation3, UnitQuaternion};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::Queries;
+use super::ride::{Sight, Surface};
+use crate::geometry::Pose;
+use crate::voxel::{VoxelKey, VoxelSet};
+
+/// Floor, ceiling and walls of a room of 14 x 9 x 3 m, one voxel thick: 155 thousand voxels of 5 cm, as many as the
+/// paper's largest map has. Its middle is the origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room;
+
+/// Half the room's sides, voxels.
+const HALF: [i32; 3] = [140, 90, 30];
+/// The sensor's way: an ellipse around the room's middle, metres,
+const WAY_M: [f64; 2] = [4.5, 2.5];
+/// and how far it gets in a turn of the sensor.
+const TURN_M: f64 = 0.1;
+
+impl Room {
+    /// Side of its voxels, metres.
+    pub const RESOLUTION_M: f64 = 0.05;
+
+    pub(super) fn voxels(self) -> VoxelSet {
+        let span = |axis: usize| -HALF[axis]..HALF[axis];
+        let all = span(2).flat_map(|z| span(1).flat_map(move |y| span(0).map(move |x| [x, y, z])));
+        let is_surface = |index: &[i32; 3]| (0..3).any(|k| index[k] == -HALF[k] || index[k] == HALF[k] - 1);
+        all.filter(is_surface).filter_map(VoxelKey::new).collect()
+    }
+
+    pub(super) fn random_queries(self, count: usize, random: &mut ChaCha8Rng) -> Queries {
+        let anywhere = |_| half_m().map(|half_m| random.random_range(-half_m..half_m));
+        Queries::of_map_points((0..count).map(anywhere))
+    }
+}
+
+fn half_m() -> [f64; 3] {
+    HALF.map(|half| f64::from(half) * Room::RESOLUTION_M)
+}
+
+impl Surface for Room {
+    const SIGHT: Sight = Sight { elevation_deg: (-22.5, 22.5), noise_m: 0.01 };
+
+    fn sensor(&self, turn: usize) -> Pose {
+        let angle = turn as f64 * TURN_M / WAY_M[0];
+        let place = Translation3::new(WAY_M[0] * angle.cos(), WAY_M[1] * angle.sin(), -0.3);
+        Pose::from_parts(place, UnitQuaternion::from_euler_angles(0.02, -0.03, angle))
+    }
+
+    /// The walls are met in the middle of their voxels.
+    fn range_m(&self, from: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        let to_wall = |k: usize| {
+            let wall = half_m()[k] - Self::RESOLUTION_M / 2.0;
+            (wall.copysign(direction[k]) - from[k]) / direction[k]
+        };
+        let nearest = (0..3).filter(|&k| direction[k] != 0.0).map(to_wall).fold(f64::INFINITY, f64::min);
+        nearest.is_finite().then_some(nearest)
+    }
+}

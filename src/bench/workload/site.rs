@@ -1,0 +1,136 @@
+//! A site.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Translation3, UnitQuaternion};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::Queries;
+use super::ride::{Sight, Surface};
+use crate::geometry::Pose;
+use crate::voxel::{VoxelKey, VoxelSet};
+
+/// A square of rolling terrain, its ground two voxels of 10 cm thick. Its middle is the origin; hills of 3 and 2.5 m
+/// every 63 and 48 m are shifted by the seed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Site {
+    /// Columns along a side.
+    side: i32,
+    phases: [f64; 2],
+}
+
+/// Columns along the side of a piece: 131 thousand voxels at most.
+const PIECE_SIDE: i32 = 256;
+/// Voxels in a column.
+const THICKNESS: i32 = 2;
+/// Heights of the hills along x and y, metres,
+const HILLS_M: [f64; 2] = [3.0, 2.5];
+/// and how steeply they go up and down, radians a metre.
+const WAVES: [f64; 2] = [0.1, 0.13];
+/// Random questions are about points this far above or below the ground, metres.
+const NEAR_M: f64 = 0.5;
+/// How high the sensor is carried, metres,
+const SENSOR_HEIGHT_M: f64 = 2.0;
+/// or on small sites, this share of the side: from higher up it would look beyond the border.
+const SENSOR_HEIGHT_SHARE: f64 = 1.0 / 16.0;
+/// How far the sensor gets in a turn, metres.
+const TURN_M: f64 = 1.0;
+/// How far it sees, metres.
+const RANGE_MAX_M: f64 = 100.0;
+/// The ground is met when a ray is as near as this, metres.
+const TOUCH_M: f64 = 1e-3;
+
+impl Site {
+    /// Side of its voxels, metres.
+    pub const RESOLUTION_M: f64 = 0.1;
+    /// Voxels of a site where nothing else is said.
+    pub const VOXELS: usize = 10_000_000;
+    /// Voxels there may be at least and at most.
+    pub const VOXELS_RANGE: std::ops::RangeInclusive<u64> = 1000..=100_000_000;
+
+    /// A site of about `voxels` voxels.
+    pub fn of(voxels: usize, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let side = (voxels as f64 / f64::from(THICKNESS)).sqrt().round().max(1.0) as i32;
+        Self { side, phases: [0; 2].map(|_| random.random_range(0.0..TAU)) }
+    }
+
+    fn side_m(&self) -> f64 {
+        f64::from(self.side) * Self::RESOLUTION_M
+    }
+
+    /// Height of the ground, metres.
+    fn height_m(&self, x: f64, y: f64) -> f64 {
+        let [px, py] = self.phases;
+        HILLS_M[0] * (WAVES[0] * x + px).sin() + HILLS_M[1] * (WAVES[1] * y + py).sin()
+    }
+
+    /// Its steepest slope, metres up a metre.
+    fn slope_max() -> f64 {
+        (HILLS_M[0] * WAVES[0]).hypot(HILLS_M[1] * WAVES[1])
+    }
+
+    pub(super) fn pieces(self) -> impl Iterator<Item = VoxelSet> {
+        let starts = move || (0..self.side).step_by(PIECE_SIDE as usize);
+        starts().flat_map(move |y| starts().map(move |x| self.piece([x, y])))
+    }
+
+    /// The voxels of the columns from `start` on.
+    fn piece(self, start: [i32; 2]) -> VoxelSet {
+        let [xs, ys] = start.map(|start| start..self.side.min(start + PIECE_SIDE));
+        let columns = ys.flat_map(|y| xs.clone().map(move |x| [x - self.side / 2, y - self.side / 2]));
+        columns.flat_map(|[x, y]| self.column(x, y)).filter_map(VoxelKey::new).collect()
+    }
+
+    /// The ground goes through the middle of a column's voxels, as near as whole voxels allow.
+    fn column(self, x: i32, y: i32) -> impl Iterator<Item = [i32; 3]> {
+        let [middle_x, middle_y] = [x, y].map(|i| (f64::from(i) + 0.5) * Self::RESOLUTION_M);
+        let lowest = self.height_m(middle_x, middle_y) / Self::RESOLUTION_M - f64::from(THICKNESS) / 2.0;
+        let lowest = lowest.round() as i32;
+        (lowest..lowest + THICKNESS).map(move |z| [x, y, z])
+    }
+
+    pub(super) fn random_queries(self, count: usize, random: &mut ChaCha8Rng) -> Queries {
+        let half_m = self.side_m() / 2.0;
+        let near_ground = |_| {
+            let [x, y] = [0; 2].map(|_| random.random_range(-half_m..half_m));
+            [x, y, self.height_m(x, y) + random.random_range(-NEAR_M..NEAR_M)]
+        };
+        Queries::of_map_points((0..count).map(near_ground))
+    }
+}
+
+impl Surface for Site {
+    const SIGHT: Sight = Sight { elevation_deg: (-25.0, 2.0), noise_m: 0.04 };
+
+    /// On a circle half-way between the middle and the border.
+    fn sensor(&self, turn: usize) -> Pose {
+        let radius_m = self.side_m() / 4.0;
+        let angle = turn as f64 * TURN_M / radius_m;
+        let (x, y) = (radius_m * angle.cos(), radius_m * angle.sin());
+        let height_m = SENSOR_HEIGHT_M.min(self.side_m() * SENSOR_HEIGHT_SHARE);
+        let place = Translation3::new(x, y, self.height_m(x, y) + height_m);
+        Pose::from_parts(place, UnitQuaternion::from_euler_angles(0.01, -0.015, angle))
+    }
+
+    /// Follows the ray in steps that cannot go through the ground: none is longer than its clearance, over how fast
+    /// that can shrink.
+    fn range_m(&self, from: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        let shrinks = Self::slope_max() * direction[0].hypot(direction[1]) - direction[2];
+        let half_m = self.side_m() / 2.0;
+        let mut range_m = 0.0;
+        while shrinks > 0.0 && range_m < RANGE_MAX_M {
+            let [x, y, z]: [f64; 3] = std::array::from_fn(|k| from[k] + range_m * direction[k]);
+            if x.abs() > half_m || y.abs() > half_m {
+                return None;
+            }
+            let clearance_m = z - self.height_m(x, y);
+            if clearance_m < TOUCH_M {
+                return Some(range_m);
+            }
+            range_m += clearance_m / shrinks;
+        }
+        None
+    }
+}

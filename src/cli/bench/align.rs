@@ -1,0 +1,149 @@
+//! `mrol bench align`: how long an alignment takes.
+
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::workload::{MapOptions, times};
+use crate::bench::align::{Aligned, Scan, align_each};
+use crate::cli::error::CliError;
+use crate::cli::map_report::count;
+use crate::cli::output::Output;
+use crate::cli::statistics::Statistics;
+use crate::cli::truth::true_poses;
+use crate::geometry::Point;
+use crate::map::Lookup;
+use crate::scan::{Scene, read_points, scan_files, tours};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol bench align                                                simulated scans of a lidar
+  mrol bench align scans/ --resolution 0.05 --levels 5
+  mrol bench align scans/ --resolution 0.1 --truth poses.txt --json
+
+Each scan but the first is aligned to the map of those before it, from the pose of the scan before, once by the
+Bloom filters and once by the exact sets; both get the same map. Of --repeats alignments of a scan the quickest
+counts. Errors are those against the true poses, where these are known; the map is then made at them.";
+
+/// Time alignments, by the Bloom filters and by the exact sets
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Align {
+    /// Scan files, or folders of them: .ply .pcd .xyz .f32 [default: simulated scans]
+    #[arg(value_name = "DIR_OR_FILES")]
+    scans: Vec<PathBuf>,
+    /// Side of a finest voxel, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.05)]
+    resolution: f64,
+    /// True poses of the scans, a TUM file
+    #[arg(long, value_name = "FILE", requires = "scans")]
+    truth: Option<PathBuf>,
+    /// Scans at most
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    scans_max: u16,
+    /// Of the simulation
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    map: MapOptions,
+    /// Alignments of each scan
+    #[arg(long, value_name = "N", default_value = "3", value_parser = times)]
+    repeats: usize,
+}
+
+impl Align {
+    pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
+        let settings = self.map.settings(self.resolution)?;
+        let scans = if self.scans.is_empty() { self.simulated() } else { self.scans_of_files(output)? };
+        if scans.len() < 2 {
+            return Err(CliError::failed(
+                "at least two scans are needed: the second is aligned to the first",
+            ));
+        }
+        let points = scans.iter().map(|scan| scan.points.len()).sum::<usize>() / scans.len();
+        let (scans_aligned, points) = (scans.len() - 1, count(points));
+        output.say(format!("{scans_aligned} scans of {points} points each, about"))?;
+        output.say(Line::HEAD)?;
+        let lookups = [Lookup::Bloom, Lookup::Exact];
+        let aligned = align_each(&scans, settings, &lookups, self.repeats).map_err(CliError::usage)?;
+        aligned.iter().try_for_each(|aligned| output.print(&Line::of(aligned)))
+    }
+
+    fn simulated(&self) -> Vec<Scan> {
+        let (scene, mut random) = (Scene::furnished(self.seed), ChaCha8Rng::seed_from_u64(self.seed));
+        let [lidar, _] = tours(self.scans_max.into());
+        let scan = |pose| Scan {
+            points: finite(lidar.sensor.scan(&scene, pose, &mut random)),
+            map_from_sensor: Some(*pose),
+        };
+        lidar.poses.iter().map(scan).collect()
+    }
+
+    fn scans_of_files(&self, output: &Output) -> Result<Vec<Scan>, CliError> {
+        let mut files = scan_files(&self.scans)?;
+        files.truncate(self.scans_max.into());
+        let poses = self.truth.as_ref().map(|path| true_poses(path, files.len(), output)).transpose()?;
+        let read = |(k, file): (usize, &PathBuf)| {
+            let map_from_sensor = poses.as_ref().map(|poses| poses[k]);
+            Ok(Scan { points: finite(read_points(file)?), map_from_sensor })
+        };
+        files.iter().enumerate().map(read).collect()
+    }
+}
+
+fn finite(mut points: Vec<Point>) -> Vec<Point> {
+    points.retain(|point| point.is_finite());
+    points
+}
+
+/// Of one method.
+#[derive(Serialize)]
+struct Line {
+    lookup: &'static str,
+    scans: usize,
+    ms_median: f64,
+    ms_max: f64,
+    lookups: u64,
+    ns_per_lookup: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_m: Option<Statistics>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_deg: Option<Statistics>,
+}
+
+impl Line {
+    const HEAD: &str = "look-ups  ms median     max        look-ups  ns a look-up  median error";
+
+    fn of(aligned: &Aligned) -> Self {
+        let ms = Statistics::of(aligned.ms.clone());
+        let of_errors =
+            |pick: fn(&(f64, f64)) -> f64| Statistics::of(aligned.errors.iter().map(pick).collect());
+        Self {
+            lookup: aligned.lookup.as_str(),
+            scans: aligned.ms.len(),
+            ms_median: ms.map_or(0.0, |ms| ms.median),
+            ms_max: ms.map_or(0.0, |ms| ms.max),
+            lookups: aligned.lookups,
+            ns_per_lookup: aligned.ms.iter().sum::<f64>() * 1e6 / aligned.lookups.max(1) as f64,
+            error_m: of_errors(|error| error.0),
+            error_deg: of_errors(|error| error.1),
+        }
+    }
+}
+
+impl Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { lookup, ms_median, ms_max, ns_per_lookup, .. } = self;
+        let lookups = count(self.lookups as usize);
+        write!(f, "{lookup:<8} {ms_median:>10.2} {ms_max:>7.2} {lookups:>15} {ns_per_lookup:>13.2}")?;
+        match (&self.error_m, &self.error_deg) {
+            (Some(metres), Some(degrees)) => {
+                write!(f, "  {:.1} mm {:.3} deg", metres.median * 1e3, degrees.median)
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! `mrol bench`: what everything costs on this machine.
+
+mod align;
+mod insert;
+mod lookup;
+mod readers;
+mod serve;
+pub(super) mod workload;
+
+use clap::Subcommand;
+
+use super::error::CliError;
+use super::output::Output;
+use super::runtime;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol bench lookup                                   this map against other structures, in a simulated room
+  mrol bench lookup --workload site --order scan      the same on ten million voxels, as a sensor asks
+  mrol bench lookup --voxels map.ply --points scan.ply --resolution 0.05
+  mrol bench insert --workload site
+  mrol bench align scans/ --resolution 0.05
+  mrol bench readers --workload site                  readers beside each other, and beside a writer
+  mrol bench serve                                    a load of point queries on a server of its own
+
+Figures are medians of several runs; give the machine nothing else to do meanwhile. `mrol bench WHAT --help`
+explains each.";
+
+/// Measure look-ups, insertions, alignments and a server's answers on this machine
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Bench {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    Lookup(lookup::Lookup),
+    Insert(insert::Insert),
+    Align(align::Align),
+    Readers(readers::Readers),
+    Serve(serve::Serve),
+}
+
+impl Bench {
+    pub(super) fn run(self, output: Output) -> Result<(), CliError> {
+        match self.what {
+            What::Lookup(lookup) => lookup.run(&output),
+            What::Insert(insert) => insert.run(&output),
+            What::Align(align) => align.run(&output),
+            What::Readers(readers) => readers.run(&output),
+            What::Serve(serve) => runtime::block_on(serve.run(output)),
+        }
+    }
+}

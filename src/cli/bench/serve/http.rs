@@ -1,0 +1,45 @@
+//! Point queries over HTTP, bytes in and bytes out.
+
+use axum::body::{Body, to_bytes};
+use axum::http::{Request, Uri, header};
+use hyper_util::client::legacy::Client;
+use hyper_util::client::legacy::connect::HttpConnector;
+use hyper_util::rt::TokioExecutor;
+
+use crate::cli::error::CliError;
+use crate::service::PointCloud;
+
+/// Most bytes of an answer: a bit a point, or an error's text.
+const ANSWER_BYTES_MAX: usize = 1 << 20;
+
+/// A connection, and where it asks.
+pub(super) struct HttpConnection {
+    client: Client<HttpConnector, Body>,
+    uri: Uri,
+}
+
+impl HttpConnection {
+    pub(super) fn to(url: &str) -> Result<Self, CliError> {
+        let uri = url.parse().map_err(|error| CliError::usage(format!("{url}: {error}")))?;
+        let mut connector = HttpConnector::new();
+        connector.set_nodelay(true);
+        Ok(Self { client: Client::builder(TokioExecutor::new()).build(connector), uri })
+    }
+
+    /// Asks about `points`; how many are occupied.
+    pub(super) async fn ask(&self, points: PointCloud) -> Result<usize, CliError> {
+        let request =
+            Request::post(self.uri.clone()).header(header::CONTENT_TYPE, "application/octet-stream");
+        let request = request.body(Body::from(points.into_bytes())).map_err(CliError::failed)?;
+        let failed = |error: &dyn std::fmt::Display| CliError::failed(format!("{}: {error}", self.uri));
+        let answer = self.client.request(request).await.map_err(|error| failed(&error))?;
+        let status = answer.status();
+        let bitmap = to_bytes(Body::new(answer.into_body()), ANSWER_BYTES_MAX)
+            .await
+            .map_err(|error| failed(&error))?;
+        if !status.is_success() {
+            return Err(failed(&format!("{status}: {}", String::from_utf8_lossy(&bitmap))));
+        }
+        Ok(bitmap.iter().map(|byte| byte.count_ones() as usize).sum())
+    }
+}

@@ -1,0 +1,169 @@
+//! `mrol bench serve`: a load of point queries on a server.
+
+mod daemon;
+mod http;
+mod load;
+mod report;
+mod target;
+
+use std::time::Duration;
+
+use clap::ValueEnum;
+
+use super::workload::{MapOptions, WorkloadOptions};
+use crate::bench::workload::Queries;
+use crate::cli::error::CliError;
+use crate::cli::map_report::count;
+use crate::cli::output::Output;
+use crate::cli::parse::LookupName;
+use crate::client::Client;
+use crate::service::PointCloud;
+use daemon::Daemon;
+use load::{Load, Question};
+use report::Line;
+use target::Target;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol bench serve                                            a server of its own, on the same cores
+  mrol bench serve --protocols grpc --points 10000 --connections 4 --seconds 10
+  mrol bench serve --server http://robot-7:7334 --http http://robot-7:7333 --workload site --json
+
+On the server a map of the workload is made under a name of its own, and deleted at the end. Each connection asks
+again as soon as it is answered; on a stream --in-flight messages are under way. The time of an answer is that from
+handing over the question to having the bitmap. A tenth of the time goes by before the clock runs.";
+
+/// What questions travel by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Protocol {
+    /// gRPC, a call a message
+    Grpc,
+    /// gRPC, one stream of messages
+    GrpcStream,
+    /// HTTP, points and bitmap as bytes
+    Http,
+}
+
+/// Put a load of point queries on a server: answers a second, and how long they take
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Serve {
+    /// The gRPC address of a running server [default: a server is started in this process]
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
+    /// The HTTP address of the same server; without it only gRPC is measured there
+    #[arg(long, value_name = "URL", requires = "server")]
+    http: Option<String>,
+    #[command(flatten)]
+    workload: WorkloadOptions,
+    #[command(flatten)]
+    map: MapOptions,
+    /// What questions travel by, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["grpc", "grpc-stream", "http"])]
+    protocols: Vec<Protocol>,
+    /// Points of a message, several separated by commas
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values = ["1000", "10000", "100000", "1000000"], value_parser = message_points)]
+    points: Vec<usize>,
+    /// What is asked: the exact set, or the Bloom filter
+    #[arg(long, value_enum, default_value_t = LookupName::Bloom)]
+    lookup: LookupName,
+    /// Connections that ask at once
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    connections: u16,
+    /// Messages under way on a stream
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    in_flight: u16,
+    /// Seconds of each measurement
+    #[arg(long, default_value_t = 3.0)]
+    seconds: f64,
+}
+
+impl Serve {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let time = Duration::try_from_secs_f64(self.seconds).map_err(CliError::usage)?;
+        let workload = self.workload.workload();
+        self.map.settings(workload.resolution_m())?;
+        let daemon = match self.server {
+            Some(_) => None,
+            None => Some(Daemon::start().await?),
+        };
+        let (grpc, http) = self.addresses(daemon.as_ref(), &output)?;
+        let target = Target::make(&grpc, http, workload, &self.map).await?;
+        let measured = self.measure(&target, time, &output).await;
+        target.delete().await?;
+        if let Some(daemon) = daemon {
+            daemon.stop().await?;
+        }
+        measured
+    }
+
+    /// Where the server is: gRPC, and HTTP if that is known.
+    fn addresses(
+        &self,
+        daemon: Option<&Daemon>,
+        output: &Output,
+    ) -> Result<(String, Option<String>), CliError> {
+        let serving = daemon.map(Daemon::serving);
+        let Some(serving) = serving else {
+            let http = self.http.as_ref().map(|url| url.trim_end_matches('/').to_owned());
+            if http.is_none() && self.protocols.contains(&Protocol::Http) {
+                output.note("http is left out: --http says where the server has it");
+            }
+            return Ok((self.server.clone().unwrap_or_default(), http));
+        };
+        Ok((serving.grpc.to_string(), Some(format!("http://{}", serving.http))))
+    }
+
+    async fn measure(&self, target: &Target, time: Duration, output: &Output) -> Result<(), CliError> {
+        let (voxels, connections) = (count(target.voxels), self.connections);
+        let (workload, lookup) = (&self.workload, crate::map::Lookup::from(self.lookup).as_str());
+        output.say(format!("{workload}: {voxels} voxels, {lookup} look-ups, {connections} connections"))?;
+        output.say(Line::HEAD)?;
+        let queries = self.workload.queries(1);
+        for &points in &self.points {
+            let question = self.question(&queries, points);
+            for &protocol in &self.protocols {
+                let Some(load) = self.load(protocol, target, &question) else { continue };
+                // Until connections, windows and caches are as they will be.
+                load.run(self.connections.into(), time / 10).await?;
+                let answered = load.run(self.connections.into(), time).await?;
+                output.print(&Line::of(protocol, points, &answered))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Messages of `points` points each, all of the workload's points in turn.
+    fn question(&self, queries: &Queries, points: usize) -> Question {
+        let mut endless = queries.points.iter().cycle().copied();
+        let messages = queries.points.len().div_ceil(points);
+        let message = |_| PointCloud::from(endless.by_ref().take(points).collect::<Vec<_>>());
+        Question {
+            messages: (0..messages).map(message).collect(),
+            map_from_points: queries.map_from_points,
+            lookup: self.lookup.into(),
+        }
+    }
+
+    fn load(&self, protocol: Protocol, target: &Target, question: &Question) -> Option<Load> {
+        let (server, map, question) = (target.grpc.clone(), target.map.clone(), question.clone());
+        match protocol {
+            Protocol::Grpc => Some(Load::Unary { server, map, question }),
+            Protocol::GrpcStream => {
+                Some(Load::Stream { server, map, question, in_flight: self.in_flight.into() })
+            }
+            Protocol::Http => {
+                target.http.as_ref().map(|url| Load::Http { url: question.url(url, &map), question })
+            }
+        }
+    }
+}
+
+fn message_points(text: &str) -> Result<usize, String> {
+    let points: usize = text.parse().map_err(|_| format!("{text:?} is no number"))?;
+    (1..=2_000_000).contains(&points).then_some(points).ok_or_else(|| format!("1 to 2000000, got {points}"))
+}
+
+async fn connect(url: &str) -> Result<Client, CliError> {
+    Ok(Client::connect(url).await?)
+}

@@ -1,0 +1,80 @@
+//! The map that is asked, on whatever server.
+
+use uuid::Uuid;
+
+use super::connect;
+use crate::align::Guess;
+use crate::bench::workload::Workload;
+use crate::cli::bench::workload::MapOptions;
+use crate::cli::error::CliError;
+use crate::client::{Client, NewMap};
+use crate::geometry::{Point, Pose};
+use crate::map::{MapName, RobotName};
+use crate::service::{PointCloud, ScanRequest};
+use crate::voxel::{Lattice, VoxelSet};
+
+/// A map of a workload, under a name that no other map has.
+pub(super) struct Target {
+    pub(super) grpc: String,
+    pub(super) http: Option<String>,
+    pub(super) map: MapName,
+    pub(super) voxels: usize,
+    client: Client,
+}
+
+impl Target {
+    pub(super) async fn make(
+        grpc: &str,
+        http: Option<String>,
+        workload: Workload,
+        options: &MapOptions,
+    ) -> Result<Self, CliError> {
+        let client = connect(grpc).await?;
+        let map = MapName::new(&format!("bench-{}", Uuid::new_v4())).map_err(CliError::failed)?;
+        let settings = options.settings(workload.resolution_m())?;
+        let new_map = NewMap {
+            resolution_m: settings.resolution_m,
+            levels: Some(settings.levels),
+            filter_hashes: Some(settings.filter.hashes),
+            filter_bits_per_voxel: Some(settings.filter.bits_per_key),
+        };
+        client.create_map(&map, new_map).await?;
+        let mut target = Self { grpc: grpc.to_owned(), http, map, voxels: 0, client };
+        match target.fill(workload).await {
+            Ok(()) => Ok(target),
+            Err(error) => {
+                // What went wrong first is what is told.
+                let _ = target.delete().await;
+                Err(error)
+            }
+        }
+    }
+
+    /// Sends the voxels as scans of points in their middles.
+    async fn fill(&mut self, workload: Workload) -> Result<(), CliError> {
+        let robot = RobotName::new("bench").map_err(CliError::failed)?;
+        let lattice = Lattice::new(workload.resolution_m(), 1).map_err(CliError::failed)?;
+        for voxels in workload.pieces() {
+            let scan = ScanRequest {
+                robot: robot.clone(),
+                scan_id: None,
+                points: middles(&voxels, &lattice),
+                timestamp_ns: None,
+                guess: Guess::Pose(Pose::identity()),
+                at_guess: true,
+                strict: true,
+            };
+            self.voxels += self.client.insert_scan(&self.map, scan).await?.new_voxels;
+        }
+        Ok(())
+    }
+
+    pub(super) async fn delete(self) -> Result<(), CliError> {
+        Ok(self.client.delete_map(&self.map).await?)
+    }
+}
+
+fn middles(voxels: &VoxelSet, lattice: &Lattice) -> PointCloud {
+    let middle = |voxel| Point::from(nalgebra::Point3::from(lattice.center_m(voxel, 0)));
+    voxels.iter().map(middle).collect::<Vec<_>>().into()
+}

@@ -1,0 +1,129 @@
+//! What happened on the robots' way.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::planner::{Tally, Told};
+use super::report::Line;
+use super::robot::News;
+use crate::cli::statistics::Statistics;
+
+/// Over which the planner's rate is told: lines may come at once.
+const RATE_WINDOW: Duration = Duration::from_millis(100);
+
+/// All that the robots were told, and how the map grew.
+pub(super) struct Journal {
+    start: Instant,
+    tally: Arc<Tally>,
+    /// The tally at the beginning of the window whose rate is told, and the rate of the window before.
+    window: (Instant, u64, u64),
+    told: Option<Told>,
+    robots: Vec<RobotJournal>,
+    voxels: usize,
+}
+
+/// Of one robot.
+#[derive(Default)]
+pub(super) struct RobotJournal {
+    name: &'static str,
+    accepted: usize,
+    refused: usize,
+    metres: Vec<f64>,
+    degrees: Vec<f64>,
+}
+
+/// What a robot's journal comes to.
+pub(super) struct RobotSummary {
+    pub(super) name: &'static str,
+    pub(super) accepted: usize,
+    pub(super) refused: usize,
+    pub(super) metres: Statistics,
+    pub(super) degrees: Statistics,
+}
+
+impl Journal {
+    pub(super) fn new(start: Instant, tally: Arc<Tally>) -> Self {
+        Self { start, tally, window: (start, 0, 0), told: None, robots: Vec::new(), voxels: 0 }
+    }
+
+    /// Enters a scan; its line.
+    pub(super) fn enter(&mut self, news: News) -> Line {
+        let answer = &news.answer;
+        self.voxels += answer.new_voxels;
+        self.robot(news.robot).enter(answer.accepted(), news.error);
+        let told = self.told_lately();
+        Line {
+            seconds: self.start.elapsed().as_secs_f64(),
+            robot: news.robot,
+            scan: news.scan,
+            scans: news.scans,
+            verdict: answer.verdict.as_str(),
+            overlap: answer.overlap(),
+            error_m: news.error.0,
+            error_deg: news.error.1,
+            new_voxels: answer.new_voxels,
+            voxels: self.voxels,
+            revision: answer.state.revision,
+            planner_points_per_s: told.points_per_s(),
+            planner_share_occupied: told.share_occupied(),
+        }
+    }
+
+    fn robot(&mut self, name: &'static str) -> &mut RobotJournal {
+        let place = self.robots.iter().position(|robot| robot.name == name).unwrap_or_else(|| {
+            self.robots.push(RobotJournal { name, ..RobotJournal::default() });
+            self.robots.len() - 1
+        });
+        &mut self.robots[place]
+    }
+
+    /// What the planner was told in the last window that is long enough for a rate.
+    fn told_lately(&mut self) -> Told {
+        let (then, points_then, occupied_then) = self.window;
+        let (now, (points, occupied)) = (Instant::now(), self.tally.read());
+        let told =
+            Told { points: points - points_then, occupied: occupied - occupied_then, time: now - then };
+        if told.time < RATE_WINDOW {
+            return self.told.unwrap_or(told);
+        }
+        self.window = (now, points, occupied);
+        *self.told.insert(told)
+    }
+
+    /// Voxels that the answers speak of.
+    pub(super) fn voxels(&self) -> usize {
+        self.voxels
+    }
+
+    /// By name.
+    pub(super) fn robots(&self) -> Vec<RobotSummary> {
+        let mut robots: Vec<_> = self.robots.iter().filter_map(RobotJournal::summary).collect();
+        robots.sort_unstable_by_key(|robot| robot.name);
+        robots
+    }
+}
+
+impl RobotJournal {
+    fn enter(&mut self, accepted: bool, (metres, degrees): (f64, f64)) {
+        if !accepted {
+            self.refused += 1;
+            return;
+        }
+        self.accepted += 1;
+        // The first scan is where it was told to be.
+        if self.accepted > 1 {
+            self.metres.push(metres);
+            self.degrees.push(degrees);
+        }
+    }
+
+    fn summary(&self) -> Option<RobotSummary> {
+        Some(RobotSummary {
+            name: self.name,
+            accepted: self.accepted,
+            refused: self.refused,
+            metres: Statistics::of(self.metres.clone())?,
+            degrees: Statistics::of(self.degrees.clone())?,
+        })
+    }
+}

@@ -1,0 +1,89 @@
+//! The probe of the counting Bloom filter.
+
+use std::arch::x86_64::*;
+
+use super::Probe;
+use super::registers::{PerShard, addresses, gather, lengths, mix, pack, prefetch, scale, widen};
+use crate::bloom::{HASH_A, HASH_B, HASH_C};
+use crate::map::lookup::LevelView;
+
+/// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says.
+pub(super) struct Bloom<const HASHES: u32>;
+
+pub(super) struct BloomRegisters {
+    plane: PerShard,
+    words: PerShard,
+    pub(super) hashes: u32,
+}
+
+impl<const HASHES: u32> Probe for Bloom<HASHES> {
+    type Registers<'a> = BloomRegisters;
+    /// Addresses of words of the planes, and the bits that count there; eight voxels a register.
+    type Located = ([__m512i; 2], [__m512i; 2]);
+    type Found = Self::Located;
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
+        BloomRegisters {
+            plane: PerShard::load(addresses(view.planes)),
+            words: PerShard::load(lengths(view.planes)),
+            hashes: view.hashes,
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn locate<const FAR: bool>(
+        r: &BloomRegisters,
+        index: [__m512i; 3],
+        shard: __m512i,
+    ) -> Self::Located {
+        let (keys, shards) = (pack(index), widen(shard));
+        let hashes = if HASHES == 0 { r.hashes } else { HASHES };
+        let (a, b) = (r.word_of(keys[0], shards[0], hashes), r.word_of(keys[1], shards[1], hashes));
+        if FAR {
+            // SAFETY: a prefetch never faults.
+            unsafe {
+                prefetch(a.0);
+                prefetch(b.0);
+            }
+        }
+        ([a.0, b.0], [a.1, b.1])
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn find<const FAR: bool>(_: &BloomRegisters, located: Self::Located) -> Self::Found {
+        located
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn answer(_: &BloomRegisters, (addresses, masks): Self::Found) -> u16 {
+        // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
+        let words = unsafe { gather(addresses) };
+        let hit =
+            |half: usize| _mm512_cmpeq_epi64_mask(_mm512_and_si512(words[half], masks[half]), masks[half]);
+        u16::from(hit(0)) | u16::from(hit(1)) << 8
+    }
+}
+
+impl BloomRegisters {
+    /// The twin of `bloom::Probe::of` for eight keys: addresses of words, and masks.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    pub(super) fn word_of(&self, key: __m512i, shard: __m512i, hashes: u32) -> (__m512i, __m512i) {
+        let h = mix(key, HASH_A, HASH_B);
+        let word = scale(h, self.words.of(shard));
+        let address = _mm512_add_epi64(self.plane.of(shard), _mm512_slli_epi64::<3>(word));
+        let one = _mm512_set1_epi64(1);
+        let mut g = _mm512_mul_epu32(h, _mm512_set1_epi64(HASH_C as i64));
+        let mut mask = _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g));
+        for _ in 1..hashes {
+            g = _mm512_slli_epi64::<6>(g);
+            mask = _mm512_or_si512(mask, _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g)));
+        }
+        (address, mask)
+    }
+}

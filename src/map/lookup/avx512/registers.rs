@@ -1,0 +1,123 @@
+//! What both probes do with eight or sixteen lanes: keys, hashes, descriptors of shards, memory.
+
+use std::arch::x86_64::*;
+
+use super::LANES;
+use crate::map::sharding::SHARDS;
+
+const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn lanes(values: &[i32; LANES]) -> __m512i {
+    // SAFETY: sixteen i32 are one register.
+    unsafe { _mm512_loadu_si512(values.as_ptr().cast()) }
+}
+
+/// Sixteen packed keys (`VoxelKey::pack`), eight a register.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn pack(index: [__m512i; 3]) -> [__m512i; 2] {
+    let field = _mm512_set1_epi32(0x1f_ffff);
+    let [x, y, z] = index.map(|i| _mm512_and_si512(i, field));
+    let low = _mm512_or_si512(x, _mm512_slli_epi32::<21>(y));
+    let high = _mm512_or_si512(_mm512_srli_epi32::<11>(y), _mm512_slli_epi32::<10>(z));
+    const FIRST: [i32; LANES] = [0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23];
+    const SECOND: [i32; LANES] = [8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31];
+    [FIRST, SECOND].map(|index| _mm512_permutex2var_epi32(low, lanes(&index), high))
+}
+
+/// Sixteen u32 as u64, eight a register.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn widen(values: __m512i) -> [__m512i; 2] {
+    [
+        _mm512_cvtepu32_epi64(_mm512_castsi512_si256(values)),
+        _mm512_cvtepu32_epi64(_mm512_extracti64x4_epi64::<1>(values)),
+    ]
+}
+
+/// high32(mix(key)) and mix(key), for the mix of both the filter and the table.
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq")]
+pub(super) fn mix(key: __m512i, a: u64, b: u64) -> __m512i {
+    let h = _mm512_mullo_epi64(key, _mm512_set1_epi64(a as i64));
+    let h = _mm512_xor_si512(h, _mm512_srli_epi64::<32>(h));
+    _mm512_mullo_epi64(h, _mm512_set1_epi64(b as i64))
+}
+
+/// high32(h) * n >> 32.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn scale(h: __m512i, n: __m512i) -> __m512i {
+    _mm512_srli_epi64::<32>(_mm512_mul_epu32(_mm512_srli_epi64::<32>(h), n))
+}
+
+/// One u64 a shard, in two registers.
+#[derive(Clone, Copy)]
+pub(super) struct PerShard([__m512i; 2]);
+
+impl PerShard {
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn load(values: [u64; SHARDS]) -> Self {
+        // SAFETY: eight u64 are one register.
+        unsafe { Self([0, 8].map(|i| _mm512_loadu_si512(values[i..].as_ptr().cast()))) }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn of(self, shard: __m512i) -> __m512i {
+        _mm512_permutex2var_epi64(self.0[0], shard, self.0[1])
+    }
+}
+
+pub(super) fn addresses<T>(slices: [&[T]; SHARDS]) -> [u64; SHARDS] {
+    slices.map(|slice| slice.as_ptr().expose_provenance() as u64)
+}
+
+pub(super) fn lengths<T>(slices: [&[T]; SHARDS]) -> [u64; SHARDS] {
+    slices.map(|slice| slice.len() as u64)
+}
+
+/// Starts fetching the lines at eight addresses.
+///
+/// # Safety
+/// Needs AVX-512 F. Any address will do: a prefetch never faults.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) unsafe fn prefetch(addresses: __m512i) {
+    let mut each = [0u64; 8];
+    // SAFETY: a register is eight u64.
+    unsafe {
+        _mm512_storeu_si512(each.as_mut_ptr().cast(), addresses);
+        for address in each {
+            _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(address as usize));
+        }
+    }
+}
+
+/// The u64 at each of sixteen addresses.
+///
+/// # Safety
+/// Needs AVX-512 F; each address must be of a u64 that may be read.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) unsafe fn gather([a, b]: [__m512i; 2]) -> [__m512i; 2] {
+    // SAFETY: as for this function.
+    unsafe {
+        let base = std::ptr::null();
+        [_mm512_i64gather_epi64::<1>(a, base), _mm512_i64gather_epi64::<1>(b, base)]
+    }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn to_array(registers: [__m512i; 2]) -> [u64; LANES] {
+    let mut array = [0; LANES];
+    for (half, register) in array.chunks_exact_mut(8).zip(registers) {
+        // SAFETY: eight u64 are one register.
+        unsafe { _mm512_storeu_si512(half.as_mut_ptr().cast(), register) };
+    }
+    array
+}

@@ -1,0 +1,141 @@
+//! `mrol bench` and `mrol experiment`: what is measured is there and makes sense; how fast it is, is not tested.
+
+use mrol::geometry::Point;
+use mrol::scan::{write_f32, write_ply};
+use serde_json::Value;
+
+use super::{Sequence, complaint, mrol, objects};
+
+fn number(line: &Value, field: &str) -> f64 {
+    line[field].as_f64().unwrap_or_else(|| panic!("{field} in {line}"))
+}
+
+fn texts<'a>(lines: &'a [Value], field: &str) -> Vec<&'a str> {
+    lines.iter().map(|line| line[field].as_str().unwrap()).collect()
+}
+
+#[test]
+fn structures_answer_alike_and_each_has_a_line() {
+    let names = ["bloom", "exact", "bloom-kernel", "exact-kernel", "hashset", "dense", "paper"];
+    let structures = names.join(",");
+    let lines =
+        objects(&["bench", "lookup", "--structures", &structures, "--queries", "20000", "--repeats", "2"]);
+    assert_eq!(texts(&lines, "structure"), names);
+    for line in &lines {
+        let fields = ["structure", "ns_per_point", "points", "occupied", "false_positives", "bytes"];
+        assert!(line.as_object().unwrap().keys().all(|key| fields.contains(&key.as_str())), "{line}");
+        assert!(number(line, "ns_per_point") > 0.0 && number(line, "bytes") > 1000.0, "{line}");
+        assert_eq!(number(line, "points"), 20_000.0);
+        let truly = number(line, "occupied") - number(line, "false_positives");
+        assert_eq!(truly, number(&lines[1], "occupied"));
+    }
+}
+
+#[test]
+fn files_of_points_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let row = |n: usize| (0..n).map(|i| Point::new(i as f32 * 0.1 + 0.05, 0.05, 0.05)).collect::<Vec<_>>();
+    write_ply(path("map.ply").as_ref(), &row(300)).unwrap();
+    write_f32(path("scan.f32").as_ref(), &row(1000)).unwrap();
+    let (map, scan) = (path("map.ply"), path("scan.f32"));
+    let files =
+        ["bench", "lookup", "--voxels", &map, "--points", &scan, "--resolution", "0.1", "--repeats", "1"];
+    let lines = objects(&files);
+    assert_eq!(texts(&lines, "structure"), ["bloom", "exact", "hashset", "dense", "paper"]);
+    assert_eq!((number(&lines[1], "points"), number(&lines[1], "occupied")), (1000.0, 300.0));
+
+    let moved = objects(&[&files[..], &["--pose", "-10 0 0 0 0 0 1", "--structures", "exact"]].concat());
+    assert_eq!(number(&moved[0], "occupied"), 300.0);
+    let coarse = objects(&[&files[..], &["--level", "2", "--structures", "exact"]].concat());
+    assert_eq!(number(&coarse[0], "occupied"), 300.0);
+}
+
+#[test]
+fn an_array_that_would_not_fit_is_left_out_with_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("far.f32");
+    write_f32(&path, &[Point::new(0.0, 0.0, 0.0), Point::new(900.0, 900.0, 900.0)]).unwrap();
+    let file = path.to_str().unwrap();
+    let files = ["bench", "lookup", "--voxels", file, "--points", file, "--resolution", "0.1", "--json"];
+    let output = mrol(&files).assert().success().get_output().clone();
+    assert!(!String::from_utf8(output.stdout).unwrap().contains("dense"));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("dense is left out: "));
+}
+
+#[test]
+fn options_that_make_no_sense_together_are_usage_errors() {
+    assert!(complaint(&["bench", "lookup", "--level", "4", "--queries", "1"], 2).contains("--level"));
+    assert!(complaint(&["bench", "insert", "--levels", "13", "--queries", "1"], 2).contains("levels"));
+    mrol(&["bench", "lookup", "--voxels", "a.ply"]).assert().code(2);
+    mrol(&["bench", "serve", "--http", "http://127.0.0.1:1"]).assert().code(2);
+}
+
+#[test]
+fn insertion_is_timed_for_new_and_known_points() {
+    let lines = objects(&["bench", "insert", "--queries", "3000", "--scan-points", "1000", "--repeats", "2"]);
+    assert_eq!(texts(&lines, "structure"), ["map", "map", "map", "hashset", "hashset"]);
+    assert_eq!(texts(&lines, "points_are"), ["new", "known", "removed", "new", "known"]);
+    assert!(lines.iter().all(|line| number(line, "points") == 3000.0 && number(line, "ns_per_point") > 0.0));
+}
+
+#[test]
+fn alignments_of_files_are_timed_by_both_structures() {
+    let sequence = Sequence::of(3);
+    let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));
+    let lines = objects(&["bench", "align", &scans, "--truth", &truth, "--repeats", "1"]);
+    assert_eq!(texts(&lines, "lookup"), ["bloom", "exact"]);
+    for line in &lines {
+        assert_eq!(number(line, "scans"), 2.0);
+        assert!(
+            number(line, "ms_median") > 0.0 && line["error_m"]["median"].as_f64().unwrap() < 0.1,
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn readers_are_timed_alone_together_and_beside_a_writer() {
+    let lines = objects(&["bench", "readers", "--queries", "50000", "--rounds", "1", "--seconds", "0.05"]);
+    let crowds: Vec<_> =
+        lines.iter().map(|line| (number(line, "readers"), number(line, "writers"))).collect();
+    assert_eq!(crowds, [(1.0, 0.0), (2.0, 0.0), (1.0, 1.0)]);
+    assert!(number(&lines[2], "commits_per_s") > 0.0 && number(&lines[0], "of_one") == 1.0);
+}
+
+#[test]
+fn a_server_of_its_own_is_asked_by_every_protocol() {
+    let serve = ["bench", "serve", "--seconds", "0.1", "--points", "1000,5000", "--queries", "20000"];
+    let lines = objects(&[&serve[..], &["--connections", "2"]].concat());
+    assert_eq!(texts(&lines, "protocol"), ["grpc", "grpc-stream", "http", "grpc", "grpc-stream", "http"]);
+    for line in &lines {
+        assert!(number(line, "messages") > 0.0 && number(line, "points_per_s") > 0.0, "{line}");
+        assert!(number(line, "p50_us") > 0.0 && number(line, "p99_us") >= number(line, "p50_us"), "{line}");
+        assert!((0.03..0.2).contains(&number(line, "share_occupied")), "{line}");
+    }
+}
+
+#[test]
+fn experiment_1_leaves_a_plot_and_its_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new/results");
+    let out_dir = out.to_str().unwrap();
+    let lines = objects(&["experiment", "lookup", "--out", out_dir, "--runs", "3", "--points", "2000"]);
+    assert_eq!(lines.len(), 8);
+    let csv = std::fs::read_to_string(out.join("lookup.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 8 * 3);
+    let svg = std::fs::read_to_string(out.join("lookup.svg")).unwrap();
+    assert!(texts(&lines, "stage").iter().all(|stage| svg.contains(stage) && csv.contains(stage)));
+}
+
+#[test]
+fn scaling_leaves_a_plot_and_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let sizes = ["--sizes", "2000,20000", "--points", "2000", "--repeats", "1"];
+    let lines = objects(&[&["experiment", "scaling", "--out", out][..], &sizes].concat());
+    assert_eq!(lines.len(), 2 * 2 * 3);
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert_eq!((read("scaling.csv").lines().count(), read("scaling.md").lines().count()), (13, 4));
+    assert!(read("scaling.svg").contains("hashset, scan"));
+}
