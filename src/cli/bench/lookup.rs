@@ -28,7 +28,8 @@ EXAMPLES:
 Each structure is asked which of the same points are in occupied voxels, from points in a sensor's frame and its
 pose to a bit a point, on one core. bloom and exact are this map as its users ask it, ten thousand points at a
 time through its locks; bloom-kernel and exact-kernel the same without locks. The others get the same transform,
-and one level without locks. ns_per_point is the median of --repeats passes, structures taking turns in each.
+and one level without locks. ns_per_point is the median of --repeats passes, each after one that is not timed;
+structures take turns.
 bytes are those of the level: a filter's plane and counters, for exact the set of all levels.
 
 Answers are checked before the clock runs: none may deny an occupied voxel, exact ones may not invent one.";
