@@ -7,12 +7,12 @@ mod scatter;
 mod site;
 
 use nalgebra::{Translation3, UnitQuaternion};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{Point, Pose};
 use crate::map::{MapSettings, MapSettingsError, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use crate::voxel::{LatticeFromPoints, VoxelSet};
+use crate::voxel::{LatticeFromPoints, VoxelKey, VoxelSet};
 pub use room::Room;
 pub use scatter::Scatter;
 pub use site::Site;
@@ -25,6 +25,8 @@ pub enum Order {
     Random,
     /// As a spinning sensor of 64 rings sees the surface from a moving place.
     Scan,
+    /// Each voxel once, row by row, as a survey without gaps would bring them.
+    Sweep,
 }
 
 /// Points to look up, and where their frame lies: as a sensor's are, neither upright nor at the origin.
@@ -45,7 +47,7 @@ impl Queries {
         Self { points: points.into_iter().map(told).collect(), map_from_points }
     }
 
-    /// Of the points whose voxels are not in `known`, the first in each voxel, shortened to `most`.
+    /// The first point in each voxel, `most` of them at most.
     pub fn first_of_each_voxel(
         self,
         lattice_from_map: impl Fn(&Pose) -> LatticeFromPoints,
@@ -93,7 +95,8 @@ impl Workload {
         }
     }
 
-    /// `count` points to ask about. What is scattered has no surface, so there the order is always random.
+    /// `count` points to ask about; of a sweep as many as there are voxels, at most. A sensor sees nothing of what is
+    /// scattered: there its order is random too.
     pub fn queries(&self, order: Order, count: usize, seed: u64) -> Queries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         match (self, order) {
@@ -101,8 +104,24 @@ impl Workload {
             (Self::Room(room), Order::Scan) => ride::queries(room, count, &mut random),
             (Self::Site(site), Order::Random) => site.random_queries(count, &mut random),
             (Self::Site(site), Order::Scan) => ride::queries(site, count, &mut random),
-            (Self::Scatter(scatter), _) => scatter.random_queries(count, &mut random),
+            (Self::Scatter(scatter), Order::Random | Order::Scan) => {
+                scatter.random_queries(count, &mut random)
+            }
+            (_, Order::Sweep) => self.sweep(count, &mut random),
         }
+    }
+
+    /// A point somewhere in each voxel, but not on its border.
+    fn sweep(&self, count: usize, random: &mut ChaCha8Rng) -> Queries {
+        let indices: Box<dyn Iterator<Item = [i32; 3]>> = match *self {
+            Self::Room(room) => Box::new(room.indices()),
+            Self::Site(site) => Box::new(site.indices()),
+            Self::Scatter(scatter) => {
+                Box::new(scatter.voxels().iter().map(VoxelKey::index).collect::<Vec<_>>().into_iter())
+            }
+        };
+        let mut inside = |i: i32| (f64::from(i) + random.random_range(0.1..0.9)) * self.resolution_m();
+        Queries::of_map_points(indices.take(count).map(|index| index.map(&mut inside)))
     }
 
     /// A map of it with `settings`, its voxels streamed in.
@@ -145,7 +164,7 @@ mod tests {
     #[test]
     fn one_seed_gives_one_workload() {
         for workload in workloads() {
-            for order in [Order::Random, Order::Scan] {
+            for order in [Order::Random, Order::Scan, Order::Sweep] {
                 assert_eq!(workload.queries(order, 1000, 3), workload.queries(order, 1000, 3));
                 assert_ne!(workload.queries(order, 1000, 3), workload.queries(order, 1000, 4));
             }
@@ -169,6 +188,19 @@ mod tests {
                 [Order::Random, Order::Scan].map(|order| occupied(&map, &workload.queries(order, 50_000, 1)));
             assert!((0.02..0.4).contains(&random), "{workload:?}: {random}");
             assert!(scan > 0.8, "{workload:?}: {scan}");
+        }
+    }
+
+    #[test]
+    fn a_sweep_meets_each_voxel_once() {
+        for workload in workloads() {
+            let map = map_of(workload);
+            let sweep = workload.queries(Order::Sweep, usize::MAX, 1);
+            assert_eq!((sweep.points.len(), occupied(&map, &sweep)), (map.voxels(0), 1.0));
+            assert_eq!(
+                sweep.first_of_each_voxel(|pose| map.lattice().from_points(pose), usize::MAX).points.len(),
+                map.voxels(0)
+            );
         }
     }
 

@@ -26,10 +26,15 @@ impl Room {
     pub const RESOLUTION_M: f64 = 0.05;
 
     pub(super) fn voxels(self) -> VoxelSet {
-        let span = |axis: usize| -HALF[axis]..HALF[axis];
-        let all = span(2).flat_map(|z| span(1).flat_map(move |y| span(0).map(move |x| [x, y, z])));
+        self.indices().filter_map(VoxelKey::new).collect()
+    }
+
+    /// Its voxels, row by row.
+    pub(super) fn indices(self) -> impl Iterator<Item = [i32; 3]> {
+        let [nx, ny, nz] = HALF.map(|half| 2 * half);
+        let index = move |n: i32| [n % nx - HALF[0], n / nx % ny - HALF[1], n / (nx * ny) - HALF[2]];
         let is_surface = |index: &[i32; 3]| (0..3).any(|k| index[k] == -HALF[k] || index[k] == HALF[k] - 1);
-        all.filter(is_surface).filter_map(VoxelKey::new).collect()
+        (0..nx * ny * nz).map(index).filter(is_surface)
     }
 
     pub(super) fn random_queries(self, count: usize, random: &mut ChaCha8Rng) -> Queries {

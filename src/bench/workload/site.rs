@@ -72,19 +72,29 @@ impl Site {
     }
 
     pub(super) fn pieces(self) -> impl Iterator<Item = VoxelSet> {
+        self.starts().map(move |start| self.piece(start).filter_map(VoxelKey::new).collect())
+    }
+
+    /// Its voxels, piece by piece, row by row.
+    pub(super) fn indices(self) -> impl Iterator<Item = [i32; 3]> {
+        self.starts().flat_map(move |start| self.piece(start))
+    }
+
+    /// The first columns of all pieces.
+    fn starts(self) -> impl Iterator<Item = [i32; 2]> {
         let starts = move || (0..self.side).step_by(PIECE_SIDE as usize);
-        starts().flat_map(move |y| starts().map(move |x| self.piece([x, y])))
+        starts().flat_map(move |y| starts().map(move |x| [x, y]))
     }
 
     /// The voxels of the columns from `start` on.
-    fn piece(self, start: [i32; 2]) -> VoxelSet {
+    fn piece(self, start: [i32; 2]) -> impl Iterator<Item = [i32; 3]> {
         let [xs, ys] = start.map(|start| start..self.side.min(start + PIECE_SIDE));
-        let columns = ys.flat_map(|y| xs.clone().map(move |x| [x - self.side / 2, y - self.side / 2]));
-        columns.flat_map(|[x, y]| self.column(x, y)).filter_map(VoxelKey::new).collect()
+        let columns = ys.flat_map(move |y| xs.clone().map(move |x| [x - self.side / 2, y - self.side / 2]));
+        columns.flat_map(move |[x, y]| self.column(x, y))
     }
 
     /// The ground goes through the middle of a column's voxels, as near as whole voxels allow.
-    fn column(self, x: i32, y: i32) -> impl Iterator<Item = [i32; 3]> {
+    fn column(self, x: i32, y: i32) -> impl Iterator<Item = [i32; 3]> + use<> {
         let [middle_x, middle_y] = [x, y].map(|i| (f64::from(i) + 0.5) * Self::RESOLUTION_M);
         let lowest = self.height_m(middle_x, middle_y) / Self::RESOLUTION_M - f64::from(THICKNESS) / 2.0;
         let lowest = lowest.round() as i32;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::workload::{MapOptions, WorkloadOptions, times};
 use crate::bench::insert::{into_hash_set, into_map, out_of_map};
 use crate::bench::stopwatch::Runs;
-use crate::bench::workload::Queries;
+use crate::bench::workload::{Order, Queries};
 use crate::cli::error::CliError;
 use crate::cli::map_report::{bytes, count};
 use crate::cli::output::Output;
@@ -16,7 +16,8 @@ use crate::voxel::Lattice;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
-  mrol bench insert --workload site --order scan
+  mrol bench insert --workload site                 scans of a robot that drives through the site
+  mrol bench insert --workload site --order sweep   the site row by row
   mrol bench insert --workload room --queries 100000 --json
 
 Points go in at a known pose, scan by scan, on one core, without a journal: into an empty map (all new), again (all
@@ -44,7 +45,8 @@ pub(super) struct Insert {
 }
 
 impl Insert {
-    pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
+    pub(super) fn run(mut self, output: &Output) -> Result<(), CliError> {
+        self.workload = self.workload.usually(Order::Scan);
         let settings = self.map.settings(self.workload.workload().resolution_m())?;
         let points = self.points(&settings)?;
         if points.points.is_empty() {

@@ -30,9 +30,10 @@ pub(in crate::cli) struct WorkloadOptions {
     /// Voxels of a site, about
     #[arg(long, value_name = "N", default_value_t = Site::VOXELS as u64, value_parser = clap::value_parser!(u64).range(Site::VOXELS_RANGE))]
     site_voxels: u64,
-    /// In which order points are asked: anywhere, or as a spinning sensor of 64 rings sees the surface
-    #[arg(long, value_enum, default_value_t = Order::Random)]
-    order: Order,
+    /// In which order points come: anywhere, as a spinning sensor of 64 rings sees the surface, or each voxel once
+    /// [default: random; of points that are inserted, scan]
+    #[arg(long, value_enum)]
+    order: Option<Order>,
     /// Points of a pass
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     queries: u64,
@@ -42,6 +43,15 @@ pub(in crate::cli) struct WorkloadOptions {
 }
 
 impl WorkloadOptions {
+    /// The same in the order `usual`, where none was asked for.
+    pub(in crate::cli) fn usually(self, usual: Order) -> Self {
+        Self { order: self.order.or(Some(usual)), ..self }
+    }
+
+    fn order(&self) -> Order {
+        self.order.unwrap_or_default()
+    }
+
     pub(in crate::cli) fn workload(&self) -> Workload {
         match self.workload {
             WorkloadName::Room => Workload::Room(Room),
@@ -54,7 +64,7 @@ impl WorkloadOptions {
     pub(in crate::cli) fn queries(&self, times: usize) -> Queries {
         // The voxels' seed would give scattered points that are scattered voxels.
         let seed = self.seed.wrapping_add(0x5eed);
-        self.workload().queries(self.order, self.points() * times, seed)
+        self.workload().queries(self.order(), self.points() * times, seed)
     }
 
     pub(in crate::cli) fn points(&self) -> usize {
@@ -67,7 +77,8 @@ impl Display for WorkloadOptions {
         let name = |value: &dyn Fn() -> Option<clap::builder::PossibleValue>| {
             value().map(|value| value.get_name().to_owned()).unwrap_or_default()
         };
-        let order = if self.workload == WorkloadName::Scatter { Order::Random } else { self.order };
+        let scattered = self.workload == WorkloadName::Scatter && self.order() == Order::Scan;
+        let order = if scattered { Order::Random } else { self.order() };
         write!(
             f,
             "{}, {} order",

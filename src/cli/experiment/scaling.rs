@@ -114,6 +114,7 @@ fn name_of(order: Order) -> &'static str {
     match order {
         Order::Random => "random",
         Order::Scan => "scan",
+        Order::Sweep => "sweep",
     }
 }
 
