@@ -72,8 +72,7 @@ fn read(map: &ThroughMap<'_>, queries: &Queries, over: &AtomicBool, answered: &A
 fn write(map: &MultiResolutionMap, queries: &Queries, over: &AtomicBool, commits: &AtomicUsize) {
     let quantise = map.lattice().from_points(&queries.map_from_points);
     for scan in queries.points.chunks(SCAN_POINTS).cycle() {
-        let (voxels, _) = VoxelSet::of_points(scan, &quantise);
-        let present = voxels.iter().filter(|&voxel| map.view().contains(voxel, 0)).collect::<VoxelSet>();
+        let present = present(map, &VoxelSet::of_points(scan, &quantise).0);
         map.committer().remove(&present);
         add(map, present);
         commits.fetch_add(2, Ordering::Relaxed);
@@ -81,6 +80,12 @@ fn write(map: &MultiResolutionMap, queries: &Queries, over: &AtomicBool, commits
             return;
         }
     }
+}
+
+/// Those of `voxels` that are in the map.
+fn present(map: &MultiResolutionMap, voxels: &VoxelSet) -> VoxelSet {
+    let view = map.view();
+    voxels.iter().filter(|&voxel| view.contains(voxel, 0)).collect()
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub const STAGES: [&str; 8] = [
     "transform and look-up: hash table",
 ];
 
-/// Times each stage `runs` times on level 0 of `map`, one stage after the other in each run.
+/// Times each stage `runs` times on level 0 of `map`, each after a run that is not timed. The stages take turns.
 ///
 /// # Errors
 /// When a dense array of the map would be too large.
@@ -41,11 +41,12 @@ pub fn measure(
 ) -> Result<Vec<Stage>, DenseTooLarge> {
     let mut bench = Bench::new(map, queries)?;
     let mut measured = STAGES.map(|name| Stage { name, runs: Runs::default() });
-    for stage in 0..STAGES.len() {
-        bench.run(stage, &mut Runs::default());
-    }
     for _ in 0..runs {
-        measured.iter_mut().enumerate().for_each(|(stage, measured)| bench.run(stage, &mut measured.runs));
+        for (stage, measured) in measured.iter_mut().enumerate() {
+            // What the others left in the caches is not this one's doing.
+            bench.run(stage, &mut Runs::default());
+            bench.run(stage, &mut measured.runs);
+        }
     }
     Ok(measured.into())
 }
