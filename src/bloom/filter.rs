@@ -6,8 +6,9 @@ use super::{FilterSettings, Probe, expected_rate, unblocked_rate};
 const COUNTER_MAX: u64 = 15;
 const COUNTER_BITS: u32 = 4;
 const COUNTERS_PER_WORD: u32 = u64::BITS / COUNTER_BITS;
-/// Words of counters for each word of the plane.
-const COUNTER_WORDS: usize = COUNTER_BITS as usize;
+/// The counters of one word of the plane.
+pub(crate) type Counters = [u64; COUNTER_BITS as usize];
+const NO_COUNT: Counters = [0; COUNTER_BITS as usize];
 
 /// A set of u64 keys that may answer "present" of an absent key, and never "absent" of a present one.
 ///
@@ -22,7 +23,7 @@ const COUNTER_WORDS: usize = COUNTER_BITS as usize;
 #[derive(Debug, Clone)]
 pub struct CountingBloomFilter {
     plane: Vec<u64>,
-    counters: Vec<u64>,
+    counters: Vec<Counters>,
     settings: FilterSettings,
     keys: usize,
     capacity: usize,
@@ -34,7 +35,7 @@ impl CountingBloomFilter {
         let words = settings.words(capacity);
         Self {
             plane: vec![0; words],
-            counters: vec![0; words * COUNTER_WORDS],
+            counters: vec![NO_COUNT; words],
             settings,
             keys: 0,
             capacity: capacity.max(1),
@@ -51,15 +52,27 @@ impl CountingBloomFilter {
     /// Adds a key that is absent.
     #[inline]
     pub fn insert(&mut self, key: u64) {
-        let probe = self.probe(key);
+        self.insert_at(self.probe(key));
+    }
+
+    /// Adds an absent key whose probe is known, of this filter.
+    #[inline]
+    pub(crate) fn insert_at(&mut self, probe: Probe) {
         self.keys += 1;
         self.plane[probe.word] |= probe.mask;
+        let counters = &mut self.counters[probe.word];
         for_each_bit(probe.mask, |bit| {
-            let (counters, shift) = self.counter(probe.word, bit);
-            if *counters >> shift & COUNTER_MAX != COUNTER_MAX {
-                *counters += 1 << shift;
-            }
+            let (part, shift) = place_of(bit);
+            // No branch: what a counter holds is not foreseen.
+            let may_count = counters[part] >> shift & COUNTER_MAX != COUNTER_MAX;
+            counters[part] += u64::from(may_count) << shift;
         });
+    }
+
+    /// What a change at `probe` touches: a word of the plane, and its counters.
+    #[inline]
+    pub(crate) fn touched_at(&self, probe: Probe) -> (&u64, &Counters) {
+        (&self.plane[probe.word], &self.counters[probe.word])
     }
 
     /// Takes out a key that is present: confirm that in the exact set first (paper II-A). Removing a key that
@@ -69,7 +82,8 @@ impl CountingBloomFilter {
         debug_assert!(self.contains(key), "a key is removed that was never inserted");
         self.keys -= 1;
         for_each_bit(probe.mask, |bit| {
-            let (counters, shift) = self.counter(probe.word, bit);
+            let (word, shift) = place_of(bit);
+            let counters = &mut self.counters[probe.word][word];
             match *counters >> shift & COUNTER_MAX {
                 COUNTER_MAX => {}
                 count => {
@@ -82,15 +96,9 @@ impl CountingBloomFilter {
         });
     }
 
-    /// The word of counters that holds the one of `bit` of the plane's `word`, and its shift there.
+    /// Where `key` is, or would be.
     #[inline(always)]
-    fn counter(&mut self, word: usize, bit: u32) -> (&mut u64, u32) {
-        let counters = &mut self.counters[word * COUNTER_WORDS + (bit / COUNTERS_PER_WORD) as usize];
-        (counters, bit % COUNTERS_PER_WORD * COUNTER_BITS)
-    }
-
-    #[inline(always)]
-    fn probe(&self, key: u64) -> Probe {
+    pub(crate) fn probe(&self, key: u64) -> Probe {
         Probe::of(key, self.settings.hashes, self.plane.len())
     }
 
@@ -127,7 +135,7 @@ impl CountingBloomFilter {
     /// Number of counters that are neither zero nor saturated, and of those that are saturated.
     pub fn counters_in_use(&self) -> (usize, usize) {
         let counters = || {
-            self.counters.iter().flat_map(|word| {
+            self.counters.as_flattened().iter().flat_map(|word| {
                 (0..COUNTERS_PER_WORD).map(move |c| word >> (c * COUNTER_BITS) & COUNTER_MAX)
             })
         };
@@ -139,7 +147,7 @@ impl CountingBloomFilter {
     /// plane follows from the counters.
     pub fn is_recount_of(&self, keys: impl IntoIterator<Item = u64>) -> bool {
         let mut recount =
-            Self { plane: vec![0; self.plane.len()], counters: vec![0; self.counters.len()], ..*self };
+            Self { plane: vec![0; self.plane.len()], counters: vec![NO_COUNT; self.plane.len()], ..*self };
         recount.keys = 0;
         keys.into_iter().for_each(|key| recount.insert(key));
         let bits = 0..self.plane.len() * u64::BITS as usize;
@@ -152,8 +160,8 @@ impl CountingBloomFilter {
 
     /// The counter of `bit` of the plane's `word`.
     fn count(&self, word: usize, bit: u32) -> u64 {
-        let counters = self.counters[word * COUNTER_WORDS + (bit / COUNTERS_PER_WORD) as usize];
-        counters >> (bit % COUNTERS_PER_WORD * COUNTER_BITS) & COUNTER_MAX
+        let (part, shift) = place_of(bit);
+        self.counters[word][part] >> shift & COUNTER_MAX
     }
 
     /// The false positive rate to expect of this layout as it is filled now; see [`expected_rate`].
@@ -165,6 +173,12 @@ impl CountingBloomFilter {
     pub fn unblocked_rate(&self) -> f64 {
         unblocked_rate(self.keys, self.plane.len() * u64::BITS as usize, self.settings.hashes)
     }
+}
+
+/// Where the counter of a bit of a word lies: in which word of the counters, and how far up.
+#[inline(always)]
+fn place_of(bit: u32) -> (usize, u32) {
+    ((bit / COUNTERS_PER_WORD) as usize, bit % COUNTERS_PER_WORD * COUNTER_BITS)
 }
 
 #[inline(always)]

@@ -18,7 +18,7 @@ pub(crate) const HASH_C: u64 = 0xf135_7aeb;
 /// `5381 * 33 ^ key` and `2166136261 * 16777619 ^ key` differ by a constant: where the table's size is a power
 /// of two their two positions collapse into one, and neighbouring keys fall on neighbouring counters. A hash
 /// that mixes is as good at every size.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Probe {
     /// Which word of the plane.
     pub word: usize,

@@ -4,10 +4,11 @@ use std::sync::atomic::Ordering;
 
 use parking_lot::{MutexGuard, RwLockUpgradableReadGuard, RwLockWriteGuard};
 
-use super::shard::{Growth, Shard};
+use super::addition::Addition;
+use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
 use super::{MultiResolutionMap, ScanRecord, TrajectoryPose};
-use crate::voxel::{BLOCK_LEVELS, BlockMask, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_LEVELS, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
 #[derive(Debug)]
@@ -37,10 +38,8 @@ impl<'a> Committer<'a> {
 
     /// Adds a scan's voxels at every level and its pose to the trajectory; always makes a revision.
     pub fn insert_scan(self, scan: ScanRecord) -> Committed {
-        let by_shard = self.group(&scan.voxels);
-        let mut shards = self.lock_with_room_for(&by_shard);
+        let (_shards, voxels) = self.add_to_shards(&scan.voxels);
         let mut trajectory = self.map.trajectory.write();
-        let voxels = shards.iter_mut().map(|(i, shard)| shard.insert(&by_shard[*i])).sum();
         let revision = self.map.revision() + 1;
         trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose });
         self.publish(revision, voxels)
@@ -48,11 +47,7 @@ impl<'a> Committer<'a> {
 
     /// Adds finest voxels, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins with.
     pub(super) fn add(self, voxels: &VoxelSet) {
-        let by_shard = self.group(voxels);
-        let mut shards = self.lock_with_room_for(&by_shard);
-        for (i, shard) in &mut shards {
-            shard.insert(&by_shard[*i]);
-        }
+        self.add_to_shards(voxels);
     }
 
     /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
@@ -75,41 +70,38 @@ impl<'a> Committer<'a> {
     }
 
     /// The blocks of `voxels`, shard by shard. A block lies in one region, and so in one shard.
-    fn group(&self, voxels: &VoxelSet) -> [Vec<(VoxelKey, BlockMask)>; SHARDS] {
+    fn group<'v>(&self, voxels: &'v VoxelSet) -> [Vec<&'v Block>; SHARDS] {
         let mut by_shard: [Vec<_>; SHARDS] = Default::default();
-        for &(block, mask) in voxels.blocks() {
-            let finest = block.index().map(|i| i << BLOCK_LEVELS);
-            by_shard[self.map.sharding.shard_of(finest, 0)].push((block, mask));
+        for block in voxels.blocks() {
+            let finest = block.0.index().map(|i| i << BLOCK_LEVELS);
+            by_shard[self.map.sharding.shard_of(finest, 0)].push(block);
         }
         by_shard
     }
 
-    /// Write locks on the shards with blocks, in ascending order, each with room for them. What has to grow is
-    /// built while readers go on; they wait only for the swap and the change itself.
-    fn lock_with_room_for(
-        &self,
-        by_shard: &[Vec<(VoxelKey, BlockMask)>; SHARDS],
-    ) -> Vec<(usize, RwLockWriteGuard<'a, Shard>)> {
-        let touched = (0..SHARDS).filter(|&i| !by_shard[i].is_empty());
-        let grown: Vec<_> = touched
-            .map(|i| {
-                let shard = self.map.shards[i].upgradable_read();
-                let growth = shard.growth_for(&by_shard[i]);
-                (i, shard, growth)
+    /// Adds voxels to their shards: the write locks, taken in ascending order, and the number of voxels that were
+    /// absent. What is to be done is found out, and what has to grow is built, while readers go on; they wait only
+    /// while it is done.
+    fn add_to_shards(&self, voxels: &VoxelSet) -> (Vec<RwLockWriteGuard<'a, Shard>>, usize) {
+        let by_shard = self.group(voxels);
+        let touched = self.map.shards.iter().zip(&by_shard).filter(|(_, blocks)| !blocks.is_empty());
+        let planned: Vec<_> = touched
+            .map(|(shard, blocks)| {
+                let shard = shard.upgradable_read();
+                let addition = Addition::plan(&shard, blocks);
+                (shard, addition)
             })
             .collect();
-        let adopt = |(i, shard, growth): (usize, RwLockUpgradableReadGuard<'a, Shard>, Growth)| {
+        let mut added = 0;
+        let locked = planned.into_iter().map(|(shard, addition)| {
             let mut shard = RwLockUpgradableReadGuard::upgrade(shard);
-            shard.adopt(growth);
-            (i, shard)
-        };
-        grown.into_iter().map(adopt).collect()
+            added += addition.apply(&mut shard);
+            shard
+        });
+        (locked.collect(), added)
     }
 
-    fn lock(
-        &self,
-        by_shard: &[Vec<(VoxelKey, BlockMask)>; SHARDS],
-    ) -> Vec<(usize, RwLockWriteGuard<'a, Shard>)> {
+    fn lock(&self, by_shard: &[Vec<&Block>; SHARDS]) -> Vec<(usize, RwLockWriteGuard<'a, Shard>)> {
         let touched = (0..SHARDS).filter(|&i| !by_shard[i].is_empty());
         touched.map(|i| (i, self.map.shards[i].write())).collect()
     }

@@ -4,6 +4,7 @@
 //! Reading order: [`OccupiedVoxelList`] is one level of the paper, `shard` all levels of one part of space,
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
+mod addition;
 pub mod commit;
 mod info;
 pub mod lookup;
@@ -11,6 +12,7 @@ mod name;
 mod occupied_voxel_list;
 mod region;
 mod restore;
+mod room;
 mod settings;
 mod shard;
 mod sharding;
@@ -66,7 +68,7 @@ impl MultiResolutionMap {
             settings,
             lattice,
             sharding: Sharding::new(settings.levels),
-            shards: std::array::from_fn(|_| RwLock::new(Shard::new(&settings))),
+            shards: std::array::from_fn(|i| RwLock::new(Shard::new(i, &settings))),
             trajectory: RwLock::default(),
             revision: AtomicU64::new(0),
             committing: Mutex::new(()),

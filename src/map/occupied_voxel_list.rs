@@ -57,6 +57,14 @@ impl<'a> OccupiedVoxelList<'a> {
         self.blocks.iter().flat_map(voxels)
     }
 
+    /// Calls `f` with the key of each occupied voxel, in no order.
+    pub(super) fn for_each_key(&self, mut f: impl FnMut(u64)) {
+        let up = tier_of(self.level).1;
+        for (block, mask) in self.blocks.iter() {
+            mask.firsts(up).for_each_key(block, up, &mut f);
+        }
+    }
+
     /// About `wish` occupied voxels, spread over the blocks: some of every n-th block, from a random start.
     pub fn sample(&self, wish: usize, random: &mut impl Rng) -> Vec<VoxelKey> {
         let up = tier_of(self.level).1;

@@ -33,15 +33,16 @@ impl Cell {
         (VoxelKey::pack(index.map(|i| i >> BLOCK_LEVELS)), Self(cell))
     }
 
+    /// The cell of a voxel in its block.
+    #[inline(always)]
+    pub(crate) fn of_key(voxel: VoxelKey) -> Self {
+        Self::of(voxel.index()).1
+    }
+
     /// The key of this cell's voxel in `block`: the inverse of [`Cell::of`].
     #[inline(always)]
     pub fn voxel(self, block: VoxelKey) -> VoxelKey {
-        let gather = |axis: u32| {
-            let c = i32::from(self.0) >> axis;
-            c & 1 | (c >> 2) & 2 | (c >> 4) & 4
-        };
-        let [x, y, z] = block.index().map(|b| b << BLOCK_LEVELS);
-        VoxelKey::pack([x | gather(0), y | gather(1), z | gather(2)])
+        block.first_within(BLOCK_LEVELS).offset_by(OFFSETS[usize::from(self.0)])
     }
 
     /// Which word of the mask holds this cell.
@@ -56,13 +57,38 @@ impl Cell {
         u32::from(self.0 & 63)
     }
 
-    /// The cell whose 0 <= `n` < 512.
-    #[cfg(test)]
-    pub(super) fn from_bits(n: u16) -> Self {
-        debug_assert!(n < 512);
-        Self(n)
+    /// Its number.
+    #[inline(always)]
+    pub(crate) fn to_bits(self) -> u16 {
+        self.0
+    }
+
+    /// The cell of the number in the low nine bits of `n`.
+    #[inline(always)]
+    pub(crate) fn from_bits(n: u16) -> Self {
+        Self(n % CELLS as u16)
     }
 }
+
+/// Cells of a block.
+const CELLS: usize = 64 * WORDS;
+
+/// What a cell's number adds to the key of its block's first voxel.
+const OFFSETS: [u64; CELLS] = {
+    let mut offsets = [0; CELLS];
+    let mut cell = 0;
+    while cell < CELLS {
+        let mut bit = 0;
+        while bit < BLOCK_LEVELS * 3 {
+            if cell >> bit & 1 == 1 {
+                offsets[cell] |= VoxelKey::axis_unit(bit % 3) << (bit / 3);
+            }
+            bit += 1;
+        }
+        cell += 1;
+    }
+    offsets
+};
 
 /// The occupied voxels of one block, at three levels: level 0 a bit, level 1 a byte that is not zero, level 2
 /// a word that is not zero. That a parent goes with its last child holds by construction.
@@ -161,12 +187,25 @@ impl BlockMask {
         Self(std::array::from_fn(|w| self.0[w] & !other.0[w]))
     }
 
-    /// The voxels of `level` that `after` has and `self` has not, each as the first cell it covers.
+    /// The voxels of `level`, each as the first cell it covers.
     #[inline]
-    pub(crate) fn gained<'a>(&'a self, after: &'a Self, level: u32) -> impl Iterator<Item = Cell> + 'a {
-        let gained: [u64; WORDS] =
-            std::array::from_fn(|w| first_of_each(after.0[w], level) & !first_of_each(self.0[w], level));
-        BlockMask(gained).cells(0)
+    pub(crate) fn firsts(&self, level: u32) -> Self {
+        Self(self.0.map(|word| first_of_each(word, level)))
+    }
+
+    /// Calls `f` with the key of each voxel of `level` of `block`, where this mask holds the first cell of each.
+    #[inline]
+    pub(crate) fn for_each_key(&self, block: VoxelKey, level: u32, mut f: impl FnMut(u64)) {
+        let first = block.first_within(BLOCK_LEVELS - level).to_bits();
+        for (w, &word) in self.0.iter().enumerate() {
+            let mut rest = word;
+            while rest != 0 {
+                let cell = w << 6 | rest.trailing_zeros() as usize;
+                // A first cell's offset has no bit below the level's own, so nothing moves to another axis.
+                f(first | OFFSETS[cell] >> level);
+                rest &= rest - 1;
+            }
+        }
     }
 }
 
@@ -197,6 +236,7 @@ mod tests {
             let index = index.map(i32::from);
             let (block, cell) = Cell::of(index);
             prop_assert_eq!(cell.voxel(block), VoxelKey::pack(index));
+            prop_assert_eq!(Cell::of_key(VoxelKey::pack(index)), cell);
         }
 
         #[test]
@@ -211,6 +251,11 @@ mod tests {
                 let found: Vec<u16> = mask.cells(level).map(|c| c.0 >> (3 * level)).collect();
                 prop_assert_eq!(&found, &parents.iter().copied().collect::<Vec<_>>());
                 prop_assert_eq!(mask.count(level), parents.len());
+                let block = VoxelKey::pack([-3, 7, 0]);
+                let mut keys = Vec::new();
+                mask.firsts(level).for_each_key(block, level, |key| keys.push(key));
+                let expected = mask.cells(level).map(|cell| cell.voxel(block).ancestor(level).to_bits());
+                prop_assert_eq!(keys, expected.collect::<Vec<_>>());
                 for c in 0..512 {
                     prop_assert_eq!(mask.contains(Cell(c), level), parents.contains(&(c >> (3 * level))));
                 }
@@ -222,7 +267,9 @@ mod tests {
     fn what_is_gained_at_a_level_is_what_had_no_voxel_before() {
         let before = BlockMask([0b1, 0, 0, 0, 0, 0, 0, 0]);
         let after = BlockMask([0b11 | 1 << 8, 1 << 63, 0, 0, 0, 0, 0, 0]);
-        let gained = |level| before.gained(&after, level).map(|c| c.0).collect::<Vec<_>>();
+        let gained = |level| {
+            after.firsts(level).difference(&before.firsts(level)).cells(0).map(|c| c.0).collect::<Vec<_>>()
+        };
         assert_eq!(gained(0), [1, 8, 127]);
         assert_eq!(gained(1), [8, 64 + 56]);
         assert_eq!(gained(2), [64]);

@@ -24,7 +24,7 @@ const LOAD_OF: usize = 8;
 /// A key lives in its home bucket or, where that is full, in the next one that is not. A bucket's vacant slots
 /// come last, so that its last key tells whether a search has to go on; removal pulls keys back instead of
 /// leaving tombstones. Any number of buckets is allowed (the home is a multiply-shift of the hash, not a
-/// remainder), so that a table grows by a quarter and stays near its memory budget.
+/// remainder), so that a table grows in small steps and stays near its memory budget.
 #[derive(Debug, Clone)]
 pub struct BlockTable {
     keys: Vec<Bucket>,
@@ -78,6 +78,30 @@ impl BlockTable {
         self.slots().contains(block, cell, level)
     }
 
+    /// The keys among which the search for `block` begins.
+    #[inline]
+    pub(crate) fn home(&self, block: VoxelKey) -> &Bucket {
+        &self.keys[Slots::home(block.to_bits(), self.keys.len())]
+    }
+
+    /// Where `block` is, until the table changes.
+    #[inline]
+    pub(crate) fn find(&self, block: VoxelKey) -> Option<usize> {
+        self.slots().find(block.to_bits())
+    }
+
+    /// The voxels of the block at `slot`.
+    #[inline]
+    pub(crate) fn at(&self, slot: usize) -> &BlockMask {
+        &self.masks[slot]
+    }
+
+    /// The same, to be added to.
+    #[inline]
+    pub(crate) fn at_mut(&mut self, slot: usize) -> &mut BlockMask {
+        &mut self.masks[slot]
+    }
+
     /// The mask of `block` to be added to, which is empty where the block was absent. The caller leaves at
     /// least one voxel in it.
     #[inline]
@@ -93,7 +117,7 @@ impl BlockTable {
     /// The slot of a key that was absent.
     fn add(&mut self, key: u64) -> usize {
         if self.len >= self.capacity() {
-            *self = self.resized(self.len + 1);
+            *self = self.with_room_for(self.len * 5 / 4 + 4);
         }
         self.add_in_room(key)
     }
@@ -165,9 +189,9 @@ impl BlockTable {
         None
     }
 
-    /// A copy with room for `blocks` blocks and a quarter more.
-    pub(crate) fn resized(&self, blocks: usize) -> Self {
-        let mut table = Self::with_capacity(blocks.max(self.len) * 5 / 4 + 4);
+    /// A copy with room for `blocks` blocks.
+    pub(crate) fn with_room_for(&self, blocks: usize) -> Self {
+        let mut table = Self::with_capacity(blocks.max(self.len));
         for (block, mask) in self.iter() {
             *table.entry(block) = mask;
         }

@@ -1,8 +1,11 @@
 //! Packed voxel keys (paper II-B): the three indices of a voxel *are* its identity, unique and reversible.
 
 /// Bits of one axis in a key.
-const AXIS_BITS: u32 = 21;
-const AXIS_MASK: u64 = (1 << AXIS_BITS) - 1;
+pub(super) const AXIS_BITS: u32 = 21;
+pub(super) const AXIS_MASK: u64 = (1 << AXIS_BITS) - 1;
+
+/// The lowest bit of each axis.
+pub(super) const AXIS_UNITS: u64 = 1 | 1 << AXIS_BITS | 1 << (2 * AXIS_BITS);
 
 /// Smallest voxel index an axis can hold, at level 0.
 pub const INDEX_MIN: i32 = -(1 << (AXIS_BITS - 1));
@@ -61,6 +64,23 @@ impl VoxelKey {
     #[inline(always)]
     pub fn ancestor(self, levels: u32) -> Self {
         Self::pack(self.index().map(|i| i >> levels))
+    }
+
+    /// The first of the voxels `levels` levels finer within this one.
+    #[inline(always)]
+    pub(crate) fn first_within(self, levels: u32) -> Self {
+        Self((self.0 & (AXIS_UNITS * (AXIS_MASK >> levels))) << levels)
+    }
+
+    /// The voxel `offset` further along the axes, where no axis of this one has a bit of the offset's.
+    #[inline(always)]
+    pub(super) fn offset_by(self, offset: u64) -> Self {
+        Self(self.0 | offset)
+    }
+
+    /// One step along an axis, packed.
+    pub(super) const fn axis_unit(axis: u32) -> u64 {
+        1 << (axis * AXIS_BITS)
     }
 }
 

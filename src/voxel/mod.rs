@@ -3,6 +3,7 @@
 
 mod block;
 mod block_table;
+mod grouping;
 mod key;
 mod lattice;
 mod sample;

@@ -1,10 +1,7 @@
 //! A set of finest voxels as sorted blocks: what a scan touches, a deletion takes, a snapshot keeps.
 
-use std::collections::BTreeMap;
-
-use super::block_table::BlockTable;
-use super::{BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey};
-use crate::geometry::Point;
+use super::grouping::blocks_of;
+use super::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey};
 
 /// Distinct finest voxels, as blocks in ascending order of their keys; no block is empty.
 ///
@@ -22,32 +19,6 @@ impl std::fmt::Debug for BlockMask {
 }
 
 impl VoxelSet {
-    /// The voxels that `points` fall in. Points without a voxel (not finite, out of range) are left out and
-    /// counted.
-    pub fn of_points(points: &[Point], lattice_from_points: &LatticeFromPoints) -> (Self, usize) {
-        let mut table = BlockTable::with_capacity(points.len() / 64);
-        let mut skipped = 0;
-        // Neighbours in a scan share blocks: one probe serves a run of points.
-        let mut run: Option<(VoxelKey, BlockMask)> = None;
-        for &point in points {
-            let Some(index) = lattice_from_points.index(point) else {
-                skipped += 1;
-                continue;
-            };
-            let (block, cell) = Cell::of(index);
-            match &mut run {
-                Some((key, mask)) if *key == block => drop(mask.insert(cell)),
-                _ => {
-                    let mut mask = BlockMask::EMPTY;
-                    mask.insert(cell);
-                    flush(&mut table, run.replace((block, mask)));
-                }
-            }
-        }
-        flush(&mut table, run);
-        (table.iter().collect(), skipped)
-    }
-
     /// The key of a block from its packed form; none when no finest voxel can lie in it.
     pub fn block_key(bits: u64) -> Option<VoxelKey> {
         let blocks = INDEX_MIN >> BLOCK_LEVELS..=INDEX_MAX >> BLOCK_LEVELS;
@@ -75,13 +46,6 @@ impl VoxelSet {
     }
 }
 
-fn flush(table: &mut BlockTable, run: Option<(VoxelKey, BlockMask)>) {
-    if let Some((block, mask)) = run {
-        let entry = table.entry(block);
-        *entry = entry.union(&mask);
-    }
-}
-
 impl FromIterator<(VoxelKey, BlockMask)> for VoxelSet {
     /// The union of `blocks`, in any order.
     fn from_iter<I: IntoIterator<Item = (VoxelKey, BlockMask)>>(blocks: I) -> Self {
@@ -101,40 +65,6 @@ impl FromIterator<(VoxelKey, BlockMask)> for VoxelSet {
 impl FromIterator<VoxelKey> for VoxelSet {
     /// The set of `keys`, in any order, repeated or not.
     fn from_iter<I: IntoIterator<Item = VoxelKey>>(keys: I) -> Self {
-        let mut blocks = BTreeMap::<VoxelKey, BlockMask>::new();
-        for key in keys {
-            let (block, cell) = Cell::of(key.index());
-            blocks.entry(block).or_default().insert(cell);
-        }
-        blocks.into_iter().collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::voxel::Lattice;
-    use proptest::prelude::*;
-    use std::collections::BTreeSet;
-
-    proptest! {
-        #[test]
-        fn a_set_of_points_is_the_set_of_their_keys(points: Vec<[i8; 3]>) {
-            let points: Vec<Point> = points.iter().map(|p| Point::from(p.map(f32::from))).collect();
-            let quantise = Lattice::new(2.5, 1).unwrap().from_map();
-            let keys: BTreeSet<VoxelKey> = points.iter().map(|&p| quantise.key(p).unwrap()).collect();
-            let (set, skipped) = VoxelSet::of_points(&points, &quantise);
-            prop_assert_eq!(skipped, 0);
-            prop_assert_eq!(set.len(), keys.len());
-            prop_assert_eq!(&set.iter().collect::<BTreeSet<_>>(), &keys);
-            prop_assert_eq!(set, keys.into_iter().collect::<VoxelSet>());
-        }
-    }
-
-    #[test]
-    fn points_without_a_voxel_are_counted() {
-        let points = [Point::new(f32::NAN, 0.0, 0.0), Point::new(0.1, 0.1, 0.1), Point::new(1e9, 0.0, 0.0)];
-        let (set, skipped) = VoxelSet::of_points(&points, &Lattice::new(1.0, 1).unwrap().from_map());
-        assert_eq!((set.len(), skipped), (1, 2));
+        Self { blocks: blocks_of(&keys.into_iter().collect::<Vec<_>>()) }
     }
 }
