@@ -8,7 +8,7 @@ fn main() {
 }
 
 fn generate() -> Result<(), Box<dyn std::error::Error>> {
-    let protos = ["v1/occupancy", "v1/mapping", "v1/maps", "store/v1/snapshot"];
+    let protos = ["v1/occupancy", "v1/mapping", "v1/maps", "store/v1/records", "store/v1/snapshot"];
     let protos = protos.map(|name| format!("proto/mrol/{name}.proto"));
     println!("cargo::rerun-if-changed=proto");
     let descriptors = protox::compile(&protos, ["proto"])?;

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::service::{Limits, ServiceSettings};
+use crate::store::{Durability, StoreSettings};
 use crate::telemetry::LogFormat;
 
 /// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
@@ -22,8 +23,8 @@ const VARIABLE_PREFIX: &str = "MROL_";
 pub struct Config {
     /// Where maps are kept across restarts; an empty path keeps them in memory only. `./mrol-data`.
     pub data_dir: PathBuf,
-    /// Seconds between two savings of the maps that changed. 60.
-    pub save_interval_s: u64,
+    /// How maps are kept.
+    pub store: StoreConfig,
     /// Seconds that requests in flight may take when the server goes down. 10.
     pub drain_seconds: u64,
     /// The HTTP listener; 127.0.0.1:7333.
@@ -38,6 +39,21 @@ pub struct Config {
     pub filter: FilterConfig,
     /// Bounds on what callers may ask.
     pub limits: LimitsConfig,
+}
+
+/// How maps are kept; see [`StoreSettings`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StoreConfig {
+    /// `always`: what is acknowledged is synced; or an interval (`200ms`, `1s`) at which it is. `always`.
+    #[serde(with = "as_text")]
+    pub durability: Durability,
+    /// MiB of journal after which a map is written to a snapshot. 64.
+    pub snapshot_journal_mib: u64,
+    /// Seconds after which a map that changed is written to a snapshot. 300.
+    pub snapshot_interval_s: u64,
+    /// Revisions behind the newest within which a scan can be undone, at least. 20,000.
+    pub undo_revisions: u64,
 }
 
 /// Where a protocol is served.
@@ -105,7 +121,7 @@ impl Default for Config {
         let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into() };
         Self {
             data_dir: "./mrol-data".into(),
-            save_interval_s: 60,
+            store: StoreConfig::default(),
             drain_seconds: 10,
             http: listener(7333),
             grpc: listener(7334),
@@ -113,6 +129,18 @@ impl Default for Config {
             threads: ThreadsConfig::default(),
             filter: FilterConfig::default(),
             limits: LimitsConfig::default(),
+        }
+    }
+}
+
+impl Default for StoreConfig {
+    fn default() -> Self {
+        let store = StoreSettings::default();
+        Self {
+            durability: store.durability,
+            snapshot_journal_mib: store.snapshot_journal_bytes >> 20,
+            snapshot_interval_s: store.snapshot_interval.as_secs(),
+            undo_revisions: store.undo_revisions,
         }
     }
 }
@@ -196,8 +224,13 @@ impl Config {
     /// Refuses numbers that would stop the server from working at all.
     fn checked(self) -> Result<Self, ConfigError> {
         let range = |key, range, value: String| Err(ConfigError::Range { key, range, value });
-        if self.save_interval_s == 0 {
-            return range("save_interval_s", "at least 1", "0".into());
+        for (key, value) in [
+            ("store.snapshot_journal_mib", self.store.snapshot_journal_mib),
+            ("store.snapshot_interval_s", self.store.snapshot_interval_s),
+        ] {
+            if !(1..=1 << 20).contains(&value) {
+                return range(key, "1 to 1048576", value.to_string());
+            }
         }
         if self.limits.message_bytes_max == 0 {
             return range("limits.message_bytes_max", "at least 1", "0".into());
@@ -214,6 +247,7 @@ impl Config {
         let FilterConfig { hashes, bits_per_voxel } = self.filter;
         ServiceSettings {
             data_dir: (!self.data_dir.as_os_str().is_empty()).then(|| self.data_dir.clone()),
+            store: self.store.settings(),
             limits: self.limits.service_limits(),
             query_threads: self.threads.query,
             mapping_threads: self.threads.mapping,
@@ -222,14 +256,21 @@ impl Config {
         }
     }
 
-    /// Time between two savings.
-    pub fn save_interval(&self) -> Duration {
-        Duration::from_secs(self.save_interval_s)
-    }
-
     /// Time that requests in flight may take when the server goes down.
     pub fn drain(&self) -> Duration {
         Duration::from_secs(self.drain_seconds)
+    }
+}
+
+impl StoreConfig {
+    fn settings(&self) -> StoreSettings {
+        StoreSettings {
+            durability: self.durability,
+            snapshot_journal_bytes: self.snapshot_journal_mib << 20,
+            snapshot_interval: Duration::from_secs(self.snapshot_interval_s),
+            undo_revisions: self.undo_revisions,
+            ..StoreSettings::default()
+        }
     }
 }
 
@@ -247,9 +288,30 @@ impl LimitsConfig {
     }
 }
 
+/// Values that are written as text.
+mod as_text {
+    use std::fmt::Display;
+    use std::str::FromStr;
+
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(value)
+    }
+
+    pub(super) fn deserialize<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+    where
+        D: Deserializer<'de>,
+        T: FromStr<Err: Display>,
+    {
+        String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
+    }
+}
+
 /// The variables that mean this program; see [`Config::load`].
 fn variables() -> Env {
-    let top = ["data_dir", "save_interval_s", "drain_seconds"];
+    let top = ["data_dir", "drain_seconds"];
     Env::prefixed(VARIABLE_PREFIX)
         .filter(move |key| key.as_str().contains("__") || top.iter().any(|name| key == *name))
         .split("__")
@@ -304,7 +366,14 @@ mod tests {
     #[test]
     fn values_that_do_not_fit_are_named() {
         let error = |toml| load(toml, json!({})).unwrap_err().to_string();
-        assert!(error("save_interval_s = 0").contains("save_interval_s must be at least 1, got 0"));
+        let journal = error("[store]\nsnapshot_journal_mib = 0");
+        assert!(journal.contains("store.snapshot_journal_mib must be 1 to 1048576, got 0"), "{journal}");
+        let durability = error("[store]\ndurability = \"often\"");
+        assert!(
+            durability.contains("must be \"always\" or an interval")
+                && durability.contains("store.durability"),
+            "{durability}"
+        );
         assert!(error("[limits]\nmin_revision_wait_max_s = -1").contains("min_revision_wait_max_s"));
         assert!(error("[log]\nformat = \"xml\"").contains("xml"));
         let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();

@@ -87,6 +87,23 @@ pub enum PoseError {
 /// When a number is not finite, or the quaternion's norm is further from one than
 /// [`QUATERNION_NORM_TOLERANCE`]; within it the quaternion is normalised.
 pub fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Pose, PoseError> {
+    let (translation, quaternion) = checked_parts(translation_m, rotation_xyzw)?;
+    Ok(Pose::from_parts(translation, UnitQuaternion::new_normalize(quaternion)))
+}
+
+/// The pose of exactly these numbers, which [`translation_m`] and [`rotation_xyzw`] gave: every bit comes back.
+///
+/// # Errors
+/// As for [`pose`]; within the tolerance the quaternion is left as it is.
+pub fn stored_pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Pose, PoseError> {
+    let (translation, quaternion) = checked_parts(translation_m, rotation_xyzw)?;
+    Ok(Pose::from_parts(translation, UnitQuaternion::new_unchecked(quaternion)))
+}
+
+fn checked_parts(
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+) -> Result<(Translation3<f64>, Quaternion<f64>), PoseError> {
     if !translation_m.iter().all(|c| c.is_finite()) {
         return Err(PoseError::Translation(translation_m));
     }
@@ -96,8 +113,7 @@ pub fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Pose, Po
     if !norm.is_finite() || (norm - 1.0).abs() > QUATERNION_NORM_TOLERANCE {
         return Err(PoseError::Rotation(rotation_xyzw, norm));
     }
-    let rotation = UnitQuaternion::new_normalize(quaternion);
-    Ok(Pose::from_parts(Translation3::from(Vector3::from(translation_m)), rotation))
+    Ok((Translation3::from(Vector3::from(translation_m)), quaternion))
 }
 
 /// The translation in metres of a pose.
@@ -135,6 +151,16 @@ mod tests {
         let after = pose(translation_m(&before), rotation_xyzw(&before)).unwrap();
         let (metres, degrees) = pose_difference(&before, &after);
         assert!(metres < 1e-12 && degrees < 1e-5);
+    }
+
+    #[test]
+    fn a_stored_pose_comes_back_bit_for_bit() {
+        let rotation = UnitQuaternion::new_unchecked(Quaternion::new(0.5, 0.5, 0.5, 0.500_000_1));
+        let before = Pose::from_parts(Translation3::new(1.0 / 3.0, -0.0, 3e-300), rotation);
+        let after = stored_pose(translation_m(&before), rotation_xyzw(&before)).unwrap();
+        assert_eq!(translation_m(&before).map(f64::to_bits), translation_m(&after).map(f64::to_bits));
+        assert_eq!(rotation_xyzw(&before).map(f64::to_bits), rotation_xyzw(&after).map(f64::to_bits));
+        assert!(stored_pose([f64::NAN; 3], [0.0, 0.0, 0.0, 1.0]).is_err());
     }
 
     #[test]

@@ -1,13 +1,16 @@
 //! The daemon: both listeners, periodic saving, and going down within a bound.
 
+mod starting;
+
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::serve::ListenerExt;
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
-use tokio::time::{MissedTickBehavior, interval, interval_at, timeout};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 use tonic::transport::server::TcpIncoming;
@@ -15,14 +18,18 @@ use tonic::transport::server::TcpIncoming;
 use crate::config::Config;
 use crate::lifecycle::Lifecycle;
 use crate::service::{MapService, ServiceError};
+use crate::store::OpeningProgress;
 use crate::telemetry::{MeteredService, Metrics, TelemetryError};
 use crate::wire::transport;
 use crate::{grpc, http};
+use starting::Starting;
 
 /// Streams of one gRPC connection at once: with the size of a message it bounds what a client may hold.
 const STREAMS_PER_CONNECTION_MAX: u32 = 128;
 /// How long connections have to close once their requests are done: what is left then is idle or half open.
 const CLOSING_MAX: Duration = Duration::from_secs(1);
+/// How often it is asked whether a snapshot is due.
+const SNAPSHOTS_DUE_INTERVAL: Duration = Duration::from_millis(250);
 /// How often histograms are folded between scrapes.
 const METRICS_UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
 
@@ -73,20 +80,24 @@ struct Listener {
 }
 
 impl Server {
-    /// Opens the maps and binds both addresses.
+    /// Binds both addresses and opens the maps. Meanwhile HTTP says at `/readyz` how far that has come.
     ///
     /// # Errors
     /// When a map cannot be read or an address is taken.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
         let settings = config.service_settings();
-        let opened = tokio::task::spawn_blocking(move || MapService::open(settings)).await;
+        let http = Listener::bind("http", config.http.listen).await?;
+        let progress = Arc::new(OpeningProgress::default());
+        let (http, starting) = Starting::serve(http, Arc::clone(&progress))?;
+        let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
+        starting.end().await;
         let service = opened
             .map_err(|panic| ServerError::Stopped("opening the maps", panic.to_string()))?
             .map_err(ServerError::Open)?;
         Ok(Self {
             service: MeteredService::new(service, Metrics::new()?),
             lifecycle: Lifecycle::default(),
-            http: Listener::bind("http", config.http.listen).await?,
+            http,
             grpc: Listener::bind("grpc", config.grpc.listen).await?,
             config,
         })
@@ -121,8 +132,7 @@ impl Server {
         let mut listeners = JoinSet::new();
         listeners.spawn(serve_grpc(grpc.tcp, routes, lifecycle.clone()));
         listeners.spawn(serve_http(http.tcp, router, idle.clone()));
-        let housekeeping =
-            tokio::spawn(keep_house(service.clone(), lifecycle.clone(), config.save_interval()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {
@@ -202,19 +212,17 @@ async fn serve_http(listener: TcpListener, router: axum::Router, idle: Cancellat
         .map_err(|error| ServerError::Stopped("http", error.to_string()))
 }
 
-/// Saves changed maps at an interval, and keeps the metrics small, until the server is draining.
-async fn keep_house(service: MeteredService, lifecycle: Lifecycle, save_interval: Duration) {
-    let mut saving = interval_at(tokio::time::Instant::now() + save_interval, save_interval);
+/// Writes snapshots of the maps whose turn it is, and keeps the metrics small, until the server is draining.
+async fn keep_house(service: MeteredService, lifecycle: Lifecycle) {
+    let mut saving = interval(SNAPSHOTS_DUE_INTERVAL);
     saving.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut upkeep = interval(METRICS_UPKEEP_INTERVAL);
     loop {
         tokio::select! {
             () = lifecycle.draining() => return,
             _ = upkeep.tick() => service.metrics().upkeep(),
-            _ = saving.tick() => match service.maps().save().await {
-                Ok(0) => {}
-                Ok(maps) => tracing::info!(maps, "saved"),
-                Err(error) => tracing::error!(%error, "maps cannot be saved"),
+            _ = saving.tick() => if let Err(error) = service.maps().save_due().await {
+                tracing::error!(%error, "a snapshot cannot be written");
             },
         }
     }

@@ -69,7 +69,7 @@ async fn points_that_fall_in_no_voxel_are_named_by_their_place() {
         let deletion = pb::DeleteVoxelsRequest {
             map: "a".into(),
             target: points_pb(&points).map(Target::Points),
-            level: 0,
+            ..Default::default()
         };
         assert_invalid(&robot.delete_voxels(deletion).await.unwrap_err(), &["points[2]"]);
         for route in ["occupancy", "deletions"] {
@@ -159,7 +159,7 @@ async fn batches_are_neither_empty_nor_beyond_the_limit() {
     let keys = |keys: Vec<u64>| pb::DeleteVoxelsRequest {
         map: "a".into(),
         target: Some(Target::Keys(pb::VoxelKeys { keys })),
-        level: 0,
+        ..Default::default()
     };
     assert_invalid(&robot.delete_voxels(keys(vec![])).await.unwrap_err(), &["keys"]);
     assert_invalid(&robot.delete_voxels(keys(vec![0; 101])).await.unwrap_err(), &["keys", "101", "100"]);
@@ -359,8 +359,11 @@ async fn regions_and_robots_that_are_none_are_named() {
     let mut robot = daemon.mapping().await;
     let upside_down = pb::Box { min_m: Some([1.0; 3].into()), max_m: Some([0.0; 3].into()) };
     let region = pb::Region { shape: Some(pb::region::Shape::Box(upside_down)) };
-    let deletion =
-        pb::DeleteVoxelsRequest { map: "a".into(), target: Some(Target::Region(region)), level: 0 };
+    let deletion = pb::DeleteVoxelsRequest {
+        map: "a".into(),
+        target: Some(Target::Region(region)),
+        ..Default::default()
+    };
     assert_invalid(&robot.delete_voxels(deletion).await.unwrap_err(), &["box.min_m", "box.max_m"]);
     for (body, words) in [
         (json!({"box": {"min_m": [1, 1, 1], "max_m": [0, 0, 0]}}), ["box.min_m", "box.max_m"]),

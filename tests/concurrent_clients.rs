@@ -74,7 +74,7 @@ fn deletion(random: &mut ChaCha8Rng) -> Deletion {
         }
         _ => DeletionTarget::Points(questions(random).into()),
     };
-    Deletion { target, level }
+    Deletion { target, level, request_id: None }
 }
 
 /// A pose near the origin: scans are put in there, or aligned from there.
@@ -180,7 +180,8 @@ async fn http_client(base: String, seed: u64, end: Instant) -> History {
                 let points = questions(&mut random);
                 let answer = post("deletions", json!({"points": coordinates(&points), "level": 1})).await;
                 let removed = answer["removed"].as_u64().expect("a count") as usize;
-                let deletion = Deletion { target: DeletionTarget::Points(points.into()), level: 1 };
+                let deletion =
+                    Deletion { target: DeletionTarget::Points(points.into()), level: 1, request_id: None };
                 (answer["revision"].as_u64(), Event::Deleted { deletion, removed })
             }
             _ => {

@@ -170,7 +170,12 @@ async fn voxels_are_deleted_by_points_keys_box_and_sphere() {
     let mut left = 40;
     for (target, level, removed) in cases {
         let before = daemon.contents("a").await.0;
-        let deletion = pb::DeleteVoxelsRequest { map: "a".into(), target: Some(target.clone()), level };
+        let deletion = pb::DeleteVoxelsRequest {
+            map: "a".into(),
+            target: Some(target.clone()),
+            level,
+            ..Default::default()
+        };
         let answer = robot.delete_voxels(deletion).await.unwrap().into_inner();
         left -= removed as usize;
         let (revision, voxels) = daemon.contents("a").await;

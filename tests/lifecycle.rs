@@ -146,19 +146,18 @@ async fn maps_survive_a_restart() {
 }
 
 #[tokio::test]
-async fn changed_maps_are_saved_at_an_interval() {
-    let daemon = Daemon::start_with(|config| config.save_interval_s = 1).await;
+async fn changed_maps_are_written_to_snapshots_beside_the_running_server() {
+    let daemon = Daemon::start_with(|config| config.store.snapshot_interval_s = 1).await;
     daemon.make_map("a").await;
-    let file = daemon.data.path().join("maps/a.mrol");
-    let empty = std::fs::read(&file).unwrap();
     daemon.put_in("a", &row(5)).await;
-    wait_until(async || std::fs::read(&file).unwrap() != empty).await;
-    // As after a power cut: what lies on disk is all there is.
+    let snapshot = daemon.data.path().join("maps/a/snapshot-00000000000000000001.mrol");
+    wait_until(async || snapshot.exists()).await;
+    // It is a map file like any other: another server takes it in.
     let copied = tempfile::tempdir().unwrap();
     std::fs::create_dir(copied.path().join("maps")).unwrap();
-    std::fs::copy(&file, copied.path().join("maps/a.mrol")).unwrap();
+    std::fs::copy(&snapshot, copied.path().join("maps/b.mrol")).unwrap();
     let other = Daemon::start_in(copied, |_| {}).await;
-    assert_eq!(other.contents("a").await, daemon.contents("a").await);
+    assert_eq!(other.contents("b").await, daemon.contents("a").await);
 }
 
 #[tokio::test]

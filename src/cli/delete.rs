@@ -12,7 +12,7 @@ use super::parse;
 use super::query::points_of;
 use super::remote::MapOptions;
 use crate::geometry::Point;
-use crate::map::Region;
+use crate::map::{Region, RequestId};
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget};
 
 const EXAMPLES: &str = "\
@@ -35,6 +35,9 @@ pub(super) struct Delete {
     /// Level of the voxels that are meant: all their descendants go
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// An id of this deletion: sent again, it is not done again
+    #[arg(long, value_name = "ID", value_parser = parse::request_id)]
+    request_id: Option<RequestId>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -56,9 +59,10 @@ struct Target {
 
 impl Delete {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let deletion = Deletion { target: self.target.resolve()?, level: self.level };
-        let client = self.map.server.connect().await?;
-        let answer = client.delete_voxels(&self.map.name, deletion).await?;
+        let Self { map, target, level, request_id } = self;
+        let deletion = Deletion { target: target.resolve()?, level, request_id };
+        let client = map.server.connect().await?;
+        let answer = client.delete_voxels(&map.name, deletion).await?;
         output.print(&Deleted::from(answer))
     }
 }
@@ -79,6 +83,7 @@ impl Target {
 #[derive(Serialize)]
 struct Deleted {
     removed: usize,
+    replayed: bool,
     revision: u64,
     map_uuid: String,
 }
@@ -86,7 +91,7 @@ struct Deleted {
 impl From<DeletionAnswer> for Deleted {
     fn from(answer: DeletionAnswer) -> Self {
         let (revision, map_uuid) = (answer.state.revision, answer.state.map_uuid.to_string());
-        Self { removed: answer.removed, revision, map_uuid }
+        Self { removed: answer.removed, replayed: answer.replayed, revision, map_uuid }
     }
 }
 

@@ -6,7 +6,7 @@ use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
 use crate::map::LevelInfo;
-use crate::service::MapInfo;
+use crate::service::{MapInfo, MapStorage};
 
 /// A map's description.
 #[derive(Serialize)]
@@ -19,6 +19,16 @@ pub(super) struct MapReport {
     scans: usize,
     robots: Vec<String>,
     set_bytes: usize,
+    storage: Option<Storage>,
+}
+
+/// What lies on disk.
+#[derive(Serialize)]
+struct Storage {
+    durable_revision: u64,
+    snapshot_revision: u64,
+    undo_from_revision: u64,
+    read_only: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -77,7 +87,15 @@ impl From<&MapInfo> for MapReport {
             scans: info.scans,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes,
+            storage: info.storage.clone().map(Storage::from),
         }
+    }
+}
+
+impl From<MapStorage> for Storage {
+    fn from(storage: MapStorage) -> Self {
+        let MapStorage { durable_revision, snapshot_revision, undo_from_revision, failure, .. } = storage;
+        Self { durable_revision, snapshot_revision, undo_from_revision, read_only: failure }
     }
 }
 
@@ -101,11 +119,24 @@ impl Display for MapReport {
         writeln!(f, "map {} at revision {}, uuid {}", self.map, self.revision, self.map_uuid)?;
         let robots = if self.robots.is_empty() { "nobody".into() } else { self.robots.join(", ") };
         writeln!(f, "{} scans from {robots}; exact sets {}", count(self.scans), bytes(self.set_bytes))?;
+        match &self.storage {
+            Some(storage) => writeln!(f, "{storage}")?,
+            None => writeln!(f, "in memory only: it ends with the server")?,
+        }
         let Filter { hashes, bits_per_voxel } = self.settings.filter;
         writeln!(f, "filters of {hashes} hashes, {bits_per_voxel} bits a voxel at least\n")?;
         write!(f, "level  resolution          voxels   filter plane      counters   false positives:")?;
         write!(f, " expected   eq. (1)   measured")?;
         self.levels.iter().try_for_each(|level| write!(f, "\n{level}"))
+    }
+}
+
+impl Display for Storage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { durable_revision, snapshot_revision, undo_from_revision, read_only } = self;
+        write!(f, "synced up to revision {durable_revision}, snapshot at {snapshot_revision}; ")?;
+        write!(f, "scans from revision {undo_from_revision} on can be undone")?;
+        read_only.iter().try_for_each(|reason| write!(f, "\nREAD ONLY since its journal failed: {reason}"))
     }
 }
 

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 
 use crate::geometry::{self, Point, Pose};
-use crate::map::{Lookup, MapName, Region, RobotName};
+use crate::map::{Lookup, MapName, Region, RequestId, RobotName};
 
 /// What decides whether a voxel is occupied: the exact set, or the counting Bloom filter alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -53,6 +53,11 @@ pub(super) fn map_name(text: &str) -> Result<MapName, String> {
 /// A robot's name.
 pub(super) fn robot_name(text: &str) -> Result<RobotName, String> {
     RobotName::new(text).map_err(|error| error.to_string())
+}
+
+/// A caller's own id of a change.
+pub(super) fn request_id(text: &str) -> Result<RequestId, String> {
+    RequestId::new(text).map_err(|error| error.to_string())
 }
 
 /// `N` numbers, divided by spaces or commas.

@@ -25,7 +25,7 @@ EXAMPLES:
 
 The first line on standard output says where it serves; the log goes to standard error. Settings come from
 defaults, then the file of --config (TOML), then MROL_... variables, then the options here. SIGTERM and Ctrl-C
-end it: requests in flight are finished, maps are saved.";
+end it: requests in flight are finished, maps are saved. Whatever ends it, nothing acknowledged is lost.";
 
 /// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
 #[derive(Debug, clap::Args)]
@@ -49,9 +49,16 @@ pub(super) struct Serve {
     /// Least level of log lines, or a list of target=level [default: info]
     #[arg(long, value_name = "LEVEL")]
     log_level: Option<String>,
-    /// Seconds between two savings of changed maps [default: 60]
+    /// When a change is acknowledged: "always" when it is synced, or synced at an interval (200ms, 1s)
+    /// [default: always]
+    #[arg(long, value_name = "WHEN")]
+    durability: Option<String>,
+    /// MiB of journal after which a map is written to a snapshot [default: 64]
+    #[arg(long, value_name = "MIB")]
+    snapshot_journal_mib: Option<u64>,
+    /// Seconds after which a map that changed is written to a snapshot [default: 300]
     #[arg(long, value_name = "SECONDS")]
-    save_interval_s: Option<u64>,
+    snapshot_interval_s: Option<u64>,
     /// Seconds that requests in flight may take when it ends [default: 10]
     #[arg(long, value_name = "SECONDS")]
     drain_seconds: Option<u64>,
@@ -83,7 +90,11 @@ impl Serve {
             "http": {"listen": self.http_listen},
             "grpc": {"listen": self.grpc_listen},
             "log": {"format": self.log_format, "level": self.log_level},
-            "save_interval_s": self.save_interval_s,
+            "store": {
+                "durability": self.durability,
+                "snapshot_journal_mib": self.snapshot_journal_mib,
+                "snapshot_interval_s": self.snapshot_interval_s,
+            },
             "drain_seconds": self.drain_seconds,
         });
         Config::load(self.config.as_deref(), options)

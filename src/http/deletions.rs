@@ -8,7 +8,7 @@ use super::Adapter;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonState};
-use super::parameters::Map;
+use super::parameters::{Map, request_id_of};
 use crate::map::Region;
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
@@ -22,6 +22,7 @@ pub(super) struct DeletionJson {
     sphere: Option<SphereJson>,
     #[serde(default)]
     level: u32,
+    request_id: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -43,6 +44,7 @@ struct SphereJson {
 pub(super) struct DeletionQuery {
     #[serde(default)]
     level: u32,
+    request_id: Option<String>,
 }
 
 type DeletionBody = Points<DeletionJson, DeletionQuery>;
@@ -50,6 +52,7 @@ type DeletionBody = Points<DeletionJson, DeletionQuery>;
 #[derive(Serialize)]
 pub(super) struct DeletionOut {
     removed: usize,
+    replayed: bool,
     #[serde(flatten)]
     state: JsonState,
 }
@@ -68,9 +71,13 @@ impl TryFrom<DeletionBody> for Deletion {
 
     fn try_from(body: DeletionBody) -> Result<Self, ServiceError> {
         match body {
-            Points::Json(json) => Ok(Self { level: json.level, target: json.try_into()? }),
-            Points::Bytes(points, rest) => {
-                Ok(Self { level: rest.level, target: DeletionTarget::Points(points) })
+            Points::Json(mut json) => {
+                let request_id = request_id_of(json.request_id.take())?;
+                Ok(Self { level: json.level, request_id, target: json.try_into()? })
+            }
+            Points::Bytes(points, DeletionQuery { level, request_id }) => {
+                let request_id = request_id_of(request_id)?;
+                Ok(Self { level, request_id, target: DeletionTarget::Points(points) })
             }
         }
     }
@@ -110,6 +117,6 @@ fn keys_of(voxels: &[[i32; 3]]) -> Result<Vec<VoxelKey>, ServiceError> {
 
 impl From<DeletionAnswer> for DeletionOut {
     fn from(answer: DeletionAnswer) -> Self {
-        Self { removed: answer.removed, state: answer.state.into() }
+        Self { removed: answer.removed, replayed: answer.replayed, state: answer.state.into() }
     }
 }

@@ -12,7 +12,7 @@ use super::json::JsonState;
 use super::parameters::Map;
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapSettings};
-use crate::service::MapInfo;
+use crate::service::{MapInfo, MapStorage};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -53,6 +53,15 @@ pub(super) struct MapOut {
     scans: usize,
     robots: Vec<String>,
     set_bytes: usize,
+    storage: Option<StorageOut>,
+}
+
+#[derive(Serialize)]
+struct StorageOut {
+    durable_revision: u64,
+    snapshot_revision: u64,
+    undo_from_revision: u64,
+    read_only: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -124,6 +133,18 @@ impl From<MapInfo> for MapOut {
             scans: info.scans,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes,
+            storage: info.storage.map(Into::into),
+        }
+    }
+}
+
+impl From<MapStorage> for StorageOut {
+    fn from(storage: MapStorage) -> Self {
+        Self {
+            durable_revision: storage.durable_revision,
+            snapshot_revision: storage.snapshot_revision,
+            undo_from_revision: storage.undo_from_revision,
+            read_only: storage.failure,
         }
     }
 }

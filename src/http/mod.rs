@@ -10,8 +10,11 @@ mod occupancy;
 mod parameters;
 mod probes;
 mod scans;
+mod starting;
 mod trajectory;
 mod voxels;
+
+pub use starting::starting;
 
 use std::time::Duration;
 

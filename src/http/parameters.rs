@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use super::Adapter;
 use super::error::{HttpError, excerpt};
 use crate::geometry::{self, Pose};
-use crate::map::MapName;
+use crate::map::{MapName, RequestId};
 use crate::service::ServiceError;
 use crate::wire::InField;
 
@@ -23,6 +23,11 @@ impl FromRequestParts<Adapter> for Map {
         let text = path.map_err(|rejection| ServiceError::invalid("bad_name", rejection.body_text()))?;
         Ok(Self(MapName::new(&text).map_err(ServiceError::from)?))
     }
+}
+
+/// The id of a change, where one is given.
+pub(super) fn request_id_of(text: Option<String>) -> Result<Option<RequestId>, ServiceError> {
+    Ok(text.map(|text| RequestId::new(&text)).transpose()?)
 }
 
 /// The parameters of a request without a body.

@@ -7,18 +7,27 @@ use axum::response::IntoResponse;
 use serde_json::{Value, json};
 
 use super::Adapter;
+use crate::map::MapName;
 
 /// `GET /livez`: 200 while the process lives.
 pub(super) async fn live() -> &'static str {
     "ok"
 }
 
-/// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not.
+/// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not. Maps that take no changes since
+/// their journal failed are named; they answer queries all the same.
 pub(super) async fn ready(State(adapter): State<Adapter>) -> (StatusCode, Json<Value>) {
     if adapter.lifecycle.is_draining() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
     } else {
-        (StatusCode::OK, Json(json!({"ready": true})))
+        let maps = adapter.service.maps().read_only_maps();
+        let named = |(map, reason): &(MapName, String)| json!({"map": map.as_str(), "reason": reason});
+        let read_only: Vec<Value> = maps.iter().map(named).collect();
+        let mut body = json!({"ready": true});
+        if !read_only.is_empty() {
+            body["read_only"] = read_only.into();
+        }
+        (StatusCode::OK, Json(body))
     }
 }
 

@@ -7,7 +7,7 @@ use parking_lot::{MutexGuard, RwLockUpgradableReadGuard, RwLockWriteGuard};
 use super::addition::Addition;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
-use super::{MultiResolutionMap, ScanRecord, TrajectoryPose};
+use super::{AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, UndoRecord};
 use crate::voxel::{BLOCK_LEVELS, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
@@ -36,12 +36,25 @@ impl<'a> Committer<'a> {
         self.map
     }
 
+    /// Makes `change`, for the first time or again.
+    pub fn apply(self, change: &Change) -> Committed {
+        match change {
+            Change::Insertion(scan) => self.insert(scan),
+            Change::Deletion(deletion) => self.delete(&deletion.voxels, deletion.request.as_ref()),
+            Change::Undo(undo) => self.undo(undo),
+        }
+    }
+
     /// Adds a scan's voxels at every level and its pose to the trajectory; always makes a revision.
     pub fn insert_scan(self, scan: ScanRecord) -> Committed {
+        self.insert(&scan)
+    }
+
+    fn insert(self, scan: &ScanRecord) -> Committed {
         let (_shards, voxels) = self.add_to_shards(&scan.voxels);
         let mut trajectory = self.map.trajectory.write();
         let revision = self.map.revision() + 1;
-        trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose });
+        trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose.clone() });
         self.publish(revision, voxels)
     }
 
@@ -53,6 +66,10 @@ impl<'a> Committer<'a> {
     /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
     /// passed over; removing none makes no revision.
     pub fn remove(self, voxels: &VoxelSet) -> Committed {
+        self.delete(voxels, None)
+    }
+
+    fn delete(self, voxels: &VoxelSet, request: Option<&Request>) -> Committed {
         let by_shard = self.group(voxels);
         let mut shards = self.lock(&by_shard);
         let removed = shards.iter_mut().map(|(i, shard)| shard.remove(&by_shard[*i])).sum();
@@ -60,7 +77,29 @@ impl<'a> Committer<'a> {
             return Committed { revision: self.map.revision(), voxels: 0 };
         }
         shards.iter_mut().for_each(|(_, shard)| shard.reset_if_empty(&self.map.settings));
-        self.publish(self.map.revision() + 1, removed)
+        let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
+        self.remember(request, committed, 0);
+        self.publish(committed.revision, committed.voxels)
+    }
+
+    /// Takes scans out of the trajectory, and the voxels that they alone held; always makes a revision.
+    fn undo(self, undo: &UndoRecord) -> Committed {
+        let by_shard = self.group(&undo.voxels);
+        // All of them, so that nobody who has a view of the whole map sees the trajectory change.
+        let mut shards: Vec<_> = self.map.shards.iter().map(|shard| shard.write()).collect();
+        let mut trajectory = self.map.trajectory.write();
+        let removed = shards.iter_mut().zip(&by_shard).map(|(shard, blocks)| shard.remove(blocks)).sum();
+        shards.iter_mut().for_each(|shard| shard.reset_if_empty(&self.map.settings));
+        let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
+        trajectory.withdraw(&undo.scans, committed.revision);
+        self.remember(undo.request.as_ref(), committed, undo.scans.len());
+        self.publish(committed.revision, committed.voxels)
+    }
+
+    fn remember(&self, request: Option<&Request>, Committed { revision, voxels }: Committed, scans: usize) {
+        if let Some(Request { id, digest }) = request.cloned() {
+            self.map.requests.write().push(AnsweredRequest { id, digest, revision, voxels, scans });
+        }
     }
 
     /// Makes the change visible: readers that get a lock from now on report this revision.

@@ -5,13 +5,16 @@
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
 mod addition;
+mod change;
 pub mod commit;
+mod contents;
 mod info;
 pub mod lookup;
 mod name;
+mod observations;
 mod occupied_voxel_list;
 mod region;
-mod restore;
+mod requests;
 mod room;
 mod settings;
 mod shard;
@@ -19,15 +22,19 @@ mod sharding;
 mod trajectory;
 pub mod view;
 
+pub use change::{Change, DeletionRecord, Request, UndoRecord};
 pub use commit::{Committed, Committer};
+pub use contents::MapContents;
 pub use info::LevelInfo;
 pub use lookup::Lookup;
-pub use name::{MapName, NAME_LENGTH_MAX, NameError, RobotName};
+pub use name::{MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
+pub use observations::Observations;
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError};
+pub use requests::{AnsweredRequest, REQUESTS_KEPT, Requests};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
-pub use trajectory::{ScanRecord, Trajectory, TrajectoryPose};
+pub use trajectory::{ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
 pub use view::MapView;
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -53,6 +60,7 @@ pub struct MultiResolutionMap {
     sharding: Sharding,
     shards: [RwLock<Shard>; SHARDS],
     trajectory: RwLock<Trajectory>,
+    requests: RwLock<Requests>,
     revision: AtomicU64,
     committing: Mutex<()>,
 }
@@ -70,6 +78,7 @@ impl MultiResolutionMap {
             sharding: Sharding::new(settings.levels),
             shards: std::array::from_fn(|i| RwLock::new(Shard::new(i, &settings))),
             trajectory: RwLock::default(),
+            requests: RwLock::default(),
             revision: AtomicU64::new(0),
             committing: Mutex::new(()),
         })
@@ -103,6 +112,11 @@ impl MultiResolutionMap {
     /// The poses of the accepted scans.
     pub fn trajectory(&self) -> RwLockReadGuard<'_, Trajectory> {
         self.trajectory.read()
+    }
+
+    /// Answers to changes that were asked for under an id.
+    pub fn requests(&self) -> RwLockReadGuard<'_, Requests> {
+        self.requests.read()
     }
 
     /// Locks the whole map for reading, at one revision.

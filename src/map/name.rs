@@ -14,6 +14,9 @@ pub enum NameError {
     /// Not a robot's name.
     #[error("robot must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
     Robot(String),
+    /// Not a request's id.
+    #[error("request_id must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
+    Request(String),
 }
 
 /// The name of a map: `[a-z0-9][a-z0-9_-]{0,63}`.
@@ -51,18 +54,38 @@ impl RobotName {
     /// # Errors
     /// Names the text and what a name looks like.
     pub fn new(text: &str) -> Result<Self, NameError> {
-        let fits = |c: u8| c.is_ascii_alphanumeric() || b"_.-".contains(&c);
-        if (1..=NAME_LENGTH_MAX).contains(&text.len()) && text.bytes().all(fits) {
-            Ok(Self(text.into()))
-        } else {
-            Err(NameError::Robot(excerpt(text)))
-        }
+        word(text).map(Self).ok_or_else(|| NameError::Robot(excerpt(text)))
     }
 
     /// The text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
+}
+
+/// A caller's own id of a change: 1 to 64 of `[A-Za-z0-9_.-]`; a UUID is one.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RequestId(Arc<str>);
+
+impl RequestId {
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// Names the text and what an id looks like.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        word(text).map(Self).ok_or_else(|| NameError::Request(excerpt(text)))
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// 1 to 64 of `[A-Za-z0-9_.-]`.
+fn word(text: &str) -> Option<Arc<str>> {
+    let fits = |c: u8| c.is_ascii_alphanumeric() || b"_.-".contains(&c);
+    ((1..=NAME_LENGTH_MAX).contains(&text.len()) && text.bytes().all(fits)).then(|| text.into())
 }
 
 impl std::fmt::Display for MapName {
@@ -72,6 +95,12 @@ impl std::fmt::Display for MapName {
 }
 
 impl std::fmt::Display for RobotName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::fmt::Display for RequestId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0)
     }

@@ -8,7 +8,7 @@ use crate::voxel::VoxelSet;
 
 /// A scan as it enters a map: everything that replaying the insertion needs, nothing that would have to be
 /// computed again in floating point.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ScanRecord {
     /// What is kept of it in the trajectory; its revision and new voxels are filled in by the commit.
     pub pose: TrajectoryPose,
@@ -64,10 +64,20 @@ impl TrajectoryPose {
     }
 }
 
+/// A scan that was taken out again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WithdrawnScan {
+    /// The revision that the scan had made.
+    pub scan: u64,
+    /// The revision that took it out.
+    pub revision: u64,
+}
+
 /// The accepted scans of all robots, in the order of their revisions.
 #[derive(Debug, Clone, Default)]
 pub struct Trajectory {
     poses: Vec<TrajectoryPose>,
+    withdrawn: Vec<WithdrawnScan>,
     last: HashMap<RobotName, usize>,
     by_id: HashMap<(RobotName, u64), usize>,
 }
@@ -76,6 +86,18 @@ impl Trajectory {
     /// In the order of acceptance.
     pub fn poses(&self) -> &[TrajectoryPose] {
         &self.poses
+    }
+
+    /// The scan that made `revision`.
+    pub fn at(&self, revision: u64) -> Option<&TrajectoryPose> {
+        let place = self.poses.binary_search_by_key(&revision, |pose| pose.revision).ok()?;
+        self.poses.get(place)
+    }
+
+    /// The scans that were taken out again, in the order in which that was done. They are no longer accepted: their
+    /// ids may be used again.
+    pub fn withdrawn(&self) -> &[WithdrawnScan] {
+        &self.withdrawn
     }
 
     /// A robot's last accepted scan.
@@ -105,10 +127,32 @@ impl Trajectory {
     }
 }
 
-impl FromIterator<TrajectoryPose> for Trajectory {
-    fn from_iter<I: IntoIterator<Item = TrajectoryPose>>(poses: I) -> Self {
-        let mut trajectory = Self::default();
+impl Trajectory {
+    /// The trajectory of these poses, after the scans of `withdrawn` were taken out of it.
+    pub fn new(poses: impl IntoIterator<Item = TrajectoryPose>, withdrawn: Vec<WithdrawnScan>) -> Self {
+        let mut trajectory = Self { withdrawn, ..Self::default() };
         poses.into_iter().for_each(|pose| trajectory.push(pose));
         trajectory
+    }
+
+    /// Takes out the scans that made the revisions `scans`, ascending, at `revision`.
+    pub(super) fn withdraw(&mut self, scans: &[u64], revision: u64) {
+        let Self { mut poses, mut withdrawn, .. } = std::mem::take(self);
+        poses.retain(|pose| scans.binary_search(&pose.revision).is_err());
+        withdrawn.extend(scans.iter().map(|&scan| WithdrawnScan { scan, revision }));
+        *self = Self::new(poses, withdrawn);
+    }
+}
+
+impl PartialEq for Trajectory {
+    /// The indices follow from the poses.
+    fn eq(&self, other: &Self) -> bool {
+        self.poses == other.poses && self.withdrawn == other.withdrawn
+    }
+}
+
+impl FromIterator<TrajectoryPose> for Trajectory {
+    fn from_iter<I: IntoIterator<Item = TrajectoryPose>>(poses: I) -> Self {
+        Self::new(poses, Vec::new())
     }
 }

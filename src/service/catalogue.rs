@@ -1,20 +1,20 @@
 //! The maps by name, in memory and on disk.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
 use parking_lot::RwLock;
 use uuid::Uuid;
 
-use super::hosted_map::HostedMap;
+use super::hosted_map::{HostedMap, Saving};
 use super::{ErrorCode, ServiceError};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap};
-use crate::store::{DataDir, Snapshot, StoreError};
+use crate::store::{Cut, DataDir, OpeningProgress, Snapshot, StoreError, StoreSettings};
 
-/// Names to maps. Files follow the same order of changes as the names: whoever makes, deletes or saves holds
-/// `writing`.
+/// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
 pub(super) struct Catalogue {
     maps: RwLock<BTreeMap<MapName, Arc<HostedMap>>>,
@@ -23,13 +23,20 @@ pub(super) struct Catalogue {
 }
 
 impl Catalogue {
-    /// Reads the maps of `data_dir`; without one, nothing outlives the process.
-    pub(super) fn open(data_dir: Option<PathBuf>) -> Result<Self, ServiceError> {
-        let data_dir = data_dir.map(|path| DataDir::open(&path)).transpose().map_err(not_stored)?;
+    /// Opens the maps of `data_dir`; without one, nothing outlives the process.
+    pub(super) fn open(
+        data_dir: Option<&Path>,
+        settings: &StoreSettings,
+        progress: &OpeningProgress,
+    ) -> Result<Self, ServiceError> {
+        let open = |path: &Path| DataDir::open(path, settings.clone());
+        let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
         let mut maps = BTreeMap::new();
         if let Some(data_dir) = &data_dir {
-            for name in data_dir.names().map_err(not_stored)? {
-                let map = load(data_dir, &name)?;
+            let names = data_dir.names().map_err(not_stored)?;
+            data_dir.expect(&names, progress).map_err(not_stored)?;
+            for name in names {
+                let map = load(data_dir, &name, progress)?;
                 maps.insert(name, Arc::new(map));
             }
         }
@@ -63,36 +70,41 @@ impl Catalogue {
             let message = format!("there are {count} maps, maps_max is {maps_max}: delete one first");
             return Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message));
         }
-        let map = Arc::new(HostedMap::new(name.clone(), Uuid::new_v4(), MultiResolutionMap::new(settings)?));
-        let snapshot = Snapshot::of(&map.map, map.uuid);
-        self.on_disk({
-            let name = name.clone();
-            move |data_dir| data_dir.write(&name, &snapshot)
-        })
-        .await?;
+        let empty = Snapshot::of(&MultiResolutionMap::new(settings)?, Uuid::new_v4());
+        self.add(name, empty).await.map(|map| (map, true))
+    }
+
+    /// Takes a map into the catalogue, kept and named; the caller holds `writing`.
+    async fn add(&self, name: MapName, snapshot: Snapshot) -> Result<Arc<HostedMap>, ServiceError> {
+        let (snapshot, kept_name) = (Arc::new(snapshot), name.clone());
+        let kept = Arc::clone(&snapshot);
+        let folder = self.on_disk(move |data_dir| data_dir.create(&kept_name, &kept)).await?;
+        let (uuid, map) = (snapshot.uuid, Arc::unwrap_or_clone(snapshot).restore()?);
+        let map = Arc::new(HostedMap::new(name.clone(), uuid, map, folder)?);
         self.maps.write().insert(name, Arc::clone(&map));
-        Ok((map, true))
+        Ok(map)
     }
 
     pub(super) async fn delete(&self, name: &MapName) -> Result<(), ServiceError> {
         let _writing = self.writing.lock().await;
-        self.get(name)?;
+        let map = self.get(name)?;
         self.on_disk({
-            let name = name.clone();
-            move |data_dir| data_dir.remove(&name)
+            let (name, uuid) = (name.clone(), map.uuid);
+            move |data_dir| data_dir.remove(&name, uuid)
         })
         .await?;
         self.maps.write().remove(name);
+        // Who still holds the map may read it, but nothing is kept of it any more.
+        map.committing.end();
         Ok(())
     }
 
-    /// Writes the maps that changed; the number of them. One that cannot be written keeps none of the others
-    /// from it.
-    pub(super) async fn save(&self) -> Result<usize, ServiceError> {
-        let _writing = self.writing.lock().await;
+    /// Writes snapshots of the maps that changed, of all or of those whose turn it is; the number of them. One that
+    /// cannot be written keeps none of the others from it.
+    pub(super) async fn save(&self, which: Saving) -> Result<usize, ServiceError> {
         let (mut saved, mut failed) = (0, None);
         for map in self.all() {
-            match self.on_disk(move |data_dir| save(data_dir, &map)).await {
+            match self.on_disk(move |_| map.save(which)).await {
                 Ok(written) => saved += usize::from(written.unwrap_or(false)),
                 Err(error) => failed = Some(error),
             }
@@ -114,22 +126,23 @@ impl Catalogue {
     }
 }
 
-fn save(data_dir: &DataDir, map: &HostedMap) -> Result<bool, StoreError> {
-    let Some(snapshot) = map.unsaved() else {
-        return Ok(false);
-    };
-    data_dir.write(&map.name, &snapshot)?;
-    map.saved(snapshot.revision);
-    tracing::info!(map = %map.name, revision = snapshot.revision, "saved");
-    Ok(true)
-}
-
-fn load(data_dir: &DataDir, name: &MapName) -> Result<HostedMap, ServiceError> {
-    let snapshot = data_dir.read(name).map_err(not_stored)?;
-    let (uuid, revision) = (snapshot.uuid, snapshot.revision);
-    let map = snapshot.restore()?;
-    tracing::info!(map = %name, revision, voxels = map.voxels(0), "loaded");
-    Ok(HostedMap::new(name.clone(), uuid, map))
+fn load(data_dir: &DataDir, name: &MapName, progress: &OpeningProgress) -> Result<HostedMap, ServiceError> {
+    let start = Instant::now();
+    let opened = data_dir.map(name, progress).map_err(not_stored)?;
+    for damaged in &opened.damaged {
+        tracing::warn!(map = %name, %damaged, "a snapshot is damaged: set aside, an older one and more journal are used");
+    }
+    if let Some(Cut { path, offset, bytes, reason }) = &opened.recovered.cut {
+        let file = path.display();
+        tracing::warn!(map = %name, %file, offset, bytes, reason, "cut off an end that was never acknowledged");
+    }
+    if let Some(harmless) = &opened.recovered.harmless {
+        tracing::warn!(map = %name, harmless, "the journal is damaged where the snapshot holds what was there");
+    }
+    let (revision, replayed, snapshot) = (opened.map.revision(), opened.recovered.replayed, opened.snapshot);
+    let (voxels, elapsed) = (opened.map.voxels(0), start.elapsed());
+    tracing::info!(map = %name, revision, snapshot, replayed, voxels, ?elapsed, "opened");
+    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder))
 }
 
 /// Making a map again as it is changes nothing; as another it is a conflict.

@@ -2,33 +2,43 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use parking_lot::Mutex;
 use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
+use super::committing::{Committing, Stop};
 use super::{
-    Deletion, DeletionAnswer, DeletionTarget, ErrorCode, MapInfo, MapState, PointAnswer, PointQuery,
-    ServiceError, TrajectoryAnswer, VoxelListing,
+    ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, TrajectoryAnswer,
+    VoxelListing,
 };
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MultiResolutionMap, Region, RobotName, TrajectoryPose};
-use crate::store::Snapshot;
-use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
+use crate::store::{FolderUse, MapFolder, Snapshot, StoreError};
+use crate::voxel::LatticeFromPoints;
+
+/// Which maps to write snapshots of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Saving {
+    /// Those that changed since their last one.
+    Changed,
+    /// Of those, the ones with much journal or an old snapshot.
+    Due,
+}
 
 /// A named map and who waits for it.
 #[derive(Debug)]
 pub(super) struct HostedMap {
     pub(super) name: MapName,
     pub(super) uuid: Uuid,
-    pub(super) map: MultiResolutionMap,
-    /// The last revision that readers were told of.
-    announced: watch::Sender<u64>,
-    /// Of the file on disk.
-    saved: AtomicU64,
+    pub(super) map: Arc<MultiResolutionMap>,
+    /// What keeps it across restarts, where anything does.
+    pub(super) folder: Option<Arc<MapFolder>>,
+    pub(super) committing: Committing,
+    /// The last revision that was published.
+    announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
 }
@@ -39,16 +49,45 @@ const TURNS_KEPT: usize = 1024;
 const RATE_SEED: u64 = 1;
 
 impl HostedMap {
-    pub(super) fn new(name: MapName, uuid: Uuid, map: MultiResolutionMap) -> Self {
-        let revision = map.revision();
-        Self {
-            name,
-            uuid,
-            map,
-            announced: watch::Sender::new(revision),
-            saved: AtomicU64::new(revision),
-            turns: Mutex::default(),
+    /// Takes a map into service.
+    ///
+    /// # Errors
+    /// When no thread can be started for its changes.
+    pub(super) fn new(
+        name: MapName,
+        uuid: Uuid,
+        map: MultiResolutionMap,
+        folder: Option<MapFolder>,
+    ) -> Result<Self, ServiceError> {
+        let (map, folder) = (Arc::new(map), folder.map(Arc::new));
+        let (announcing, announced) = watch::channel(map.revision());
+        let committing = Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing)?;
+        Ok(Self { name, uuid, map, folder, committing, announced, turns: Mutex::default() })
+    }
+
+    /// Writes a snapshot where there is need for one; true when it did. A map whose journal failed is left as it is.
+    pub(super) fn save(&self, which: Saving) -> Result<bool, StoreError> {
+        let Some(folder) = self.folder.as_ref().filter(|_| self.committing.stopped().is_none()) else {
+            return Ok(false);
+        };
+        let changed = self.map.revision() != folder.used().snapshot;
+        if !changed || which == Saving::Due && !folder.snapshot_is_due() {
+            return Ok(false);
         }
+        let (start, snapshot) = (Instant::now(), Snapshot::of(&self.map, self.uuid));
+        let saved = folder.save(&snapshot);
+        // Its folder may go while it is written.
+        if self.committing.stopped() == Some(&Stop::Deleted) {
+            return Ok(false);
+        }
+        saved?;
+        tracing::info!(map = %self.name, revision = snapshot.contents.revision, elapsed = ?start.elapsed(), "saved");
+        Ok(true)
+    }
+
+    /// Refuses changes that would be refused in the end, before any work is done for them.
+    pub(super) fn check_writable(&self) -> Result<(), ServiceError> {
+        self.committing.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
     }
 
     pub(super) fn state(&self, revision: u64) -> MapState {
@@ -67,22 +106,13 @@ impl HostedMap {
         turn.lock_owned().await
     }
 
-    /// Tells those who wait for `revision`.
-    pub(super) fn announce(&self, revision: u64) {
-        self.announced.send_if_modified(|announced| {
-            let newer = revision > *announced;
-            *announced = revision.max(*announced);
-            newer
-        });
-    }
-
     /// Waits until `revision` is there.
     pub(super) async fn reached(&self, revision: u64, wait_max: Duration) -> Result<(), ServiceError> {
-        let mut announced = self.announced.subscribe();
+        let mut announced = self.announced.clone();
         let reached = announced.wait_for(|announced| *announced >= revision);
         match tokio::time::timeout(wait_max, reached).await {
-            Ok(_) => Ok(()),
-            Err(_) => {
+            Ok(Ok(_)) => Ok(()),
+            Ok(Err(_)) | Err(_) => {
                 let message = format!(
                     "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
                     self.name,
@@ -132,7 +162,7 @@ impl HostedMap {
     }
 
     /// Names the first point that falls in no voxel.
-    fn point_without_voxel(&self, points: &[Point], quantise: &LatticeFromPoints) -> ServiceError {
+    pub(super) fn point_without_voxel(&self, points: &[Point], quantise: &LatticeFromPoints) -> ServiceError {
         let place = points.iter().position(|&point| quantise.index(point).is_none()).unwrap_or_default();
         let point = points[place];
         let (min_m, end_m) = self.map.lattice().range_m();
@@ -141,34 +171,6 @@ impl HostedMap {
             false => ("point_not_finite", "not finite".to_owned()),
         };
         ServiceError::invalid(reason, format!("points[{place}] is {what}: {point:?}"))
-    }
-
-    pub(super) fn delete(&self, deletion: &Deletion) -> Result<DeletionAnswer, ServiceError> {
-        // Which voxels are meant is decided when nobody else can change the map.
-        let committer = self.map.committer();
-        let voxels = self.targets_of(deletion)?;
-        let committed = committer.remove(&voxels);
-        self.announce(committed.revision);
-        Ok(DeletionAnswer { removed: committed.voxels, state: self.state(committed.revision) })
-    }
-
-    fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
-        let level = deletion.level;
-        let keys = match &deletion.target {
-            DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
-            DeletionTarget::Keys(keys) => {
-                keys.iter().map(|&key| in_range(key, level)).collect::<Result<_, _>>()?
-            }
-            DeletionTarget::Region(region) => self.map.view().voxels_in(region, level),
-        };
-        Ok(self.map.view().descendants_of(keys, level))
-    }
-
-    fn keys_of(&self, points: &[Point], level: u32) -> Result<Vec<VoxelKey>, ServiceError> {
-        let quantise = self.map.lattice().from_map();
-        let keys: Option<Vec<_>> =
-            points.iter().map(|&point| Some(quantise.key(point)?.ancestor(level))).collect();
-        keys.ok_or_else(|| self.point_without_voxel(points, &quantise))
     }
 
     pub(super) fn list(
@@ -213,32 +215,28 @@ impl HostedMap {
             scans: trajectory.poses().len(),
             robots: trajectory.robots(),
             set_bytes,
+            storage: self.storage(),
         }
     }
 
-    /// The picture to write to disk, where the map changed since the last one was.
-    pub(super) fn unsaved(&self) -> Option<Snapshot> {
-        let changed = self.map.revision() != self.saved.load(Ordering::Acquire);
-        changed.then(|| Snapshot::of(&self.map, self.uuid))
+    /// Why the map takes no changes.
+    pub(super) fn failure(&self) -> Option<&str> {
+        match self.committing.stopped()? {
+            Stop::Failed(reason) => Some(reason),
+            Stop::Deleted => None,
+        }
     }
 
-    /// Notes that `revision` is on disk.
-    pub(super) fn saved(&self, revision: u64) {
-        self.saved.store(revision, Ordering::Release);
+    fn storage(&self) -> Option<MapStorage> {
+        let FolderUse { durable, snapshot, undo_from, journal } = self.folder.as_ref()?.used();
+        Some(MapStorage {
+            durable_revision: durable,
+            snapshot_revision: snapshot,
+            undo_from_revision: undo_from,
+            journal,
+            failure: self.failure().map(str::to_owned),
+        })
     }
-}
-
-fn in_range(key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
-    let range = INDEX_MIN >> level..=INDEX_MAX >> level;
-    if key.index().iter().all(|i| range.contains(i)) {
-        return Ok(key);
-    }
-    let message = format!(
-        "keys has {key:?}, whose indices must lie in {}..={} at level {level}",
-        range.start(),
-        range.end()
-    );
-    Err(ServiceError::invalid("key_out_of_range", message))
 }
 
 /// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.

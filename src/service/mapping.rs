@@ -1,10 +1,13 @@
-//! How a scan enters a map: align, quantise, commit (paper III).
+//! How a scan enters a map: align, quantise, propose (paper III).
 
+use tokio::sync::oneshot;
+
+use super::committing::{Outcome, Prepared, Proposal, Turn, record_of};
 use super::hosted_map::HostedMap;
 use super::{ErrorCode, ScanAnswer, ScanRequest, ServiceError, ServiceSettings};
 use crate::align::{Alignment, Guess, Verdict, align, judge_at};
 use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
-use crate::map::{Committer, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{Change, Committed, RobotName, ScanRecord, TrajectoryPose};
 use crate::voxel::VoxelSet;
 
 /// A scan reduced to the points that can be somewhere.
@@ -22,33 +25,48 @@ struct Placement {
     as_first: bool,
 }
 
+/// A scan that is judged, or on its way into the map.
+pub(super) enum ScanStep {
+    /// It was refused, or is in the map already.
+    Answered(ScanAnswer),
+    /// What becomes of it will be known.
+    Proposed(TrajectoryPose, oneshot::Receiver<Outcome>),
+}
+
 impl HostedMap {
-    /// Aligns the scan, and adds it where it fits.
-    pub(super) fn insert_scan(
+    /// Aligns the scan, and where it fits sets it on its way into the map.
+    pub(super) fn propose_scan(
         &self,
         request: &ScanRequest,
+        turn: Turn,
         settings: &ServiceSettings,
-    ) -> Result<ScanAnswer, ServiceError> {
+    ) -> Result<ScanStep, ServiceError> {
+        self.check_writable()?;
         let scan = UsableScan::of(request)?;
         if let Some(answer) = self.replay(&scan)? {
-            return Ok(answer);
+            return Ok(ScanStep::Answered(answer));
         }
-        loop {
-            let placement = self.place(&scan, settings)?;
-            if placement.alignment.verdict != Verdict::Accepted {
-                return Ok(self.answer(&scan, placement.alignment));
-            }
-            let (voxels, out_of_range) = self.quantise(&scan, &placement.alignment.map_from_sensor)?;
-            let committer = self.map.committer();
-            if placement.as_first && !self.map.is_empty() {
-                continue;
-            }
-            self.check_room(settings)?;
-            return Ok(self.commit(committer, &scan, placement.alignment, voxels, out_of_range));
+        self.check_room(settings)?;
+        let placement = self.place(&scan, settings)?;
+        if placement.alignment.verdict != Verdict::Accepted {
+            return Ok(ScanStep::Answered(self.answer(&scan, placement.alignment)));
         }
+        let (voxels, out_of_range) = self.quantise(&scan, &placement.alignment.map_from_sensor)?;
+        let pose = pose_of(&scan, placement.alignment, out_of_range);
+        let change = Change::Insertion(ScanRecord { pose: pose.clone(), voxels });
+        let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
+        let prepared = Prepared { change, record, if_empty: placement.as_first, turn };
+        let outcome = self.committing.propose(Proposal::Prepared(prepared.into()));
+        Ok(ScanStep::Proposed(pose, outcome))
     }
 
-    /// Says what [`HostedMap::insert_scan`] would; changes nothing.
+    /// What to say of a scan that was committed.
+    pub(super) fn committed(&self, pose: TrajectoryPose, committed: Committed) -> ScanAnswer {
+        let Committed { revision, voxels: new_voxels } = committed;
+        self.answer_of(&TrajectoryPose { revision, new_voxels, ..pose }, false)
+    }
+
+    /// Says what [`HostedMap::propose_scan`] would; changes nothing.
     pub(super) fn align_scan(
         &self,
         request: &ScanRequest,
@@ -140,32 +158,6 @@ impl HostedMap {
         Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message))
     }
 
-    fn commit(
-        &self,
-        committer: Committer<'_>,
-        scan: &UsableScan<'_>,
-        alignment: Alignment,
-        voxels: VoxelSet,
-        out_of_range: usize,
-    ) -> ScanAnswer {
-        let mut pose = TrajectoryPose {
-            robot: scan.request.robot.clone(),
-            scan_id: scan.request.scan_id,
-            timestamp_ns: scan.request.timestamp_ns,
-            map_from_sensor: alignment.map_from_sensor,
-            revision: 0,
-            level_overlaps: alignment.level_overlaps,
-            iterations: alignment.iterations,
-            points_skipped: scan.not_finite + out_of_range,
-            new_voxels: 0,
-            digest: scan.digest,
-        };
-        let committed = committer.insert_scan(ScanRecord { pose: pose.clone(), voxels });
-        self.announce(committed.revision);
-        (pose.revision, pose.new_voxels) = (committed.revision, committed.voxels);
-        self.answer_of(&pose, false)
-    }
-
     /// What to say of a scan that is in the map.
     fn answer_of(&self, pose: &TrajectoryPose, replayed: bool) -> ScanAnswer {
         ScanAnswer {
@@ -192,6 +184,22 @@ impl HostedMap {
             state: self.state(self.map.revision()),
             replayed: false,
         }
+    }
+}
+
+/// What the trajectory keeps of a scan, but for what its commit tells.
+fn pose_of(scan: &UsableScan<'_>, alignment: Alignment, out_of_range: usize) -> TrajectoryPose {
+    TrajectoryPose {
+        robot: scan.request.robot.clone(),
+        scan_id: scan.request.scan_id,
+        timestamp_ns: scan.request.timestamp_ns,
+        map_from_sensor: alignment.map_from_sensor,
+        revision: 0,
+        level_overlaps: alignment.level_overlaps,
+        iterations: alignment.iterations,
+        points_skipped: scan.not_finite + out_of_range,
+        new_voxels: 0,
+        digest: scan.digest,
     }
 }
 

@@ -3,6 +3,9 @@
 //! Limits are checked here and before any work is done; every failure is a [`ServiceError`].
 
 mod catalogue;
+mod committing;
+mod deletion;
+mod digest;
 mod error;
 mod hosted_map;
 mod limits;
@@ -14,16 +17,20 @@ mod settings;
 pub use error::{ErrorCode, ServiceError};
 pub use limits::Limits;
 pub use request::{
-    Deletion, DeletionAnswer, DeletionTarget, MapInfo, MapState, PointAnswer, PointCloud, PointQuery,
-    ScanAnswer, ScanRequest, TrajectoryAnswer, VoxelListing,
+    Deletion, DeletionAnswer, DeletionTarget, MapInfo, MapState, MapStorage, PointAnswer, PointCloud,
+    PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, VoxelListing,
 };
 pub use settings::ServiceSettings;
 
 use std::sync::Arc;
 
-use crate::map::{MapName, MapSettings, Region, RobotName};
+use crate::map::{Committed, MapName, MapSettings, Region, RobotName};
+use crate::store::OpeningProgress;
 use catalogue::Catalogue;
-use hosted_map::HostedMap;
+use committing::Refusal;
+use deletion::DeletionStep;
+use hosted_map::{HostedMap, Saving};
+use mapping::ScanStep;
 use pool::Pool;
 
 /// All operations on all maps. A clone is another handle on the same maps.
@@ -44,16 +51,17 @@ struct Inner {
 const RATE_SAMPLES: usize = 4096;
 
 impl MapService {
-    /// Opens the service with the maps of its data folder. Reads files: not for an async thread.
+    /// Opens the service with the maps of its data folder; `progress` tells how far that has come. Reads files: not
+    /// for an async thread.
     ///
     /// # Errors
     /// When a setting is out of range, or a map on disk cannot be read: the error names the file.
-    pub fn open(settings: ServiceSettings) -> Result<Self, ServiceError> {
+    pub fn open(settings: ServiceSettings, progress: &OpeningProgress) -> Result<Self, ServiceError> {
         settings.alignment.checked().map_err(|e| ServiceError::invalid("bad_settings", e.to_string()))?;
         settings.filter.checked()?;
         let waiting = settings.limits.jobs_waiting_max;
         Ok(Self(Arc::new(Inner {
-            catalogue: Catalogue::open(settings.data_dir.clone())?,
+            catalogue: Catalogue::open(settings.data_dir.as_deref(), &settings.store, progress)?,
             queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
             mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
             settings,
@@ -105,6 +113,12 @@ impl MapService {
         self.0.queries.run(describe).await
     }
 
+    /// The maps that take no changes since their journal failed, by name, with the reason.
+    pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
+        let maps = self.0.catalogue.all();
+        maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
+    }
+
     /// Takes a map out, in memory and on disk.
     ///
     /// # Errors
@@ -142,13 +156,23 @@ impl MapService {
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
-        let turn = map.turn_of(&scan.robot).await;
-        let inner = Arc::clone(&self.0);
-        let insert = move || {
-            let _turn = turn;
-            map.insert_scan(&scan, &inner.settings)
-        };
-        self.0.mapping.run(insert).await?
+        let turn = Arc::new(map.turn_of(&scan.robot).await);
+        let scan = Arc::new(scan);
+        loop {
+            let step = {
+                let (inner, map) = (Arc::clone(&self.0), Arc::clone(&map));
+                let (scan, turn) = (Arc::clone(&scan), Arc::clone(&turn));
+                self.0.mapping.run(move || map.propose_scan(&scan, turn, &inner.settings)).await??
+            };
+            match step {
+                ScanStep::Answered(answer) => return Ok(answer),
+                ScanStep::Proposed(pose, outcome) => match outcome.await.map_err(committing_ended)? {
+                    Ok(committed) => return Ok(map.committed(pose, committed)),
+                    Err(Refusal::Failed(error)) => return Err(error),
+                    Err(Refusal::Stale) => {}
+                },
+            }
+        }
     }
 
     /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
@@ -179,7 +203,23 @@ impl MapService {
             DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
             DeletionTarget::Region(_) => {}
         }
-        self.0.mapping.run(move || map.delete(&deletion)).await?
+        let deletion = Arc::new(deletion);
+        loop {
+            let step = {
+                let (map, deletion) = (Arc::clone(&map), Arc::clone(&deletion));
+                self.0.mapping.run(move || map.propose_deletion(&deletion)).await??
+            };
+            match step {
+                DeletionStep::Answered(answer) => return Ok(answer),
+                DeletionStep::Proposed(outcome) => match outcome.await.map_err(committing_ended)? {
+                    Ok(Committed { revision, voxels: removed }) => {
+                        return Ok(DeletionAnswer { removed, state: map.state(revision), replayed: false });
+                    }
+                    Err(Refusal::Failed(error)) => return Err(error),
+                    Err(Refusal::Stale) => {}
+                },
+            }
+        }
     }
 
     /// The poses of the accepted scans, of one robot or of all.
@@ -211,13 +251,20 @@ impl MapService {
         self.0.queries.run(move || map.list(level, region.as_ref(), most)).await?
     }
 
-    /// Writes the maps that changed since they were written last, each beside its old file and renamed; the
-    /// number of them.
+    /// Writes snapshots of the maps that changed since their last one; the number of them.
     ///
     /// # Errors
     /// `Internal` when a file cannot be written; the others are written all the same.
     pub async fn save(&self) -> Result<usize, ServiceError> {
-        self.0.catalogue.save().await
+        self.0.catalogue.save(Saving::Changed).await
+    }
+
+    /// The same for the maps with much journal or an old snapshot; to be called every now and then.
+    ///
+    /// # Errors
+    /// As for [`MapService::save`].
+    pub async fn save_due(&self) -> Result<usize, ServiceError> {
+        self.0.catalogue.save(Saving::Due).await
     }
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
@@ -227,6 +274,11 @@ impl MapService {
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
         self.0.queries.run(move || map.describe(RATE_SAMPLES)).await
     }
+}
+
+/// The map's thread is gone, by a defect.
+fn committing_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
+    ServiceError::new(ErrorCode::Internal, "job_panicked", "the change failed by a defect of the server")
 }
 
 /// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.

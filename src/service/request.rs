@@ -6,7 +6,8 @@ use uuid::Uuid;
 use super::ServiceError;
 use crate::align::{Guess, Verdict};
 use crate::geometry::{Point, Pose};
-use crate::map::{LevelInfo, Lookup, MapName, MapSettings, Region, RobotName, TrajectoryPose};
+use crate::map::{LevelInfo, Lookup, MapName, MapSettings, Region, RequestId, RobotName, TrajectoryPose};
+use crate::store::JournalUse;
 use crate::voxel::VoxelKey;
 
 /// Points as they came from the wire: 12 bytes each, shared, never copied.
@@ -167,6 +168,8 @@ pub struct Deletion {
     pub target: DeletionTarget,
     /// At this level: all descendants go.
     pub level: u32,
+    /// The caller's own id of this deletion; makes it idempotent.
+    pub request_id: Option<RequestId>,
 }
 
 /// The ways to name voxels.
@@ -187,6 +190,8 @@ pub struct DeletionAnswer {
     pub removed: usize,
     /// After it.
     pub state: MapState,
+    /// It was done before under its id, and this is that answer.
+    pub replayed: bool,
 }
 
 /// The accepted scans' poses.
@@ -226,4 +231,21 @@ pub struct MapInfo {
     pub robots: Vec<RobotName>,
     /// Bytes of memory of the exact sets of all levels.
     pub set_bytes: usize,
+    /// How it is kept; not at all without a data folder.
+    pub storage: Option<MapStorage>,
+}
+
+/// How a map is kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapStorage {
+    /// The last revision that is known to be synced.
+    pub durable_revision: u64,
+    /// Of the newest snapshot.
+    pub snapshot_revision: u64,
+    /// Scans of this revision and later can be undone.
+    pub undo_from_revision: u64,
+    /// What the journal has done since the server was started; not sent over the wire.
+    pub journal: JournalUse,
+    /// Why the map takes no changes, where it does not.
+    pub failure: Option<String>,
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 1
+//!      8  4      format version, u32 little-endian: 2
 //!     12  4      CRC-32C of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
 //!     24  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto
@@ -14,25 +14,21 @@ use std::path::Path;
 use prost::Message;
 use uuid::Uuid;
 
-use super::{StoreError, write_beside_and_rename};
+use super::codec::Unreadable;
+use super::{FileSystem, StoreError, folder, pb};
 use crate::bloom::FilterSettings;
-use crate::geometry::{self, rotation_xyzw, translation_m};
-use crate::map::{MapSettings, MultiResolutionMap, RobotName, TrajectoryPose};
+use crate::map::{AnsweredRequest, MapContents, MapSettings, MultiResolutionMap, Trajectory, TrajectoryPose};
 use crate::voxel::{BlockMask, VoxelSet};
 
-/// The version that this build writes; it reads this one and all before.
-pub const FORMAT_VERSION: u32 = 1;
+/// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
+/// bytes, and neither withdrawn scans nor requests.
+pub const FORMAT_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 const HEADER_BYTES: usize = 24;
 const CHECKED_FROM: usize = 16;
 /// Bodies beyond this are refused before memory is taken: 4 billion voxels of a surface.
 const BODY_BYTES_MAX: u64 = 8 << 30;
-const ZSTD_LEVEL: i32 = 3;
-
-#[expect(unreachable_pub, reason = "generated; the .proto is its documentation")]
-mod pb {
-    include!(concat!(env!("OUT_DIR"), "/mrol.store.v1.rs"));
-}
+const ZSTD_LEVEL: i32 = 1;
 
 /// A map at one revision.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,26 +37,14 @@ pub struct Snapshot {
     pub uuid: Uuid,
     /// What it was made with.
     pub settings: MapSettings,
-    /// At this revision.
-    pub revision: u64,
-    /// The finest voxels; all else follows from them.
-    pub voxels: VoxelSet,
-    /// The accepted scans.
-    pub trajectory: Vec<TrajectoryPose>,
+    /// What it holds.
+    pub contents: MapContents,
 }
 
 impl Snapshot {
     /// Takes the picture of `map`, at one revision.
     pub fn of(map: &MultiResolutionMap, uuid: Uuid) -> Self {
-        let view = map.view();
-        let trajectory = map.trajectory();
-        Self {
-            uuid,
-            settings: *map.settings(),
-            revision: view.revision(),
-            voxels: view.voxels(),
-            trajectory: trajectory.poses().to_vec(),
-        }
+        Self { uuid, settings: *map.settings(), contents: map.contents() }
     }
 
     /// The map again.
@@ -68,25 +52,25 @@ impl Snapshot {
     /// # Errors
     /// When its settings are out of range.
     pub fn restore(self) -> Result<MultiResolutionMap, crate::map::MapSettingsError> {
-        MultiResolutionMap::restore(self.settings, self.revision, &self.voxels, self.trajectory)
+        MultiResolutionMap::restore(self.settings, self.contents)
     }
 
     /// Writes it to `path`, beside the old file and renamed.
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write(&self, path: &Path) -> Result<(), StoreError> {
+    pub fn write(&self, files: &dyn FileSystem, path: &Path) -> Result<(), StoreError> {
         let bytes = self.encode().map_err(StoreError::io(path))?;
-        write_beside_and_rename(path, &bytes)
+        folder::replace(files, path, &bytes)
     }
 
     /// Reads the file at `path`.
     ///
     /// # Errors
     /// When it cannot be read, is no map, is damaged, or was written by a newer version.
-    pub fn read(path: &Path) -> Result<Self, StoreError> {
-        let bytes = std::fs::read(path).map_err(StoreError::io(path))?;
-        Self::decode(&bytes).map_err(|reason| StoreError::Damaged { path: path.to_owned(), reason })
+    pub fn read(files: &dyn FileSystem, path: &Path) -> Result<Self, StoreError> {
+        let bytes = files.read(path).map_err(StoreError::io(path))?;
+        Self::decode(&bytes).map_err(|reason| StoreError::damaged(path, reason))
     }
 
     /// The file's bytes.
@@ -110,7 +94,7 @@ impl Snapshot {
     ///
     /// # Errors
     /// What is wrong with the bytes, and where.
-    pub fn decode(bytes: &[u8]) -> Result<Self, String> {
+    pub fn decode(bytes: &[u8]) -> Result<Self, Unreadable> {
         let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
             format!("{} bytes are too few for a map file's header of {HEADER_BYTES}", bytes.len())
         })?;
@@ -140,35 +124,46 @@ impl Snapshot {
     }
 
     fn to_message(&self) -> pb::Snapshot {
-        let masks = self.voxels.blocks().iter().flat_map(|(_, mask)| mask.to_le_bytes());
+        let MapContents { revision, voxels, trajectory, requests } = &self.contents;
         pb::Snapshot {
             uuid: self.uuid.as_bytes().to_vec().into(),
             resolution_m: self.settings.resolution_m,
             levels: self.settings.levels,
             filter_hashes: self.settings.filter.hashes,
             filter_bits_per_voxel: self.settings.filter.bits_per_key,
-            revision: self.revision,
-            block_keys: self.voxels.blocks().iter().map(|(key, _)| key.to_bits()).collect(),
-            block_masks: masks.collect::<Vec<u8>>().into(),
-            trajectory: self.trajectory.iter().map(pose_to_message).collect(),
+            revision: *revision,
+            block_keys: Vec::new(),
+            block_masks: Vec::new().into(),
+            trajectory: trajectory.poses().iter().map(Into::into).collect(),
+            voxels: Some(voxels.into()),
+            withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
+            requests: requests.iter().map(Into::into).collect(),
         }
     }
 
-    fn from_message(message: pb::Snapshot) -> Result<Self, String> {
+    fn from_message(message: pb::Snapshot) -> Result<Self, Unreadable> {
         let filter =
             FilterSettings { hashes: message.filter_hashes, bits_per_key: message.filter_bits_per_voxel };
         let settings = MapSettings { resolution_m: message.resolution_m, levels: message.levels, filter };
-        Ok(Self {
-            uuid: Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?,
-            settings: settings.checked().map_err(|e| e.to_string())?,
+        let poses: Vec<TrajectoryPose> =
+            message.trajectory.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?;
+        let withdrawn = message.withdrawn.into_iter().map(Into::into).collect();
+        let requests = message.requests.into_iter().map(AnsweredRequest::try_from);
+        let contents = MapContents {
             revision: message.revision,
-            voxels: voxels_from(&message.block_keys, &message.block_masks)?,
-            trajectory: message.trajectory.into_iter().map(pose_from_message).collect::<Result<_, _>>()?,
-        })
+            voxels: match message.voxels {
+                Some(voxels) => voxels.try_into()?,
+                None => voxels_of_version_1(&message.block_keys, &message.block_masks)?,
+            },
+            trajectory: Trajectory::new(poses, withdrawn),
+            requests: requests.collect::<Result<_, _>>()?,
+        };
+        let uuid = Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?;
+        Ok(Self { uuid, settings: settings.checked().map_err(|e| e.to_string())?, contents })
     }
 }
 
-fn voxels_from(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, String> {
+fn voxels_of_version_1(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, Unreadable> {
     let (masks, rest) = masks.as_chunks::<{ BlockMask::BYTES }>();
     if masks.len() != keys.len() || !rest.is_empty() {
         return Err(format!(
@@ -184,42 +179,6 @@ fn voxels_from(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, String> {
     keys.iter().zip(masks).map(block).collect()
 }
 
-fn pose_to_message(pose: &TrajectoryPose) -> pb::ScanPose {
-    let [x, y, z] = translation_m(&pose.map_from_sensor);
-    let [qx, qy, qz, qw] = rotation_xyzw(&pose.map_from_sensor);
-    pb::ScanPose {
-        robot: pose.robot.as_str().to_owned(),
-        scan_id: pose.scan_id,
-        timestamp_ns: pose.timestamp_ns,
-        map_from_sensor: vec![x, y, z, qx, qy, qz, qw],
-        revision: pose.revision,
-        level_overlaps: pose.level_overlaps.clone(),
-        iterations: pose.iterations,
-        points_skipped: pose.points_skipped as u64,
-        new_voxels: pose.new_voxels as u64,
-        digest: pose.digest,
-    }
-}
-
-fn pose_from_message(message: pb::ScanPose) -> Result<TrajectoryPose, String> {
-    let [x, y, z, qx, qy, qz, qw] = message.map_from_sensor[..] else {
-        return Err(format!("a pose of {} numbers instead of 7", message.map_from_sensor.len()));
-    };
-    let map_from_sensor = geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?;
-    Ok(TrajectoryPose {
-        robot: RobotName::new(&message.robot).map_err(|e| e.to_string())?,
-        scan_id: message.scan_id,
-        timestamp_ns: message.timestamp_ns,
-        map_from_sensor,
-        revision: message.revision,
-        level_overlaps: message.level_overlaps,
-        iterations: message.iterations,
-        points_skipped: message.points_skipped as usize,
-        new_voxels: message.new_voxels as usize,
-        digest: message.digest,
-    })
-}
-
 fn u32_at(bytes: &[u8], offset: usize) -> u32 {
     u32::from_le_bytes(std::array::from_fn(|i| bytes[offset + i]))
 }
@@ -227,6 +186,8 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry;
+    use crate::map::{RequestId, RobotName, WithdrawnScan};
     use crate::voxel::VoxelKey;
 
     fn snapshot() -> Snapshot {
@@ -243,12 +204,17 @@ mod tests {
             new_voxels: 5000,
             digest: u64::MAX,
         };
+        let id = RequestId::new("undo-1").unwrap();
+        let request = AnsweredRequest { id, digest: 9, revision: 42, voxels: 0, scans: 1 };
         Snapshot {
             uuid: Uuid::from_bytes([7; 16]),
             settings: MapSettings::new(0.05, 4),
-            revision: 42,
-            voxels: keys.collect(),
-            trajectory: vec![pose],
+            contents: MapContents {
+                revision: 42,
+                voxels: keys.collect(),
+                trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }]),
+                requests: [request].into_iter().collect(),
+            },
         }
     }
 
@@ -279,8 +245,8 @@ mod tests {
     #[test]
     fn a_newer_version_is_refused_by_name() {
         let mut bytes = snapshot().encode().unwrap();
-        bytes[8] = 2;
-        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 2"));
+        bytes[8] = 3;
+        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 3"));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::fmt::{Display, Write};
 
 use crate::map::LevelInfo;
-use crate::service::MapInfo;
+use crate::service::{MapInfo, MapStorage};
 
 /// Appends the gauges of `maps`.
 pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
@@ -26,6 +26,7 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     for map in maps {
         family.gauge(&[("map", &map.name)], map.scans);
     }
+    write_storage(text, maps);
 }
 
 fn write_filters(text: &mut String, maps: &[MapInfo]) {
@@ -55,6 +56,35 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
 
 fn levels(maps: &[MapInfo]) -> impl Iterator<Item = (&MapInfo, &LevelInfo)> {
     maps.iter().flat_map(|map| map.levels.iter().map(move |level| (map, level)))
+}
+
+/// What keeps the maps: how far it is, and what it took.
+fn write_storage(text: &mut String, maps: &[MapInfo]) {
+    let kept = || maps.iter().filter_map(|map| Some((&map.name, map.storage.as_ref()?)));
+    type Value = fn(&MapStorage) -> f64;
+    let families: [(&'static str, &str, Value); 7] = [
+        ("mrol_map_durable_revision", "Last revision known to be synced, by map", |s| {
+            s.durable_revision as f64
+        }),
+        ("mrol_map_snapshot_revision", "Revision of the newest snapshot, by map", |s| {
+            s.snapshot_revision as f64
+        }),
+        ("mrol_map_read_only", "1 where the journal failed and the map takes no changes, by map", |s| {
+            f64::from(u8::from(s.failure.is_some()))
+        }),
+        ("mrol_journal_records", "Records appended since the start, by map", |s| s.journal.records as f64),
+        ("mrol_journal_bytes", "Bytes appended since the start, by map", |s| s.journal.bytes as f64),
+        ("mrol_journal_syncs", "Syncs since the start, by map", |s| s.journal.syncs as f64),
+        ("mrol_journal_sync_seconds", "Seconds spent in syncs since the start, by map", |s| {
+            s.journal.sync_time.as_secs_f64()
+        }),
+    ];
+    for (name, what, value) in families {
+        let mut family = Family::begin(text, name, what);
+        for (map, storage) in kept() {
+            family.gauge(&[("map", map)], value(storage));
+        }
+    }
 }
 
 /// One metric name with its samples.

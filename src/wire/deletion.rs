@@ -1,7 +1,7 @@
 //! Deletions (`mapping.proto`).
 
 use super::occupancy::keys_from;
-use super::types::count_from;
+use super::types::{count_from, request_id_from, text_of};
 use super::{InField, pb, required};
 use crate::map::{MapName, Region};
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
@@ -16,7 +16,8 @@ impl TryFrom<pb::DeleteVoxelsRequest> for (MapName, Deletion) {
             Target::Keys(keys) => DeletionTarget::Keys(keys_from(&keys.keys)?),
             Target::Region(region) => DeletionTarget::Region(Region::try_from(region)?),
         };
-        Ok((MapName::new(&request.map)?, Deletion { target, level: request.level }))
+        let request_id = request_id_from(&request.request_id)?;
+        Ok((MapName::new(&request.map)?, Deletion { target, level: request.level, request_id }))
     }
 }
 
@@ -30,13 +31,15 @@ impl From<(&MapName, Deletion)> for pb::DeleteVoxelsRequest {
             }
             DeletionTarget::Region(region) => Target::Region(region.into()),
         };
-        Self { map: map.to_string(), target: Some(target), level: deletion.level }
+        let request_id = text_of(deletion.request_id);
+        Self { map: map.to_string(), target: Some(target), level: deletion.level, request_id }
     }
 }
 
 impl From<DeletionAnswer> for pb::DeleteVoxelsResponse {
     fn from(answer: DeletionAnswer) -> Self {
-        Self { removed: answer.removed as u64, state: Some(answer.state.into()) }
+        let DeletionAnswer { removed, state, replayed } = answer;
+        Self { removed: removed as u64, state: Some(state.into()), replayed }
     }
 }
 
@@ -45,6 +48,6 @@ impl TryFrom<pb::DeleteVoxelsResponse> for DeletionAnswer {
 
     fn try_from(answer: pb::DeleteVoxelsResponse) -> Result<Self, ServiceError> {
         let state = required(answer.state, "state")?.try_into()?;
-        Ok(Self { removed: count_from(answer.removed), state })
+        Ok(Self { removed: count_from(answer.removed), state, replayed: answer.replayed })
     }
 }

@@ -4,7 +4,8 @@ use super::types::count_from;
 use super::{InField, pb, required};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
-use crate::service::{MapInfo, ServiceError};
+use crate::service::{MapInfo, MapStorage, ServiceError};
+use crate::store::JournalUse;
 
 /// The name and settings of a map to make; `filter` fills in what the request leaves to the server.
 ///
@@ -98,6 +99,7 @@ impl From<MapInfo> for pb::MapInfo {
             scans: info.scans as u64,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes as u64,
+            storage: info.storage.map(Into::into),
         }
     }
 }
@@ -116,7 +118,31 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             scans: count_from(info.scans),
             robots: robots.in_field("map.robots")?,
             set_bytes: count_from(info.set_bytes),
+            storage: info.storage.map(Into::into),
         })
+    }
+}
+
+impl From<MapStorage> for pb::MapStorage {
+    fn from(storage: MapStorage) -> Self {
+        Self {
+            durable_revision: storage.durable_revision,
+            snapshot_revision: storage.snapshot_revision,
+            undo_from_revision: storage.undo_from_revision,
+            read_only: storage.failure.unwrap_or_default(),
+        }
+    }
+}
+
+impl From<pb::MapStorage> for MapStorage {
+    fn from(storage: pb::MapStorage) -> Self {
+        Self {
+            durable_revision: storage.durable_revision,
+            snapshot_revision: storage.snapshot_revision,
+            undo_from_revision: storage.undo_from_revision,
+            journal: JournalUse::default(),
+            failure: (!storage.read_only.is_empty()).then_some(storage.read_only),
+        }
     }
 }
 

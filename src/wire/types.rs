@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use super::{InField, pb, required};
 use crate::geometry::{self, Point, Pose};
-use crate::map::{Lookup, Region};
+use crate::map::{Lookup, Region, RequestId};
 use crate::service::{MapState, PointCloud, ServiceError};
 
 impl TryFrom<pb::Points> for PointCloud {
@@ -148,6 +148,16 @@ pub(crate) fn uuid_from(text: &str) -> Result<Uuid, ServiceError> {
         let start: String = text.chars().take(64).collect();
         ServiceError::invalid("bad_uuid", format!("map_uuid must be a uuid, got {start:?}: {error}"))
     })
+}
+
+/// A request's id; none where the text is empty.
+pub(super) fn request_id_from(text: &str) -> Result<Option<RequestId>, ServiceError> {
+    Ok((!text.is_empty()).then(|| RequestId::new(text)).transpose()?)
+}
+
+/// The inverse of [`request_id_from`].
+pub(super) fn text_of(id: Option<RequestId>) -> String {
+    id.map(|id| id.to_string()).unwrap_or_default()
 }
 
 /// A count that came over the wire. Machines of less than 64 bits hold no map that would notice.

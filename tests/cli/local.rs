@@ -2,7 +2,7 @@
 
 use mrol::geometry::pose_difference;
 use mrol::scan::read_trajectory;
-use mrol::store::Snapshot;
+use mrol::store::{Disk, Snapshot};
 
 use super::{Sequence, mrol, objects};
 
@@ -47,8 +47,8 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
         let (metres, degrees) = pose_difference(&found.map_from_sensor, truth);
         assert!(metres < 0.06 && degrees < 1.5, "{metres} m {degrees} degrees");
     }
-    let snapshot = Snapshot::read(map.as_ref()).unwrap();
-    assert_eq!((snapshot.voxels.len() as u64, snapshot.trajectory.len()), (added, SCANS));
+    let snapshot = Snapshot::read(&Disk, map.as_ref()).unwrap().contents;
+    assert_eq!((snapshot.voxels.len() as u64, snapshot.trajectory.poses().len()), (added, SCANS));
 }
 
 #[test]

@@ -7,6 +7,8 @@ mod demo;
 mod errors;
 mod help;
 mod local;
+#[path = "../process/mod.rs"]
+mod process;
 mod remote;
 
 use assert_cmd::Command;

@@ -1,57 +1,30 @@
 //! `mrol serve`, and what is done with it: maps, insert, query, delete.
 
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
-
 use serde_json::{Value, json};
 
+use super::process::Process;
 use super::{Sequence, complaint, mrol, objects};
 
-/// A daemon in a process of its own, on free ports.
-struct Daemon {
-    process: Child,
-    http: String,
-    grpc: String,
-}
+/// A daemon in a process of its own, which is called.
+struct Daemon(Process);
 
 impl Daemon {
     fn start(data_dir: &str) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_mrol"))
-            .args(["serve", "--json", "--data-dir", data_dir, "--log-level", "warn"])
-            .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let serving: Value = serde_json::from_str(&line).unwrap();
-        let address = |protocol: &str| format!("http://{}", serving[protocol].as_str().unwrap());
-        Self { process, http: address("http"), grpc: address("grpc") }
+        Self(Process::start(data_dir, &[]))
     }
 
     /// The objects that a call to it prints.
     fn call(&self, arguments: &[&str]) -> Vec<Value> {
-        objects(&[arguments, &["--server", &self.grpc]].concat())
+        objects(&[arguments, &["--server", &self.0.grpc]].concat())
     }
 
     /// What a call to it complains about.
     fn refuses(&self, arguments: &[&str]) -> String {
-        complaint(&[arguments, &["--server", &self.grpc]].concat(), 1)
+        complaint(&[arguments, &["--server", &self.0.grpc]].concat(), 1)
     }
 
-    /// Tells it to end, as a service manager does; its exit code.
-    fn stop(mut self) -> Option<i32> {
-        let told = Command::new("kill").arg(self.process.id().to_string()).status().unwrap();
-        assert!(told.success());
-        self.process.wait().unwrap().code()
-    }
-}
-
-impl Drop for Daemon {
-    fn drop(&mut self) {
-        // Where a test failed before it was stopped.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+    fn stop(self) -> Option<i32> {
+        self.0.stop()
     }
 }
 
@@ -144,7 +117,7 @@ fn maps_survive_a_restart_and_one_made_without_a_daemon_is_served() {
 #[test]
 fn the_address_of_the_other_protocol_is_recognised_as_such() {
     let daemon = Daemon::start("");
-    let said = complaint(&["maps", "list", "--server", &daemon.http], 1);
+    let said = complaint(&["maps", "list", "--server", &daemon.0.http], 1);
     assert!(said.contains("is that the gRPC address"), "{said}");
 }
 
@@ -153,7 +126,7 @@ fn the_server_may_come_from_the_environment_and_people_get_tables() {
     let daemon = Daemon::start("");
     daemon.call(&["maps", "create", "a", "--resolution", "0.25"]);
     let list =
-        mrol(&["maps", "list"]).env("MROL_SERVER", &daemon.grpc).assert().success().get_output().clone();
+        mrol(&["maps", "list"]).env("MROL_SERVER", &daemon.0.grpc).assert().success().get_output().clone();
     let list = String::from_utf8(list.stdout).unwrap();
     assert!(list.starts_with("a ") && list.contains("0.25 m"), "{list}");
 }

@@ -73,13 +73,14 @@ impl Structure for Dense {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::MapSettings;
-    use crate::voxel::{VoxelKey, VoxelSet};
+    use crate::map::{MapContents, MapSettings};
+    use crate::voxel::VoxelKey;
 
     #[test]
     fn an_array_that_would_not_fit_is_refused_with_its_size() {
-        let corners: VoxelSet = [[0; 3], [9999; 3]].into_iter().filter_map(VoxelKey::new).collect();
-        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), 1, &corners, []).unwrap();
+        let voxels = [[0; 3], [9999; 3]].into_iter().filter_map(VoxelKey::new).collect();
+        let contents = MapContents::at(1, voxels);
+        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), contents).unwrap();
         assert_eq!(Dense::of(&map, 0).unwrap_err(), DenseTooLarge(1_000_000_000_001));
     }
 

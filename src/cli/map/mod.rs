@@ -20,7 +20,7 @@ use crate::bloom::FilterSettings;
 use crate::geometry::{Point, Pose};
 use crate::map::{LEVELS_DEFAULT, MapSettings};
 use crate::scan::{StampedPose, read_points, scan_files, write_trajectory};
-use crate::store::Snapshot;
+use crate::store::{Disk, Snapshot};
 use ample::FalsePositives;
 use mapper::{Mapped, Mapper};
 use report::{ScanLine, Summary};
@@ -130,7 +130,7 @@ impl Map {
             write_trajectory(path, &run.trajectory).map_err(CliError::writing(path))?;
         }
         if let Some(path) = &self.out {
-            Snapshot::of(mapper.map(), Uuid::new_v4()).write(path)?;
+            Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk, path)?;
         }
         Ok(())
     }

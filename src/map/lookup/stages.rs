@@ -158,7 +158,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::Pose;
-    use crate::map::{MapSettings, MultiResolutionMap};
+    use crate::map::{MapContents, MapSettings, MultiResolutionMap};
     use crate::voxel::VoxelSet;
 
     /// Points of a cube of 60 voxels, on borders too, and some that no voxel holds.
@@ -173,7 +173,7 @@ mod tests {
     fn map_of(points: &[Point], levels: u32) -> MultiResolutionMap {
         let map = MultiResolutionMap::new(MapSettings::new(0.5, levels)).unwrap();
         let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_map());
-        MultiResolutionMap::restore(*map.settings(), 1, &voxels, []).unwrap()
+        MultiResolutionMap::restore(*map.settings(), MapContents::at(1, voxels)).unwrap()
     }
 
     type Keys = fn(&[Point], &LatticeFromPoints, u32, &mut [u64]);

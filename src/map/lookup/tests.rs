@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::{LevelView, Lookup, scalar};
 use crate::bloom::FilterSettings;
 use crate::geometry::{Point, Pose};
-use crate::map::{MapSettings, MultiResolutionMap};
+use crate::map::{MapContents, MapSettings, MultiResolutionMap};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
 
 type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64]) -> bool;
@@ -43,7 +43,7 @@ fn assert_twins(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
 
 fn map_of(keys: impl IntoIterator<Item = [i32; 3]>, settings: MapSettings) -> MultiResolutionMap {
     let voxels: VoxelSet = keys.into_iter().filter_map(VoxelKey::new).collect();
-    MultiResolutionMap::restore(settings, 1, &voxels, []).unwrap()
+    MultiResolutionMap::restore(settings, MapContents::at(1, voxels)).unwrap()
 }
 
 /// Indices crowded enough to hit, near the origin, at region borders, and at the ends of the range.

@@ -1,0 +1,39 @@
+//! What is answered while the maps are being opened: that the process lives, and how far that has come.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::{Json, Router};
+use serde_json::json;
+
+use super::error::HttpError;
+use super::probes;
+use crate::service::{ErrorCode, ServiceError};
+use crate::store::{Opened, OpeningProgress};
+
+/// The routes of a server that is starting.
+pub fn starting(progress: Arc<OpeningProgress>) -> Router {
+    Router::new()
+        .route("/livez", get(probes::live))
+        .route("/readyz", get(ready))
+        .fallback(refuse)
+        .with_state(progress)
+}
+
+/// `GET /readyz`: 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.
+async fn ready(State(progress): State<Arc<OpeningProgress>>) -> Response {
+    let Opened { bytes, bytes_read, maps, maps_open } = progress.opened();
+    let body = json!({
+        "ready": false, "reason": "starting",
+        "maps": maps, "maps_open": maps_open, "bytes": bytes, "bytes_read": bytes_read,
+    });
+    (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], Json(body)).into_response()
+}
+
+async fn refuse() -> HttpError {
+    let message = "server is starting: /readyz tells how far it has come";
+    ServiceError::new(ErrorCode::Unavailable, "starting", message).into()
+}

@@ -1,0 +1,66 @@
+//! What one revision did to a map: everything that doing it again needs, and nothing that would have to be computed
+//! again in floating point.
+
+use super::{RequestId, ScanRecord};
+use crate::voxel::VoxelSet;
+
+/// One committed change. A map is what its changes made of it, in the order of revisions: the same changes make
+/// the same map, bit for bit, on every machine.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// A scan went in.
+    Insertion(ScanRecord),
+    /// Voxels were taken out.
+    Deletion(DeletionRecord),
+    /// Scans were taken out again.
+    Undo(UndoRecord),
+}
+
+/// Voxels that were taken out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeletionRecord {
+    /// The finest voxels, all of them there before.
+    pub voxels: VoxelSet,
+    /// Under which id it was asked for.
+    pub request: Option<Request>,
+}
+
+/// Scans that were taken out again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UndoRecord {
+    /// The revisions that the scans had made, ascending.
+    pub scans: Vec<u64>,
+    /// The finest voxels that no other scan holds, all of them there before.
+    pub voxels: VoxelSet,
+    /// Under which id it was asked for.
+    pub request: Option<Request>,
+}
+
+/// The caller's own name of a change, by which it is told when it comes again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Request {
+    /// Chosen by the caller.
+    pub id: RequestId,
+    /// Of what was asked for, so that the same request sent again is told from another under its id.
+    pub digest: u64,
+}
+
+impl Change {
+    /// The finest voxels that it touches.
+    pub fn voxels(&self) -> &VoxelSet {
+        match self {
+            Self::Insertion(scan) => &scan.voxels,
+            Self::Deletion(deletion) => &deletion.voxels,
+            Self::Undo(undo) => &undo.voxels,
+        }
+    }
+
+    /// Under which id it was asked for, where that is not a scan's.
+    pub fn request(&self) -> Option<&Request> {
+        match self {
+            Self::Insertion(_) => None,
+            Self::Deletion(deletion) => deletion.request.as_ref(),
+            Self::Undo(undo) => undo.request.as_ref(),
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! All that a map holds, at one revision: what is kept of it, and a map from what was kept.
+
+use std::sync::atomic::Ordering;
+
+use super::{MapSettings, MapSettingsError, MultiResolutionMap, Requests, Trajectory};
+use crate::voxel::VoxelSet;
+
+/// What a map holds at one revision, besides its settings. Coarser levels and filters follow from the finest
+/// voxels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MapContents {
+    /// Committed changes so far.
+    pub revision: u64,
+    /// The finest voxels.
+    pub voxels: VoxelSet,
+    /// The accepted scans.
+    pub trajectory: Trajectory,
+    /// Answers to changes that were asked for under an id.
+    pub requests: Requests,
+}
+
+impl MapContents {
+    /// Voxels alone, at a revision.
+    pub fn at(revision: u64, voxels: VoxelSet) -> Self {
+        Self { revision, voxels, ..Self::default() }
+    }
+}
+
+impl MultiResolutionMap {
+    /// Takes the picture of this map. Changes wait while it is taken, readers do not.
+    pub fn contents(&self) -> MapContents {
+        // Locks in the order in which committers take them; every change of the trajectory or the requests holds
+        // a shard meanwhile, so that the view keeps both as they are.
+        let view = self.view();
+        let (trajectory, requests) = (self.trajectory().clone(), self.requests().clone());
+        MapContents { revision: view.revision(), voxels: view.voxels(), trajectory, requests }
+    }
+
+    /// The map of `settings` that holds `contents`.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn restore(settings: MapSettings, contents: MapContents) -> Result<Self, MapSettingsError> {
+        let map = Self::new(settings)?;
+        map.committer().add(&contents.voxels);
+        *map.trajectory.write() = contents.trajectory;
+        *map.requests.write() = contents.requests;
+        map.revision.store(contents.revision, Ordering::Release);
+        Ok(map)
+    }
+}

@@ -1,0 +1,114 @@
+//! Changes, and the requests behind them.
+
+use super::{Unreadable, count, required};
+use crate::map::{AnsweredRequest, Change, DeletionRecord, Request, RequestId, UndoRecord};
+use crate::store::pb;
+
+impl From<&Change> for pb::Change {
+    fn from(change: &Change) -> Self {
+        use pb::change::Kind;
+        let kind = match change {
+            Change::Insertion(scan) => Kind::Insertion(scan.into()),
+            Change::Deletion(deletion) => Kind::Deletion(deletion.into()),
+            Change::Undo(undo) => Kind::Undo(undo.into()),
+        };
+        Self { kind: Some(kind) }
+    }
+}
+
+impl TryFrom<pb::Change> for Change {
+    type Error = Unreadable;
+
+    fn try_from(message: pb::Change) -> Result<Self, Unreadable> {
+        use pb::change::Kind;
+        match required(message.kind, "the change's kind, or known to this version,")? {
+            Kind::Insertion(scan) => Ok(Self::Insertion(scan.try_into()?)),
+            Kind::Deletion(deletion) => Ok(Self::Deletion(deletion.try_into()?)),
+            Kind::Undo(undo) => Ok(Self::Undo(undo.try_into()?)),
+        }
+    }
+}
+
+impl From<&DeletionRecord> for pb::Deletion {
+    fn from(deletion: &DeletionRecord) -> Self {
+        Self { voxels: Some((&deletion.voxels).into()), request: deletion.request.as_ref().map(Into::into) }
+    }
+}
+
+impl TryFrom<pb::Deletion> for DeletionRecord {
+    type Error = Unreadable;
+
+    fn try_from(message: pb::Deletion) -> Result<Self, Unreadable> {
+        Ok(Self {
+            voxels: required(message.voxels, "deletion.voxels")?.try_into()?,
+            request: message.request.map(Request::try_from).transpose()?,
+        })
+    }
+}
+
+impl From<&UndoRecord> for pb::Undo {
+    fn from(undo: &UndoRecord) -> Self {
+        Self {
+            scans: undo.scans.clone(),
+            voxels: Some((&undo.voxels).into()),
+            request: undo.request.as_ref().map(Into::into),
+        }
+    }
+}
+
+impl TryFrom<pb::Undo> for UndoRecord {
+    type Error = Unreadable;
+
+    fn try_from(message: pb::Undo) -> Result<Self, Unreadable> {
+        if !message.scans.is_sorted() {
+            return Err("undo.scans must ascend".into());
+        }
+        Ok(Self {
+            scans: message.scans,
+            voxels: required(message.voxels, "undo.voxels")?.try_into()?,
+            request: message.request.map(Request::try_from).transpose()?,
+        })
+    }
+}
+
+impl From<&Request> for pb::Request {
+    fn from(request: &Request) -> Self {
+        Self { id: request.id.as_str().to_owned(), digest: request.digest }
+    }
+}
+
+impl TryFrom<pb::Request> for Request {
+    type Error = Unreadable;
+
+    fn try_from(message: pb::Request) -> Result<Self, Unreadable> {
+        let id = RequestId::new(&message.id).map_err(|e| e.to_string())?;
+        Ok(Self { id, digest: message.digest })
+    }
+}
+
+impl From<&AnsweredRequest> for pb::AnsweredRequest {
+    fn from(answered: &AnsweredRequest) -> Self {
+        let request = Request { id: answered.id.clone(), digest: answered.digest };
+        Self {
+            request: Some((&request).into()),
+            revision: answered.revision,
+            voxels: answered.voxels as u64,
+            scans: answered.scans as u64,
+        }
+    }
+}
+
+impl TryFrom<pb::AnsweredRequest> for AnsweredRequest {
+    type Error = Unreadable;
+
+    fn try_from(message: pb::AnsweredRequest) -> Result<Self, Unreadable> {
+        let Request { id, digest } = required(message.request, "requests.request")?.try_into()?;
+        Ok(Self {
+            id,
+            digest,
+            revision: message.revision,
+            voxels: count(message.voxels),
+            scans: count(message.scans),
+        })
+    }
+}

@@ -1,0 +1,111 @@
+//! Sets of voxels: gaps between block keys, and each block as an octree of three levels.
+
+use super::Unreadable;
+use crate::store::pb;
+use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
+
+impl From<&VoxelSet> for pb::Voxels {
+    fn from(voxels: &VoxelSet) -> Self {
+        let mut before = 0;
+        let gap = |&(key, _): &(VoxelKey, BlockMask)| {
+            let bits = key.to_bits();
+            bits - std::mem::replace(&mut before, bits)
+        };
+        let key_gaps = voxels.blocks().iter().map(gap).collect();
+        let mut octrees = Vec::with_capacity(voxels.blocks().len() * 16);
+        voxels.blocks().iter().for_each(|(_, mask)| write_octree(mask, &mut octrees));
+        Self { key_gaps, octrees: octrees.into() }
+    }
+}
+
+impl TryFrom<pb::Voxels> for VoxelSet {
+    type Error = Unreadable;
+
+    fn try_from(voxels: pb::Voxels) -> Result<Self, Unreadable> {
+        let (mut key, mut octrees) = (0u64, &voxels.octrees[..]);
+        let mut blocks = Vec::with_capacity(voxels.key_gaps.len());
+        for (i, &gap) in voxels.key_gaps.iter().enumerate() {
+            if gap == 0 && i > 0 {
+                return Err(format!("voxels.key_gaps[{i}] is 0: a block comes twice"));
+            }
+            key = key.checked_add(gap).ok_or_else(|| format!("voxels.key_gaps[{i}] is too large: {gap}"))?;
+            let block = Self::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
+            let mask = read_octree(&mut octrees).ok_or_else(|| {
+                format!("voxels.octrees: that of block {i} is cut short or has an empty child")
+            })?;
+            blocks.push((block, mask));
+        }
+        if !octrees.is_empty() {
+            return Err(format!("voxels.octrees has {} bytes too many", octrees.len()));
+        }
+        Ok(blocks.into_iter().collect())
+    }
+}
+
+/// Appends the tree of a block that is not empty.
+fn write_octree(mask: &BlockMask, tree: &mut Vec<u8>) {
+    let bytes = mask.to_le_bytes();
+    let (words, _) = bytes.as_chunks::<8>();
+    tree.push(children(std::array::from_fn(|w| words[w] != [0; 8])));
+    for word in words.iter().filter(|word| **word != [0; 8]) {
+        tree.push(children(word.map(|byte| byte != 0)));
+        tree.extend(word.iter().filter(|byte| **byte != 0));
+    }
+}
+
+/// Takes the tree of one block off the front; none where it is no tree.
+fn read_octree(tree: &mut &[u8]) -> Option<BlockMask> {
+    let mut bytes = [0; BlockMask::BYTES];
+    let (words, _) = bytes.as_chunks_mut::<8>();
+    for word in present(words, next(tree)?) {
+        for byte in present(word, next(tree)?) {
+            *byte = next(tree)?;
+        }
+    }
+    Some(BlockMask::from_le_bytes(&bytes))
+}
+
+/// The next byte, which says something: no node of a tree is empty.
+fn next(tree: &mut &[u8]) -> Option<u8> {
+    tree.split_off_first().copied().filter(|&byte| byte != 0)
+}
+
+/// A bit for each child that is there, lowest first.
+fn children(there: [bool; 8]) -> u8 {
+    there.into_iter().rev().fold(0, |bits, there| bits << 1 | u8::from(there))
+}
+
+/// The children that a byte says are there.
+fn present<T>(children: &mut [T], bits: u8) -> impl Iterator<Item = &mut T> {
+    children.iter_mut().enumerate().filter(move |(i, _)| bits >> i & 1 == 1).map(|(_, child)| child)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_set_survives_its_message(keys in prop::collection::vec(prop::array::uniform3(-40i32..40), 0..300), far: [i16; 3]) {
+            let far = VoxelKey::new(far.map(|i| i32::from(i) * 32)).unwrap();
+            let voxels: VoxelSet = keys.into_iter().filter_map(VoxelKey::new).chain([far]).collect();
+            prop_assert_eq!(VoxelSet::try_from(pb::Voxels::from(&voxels)).unwrap(), voxels);
+        }
+
+        #[test]
+        fn bytes_that_are_no_tree_are_an_error_and_never_a_panic(key_gaps: Vec<u64>, octrees: Vec<u8>) {
+            let message = pb::Voxels { key_gaps, octrees: octrees.into() };
+            if let Ok(voxels) = VoxelSet::try_from(message.clone()) {
+                prop_assert_eq!(pb::Voxels::from(&voxels), message);
+            }
+        }
+    }
+
+    #[test]
+    fn a_single_voxel_is_three_bytes_beside_its_key() {
+        let voxels: VoxelSet = [VoxelKey::new([1, 0, 4]).unwrap()].into_iter().collect();
+        let message = pb::Voxels::from(&voxels);
+        assert_eq!((&message.key_gaps[..], &message.octrees[..]), (&[0][..], &[1 << 4, 1, 2][..]));
+    }
+}

@@ -1,0 +1,71 @@
+//! What can go wrong with what is kept.
+
+use std::path::{Path, PathBuf};
+
+/// Why a map could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The system said no.
+    #[error("{}: {source}", .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Another process uses the data folder.
+    #[error("{} is in use by another server: stop it, or choose another data folder", .0.display())]
+    InUse(PathBuf),
+    /// The file is none of ours, damaged, or of a newer version.
+    #[error("{}: {reason}", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The journal is damaged before its end: something that was acknowledged may be lost, and nothing is skipped
+    /// in silence.
+    #[error(
+        "{}: damaged at offset {offset}: {reason}. Revision {revision} and what follows cannot be read; {} keeps \
+         what comes before and sets the rest aside",
+        .path.display(), set_aside_command(.path)
+    )]
+    JournalDamaged {
+        /// The segment.
+        path: PathBuf,
+        /// The first byte that is wrong.
+        offset: u64,
+        /// What is wrong with it.
+        reason: String,
+        /// The first revision that is lost.
+        revision: u64,
+    },
+    /// An earlier write failed, and what the disk holds since is unknown.
+    #[error("the journal stopped: {0}")]
+    JournalStopped(String),
+}
+
+impl StoreError {
+    pub(super) fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { path, source }
+    }
+
+    /// A journal's segment is wrong at `offset`, where `revision` should stand.
+    pub(super) fn at(path: &Path, offset: usize, revision: u64, reason: impl Into<String>) -> Self {
+        let (path, offset, reason) = (path.to_owned(), offset as u64, reason.into());
+        Self::JournalDamaged { path, offset, reason, revision }
+    }
+
+    pub(super) fn damaged(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Damaged { path: path.to_owned(), reason: reason.into() }
+    }
+}
+
+/// What helps against a damaged file `DATA_DIR/maps/MAP/FILE`.
+fn set_aside_command(file: &Path) -> String {
+    let map = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+    let data_dir = file.ancestors().nth(3).unwrap_or(file);
+    format!("`mrol doctor {} --set-aside {map}`", data_dir.display())
+}

@@ -1,0 +1,54 @@
+//! Folders and files that are whole or not there.
+
+use std::path::{Path, PathBuf};
+
+use super::{FileSystem, StoreError};
+
+/// What the name of something unfinished begins with: swept away when it is found.
+const UNFINISHED: &str = ".unfinished-";
+
+/// Where a path is made before it gets its name.
+pub(super) fn unfinished(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{UNFINISHED}{name}"))
+}
+
+/// Writes `bytes` to a file beside `path`, syncs it, renames it over `path` and syncs the folder: after a crash at
+/// any moment `path` holds the old bytes or the new.
+///
+/// # Errors
+/// When the system refuses; `path` is then as it was, or, where the folder could not be synced, new.
+pub(super) fn replace(files: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let aside = unfinished(path);
+    let write = || {
+        let mut file = files.create(&aside)?;
+        file.append(bytes)?;
+        file.sync()?;
+        drop(file);
+        files.rename(&aside, path)?;
+        files.sync(folder_of(path))
+    };
+    write().map_err(StoreError::io(path))
+}
+
+/// Removes what a crash left unfinished in `folder`.
+///
+/// # Errors
+/// When the system refuses.
+pub(super) fn sweep(files: &dyn FileSystem, folder: &Path) -> Result<(), StoreError> {
+    for name in files.list(folder).map_err(StoreError::io(folder))? {
+        if name.starts_with(UNFINISHED) {
+            let path = folder.join(name);
+            files.remove(&path).or_else(|_| files.remove_folder(&path)).map_err(StoreError::io(&path))?;
+        }
+    }
+    Ok(())
+}
+
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}

@@ -1,0 +1,112 @@
+//! A change as its bytes: made where there is time for it, before its revision is known.
+
+use prost::Message;
+
+use crate::map::Change;
+use crate::store::codec::Unreadable;
+use crate::store::pb;
+
+/// Bytes that a record may have before compression. Beyond it no memory is taken: taking out a whole map of the
+/// largest size allowed by default is a tenth of it.
+pub const RECORD_BYTES_MAX: usize = 2 << 30;
+/// The fastest: gaps and octrees have left little to find.
+const ZSTD_LEVEL: i32 = 1;
+
+/// A change, encoded (`proto/mrol/store/v1/records.proto`), compressed and checksummed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Record {
+    /// A zstd frame.
+    pub(super) payload: Vec<u8>,
+    /// Before compression.
+    pub(super) bytes: u32,
+    /// CRC-32C of the payload.
+    pub(super) checksum: u32,
+}
+
+impl Record {
+    /// The record of `change`.
+    ///
+    /// # Errors
+    /// When it is larger than [`RECORD_BYTES_MAX`], or there is no memory to compress it.
+    pub fn of(change: &Change) -> Result<Self, String> {
+        let message = pb::Change::from(change).encode_to_vec();
+        if message.len() > RECORD_BYTES_MAX {
+            return Err(format!("a record of {} bytes, at most {RECORD_BYTES_MAX} are kept", message.len()));
+        }
+        let payload = zstd::bulk::compress(&message, ZSTD_LEVEL).map_err(|e| e.to_string())?;
+        let checksum = crc32c::crc32c(&payload);
+        Ok(Self { payload, bytes: message.len() as u32, checksum })
+    }
+
+    /// Bytes that it takes in the journal, but for its frame.
+    pub fn len(&self) -> usize {
+        self.payload.len()
+    }
+
+    /// False: a record has at least its kind.
+    pub fn is_empty(&self) -> bool {
+        self.payload.is_empty()
+    }
+}
+
+/// The change of a record whose checksum was right.
+pub(super) fn change_of(payload: &[u8], bytes: u32) -> Result<Change, Unreadable> {
+    if bytes as usize > RECORD_BYTES_MAX {
+        return Err(format!("a record of {bytes} bytes, at most {RECORD_BYTES_MAX} are read"));
+    }
+    let message = zstd::bulk::decompress(payload, bytes as usize).map_err(|e| e.to_string())?;
+    pb::Change::decode(&message[..]).map_err(|e| e.to_string())?.try_into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::map::{DeletionRecord, Request, RequestId, RobotName, ScanRecord, TrajectoryPose, UndoRecord};
+    use crate::voxel::{VoxelKey, VoxelSet};
+
+    fn voxels(n: i32) -> VoxelSet {
+        (0..n).filter_map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3])).collect()
+    }
+
+    #[test]
+    fn every_kind_of_change_survives_its_record() {
+        let pose = TrajectoryPose {
+            scan_id: Some(7),
+            timestamp_ns: Some(-5),
+            level_overlaps: vec![0.1, 1.0 / 3.0],
+            iterations: 12,
+            points_skipped: 3,
+            digest: u64::MAX,
+            ..TrajectoryPose::new(RobotName::new("r1").unwrap(), Pose::translation(0.1, -2.0, 1.0 / 3.0))
+        };
+        let request = Some(Request { id: RequestId::new("x-1").unwrap(), digest: 3 });
+        for change in [
+            Change::Insertion(ScanRecord { pose, voxels: voxels(5000) }),
+            Change::Deletion(DeletionRecord { voxels: voxels(10), request: None }),
+            Change::Undo(UndoRecord { scans: vec![3, 9], voxels: voxels(0), request }),
+        ] {
+            let record = Record::of(&change).unwrap();
+            assert_eq!(change_of(&record.payload, record.bytes).unwrap(), change);
+        }
+    }
+
+    #[test]
+    fn a_scan_of_a_surface_takes_less_than_two_bits_a_voxel() {
+        let surface =
+            (0..300 * 300).filter_map(|i| VoxelKey::new([i % 300, i / 300, (i % 300 + i / 300) / 40]));
+        let record =
+            Record::of(&Change::Deletion(DeletionRecord { voxels: surface.collect(), request: None }))
+                .unwrap();
+        assert!(record.len() * 8 < 2 * 300 * 300, "{} bytes", record.len());
+    }
+
+    #[test]
+    fn a_length_that_is_a_lie_is_an_error() {
+        let record =
+            Record::of(&Change::Deletion(DeletionRecord { voxels: voxels(9), request: None })).unwrap();
+        assert!(change_of(&record.payload, record.bytes - 1).is_err());
+        assert!(change_of(&record.payload, u32::MAX).unwrap_err().contains("at most"));
+        assert!(change_of(b"garbage", 100).is_err());
+    }
+}

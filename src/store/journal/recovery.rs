@@ -1,0 +1,175 @@
+//! What is made of a journal after a crash.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::segment::{self, Break, Frames};
+use super::segmented::{Place, SegmentedJournal};
+use crate::map::Change;
+use crate::store::{FileSystem, OpeningProgress, StoreError};
+
+/// What was found in a journal behind a snapshot.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Recovered {
+    /// Changes that were made again.
+    pub replayed: u64,
+    /// Bytes of journal that they take.
+    pub bytes: u64,
+    /// The end that was cut off: it had never been written to its end, and so never been acknowledged.
+    pub cut: Option<Cut>,
+    /// Damage that does no harm, since the snapshot holds what was there.
+    pub harmless: Option<String>,
+}
+
+/// An end that was cut off.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cut {
+    /// The segment.
+    pub path: PathBuf,
+    /// What is left of it.
+    pub offset: u64,
+    /// What was cut off.
+    pub bytes: u64,
+    /// What was wrong with it.
+    pub reason: String,
+}
+
+/// What recovery goes by.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::store) struct Known {
+    /// The snapshot's revision: what comes after it is replayed.
+    pub(in crate::store) snapshot: u64,
+    /// Everything up to here had been durable: a snapshot of it was written, readable or not.
+    pub(in crate::store) durable: u64,
+}
+
+impl SegmentedJournal {
+    /// Opens the segments in `folder` and hands every change after the snapshot to `replay`, in order.
+    ///
+    /// A torn end is cut off. What was read is synced, since a crash may have left it unsynced, and from now on it
+    /// is seen.
+    ///
+    /// # Errors
+    /// When the system refuses; when a revision is missing or unreadable that may have been acknowledged; when
+    /// `replay` fails.
+    pub(in crate::store) fn recover(
+        files: Arc<dyn FileSystem>,
+        folder: &Path,
+        map: Uuid,
+        known: Known,
+        segment_bytes_max: u64,
+        progress: &OpeningProgress,
+        mut replay: impl FnMut(u64, Change) -> Result<(), String>,
+    ) -> Result<(Self, Recovered), StoreError> {
+        let names = files.list(folder).map_err(StoreError::io(folder))?;
+        let segments: Vec<u64> = names.iter().filter_map(|name| segment::first_revision(name)).collect();
+        let place = Place { files, folder: folder.to_owned(), map };
+        let mut journal = Self::at(place, segments, known.snapshot, segment_bytes_max);
+        let mut recovered = Recovered::default();
+        let needed = journal.segments.partition_point(|&first| first <= known.snapshot + 1);
+        let needed = journal.segments[needed.saturating_sub(1)..].to_vec();
+        let mut expected = needed.first().map_or(known.snapshot + 1, |&first| first.min(known.snapshot + 1));
+        for (i, &first) in needed.iter().enumerate() {
+            let path = journal.place.path(first);
+            if first != expected && first > known.snapshot + 1 {
+                return Err(missing(&path, expected, first));
+            }
+            let bytes = journal.place.read(&path)?;
+            progress.read(bytes.len() as u64);
+            let mut segment = Segment { path: &path, bytes: &bytes, first, last: i + 1 == needed.len() };
+            expected = segment.replay(&journal.place, known, &mut recovered, &mut replay)?;
+        }
+        journal.head = known.snapshot.max(expected - 1);
+        journal.durable = journal.head;
+        journal.forget_empty_segment(&recovered)?;
+        Ok((journal, recovered))
+    }
+
+    /// After a cut before the first frame, there is no file.
+    fn forget_empty_segment(&mut self, recovered: &Recovered) -> Result<(), StoreError> {
+        if recovered.cut.as_ref().is_some_and(|cut| cut.offset == 0) {
+            self.segments.pop();
+        }
+        Ok(())
+    }
+}
+
+fn missing(path: &Path, expected: u64, first: u64) -> StoreError {
+    StoreError::at(path, 0, expected, format!("it begins with revision {first}, those before it are missing"))
+}
+
+/// A segment that is read again.
+struct Segment<'a> {
+    path: &'a Path,
+    bytes: &'a [u8],
+    first: u64,
+    /// No other comes after it.
+    last: bool,
+}
+
+impl Segment<'_> {
+    /// Hands its changes after the snapshot to `replay`; the revision expected next.
+    fn replay(
+        &mut self,
+        place: &Place,
+        known: Known,
+        recovered: &mut Recovered,
+        replay: &mut impl FnMut(u64, Change) -> Result<(), String>,
+    ) -> Result<u64, StoreError> {
+        let mut frames = match Frames::of(self.bytes, place.map, self.first) {
+            Ok(frames) => frames,
+            Err(broken) => return self.ends_with(broken, place, known, recovered),
+        };
+        loop {
+            let at = frames.offset();
+            let frame = match frames.next(self.bytes) {
+                Ok(Some(frame)) => frame,
+                Ok(None) => break,
+                Err(broken) => return self.ends_with(broken, place, known, recovered),
+            };
+            if frame.revision > known.snapshot {
+                let made = frame.change().and_then(|change| replay(frame.revision, change));
+                made.map_err(|reason| StoreError::at(self.path, at, frame.revision, reason))?;
+                recovered.replayed += 1;
+                recovered.bytes += frame.len() as u64;
+            }
+        }
+        if self.last {
+            place.files.sync(self.path).map_err(StoreError::io(self.path))?;
+        }
+        Ok(frames.next_revision())
+    }
+
+    /// What can be done about a segment that breaks off; the revision expected next.
+    fn ends_with(
+        &self,
+        broken: Break,
+        place: &Place,
+        known: Known,
+        recovered: &mut Recovered,
+    ) -> Result<u64, StoreError> {
+        let needed = broken.last_behind.unwrap_or(broken.revision) > known.snapshot;
+        let revision = broken.revision;
+        if self.last && broken.torn && revision > known.durable {
+            recovered.cut = Some(self.cut(broken, place)?);
+            Ok(revision)
+        } else if self.last && revision <= known.snapshot && !needed {
+            recovered.harmless = Some(broken.of(self.path).to_string());
+            Ok(known.snapshot + 1)
+        } else {
+            Err(broken.of(self.path))
+        }
+    }
+
+    fn cut(&self, broken: Break, place: &Place) -> Result<Cut, StoreError> {
+        let (offset, bytes) = (broken.offset as u64, self.bytes.len() as u64);
+        let cut = || match offset {
+            0 => place.files.remove(self.path).and_then(|()| place.files.sync(&place.folder)),
+            _ => place.files.truncate(self.path, offset).and_then(|()| place.files.sync(self.path)),
+        };
+        cut().map_err(StoreError::io(self.path))?;
+        Ok(Cut { path: self.path.to_owned(), offset, bytes: bytes - offset, reason: broken.reason })
+    }
+}

@@ -1,0 +1,148 @@
+//! A file of the journal: frames of consecutive revisions.
+//!
+//! ```text
+//! offset  bytes
+//!      0  8      magic "MROL-JNL"
+//!      8  4      format version, u32 little-endian: 1
+//!     12  4      CRC-32C of bytes 16 to 64, u32 little-endian
+//!     16  16     uuid of the map
+//!     32  8      revision of the first frame, u64 little-endian
+//!     40  24     zero
+//!     64  rest   frames, see `frame.rs`
+//! ```
+//!
+//! Its name, `journal-REVISION.log`, repeats the first revision in 20 digits, so that names sort as revisions do.
+
+use std::path::Path;
+
+use uuid::Uuid;
+
+use super::frame::{self, Frame};
+use crate::store::StoreError;
+
+/// The version that this build writes; it reads this one and all before.
+pub const JOURNAL_VERSION: u32 = 1;
+const MAGIC: &[u8; 8] = b"MROL-JNL";
+const CHECKED_FROM: usize = 16;
+pub(super) const HEADER_BYTES: usize = 64;
+
+/// The name of the segment that begins with revision `first`.
+pub(super) fn file_name(first: u64) -> String {
+    format!("journal-{first:020}.log")
+}
+
+/// The first revision of the segment of that name, where it is one's.
+pub(crate) fn first_revision(name: &str) -> Option<u64> {
+    name.strip_prefix("journal-")?.strip_suffix(".log")?.parse().ok()
+}
+
+/// What a segment begins with.
+pub(super) fn header(map: Uuid, first: u64) -> Vec<u8> {
+    let checked = [&map.as_bytes()[..], &first.to_le_bytes(), &[0; 24]].concat();
+    let (version, checksum) = (JOURNAL_VERSION.to_le_bytes(), crc32c::crc32c(&checked).to_le_bytes());
+    [&MAGIC[..], &version, &checksum, &checked].concat()
+}
+
+/// Where a segment ends to be one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Break {
+    /// The first byte that is wrong.
+    pub(crate) offset: usize,
+    /// The revision that should stand there.
+    pub(crate) revision: u64,
+    /// The largest revision that a frame behind it has.
+    pub(crate) last_behind: Option<u64>,
+    pub(crate) reason: String,
+    /// Nothing that is known to have been durable is lost with it: a crash while it was written explains it.
+    pub(crate) torn: bool,
+}
+
+/// Where the reading of a segment's frames has come to; its bytes are handed in at each step.
+#[derive(Debug)]
+pub(super) struct Frames {
+    map: Uuid,
+    offset: usize,
+    revision: u64,
+}
+
+impl Frames {
+    /// Before the first frame of the segment `bytes` of the map `map`, whose name says that it begins with revision
+    /// `first`.
+    pub(super) fn of(bytes: &[u8], map: Uuid, first: u64) -> Result<Self, Break> {
+        let frames = Self { map, offset: HEADER_BYTES, revision: first };
+        let blank = bytes.iter().all(|&byte| byte == 0);
+        let expected = header(map, first);
+        let Some((header, _)) = bytes.split_at_checked(HEADER_BYTES) else {
+            let reason = format!("a segment's header of {HEADER_BYTES} bytes is cut short");
+            return Err(frames.broken(bytes, 0, reason, blank || expected.starts_with(bytes)));
+        };
+        match check_header(header, &expected) {
+            Ok(()) => Ok(frames),
+            Err(reason) => Err(frames.broken(bytes, 0, reason, blank)),
+        }
+    }
+
+    /// The next frame; none at the segment's end.
+    pub(super) fn next<'a>(&mut self, bytes: &'a [u8]) -> Result<Option<Frame<'a>>, Break> {
+        match frame::read(bytes, self.offset, self.map) {
+            Ok(Some(frame)) if frame.revision == self.revision => {
+                self.offset += frame.len();
+                self.revision += 1;
+                Ok(Some(frame))
+            }
+            Ok(Some(frame)) => {
+                let reason = format!("revision {} where {} should be", frame.revision, self.revision);
+                Err(self.broken(bytes, self.offset, reason, false))
+            }
+            Ok(None) => Ok(None),
+            Err(bad) => Err(self.broken(bytes, self.offset, bad.reason, bad.torn)),
+        }
+    }
+
+    /// Bytes that were read.
+    pub(super) fn offset(&self) -> usize {
+        self.offset
+    }
+
+    /// The revision that comes next.
+    pub(super) fn next_revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Something is wrong at `offset`. A crash tore it only where no frame behind it knows it to have been durable.
+    fn broken(&self, bytes: &[u8], offset: usize, reason: String, torn: bool) -> Break {
+        let behind = frame::newest_behind(bytes, offset + 1, self.map);
+        let was_durable = behind.is_some_and(|newest| newest.durable >= self.revision);
+        let (revision, torn) = (self.revision, torn && !was_durable);
+        Break { offset, revision, last_behind: behind.map(|newest| newest.revision), reason, torn }
+    }
+}
+
+fn check_header(header: &[u8], expected: &[u8]) -> Result<(), String> {
+    if header[..8] != MAGIC[..] {
+        return Err("not a journal: it does not begin with MROL-JNL".into());
+    }
+    let version = u32::from_le_bytes(std::array::from_fn(|i| header[8 + i]));
+    if version == 0 || version > JOURNAL_VERSION {
+        return Err(format!(
+            "format version {version}, this build reads 1 to {JOURNAL_VERSION}: use a newer one"
+        ));
+    }
+    let stored = u32::from_le_bytes(std::array::from_fn(|i| header[12 + i]));
+    if crc32c::crc32c(&header[CHECKED_FROM..]) != stored {
+        return Err("the segment's header has a wrong checksum".into());
+    }
+    if header[CHECKED_FROM..] != expected[CHECKED_FROM..] {
+        return Err(
+            "another map's, or renamed: uuid or first revision differ from the snapshot and the name".into(),
+        );
+    }
+    Ok(())
+}
+
+impl Break {
+    /// As an error of the segment at `path`.
+    pub(super) fn of(self, path: &Path) -> StoreError {
+        StoreError::at(path, self.offset, self.revision, self.reason)
+    }
+}

@@ -1,0 +1,271 @@
+//! A journal of files.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use uuid::Uuid;
+
+use super::segment::{self, Frames};
+use super::{Changes, Journal, Record, Revised, frame};
+use crate::store::{Appending, FileSystem, StoreError};
+
+/// A journal as segments in a map's folder. It appends to segments that it began itself, never to one it found.
+#[derive(Debug)]
+pub struct SegmentedJournal {
+    pub(super) place: Place,
+    /// The first revisions of the segments, ascending.
+    pub(super) segments: Vec<u64>,
+    active: Option<Active>,
+    pub(super) head: u64,
+    /// The last revision that is known to be durable.
+    pub(super) durable: u64,
+    /// Why it takes nothing more.
+    stopped: Option<String>,
+    segment_bytes_max: u64,
+    used: JournalUse,
+}
+
+/// What a journal has done since it was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct JournalUse {
+    /// Records appended.
+    pub records: u64,
+    /// Bytes appended, frames included.
+    pub bytes: u64,
+    /// Times that it was synced.
+    pub syncs: u64,
+    /// How long that took.
+    pub sync_time: Duration,
+}
+
+/// Where a map's segments are.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    pub(super) files: Arc<dyn FileSystem>,
+    pub(super) folder: PathBuf,
+    pub(super) map: Uuid,
+}
+
+/// The segment that is appended to.
+#[derive(Debug)]
+struct Active {
+    file: Box<dyn Appending>,
+    path: PathBuf,
+    bytes: u64,
+}
+
+impl SegmentedJournal {
+    pub(super) fn at(place: Place, segments: Vec<u64>, head: u64, segment_bytes_max: u64) -> Self {
+        Self {
+            place,
+            segments,
+            active: None,
+            head,
+            durable: head,
+            stopped: None,
+            segment_bytes_max,
+            used: JournalUse::default(),
+        }
+    }
+
+    /// What it has done since it was opened.
+    pub fn used(&self) -> JournalUse {
+        self.used
+    }
+
+    /// The last revision that is known to be durable.
+    pub fn durable(&self) -> u64 {
+        self.durable
+    }
+
+    /// The first revision that can be read; none without a segment.
+    pub fn tail(&self) -> Option<u64> {
+        self.segments.first().copied()
+    }
+
+    /// Ends the present segment: what comes next begins another, so that this one can be forgotten as a whole.
+    ///
+    /// # Errors
+    /// As for [`Journal::sync`].
+    pub fn end_segment(&mut self) -> Result<(), StoreError> {
+        self.sync()?;
+        self.active = None;
+        Ok(())
+    }
+
+    /// Does what may fail; after a failure nobody knows what the disk holds, so nothing more is taken.
+    fn or_stop<T>(&mut self, act: impl FnOnce(&mut Self) -> Result<T, StoreError>) -> Result<T, StoreError> {
+        if let Some(reason) = &self.stopped {
+            return Err(StoreError::JournalStopped(reason.clone()));
+        }
+        act(self).inspect_err(|error| {
+            self.active = None;
+            self.stopped = Some(error.to_string());
+        })
+    }
+
+    fn write(&mut self, records: &[&Record]) -> Result<u64, StoreError> {
+        if self.active.as_ref().is_none_or(|active| active.bytes >= self.segment_bytes_max) {
+            self.sync_active()?;
+            self.active = Some(self.begin_segment()?);
+        }
+        let mut bytes = Vec::with_capacity(records.iter().map(|record| frame::length_of(record.len())).sum());
+        for (revision, record) in (self.head + 1..).zip(records) {
+            frame::write(record, revision, self.durable, self.place.map, &mut bytes);
+        }
+        if let Some(active) = &mut self.active {
+            active.file.append(&bytes).map_err(StoreError::io(&active.path))?;
+            active.bytes += bytes.len() as u64;
+        }
+        self.head += records.len() as u64;
+        self.used.records += records.len() as u64;
+        self.used.bytes += bytes.len() as u64;
+        Ok(self.head)
+    }
+
+    fn begin_segment(&mut self) -> Result<Active, StoreError> {
+        let first = self.head + 1;
+        let path = self.place.path(first);
+        let make = || {
+            let header = segment::header(self.place.map, first);
+            let mut file = self.place.files.create(&path)?;
+            file.append(&header)?;
+            file.sync()?;
+            self.place.files.sync(&self.place.folder)?;
+            Ok((file, header.len() as u64))
+        };
+        let (file, bytes) = make().map_err(StoreError::io(&path))?;
+        // One without a frame, left by a crash, has the same name.
+        if self.segments.last() != Some(&first) {
+            self.segments.push(first);
+        }
+        Ok(Active { file, path, bytes })
+    }
+
+    fn sync_active(&mut self) -> Result<(), StoreError> {
+        if let Some(active) = &mut self.active
+            && self.durable < self.head
+        {
+            let start = Instant::now();
+            active.file.sync().map_err(StoreError::io(&active.path))?;
+            self.used.syncs += 1;
+            self.used.sync_time += start.elapsed();
+            self.durable = self.head;
+        }
+        Ok(())
+    }
+}
+
+impl Journal for SegmentedJournal {
+    fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError> {
+        self.or_stop(|journal| journal.write(records))
+    }
+
+    fn sync(&mut self) -> Result<(), StoreError> {
+        self.or_stop(Self::sync_active)
+    }
+
+    fn head(&self) -> u64 {
+        self.head
+    }
+
+    fn read_from(&self, revision: u64) -> Changes {
+        let first = self.segments.partition_point(|&first| first <= revision).saturating_sub(1);
+        Box::new(Reader {
+            place: self.place.clone(),
+            segments: self.segments[first..].iter().copied().collect(),
+            revision,
+            head: self.head,
+            open: None,
+        })
+    }
+
+    fn truncate_before(&mut self, revision: u64) -> Result<(), StoreError> {
+        // A segment goes when the next one begins early enough.
+        while self.segments.get(1).is_some_and(|&next| next <= revision) {
+            let path = self.place.path(self.segments[0]);
+            self.place.files.remove(&path).map_err(StoreError::io(&path))?;
+            self.segments.remove(0);
+        }
+        self.place.files.sync(&self.place.folder).map_err(StoreError::io(&self.place.folder))
+    }
+}
+
+impl Place {
+    pub(super) fn path(&self, first: u64) -> PathBuf {
+        self.folder.join(segment::file_name(first))
+    }
+
+    pub(super) fn read(&self, path: &Path) -> Result<Vec<u8>, StoreError> {
+        self.files.read(path).map_err(StoreError::io(path))
+    }
+}
+
+/// Changes read segment by segment.
+struct Reader {
+    place: Place,
+    segments: VecDeque<u64>,
+    /// The next to hand out.
+    revision: u64,
+    /// The last to hand out.
+    head: u64,
+    open: Option<OpenSegment>,
+}
+
+struct OpenSegment {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    frames: Frames,
+}
+
+impl Iterator for Reader {
+    type Item = Result<Revised, StoreError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.revision > self.head {
+            return None;
+        }
+        let change = self.read();
+        match &change {
+            Ok(_) => self.revision += 1,
+            // Nothing comes after a failure.
+            Err(_) => self.revision = u64::MAX,
+        }
+        Some(change)
+    }
+}
+
+impl Reader {
+    fn read(&mut self) -> Result<Revised, StoreError> {
+        loop {
+            let Some(OpenSegment { path, bytes, frames }) = &mut self.open else {
+                self.open = Some(self.next_segment()?);
+                continue;
+            };
+            let at = frames.offset();
+            match frames.next(bytes).map_err(|broken| broken.of(path))? {
+                Some(frame) if frame.revision == self.revision => {
+                    let change = frame.change();
+                    let change = change.map_err(|reason| StoreError::at(path, at, self.revision, reason))?;
+                    return Ok((self.revision, change));
+                }
+                Some(_) => {}
+                None => self.open = None,
+            }
+        }
+    }
+
+    fn next_segment(&mut self) -> Result<OpenSegment, StoreError> {
+        let missing = || {
+            let reason = format!("revision {} is no longer kept", self.revision);
+            StoreError::damaged(&self.place.folder, reason)
+        };
+        let first = self.segments.pop_front().filter(|&first| first <= self.revision).ok_or_else(missing)?;
+        let path = self.place.path(first);
+        let bytes = self.place.read(&path)?;
+        let frames = Frames::of(&bytes, self.place.map, first).map_err(|broken| broken.of(&path))?;
+        Ok(OpenSegment { path, bytes, frames })
+    }
+}

@@ -1,0 +1,51 @@
+//! How far the opening of the maps has come.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Counted by who opens maps, read by who asks whether the server is ready.
+#[derive(Debug, Default)]
+pub struct OpeningProgress {
+    bytes: AtomicU64,
+    bytes_read: AtomicU64,
+    maps: AtomicU64,
+    maps_open: AtomicU64,
+}
+
+/// How far it has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Opened {
+    /// Bytes of the snapshots and journals that have to be read.
+    pub bytes: u64,
+    /// Those that were.
+    pub bytes_read: u64,
+    /// Maps there are.
+    pub maps: u64,
+    /// Those that are open.
+    pub maps_open: u64,
+}
+
+impl OpeningProgress {
+    /// How far it has come.
+    pub fn opened(&self) -> Opened {
+        Opened {
+            bytes: self.bytes.load(Relaxed),
+            bytes_read: self.bytes_read.load(Relaxed),
+            maps: self.maps.load(Relaxed),
+            maps_open: self.maps_open.load(Relaxed),
+        }
+    }
+
+    /// One more map of so many bytes will be opened.
+    pub(super) fn expect_map(&self, bytes: u64) {
+        self.maps.fetch_add(1, Relaxed);
+        self.bytes.fetch_add(bytes, Relaxed);
+    }
+
+    pub(super) fn read(&self, bytes: u64) {
+        self.bytes_read.fetch_add(bytes, Relaxed);
+    }
+
+    pub(super) fn map_is_open(&self) {
+        self.maps_open.fetch_add(1, Relaxed);
+    }
+}

@@ -1,0 +1,73 @@
+//! Which snapshots are kept.
+//!
+//! Two for recovery: the newest, and the one before it in case the newest is damaged. And one or two older ones for
+//! undo, which replays from a *base*: a snapshot from before the scans in question.
+//!
+//! ```text
+//!          base         next base                  older   newest
+//! ----------+--------------+-------------------------+-------+------> revisions
+//!           |<--------------- undo_revisions, at least ------------>|
+//!           |<--------------------- journal ----------------------->|
+//! ```
+
+use crate::map::WithdrawnScan;
+
+/// The revisions of the snapshots to keep, of `snapshots`, ascending. The journal is kept from the first of them on.
+pub(super) fn kept(
+    snapshots: &[u64],
+    head: u64,
+    undo_revisions: u64,
+    withdrawn: &[WithdrawnScan],
+) -> Vec<u64> {
+    let can_be_base = |snapshot: &&u64| is_base(**snapshot, withdrawn);
+    let reach = head.saturating_sub(undo_revisions);
+    let base =
+        snapshots.iter().filter(|&&snapshot| snapshot <= reach).rfind(can_be_base).or(snapshots.first());
+    // So that the base can move on without all snapshots being kept until then.
+    let next = snapshots.iter().filter(|&snapshot| Some(snapshot) > base).find(can_be_base);
+    let newest = snapshots.iter().rev().take(2);
+    let mut kept: Vec<u64> = base.into_iter().chain(next).chain(newest).copied().collect();
+    kept.sort_unstable();
+    kept.dedup();
+    kept
+}
+
+/// True when a snapshot holds nothing of a scan that was withdrawn after it: who holds which of its voxels could
+/// not be told apart.
+pub(super) fn is_base(snapshot: u64, withdrawn: &[WithdrawnScan]) -> bool {
+    withdrawn.iter().all(|withdrawn| snapshot < withdrawn.scan || withdrawn.revision <= snapshot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_are_kept_for_recovery_and_two_for_undo() {
+        let snapshots: Vec<u64> = (0..20).map(|i| i * 10).collect();
+        assert_eq!(kept(&snapshots, 195, 0, &[]), [180, 190]);
+        assert_eq!(kept(&snapshots, 195, 100, &[]), [90, 100, 180, 190]);
+        assert_eq!(kept(&snapshots, 195, 1000, &[]), [0, 10, 180, 190]);
+        assert_eq!(kept(&[7], 7, 0, &[]), [7]);
+    }
+
+    #[test]
+    fn the_base_moves_on_though_those_between_are_dropped() {
+        let (mut snapshots, undo) = (vec![0], 100);
+        for head in (10..1000).step_by(10) {
+            snapshots.push(head);
+            snapshots = kept(&snapshots, head, undo, &[]);
+            assert!(snapshots.len() <= 4);
+            let covered = head - snapshots[0];
+            assert!(covered >= undo.min(head) && covered <= 2 * undo + 20, "at {head}: {snapshots:?}");
+        }
+    }
+
+    #[test]
+    fn a_snapshot_that_holds_a_scan_withdrawn_later_is_no_base() {
+        let withdrawn = [WithdrawnScan { scan: 15, revision: 45 }];
+        let bases: Vec<u64> = (1..7).map(|i| i * 10).filter(|&s| is_base(s, &withdrawn)).collect();
+        assert_eq!(bases, [10, 50, 60]);
+        assert_eq!(kept(&[10, 20, 30, 40, 50, 60, 70], 70, 30, &withdrawn), [10, 50, 60, 70]);
+    }
+}

@@ -1,0 +1,99 @@
+//! How maps are kept.
+
+use std::fmt::{self, Display};
+use std::str::FromStr;
+use std::time::Duration;
+
+/// When a change may be acknowledged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Durability {
+    /// When it is synced: what was acknowledged survives the loss of power.
+    #[default]
+    Always,
+    /// When it is written; synced at this interval. What was acknowledged survives the end of the process at any
+    /// moment; the loss of power takes the last interval.
+    Interval(Duration),
+}
+
+/// Why a text is no [`Durability`].
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("must be \"always\" or an interval such as \"200ms\" or \"1s\", from 1ms to 1h, got {0:?}")]
+pub struct DurabilityError(String);
+
+impl FromStr for Durability {
+    type Err = DurabilityError;
+
+    fn from_str(text: &str) -> Result<Self, DurabilityError> {
+        const HOUR: Duration = Duration::from_secs(3600);
+        let number = |digits: &str| digits.parse::<u32>().ok();
+        let interval = || match text.strip_suffix("ms") {
+            Some(digits) => number(digits).map(|ms| Duration::from_millis(ms.into())),
+            None => number(text.strip_suffix('s')?).map(|s| Duration::from_secs(s.into())),
+        };
+        match text {
+            "always" => Ok(Self::Always),
+            _ => interval()
+                .filter(|interval| (Duration::from_millis(1)..=HOUR).contains(interval))
+                .map(Self::Interval)
+                .ok_or_else(|| DurabilityError(text.chars().take(64).collect())),
+        }
+    }
+}
+
+impl Display for Durability {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Always => f.write_str("always"),
+            Self::Interval(interval) => write!(f, "{}ms", interval.as_millis()),
+        }
+    }
+}
+
+/// Settings of a store.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoreSettings {
+    /// When a change may be acknowledged. Always synced.
+    pub durability: Durability,
+    /// A map is written to a snapshot after so many bytes of journal. 64 MiB.
+    pub snapshot_journal_bytes: u64,
+    /// A map that changed is written to a snapshot after so long. 5 minutes.
+    pub snapshot_interval: Duration,
+    /// Revisions behind the newest within which a scan can be undone, at least: so long the journal outlives the
+    /// snapshots. 20,000.
+    pub undo_revisions: u64,
+    /// Bytes after which a segment of the journal is ended. 64 MiB.
+    pub segment_bytes_max: u64,
+}
+
+impl Default for StoreSettings {
+    fn default() -> Self {
+        Self {
+            durability: Durability::default(),
+            snapshot_journal_bytes: 64 << 20,
+            snapshot_interval: Duration::from_secs(300),
+            undo_revisions: 20_000,
+            segment_bytes_max: 64 << 20,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_durability_is_always_or_an_interval() {
+        for (text, durability) in [
+            ("always", Durability::Always),
+            ("200ms", Durability::Interval(Duration::from_millis(200))),
+            ("3s", Durability::Interval(Duration::from_secs(3))),
+        ] {
+            assert_eq!(text.parse(), Ok(durability));
+            assert_eq!(durability.to_string().parse(), Ok(durability));
+        }
+        for bad in ["", "never", "0ms", "2h", "-1s", "3601s", "1.5s", "s", "always "] {
+            let error = bad.parse::<Durability>().unwrap_err().to_string();
+            assert!(error.contains("always") && error.contains(&format!("{bad:?}")), "{error}");
+        }
+    }
+}

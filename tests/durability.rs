@@ -1,0 +1,156 @@
+//! What is kept, what it looks like when it cannot be, and data folders of former releases.
+
+#![cfg(feature = "server")]
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use common::{Daemon, bytes_of, client, json_of, row, scan_pb};
+use mrol::http;
+use mrol::store::OpeningProgress;
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use tonic::Code;
+
+/// A copy of a folder under `tests/released`.
+fn released(folder: &str) -> tempfile::TempDir {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/released").join(folder);
+    let copy = tempfile::tempdir().unwrap();
+    copy_folder(&from, copy.path());
+    copy
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let from = entry.unwrap().path();
+        let to = to.join(from.file_name().unwrap());
+        if from.is_dir() {
+            copy_folder(&from, &to);
+        } else {
+            std::fs::copy(&from, &to).unwrap();
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_map_whose_journal_fails_is_read_only_and_says_so() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("well").await;
+    daemon.make_map("ill").await;
+    let folder = daemon.data.path().join("maps/ill");
+    std::fs::rename(&folder, daemon.data.path().join("moved")).unwrap();
+
+    let mut robot = daemon.mapping().await;
+    for _ in 0..2 {
+        let refused = robot.insert_scan(scan_pb("ill", "r", &row(3))).await.unwrap_err();
+        assert_eq!(refused.code(), Code::Unavailable);
+        assert!(refused.message().contains("map ill is read only since its journal failed"), "{refused}");
+    }
+    let refused = daemon.post("/v1/maps/ill/deletions", json!({"points": row(3)})).await;
+    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(json_of(refused).await["error"]["reason"], "map_read_only");
+
+    // Nothing came of it, reading goes on, and other maps are as they were.
+    assert_eq!(daemon.contents("ill").await, (0, vec![]));
+    let asked = daemon.post_bytes("/v1/maps/ill/occupancy", bytes_of(&row(3))).await;
+    assert_eq!(asked.status(), StatusCode::OK);
+    daemon.put_in("well", &row(3)).await;
+    let ready = json_of(daemon.get("/readyz").await).await;
+    assert_eq!((&ready["ready"], &ready["read_only"][0]["map"]), (&json!(true), &json!("ill")));
+    assert!(ready["read_only"][0]["reason"].as_str().unwrap().contains("journal-"), "{ready}");
+    let metrics = daemon.get("/metrics").await.text().await.unwrap();
+    for line in [
+        r#"mrol_map_read_only{map="ill"} 1"#,
+        r#"mrol_map_read_only{map="well"} 0"#,
+        r#"mrol_map_durable_revision{map="well"} 1"#,
+        r#"mrol_journal_records{map="well"} 1"#,
+        r#"mrol_journal_syncs{map="well"} 1"#,
+    ] {
+        assert!(metrics.contains(line), "{line} is not in\n{metrics}");
+    }
+    let map = json_of(daemon.get("/v1/maps/ill").await).await;
+    assert!(map["storage"]["read_only"].is_string(), "{map}");
+    daemon.stop().await;
+}
+
+#[tokio::test]
+async fn a_deletion_under_an_id_is_done_once_also_across_a_restart() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &row(9)).await;
+    let deletion = json!({"points": row(4), "request_id": "wall-7"});
+    let first = json_of(daemon.post("/v1/maps/a/deletions", deletion.clone()).await).await;
+    assert_eq!((&first["removed"], &first["replayed"]), (&json!(4), &json!(false)));
+    daemon.put_in("a", &row(9)).await;
+
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    let again = json_of(daemon.post("/v1/maps/a/deletions", deletion).await).await;
+    assert_eq!(again["replayed"], true);
+    assert_eq!((&again["removed"], &again["revision"]), (&first["removed"], &first["revision"]));
+    assert_eq!(daemon.contents("a").await.1.len(), 9);
+    let other = json!({"points": row(5), "request_id": "wall-7"});
+    let refused = daemon.post("/v1/maps/a/deletions", other).await;
+    assert_eq!(refused.status(), StatusCode::CONFLICT);
+    assert_eq!(json_of(refused).await["error"]["reason"], "request_id_taken");
+    let bad = daemon.post("/v1/maps/a/deletions", json!({"points": row(5), "request_id": "a/b"})).await;
+    assert_eq!(bad.status(), StatusCode::BAD_REQUEST);
+}
+
+#[tokio::test]
+async fn the_same_deletion_sent_many_times_at_once_is_done_once() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &row(9)).await;
+    let body = json!({"points": row(4), "request_id": "x"});
+    let post = client().post(daemon.url("/v1/maps/a/deletions")).json(&body);
+    let sent: Vec<_> = (0..16).map(|_| tokio::spawn(post.try_clone().unwrap().send())).collect();
+    let mut first = 0;
+    for answer in sent {
+        let answer: Value = answer.await.unwrap().unwrap().json().await.unwrap();
+        assert_eq!((&answer["removed"], &answer["revision"]), (&json!(4), &json!(2)));
+        first += usize::from(answer["replayed"] == false);
+    }
+    assert_eq!(first, 1);
+}
+
+#[tokio::test]
+async fn a_server_that_is_starting_says_how_far_it_is() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    let progress = Arc::new(OpeningProgress::default());
+    tokio::spawn(async move { axum::serve(listener, http::starting(progress)).await });
+    let get = async |path: &str| client().get(format!("http://{address}{path}")).send().await.unwrap();
+    assert_eq!(get("/livez").await.status(), StatusCode::OK);
+    let ready = get("/readyz").await;
+    assert_eq!(ready.status(), StatusCode::SERVICE_UNAVAILABLE);
+    let expected =
+        json!({"ready": false, "reason": "starting", "maps": 0, "maps_open": 0, "bytes": 0, "bytes_read": 0});
+    assert_eq!(json_of(ready).await, expected);
+    let refused = get("/v1/maps").await;
+    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(json_of(refused).await["error"]["reason"], "starting");
+}
+
+#[tokio::test]
+async fn a_data_folder_of_version_1_is_opened() {
+    let data = released("data-1");
+    for _ in 0..2 {
+        let daemon = Daemon::start_in(released("data-1"), |_| {}).await;
+        let (revision, voxels) = daemon.contents("office").await;
+        assert_eq!((revision, voxels.len()), (4, 611));
+    }
+    let daemon = Daemon::start_in(data, |_| {}).await;
+    let scans = json_of(daemon.get("/v1/maps/office/trajectory").await).await;
+    assert_eq!(scans["poses"].as_array().unwrap().len(), 3);
+    assert_eq!(scans["poses"][2]["revision"], 3);
+    assert_eq!(scans["poses"][1]["timestamp_ns"], 1001);
+    daemon.put_in("office", &row(2)).await;
+    let before = daemon.contents("office").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("office").await, before);
+    assert!(!daemon.data.path().join("maps/office.mrol").exists());
+}

@@ -1,0 +1,56 @@
+//! The daemon as a process of its own, on free ports: for tests that end it in ways no thread can be ended.
+
+#![allow(clippy::allow_attributes, dead_code, reason = "each test file uses its own part of this one")]
+#![allow(unreachable_pub, reason = "a test has no crate to reach it from")]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use serde_json::Value;
+
+/// A daemon in a process of its own.
+pub struct Process {
+    child: Child,
+    pub http: String,
+    pub grpc: String,
+}
+
+impl Process {
+    /// With its maps in `data_dir`, and more options.
+    pub fn start(data_dir: &str, options: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_mrol"))
+            .args(["serve", "--json", "--data-dir", data_dir, "--log-level", "error"])
+            .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
+            .args(options)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        let mut line = String::new();
+        let output = child.stdout.take().expect("a pipe");
+        BufReader::new(output).read_line(&mut line).expect("a line");
+        let serving: Value = serde_json::from_str(&line).expect("where it serves");
+        let address = |protocol: &str| format!("http://{}", serving[protocol].as_str().expect("an address"));
+        Self { child, http: address("http"), grpc: address("grpc") }
+    }
+
+    /// Tells it to end, as a service manager does; its exit code.
+    pub fn stop(mut self) -> Option<i32> {
+        let told = Command::new("kill").arg(self.child.id().to_string()).status().expect("kill");
+        assert!(told.success());
+        self.child.wait().expect("its end").code()
+    }
+
+    /// Ends it at once, without a chance to do anything: `kill -9`.
+    pub fn kill(mut self) {
+        self.child.kill().expect("a process that runs");
+        self.child.wait().expect("its end");
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // Where a test failed before it was stopped.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
