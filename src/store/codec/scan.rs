@@ -1,7 +1,7 @@
 //! Scans: their poses, and with their voxels.
 
 use super::{Unreadable, count, required};
-use crate::geometry::{rotation_xyzw, stored_pose, translation_m};
+use crate::geometry::{self, rotation_xyzw, translation_m};
 use crate::map::{RobotName, ScanRecord, TrajectoryPose, WithdrawnScan};
 use crate::store::pb;
 
@@ -35,7 +35,7 @@ impl TryFrom<pb::ScanPose> for TrajectoryPose {
             robot: RobotName::new(&message.robot).map_err(|e| e.to_string())?,
             scan_id: message.scan_id,
             timestamp_ns: message.timestamp_ns,
-            map_from_sensor: stored_pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?,
+            map_from_sensor: geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?,
             revision: message.revision,
             level_overlaps: message.level_overlaps,
             iterations: message.iterations,
