@@ -6,6 +6,7 @@
 pub mod align;
 pub mod compare;
 pub mod insert;
+pub mod journal;
 pub mod readers;
 pub mod stages;
 pub mod stopwatch;

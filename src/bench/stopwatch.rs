@@ -1,7 +1,7 @@
 //! Timing one piece of work again and again.
 
 use std::hint::black_box;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The times of several runs of the same work, nanoseconds an item.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -13,8 +13,13 @@ impl Runs {
         let start = Instant::now();
         // Neither begun before the clock nor left out because nobody looks at the result.
         let result = black_box(work());
-        self.0.push(start.elapsed().as_nanos() as f64 / items.max(1) as f64);
+        self.push(items, start.elapsed());
         result
+    }
+
+    /// Keeps how long a run on `items` items took, which somebody else timed.
+    pub fn push(&mut self, items: usize, elapsed: Duration) {
+        self.0.push(elapsed.as_nanos() as f64 / items.max(1) as f64);
     }
 
     /// The middle run, or the mean of the two middle ones: what another program does on the same core now and then

@@ -2,6 +2,7 @@
 
 mod align;
 mod insert;
+mod journal;
 mod lookup;
 mod readers;
 mod serve;
@@ -19,6 +20,7 @@ EXAMPLES:
   mrol bench lookup --workload site --order scan      the same on ten million voxels, as a sensor asks
   mrol bench lookup --voxels map.ply --points scan.ply --resolution 0.05
   mrol bench insert --workload site
+  mrol bench journal --workload site                  what it costs that nothing is lost
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench serve                                    a load of point queries on a server of its own
@@ -38,6 +40,7 @@ pub(super) struct Bench {
 enum What {
     Lookup(lookup::Lookup),
     Insert(insert::Insert),
+    Journal(journal::Journal),
     Align(align::Align),
     Readers(readers::Readers),
     Serve(serve::Serve),
@@ -48,6 +51,7 @@ impl Bench {
         match self.what {
             What::Lookup(lookup) => lookup.run(&output),
             What::Insert(insert) => insert.run(&output),
+            What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
             What::Readers(readers) => readers.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),
