@@ -17,7 +17,7 @@ use mrol::align::Guess;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RequestId, RobotName};
-use mrol::service::{Deletion, DeletionTarget, ScanRequest};
+use mrol::service::{Deletion, DeletionTarget, ScanRequest, Undo, UndoTarget};
 use mrol::voxel::{Lattice, VoxelKey};
 use process::Process;
 use rand::{Rng, RngExt, SeedableRng};
@@ -43,6 +43,7 @@ fn office() -> MapName {
 enum Wish {
     Insert { scan_id: u64, points: Vec<Point> },
     Delete { request_id: RequestId, keys: Vec<VoxelKey> },
+    Undo { request_id: RequestId, scan_id: u64 },
 }
 
 /// A wish that was acknowledged.
@@ -77,8 +78,15 @@ impl Writer {
     fn wish(&mut self) -> Wish {
         self.next_id += 1;
         let id = self.next_id;
+        let request_id = RequestId::new(&format!("{}-{id}", self.robot())).unwrap();
+        if id.is_multiple_of(7) {
+            // The last scan before it: others may have seen its voxels too.
+            return Wish::Undo {
+                request_id,
+                scan_id: if (id - 1).is_multiple_of(5) { id - 2 } else { id - 1 },
+            };
+        }
         if id.is_multiple_of(5) {
-            let request_id = RequestId::new(&format!("{}-{id}", self.robot())).unwrap();
             let keys = (0..40).filter_map(|_| VoxelKey::new(index(&mut self.rng))).collect();
             return Wish::Delete { request_id, keys };
         }
@@ -110,9 +118,16 @@ impl Writer {
                 let answer = client.delete_voxels(&office(), deletion).await?;
                 (answer.state, answer.removed)
             }
+            Wish::Undo { request_id, scan_id } => {
+                let target = UndoTarget::Scan { robot: self.robot(), scan_id: *scan_id };
+                let undo = Undo { target, request_id: Some(request_id.clone()) };
+                let answer = client.undo_scans(&office(), undo).await?;
+                assert_eq!(answer.scans, 1);
+                (answer.state, answer.removed)
+            }
         };
         self.pending = None;
-        if voxels > 0 || matches!(wish, Wish::Insert { .. }) {
+        if voxels > 0 || !matches!(wish, Wish::Delete { .. }) {
             let done = Done { writer: self.number, wish, voxels };
             assert!(self.done.insert(state.revision, done).is_none(), "a revision came twice");
         }
@@ -136,11 +151,11 @@ fn index(rng: &mut impl Rng) -> [i32; 3] {
     [rng.random_range(-60..60), rng.random_range(-60..60), rng.random_range(-8..8)]
 }
 
-/// A plain set of voxels, and who is in the trajectory.
+/// Which scans hold each voxel, and who is in the trajectory.
 #[derive(Default)]
 struct Model {
     revision: u64,
-    voxels: BTreeSet<VoxelKey>,
+    holders: BTreeMap<VoxelKey, BTreeSet<u64>>,
     trajectory: Vec<(u64, String, Option<u64>)>,
 }
 
@@ -151,25 +166,39 @@ impl Model {
         for (revision, Done { writer, wish, voxels }) in done {
             assert_eq!(revision, self.revision + 1, "a revision that nobody was told of");
             self.revision = revision;
-            let before = self.voxels.len();
+            let before = self.holders.len();
             match wish {
                 Wish::Insert { scan_id, points } => {
-                    self.voxels.extend(points.iter().map(|&point| quantise.key(point).unwrap()));
+                    for &point in &points {
+                        self.holders.entry(quantise.key(point).unwrap()).or_default().insert(revision);
+                    }
                     self.trajectory.push((revision, format!("robot-{writer}"), Some(scan_id)));
                 }
                 Wish::Delete { keys, .. } => keys.iter().for_each(|key| {
-                    self.voxels.remove(key);
+                    self.holders.remove(key);
                 }),
+                Wish::Undo { scan_id, .. } => self.undo(&format!("robot-{writer}"), scan_id),
             }
-            assert_eq!(self.voxels.len().abs_diff(before), voxels, "at revision {revision}");
+            assert_eq!(self.holders.len().abs_diff(before), voxels, "at revision {revision}");
         }
+    }
+
+    fn undo(&mut self, robot: &str, scan_id: u64) {
+        let is_meant = |(_, who, id): &(u64, String, Option<u64>)| who == robot && *id == Some(scan_id);
+        let place = self.trajectory.iter().position(is_meant).expect("an accepted scan");
+        let (scan, ..) = self.trajectory.remove(place);
+        self.holders.retain(|_, holders| {
+            holders.remove(&scan);
+            !holders.is_empty()
+        });
     }
 
     async fn assert_equals(&self, client: &Client, round: usize) {
         let listing = client.list_voxels(&office(), 0, None).await.unwrap();
         assert_eq!(listing.state.revision, self.revision, "round {round}");
         let found: BTreeSet<VoxelKey> = listing.keys.into_iter().collect();
-        assert!(found == self.voxels, "round {round}: {} voxels, not {}", found.len(), self.voxels.len());
+        let count = self.holders.len();
+        assert!(found.iter().eq(self.holders.keys()), "round {round}: {} voxels, not {count}", found.len());
         let poses = client.trajectory(&office(), None).await.unwrap().poses;
         let found: Vec<_> =
             poses.into_iter().map(|pose| (pose.revision, pose.robot.to_string(), pose.scan_id)).collect();
@@ -238,7 +267,7 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
          damaged snapshot",
         rounds(),
         model.revision,
-        model.voxels.len()
+        model.holders.len()
     );
     assert!(unanswered > 0 && damaged > 0, "{unanswered} unanswered, {damaged} damaged");
 }

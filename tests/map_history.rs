@@ -3,13 +3,14 @@
 #![cfg(feature = "client")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-use std::collections::BTreeSet;
+mod plain_set;
 
 use mrol::bloom::FilterSettings;
 use mrol::geometry::Pose;
 use mrol::map::{MapSettings, MultiResolutionMap, Region, RobotName, ScanRecord, TrajectoryPose};
 use mrol::store::Snapshot;
 use mrol::voxel::{VoxelKey, VoxelSet};
+use plain_set::{PlainSet as Model, assert_equal, up};
 use proptest::prelude::*;
 use uuid::Uuid;
 
@@ -43,12 +44,6 @@ fn change() -> impl Strategy<Value = Change> {
 
 fn pose_of(robot: &str) -> TrajectoryPose {
     TrajectoryPose::new(RobotName::new(robot).unwrap(), Pose::identity())
-}
-
-type Model = BTreeSet<[i32; 3]>;
-
-fn up(index: [i32; 3], level: u32) -> [i32; 3] {
-    index.map(|i| i >> level)
 }
 
 /// Makes the change on the map; the voxels that it added or removed.
@@ -109,30 +104,6 @@ fn apply_to_model(model: &mut Model, change: &Change, levels: u32) -> usize {
         Change::Restart => {}
     }
     before.abs_diff(model.len())
-}
-
-fn assert_equal(map: &MultiResolutionMap, model: &Model) {
-    let view = map.view();
-    for level in 0..map.settings().levels {
-        let expected: Model = model.iter().map(|&i| up(i, level)).collect();
-        let found: Model = view.lists(level).flat_map(|list| list.iter()).map(VoxelKey::index).collect();
-        assert_eq!(found, expected, "level {level}");
-        assert_eq!(map.voxels(level), expected.len());
-        for list in view.lists(level) {
-            assert!(
-                list.iter().all(|voxel| list.contains(voxel)),
-                "the filter denies a voxel of level {level}"
-            );
-            assert!(
-                list.filter().is_recount_of(list.iter().map(VoxelKey::to_bits)),
-                "counters of level {level}"
-            );
-        }
-        for &i in model.iter().take(20) {
-            let neighbour = VoxelKey::new(up(i, level).map(|c| c + 1)).unwrap();
-            assert_eq!(view.contains(neighbour, level), expected.contains(&neighbour.index()));
-        }
-    }
 }
 
 proptest! {

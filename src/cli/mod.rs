@@ -23,6 +23,7 @@ mod scan_report;
 mod serve;
 mod statistics;
 mod truth;
+mod undo;
 
 use std::process::ExitCode;
 
@@ -61,6 +62,7 @@ enum Command {
     Insert(insert::Insert),
     Query(query::Query),
     Delete(delete::Delete),
+    Undo(undo::UndoScans),
     Maps(maps::Maps),
     Bench(bench::Bench),
     Experiment(experiment::Experiment),
@@ -92,6 +94,7 @@ impl Command {
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
             Self::Query(query) => runtime::block_on(query.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
+            Self::Undo(undo) => runtime::block_on(undo.run(output)),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
             Self::Bench(bench) => bench.run(output),
             Self::Experiment(experiment) => experiment.run(output),

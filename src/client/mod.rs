@@ -41,7 +41,7 @@ use tonic::{Request, Response, Status};
 use crate::map::{MapName, Region, RobotName};
 use crate::service::{
     Deletion, DeletionAnswer, MapInfo, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
-    TrajectoryAnswer, VoxelListing,
+    TrajectoryAnswer, Undo, UndoAnswer, VoxelListing,
 };
 use crate::wire::pb;
 use connection::Connection;
@@ -163,6 +163,15 @@ impl Client {
     ) -> Result<DeletionAnswer, ClientError> {
         let request = self.request((map, deletion));
         self.domain(self.connection.mapping().delete_voxels(request).await)
+    }
+
+    /// Takes scans out again; what other scans hold stays.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ClientError> {
+        let request = self.request((map, undo));
+        self.domain(self.connection.mapping().undo_scans(request).await)
     }
 
     /// The poses of the accepted scans, of one robot or of all.

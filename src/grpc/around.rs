@@ -43,7 +43,7 @@ fn code(response: &Response) -> Code {
 
 /// The name of a call for metrics and the log. Whatever a client may send, it is one of few.
 fn operation(path: &str) -> &'static str {
-    const OPERATIONS: [&str; 12] = [
+    const OPERATIONS: [&str; 13] = [
         "Occupancy/QueryPoints",
         "Occupancy/QueryPointsStream",
         "Occupancy/ListVoxels",
@@ -51,6 +51,7 @@ fn operation(path: &str) -> &'static str {
         "Mapping/InsertScanStream",
         "Mapping/AlignScan",
         "Mapping/DeleteVoxels",
+        "Mapping/UndoScans",
         "Mapping/GetTrajectory",
         "Maps/CreateMap",
         "Maps/GetMap",

@@ -51,6 +51,15 @@ impl Mapping for Adapter {
         Ok(Response::new(answer.into()))
     }
 
+    async fn undo_scans(
+        &self,
+        request: Request<pb::UndoScansRequest>,
+    ) -> Result<Response<pb::UndoScansResponse>, Status> {
+        let (map, undo) = request.into_inner().try_into()?;
+        let answer = self.service.undo_scans(&map, undo).await?;
+        Ok(Response::new(answer.into()))
+    }
+
     async fn get_trajectory(
         &self,
         request: Request<pb::GetTrajectoryRequest>,

@@ -37,6 +37,7 @@ fn operation(method: &Method, route: &str) -> &'static str {
         ("POST", "/v1/maps/{map}/alignment") => "AlignScan",
         ("POST", "/v1/maps/{map}/occupancy") => "QueryPoints",
         ("POST", "/v1/maps/{map}/deletions") => "DeleteVoxels",
+        ("POST", "/v1/maps/{map}/undo") => "UndoScans",
         ("GET" | "HEAD", "/v1/maps/{map}/trajectory") => "GetTrajectory",
         ("GET" | "HEAD", "/v1/maps/{map}/voxels") => "ListVoxels",
         _ => "unknown",

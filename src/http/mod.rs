@@ -12,6 +12,7 @@ mod probes;
 mod scans;
 mod starting;
 mod trajectory;
+mod undo;
 mod voxels;
 
 pub use starting::starting;
@@ -49,6 +50,7 @@ pub fn router(service: MeteredService, lifecycle: Lifecycle, message_bytes_max: 
         .route("/v1/maps/{map}/alignment", post(scans::align))
         .route("/v1/maps/{map}/occupancy", post(occupancy::query))
         .route("/v1/maps/{map}/deletions", post(deletions::delete))
+        .route("/v1/maps/{map}/undo", post(undo::undo))
         .route("/v1/maps/{map}/trajectory", get(trajectory::get))
         .route("/v1/maps/{map}/voxels", get(voxels::list))
         .fallback(error::no_such_route)

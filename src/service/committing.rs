@@ -67,6 +67,14 @@ impl From<ServiceError> for Refusal {
 
 pub(super) type Outcome = Result<Committed, Refusal>;
 
+/// A request that is answered, or on its way into the map.
+pub(super) enum Step<A> {
+    /// It changes nothing, or was done before.
+    Answered(A),
+    /// What becomes of it will be known, and then what to say.
+    Proposed(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
+}
+
 /// A proposal with the one who waits for it.
 struct Waiting {
     proposal: Proposal,

@@ -2,36 +2,25 @@
 
 use std::sync::Arc;
 
-use super::committing::{Outcome, Proposal, Refusal};
+use super::committing::{Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
 use crate::geometry::Point;
-use crate::map::{AnsweredRequest, Change, DeletionRecord, Region, Request};
+use crate::map::{AnsweredRequest, Change, Committed, DeletionRecord, Region, Request};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
-
-/// A deletion that is done, or on its way.
-pub(super) enum DeletionStep {
-    /// It was done before, under its id.
-    Answered(DeletionAnswer),
-    /// What becomes of it will be known.
-    Proposed(tokio::sync::oneshot::Receiver<Outcome>),
-}
 
 impl HostedMap {
     /// Sets a deletion on its way, unless it was done before.
     pub(super) fn propose_deletion(
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
-    ) -> Result<DeletionStep, ServiceError> {
+    ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request { id, digest: digest(deletion) });
         if let Some(answered) = self.answered(request.as_ref())? {
-            return Ok(DeletionStep::Answered(DeletionAnswer {
-                removed: answered.voxels,
-                state: self.state(answered.revision),
-                replayed: true,
-            }));
+            let state = self.state(answered.revision);
+            return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, state, replayed: true }));
         }
         let (map, deletion) = (Arc::clone(self), Arc::clone(deletion));
         // Which voxels are meant is decided when nobody else can change the map.
@@ -40,7 +29,14 @@ impl HostedMap {
             let voxels = map.targets_of(&deletion)?;
             Ok((!voxels.is_empty()).then_some(Change::Deletion(DeletionRecord { voxels, request })))
         };
-        Ok(DeletionStep::Proposed(self.committing.propose(Proposal::Undecided(Box::new(decide)))))
+        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)));
+        let map = Arc::clone(self);
+        let answer = move |Committed { revision, voxels: removed }| DeletionAnswer {
+            removed,
+            state: map.state(revision),
+            replayed: false,
+        };
+        Ok(Step::Proposed(outcome, Box::new(answer)))
     }
 
     /// What came of a request the first time.

@@ -1,8 +1,8 @@
 //! How a scan enters a map: align, quantise, propose (paper III).
 
-use tokio::sync::oneshot;
+use std::sync::Arc;
 
-use super::committing::{Outcome, Prepared, Proposal, Turn, record_of};
+use super::committing::{Prepared, Proposal, Step, Turn, record_of};
 use super::hosted_map::HostedMap;
 use super::{ErrorCode, ScanAnswer, ScanRequest, ServiceError, ServiceSettings};
 use crate::align::{Alignment, Guess, Verdict, align, judge_at};
@@ -25,31 +25,23 @@ struct Placement {
     as_first: bool,
 }
 
-/// A scan that is judged, or on its way into the map.
-pub(super) enum ScanStep {
-    /// It was refused, or is in the map already.
-    Answered(ScanAnswer),
-    /// What becomes of it will be known.
-    Proposed(TrajectoryPose, oneshot::Receiver<Outcome>),
-}
-
 impl HostedMap {
     /// Aligns the scan, and where it fits sets it on its way into the map.
     pub(super) fn propose_scan(
-        &self,
+        self: &Arc<Self>,
         request: &ScanRequest,
         turn: Turn,
         settings: &ServiceSettings,
-    ) -> Result<ScanStep, ServiceError> {
+    ) -> Result<Step<ScanAnswer>, ServiceError> {
         self.check_writable()?;
         let scan = UsableScan::of(request)?;
         if let Some(answer) = self.replay(&scan)? {
-            return Ok(ScanStep::Answered(answer));
+            return Ok(Step::Answered(answer));
         }
         self.check_room(settings)?;
         let placement = self.place(&scan, settings)?;
         if placement.alignment.verdict != Verdict::Accepted {
-            return Ok(ScanStep::Answered(self.answer(&scan, placement.alignment)));
+            return Ok(Step::Answered(self.answer(&scan, placement.alignment)));
         }
         let (voxels, out_of_range) = self.quantise(&scan, &placement.alignment.map_from_sensor)?;
         let pose = pose_of(&scan, placement.alignment, out_of_range);
@@ -57,11 +49,12 @@ impl HostedMap {
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
         let prepared = Prepared { change, record, if_empty: placement.as_first, turn };
         let outcome = self.committing.propose(Proposal::Prepared(prepared.into()));
-        Ok(ScanStep::Proposed(pose, outcome))
+        let map = Arc::clone(self);
+        Ok(Step::Proposed(outcome, Box::new(move |committed| map.committed(pose, committed))))
     }
 
     /// What to say of a scan that was committed.
-    pub(super) fn committed(&self, pose: TrajectoryPose, committed: Committed) -> ScanAnswer {
+    fn committed(&self, pose: TrajectoryPose, committed: Committed) -> ScanAnswer {
         let Committed { revision, voxels: new_voxels } = committed;
         self.answer_of(&TrajectoryPose { revision, new_voxels, ..pose }, false)
     }

@@ -13,24 +13,23 @@ mod mapping;
 mod pool;
 mod request;
 mod settings;
+mod undo;
 
 pub use error::{ErrorCode, ServiceError};
 pub use limits::Limits;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, MapInfo, MapState, MapStorage, PointAnswer, PointCloud,
-    PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, VoxelListing,
+    PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
 pub use settings::ServiceSettings;
 
 use std::sync::Arc;
 
-use crate::map::{Committed, MapName, MapSettings, Region, RobotName};
+use crate::map::{MapName, MapSettings, Region, RobotName};
 use crate::store::OpeningProgress;
 use catalogue::Catalogue;
-use committing::Refusal;
-use deletion::DeletionStep;
+use committing::{Refusal, Step};
 use hosted_map::{HostedMap, Saving};
-use mapping::ScanStep;
 use pool::Pool;
 
 /// All operations on all maps. A clone is another handle on the same maps.
@@ -157,22 +156,8 @@ impl MapService {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let turn = Arc::new(map.turn_of(&scan.robot).await);
-        let scan = Arc::new(scan);
-        loop {
-            let step = {
-                let (inner, map) = (Arc::clone(&self.0), Arc::clone(&map));
-                let (scan, turn) = (Arc::clone(&scan), Arc::clone(&turn));
-                self.0.mapping.run(move || map.propose_scan(&scan, turn, &inner.settings)).await??
-            };
-            match step {
-                ScanStep::Answered(answer) => return Ok(answer),
-                ScanStep::Proposed(pose, outcome) => match outcome.await.map_err(committing_ended)? {
-                    Ok(committed) => return Ok(map.committed(pose, committed)),
-                    Err(Refusal::Failed(error)) => return Err(error),
-                    Err(Refusal::Stale) => {}
-                },
-            }
-        }
+        let (inner, scan) = (Arc::clone(&self.0), Arc::new(scan));
+        self.carry_through(move || map.propose_scan(&scan, Arc::clone(&turn), &inner.settings)).await
     }
 
     /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
@@ -204,22 +189,18 @@ impl MapService {
             DeletionTarget::Region(_) => {}
         }
         let deletion = Arc::new(deletion);
-        loop {
-            let step = {
-                let (map, deletion) = (Arc::clone(&map), Arc::clone(&deletion));
-                self.0.mapping.run(move || map.propose_deletion(&deletion)).await??
-            };
-            match step {
-                DeletionStep::Answered(answer) => return Ok(answer),
-                DeletionStep::Proposed(outcome) => match outcome.await.map_err(committing_ended)? {
-                    Ok(Committed { revision, voxels: removed }) => {
-                        return Ok(DeletionAnswer { removed, state: map.state(revision), replayed: false });
-                    }
-                    Err(Refusal::Failed(error)) => return Err(error),
-                    Err(Refusal::Stale) => {}
-                },
-            }
-        }
+        self.carry_through(move || map.propose_deletion(&deletion)).await
+    }
+
+    /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
+    /// is as if they had never been accepted.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map or scan; `FailedPrecondition` for a scan from before what undo reaches, or where
+    /// maps are kept in memory only.
+    pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
+        let (map, undo) = (self.map(map)?, Arc::new(undo));
+        self.carry_through(move || map.propose_undo(&undo)).await
     }
 
     /// The poses of the accepted scans, of one robot or of all.
@@ -265,6 +246,23 @@ impl MapService {
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
         self.0.catalogue.save(Saving::Due).await
+    }
+
+    /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile.
+    async fn carry_through<A: Send + 'static>(
+        &self,
+        propose: impl Fn() -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
+    ) -> Result<A, ServiceError> {
+        loop {
+            match self.0.mapping.run(propose.clone()).await?? {
+                Step::Answered(answer) => return Ok(answer),
+                Step::Proposed(outcome, answer) => match outcome.await.map_err(committing_ended)? {
+                    Ok(committed) => return Ok(answer(committed)),
+                    Err(Refusal::Failed(error)) => return Err(error),
+                    Err(Refusal::Stale) => {}
+                },
+            }
+        }
     }
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {

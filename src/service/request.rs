@@ -194,6 +194,49 @@ pub struct DeletionAnswer {
     pub replayed: bool,
 }
 
+/// Which scans to take out again.
+#[derive(Debug, Clone)]
+pub struct Undo {
+    /// Which.
+    pub target: UndoTarget,
+    /// The caller's own id of this undo; makes it idempotent.
+    pub request_id: Option<RequestId>,
+}
+
+/// The ways to name accepted scans.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum UndoTarget {
+    /// One, by the robot's own number.
+    Scan {
+        /// Who sent it.
+        robot: RobotName,
+        /// Its number.
+        scan_id: u64,
+    },
+    /// One, by the revision that it made.
+    Revision(u64),
+    /// All of a robot's that made a revision after this one.
+    RobotSince {
+        /// Who sent them.
+        robot: RobotName,
+        /// The last revision to keep.
+        revision: u64,
+    },
+}
+
+/// What an undo did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UndoAnswer {
+    /// Scans taken out.
+    pub scans: usize,
+    /// Finest voxels that went with them.
+    pub removed: usize,
+    /// After it.
+    pub state: MapState,
+    /// It was done before under its id, and this is that answer.
+    pub replayed: bool,
+}
+
 /// The accepted scans' poses.
 #[derive(Debug, Clone)]
 pub struct TrajectoryAnswer {

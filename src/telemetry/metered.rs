@@ -4,6 +4,7 @@ use super::Metrics;
 use crate::map::MapName;
 use crate::service::{
     Deletion, DeletionAnswer, MapService, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
+    Undo, UndoAnswer,
 };
 
 /// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
@@ -53,7 +54,20 @@ impl MeteredService {
         Ok(answer)
     }
 
-    /// [`MapService::delete_voxels`], counted.
+    /// [`MapService::undo_scans`], counted.
+    ///
+    /// # Errors
+    /// Those of the service.
+    pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
+        let answer = self.service.undo_scans(map, undo).await?;
+        if !answer.replayed {
+            self.metrics.scans_undone(map, answer.scans);
+            self.metrics.voxels_removed(map, answer.removed);
+        }
+        Ok(answer)
+    }
+
+    /// [`MapService::delete_voxels`], counted unless it is a replay.
     ///
     /// # Errors
     /// Those of the service.
@@ -63,7 +77,9 @@ impl MeteredService {
         deletion: Deletion,
     ) -> Result<DeletionAnswer, ServiceError> {
         let answer = self.service.delete_voxels(map, deletion).await?;
-        self.metrics.voxels_removed(map, answer.removed);
+        if !answer.replayed {
+            self.metrics.voxels_removed(map, answer.removed);
+        }
         Ok(answer)
     }
 }

@@ -20,6 +20,7 @@ const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
 const POINTS_QUERIED: &str = "mrol_points_queried_total";
 const SCANS: &str = "mrol_scans_total";
+const SCANS_UNDONE: &str = "mrol_scans_undone_total";
 const VOXELS_REMOVED: &str = "mrol_voxels_removed_total";
 
 /// The metrics of one server. A clone is another handle on the same ones.
@@ -73,7 +74,12 @@ impl Metrics {
         self.record(|| counter!(SCANS, "map" => map.to_string(), "verdict" => verdict.as_str()).increment(1));
     }
 
-    /// Counts finest voxels that a deletion removed.
+    /// Counts scans that were taken out again.
+    pub fn scans_undone(&self, map: &MapName, scans: usize) {
+        self.record(|| counter!(SCANS_UNDONE, "map" => map.to_string()).increment(scans as u64));
+    }
+
+    /// Counts finest voxels that a deletion or an undo removed.
     pub fn voxels_removed(&self, map: &MapName, voxels: usize) {
         self.record(|| counter!(VOXELS_REMOVED, "map" => map.to_string()).increment(voxels as u64));
     }
@@ -101,7 +107,8 @@ fn describe() {
     describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
     describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
     describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
-    describe_counter!(VOXELS_REMOVED, "Finest voxels removed by deletions, by map");
+    describe_counter!(SCANS_UNDONE, "Scans taken out again, by map");
+    describe_counter!(VOXELS_REMOVED, "Finest voxels removed by deletions and undos, by map");
 }
 
 #[cfg(test)]

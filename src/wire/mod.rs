@@ -13,6 +13,7 @@ mod scan;
 mod trajectory;
 pub mod transport;
 mod types;
+mod undo;
 
 pub(crate) use field::{InField, required};
 pub use maps::create_map;

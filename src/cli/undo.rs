@@ -1,0 +1,89 @@
+//! `mrol undo`: take scans out of a map again.
+
+use std::fmt::{self, Display};
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::count;
+use super::output::Output;
+use super::parse;
+use super::remote::MapOptions;
+use crate::map::{RequestId, RobotName};
+use crate::service::{Undo, UndoAnswer, UndoTarget};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol undo --map office --robot r1 --scan-id 7          one scan, by the robot's own number
+  mrol undo --map office --revision 41                   one scan, by the revision that it made
+  mrol undo --map office --robot r1 --since 40           all that r1 sent after revision 40
+
+Of the voxels that the scans touched, those go that no other scan holds; everything else stays as it is. The scans'
+numbers may be used again. How far back this reaches, `mrol maps show` tells.";
+
+/// Take scans out of a map on a server again
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct UndoScans {
+    #[command(flatten)]
+    map: MapOptions,
+    /// Who sent the scans
+    #[arg(long, value_name = "NAME", value_parser = parse::robot_name)]
+    robot: Option<RobotName>,
+    /// The robot's own number of the scan
+    #[arg(long, value_name = "N", requires = "robot")]
+    scan_id: Option<u64>,
+    /// All of the robot's scans that made a revision after this one
+    #[arg(long, value_name = "REVISION", requires = "robot", conflicts_with = "scan_id")]
+    since: Option<u64>,
+    /// The scan that made this revision
+    #[arg(long, value_name = "N", conflicts_with_all = ["robot", "scan_id", "since"])]
+    revision: Option<u64>,
+    /// An id of this undo: sent again, it is not done again
+    #[arg(long, value_name = "ID", value_parser = parse::request_id)]
+    request_id: Option<RequestId>,
+}
+
+impl UndoScans {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let target = match (self.robot, self.scan_id, self.since, self.revision) {
+            (Some(robot), Some(scan_id), ..) => UndoTarget::Scan { robot, scan_id },
+            (Some(robot), None, Some(revision), _) => UndoTarget::RobotSince { robot, revision },
+            (None, .., Some(revision)) => UndoTarget::Revision(revision),
+            _ => {
+                return Err(CliError::usage("which scans? --robot with --scan-id or --since, or --revision"));
+            }
+        };
+        let undo = Undo { target, request_id: self.request_id };
+        let client = self.map.server.connect().await?;
+        let answer = client.undo_scans(&self.map.name, undo).await?;
+        output.print(&Undone::from(answer))
+    }
+}
+
+#[derive(Serialize)]
+struct Undone {
+    scans: usize,
+    removed: usize,
+    replayed: bool,
+    revision: u64,
+    map_uuid: String,
+}
+
+impl From<UndoAnswer> for Undone {
+    fn from(UndoAnswer { scans, removed, state, replayed }: UndoAnswer) -> Self {
+        Self { scans, removed, replayed, revision: state.revision, map_uuid: state.map_uuid.to_string() }
+    }
+}
+
+impl Display for Undone {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scans, removed, revision, .. } = self;
+        write!(
+            f,
+            "{} scans taken out, {} voxels with them; revision {revision}",
+            count(*scans),
+            count(*removed)
+        )
+    }
+}

@@ -1,0 +1,66 @@
+//! `POST /v1/maps/{map}/undo`: take scans out again.
+
+use axum::extract::State;
+use axum::response::Json;
+use serde::{Deserialize, Serialize};
+
+use super::Adapter;
+use super::body;
+use super::error::HttpError;
+use super::json::JsonState;
+use super::parameters::{Map, request_id_of};
+use crate::map::RobotName;
+use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};
+
+/// `{"robot", "scan_id"}`, `{"robot", "since_revision"}` or `{"revision"}`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct UndoIn {
+    robot: Option<String>,
+    scan_id: Option<u64>,
+    since_revision: Option<u64>,
+    revision: Option<u64>,
+    request_id: Option<String>,
+}
+
+#[derive(Serialize)]
+pub(super) struct UndoOut {
+    scans: usize,
+    removed: usize,
+    replayed: bool,
+    #[serde(flatten)]
+    state: JsonState,
+}
+
+pub(super) async fn undo(
+    State(adapter): State<Adapter>,
+    Map(map): Map,
+    body::Json(undo): body::Json<UndoIn>,
+) -> Result<Json<UndoOut>, HttpError> {
+    let answer = adapter.service.undo_scans(&map, undo.try_into()?).await?;
+    Ok(Json(answer.into()))
+}
+
+impl TryFrom<UndoIn> for Undo {
+    type Error = ServiceError;
+
+    fn try_from(undo: UndoIn) -> Result<Self, ServiceError> {
+        let robot = undo.robot.map(|robot| RobotName::new(&robot)).transpose()?;
+        let target = match (robot, undo.scan_id, undo.since_revision, undo.revision) {
+            (Some(robot), Some(scan_id), None, None) => UndoTarget::Scan { robot, scan_id },
+            (Some(robot), None, Some(revision), None) => UndoTarget::RobotSince { robot, revision },
+            (None, None, None, Some(revision)) => UndoTarget::Revision(revision),
+            _ => {
+                let message = "give robot and scan_id, robot and since_revision, or revision";
+                return Err(ServiceError::invalid("ambiguous_target", message));
+            }
+        };
+        Ok(Self { target, request_id: request_id_of(undo.request_id)? })
+    }
+}
+
+impl From<UndoAnswer> for UndoOut {
+    fn from(UndoAnswer { scans, removed, state, replayed }: UndoAnswer) -> Self {
+        Self { scans, removed, replayed, state: state.into() }
+    }
+}

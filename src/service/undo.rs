@@ -1,0 +1,112 @@
+//! How scans leave a map again.
+
+use std::sync::Arc;
+
+use super::committing::{Proposal, Refusal, Step};
+use super::digest::Digest;
+use super::hosted_map::HostedMap;
+use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget};
+use crate::map::{Change, Committed, MultiResolutionMap, Request, TrajectoryPose, UndoRecord, WithdrawnScan};
+use crate::store::{MapFolder, StoreError};
+
+impl HostedMap {
+    /// Sets an undo on its way, unless it was done before.
+    ///
+    /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
+    /// nobody else can change the map.
+    pub(super) fn propose_undo(self: &Arc<Self>, undo: &Undo) -> Result<Step<UndoAnswer>, ServiceError> {
+        self.check_writable()?;
+        let request = undo.request_id.clone().map(|id| Request { id, digest: digest(&undo.target) });
+        if let Some(answered) = self.answered(request.as_ref())? {
+            let (scans, removed, state) = (answered.scans, answered.voxels, self.state(answered.revision));
+            return Ok(Step::Answered(UndoAnswer { scans, removed, state, replayed: true }));
+        }
+        let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
+        let (scans, withdrawn) = self.targets_of_undo(&undo.target)?;
+        if scans.is_empty() {
+            let state = self.state(self.map.revision());
+            return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, state, replayed: false }));
+        }
+        let observed = folder.observations(&scans, &withdrawn).map_err(unreadable)?;
+        let (mut observations, seen) = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
+
+        let (map, count) = (Arc::clone(self), scans.len());
+        let decide = move |core: &MultiResolutionMap| {
+            map.still_unanswered(request.as_ref())?;
+            if core.trajectory().withdrawn() != withdrawn {
+                return Err(Refusal::Stale);
+            }
+            folder.observe(&mut observations, seen).map_err(unreadable)?;
+            let voxels = observations.held_by_targets_alone();
+            Ok(Some(Change::Undo(UndoRecord { scans, voxels, request })))
+        };
+        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)));
+        let map = Arc::clone(self);
+        let answer = move |Committed { revision, voxels: removed }| UndoAnswer {
+            scans: count,
+            removed,
+            state: map.state(revision),
+            replayed: false,
+        };
+        Ok(Step::Proposed(outcome, Box::new(answer)))
+    }
+
+    /// The revisions of the scans that are meant, ascending, and the scans that were withdrawn before.
+    fn targets_of_undo(&self, target: &UndoTarget) -> Result<(Vec<u64>, Vec<WithdrawnScan>), ServiceError> {
+        let trajectory = self.map.trajectory();
+        let one = |found: Option<&TrajectoryPose>, what: String| {
+            let missing = || {
+                let message = format!("map {} has no accepted scan {what}", self.name);
+                ServiceError::new(ErrorCode::NotFound, "scan_not_found", message)
+            };
+            found.map(|pose| vec![pose.revision]).ok_or_else(missing)
+        };
+        let scans = match target {
+            UndoTarget::Scan { robot, scan_id } => {
+                one(trajectory.find(robot, *scan_id), format!("of scan_id {scan_id} of robot {robot}"))?
+            }
+            UndoTarget::Revision(revision) => {
+                one(trajectory.at(*revision), format!("that made revision {revision}"))?
+            }
+            UndoTarget::RobotSince { robot, revision } => {
+                let meant = |pose: &&TrajectoryPose| pose.robot == *robot && pose.revision > *revision;
+                trajectory.poses().iter().filter(meant).map(|pose| pose.revision).collect()
+            }
+        };
+        Ok((scans, trajectory.withdrawn().to_vec()))
+    }
+
+    fn no_observations(&self) -> ServiceError {
+        let message =
+            format!("map {} is kept in memory only: undo needs the journal of a data folder", self.name);
+        ServiceError::new(ErrorCode::FailedPrecondition, "no_journal", message)
+    }
+
+    fn out_of_reach(&self, folder: &MapFolder, first: u64) -> ServiceError {
+        let message = format!(
+            "undo reaches back to revision {} of map {}, and the first of the scans made revision {first}; \
+             store.undo_revisions is {}",
+            folder.used().undo_from,
+            self.name,
+            folder.settings().undo_revisions
+        );
+        ServiceError::new(ErrorCode::FailedPrecondition, "undo_out_of_reach", message)
+    }
+}
+
+fn unreadable(error: StoreError) -> ServiceError {
+    ServiceError::new(ErrorCode::Internal, "journal_unreadable", error.to_string())
+}
+
+/// Tells one request from another under the same id.
+fn digest(target: &UndoTarget) -> u64 {
+    let digest = Digest::default().bytes(b"undo");
+    match target {
+        UndoTarget::Scan { robot, scan_id } => digest.bytes(robot.as_str().as_bytes()).number(*scan_id),
+        UndoTarget::Revision(revision) => digest.number(*revision),
+        UndoTarget::RobotSince { robot, revision } => {
+            digest.bytes(b"since").bytes(robot.as_str().as_bytes()).number(*revision)
+        }
+    }
+    .finish()
+}

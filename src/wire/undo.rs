@@ -1,0 +1,59 @@
+//! Undoing scans (`mapping.proto`).
+
+use super::types::{count_from, request_id_from, text_of};
+use super::{InField, pb, required};
+use crate::map::{MapName, RobotName};
+use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};
+
+impl TryFrom<pb::UndoScansRequest> for (MapName, Undo) {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::UndoScansRequest) -> Result<Self, ServiceError> {
+        use pb::undo_scans_request::Target;
+        let target = match required(request.target, "target")? {
+            Target::Scan(pb::RobotScan { robot, scan_id }) => {
+                UndoTarget::Scan { robot: RobotName::new(&robot).in_field("scan.robot")?, scan_id }
+            }
+            Target::Revision(revision) => UndoTarget::Revision(revision),
+            Target::Since(pb::RobotSince { robot, revision }) => {
+                UndoTarget::RobotSince { robot: RobotName::new(&robot).in_field("since.robot")?, revision }
+            }
+        };
+        Ok((MapName::new(&request.map)?, Undo { target, request_id: request_id_from(&request.request_id)? }))
+    }
+}
+
+impl From<(&MapName, Undo)> for pb::UndoScansRequest {
+    fn from((map, undo): (&MapName, Undo)) -> Self {
+        use pb::undo_scans_request::Target;
+        let target = match undo.target {
+            UndoTarget::Scan { robot, scan_id } => {
+                Target::Scan(pb::RobotScan { robot: robot.to_string(), scan_id })
+            }
+            UndoTarget::Revision(revision) => Target::Revision(revision),
+            UndoTarget::RobotSince { robot, revision } => {
+                Target::Since(pb::RobotSince { robot: robot.to_string(), revision })
+            }
+        };
+        Self { map: map.to_string(), target: Some(target), request_id: text_of(undo.request_id) }
+    }
+}
+
+impl From<UndoAnswer> for pb::UndoScansResponse {
+    fn from(UndoAnswer { scans, removed, state, replayed }: UndoAnswer) -> Self {
+        Self { scans: scans as u64, removed: removed as u64, state: Some(state.into()), replayed }
+    }
+}
+
+impl TryFrom<pb::UndoScansResponse> for UndoAnswer {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::UndoScansResponse) -> Result<Self, ServiceError> {
+        Ok(Self {
+            scans: count_from(answer.scans),
+            removed: count_from(answer.removed),
+            state: required(answer.state, "state")?.try_into()?,
+            replayed: answer.replayed,
+        })
+    }
+}
