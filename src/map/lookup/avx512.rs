@@ -93,10 +93,11 @@ trait Probe {
     unsafe fn answer(r: &Self::Registers<'_>, found: Self::Found) -> u16;
 }
 
-/// Sixteens of points in a word of answers.
-const GROUPS: usize = 64 / LANES;
+/// Points of a word of answers, and sixteens of them.
+const WORD: usize = 64;
+const GROUPS: usize = WORD / LANES;
 
-/// Takes all steps of sixteen points one after the other.
+/// Takes all steps of a word's points one after the other, each step of all of them together.
 ///
 /// # Safety
 /// Needs AVX-512 F and DQ, and a word of `occupied` for each 64 points.
@@ -107,27 +108,20 @@ unsafe fn run_near<P: Probe>(
     view: &LevelView<'_>,
     occupied: &mut [u64],
 ) -> bool {
-    // SAFETY: as in `run_far`.
+    // SAFETY: the features are there, and the view lives.
     unsafe {
-        let place = Place::load(lattice_from_points, view);
-        let r = P::load(view);
+        let steps = Steps::<P>::load(lattice_from_points, view);
         let mut all_have_a_voxel = true;
-        for (word, points) in occupied.iter_mut().zip(points.chunks(64)) {
-            let mut hits = 0;
-            for (group, points) in points.chunks(LANES).enumerate() {
-                let (index, shard, valid) = place.of(points);
-                let present = ((1u32 << points.len()) - 1) as u16;
-                all_have_a_voxel &= valid & present == present;
-                let found = P::find::<false>(&r, P::locate::<false>(&r, index, shard));
-                hits |= u64::from(P::answer(&r, found) & valid & present) << (group * LANES);
-            }
-            *word = hits;
+        for (word, points) in occupied.iter_mut().zip(points.chunks(WORD)) {
+            let located = steps.locate::<false>(points);
+            all_have_a_voxel &= located.all_have_a_voxel;
+            *word = steps.answer(steps.find::<false>(located));
         }
         all_have_a_voxel
     }
 }
 
-/// Takes the steps of different points in turn.
+/// Takes the steps of different words' points in turn.
 ///
 /// # Safety
 /// Needs AVX-512 F and DQ, and a word of `occupied` for each 64 points.
@@ -138,52 +132,102 @@ unsafe fn run_far<P: Probe>(
     view: &LevelView<'_>,
     occupied: &mut [u64],
 ) -> bool {
-    // SAFETY: loads stay within `points` or the padded tail; the rest needs only the features.
+    // SAFETY: the features are there, and the view lives.
     unsafe {
-        let place = Place::load(lattice_from_points, view);
-        let r = P::load(view);
+        let steps = Steps::<P>::load(lattice_from_points, view);
         let mut all_have_a_voxel = true;
-        let mut locate = |points: &[Point]| {
-            let mut has_voxel = 0;
-            let mut located = [None; GROUPS];
-            for (group, points) in points.chunks(LANES).enumerate() {
-                let (index, shard, valid) = place.of(points);
-                let present = ((1u32 << points.len()) - 1) as u16;
-                all_have_a_voxel &= valid & present == present;
-                has_voxel |= u64::from(valid & present) << (group * LANES);
-                located[group] = Some(P::locate::<true>(&r, index, shard));
-            }
-            (located, has_voxel)
+        let mut locate = |points| {
+            let located = steps.locate::<true>(points);
+            all_have_a_voxel &= located.all_have_a_voxel;
+            located
         };
-        let find = |(located, has_voxel): ([Option<P::Located>; GROUPS], u64)| {
-            let mut found = [None; GROUPS];
-            for (found, located) in found.iter_mut().zip(located) {
-                if let Some(located) = located {
-                    *found = Some(P::find::<true>(&r, located));
-                }
-            }
-            (found, has_voxel)
-        };
-        let answer = |(found, has_voxel): ([Option<P::Found>; GROUPS], u64)| {
-            let mut hits = 0;
-            for (group, found) in found.into_iter().enumerate() {
-                if let Some(found) = found {
-                    hits |= u64::from(P::answer(&r, found)) << (group * LANES);
-                }
-            }
-            hits & has_voxel
-        };
-        let mut words = points.chunks(64);
+        let mut words = points.chunks(WORD);
+        let mut found = words.next().map(|points| steps.find::<true>(locate(points)));
         let mut located = words.next().map(&mut locate);
-        let mut found = located.take().map(&find);
-        located = words.next().map(&mut locate);
         for word in occupied {
             let Some(ready) = found else { break };
             let next = words.next().map(&mut locate);
-            found = located.map(&find);
+            found = located.map(|located| steps.find::<true>(located));
             located = next;
-            *word = answer(ready);
+            *word = steps.answer(ready);
         }
         all_have_a_voxel
+    }
+}
+
+/// The steps of the points of a word.
+struct Steps<'a, P: Probe> {
+    place: Place,
+    registers: P::Registers<'a>,
+}
+
+/// A step's outcome for the points of a word.
+struct Word<T> {
+    of: [T; GROUPS],
+    /// A bit for each point that has a voxel.
+    has_voxel: u64,
+    all_have_a_voxel: bool,
+}
+
+impl<'a, P: Probe> Steps<'a, P> {
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn load(lattice_from_points: &LatticeFromPoints, view: &'a LevelView<'_>) -> Self {
+        // SAFETY: the features are there.
+        unsafe { Self { place: Place::load(lattice_from_points, view), registers: P::load(view) } }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn locate<const FAR: bool>(&self, points: &[Point]) -> Word<P::Located> {
+        let Some(points) = points.first_chunk::<WORD>() else {
+            // SAFETY: as for this function.
+            return unsafe { self.locate_last::<FAR>(points) };
+        };
+        let (mut has_voxel, mut group) = (0, 0);
+        let of = points.as_chunks::<LANES>().0;
+        let mut locate = |points: &[Point; LANES]| {
+            // SAFETY: the features are there.
+            unsafe {
+                let (index, shard, valid) = self.place.of(points);
+                has_voxel |= u64::from(valid) << (group * LANES);
+                group += 1;
+                P::locate::<FAR>(&self.registers, index, shard)
+            }
+        };
+        let of = [locate(&of[0]), locate(&of[1]), locate(&of[2]), locate(&of[3])];
+        Word { of, has_voxel, all_have_a_voxel: has_voxel == u64::MAX }
+    }
+
+    /// The same for fewer points than a word has bits.
+    #[cold]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn locate_last<const FAR: bool>(&self, points: &[Point]) -> Word<P::Located> {
+        let mut padded = [Point::new(0.0, 0.0, 0.0); WORD];
+        padded[..points.len()].copy_from_slice(points);
+        let present = (1 << points.len()) - 1;
+        // SAFETY: as for this function.
+        let word = unsafe { self.locate::<FAR>(&padded) };
+        let has_voxel = word.has_voxel & present;
+        Word { has_voxel, all_have_a_voxel: has_voxel == present, ..word }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn find<const FAR: bool>(&self, located: Word<P::Located>) -> Word<P::Found> {
+        let Word { of: [a, b, c, d], has_voxel, all_have_a_voxel } = located;
+        // SAFETY: as for this function.
+        let find = |located| unsafe { P::find::<FAR>(&self.registers, located) };
+        Word { of: [find(a), find(b), find(c), find(d)], has_voxel, all_have_a_voxel }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    unsafe fn answer(&self, found: Word<P::Found>) -> u64 {
+        // SAFETY: as for this function.
+        let answer = |group: usize| unsafe {
+            u64::from(P::answer(&self.registers, found.of[group])) << (group * LANES)
+        };
+        (answer(0) | answer(1) | answer(2) | answer(3)) & found.has_voxel
     }
 }

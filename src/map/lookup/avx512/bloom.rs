@@ -62,7 +62,7 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
     #[target_feature(enable = "avx512f,avx512dq")]
     unsafe fn answer(_: &BloomRegisters, (addresses, masks): Self::Found) -> u16 {
         // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
-        let words = unsafe { gather(addresses) };
+        let words = addresses.map(|a| unsafe { gather(a) });
         let hit =
             |half: usize| _mm512_cmpeq_epi64_mask(_mm512_and_si512(words[half], masks[half]), masks[half]);
         u16::from(hit(0)) | u16::from(hit(1)) << 8

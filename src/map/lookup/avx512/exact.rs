@@ -124,7 +124,7 @@ impl Probe for Exact {
         // or of `NO_VOXELS`.
         let voxels = unsafe {
             let [a, b] = [0, 8].map(|i| _mm512_loadu_si512(words[i..].as_ptr().cast()));
-            gather([a, b])
+            [gather(a), gather(b)]
         };
         let hit = |half: usize| _mm512_test_epi64_mask(voxels[half], within[half]);
         u16::from(hit(0)) | u16::from(hit(1)) << 8

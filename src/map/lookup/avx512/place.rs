@@ -7,7 +7,7 @@ use super::registers::lanes;
 use crate::geometry::Point;
 use crate::map::lookup::LevelView;
 use crate::map::sharding::SHARDS;
-use crate::voxel::LatticeFromPoints;
+use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints};
 
 /// From points to indices of a level and shards.
 pub(super) struct Place {
@@ -35,8 +35,8 @@ impl Place {
     #[target_feature(enable = "avx512f")]
     pub(super) unsafe fn of(&self, points: &[Point]) -> ([__m512i; 3], __m512i, u16) {
         // SAFETY: the feature is there.
-        let [a, b, c] = unsafe { load(points) };
-        let (index, valid) = self.quantise.index(deinterleave(a, b, c));
+        let coordinates = unsafe { load(points) };
+        let (index, valid) = self.quantise.index(deinterleave(coordinates));
         let index = index.map(|i| _mm512_sra_epi32(i, self.level));
         (index, shard(index.map(|i| _mm512_sra_epi32(i, self.region_shift))), valid)
     }
@@ -46,47 +46,61 @@ impl Place {
 ///
 /// # Safety
 /// Needs AVX-512 F.
+#[inline]
 #[target_feature(enable = "avx512f")]
 pub(super) unsafe fn load(points: &[Point]) -> [__m512; 3] {
-    let mut tail = [Point::new(0.0, 0.0, 0.0); LANES];
-    let start = if points.len() == LANES {
-        points.as_ptr()
-    } else {
-        tail[..points.len()].copy_from_slice(points);
-        tail.as_ptr()
-    };
+    if points.len() < LANES {
+        // SAFETY: the feature is there.
+        return unsafe { load_tail(points) };
+    }
     // SAFETY: sixteen points are 48 f32, at any alignment.
-    unsafe { std::array::from_fn(|i| _mm512_loadu_ps(start.cast::<f32>().add(i * LANES))) }
+    unsafe { [0, 1, 2].map(|i| _mm512_loadu_ps(points.as_ptr().cast::<f32>().add(i * LANES))) }
 }
 
-/// For coordinate `axis`: which of the 32 values of the first two registers goes to each lane, and then which
-/// of those and the third register.
-const fn deinterleave_index(axis: usize) -> [[i32; LANES]; 2] {
-    let mut index = [[0; LANES]; 2];
-    let mut lane = 0;
+/// # Safety
+/// Needs AVX-512 F.
+#[cold]
+#[target_feature(enable = "avx512f")]
+unsafe fn load_tail(points: &[Point]) -> [__m512; 3] {
+    let mut sixteen = [Point::new(0.0, 0.0, 0.0); LANES];
+    sixteen[..points.len()].copy_from_slice(points);
+    // SAFETY: the feature is there.
+    unsafe { load(&sixteen) }
+}
+
+/// The lanes of register `register`, of three with x y z x y z ..., that hold coordinate `axis`.
+const fn lanes_of(axis: usize, register: usize) -> u16 {
+    let (mut mask, mut lane) = (0, 0);
     while lane < LANES {
-        let from = 3 * lane + axis;
-        if from < 32 {
-            index[0][lane] = from as i32;
-            index[1][lane] = lane as i32;
-        } else {
-            index[1][lane] = (from - 32 + LANES) as i32;
+        if (register * LANES + lane) % 3 == axis {
+            mask |= 1 << lane;
         }
         lane += 1;
     }
-    index
+    mask
 }
 
-const DEINTERLEAVE: [[[i32; LANES]; 2]; 3] =
-    [deinterleave_index(0), deinterleave_index(1), deinterleave_index(2)];
+/// Where the coordinate `axis` of each point is, once those of the three registers, no two of which share a lane,
+/// are put into one.
+const fn order_of(axis: usize) -> [i32; LANES] {
+    let (mut order, mut point) = ([0; LANES], 0);
+    while point < LANES {
+        order[point] = ((3 * point + axis) % LANES) as i32;
+        point += 1;
+    }
+    order
+}
 
 /// x y z x y z ... in three registers to x, y and z in one each.
 #[inline]
 #[target_feature(enable = "avx512f")]
-pub(super) fn deinterleave(a: __m512, b: __m512, c: __m512) -> [__m512; 3] {
-    DEINTERLEAVE.map(|[first, second]| {
-        let ab = _mm512_permutex2var_ps(a, lanes(&first), b);
-        _mm512_permutex2var_ps(ab, lanes(&second), c)
+pub(super) fn deinterleave([a, b, c]: [__m512; 3]) -> [__m512; 3] {
+    const ORDER: [[i32; LANES]; 3] = [order_of(0), order_of(1), order_of(2)];
+    const OF_B: [u16; 3] = [lanes_of(0, 1), lanes_of(1, 1), lanes_of(2, 1)];
+    const OF_C: [u16; 3] = [lanes_of(0, 2), lanes_of(1, 2), lanes_of(2, 2)];
+    [0, 1, 2].map(|axis| {
+        let mixed = _mm512_mask_blend_ps(OF_C[axis], _mm512_mask_blend_ps(OF_B[axis], a, b), c);
+        _mm512_permutexvar_ps(lanes(&ORDER[axis]), mixed)
     })
 }
 
@@ -112,20 +126,18 @@ impl Quantise {
     #[inline]
     #[target_feature(enable = "avx512f")]
     pub(super) fn index(&self, [x, y, z]: [__m512; 3]) -> ([__m512i; 3], u16) {
-        let min = _mm512_set1_ps(LatticeFromPoints::QUANTISED_MIN);
-        let end = _mm512_set1_ps(LatticeFromPoints::QUANTISED_END);
-        let mut valid = u16::MAX;
-        let mut index = [_mm512_setzero_si512(); 3];
-        for (axis, index) in index.iter_mut().enumerate() {
+        let index = [0, 1, 2].map(|axis| {
             let [r0, r1, r2] = self.rotation[axis];
             let sum = _mm512_add_ps(_mm512_mul_ps(r0, x), _mm512_mul_ps(r1, y));
             let sum = _mm512_add_ps(sum, _mm512_mul_ps(r2, z));
             let scaled = _mm512_mul_ps(_mm512_add_ps(sum, self.translation[axis]), self.per_resolution);
-            let q = _mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(scaled);
-            valid &= _mm512_cmp_ps_mask::<_CMP_GE_OQ>(q, min) & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(q, end);
-            *index = _mm512_cvttps_epi32(q);
-        }
-        (index, valid)
+            _mm512_cvt_roundps_epi32::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(scaled)
+        });
+        // What is no number, or no i32, became i32::MIN: out of range as well.
+        let [x, y, z] = index.map(|i| _mm512_sub_epi32(i, _mm512_set1_epi32(INDEX_MIN)));
+        let from_min = _mm512_or_si512(_mm512_or_si512(x, y), z);
+        let beyond = _mm512_set1_epi32(!(INDEX_MAX - INDEX_MIN));
+        (index, _mm512_testn_epi32_mask(from_min, beyond))
     }
 }
 

@@ -97,17 +97,21 @@ pub(super) unsafe fn prefetch(addresses: __m512i) {
     }
 }
 
-/// The u64 at each of sixteen addresses.
+/// The u64 at each of eight addresses, by eight loads: on Zen 4 the instruction that gathers takes twice as long
+/// (a look-up by the filter 2.4 ns instead of 2.0).
 ///
 /// # Safety
 /// Needs AVX-512 F; each address must be of a u64 that may be read.
 #[inline]
 #[target_feature(enable = "avx512f")]
-pub(super) unsafe fn gather([a, b]: [__m512i; 2]) -> [__m512i; 2] {
-    // SAFETY: as for this function.
+pub(super) unsafe fn gather(addresses: __m512i) -> __m512i {
+    let mut each = [std::ptr::null::<f64>(); 8];
+    // SAFETY: a register is eight addresses, and they are of words that may be read.
     unsafe {
-        let base = std::ptr::null();
-        [_mm512_i64gather_epi64::<1>(a, base), _mm512_i64gather_epi64::<1>(b, base)]
+        _mm512_storeu_si512(each.as_mut_ptr().cast(), addresses);
+        let pair = |i: usize| _mm_loadh_pd(_mm_load_sd(each[i]), each[i + 1]);
+        let four = |i: usize| _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(pair(i)), pair(i + 2));
+        _mm512_castpd_si512(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(four(0)), four(4)))
     }
 }
 

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 
 use super::bloom::{Bloom, BloomRegisters};
 use super::place::{Quantise, deinterleave, load};
-use super::registers::pack;
+use super::registers::{gather, pack};
 use super::{LANES, Probe};
 use crate::geometry::Point;
 use crate::map::lookup::LevelView;
@@ -101,8 +101,8 @@ unsafe fn all_offsets(points: &[Point], t: &LatticeFromPoints, level: u32, grid:
 #[target_feature(enable = "avx512f")]
 unsafe fn index(quantise: &Quantise, level: __m128i, points: &[Point]) -> ([__m512i; 3], u16) {
     // SAFETY: the feature is there.
-    let [a, b, c] = unsafe { load(points) };
-    let (index, valid) = quantise.index(deinterleave(a, b, c));
+    let coordinates = unsafe { load(points) };
+    let (index, valid) = quantise.index(deinterleave(coordinates));
     (index.map(|i| _mm512_sra_epi32(i, level)), valid)
 }
 
@@ -124,7 +124,7 @@ unsafe fn all_in_filter<const HASHES: u32>(keys: &[u64], view: &LevelView<'_>, o
             }
             *word = 0;
             for (group, (addresses, masks, is_key)) in located.into_iter().enumerate() {
-                let words = _mm512_i64gather_epi64::<1>(addresses, std::ptr::null());
+                let words = gather(addresses);
                 let hits = is_key & _mm512_cmpeq_epi64_mask(_mm512_and_si512(words, masks), masks);
                 *word |= u64::from(hits) << (group * EIGHT);
             }
