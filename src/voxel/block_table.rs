@@ -9,14 +9,17 @@ pub(crate) const BUCKET: usize = 8;
 /// The keys of one bucket: those in use first.
 pub(crate) type Bucket = [u64; BUCKET];
 const VACANT_BUCKET: Bucket = [VACANT; BUCKET];
-/// Slots in use, at most, of each `LOAD_OF`. At 5/8 one bucket in seven is full (a Poisson tail), just after
-/// growth one in twenty: nearly every search ends in the bucket where it began.
-const LOAD: usize = 5;
-const LOAD_OF: usize = 8;
+/// Slots for each block, at least. At 2 one bucket in twenty is full (a Poisson tail), just after growth one in fifty:
+/// nearly every search ends in the bucket where it began, and a wide look-up seldom has to leave its way.
+const SLOTS_A_BLOCK: usize = 2;
+
+/// A byte of a key for each slot of a bucket, none of them zero; zero where the slot is vacant.
+pub(crate) type Tags = u64;
 
 /// Blocks by key, in buckets of eight.
 ///
 /// ```text
+/// tags    [ 8 x 8 bits | ... ]           which slots of a bucket may hold a key: all buckets' fit in a cache
 /// keys    [ 8 keys | 8 keys | ... ]      a cache line a bucket; a search reads one, seldom two
 /// masks   [ 8 x 64 bytes | ... ]         the block of keys[b][i] is masks[8 b + i]
 /// ```
@@ -27,6 +30,7 @@ const LOAD_OF: usize = 8;
 /// remainder), so that a table grows in small steps and stays near its memory budget.
 #[derive(Debug, Clone)]
 pub struct BlockTable {
+    tags: Vec<Tags>,
     keys: Vec<Bucket>,
     masks: Vec<BlockMask>,
     len: usize,
@@ -36,8 +40,13 @@ impl BlockTable {
     /// An empty table with room for `blocks` blocks.
     pub fn with_capacity(blocks: usize) -> Self {
         // One slot more than the load allows for, so that a search always meets a bucket that is not full.
-        let buckets = (blocks * LOAD_OF / LOAD + 1).div_ceil(BUCKET);
-        Self { keys: vec![VACANT_BUCKET; buckets], masks: vec![BlockMask::EMPTY; buckets * BUCKET], len: 0 }
+        let buckets = (blocks * SLOTS_A_BLOCK + 1).div_ceil(BUCKET);
+        Self {
+            tags: vec![0; buckets],
+            keys: vec![VACANT_BUCKET; buckets],
+            masks: vec![BlockMask::EMPTY; buckets * BUCKET],
+            len: 0,
+        }
     }
 
     /// Number of blocks.
@@ -52,17 +61,17 @@ impl BlockTable {
 
     /// Blocks that fit before the table has to grow.
     pub fn capacity(&self) -> usize {
-        (self.masks.len() - 1) * LOAD / LOAD_OF
+        (self.masks.len() - 1) / SLOTS_A_BLOCK
     }
 
     /// Bytes of memory held.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.keys[..]) + size_of_val(&self.masks[..])
+        size_of_val(&self.tags[..]) + size_of_val(&self.keys[..]) + size_of_val(&self.masks[..])
     }
 
     /// What the look-up kernels read.
     pub(crate) fn slots(&self) -> Slots<'_> {
-        Slots { keys: &self.keys, masks: &self.masks }
+        Slots { tags: &self.tags, keys: &self.keys, masks: &self.masks }
     }
 
     /// The voxels of `block`; none of them when the block is absent.
@@ -128,8 +137,9 @@ impl BlockTable {
         let mut bucket = Slots::home(key, self.keys.len());
         loop {
             if let Some(place) = self.keys[bucket].iter().position(|&k| k == VACANT) {
-                self.keys[bucket][place] = key;
-                return bucket * BUCKET + place;
+                let slot = bucket * BUCKET + place;
+                self.set_key(slot, key);
+                return slot;
             }
             bucket = self.after(bucket);
         }
@@ -156,7 +166,7 @@ impl BlockTable {
         self.relocate(bucket * BUCKET + last, slot);
         if was_full && let Some(displaced) = self.displaced_past(bucket) {
             let (key, mask) = (self.keys[displaced / BUCKET][displaced % BUCKET], self.masks[displaced]);
-            self.keys[bucket][BUCKET - 1] = key;
+            self.set_key(bucket * BUCKET + BUCKET - 1, key);
             self.masks[bucket * BUCKET + BUCKET - 1] = mask;
             self.vacate(displaced);
         }
@@ -164,10 +174,18 @@ impl BlockTable {
 
     /// Moves a key and its mask; `from` is vacant afterwards.
     fn relocate(&mut self, from: usize, to: usize) {
-        self.keys[to / BUCKET][to % BUCKET] = self.keys[from / BUCKET][from % BUCKET];
+        self.set_key(to, self.keys[from / BUCKET][from % BUCKET]);
         self.masks[to] = self.masks[from];
-        self.keys[from / BUCKET][from % BUCKET] = VACANT;
+        self.set_key(from, VACANT);
         self.masks[from] = BlockMask::EMPTY;
+    }
+
+    fn set_key(&mut self, slot: usize, key: u64) {
+        let (bucket, place) = (slot / BUCKET, slot % BUCKET);
+        self.keys[bucket][place] = key;
+        let tag = if key == VACANT { 0 } else { Slots::tag(Slots::hash(key)) };
+        let shift = place * 8;
+        self.tags[bucket] = self.tags[bucket] & !(0xff << shift) | tag << shift;
     }
 
     /// The first slot beyond `bucket` whose key would rather live in it, or before it.
@@ -208,29 +226,43 @@ impl BlockTable {
 /// A table's slots as plain slices.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slots<'a> {
+    pub(crate) tags: &'a [Tags],
     pub(crate) keys: &'a [Bucket],
     pub(crate) masks: &'a [BlockMask],
 }
 
 impl Slots<'static> {
     /// Those of a table without a block.
-    pub(crate) const NONE: Self = Self { keys: &[VACANT_BUCKET], masks: &[BlockMask::EMPTY; BUCKET] };
+    pub(crate) const NONE: Self =
+        Self { tags: &[0], keys: &[VACANT_BUCKET], masks: &[BlockMask::EMPTY; BUCKET] };
 }
 
 impl Slots<'_> {
     pub(crate) const HASH_A: u64 = 0x9e37_79b9_7f4a_7c15;
     pub(crate) const HASH_B: u64 = 0xd6e8_feb8_6659_fd93;
+    /// Where a tag's bits lie in the hash.
+    pub(crate) const TAG_SHIFT: u32 = 24;
 
     /// The bucket where the search for `key` starts among `buckets` buckets.
     ///
     /// ```text
-    /// home = high32(mix(key)) * buckets >> 32,   mix = (k * A ^ (k * A) >> 32) * B
+    /// home = high32(hash) * buckets >> 32,   hash = (k * A ^ (k * A) >> 32) * B
     /// ```
     #[inline(always)]
     pub(crate) fn home(key: u64, buckets: usize) -> usize {
+        (((Self::hash(key) >> 32) * buckets as u64) >> 32) as usize
+    }
+
+    #[inline(always)]
+    fn hash(key: u64) -> u64 {
         let h = key.wrapping_mul(Self::HASH_A);
-        let h = (h ^ h >> 32).wrapping_mul(Self::HASH_B);
-        (((h >> 32) * buckets as u64) >> 32) as usize
+        (h ^ h >> 32).wrapping_mul(Self::HASH_B)
+    }
+
+    /// The tag of a key: eight bits of its hash that the home does not depend on, or 1 where they are zero.
+    #[inline(always)]
+    fn tag(hash: u64) -> Tags {
+        (hash >> Self::TAG_SHIFT & 0xff).max(1)
     }
 
     /// True when a search must go on past the bucket: its vacant slots come last.
@@ -301,6 +333,7 @@ mod tests {
         fn keys_that_overflow_are_found_and_removed(order in Just((0..37).collect::<Vec<i32>>()).prop_shuffle()) {
             let mut table = BlockTable::with_capacity(0);
             (table.keys, table.masks) = (vec![VACANT_BUCKET; 5], vec![BlockMask::EMPTY; 40]);
+            table.tags = vec![0; 5];
             let block = |x: i32| VoxelKey::pack([x, 3, -9]);
             for &x in &order {
                 let slot = table.add_in_room(block(x).to_bits());
@@ -312,6 +345,7 @@ mod tests {
                 prop_assert!(table.get(block(x)).is_empty());
             }
             prop_assert!(table.keys.iter().all(|bucket| *bucket == VACANT_BUCKET));
+            prop_assert!(table.tags.iter().all(|&tags| tags == 0));
         }
     }
 
@@ -325,6 +359,6 @@ mod tests {
         }
         let full = table.keys.iter().filter(|bucket| bucket[BUCKET - 1] != VACANT).count();
         let share = full as f64 / table.keys.len() as f64;
-        assert!((0.05..0.2).contains(&share), "{share} of the buckets are full");
+        assert!((0.01..0.1).contains(&share), "{share} of the buckets are full");
     }
 }

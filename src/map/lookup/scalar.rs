@@ -64,7 +64,7 @@ pub(super) fn bloom(view: &LevelView<'_>, index: [i32; 3]) -> bool {
 }
 
 #[inline(always)]
-fn exact(view: &LevelView<'_>, index: [i32; 3]) -> bool {
+pub(super) fn exact(view: &LevelView<'_>, index: [i32; 3]) -> bool {
     let (block, cell) = Cell::of(index.map(|i| i << view.up));
     view.blocks[shard(view, index)].contains(block, cell, view.up)
 }

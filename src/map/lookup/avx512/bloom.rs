@@ -20,10 +20,9 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
     type Registers<'a> = BloomRegisters;
     /// Addresses of words of the planes, and the bits that count there; eight voxels a register.
     type Located = ([__m512i; 2], [__m512i; 2]);
-    type Found = Self::Located;
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
     unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
         BloomRegisters {
             plane: PerShard::load(addresses(view.planes)),
@@ -33,8 +32,8 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn locate<const FAR: bool>(
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    unsafe fn locate<const FETCH: bool>(
         r: &BloomRegisters,
         index: [__m512i; 3],
         shard: __m512i,
@@ -42,7 +41,7 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
         let (keys, shards) = (pack(index), widen(shard));
         let hashes = if HASHES == 0 { r.hashes } else { HASHES };
         let (a, b) = (r.word_of(keys[0], shards[0], hashes), r.word_of(keys[1], shards[1], hashes));
-        if FAR {
+        if FETCH {
             // SAFETY: a prefetch never faults.
             unsafe {
                 prefetch(a.0);
@@ -53,14 +52,8 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn find<const FAR: bool>(_: &BloomRegisters, located: Self::Located) -> Self::Found {
-        located
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    unsafe fn answer(_: &BloomRegisters, (addresses, masks): Self::Found) -> u16 {
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    unsafe fn answer(_: &BloomRegisters, (addresses, masks): &Self::Located) -> u16 {
         // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
         let words = addresses.map(|a| unsafe { gather(a) });
         let hit =

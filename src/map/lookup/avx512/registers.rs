@@ -117,11 +117,9 @@ pub(super) unsafe fn gather(addresses: __m512i) -> __m512i {
 
 #[inline]
 #[target_feature(enable = "avx512f")]
-pub(super) fn to_array(registers: [__m512i; 2]) -> [u64; LANES] {
-    let mut array = [0; LANES];
-    for (half, register) in array.chunks_exact_mut(8).zip(registers) {
-        // SAFETY: eight u64 are one register.
-        unsafe { _mm512_storeu_si512(half.as_mut_ptr().cast(), register) };
-    }
+pub(super) fn to_array(register: __m512i) -> [u64; 8] {
+    let mut array = [0; 8];
+    // SAFETY: eight u64 are one register.
+    unsafe { _mm512_storeu_si512(array.as_mut_ptr().cast(), register) };
     array
 }
