@@ -7,6 +7,7 @@
 mod bench;
 mod delete;
 mod demo;
+mod doctor;
 mod error;
 mod experiment;
 mod health;
@@ -67,6 +68,7 @@ enum Command {
     Bench(bench::Bench),
     Experiment(experiment::Experiment),
     Health(health::Health),
+    Doctor(doctor::Doctor),
 }
 
 /// Does what the process was called for, and says how that went.
@@ -99,6 +101,7 @@ impl Command {
             Self::Bench(bench) => bench.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Health(health) => runtime::block_on(health.run(output)),
+            Self::Doctor(doctor) => doctor.run(output),
         }
     }
 }

@@ -20,11 +20,16 @@ impl Output {
         Self { json, bar: ProgressBar::hidden() }
     }
 
-    /// The same with a bar of `steps` on standard error, if that is a terminal.
+    /// The same with a bar of `steps` scans on standard error, if that is a terminal.
     pub(super) fn with_bar(self, steps: usize) -> Self {
+        self.with_bar_of(steps, "scans")
+    }
+
+    /// The same with a bar of `steps` of what is counted.
+    pub(super) fn with_bar_of(self, steps: usize, counted: &str) -> Self {
         let bar = ProgressBar::new(steps as u64);
-        let template = "{bar:40} {pos}/{len} scans, {elapsed} gone, {eta} to go";
-        if let Ok(style) = ProgressStyle::with_template(template) {
+        let template = format!("{{bar:40}} {{pos}}/{{len}} {counted}, {{elapsed}} gone, {{eta}} to go");
+        if let Ok(style) = ProgressStyle::with_template(&template) {
             bar.set_style(style);
         }
         Self { bar, ..self }

@@ -33,7 +33,7 @@ impl Catalogue {
         let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
         let mut maps = BTreeMap::new();
         if let Some(data_dir) = &data_dir {
-            let names = data_dir.names().map_err(not_stored)?;
+            let names = data_dir.take_stock().map_err(not_stored)?;
             data_dir.expect(&names, progress).map_err(not_stored)?;
             for name in names {
                 let map = load(data_dir, &name, progress)?;

@@ -60,21 +60,30 @@ impl DataDir {
         let maps = path.join(MAPS);
         let make = || make_folder(&*files, path).and_then(|()| make_folder(&*files, &maps));
         make().map_err(StoreError::io(&maps))?;
-        folder::sweep(&*files, &maps)?;
         Ok(Self { files, maps, settings, _lock: None })
     }
 
-    /// The names of the maps kept here, in order; map files that lie about become maps.
+    /// The names of the maps kept here, in order; map files that lie about become maps, and what a crash left
+    /// unfinished goes.
     ///
     /// # Errors
     /// When the folder or a map file cannot be read.
-    pub fn names(&self) -> Result<Vec<MapName>, StoreError> {
+    pub fn take_stock(&self) -> Result<Vec<MapName>, StoreError> {
+        folder::sweep(&*self.files, &self.maps)?;
         let entries = self.files.list(&self.maps).map_err(StoreError::io(&self.maps))?;
         for name in entries.iter().filter_map(|entry| entry.strip_suffix(MAP_FILE_SUFFIX)) {
             if let Ok(name) = MapName::new(name) {
                 self.take_in(&name, entries.iter().any(|entry| entry == name.as_str()))?;
             }
         }
+        self.names()
+    }
+
+    /// The names of the maps kept here, in order.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn names(&self) -> Result<Vec<MapName>, StoreError> {
         let entries = self.files.list(&self.maps).map_err(StoreError::io(&self.maps))?;
         Ok(entries.iter().filter_map(|entry| MapName::new(entry).ok()).collect())
     }
@@ -146,6 +155,10 @@ impl DataDir {
         // What is left is swept away at the next start.
         drop(self.files.remove_folder(&gone));
         Ok(())
+    }
+
+    pub(super) fn files(&self) -> &Arc<dyn FileSystem> {
+        &self.files
     }
 
     /// A map's name can be no path, see [`MapName`].

@@ -19,6 +19,7 @@
 
 mod codec;
 mod data_dir;
+pub mod doctor;
 mod error;
 mod file_system;
 mod folder;

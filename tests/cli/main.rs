@@ -4,6 +4,7 @@
 
 mod bench;
 mod demo;
+mod doctor;
 mod errors;
 mod help;
 mod local;

@@ -5,16 +5,18 @@
 //! `segmented` all of them, `recovery` what is made of them after a crash.
 
 mod frame;
+mod inspection;
 mod record;
 mod recovery;
 mod segment;
 mod segmented;
 
+pub(super) use inspection::{Inspected, inspect};
 pub use record::{RECORD_BYTES_MAX, Record};
 pub(super) use recovery::Known;
 pub use recovery::{Cut, Recovered};
 pub use segment::JOURNAL_VERSION;
-pub(super) use segment::first_revision;
+pub(super) use segment::{HEADER_BYTES as SEGMENT_HEADER_BYTES, first_revision};
 pub use segmented::{JournalUse, SegmentedJournal};
 
 use super::StoreError;

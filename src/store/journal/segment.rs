@@ -24,7 +24,7 @@ use crate::store::StoreError;
 pub const JOURNAL_VERSION: u32 = 1;
 const MAGIC: &[u8; 8] = b"MROL-JNL";
 const CHECKED_FROM: usize = 16;
-pub(super) const HEADER_BYTES: usize = 64;
+pub(crate) const HEADER_BYTES: usize = 64;
 
 /// The name of the segment that begins with revision `first`.
 pub(super) fn file_name(first: u64) -> String {

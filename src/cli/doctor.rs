@@ -1,0 +1,132 @@
+//! `mrol doctor`: look a data folder through.
+
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::{bytes, count};
+use super::output::Output;
+use super::parse;
+use crate::map::MapName;
+use crate::store::doctor::{Diagnosis, SetAside, diagnose, set_aside};
+use crate::store::{DataDir, StoreSettings};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol doctor mrol-data                            check every file of every map; changes nothing
+  mrol doctor mrol-data --set-aside office         get a map with a damaged journal to start again
+
+No server may use the folder meanwhile. Every snapshot and every record of the journals is read, the journal is
+replayed from the oldest snapshot, and the map compared with each snapshot on the way. The exit code is 1 where
+something is wrong.
+
+--set-aside keeps what can be read before the damage and moves the rest to files named .damaged: nothing is deleted,
+and what is lost to the map is said.";
+
+/// Check a data folder, file by file, while no server uses it
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Doctor {
+    /// The data folder of a server
+    #[arg(value_name = "DATA_DIR")]
+    data_dir: PathBuf,
+    /// Take the damaged end of this map's journal out of the way
+    #[arg(long, value_name = "MAP", value_parser = parse::map_name)]
+    set_aside: Option<MapName>,
+}
+
+impl Doctor {
+    pub(super) fn run(self, output: Output) -> Result<(), CliError> {
+        if !self.data_dir.join("maps").is_dir() {
+            let folder = self.data_dir.display();
+            return Err(CliError::usage(format!("{folder} is no data folder: it has no folder maps")));
+        }
+        let data_dir = DataDir::open(&self.data_dir, StoreSettings::default())?;
+        match self.set_aside {
+            Some(name) => self::aside(&data_dir, &name, &output),
+            None => check(&data_dir, output),
+        }
+    }
+}
+
+fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
+    let names = data_dir.names()?;
+    let output = output.with_bar_of(names.len(), "maps");
+    let mut problems = 0;
+    for name in names {
+        let diagnosis = diagnose(data_dir, &name)?;
+        problems += diagnosis.problems.len();
+        output.print(&Report::of(&name, diagnosis))?;
+        output.step();
+    }
+    output.clear_bar();
+    match problems {
+        0 => Ok(()),
+        n => Err(CliError::failed(format!("{n} problems were found"))),
+    }
+}
+
+fn aside(data_dir: &DataDir, name: &MapName, output: &Output) -> Result<(), CliError> {
+    match set_aside(data_dir, name)? {
+        None => output.say(format!("map {name} can be opened as it is")),
+        Some(SetAside { files, revision }) => {
+            for file in files {
+                output.note(format!("set aside: {}", file.display()));
+            }
+            output.print(&Opens { map: name.to_string(), revision })
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Opens {
+    map: String,
+    revision: u64,
+}
+
+impl Display for Opens {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "map {} opens at revision {}; what came after it is lost to the map",
+            self.map, self.revision
+        )
+    }
+}
+
+#[derive(Serialize)]
+struct Report {
+    map: String,
+    revision: Option<u64>,
+    voxels: usize,
+    snapshots: Vec<u64>,
+    segments: usize,
+    records: u64,
+    torn_bytes: u64,
+    problems: Vec<String>,
+}
+
+impl Report {
+    fn of(name: &MapName, diagnosis: Diagnosis) -> Self {
+        let Diagnosis { snapshots, segments, records, revision, voxels, torn_bytes, problems } = diagnosis;
+        let map = name.to_string();
+        Self { map, revision, voxels, snapshots, segments, records, torn_bytes, problems }
+    }
+}
+
+impl Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let state = if self.problems.is_empty() { "well" } else { "NOT WELL" };
+        let revision = self.revision.map_or("none".into(), |revision| revision.to_string());
+        write!(f, "map {}: {state}; revision {revision}, {} voxels; ", self.map, count(self.voxels))?;
+        let (snapshots, records) = (self.snapshots.len(), count(self.records as usize));
+        write!(f, "{snapshots} snapshots, {records} records in {} segments", self.segments)?;
+        if self.torn_bytes > 0 {
+            let torn = bytes(self.torn_bytes as usize);
+            write!(f, "; {torn} at the end were never acknowledged, the next start cuts them off")?;
+        }
+        self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
+    }
+}

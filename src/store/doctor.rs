@@ -1,0 +1,202 @@
+//! A data folder looked through while no server uses it: every file, and whether they agree.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::journal::{self, Inspected};
+use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, map_folder};
+use crate::map::{MapName, MultiResolutionMap};
+
+/// What was found of a map.
+#[derive(Debug, Default)]
+pub struct Diagnosis {
+    /// Of its snapshots that can be read, ascending.
+    pub snapshots: Vec<u64>,
+    /// Segments of the journal.
+    pub segments: usize,
+    /// Changes in them.
+    pub records: u64,
+    /// The revision that the files give; none where there is no good snapshot.
+    pub revision: Option<u64>,
+    /// Finest voxels at that revision.
+    pub voxels: usize,
+    /// Bytes that a crash left unfinished, which the next start cuts off: nothing acknowledged is among them.
+    pub torn_bytes: u64,
+    /// What is wrong, a sentence each.
+    pub problems: Vec<String>,
+}
+
+/// What was set aside.
+#[derive(Debug)]
+pub struct SetAside {
+    /// The files that hold it now.
+    pub files: Vec<PathBuf>,
+    /// The revision that the map has without it.
+    pub revision: u64,
+}
+
+/// Looks a map through: reads every snapshot and every record, replays the journal from the oldest snapshot, and
+/// compares the map with each snapshot on the way. Changes nothing.
+///
+/// # Errors
+/// When the system refuses. What is wrong with the files is in the diagnosis.
+pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreError> {
+    let (files, path) = (data_dir.files(), data_dir.path(name));
+    let mut diagnosis = Diagnosis::default();
+    let mut snapshots = read_snapshots(&**files, &path, &mut diagnosis)?;
+    let Some(oldest) = snapshots.pop() else {
+        diagnosis.problems.push(format!("{}: no snapshot can be read", path.display()));
+        return Ok(diagnosis);
+    };
+    let uuid = oldest.uuid;
+    let map = oldest.restore().map_err(|e| StoreError::damaged(&path, e.to_string()))?;
+    let mut replay = Replay { map, snapshots, problems: Vec::new() };
+    replay.read_journal(files, &path, uuid, &mut diagnosis)?;
+    // Newer than the journal: nothing to compare them with, but the last of them is what a server would open.
+    if let Some(newest) = replay.snapshots.into_iter().next() {
+        replay.map = newest.restore().map_err(|e| StoreError::damaged(&path, e.to_string()))?;
+    }
+    diagnosis.problems.append(&mut replay.problems);
+    (diagnosis.revision, diagnosis.voxels) = (Some(replay.map.revision()), replay.map.voxels(0));
+    Ok(diagnosis)
+}
+
+/// The snapshots that can be read, newest first.
+fn read_snapshots(
+    files: &dyn FileSystem,
+    path: &Path,
+    diagnosis: &mut Diagnosis,
+) -> Result<Vec<Snapshot>, StoreError> {
+    let mut snapshots: Vec<Snapshot> = Vec::new();
+    for revision in map_folder::snapshot_revisions(files, path)?.into_iter().rev() {
+        let file = path.join(map_folder::snapshot_name(revision));
+        match Snapshot::read(files, &file) {
+            Ok(snapshot) if snapshot.contents.revision != revision => {
+                let found = snapshot.contents.revision;
+                diagnosis.problems.push(format!("{}: it holds revision {found}", file.display()));
+            }
+            Ok(snapshot) if snapshots.first().is_some_and(|newest| newest.uuid != snapshot.uuid) => {
+                diagnosis.problems.push(format!("{}: another map's, by its uuid", file.display()));
+            }
+            Ok(snapshot) => snapshots.push(snapshot),
+            Err(error @ StoreError::Damaged { .. }) => diagnosis.problems.push(error.to_string()),
+            Err(error) => return Err(error),
+        }
+    }
+    diagnosis.snapshots = snapshots.iter().rev().map(|snapshot| snapshot.contents.revision).collect();
+    Ok(snapshots)
+}
+
+/// A map that is made again from its oldest snapshot.
+struct Replay {
+    map: MultiResolutionMap,
+    /// Those that were not reached yet, newest first.
+    snapshots: Vec<Snapshot>,
+    problems: Vec<String>,
+}
+
+impl Replay {
+    fn read_journal(
+        &mut self,
+        files: &Arc<dyn FileSystem>,
+        path: &Path,
+        uuid: Uuid,
+        diagnosis: &mut Diagnosis,
+    ) -> Result<(), StoreError> {
+        let names = files.list(path).map_err(StoreError::io(path))?;
+        let segments: Vec<u64> = names.iter().filter_map(|name| journal::first_revision(name)).collect();
+        let mut expected = segments.first().copied();
+        for (i, &first) in segments.iter().enumerate() {
+            if Some(first) != expected {
+                self.gap(expected.unwrap_or_default(), first);
+            }
+            let inspected = journal::inspect(files, path.to_owned(), uuid, first, |revision, change| {
+                self.make(revision, &change)
+            })?;
+            let Inspected { next, torn_bytes, damage, .. } = inspected;
+            diagnosis.segments += 1;
+            diagnosis.records += next - first;
+            if torn_bytes > 0 && i + 1 < segments.len() {
+                self.problems.push(format!("the segment of revision {first} ends torn, and is not the last"));
+            }
+            diagnosis.torn_bytes += torn_bytes;
+            self.problems.extend(damage.map(|error| error.to_string()));
+            expected = Some(next);
+        }
+        Ok(())
+    }
+
+    /// Revisions are missing. Where a snapshot is on the far side, a server goes on from there.
+    fn gap(&mut self, expected: u64, first: u64) {
+        while self.snapshots.last().is_some_and(|snapshot| snapshot.contents.revision < first) {
+            if let Some(Ok(map)) = self.snapshots.pop().map(Snapshot::restore) {
+                self.map = map;
+            }
+        }
+        if self.map.revision() + 1 < first {
+            self.problems
+                .push(format!("the journal goes on at revision {first}, {expected} should come next"));
+        }
+    }
+
+    fn make(&mut self, revision: u64, change: &crate::map::Change) -> Result<(), String> {
+        if revision <= self.map.revision() {
+            return Ok(());
+        }
+        let made = self.map.committer().apply(change).revision;
+        if made != revision {
+            return Err(format!("replayed, it makes revision {made}"));
+        }
+        if let Some(snapshot) = self.snapshots.pop_if(|snapshot| snapshot.contents.revision == revision)
+            && snapshot.contents != self.map.contents()
+        {
+            self.problems.push(format!("the snapshot of revision {revision} is not what the journal makes"));
+        }
+        Ok(())
+    }
+}
+
+/// Takes the part of a damaged journal that cannot be read, and what comes after it, out of the way. None where the
+/// map can be opened as it is.
+///
+/// # Errors
+/// When the system refuses, or what is wrong is not the journal.
+pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>, StoreError> {
+    let mut aside = Vec::new();
+    loop {
+        match data_dir.map(name, &OpeningProgress::default()) {
+            Ok(_) if aside.is_empty() => return Ok(None),
+            Ok(opened) => return Ok(Some(SetAside { files: aside, revision: opened.map.revision() })),
+            Err(StoreError::JournalDamaged { path, offset, .. }) => {
+                aside.extend(set_aside_from(&**data_dir.files(), &path, offset)?);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// Moves a segment from `offset` on, and all later ones, to names under which nobody looks for them.
+fn set_aside_from(files: &dyn FileSystem, path: &Path, offset: u64) -> Result<Vec<PathBuf>, StoreError> {
+    let above = folder::folder_of(path);
+    let bytes = files.read(path).map_err(StoreError::io(path))?;
+    let damaged = path.with_extension("log.damaged");
+    folder::replace(files, &damaged, &bytes)?;
+    // Without a frame a segment is not needed.
+    let shortened = match offset < journal::SEGMENT_HEADER_BYTES as u64 {
+        true => files.remove(path),
+        false => files.truncate(path, offset).and_then(|()| files.sync(path)),
+    };
+    shortened.map_err(StoreError::io(path))?;
+    let mut aside = vec![damaged];
+    let names = files.list(above).map_err(StoreError::io(above))?;
+    let damaged_first = path.file_name().and_then(|name| journal::first_revision(&name.to_string_lossy()));
+    for name in names.iter().filter(|name| journal::first_revision(name) > damaged_first) {
+        let (from, to) = (above.join(name), above.join(format!("{name}.damaged")));
+        files.rename(&from, &to).map_err(StoreError::io(&from))?;
+        aside.push(to);
+    }
+    files.sync(above).map_err(StoreError::io(above))?;
+    Ok(aside)
+}

@@ -1,0 +1,58 @@
+//! A look at a segment that changes nothing.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::segment::{Break, Frames};
+use super::segmented::Place;
+use crate::map::Change;
+use crate::store::{FileSystem, StoreError};
+
+/// What stands in a segment.
+#[derive(Debug)]
+pub(in crate::store) struct Inspected {
+    /// The first revision, by its name.
+    pub(in crate::store) first: u64,
+    /// The revision after the last that can be read.
+    pub(in crate::store) next: u64,
+    /// Bytes behind that, which a crash left and the next start will cut off.
+    pub(in crate::store) torn_bytes: u64,
+    /// Why the rest cannot be read.
+    pub(in crate::store) damage: Option<StoreError>,
+}
+
+/// Reads the segment that begins with revision `first`, and hands its changes to `each`, which may object.
+///
+/// # Errors
+/// When the file cannot be read at all.
+pub(in crate::store) fn inspect(
+    files: &Arc<dyn FileSystem>,
+    folder: PathBuf,
+    map: Uuid,
+    first: u64,
+    mut each: impl FnMut(u64, Change) -> Result<(), String>,
+) -> Result<Inspected, StoreError> {
+    let place = Place { files: Arc::clone(files), folder, map };
+    let path = place.path(first);
+    let bytes = place.read(&path)?;
+    let mut inspected = Inspected { first, next: first, torn_bytes: 0, damage: None };
+    let mut read = || -> Result<Option<StoreError>, Break> {
+        let mut frames = Frames::of(&bytes, map, first)?;
+        loop {
+            let at = frames.offset();
+            let Some(frame) = frames.next(&bytes)? else { return Ok(None) };
+            if let Err(reason) = frame.change().and_then(|change| each(frame.revision, change)) {
+                return Ok(Some(StoreError::at(&path, at, frame.revision, reason)));
+            }
+            inspected.next = frames.next_revision();
+        }
+    };
+    match read() {
+        Ok(damage) => inspected.damage = damage,
+        Err(broken) if broken.torn => inspected.torn_bytes = (bytes.len() - broken.offset) as u64,
+        Err(broken) => inspected.damage = Some(broken.of(&path)),
+    }
+    Ok(inspected)
+}
