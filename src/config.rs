@@ -112,6 +112,8 @@ pub struct LimitsConfig {
     pub listed_voxels_max: usize,
     /// See [`Limits::jobs_waiting_max`].
     pub jobs_waiting_max: usize,
+    /// See [`Limits::map_file_bytes_max`].
+    pub map_file_bytes_max: usize,
     /// See [`Limits::min_revision_wait_max`]; seconds.
     pub min_revision_wait_max_s: f64,
 }
@@ -169,6 +171,7 @@ impl Default for LimitsConfig {
             voxels_per_map_max: limits.voxels_per_map_max,
             listed_voxels_max: limits.listed_voxels_max,
             jobs_waiting_max: limits.jobs_waiting_max,
+            map_file_bytes_max: limits.map_file_bytes_max,
             min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
         }
     }
@@ -283,6 +286,7 @@ impl LimitsConfig {
             voxels_per_map_max: self.voxels_per_map_max,
             listed_voxels_max: self.listed_voxels_max,
             jobs_waiting_max: self.jobs_waiting_max,
+            map_file_bytes_max: self.map_file_bytes_max,
             min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
         }
     }

@@ -5,6 +5,7 @@
 //! makes no sense.
 
 mod bench;
+mod config;
 mod delete;
 mod demo;
 mod doctor;
@@ -22,6 +23,7 @@ mod remote;
 mod runtime;
 mod scan_report;
 mod serve;
+mod snapshot;
 mod statistics;
 mod truth;
 mod undo;
@@ -68,7 +70,10 @@ enum Command {
     Bench(bench::Bench),
     Experiment(experiment::Experiment),
     Health(health::Health),
+    Snapshot(snapshot::TakeSnapshots),
+    Restore(snapshot::Restore),
     Doctor(doctor::Doctor),
+    Config(config::Settings),
 }
 
 /// Does what the process was called for, and says how that went.
@@ -101,7 +106,10 @@ impl Command {
             Self::Bench(bench) => bench.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Health(health) => runtime::block_on(health.run(output)),
+            Self::Snapshot(snapshot) => runtime::block_on(snapshot.run(output)),
+            Self::Restore(restore) => runtime::block_on(restore.run(output)),
             Self::Doctor(doctor) => doctor.run(output),
+            Self::Config(config) => config.run(&output),
         }
     }
 }

@@ -67,7 +67,8 @@ impl Output {
         });
     }
 
-    fn object(&self, result: &impl Serialize) -> Result<(), CliError> {
+    /// Prints an object for programs.
+    pub(super) fn object(&self, result: &impl Serialize) -> Result<(), CliError> {
         self.line(serde_json::to_string(result).map_err(CliError::failed)?)
     }
 

@@ -31,6 +31,13 @@ end it: requests in flight are finished, maps are saved. Whatever ends it, nothi
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Serve {
+    #[command(flatten)]
+    options: ServeOptions,
+}
+
+/// What the settings of the daemon are made from.
+#[derive(Debug, clap::Args)]
+pub(super) struct ServeOptions {
     /// Settings to start from, TOML
     #[arg(long, env = "MROL_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
@@ -66,7 +73,7 @@ pub(super) struct Serve {
 
 impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let config = self.config().map_err(CliError::usage)?;
+        let config = self.options.config().map_err(CliError::usage)?;
         start_logging(config.log.format, &config.log.level).map_err(CliError::usage)?;
         let server = Server::bind(config).await?;
         let mut shutdown = pin!(shutdown_signal());
@@ -83,8 +90,11 @@ impl Serve {
         }
         Ok(server.run(shutdown).await?)
     }
+}
 
-    fn config(&self) -> Result<Config, ConfigError> {
+impl ServeOptions {
+    /// The settings that count.
+    pub(super) fn config(&self) -> Result<Config, ConfigError> {
         let options = json!({
             "data_dir": self.data_dir,
             "http": {"listen": self.http_listen},

@@ -36,6 +36,7 @@ pub use new_map::NewMap;
 
 use std::time::Duration;
 
+use bytes::{Bytes, BytesMut};
 use tonic::{Request, Response, Status};
 
 use crate::map::{MapName, Region, RobotName};
@@ -43,7 +44,7 @@ use crate::service::{
     Deletion, DeletionAnswer, MapInfo, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
     TrajectoryAnswer, Undo, UndoAnswer, VoxelListing,
 };
-use crate::wire::pb;
+use crate::wire::{pb, restore_pieces};
 use connection::Connection;
 
 /// A connection to a server.
@@ -103,6 +104,30 @@ impl Client {
         let request = self.request(pb::DeleteMapRequest { map: map.to_string() });
         let answer = self.connection.maps().delete_map(request).await;
         answer.map(|_| ()).map_err(|status| self.connection.failure(&status))
+    }
+
+    /// A map as a map file, at one revision.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn snapshot_map(&self, map: &MapName) -> Result<Bytes, ClientError> {
+        let request = Request::new(pb::SnapshotMapRequest { map: map.to_string() });
+        let failure = |status| self.connection.failure(&status);
+        let mut pieces = self.connection.maps().snapshot_map(request).await.map_err(failure)?.into_inner();
+        let mut file = BytesMut::new();
+        while let Some(piece) = pieces.message().await.map_err(failure)? {
+            file.extend_from_slice(&piece.data);
+        }
+        Ok(file.freeze())
+    }
+
+    /// Makes a map from a map file, under a uuid of its own.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn restore_map(&self, map: &MapName, file: Bytes) -> Result<MapInfo, ClientError> {
+        let pieces = tokio_stream::iter(restore_pieces(map, file));
+        self.domain(self.connection.maps().restore_map(pieces).await)
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.

@@ -43,7 +43,7 @@ fn code(response: &Response) -> Code {
 
 /// The name of a call for metrics and the log. Whatever a client may send, it is one of few.
 fn operation(path: &str) -> &'static str {
-    const OPERATIONS: [&str; 13] = [
+    const OPERATIONS: [&str; 15] = [
         "Occupancy/QueryPoints",
         "Occupancy/QueryPointsStream",
         "Occupancy/ListVoxels",
@@ -57,6 +57,8 @@ fn operation(path: &str) -> &'static str {
         "Maps/GetMap",
         "Maps/ListMaps",
         "Maps/DeleteMap",
+        "Maps/SnapshotMap",
+        "Maps/RestoreMap",
     ];
     let called = path.strip_prefix("/mrol.v1.").unwrap_or_default();
     let known = OPERATIONS.into_iter().find(|operation| *operation == called);

@@ -65,13 +65,34 @@ impl Catalogue {
         if let Ok(map) = self.get(&name) {
             return same_settings(map, settings).map(|map| (map, false));
         }
-        let count = self.maps.read().len();
-        if count >= maps_max {
-            let message = format!("there are {count} maps, maps_max is {maps_max}: delete one first");
-            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message));
-        }
+        self.check_room(maps_max)?;
         let empty = Snapshot::of(&MultiResolutionMap::new(settings)?, Uuid::new_v4());
         self.add(name, empty).await.map(|map| (map, true))
+    }
+
+    /// The map of `snapshot` under a name that is free.
+    pub(super) async fn restore(
+        &self,
+        name: MapName,
+        snapshot: Snapshot,
+        maps_max: usize,
+    ) -> Result<Arc<HostedMap>, ServiceError> {
+        let _writing = self.writing.lock().await;
+        if self.get(&name).is_ok() {
+            let message = format!("map {name} exists: delete it first, or restore under another name");
+            return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
+        }
+        self.check_room(maps_max)?;
+        self.add(name, snapshot).await
+    }
+
+    fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
+        let count = self.maps.read().len();
+        if count < maps_max {
+            return Ok(());
+        }
+        let message = format!("there are {count} maps, maps_max is {maps_max}: delete one first");
+        Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message))
     }
 
     /// Takes a map into the catalogue, kept and named; the caller holds `writing`.

@@ -19,6 +19,8 @@ pub struct Limits {
     pub listed_voxels_max: usize,
     /// Jobs that may wait for a query thread, and as many for a mapping thread. 256.
     pub jobs_waiting_max: usize,
+    /// Bytes of a map file that is restored, before and after compression. 1 GiB.
+    pub map_file_bytes_max: usize,
     /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
     pub min_revision_wait_max: Duration,
 }
@@ -32,6 +34,7 @@ impl Default for Limits {
             voxels_per_map_max: 200_000_000,
             listed_voxels_max: 20_000_000,
             jobs_waiting_max: 256,
+            map_file_bytes_max: 1 << 30,
             min_revision_wait_max: Duration::from_secs(10),
         }
     }

@@ -9,6 +9,7 @@ mod digest;
 mod error;
 mod hosted_map;
 mod limits;
+mod map_file;
 mod mapping;
 mod pool;
 mod request;
@@ -18,18 +19,22 @@ mod undo;
 pub use error::{ErrorCode, ServiceError};
 pub use limits::Limits;
 pub use request::{
-    Deletion, DeletionAnswer, DeletionTarget, MapInfo, MapState, MapStorage, PointAnswer, PointCloud,
-    PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer, UndoTarget, VoxelListing,
+    Deletion, DeletionAnswer, DeletionTarget, MapFile, MapInfo, MapState, MapStorage, PointAnswer,
+    PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer, UndoTarget,
+    VoxelListing,
 };
 pub use settings::ServiceSettings;
 
 use std::sync::Arc;
+
+use bytes::Bytes;
 
 use crate::map::{MapName, MapSettings, Region, RobotName};
 use crate::store::OpeningProgress;
 use catalogue::Catalogue;
 use committing::{Refusal, Step};
 use hosted_map::{HostedMap, Saving};
+use map_file::from_file;
 use pool::Pool;
 
 /// All operations on all maps. A clone is another handle on the same maps.
@@ -230,6 +235,29 @@ impl MapService {
         map.check_level(level)?;
         let most = self.limits().listed_voxels_max;
         self.0.queries.run(move || map.list(level, region.as_ref(), most)).await?
+    }
+
+    /// A map as a map file, at one revision.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait.
+    pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
+        let map = self.map(name)?;
+        self.0.queries.run(move || map.to_file()).await?
+    }
+
+    /// Makes a map from a map file, under a uuid of its own.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
+    /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`.
+    pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
+        let inner = Arc::clone(&self.0);
+        let snapshot = self.0.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
+        let inner = Arc::clone(&self.0);
+        let maps_max = self.limits().maps_max;
+        let map = to_its_end(async move { inner.catalogue.restore(name, snapshot, maps_max).await }).await?;
+        self.describe(map).await
     }
 
     /// Writes snapshots of the maps that changed since their last one; the number of them.

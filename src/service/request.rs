@@ -246,6 +246,15 @@ pub struct TrajectoryAnswer {
     pub state: MapState,
 }
 
+/// A map as a map file.
+#[derive(Debug, Clone)]
+pub struct MapFile {
+    /// What a `.mrol` file holds.
+    pub bytes: Bytes,
+    /// At this state.
+    pub state: MapState,
+}
+
 /// The occupied voxels of a level.
 #[derive(Debug, Clone)]
 pub struct VoxelListing {

@@ -95,6 +95,15 @@ impl Snapshot {
     /// # Errors
     /// What is wrong with the bytes, and where.
     pub fn decode(bytes: &[u8]) -> Result<Self, Unreadable> {
+        Self::decode_within(bytes, BODY_BYTES_MAX)
+    }
+
+    /// The same, where nobody knows who made the bytes: a body of more than `body_bytes_max` is refused before memory
+    /// is taken for it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn decode_within(bytes: &[u8], body_bytes_max: u64) -> Result<Self, Unreadable> {
         let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
             format!("{} bytes are too few for a map file's header of {HEADER_BYTES}", bytes.len())
         })?;
@@ -114,8 +123,8 @@ impl Snapshot {
             ));
         }
         let length = u64::from(u32_at(header, 16)) | u64::from(u32_at(header, 20)) << 32;
-        if length > BODY_BYTES_MAX {
-            return Err(format!("a body of {length} bytes, at most {BODY_BYTES_MAX} are read"));
+        if length > body_bytes_max {
+            return Err(format!("a body of {length} bytes, at most {body_bytes_max} are read"));
         }
         let body = zstd::bulk::decompress(&bytes[HEADER_BYTES..], length as usize)
             .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;

@@ -75,6 +75,14 @@ impl TryFrom<pb::GetMapResponse> for MapInfo {
     }
 }
 
+impl TryFrom<pb::RestoreMapResponse> for MapInfo {
+    type Error = ServiceError;
+
+    fn try_from(answer: pb::RestoreMapResponse) -> Result<Self, ServiceError> {
+        required(answer.map, "map")?.try_into()
+    }
+}
+
 impl From<Vec<MapInfo>> for pb::ListMapsResponse {
     fn from(maps: Vec<MapInfo>) -> Self {
         Self { maps: maps.into_iter().map(Into::into).collect() }

@@ -6,6 +6,7 @@
 
 mod deletion;
 mod field;
+mod map_file;
 mod maps;
 mod occupancy;
 pub mod pb;
@@ -16,6 +17,7 @@ mod types;
 mod undo;
 
 pub(crate) use field::{InField, required};
+pub use map_file::{restore_pieces, snapshot_pieces};
 pub use maps::create_map;
 pub use occupancy::{KEYS_PER_CHUNK, voxel_chunks};
 pub(crate) use types::uuid_from;

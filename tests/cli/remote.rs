@@ -130,3 +130,65 @@ fn the_server_may_come_from_the_environment_and_people_get_tables() {
     let list = String::from_utf8(list.stdout).unwrap();
     assert!(list.starts_with("a ") && list.contains("0.25 m"), "{list}");
 }
+
+#[test]
+fn maps_are_backed_up_and_brought_back_elsewhere() {
+    let sequence = Sequence::of(2);
+    let (scans, backup) = (sequence.path("scans"), sequence.path("backup"));
+    let daemon = Daemon::start(&sequence.path("data"));
+    daemon.call(&["insert", &scans, "--map", "a", "--create", "--resolution", "0.1"]);
+    daemon.call(&["maps", "create", "b", "--resolution", "0.5"]);
+    let saved = daemon.call(&["snapshot", &backup]);
+    assert_eq!((saved.len(), &saved[0]["map"], &saved[0]["revision"]), (2, &json!("a"), &json!(2)));
+    let before = &daemon.call(&["maps", "show", "a"])[0];
+
+    let other = Daemon::start(&sequence.path("elsewhere"));
+    let (a, b) = (format!("{backup}/a.mrol"), format!("{backup}/b.mrol"));
+    let restored = other.call(&["restore", &a, &b]);
+    assert_eq!(restored[0], json!({"map": "a", "revision": 2, "voxels": saved[0]["voxels"]}));
+    assert!(other.refuses(&["restore", &a]).contains("map a exists"));
+    other.call(&["restore", &a, "--map", "before"]);
+    let after = &other.call(&["maps", "show", "before"])[0];
+    assert_ne!(after["map_uuid"], before["map_uuid"]);
+    assert_eq!((&after["levels"][3]["voxels"], &after["scans"]), (&before["levels"][3]["voxels"], &json!(2)));
+    // It goes on from there, and is as durable as any.
+    other.call(&[
+        "insert",
+        &scans,
+        "--map",
+        "before",
+        "--robot",
+        "r2",
+        "--truth",
+        &sequence.path("poses.txt"),
+    ]);
+    assert_eq!(other.stop(), Some(0));
+    let other = Daemon::start(&sequence.path("elsewhere"));
+    assert_eq!(other.call(&["maps", "show", "before"])[0]["revision"], 4);
+
+    let broken = sequence.path("broken.mrol");
+    let mut bytes = std::fs::read(&a).unwrap();
+    bytes[40] ^= 1;
+    std::fs::write(&broken, bytes).unwrap();
+    assert!(other.refuses(&["restore", &broken]).contains("bad_map_file"));
+    assert!(other.refuses(&["restore", &scans]).contains("scans"));
+    let names = other.call(&["maps", "list"]);
+    assert_eq!(names.len(), 3);
+}
+
+#[test]
+fn the_settings_that_count_are_printed_and_read_back() {
+    let sequence = Sequence::of(1);
+    let printed = mrol(&["config", "print", "--durability", "250ms"])
+        .env("MROL_LIMITS__MAPS_MAX", "4")
+        .assert()
+        .success()
+        .get_output()
+        .clone();
+    let file = sequence.path("mrol.toml");
+    std::fs::write(&file, &printed.stdout).unwrap();
+    let read = &objects(&["config", "print", "--config", &file])[0];
+    assert_eq!((&read["store"]["durability"], &read["limits"]["maps_max"]), (&json!("250ms"), &json!(4)));
+    assert_eq!(read["http"]["listen"], "127.0.0.1:7333");
+    assert!(complaint(&["config", "print", "--durability", "often"], 2).contains("durability"));
+}

@@ -13,8 +13,6 @@ use crate::store::{FileSystem, StoreError};
 /// What stands in a segment.
 #[derive(Debug)]
 pub(in crate::store) struct Inspected {
-    /// The first revision, by its name.
-    pub(in crate::store) first: u64,
     /// The revision after the last that can be read.
     pub(in crate::store) next: u64,
     /// Bytes behind that, which a crash left and the next start will cut off.
@@ -37,7 +35,7 @@ pub(in crate::store) fn inspect(
     let place = Place { files: Arc::clone(files), folder, map };
     let path = place.path(first);
     let bytes = place.read(&path)?;
-    let mut inspected = Inspected { first, next: first, torn_bytes: 0, damage: None };
+    let mut inspected = Inspected { next: first, torn_bytes: 0, damage: None };
     let mut read = || -> Result<Option<StoreError>, Break> {
         let mut frames = Frames::of(&bytes, map, first)?;
         loop {

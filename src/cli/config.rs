@@ -1,0 +1,41 @@
+//! `mrol config`: the settings that count.
+
+use clap::Subcommand;
+
+use super::error::CliError;
+use super::output::Output;
+use super::serve::ServeOptions;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol config print                              every setting of the daemon with its value, as TOML
+  mrol config print > mrol.toml                  a file to start from
+  MROL_LIMITS__MAPS_MAX=4 mrol config print --config mrol.toml --durability 200ms
+
+Takes the options of `mrol serve`, and prints what it would run with: defaults, then the file, then MROL_... variables,
+then options.";
+
+/// Show the settings that `mrol serve` would run with
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Settings {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Print every setting
+    Print(Box<ServeOptions>),
+}
+
+impl Settings {
+    pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
+        let Action::Print(options) = self.action;
+        let config = options.config().map_err(CliError::usage)?;
+        if output.is_json() {
+            return output.object(&config);
+        }
+        output.say(toml::to_string(&config).map_err(CliError::failed)?.trim_end())
+    }
+}

@@ -1,0 +1,151 @@
+//! `mrol snapshot` and `mrol restore`: maps out of a server, and into one.
+
+use std::fmt::{self, Display};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::{bytes, count};
+use super::output::Output;
+use super::parse;
+use super::remote::ServerOptions;
+use crate::client::Client;
+use crate::map::MapName;
+use crate::store::{Disk, Snapshot};
+
+const SNAPSHOT_EXAMPLES: &str = "\
+EXAMPLES:
+  mrol snapshot backup/                          every map of the server, as backup/NAME.mrol
+  mrol snapshot backup/ --map office --map lab
+  mrol snapshot backup/ --server http://robot-7:7334
+
+Each file is a map at one revision, with its trajectory and the ids that it has accepted; the server goes on working.
+A file is checked before it takes the place of an older one. `mrol restore` brings maps back, on this server or
+another; so does putting a file into DATA_DIR/maps of a server that is down.";
+
+const RESTORE_EXAMPLES: &str = "\
+EXAMPLES:
+  mrol restore backup/office.mrol                as map office
+  mrol restore backup/*.mrol --server http://robot-8:7334
+  mrol restore backup/office.mrol --map office-before
+
+A restored map has a uuid of its own, since its history may go on otherwise. There must be no map of that name.";
+
+/// Back maps of a running server up, as files
+#[derive(Debug, clap::Args)]
+#[command(name = "snapshot", after_help = SNAPSHOT_EXAMPLES)]
+pub(super) struct TakeSnapshots {
+    /// Where the files go; made where it is not there
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Only this map; may be repeated
+    #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
+    maps: Vec<MapName>,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// Bring maps back to a running server, from files
+#[derive(Debug, clap::Args)]
+#[command(after_help = RESTORE_EXAMPLES)]
+pub(super) struct Restore {
+    /// Map files, NAME.mrol
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Another name for the map; of one file
+    #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
+    map: Option<MapName>,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+impl TakeSnapshots {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let client = self.server.connect().await?;
+        let names = match self.maps.is_empty() {
+            true => client.list_maps().await?.into_iter().map(|info| info.name).collect(),
+            false => self.maps,
+        };
+        std::fs::create_dir_all(&self.folder).map_err(CliError::writing(&self.folder))?;
+        let output = output.with_bar_of(names.len(), "maps");
+        for name in names {
+            output.print(&take(&client, &name, &self.folder).await?)?;
+            output.step();
+        }
+        output.clear_bar();
+        Ok(())
+    }
+}
+
+async fn take(client: &Client, name: &MapName, folder: &Path) -> Result<Saved, CliError> {
+    let file = client.snapshot_map(name).await?;
+    let path = folder.join(format!("{name}.mrol"));
+    let damaged =
+        |reason| CliError::failed(format!("what the server sent of map {name} is no map: {reason}"));
+    let snapshot = Snapshot::decode(&file).map_err(damaged)?;
+    snapshot.write(&Disk, &path)?;
+    let (revision, voxels) = (snapshot.contents.revision, snapshot.contents.voxels.len());
+    Ok(Saved { map: name.to_string(), file: path.display().to_string(), revision, voxels, bytes: file.len() })
+}
+
+impl Restore {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        if self.map.is_some() && self.files.len() > 1 {
+            return Err(CliError::usage(format!(
+                "--map names one map, and {} files are given",
+                self.files.len()
+            )));
+        }
+        let client = self.server.connect().await?;
+        let output = output.with_bar_of(self.files.len(), "maps");
+        for path in &self.files {
+            let name = self.map.clone().map_or_else(|| name_of(path), Ok)?;
+            let unreadable = |error| CliError::failed(format!("{}: {error}", path.display()));
+            let file = std::fs::read(path).map_err(unreadable)?;
+            let info = client.restore_map(&name, file.into()).await?;
+            let voxels = info.levels.first().map_or(0, |level| level.voxels);
+            output.print(&Restored { map: name.to_string(), revision: info.state.revision, voxels })?;
+            output.step();
+        }
+        output.clear_bar();
+        Ok(())
+    }
+}
+
+/// The name that a file's name says.
+fn name_of(path: &Path) -> Result<MapName, CliError> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    MapName::new(&stem)
+        .map_err(|error| CliError::usage(format!("{}: {error}; --map names it", path.display())))
+}
+
+#[derive(Serialize)]
+struct Saved {
+    map: String,
+    file: String,
+    revision: u64,
+    voxels: usize,
+    bytes: usize,
+}
+
+impl Display for Saved {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { map, file, revision, .. } = self;
+        let (voxels, size) = (count(self.voxels), bytes(self.bytes));
+        write!(f, "map {map} at revision {revision}, {voxels} voxels, {size}: {file}")
+    }
+}
+
+#[derive(Serialize)]
+struct Restored {
+    map: String,
+    revision: u64,
+    voxels: usize,
+}
+
+impl Display for Restored {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "map {} restored at revision {}, {} voxels", self.map, self.revision, count(self.voxels))
+    }
+}

@@ -1,0 +1,31 @@
+//! Maps as files, out of a server and into one.
+
+use uuid::Uuid;
+
+use super::hosted_map::HostedMap;
+use super::{ErrorCode, Limits, MapFile, ServiceError};
+use crate::store::Snapshot;
+
+impl HostedMap {
+    /// The map as a file, at one revision.
+    pub(super) fn to_file(&self) -> Result<MapFile, ServiceError> {
+        let snapshot = Snapshot::of(&self.map, self.uuid);
+        let encoded = snapshot.encode();
+        let bytes =
+            encoded.map_err(|e| ServiceError::new(ErrorCode::Internal, "not_encoded", e.to_string()))?;
+        Ok(MapFile { bytes: bytes.into(), state: self.state(snapshot.contents.revision) })
+    }
+}
+
+/// What a file holds, as a map of its own.
+pub(super) fn from_file(file: &[u8], limits: &Limits) -> Result<Snapshot, ServiceError> {
+    let decoded = Snapshot::decode_within(file, limits.map_file_bytes_max as u64);
+    let bad = |reason| ServiceError::invalid("bad_map_file", format!("map file: {reason}"));
+    let snapshot = decoded.map_err(bad)?;
+    let (voxels, most) = (snapshot.contents.voxels.len(), limits.voxels_per_map_max);
+    if voxels > most {
+        let message = format!("the map file has {voxels} voxels, voxels_per_map_max is {most}");
+        return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message));
+    }
+    Ok(Snapshot { uuid: Uuid::new_v4(), ..snapshot })
+}

@@ -1,0 +1,34 @@
+//! Map files in pieces (`maps.proto`).
+
+use bytes::Bytes;
+
+use super::pb;
+use crate::map::MapName;
+use crate::service::MapFile;
+
+/// Bytes of a piece.
+const PIECE_BYTES: usize = 1 << 20;
+
+/// A file as messages.
+pub fn snapshot_pieces(file: MapFile) -> impl Iterator<Item = pb::SnapshotMapResponse> + Send {
+    let MapFile { bytes, state } = file;
+    let file_bytes = bytes.len() as u64;
+    pieces(bytes).map(move |data| pb::SnapshotMapResponse { data, state: Some(state.into()), file_bytes })
+}
+
+/// The messages that make the map `map` of a file.
+pub fn restore_pieces(
+    map: &MapName,
+    file: Bytes,
+) -> impl Iterator<Item = pb::RestoreMapRequest> + Send + use<> {
+    let map = map.to_string();
+    pieces(file).map(move |data| pb::RestoreMapRequest { map: map.clone(), data })
+}
+
+fn pieces(bytes: Bytes) -> impl Iterator<Item = Bytes> + Send {
+    let count = bytes.len().div_ceil(PIECE_BYTES).max(1);
+    (0..count).map(move |piece| {
+        let start = piece * PIECE_BYTES;
+        bytes.slice(start..bytes.len().min(start + PIECE_BYTES))
+    })
+}
