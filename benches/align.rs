@@ -1,12 +1,11 @@
 //! Alignments: a simulated lidar scan to the map of the one before it.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mrol::align::{AlignmentSettings, align};
-use mrol::bench::workload::add;
+use mrol::align::{AlignmentSettings, Method, align};
 use mrol::geometry::{Point, Pose};
-use mrol::map::{Lookup, MapSettings, MultiResolutionMap};
+use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
 use mrol::scan::{Scene, Tour, tours};
-use mrol::voxel::{VoxelSet, volumetric_sample};
+use mrol::voxel::volumetric_sample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -16,9 +15,14 @@ fn alignment(criterion: &mut Criterion) {
     let map = map_of(&first, &lidar.poses[0]);
     let mut group = criterion.benchmark_group("align");
     group.sample_size(20);
-    for lookup in [Lookup::Bloom, Lookup::Exact] {
-        let settings = AlignmentSettings { lookup, ..AlignmentSettings::default() };
-        group.bench_function(lookup.as_str(), |bencher| {
+    let ways = [
+        (Method::Refined, Lookup::Bloom),
+        (Method::Refined, Lookup::Exact),
+        (Method::Overlap, Lookup::Bloom),
+    ];
+    for (method, lookup) in ways {
+        let settings = AlignmentSettings { method, lookup, ..AlignmentSettings::default() };
+        group.bench_function(format!("{} {}", method.as_str(), lookup.as_str()), |bencher| {
             bencher.iter(|| align(&map, &second, &lidar.poses[0], &settings));
         });
     }
@@ -35,7 +39,8 @@ fn scan(tour: &Tour, step: usize) -> Vec<Point> {
 
 fn map_of(points: &[Point], map_from_sensor: &Pose) -> MultiResolutionMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).expect("settings in range");
-    add(&map, VoxelSet::of_points(points, &map.lattice().from_points(map_from_sensor)).0);
+    let pose = TrajectoryPose::new(RobotName::new("r").expect("a name"), *map_from_sensor);
+    map.committer().insert_scan(ScanRecord::of_points(pose, points, map.lattice()));
     map
 }
 

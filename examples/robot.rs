@@ -8,7 +8,6 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use mrol::align::Guess;
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, translation_m};
 use mrol::map::{MapName, RobotName};
@@ -32,20 +31,16 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
     let client = Client::connect(&url).await?;
     client.create_map(&map, NewMap::of(0.05)).await?;
-    let requests = scans.into_iter().map(move |points| ScanRequest {
-        robot: robot.clone(),
-        scan_id: None,
-        points: points.into(),
-        timestamp_ns: None,
-        guess: Guess::Last,
-        at_guess: false,
-        strict: false,
-    });
+    let requests = scans.into_iter().map(move |points| ScanRequest::new(robot.clone(), points.into()));
     let mut answers = client.insert_scans(&map, tokio_stream::iter(requests)).await?;
     while let Some(answer) = answers.next().await {
         let answer = answer?;
         let ([x, y, z], overlap) = (translation_m(&answer.map_from_sensor), answer.overlap());
-        println!("{:<12} at {x:>7.3} {y:>7.3} {z:>7.3} m, overlap {overlap:.3}", answer.verdict.as_str());
+        println!(
+            "{:<12} at {x:>7.3} {y:>7.3} {z:>7.3} m, overlap {overlap:.3}: {}",
+            answer.verdict.as_str(),
+            answer.reason
+        );
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
 
+use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -8,9 +9,10 @@ use figment::Figment;
 use figment::providers::{Env, Format, Serialized, Toml};
 use serde::{Deserialize, Serialize};
 
-use crate::align::AlignmentSettings;
+use crate::align::{AlignmentSettings, Method};
 use crate::bloom::FilterSettings;
-use crate::service::{Limits, ServiceSettings};
+use crate::scan::{PointFilter, PointFilterError};
+use crate::service::{Limits, ServiceSettings, StandingSettings};
 use crate::store::{Durability, StoreSettings};
 use crate::telemetry::LogFormat;
 
@@ -37,6 +39,10 @@ pub struct Config {
     pub threads: ThreadsConfig,
     /// The filter of maps whose makers do not say.
     pub filter: FilterConfig,
+    /// How scans are aligned.
+    pub alignment: AlignmentConfig,
+    /// Which points of whose scans count: a table a robot, `"*"` for every other.
+    pub robots: BTreeMap<String, RobotConfig>,
     /// Bounds on what callers may ask.
     pub limits: LimitsConfig,
 }
@@ -94,6 +100,56 @@ pub struct FilterConfig {
     pub bits_per_voxel: f64,
 }
 
+/// How scans are aligned.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AlignmentConfig {
+    /// `refined`, `overlap` or `weighted_sum`, for requests that do not say. `refined`.
+    pub method: MethodConfig,
+}
+
+/// See [`Method`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodConfig {
+    /// [`Method::Refined`].
+    #[default]
+    Refined,
+    /// [`Method::Overlap`].
+    Overlap,
+    /// [`Method::WeightedSum`].
+    WeightedSum,
+}
+
+impl From<MethodConfig> for Method {
+    fn from(method: MethodConfig) -> Self {
+        match method {
+            MethodConfig::Refined => Self::Refined,
+            MethodConfig::Overlap => Self::Overlap,
+            MethodConfig::WeightedSum => Self::WeightedSum,
+        }
+    }
+}
+
+/// Which points of a robot's scans count; a request may say otherwise.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotConfig {
+    /// Distance from the sensor, metres; nearer points are skipped.
+    pub range_min_m: Option<f64>,
+    /// Distance from the sensor, metres; farther points are skipped.
+    pub range_max_m: Option<f64>,
+    /// The robot's own body in the sensor frame, metres: smallest and largest corner.
+    pub body_m: Option<[[f64; 3]; 2]>,
+}
+
+impl RobotConfig {
+    fn filter(&self) -> PointFilter {
+        let body_m = self.body_m.map(|[min_m, max_m]| (min_m, max_m));
+        PointFilter { range_min_m: self.range_min_m, range_max_m: self.range_max_m, body_m }
+    }
+}
+
 /// The service's [`Limits`], and that of a message.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -130,6 +186,8 @@ impl Default for Config {
             log: LogConfig::default(),
             threads: ThreadsConfig::default(),
             filter: FilterConfig::default(),
+            alignment: AlignmentConfig::default(),
+            robots: BTreeMap::new(),
             limits: LimitsConfig::default(),
         }
     }
@@ -196,6 +254,14 @@ pub enum ConfigError {
         /// What it is.
         value: String,
     },
+    /// Numbers of a robot's table that make no filter.
+    #[error("robots.{name}: {error}")]
+    Robot {
+        /// Of the table.
+        name: String,
+        /// What is wrong.
+        error: PointFilterError,
+    },
 }
 
 impl Config {
@@ -242,6 +308,11 @@ impl Config {
         if !(0.0..=86_400.0).contains(&wait) {
             return range("limits.min_revision_wait_max_s", "0 to 86400", wait.to_string());
         }
+        for (name, robot) in &self.robots {
+            if let Err(error) = robot.filter().checked() {
+                return Err(ConfigError::Robot { name: name.clone(), error });
+            }
+        }
         Ok(self)
     }
 
@@ -254,7 +325,12 @@ impl Config {
             limits: self.limits.service_limits(),
             query_threads: self.threads.query,
             mapping_threads: self.threads.mapping,
-            alignment: AlignmentSettings::default(),
+            alignment: AlignmentSettings {
+                method: self.alignment.method.into(),
+                ..AlignmentSettings::default()
+            },
+            standing: StandingSettings::default(),
+            robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.filter())).collect(),
             filter: FilterSettings { hashes, bits_per_key: bits_per_voxel },
         }
     }

@@ -125,6 +125,13 @@ pub fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (a_from_b.translation.vector.norm(), a_from_b.rotation.angle().to_degrees())
 }
 
+/// Where a motion at constant velocity leads that went from `before` to `last`, after `share` of the time that took.
+pub fn extrapolate(before: &Pose, last: &Pose, share: f64) -> Pose {
+    let motion = before.inv_mul(last);
+    let turn = UnitQuaternion::from_scaled_axis(motion.rotation.scaled_axis() * share);
+    last * Pose::from_parts(Translation3::from(motion.translation.vector * share), turn)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,6 +151,16 @@ mod tests {
         let after = pose(translation_m(&before), rotation_xyzw(&before)).unwrap();
         let (metres, degrees) = pose_difference(&before, &after);
         assert!(metres < 1e-12 && degrees < 1e-5);
+    }
+
+    #[test]
+    fn a_constant_velocity_goes_on() {
+        let step = Pose::new(Vector3::new(0.2, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.1));
+        let (before, last) = (Pose::identity(), step);
+        let (metres, degrees) = pose_difference(&extrapolate(&before, &last, 1.0), &(step * step));
+        assert!(metres < 1e-12 && degrees < 1e-5);
+        let half = extrapolate(&before, &last, 0.5);
+        assert!(((last.inv_mul(&half)).rotation.angle() - 0.05).abs() < 1e-12);
     }
 
     #[test]

@@ -25,7 +25,7 @@
 //!
 //! let (voxels, _out_of_range) = VoxelSet::of_points(&scan, &map.lattice().from_points(&map_from_sensor));
 //! let pose = TrajectoryPose::new(RobotName::new("r1")?, map_from_sensor);
-//! let committed = map.committer().insert_scan(ScanRecord { pose, voxels });
+//! let committed = map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 //! assert_eq!((committed.revision, committed.voxels), (1, 2));
 //!
 //! let quantise = map.lattice().from_points(&map_from_sensor);

@@ -96,16 +96,14 @@ async fn grpc_client(url: String, seed: u64, end: Instant) -> History {
                 scan_id += 1;
                 let points = scan(&mut random);
                 let request = ScanRequest {
-                    robot: RobotName::new(&format!("g{seed}")).unwrap(),
                     scan_id: Some(scan_id),
-                    points: points.clone().into(),
-                    timestamp_ns: None,
                     guess: Guess::Pose(guess(&mut random)),
                     at_guess: random.random_bool(0.5),
                     strict: true,
+                    ..ScanRequest::new(RobotName::new(&format!("g{seed}")).unwrap(), points.clone().into())
                 };
                 let answer = client.insert_scan(&map, request).await.expect("an insertion");
-                if !answer.accepted() {
+                if !answer.accepted || answer.standing {
                     continue;
                 }
                 let (map_from_sensor, new_voxels) = (answer.map_from_sensor, answer.new_voxels);
@@ -202,7 +200,7 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
         Event::Inserted { points, map_from_sensor, .. } => {
             let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_points(map_from_sensor));
             let pose = TrajectoryPose::new(RobotName::new("replay").unwrap(), *map_from_sensor);
-            map.committer().insert_scan(ScanRecord { pose, voxels }).voxels
+            map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels)).voxels
         }
         Event::Deleted { deletion, .. } => {
             let view = map.view();

@@ -101,13 +101,11 @@ impl Writer {
         let (state, voxels) = match &wish {
             Wish::Insert { scan_id, points } => {
                 let scan = ScanRequest {
-                    robot: self.robot(),
                     scan_id: Some(*scan_id),
-                    points: points.clone().into(),
-                    timestamp_ns: None,
                     guess: Guess::Pose(Pose::identity()),
                     at_guess: true,
                     strict: true,
+                    ..ScanRequest::new(self.robot(), points.clone().into())
                 };
                 let answer = client.insert_scan(&office(), scan).await?;
                 (answer.state, answer.new_voxels)

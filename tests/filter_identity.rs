@@ -7,12 +7,11 @@
 
 mod shared_scans;
 
-use mrol::align::{AlignmentSettings, align};
+use mrol::align::{AlignmentSettings, Method, align};
 use mrol::bloom::FilterSettings;
-use mrol::geometry::{Point, Pose};
+use mrol::geometry::{Point, Pose, pose_difference};
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
 use mrol::scan::{Scene, tours};
-use mrol::voxel::VoxelSet;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -27,21 +26,20 @@ struct Run {
 }
 
 /// Maps a sequence: the first scan at the origin, each next one aligned from the pose of the one before.
-fn map_sequence(scans: &[Vec<Point>], settings: MapSettings, lookup: Lookup) -> Run {
+fn map_sequence(scans: &[Vec<Point>], settings: MapSettings, lookup: Lookup, method: Method) -> Run {
     let map = MultiResolutionMap::new(settings).unwrap();
-    let alignment = AlignmentSettings { lookup, ..AlignmentSettings::default() };
+    let alignment = AlignmentSettings { lookup, method, ..AlignmentSettings::default() };
     let mut run = Run { poses: vec![Pose::identity()], expected_false_positives: 0.0 };
     for (k, points) in scans.iter().enumerate() {
         if k > 0 {
             let aligned = align(&map, points, &run.poses[k - 1], &alignment);
-            let (_, levels, _) = map.describe(0, 0);
+            let levels = map.describe(0, 0).levels;
             let rate = levels.iter().map(|level| level.expected_rate).fold(0.0, f64::max);
             run.expected_false_positives += aligned.lookups as f64 * rate;
             run.poses.push(aligned.map_from_sensor);
         }
         let map_from_sensor = run.poses[k];
-        let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_points(&map_from_sensor));
-        map.committer().insert_scan(ScanRecord { pose: pose_of(map_from_sensor), voxels });
+        map.committer().insert_scan(ScanRecord::of_points(pose_of(map_from_sensor), points, map.lattice()));
     }
     run
 }
@@ -51,12 +49,19 @@ fn pose_of(map_from_sensor: Pose) -> TrajectoryPose {
 }
 
 fn assert_identical(name: &str, scans: &[Vec<Point>], resolution_m: f64, levels: u32) {
-    let with = |filter| MapSettings { resolution_m, levels, filter };
-    let exact = map_sequence(scans, with(AMPLE), Lookup::Exact);
-    let bloom = map_sequence(scans, with(AMPLE), Lookup::Bloom);
-    let small = map_sequence(scans, with(SMALL), Lookup::Bloom);
+    for method in [Method::Overlap, Method::Refined] {
+        assert_identical_by(method, name, scans, resolution_m, levels);
+    }
+}
+
+fn assert_identical_by(method: Method, name: &str, scans: &[Vec<Point>], resolution_m: f64, levels: u32) {
+    let map =
+        |filter, lookup| map_sequence(scans, MapSettings { resolution_m, levels, filter }, lookup, method);
+    let exact = map(AMPLE, Lookup::Exact);
+    let bloom = map(AMPLE, Lookup::Bloom);
+    let small = map(SMALL, Lookup::Bloom);
     println!(
-        "{name}: {} scans, {:.3} false positives to expect over the run with an ample filter, {:.0} with a small one",
+        "{name} by {method:?}: {} scans, {:.3} false positives to expect over the run with an ample filter, {:.0} with a small one",
         scans.len(),
         bloom.expected_false_positives,
         small.expected_false_positives
@@ -65,6 +70,13 @@ fn assert_identical(name: &str, scans: &[Vec<Point>], resolution_m: f64, levels:
     assert_eq!(bloom.poses, exact.poses);
     // The comparison has teeth: where false positives are common, poses do differ.
     assert_ne!(small.poses, exact.poses);
+    if method == Method::Refined {
+        let usual = map(FilterSettings::default(), Lookup::Bloom);
+        for (k, (usual, exact)) in usual.poses.iter().zip(&exact.poses).enumerate() {
+            let (metres, degrees) = pose_difference(usual, exact);
+            assert!(metres <= 1e-4 && degrees <= 1e-3, "scan {k}: {metres} m, {degrees} degrees");
+        }
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Daemon, bits_of, guess_pb, points_pb, query_pb, row, scan_pb};
+use common::{Daemon, bits_of, corner, guess_pb, points_pb, query_pb, row, scan_pb};
 use mrol::wire::pb;
 use pb::delete_voxels_request::Target;
 use pb::region::Shape;
@@ -224,7 +224,10 @@ async fn a_scan_sent_again_is_answered_as_the_first_time_and_another_under_its_i
     let first = robot.insert_scan(scan(&row(4))).await.unwrap().into_inner();
     daemon.put_in("a", &row(9)).await;
     let again = robot.insert_scan(scan(&row(4))).await.unwrap().into_inner();
-    assert_eq!(again, pb::InsertScanResponse { replayed: true, ..first });
+    assert!(again.replayed && again.accepted);
+    assert_eq!((&again.state, again.new_voxels), (&first.state, first.new_voxels));
+    let poses = [&again, &first].map(|answer| answer.alignment.as_ref().unwrap().map_from_sensor);
+    assert_eq!(poses[0], poses[1]);
     assert_eq!(daemon.contents("a").await.0, 2);
     let other = robot.insert_scan(scan(&row(5))).await.unwrap_err();
     assert_eq!(other.code(), Code::AlreadyExists);
@@ -237,8 +240,8 @@ async fn a_robot_without_a_guess_or_a_former_scan_is_asked_for_one() {
     daemon.make_map("a").await;
     let mut robot = daemon.mapping().await;
     let without = |name: &str| {
-        let pb::InsertScanRequest { map, scan, .. } = scan_pb("a", name, &row(4));
-        pb::InsertScanRequest { map, scan, guess: None, at_guess: false }
+        let pb::InsertScanRequest { map, scan, .. } = scan_pb("a", name, &corner());
+        pb::InsertScanRequest { map, scan, ..Default::default() }
     };
     // The first scan of an empty map needs none.
     assert!(robot.insert_scan(without("one")).await.unwrap().into_inner().accepted);
@@ -252,21 +255,29 @@ async fn a_robot_without_a_guess_or_a_former_scan_is_asked_for_one() {
 async fn a_scan_from_elsewhere_is_refused_by_an_answer_and_aligning_changes_nothing() {
     let daemon = Daemon::start().await;
     daemon.make_map("a").await;
-    daemon.put_in("a", &row(20)).await;
+    daemon.put_in("a", &corner()).await;
     let before = daemon.contents("a").await;
-    let far =
-        pb::InsertScanRequest { guess: guess_pb([500.0; 3]), at_guess: false, ..scan_pb("a", "r", &row(20)) };
+    let far = pb::InsertScanRequest {
+        guess: guess_pb([500.0; 3]),
+        at_guess: false,
+        ..scan_pb("a", "r", &corner())
+    };
     let mut robot = daemon.mapping().await;
     let refused = robot.insert_scan(far).await.unwrap().into_inner();
     let alignment = refused.alignment.unwrap();
     assert!(!refused.accepted && refused.new_voxels == 0);
     assert_eq!(alignment.verdict, i32::from(pb::Verdict::LowOverlap));
+    assert!(alignment.reason.contains("overlap_min 0.2"), "{}", alignment.reason);
     assert_eq!((alignment.overlap, alignment.level_overlaps.len()), (0.0, 4));
 
-    let pb::InsertScanRequest { map, scan, guess, .. } = scan_pb("a", "r", &row(20));
-    let align = pb::AlignScanRequest { map, scan, guess, at_guess: false };
+    let pb::InsertScanRequest { map, scan, guess, .. } = scan_pb("a", "r", &corner());
+    let align = pb::AlignScanRequest { map, scan, guess, ..Default::default() };
     let aligned = robot.align_scan(align).await.unwrap().into_inner();
-    assert!(aligned.accepted && aligned.alignment.unwrap().overlap > 0.99);
+    let alignment = aligned.alignment.unwrap();
+    assert!(aligned.accepted && alignment.overlap > 0.99, "{alignment:?}");
+    assert!(alignment.inliers > 0.9 && alignment.undetermined.is_empty() && alignment.align_ms > 0.0);
+    let diagonal = (0..6).map(|i| alignment.information[7 * i]);
+    assert_eq!(diagonal.filter(|known| *known > 0.0).count(), 6);
     assert_eq!(daemon.contents("a").await, before);
 }
 

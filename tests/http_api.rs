@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Daemon, bits_of, bytes_of, client, identity_json, json_of, pose_json, row};
+use common::{Daemon, bits_of, bytes_of, client, corner, identity_json, json_of, pose_json, row};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
@@ -29,7 +29,7 @@ async fn a_map_is_made_described_listed_and_deleted() {
     // Levels and filter are the server's where they are not said.
     assert_eq!(daemon.put("/v1/maps/atrium", json!({"resolution_m": 1})).await.status(), StatusCode::CREATED);
     let atrium = json_of(daemon.get("/v1/maps/atrium").await).await;
-    assert_eq!(atrium["levels"].as_array().unwrap().len(), 4);
+    assert_eq!(atrium["levels"].as_array().unwrap().len(), 6);
     assert_eq!(atrium["settings"]["filter"], made["settings"]["filter"]);
     assert_eq!(atrium["levels"][3]["resolution_m"], 8.0);
 
@@ -57,11 +57,18 @@ async fn a_scan_in_json_is_answered_in_full() {
     let uuid = answer["map_uuid"].clone();
     assert_eq!(uuid.as_str().unwrap().len(), 36);
     let expected = json!({
-        "accepted": true, "verdict": "accepted", "map_from_sensor": pose_json([1.0, 0.0, 0.0]),
-        "overlap": 0.0, "level_overlaps": [0.0, 0.0, 0.0, 0.0], "iterations": 0, "new_voxels": 2,
-        "points_skipped": 1, "replayed": false, "revision": 1, "map_uuid": uuid,
+        "accepted": true, "verdict": "accepted", "reason": "the first scan of the map",
+        "map_from_sensor": pose_json([1.0, 0.0, 0.0]), "overlap": 0.0, "level_overlaps": vec![0.0; 4],
+        "inliers": 0.0, "fitness": 0.0, "information": vec![vec![0.0; 6]; 6], "undetermined": [], "iterations": 0,
+        "new_voxels": 2, "points_skipped": 1, "replayed": false, "standing": false, "revision": 1,
+        "map_uuid": uuid,
     });
-    assert_eq!(answer, expected);
+    assert!(answer["align_ms"].as_f64().unwrap() >= 0.0);
+    let timeless = |mut answer: Value| {
+        answer.as_object_mut().unwrap().remove("align_ms");
+        answer
+    };
+    assert_eq!(timeless(answer), expected);
     let again = json_of(daemon.post("/v1/maps/a/scans", scan).await).await;
     assert_eq!((&again["replayed"], &again["revision"]), (&json!(true), &json!(1)));
 
@@ -108,12 +115,12 @@ async fn odometry_moves_the_guess_on_from_the_last_pose() {
 async fn an_alignment_changes_nothing_and_a_scan_that_does_not_fit_is_an_answer() {
     let daemon = Daemon::start().await;
     daemon.make_map("a").await;
-    daemon.put_in("a", &row(20)).await;
+    daemon.put_in("a", &corner()).await;
     let before = daemon.contents("a").await;
-    let near = json!({"robot": "r", "points": row(20), "guess": identity_json()});
+    let near = json!({"robot": "r", "points": corner(), "guess": identity_json()});
     let aligned = json_of(daemon.post("/v1/maps/a/alignment", near).await).await;
     assert_eq!((&aligned["accepted"], &aligned["verdict"]), (&json!(true), &json!("accepted")));
-    let far = json!({"robot": "r", "points": row(20), "guess": pose_json([500.0, 0.0, 0.0])});
+    let far = json!({"robot": "r", "points": corner(), "guess": pose_json([500.0, 0.0, 0.0])});
     for route in ["alignment", "scans"] {
         let answer = daemon.post(&format!("/v1/maps/a/{route}"), far.clone()).await;
         assert_eq!(answer.status(), StatusCode::OK);
@@ -129,8 +136,8 @@ async fn errors_of_state_have_statuses_of_their_own() {
     let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = 0.1).await;
     daemon.make_map("a").await;
     daemon.put_in("a", &row(20)).await;
-    let scan = |id: u64, points: usize| json!({"robot": "r", "scan_id": id, "points": row(points), "guess": identity_json()});
-    assert_eq!(daemon.post("/v1/maps/a/scans", scan(1, 20)).await.status(), StatusCode::OK);
+    let scan = |id: u64, points: usize| json!({"robot": "r", "scan_id": id, "points": row(points), "guess": identity_json(), "align": false});
+    assert_eq!(daemon.post("/v1/maps/a/scans", scan(1, 21)).await.status(), StatusCode::OK);
     let cases = [
         (daemon.post("/v1/maps/a/scans", scan(1, 19)).await, 409, "conflict"),
         (

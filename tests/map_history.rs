@@ -57,7 +57,7 @@ fn apply(map: &mut MultiResolutionMap, change: &Change) -> usize {
     match change {
         Change::Insert(indices) => {
             let voxels: VoxelSet = indices.iter().map(key).collect();
-            map.committer().insert_scan(ScanRecord { pose: pose_of("r"), voxels }).voxels
+            map.committer().insert_scan(ScanRecord::of_voxels(pose_of("r"), voxels)).voxels
         }
         Change::DeleteKeys(level, indices) => {
             let level = level % levels;
@@ -139,7 +139,7 @@ fn a_map_that_lost_all_voxels_is_as_new() {
     let everything = VoxelSet::from_iter(map.view().voxels().iter());
     map.committer().remove(&everything);
     assert!(map.is_empty());
-    let (_, levels, _) = map.describe(100, 0);
+    let levels = map.describe(100, 0).levels;
     for level in levels {
         assert_eq!((level.voxels, level.measured_rate), (0, None));
         let view = map.view();

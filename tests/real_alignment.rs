@@ -8,12 +8,11 @@ mod common;
 mod shared_scans;
 
 use common::{Daemon, client, json_of};
-use mrol::align::{AlignmentSettings, Guess, align};
+use mrol::align::{AlignmentSettings, align};
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose, pose, pose_difference};
 use mrol::map::{MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
 use mrol::service::ScanRequest;
-use mrol::voxel::VoxelSet;
 use serde_json::{Value, json};
 use shared_scans::ScanSet;
 
@@ -29,9 +28,8 @@ fn in_process(set: &ScanSet) -> Vec<Pose> {
             None => Pose::identity(),
             Some(last) => align(&map, &points, last, &AlignmentSettings::default()).map_from_sensor,
         };
-        let (voxels, _) = VoxelSet::of_points(&points, &map.lattice().from_points(&map_from_sensor));
-        let record = TrajectoryPose::new(robot(), map_from_sensor);
-        map.committer().insert_scan(ScanRecord { pose: record, voxels });
+        let pose = TrajectoryPose::new(robot(), map_from_sensor);
+        map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
         poses.push(map_from_sensor);
     }
     poses
@@ -47,17 +45,10 @@ async fn over_grpc(daemon: &Daemon, set: &ScanSet) -> Vec<Pose> {
     client.create_map(&map, NewMap { levels: Some(LEVELS), ..NewMap::of(RESOLUTION_M) }).await.unwrap();
     let mut poses = vec![];
     for k in 0..set.files.len() {
-        let request = ScanRequest {
-            robot: robot(),
-            scan_id: Some(k as u64),
-            points: set.points(k).into(),
-            timestamp_ns: None,
-            guess: Guess::Last,
-            at_guess: false,
-            strict: false,
-        };
+        let request =
+            ScanRequest { scan_id: Some(k as u64), ..ScanRequest::new(robot(), set.points(k).into()) };
         let answer = client.insert_scan(&map, request).await.unwrap();
-        assert!(answer.accepted());
+        assert!(answer.accepted);
         poses.push(answer.map_from_sensor);
     }
     poses
@@ -93,7 +84,7 @@ async fn scans_metres_apart_align_to_the_truth_and_alike_on_every_way_in() {
     for (k, (found, truth)) in poses.iter().zip(&set.map_from_sensor).enumerate() {
         let (metres, degrees) = pose_difference(&(set.map_from_sensor[0].inv_mul(truth)), found);
         println!("scan {k}: {metres:.4} m, {degrees:.3} degrees from the truth");
-        assert!(metres <= 0.06 && degrees <= 0.7, "scan {k}: {metres} m, {degrees} degrees");
+        assert!(metres <= 0.03 && degrees <= 0.4, "scan {k}: {metres} m, {degrees} degrees");
     }
     let daemon = Daemon::start().await;
     let (over_grpc, over_http) = (over_grpc(&daemon, &set).await, over_http(&daemon, &set).await);

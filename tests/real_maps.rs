@@ -35,7 +35,7 @@ fn brute_force_index(map: &MultiResolutionMap, point: Point, pose: &Pose) -> [i3
 fn insert(map: &MultiResolutionMap, points: &[Point], map_from_sensor: Pose) {
     let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_points(&map_from_sensor));
     let pose = TrajectoryPose::new(RobotName::new("truth").unwrap(), map_from_sensor);
-    map.committer().insert_scan(ScanRecord { pose, voxels });
+    map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 }
 
 /// The map of a set's scans at their true poses, and the set of its finest voxels by brute force.
@@ -104,7 +104,7 @@ fn delete_some(map: &MultiResolutionMap, model: &mut HashSet<[i32; 3]>, random: 
 
 /// Prints each level's rate as measured, by the closed form and by eq. (1), and holds it to 1.2 x the form.
 fn assert_false_positives(set: &ScanSet, map: &MultiResolutionMap) {
-    let (_, levels, _) = map.describe(SAMPLES, 7);
+    let levels = map.describe(SAMPLES, 7).levels;
     for level in levels {
         let measured = level.measured_rate.expect("a level with voxels");
         println!(

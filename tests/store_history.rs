@@ -13,13 +13,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use mrol::geometry::Pose;
+use mrol::geometry::{Point, Pose};
 use mrol::map::{
     Change, DeletionRecord, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
     UndoRecord,
 };
 use mrol::store::{DataDir, MapFolder, OpeningProgress, Record, Snapshot, StoreSettings};
-use mrol::voxel::{VoxelKey, VoxelSet};
+use mrol::voxel::{Moments, VoxelKey, VoxelSet};
 use plain_set::{PlainSet, assert_equal, up};
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -54,16 +54,49 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// Who holds each voxel, and the scans that are accepted.
+/// Who holds each voxel, the scans that are accepted, and all that happened.
 #[derive(Default)]
 struct Model {
     holders: BTreeMap<[i32; 3], BTreeSet<u64>>,
     trajectory: Vec<(u64, RobotName)>,
+    events: Vec<Event>,
+}
+
+enum Event {
+    /// A scan of the centres of these voxels.
+    Scan(u64, Vec<[i32; 3]>),
+    /// The finest voxels that went.
+    Deletion(PlainSet),
 }
 
 impl Model {
     fn voxels(&self) -> PlainSet {
         self.holders.keys().copied().collect()
+    }
+
+    /// Of the points in each voxel of level 2: what happened, without the scans that were undone, from the start.
+    fn moments(&self) -> BTreeMap<[i32; 3], Moments> {
+        let (mut occupied, mut moments) = (PlainSet::new(), BTreeMap::<[i32; 3], Moments>::new());
+        for event in &self.events {
+            match event {
+                Event::Scan(scan, points) if self.trajectory.iter().any(|(kept, _)| kept == scan) => {
+                    occupied.extend(points);
+                    points.iter().for_each(|&i| *moments.entry(up(i, 2)).or_default() += of_center(i));
+                }
+                Event::Scan(..) => {}
+                Event::Deletion(voxels) => {
+                    for cell in voxels.intersection(&occupied).map(|&i| up(i, 2)).collect::<PlainSet>() {
+                        let mut rest = Moments::default();
+                        let left = occupied.difference(voxels).filter(|&&i| up(i, 2) == cell);
+                        left.for_each(|&i| rest += of_center(i));
+                        moments.insert(cell, rest);
+                    }
+                    occupied = occupied.difference(voxels).copied().collect();
+                }
+            }
+        }
+        moments.retain(|_, moments| !moments.is_empty());
+        moments
     }
 
     fn undo(&mut self, scans: &[u64]) {
@@ -73,6 +106,11 @@ impl Model {
         });
         self.trajectory.retain(|(scan, _)| !scans.contains(scan));
     }
+}
+
+/// The moments of a finest voxel's centre in its voxel of level 2.
+fn of_center(index: [i32; 3]) -> Moments {
+    Moments::of_offset(index.map(|i| i64::from(2 * (i & 3) - 3) * (Moments::UNITS / 8)))
 }
 
 /// A map on a disk.
@@ -131,16 +169,19 @@ impl Kept {
         };
         assert_eq!(seen, self.map.revision());
         let voxels = observations.held_by_targets_alone();
-        self.commit(&Change::Undo(UndoRecord { scans: scans.to_vec(), voxels, request: None }));
+        let moments = observations.moments_without_targets();
+        self.commit(&Change::Undo(UndoRecord { scans: scans.to_vec(), voxels, moments, request: None }));
         true
     }
 
     fn step(&mut self, step: &Step, model: &mut Model) {
         match step {
             Step::Insert { robot: number, indices } => {
-                let voxels = indices.iter().filter_map(|&i| VoxelKey::new(i)).collect();
+                let points: Vec<Point> = indices.iter().map(|i| i.map(|i| i as f32 + 0.5).into()).collect();
                 let pose = TrajectoryPose::new(robot(*number), Pose::identity());
-                let revision = self.commit(&Change::Insertion(ScanRecord { pose, voxels }));
+                let record = ScanRecord::of_points(pose, &points, self.map.lattice());
+                let revision = self.commit(&Change::Insertion(record));
+                model.events.push(Event::Scan(revision, indices.clone()));
                 for &i in indices {
                     model.holders.entry(i).or_default().insert(revision);
                 }
@@ -154,6 +195,8 @@ impl Kept {
                     self.commit(&Change::Deletion(DeletionRecord { voxels, request: None }));
                 }
                 let gone: PlainSet = indices.iter().map(|&i| up(i, level)).collect();
+                let deleted = model.voxels().into_iter().filter(|&i| gone.contains(&up(i, level)));
+                model.events.push(Event::Deletion(deleted.collect()));
                 model.holders.retain(|&i, _| !gone.contains(&up(i, level)));
             }
             Step::UndoScan(which) => {
@@ -200,6 +243,9 @@ proptest! {
             let found: Vec<_> =
                 kept.map.trajectory().poses().iter().map(|pose| (pose.revision, pose.robot.clone())).collect();
             prop_assert_eq!(&found, &model.trajectory);
+            let moments: BTreeMap<_, _> =
+                kept.map.view().moments().as_slice().iter().map(|(key, moments)| (key.index(), *moments)).collect();
+            prop_assert_eq!(moments, model.moments());
         }
         kept.restart(7);
         assert_equal(&kept.map, &model.voxels());

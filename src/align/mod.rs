@@ -1,20 +1,32 @@
 //! Scan to map alignment (paper III-A, III-B).
 //!
 //! [`align`] reads like the paper's summary: a volumetric sample, an ascent on overlap at each level from
-//! coarse to fine, and a sub-voxel ascent with all points.
+//! coarse to fine, and a sub-voxel stage, which is the paper's ascent with all points or a refinement on what the
+//! map's surfaces look like. `verdict` says whether to believe the end of it.
 
 mod ascent;
+mod information;
 mod overlap;
+mod refine;
 mod settings;
+mod verdict;
+mod wide_start;
 
+pub use information::{Direction, PoseInformation};
 pub use overlap::{level_overlaps, overlap};
-pub use settings::{AlignmentSettings, AlignmentSettingsError};
+pub use settings::{
+    AlignmentSettings, AlignmentSettingsError, Method, RefinementSettings, WideStartSettings,
+};
+pub use verdict::{Alignment, Verdict};
 
-use crate::geometry::{Point, Pose};
+use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::voxel::volumetric_sample;
 use ascent::{Ascent, Steps};
+use information::root_mean_square_range_m;
 use overlap::Overlap;
+use refine::{refine, surface_fit};
+use verdict::Fit;
 
 /// Where a scan is thought to have been taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,77 +38,51 @@ pub enum Guess {
     Pose(Pose),
     /// This far from the robot's last accepted pose: last_from_sensor, as odometry tells.
     Motion(Pose),
+    /// As far from the last accepted pose as that is from the one before it, or in proportion to the time that went
+    /// by where all three scans tell it.
+    ConstantVelocity,
 }
 
-/// What an alignment is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// The scan fits the map.
-    Accepted,
-    /// Too few of its points fall in occupied voxels.
-    LowOverlap,
+/// A scan with the samples that its alignment looks at.
+#[derive(Debug)]
+struct SampledScan<'a> {
+    /// Sensor frame, finite.
+    points: &'a [Point],
+    /// The paper's about 1000 points.
+    sample: Vec<Point>,
+    /// More of them, for the refinement and the verdict.
+    surface_sample: Vec<Point>,
 }
 
-impl Verdict {
-    /// `accepted` or `low_overlap`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Accepted => "accepted",
-            Self::LowOverlap => "low_overlap",
-        }
-    }
-}
-
-/// Where a scan was taken, and how it fits the map there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Alignment {
-    /// The pose found.
-    pub map_from_sensor: Pose,
-    /// Whether to believe it.
-    pub verdict: Verdict,
-    /// Fraction of all points in occupied voxels by the exact set, level by level, finest first.
-    pub level_overlaps: Vec<f64>,
-    /// Steps that moved the pose, over all levels.
-    pub iterations: u32,
-    /// Look-ups made, one a point and candidate pose; their expected number of false positives is what "the
-    /// filter is ample" is about (paper IV-B).
-    pub lookups: u64,
-}
-
-impl Alignment {
-    /// Fraction of all points in occupied voxels of level 0.
-    pub fn overlap(&self) -> f64 {
-        self.level_overlaps.first().copied().unwrap_or(0.0)
+impl<'a> SampledScan<'a> {
+    /// 1) Take a volumetric sample of points.
+    fn new(points: &'a [Point], settings: &AlignmentSettings) -> Self {
+        let fine = volumetric_sample(
+            points,
+            settings.refinement.sample_points.max(settings.sample_points),
+            settings.seed,
+        );
+        let sample = volumetric_sample(&fine.points, settings.sample_points, settings.seed).points;
+        Self { points, sample, surface_sample: fine.points }
     }
 }
 
 /// Finds the pose of a scan by sequential multi-resolution alignment (paper III-B), from a guess.
 ///
-/// `points` are in the sensor frame and finite. The map may change meanwhile: each step of the ascent sees one
-/// revision of it.
+/// `points` are in the sensor frame and finite. The map may change meanwhile: each step sees one revision of it.
 pub fn align(
     map: &MultiResolutionMap,
     points: &[Point],
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    // 1) Take a volumetric sample of points.
-    let sample = volumetric_sample(points, settings.sample_points, settings.seed);
-    let mut ascent = Ascent::from(*guess);
-
-    // 2) - 4) Align iteratively at each level, coarse to fine, each from where the coarser one ended.
-    for level in (0..map.settings().levels).rev() {
-        let overlap = Overlap::new(map, &sample.points, level, settings.lookup);
-        ascent.climb(&overlap, Steps::of_level(level, map, settings), settings.iterations_per_level_max);
+    let scan = SampledScan::new(points, settings);
+    let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
+    let found = finish(map, &scan, ascent, settings);
+    match found.is_doubtful(map, settings) {
+        true => wide_start::align(map, &scan, guess, found, settings),
+        false => found,
     }
-
-    // 5) Sub-voxel alignment with all points and small steps.
-    let overlap = Overlap::new(map, points, 0, settings.lookup);
-    for halvings in 0..=settings.sub_voxel_halvings {
-        let steps = Steps::sub_voxel(map, settings).halved(halvings);
-        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max);
-    }
-    judge(map, points, ascent, settings)
 }
 
 /// Says how a scan fits the map where it is thought to be, without moving it.
@@ -106,21 +92,75 @@ pub fn judge_at(
     map_from_sensor: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    judge(map, points, Ascent::from(*map_from_sensor), settings)
+    let scan = SampledScan::new(points, settings);
+    fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
-fn judge(
+/// 2) - 4) Align iteratively at each level, coarse to fine, each from where the coarser one ended.
+fn climb(
     map: &MultiResolutionMap,
-    points: &[Point],
-    ascent: Ascent,
+    scan: &SampledScan<'_>,
+    guess: Pose,
+    coarsest: u32,
+    settings: &AlignmentSettings,
+) -> Ascent {
+    let mut ascent = Ascent::from(guess);
+    for level in (0..=coarsest).rev() {
+        let overlap = match settings.method {
+            Method::WeightedSum => Overlap::weighted_sum(map, &scan.sample, settings.lookup),
+            Method::Overlap | Method::Refined => Overlap::new(map, &scan.sample, level, settings.lookup),
+        };
+        ascent.climb(&overlap, Steps::of_level(level, map, settings), settings.iterations_per_level_max);
+    }
+    ascent
+}
+
+/// 5) Sub-voxel alignment: with all points and small steps, or by [`refine`].
+fn finish(
+    map: &MultiResolutionMap,
+    scan: &SampledScan<'_>,
+    mut ascent: Ascent,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    let level_overlaps = level_overlaps(map, points, &ascent.pose);
-    let fits = level_overlaps[0] >= settings.overlap_min;
-    Alignment {
+    let climbed = ascent.pose;
+    match settings.method {
+        Method::Refined => {
+            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement);
+            ascent.pose = refined.map_from_sensor;
+            ascent.iterations += refined.iterations;
+        }
+        Method::Overlap | Method::WeightedSum => {
+            let overlap = Overlap::new(map, scan.points, 0, settings.lookup);
+            for halvings in 0..=settings.sub_voxel_halvings {
+                let steps = Steps::sub_voxel(map, settings).halved(halvings);
+                ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max);
+            }
+        }
+    }
+    let (metres, degrees) = pose_difference(&climbed, &ascent.pose);
+    fit(
+        map,
+        scan,
+        ascent,
+        metres + degrees.to_radians() * root_mean_square_range_m(&scan.surface_sample),
+        settings,
+    )
+    .judged(map, settings)
+}
+
+/// How a scan fits at the end of an ascent, which the last stage moved by `refined_by_m`.
+fn fit(
+    map: &MultiResolutionMap,
+    scan: &SampledScan<'_>,
+    ascent: Ascent,
+    refined_by_m: f64,
+    settings: &AlignmentSettings,
+) -> Fit {
+    Fit {
         map_from_sensor: ascent.pose,
-        verdict: if fits { Verdict::Accepted } else { Verdict::LowOverlap },
-        level_overlaps,
+        refined_by_m,
+        level_overlaps: level_overlaps(map, scan.points, &ascent.pose),
+        surfaces: surface_fit(map, &scan.surface_sample, &ascent.pose, &settings.refinement),
         iterations: ascent.iterations,
         lookups: ascent.lookups,
     }

@@ -1,14 +1,16 @@
 //! The objective of alignment: how many points of a scan fall in occupied voxels (paper III-B).
 
+use std::ops::RangeInclusive;
+
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MultiResolutionMap};
 
-/// The overlap of some points with one level of a map, as a function of their pose.
-#[derive(Debug, Clone, Copy)]
+/// The overlap of some points with one or more levels of a map, as a function of their pose.
+#[derive(Debug, Clone)]
 pub(super) struct Overlap<'a> {
     map: &'a MultiResolutionMap,
     points: &'a [Point],
-    level: u32,
+    levels: RangeInclusive<u32>,
     lookup: Lookup,
 }
 
@@ -16,8 +18,14 @@ pub(super) struct Overlap<'a> {
 const LOOKUPS_PER_LOCK: usize = 50_000;
 
 impl<'a> Overlap<'a> {
+    /// At one level.
     pub(super) fn new(map: &'a MultiResolutionMap, points: &'a [Point], level: u32, lookup: Lookup) -> Self {
-        Self { map, points, level, lookup }
+        Self { map, points, levels: level..=level, lookup }
+    }
+
+    /// At all levels, summed: a level counts twice as much as the next coarser one (paper \[9\]).
+    pub(super) fn weighted_sum(map: &'a MultiResolutionMap, points: &'a [Point], lookup: Lookup) -> Self {
+        Self { map, points, levels: 0..=map.settings().levels - 1, lookup }
     }
 
     /// Points whose voxel is occupied, for each candidate pose.
@@ -26,7 +34,11 @@ impl<'a> Overlap<'a> {
         let counts = poses.chunks(poses_per_lock).flat_map(|poses| {
             let view = self.map.view();
             let count = |pose: &Pose| {
-                view.count(self.points, &self.map.lattice().from_points(pose), self.level, self.lookup)
+                let quantise = self.map.lattice().from_points(pose);
+                let hits = |level: u32| {
+                    view.count(self.points, &quantise, level, self.lookup) << (self.levels.end() - level)
+                };
+                self.levels.clone().map(hits).sum::<usize>()
             };
             poses.iter().map(count).collect::<Vec<_>>()
         });
@@ -35,7 +47,7 @@ impl<'a> Overlap<'a> {
 
     /// Look-ups that one pose costs.
     pub(super) fn lookups(&self) -> u64 {
-        self.points.len() as u64
+        self.points.len() as u64 * self.levels.clone().count() as u64
     }
 }
 

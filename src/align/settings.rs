@@ -2,9 +2,38 @@
 
 use crate::map::Lookup;
 
+/// How a scan is aligned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// The paper's sequential ascent, then [refinement](RefinementSettings) in place of its sub-voxel stage.
+    #[default]
+    Refined,
+    /// The paper's method, III-B steps 1 to 5.
+    Overlap,
+    /// The older objective of the paper's \[9\], for comparison: the hits at all levels as a weighted sum, a level
+    /// counting twice as much as the next coarser one; the rest as in [`Method::Overlap`].
+    WeightedSum,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Refined, Self::Overlap, Self::WeightedSum];
+
+    /// `refined`, `overlap` or `weighted_sum`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Refined => "refined",
+            Self::Overlap => "overlap",
+            Self::WeightedSum => "weighted_sum",
+        }
+    }
+}
+
 /// Settings of the alignment; the defaults are the original implementation's where it had them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignmentSettings {
+    /// Which steps are taken.
+    pub method: Method,
     /// Points of the volumetric sample, about. 1000 (paper III-A).
     pub sample_points: usize,
     /// Of the choice of sample points. 0.
@@ -25,17 +54,61 @@ pub struct AlignmentSettings {
     /// How often the sub-voxel stage is repeated at half its step. 4, down to r_0 / 32; the original stops at the
     /// first and is left with half its step as the error.
     pub sub_voxel_halvings: u32,
+    /// What follows the ascent with [`Method::Refined`].
+    pub refinement: RefinementSettings,
+    /// What to try where the ascent from the guess ends badly.
+    pub wide_start: WideStartSettings,
     /// Fraction of a scan's points that must fall in occupied voxels for it to be accepted. 0.2: even a step
     /// that shows mostly new ground shares more than that with the map, a scan from elsewhere less.
     pub overlap_min: f64,
+    /// A pose is undetermined where its standard deviation in some direction exceeds this fraction of r_0. 0.2: ten
+    /// times that of a furnished room, a seventh of that along a blank wall.
+    pub undetermined_std: f64,
+    /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
+    /// where anything holds it. 8.
+    pub refinement_reach: f64,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").
     pub lookup: Lookup,
 }
 
+/// Settings of the refinement on the Gaussians of voxels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RefinementSettings {
+    /// Points of the volumetric sample, about. 5000: from there on more of them gain nothing.
+    pub sample_points: usize,
+    /// By how much points are uncertain beyond the spread of the surface, as a fraction of r_0. 0.1.
+    pub std: f64,
+    /// Stages, each with half the uncertainty of the one before. 4: the first begins at 0.8 r_0.
+    pub stages: u32,
+    /// Gauss-Newton steps of a stage, at most. 10.
+    pub iterations_per_stage_max: u32,
+    /// The Mahalanobis distance at which a point counts a quarter (Geman and McClure). 4.5.
+    pub robust_scale: f64,
+}
+
+impl RefinementSettings {
+    /// The last stage's uncertainty of a point, metres.
+    pub(super) fn std_m(&self, resolution_m: f64) -> f64 {
+        self.std * resolution_m
+    }
+}
+
+/// Settings of the wide start: more guesses around the first one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WideStartSettings {
+    /// Overlap below which the end of the first ascent is not believed, and others are tried. 0.35; 0 never tries.
+    pub overlap_below: f64,
+    /// Ascents of the guesses that look best, at most. 8.
+    pub ascents: usize,
+    /// Two ends are equally good where the worse fits at least this fraction as well as the better. 0.95.
+    pub ambiguous_fitness: f64,
+}
+
 impl Default for AlignmentSettings {
     fn default() -> Self {
         Self {
+            method: Method::Refined,
             sample_points: 1000,
             seed: 0,
             translation_step: 1.0,
@@ -45,9 +118,25 @@ impl Default for AlignmentSettings {
             sub_voxel_rotation_step_deg: 0.25,
             sub_voxel_iterations_max: 100,
             sub_voxel_halvings: 4,
+            refinement: RefinementSettings::default(),
+            wide_start: WideStartSettings::default(),
             overlap_min: 0.2,
+            undetermined_std: 0.2,
+            refinement_reach: 8.0,
             lookup: Lookup::Bloom,
         }
+    }
+}
+
+impl Default for RefinementSettings {
+    fn default() -> Self {
+        Self { sample_points: 5000, std: 0.1, stages: 4, iterations_per_stage_max: 10, robust_scale: 4.5 }
+    }
+}
+
+impl Default for WideStartSettings {
+    fn default() -> Self {
+        Self { overlap_below: 0.35, ascents: 8, ambiguous_fitness: 0.95 }
     }
 }
 
@@ -55,14 +144,14 @@ impl Default for AlignmentSettings {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum AlignmentSettingsError {
     /// The sample would be empty.
-    #[error("sample_points must be at least 1, got 0")]
-    SamplePoints,
+    #[error("{0} must be at least 1, got 0")]
+    Zero(&'static str),
     /// A step that does not step.
     #[error("{0} must be positive and finite, got {1}")]
-    Step(&'static str, f64),
+    NotPositive(&'static str, f64),
     /// Not a fraction.
-    #[error("overlap_min must lie in 0..=1, got {0}")]
-    OverlapMin(f64),
+    #[error("{0} must lie in 0..=1, got {1}")]
+    NotAFraction(&'static str, f64),
 }
 
 impl AlignmentSettings {
@@ -71,21 +160,52 @@ impl AlignmentSettings {
     /// # Errors
     /// Names the setting out of range and the range.
     pub fn checked(self) -> Result<Self, AlignmentSettingsError> {
-        if self.sample_points == 0 {
-            return Err(AlignmentSettingsError::SamplePoints);
+        let counts = [
+            ("sample_points", self.sample_points),
+            ("refinement.sample_points", self.refinement.sample_points),
+            ("refinement.stages", self.refinement.stages as usize),
+        ];
+        if let Some(&(name, _)) = counts.iter().find(|(_, count)| *count == 0) {
+            return Err(AlignmentSettingsError::Zero(name));
         }
-        let steps = [
+        let positive = [
             ("translation_step", self.translation_step),
             ("rotation_step_deg", self.rotation_step_deg),
             ("sub_voxel_translation_step", self.sub_voxel_translation_step),
             ("sub_voxel_rotation_step_deg", self.sub_voxel_rotation_step_deg),
+            ("refinement.std", self.refinement.std),
+            ("refinement.robust_scale", self.refinement.robust_scale),
+            ("undetermined_std", self.undetermined_std),
+            ("refinement_reach", self.refinement_reach),
         ];
-        if let Some(&(name, step)) = steps.iter().find(|(_, step)| !(step.is_finite() && *step > 0.0)) {
-            return Err(AlignmentSettingsError::Step(name, step));
+        if let Some(&(name, value)) = positive.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
+        {
+            return Err(AlignmentSettingsError::NotPositive(name, value));
         }
-        if !(0.0..=1.0).contains(&self.overlap_min) {
-            return Err(AlignmentSettingsError::OverlapMin(self.overlap_min));
+        let fractions = [
+            ("overlap_min", self.overlap_min),
+            ("wide_start.overlap_below", self.wide_start.overlap_below),
+            ("wide_start.ambiguous_fitness", self.wide_start.ambiguous_fitness),
+        ];
+        match fractions.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
+            Some(&(name, value)) => Err(AlignmentSettingsError::NotAFraction(name, value)),
+            None => Ok(self),
         }
-        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let defaults = AlignmentSettings::default();
+        assert!(defaults.checked().is_ok());
+        let message = |settings: AlignmentSettings| settings.checked().unwrap_err().to_string();
+        assert!(message(AlignmentSettings { sample_points: 0, ..defaults }).contains("sample_points"));
+        assert!(message(AlignmentSettings { overlap_min: 1.5, ..defaults }).contains("overlap_min"));
+        let refinement = RefinementSettings { std: f64::NAN, ..defaults.refinement };
+        assert!(message(AlignmentSettings { refinement, ..defaults }).contains("refinement.std"));
     }
 }

@@ -1,12 +1,12 @@
-//! How long alignments take, by what answers their look-ups.
+//! How long alignments take, by method and by what answers their look-ups.
 
 use std::time::Instant;
 
-use super::workload::add;
-use crate::align::{Alignment, AlignmentSettings, align};
+use crate::align::{Alignment, AlignmentSettings, Method, align};
 use crate::geometry::{Point, Pose, pose_difference};
-use crate::map::{Lookup, MapSettings, MapSettingsError, MultiResolutionMap};
-use crate::voxel::VoxelSet;
+use crate::map::{
+    Lookup, MapSettings, MapSettingsError, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
+};
 
 /// A scan to align.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,9 +17,11 @@ pub struct Scan {
     pub map_from_sensor: Option<Pose>,
 }
 
-/// All alignments of one method.
+/// All alignments of one kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aligned {
+    /// How.
+    pub method: Method,
     /// What answered the ascent's look-ups.
     pub lookup: Lookup,
     /// Of each scan but the first, milliseconds: the quickest of the repeats.
@@ -31,8 +33,8 @@ pub struct Aligned {
 }
 
 impl Aligned {
-    fn by(lookup: Lookup) -> Self {
-        Self { lookup, ms: Vec::new(), lookups: 0, errors: Vec::new() }
+    fn by((method, lookup): (Method, Lookup)) -> Self {
+        Self { method, lookup, ms: Vec::new(), lookups: 0, errors: Vec::new() }
     }
 
     fn add(&mut self, alignment: &Alignment, ms: f64, truth: Option<&Pose>) {
@@ -42,34 +44,37 @@ impl Aligned {
     }
 }
 
-/// Aligns each scan but the first to the map of those before it, by each of `lookups`, `repeats` times.
+/// Aligns each scan but the first to the map of those before it, in each of `ways`, `repeats` times.
 ///
-/// All methods get the same map and the same guess, the pose of the scan before: as it was, where that is known, or as
-/// the first method found it.
+/// All get the same map and the same guess, the pose of the scan before: as it was, where that is known, or as the first
+/// way found it.
 ///
 /// # Errors
 /// When a setting is out of range.
 pub fn align_each(
     scans: &[Scan],
+    robot: &RobotName,
     settings: MapSettings,
-    lookups: &[Lookup],
+    ways: &[(Method, Lookup)],
     repeats: usize,
 ) -> Result<Vec<Aligned>, MapSettingsError> {
     let map = MultiResolutionMap::new(settings)?;
-    let mut methods: Vec<_> = lookups.iter().map(|&lookup| Aligned::by(lookup)).collect();
+    let mut all: Vec<_> = ways.iter().map(|&way| Aligned::by(way)).collect();
     let mut last = Pose::identity();
     for (k, scan) in scans.iter().enumerate() {
         let guess = last;
         last = scan.map_from_sensor.unwrap_or(guess);
-        for method in methods.iter_mut().filter(|_| k > 0).rev() {
-            let (alignment, ms) = quickest(&map, &scan.points, &guess, method.lookup, repeats);
-            method.add(&alignment, ms, scan.map_from_sensor.as_ref());
-            // In reverse order, so that the first method has the last word.
+        for aligned in all.iter_mut().filter(|_| k > 0).rev() {
+            let way = (aligned.method, aligned.lookup);
+            let (alignment, ms) = quickest(&map, &scan.points, &guess, way, repeats);
+            aligned.add(&alignment, ms, scan.map_from_sensor.as_ref());
+            // In reverse order, so that the first way has the last word.
             last = scan.map_from_sensor.unwrap_or(alignment.map_from_sensor);
         }
-        add(&map, VoxelSet::of_points(&scan.points, &map.lattice().from_points(&last)).0);
+        let pose = TrajectoryPose::new(robot.clone(), last);
+        map.committer().insert_scan(ScanRecord::of_points(pose, &scan.points, map.lattice()));
     }
-    Ok(methods)
+    Ok(all)
 }
 
 /// The alignment, which is always the same, and the milliseconds of the quickest.
@@ -77,10 +82,10 @@ fn quickest(
     map: &MultiResolutionMap,
     points: &[Point],
     guess: &Pose,
-    lookup: Lookup,
+    (method, lookup): (Method, Lookup),
     repeats: usize,
 ) -> (Alignment, f64) {
-    let settings = AlignmentSettings { lookup, ..AlignmentSettings::default() };
+    let settings = AlignmentSettings { method, lookup, ..AlignmentSettings::default() };
     let timed = || {
         let start = Instant::now();
         let alignment = align(map, points, guess, &settings);
@@ -110,11 +115,13 @@ mod tests {
                 Scan { points, map_from_sensor: Some(*pose) }
             })
             .collect();
+        let ways = [(Method::Refined, Lookup::Bloom), (Method::Overlap, Lookup::Exact)];
         let aligned =
-            align_each(&scans, MapSettings::new(0.05, 4), &[Lookup::Bloom, Lookup::Exact], 1).unwrap();
-        for method in aligned {
-            assert_eq!((method.ms.len(), method.errors.len()), (2, 2));
-            assert!(method.errors.iter().all(|&(metres, degrees)| metres < 0.05 && degrees < 0.5));
+            align_each(&scans, &RobotName::new("r").unwrap(), MapSettings::new(0.05, 4), &ways, 1).unwrap();
+        for (aligned, metres_max) in aligned.iter().zip([0.01, 0.05]) {
+            assert_eq!((aligned.ms.len(), aligned.errors.len()), (2, 2));
+            let near = |&(metres, degrees): &(f64, f64)| metres < metres_max && degrees < 0.5;
+            assert!(aligned.errors.iter().all(near), "{aligned:?}");
         }
     }
 }

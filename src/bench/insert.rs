@@ -4,7 +4,7 @@ use super::stopwatch::Runs;
 use super::workload::{Queries, add};
 use crate::geometry::{Point, Pose};
 use crate::map::lookup::stages;
-use crate::map::{MapSettings, MapSettingsError, MultiResolutionMap};
+use crate::map::{MapDescription, MapSettings, MapSettingsError, MultiResolutionMap};
 use crate::voxel::{Lattice, VoxelSet};
 
 /// What insertion took: nanoseconds a point, run by run.
@@ -51,7 +51,7 @@ fn insert(map: &MultiResolutionMap, points: &Queries, scan_points: usize) {
 
 /// Bytes of a map's sets and filters, all levels.
 pub fn bytes(map: &MultiResolutionMap) -> usize {
-    let (_, levels, set_bytes) = map.describe(0, 0);
+    let MapDescription { levels, set_bytes, .. } = map.describe(0, 0);
     set_bytes + levels.iter().map(|level| level.plane_bytes + level.counter_bytes).sum::<usize>()
 }
 

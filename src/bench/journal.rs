@@ -99,13 +99,10 @@ async fn send(
 ) -> Result<(), ServiceError> {
     for (scan_id, points) in (0..).zip(scans) {
         let scan = ScanRequest {
-            robot: robot.clone(),
             scan_id: Some(scan_id),
-            points,
-            timestamp_ns: None,
             guess,
             at_guess: true,
-            strict: false,
+            ..ScanRequest::new(robot.clone(), points)
         };
         service.insert_scan(&map, scan).await?;
     }

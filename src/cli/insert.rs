@@ -7,6 +7,7 @@ use serde::Serialize;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
+use super::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use super::error::CliError;
 use super::map_report::count;
 use super::maps::OptionalSettings;
@@ -15,11 +16,11 @@ use super::parse;
 use super::remote::MapOptions;
 use super::scan_report::{PLACE_HEAD, name_of, name_width, place, seven};
 use super::truth::true_poses;
-use crate::align::Guess;
+use crate::align::{Guess, Method};
 use crate::client::{Client, ClientError};
 use crate::geometry::Pose;
 use crate::map::RobotName;
-use crate::scan::{read_points, scan_files};
+use crate::scan::{PointFilter, read_points, scan_files};
 use crate::service::{ScanAnswer, ScanRequest};
 
 /// Scans read ahead of the one that is being sent.
@@ -53,6 +54,17 @@ pub(super) struct Insert {
     /// Take --guess as it is, without aligning the first scan
     #[arg(long, requires = "guess")]
     at_guess: bool,
+    /// Add scans where they were found even if their verdict is not accepted
+    #[arg(long)]
+    force: bool,
+    /// Where each next scan is thought to have been taken: at the last accepted pose, or as far on as that is from the
+    /// one before it
+    #[arg(long, value_enum, value_name = "GUESS", default_value_t)]
+    next_guess: GuessName,
+    #[command(flatten)]
+    alignment: AlignmentOptions,
+    #[command(flatten)]
+    points: PointOptions,
     /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
     #[arg(long, value_name = "FILE", conflicts_with = "guess")]
     truth: Option<PathBuf>,
@@ -80,8 +92,16 @@ impl Insert {
         self.create_map(&client).await?;
 
         let (sender, scans) = mpsc::channel(SCANS_AHEAD);
-        let plan =
-            Plan { robot: self.robot.clone(), first: self.first_guess(), poses, ids: self.first_scan_id };
+        let plan = Plan {
+            robot: self.robot.clone(),
+            first: self.first_guess(),
+            poses,
+            ids: self.first_scan_id,
+            next: self.next_guess.into(),
+            method: self.alignment.method(),
+            filter: self.points.filter().map_err(CliError::usage)?,
+            force: self.force,
+        };
         let reader = tokio::task::spawn_blocking({
             let files = files.clone();
             move || plan.send(&files, &sender)
@@ -152,6 +172,11 @@ struct Plan {
     poses: Option<Vec<Pose>>,
     /// Number of the first scan, if they are numbered.
     ids: Option<u64>,
+    /// How the others begin.
+    next: Guess,
+    method: Option<Method>,
+    filter: PointFilter,
+    force: bool,
 }
 
 impl Plan {
@@ -160,13 +185,13 @@ impl Plan {
         for (k, file) in files.iter().enumerate() {
             let (guess, at_guess) = self.guess(k);
             let scan = ScanRequest {
-                robot: self.robot.clone(),
                 scan_id: self.ids.map(|first| first.saturating_add(k as u64)),
-                points: read_points(file)?.into(),
-                timestamp_ns: None,
                 guess,
                 at_guess,
-                strict: false,
+                force: self.force,
+                method: self.method,
+                filter: self.filter,
+                ..ScanRequest::new(self.robot.clone(), read_points(file)?.into())
             };
             if sender.blocking_send(scan).is_err() {
                 break;
@@ -179,7 +204,7 @@ impl Plan {
         match (&self.poses, k) {
             (Some(poses), k) => (Guess::Pose(poses[k]), true),
             (None, 0) => self.first,
-            (None, _) => (Guess::Last, false),
+            (None, _) => (self.next, false),
         }
     }
 }
@@ -189,13 +214,18 @@ struct ScanLine {
     scan: String,
     accepted: bool,
     verdict: &'static str,
+    reason: String,
     map_from_sensor: [f64; 7],
     overlap: f64,
+    inliers: f64,
+    information: Option<[[f64; 6]; 6]>,
+    align_ms: f64,
     new_voxels: usize,
     points_skipped: usize,
     revision: u64,
     map_uuid: String,
     replayed: bool,
+    standing: bool,
     #[serde(skip)]
     width: usize,
 }
@@ -204,21 +234,26 @@ impl ScanLine {
     fn of(scan: String, answer: &ScanAnswer, width: usize) -> Self {
         Self {
             scan,
-            accepted: answer.accepted(),
+            accepted: answer.accepted,
             verdict: answer.verdict.as_str(),
+            reason: answer.reason.clone(),
             map_from_sensor: seven(&answer.map_from_sensor),
             overlap: answer.overlap(),
+            inliers: answer.inliers,
+            information: answer.information,
+            align_ms: answer.align_time.as_secs_f64() * 1e3,
             new_voxels: answer.new_voxels,
             points_skipped: answer.points_skipped,
             revision: answer.state.revision,
             map_uuid: answer.state.map_uuid.to_string(),
             replayed: answer.replayed,
+            standing: answer.standing,
             width,
         }
     }
 
     fn head(width: usize) -> String {
-        format!("{:<width$}  verdict      overlap  {PLACE_HEAD}  new voxels  revision", "scan")
+        format!("{:<width$}  verdict       overlap  {PLACE_HEAD}  new voxels  revision", "scan")
     }
 }
 
@@ -226,7 +261,7 @@ impl Display for ScanLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:<width$}  {:<11}  {:>7.3}  {}  {:>10}  {:>8}",
+            "{:<width$}  {:<12}  {:>7.3}  {}  {:>10}  {:>8}",
             self.scan,
             self.verdict,
             self.overlap,
@@ -235,6 +270,11 @@ impl Display for ScanLine {
             self.revision,
             width = self.width
         )?;
-        if self.replayed { write!(f, "  (was there already)") } else { Ok(()) }
+        match self {
+            Self { replayed: true, .. } => write!(f, "  (was there already)"),
+            Self { standing: true, .. } => write!(f, "  (nothing new from where it stands)"),
+            Self { verdict: "accepted", .. } => Ok(()),
+            Self { reason, .. } => write!(f, "  {reason}"),
+        }
     }
 }

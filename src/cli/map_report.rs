@@ -19,6 +19,7 @@ pub(super) struct MapReport {
     scans: usize,
     robots: Vec<String>,
     set_bytes: usize,
+    moment_bytes: usize,
     storage: Option<Storage>,
 }
 
@@ -87,6 +88,7 @@ impl From<&MapInfo> for MapReport {
             scans: info.scans,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes,
+            moment_bytes: info.moment_bytes,
             storage: info.storage.clone().map(Storage::from),
         }
     }
@@ -118,7 +120,8 @@ impl Display for MapReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "map {} at revision {}, uuid {}", self.map, self.revision, self.map_uuid)?;
         let robots = if self.robots.is_empty() { "nobody".into() } else { self.robots.join(", ") };
-        writeln!(f, "{} scans from {robots}; exact sets {}", count(self.scans), bytes(self.set_bytes))?;
+        let (sets, moments) = (bytes(self.set_bytes), bytes(self.moment_bytes));
+        writeln!(f, "{} scans from {robots}; exact sets {sets}, moments {moments}", count(self.scans))?;
         match &self.storage {
             Some(storage) => writeln!(f, "{storage}")?,
             None => writeln!(f, "in memory only: it ends with the server")?,

@@ -4,6 +4,7 @@
 //! standard error. The exit code is 0 when all went well, 1 when something failed, 2 for a command line that
 //! makes no sense.
 
+mod alignment_options;
 mod bench;
 mod config;
 mod delete;

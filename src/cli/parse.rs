@@ -35,8 +35,14 @@ pub(super) fn point(text: &str) -> Result<Point, String> {
 
 /// "x y z x y z": smallest and largest corner, metres.
 pub(super) fn cuboid(text: &str) -> Result<Region, String> {
+    let (min_m, max_m) = corners(text)?;
+    Region::cuboid(min_m, max_m).map_err(|error| error.to_string())
+}
+
+/// "x y z x y z": two corners, metres.
+pub(super) fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
-    Region::cuboid([x0, y0, z0], [x1, y1, z1]).map_err(|error| error.to_string())
+    Ok(([x0, y0, z0], [x1, y1, z1]))
 }
 
 /// "x y z r": centre and radius, metres.

@@ -53,6 +53,7 @@ pub(super) struct MapOut {
     scans: usize,
     robots: Vec<String>,
     set_bytes: usize,
+    moment_bytes: usize,
     storage: Option<StorageOut>,
 }
 
@@ -133,6 +134,7 @@ impl From<MapInfo> for MapOut {
             scans: info.scans,
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes,
+            moment_bytes: info.moment_bytes,
             storage: info.storage.map(Into::into),
         }
     }

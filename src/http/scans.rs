@@ -9,9 +9,10 @@ use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonPose, JsonState};
 use super::parameters::{self, Map};
-use crate::align::Guess;
+use crate::align::{Direction, Guess, Method};
 use crate::geometry::Pose;
 use crate::map::RobotName;
+use crate::scan::PointFilter;
 use crate::service::{PointCloud, ScanAnswer, ScanRequest, ServiceError};
 use crate::wire::InField;
 
@@ -24,10 +25,38 @@ pub(super) struct ScanJson {
     timestamp_ns: Option<i64>,
     guess: Option<JsonPose>,
     motion: Option<JsonPose>,
+    #[serde(default)]
+    constant_velocity: bool,
     #[serde(default = "yes")]
     align: bool,
     #[serde(default)]
+    force: bool,
+    method: Option<JsonMethod>,
+    foreground_level: Option<u32>,
+    range_min_m: Option<f64>,
+    range_max_m: Option<f64>,
+    body_m: Option<[[f64; 3]; 2]>,
+    #[serde(default)]
     strict: bool,
+}
+
+/// `"refined"`, `"overlap"` or `"weighted_sum"`.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum JsonMethod {
+    Refined,
+    Overlap,
+    WeightedSum,
+}
+
+impl From<JsonMethod> for Method {
+    fn from(method: JsonMethod) -> Self {
+        match method {
+            JsonMethod::Refined => Self::Refined,
+            JsonMethod::Overlap => Self::Overlap,
+            JsonMethod::WeightedSum => Self::WeightedSum,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -38,8 +67,17 @@ pub(super) struct ScanQuery {
     timestamp_ns: Option<i64>,
     guess: Option<String>,
     motion: Option<String>,
+    #[serde(default)]
+    constant_velocity: bool,
     #[serde(default = "yes")]
     align: bool,
+    #[serde(default)]
+    force: bool,
+    method: Option<JsonMethod>,
+    foreground_level: Option<u32>,
+    range_min_m: Option<f64>,
+    range_max_m: Option<f64>,
+    body_m: Option<String>,
     #[serde(default)]
     strict: bool,
 }
@@ -50,15 +88,43 @@ type ScanBody = Points<ScanJson, ScanQuery>;
 pub(super) struct ScanOut {
     accepted: bool,
     verdict: &'static str,
+    reason: String,
     map_from_sensor: JsonPose,
     overlap: f64,
     level_overlaps: Vec<f64>,
+    inliers: f64,
+    fitness: f64,
+    information: Option<[[f64; 6]; 6]>,
+    undetermined: Vec<DirectionOut>,
     iterations: u32,
+    align_ms: f64,
     new_voxels: usize,
     points_skipped: usize,
     replayed: bool,
+    standing: bool,
+    /// Places in the scan of the points that the map does not show.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    foreground: Option<Vec<usize>>,
     #[serde(flatten)]
     state: JsonState,
+}
+
+/// The places of the bits that are set, the lowest of each byte first.
+fn places(bitmap: &[u8]) -> Vec<usize> {
+    (0..bitmap.len() * 8).filter(|i| bitmap[i / 8] >> (i % 8) & 1 == 1).collect()
+}
+
+/// See [`Direction`]; `std_m` is null where nothing holds the pose.
+#[derive(Serialize)]
+struct DirectionOut {
+    direction: [f64; 6],
+    std_m: Option<f64>,
+}
+
+impl From<Direction> for DirectionOut {
+    fn from(open: Direction) -> Self {
+        Self { direction: open.direction, std_m: Some(open.std_m).filter(|std_m| std_m.is_finite()) }
+    }
 }
 
 pub(super) async fn insert(
@@ -97,13 +163,20 @@ impl TryFrom<ScanJson> for ScanRequest {
         let guess = scan.guess.map(|pose| Pose::try_from(pose).in_field("guess")).transpose()?;
         let motion = scan.motion.map(|pose| Pose::try_from(pose).in_field("motion")).transpose()?;
         Ok(Self {
-            robot: RobotName::new(&scan.robot)?,
             scan_id: scan.scan_id,
-            points: scan.points.into(),
             timestamp_ns: scan.timestamp_ns,
-            guess: guess_of(guess, motion)?,
+            guess: guess_of(guess, motion, scan.constant_velocity)?,
             at_guess: !scan.align,
+            force: scan.force,
+            method: scan.method.map(Method::from),
+            foreground_level: scan.foreground_level,
+            filter: PointFilter {
+                range_min_m: scan.range_min_m,
+                range_max_m: scan.range_max_m,
+                body_m: scan.body_m.map(|[min_m, max_m]| (min_m, max_m)),
+            },
             strict: scan.strict,
+            ..Self::new(RobotName::new(&scan.robot)?, scan.points.into())
         })
     }
 }
@@ -112,24 +185,47 @@ impl ScanQuery {
     fn with(self, points: PointCloud) -> Result<ScanRequest, ServiceError> {
         let pose = |text: Option<String>, field| text.map(|text| parameters::pose(&text, field)).transpose();
         Ok(ScanRequest {
-            robot: RobotName::new(&self.robot)?,
             scan_id: self.scan_id,
-            points,
             timestamp_ns: self.timestamp_ns,
-            guess: guess_of(pose(self.guess, "guess")?, pose(self.motion, "motion")?)?,
+            guess: guess_of(
+                pose(self.guess, "guess")?,
+                pose(self.motion, "motion")?,
+                self.constant_velocity,
+            )?,
             at_guess: !self.align,
+            force: self.force,
+            method: self.method.map(Method::from),
+            foreground_level: self.foreground_level,
+            filter: PointFilter {
+                range_min_m: self.range_min_m,
+                range_max_m: self.range_max_m,
+                body_m: self.body_m.map(|text| corners(&text)).transpose()?,
+            },
             strict: self.strict,
+            ..ScanRequest::new(RobotName::new(&self.robot)?, points)
         })
     }
 }
 
-fn guess_of(guess: Option<Pose>, motion: Option<Pose>) -> Result<Guess, ServiceError> {
-    match (guess, motion) {
-        (None, None) => Ok(Guess::Last),
-        (Some(map_from_sensor), None) => Ok(Guess::Pose(map_from_sensor)),
-        (None, Some(last_from_sensor)) => Ok(Guess::Motion(last_from_sensor)),
-        (Some(_), Some(_)) => {
-            Err(ServiceError::invalid("ambiguous_guess", "one of guess and motion can be given, got both"))
+/// A box as `x,y,z,x,y,z`.
+fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), ServiceError> {
+    let [x0, y0, z0, x1, y1, z1] = parameters::numbers(text, "body_m")?;
+    Ok(([x0, y0, z0], [x1, y1, z1]))
+}
+
+fn guess_of(
+    guess: Option<Pose>,
+    motion: Option<Pose>,
+    constant_velocity: bool,
+) -> Result<Guess, ServiceError> {
+    match (guess, motion, constant_velocity) {
+        (None, None, false) => Ok(Guess::Last),
+        (None, None, true) => Ok(Guess::ConstantVelocity),
+        (Some(map_from_sensor), None, false) => Ok(Guess::Pose(map_from_sensor)),
+        (None, Some(last_from_sensor), false) => Ok(Guess::Motion(last_from_sensor)),
+        _ => {
+            let message = "one of guess, motion and constant_velocity can be given, got several";
+            Err(ServiceError::invalid("ambiguous_guess", message))
         }
     }
 }
@@ -137,7 +233,7 @@ fn guess_of(guess: Option<Pose>, motion: Option<Pose>) -> Result<Guess, ServiceE
 impl From<ScanAnswer> for ScanOut {
     fn from(answer: ScanAnswer) -> Self {
         Self {
-            accepted: answer.accepted(),
+            accepted: answer.accepted,
             verdict: answer.verdict.as_str(),
             map_from_sensor: (&answer.map_from_sensor).into(),
             overlap: answer.overlap(),
@@ -145,8 +241,16 @@ impl From<ScanAnswer> for ScanOut {
             new_voxels: answer.new_voxels,
             points_skipped: answer.points_skipped,
             replayed: answer.replayed,
+            standing: answer.standing,
+            foreground: answer.foreground.map(|foreground| places(&foreground.bitmap)),
             state: answer.state.into(),
+            align_ms: answer.align_time.as_secs_f64() * 1e3,
+            inliers: answer.inliers,
+            fitness: answer.fitness,
+            information: answer.information,
+            undetermined: answer.undetermined.into_iter().map(Into::into).collect(),
             level_overlaps: answer.level_overlaps,
+            reason: answer.reason,
         }
     }
 }

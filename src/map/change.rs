@@ -2,7 +2,7 @@
 //! again in floating point.
 
 use super::{RequestId, ScanRecord};
-use crate::voxel::VoxelSet;
+use crate::voxel::{MomentSet, VoxelSet};
 
 /// One committed change. A map is what its changes made of it, in the order of revisions: the same changes make
 /// the same map, bit for bit, on every machine.
@@ -32,6 +32,9 @@ pub struct UndoRecord {
     pub scans: Vec<u64>,
     /// The finest voxels that no other scan holds, all of them there before.
     pub voxels: VoxelSet,
+    /// What the moments of the voxels that the scans touched are without them, see
+    /// [`Observations::moments_without_targets`](super::Observations::moments_without_targets).
+    pub moments: MomentSet,
     /// Under which id it was asked for.
     pub request: Option<Request>,
 }

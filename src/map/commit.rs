@@ -8,7 +8,7 @@ use super::addition::Addition;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
 use super::{AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, UndoRecord};
-use crate::voxel::{BLOCK_LEVELS, VoxelSet};
+use crate::voxel::{BLOCK_LEVELS, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
 #[derive(Debug)]
@@ -51,16 +51,17 @@ impl<'a> Committer<'a> {
     }
 
     fn insert(self, scan: &ScanRecord) -> Committed {
-        let (_shards, voxels) = self.add_to_shards(&scan.voxels);
+        let (_shards, voxels) = self.add_to_shards(&scan.voxels, &scan.moments);
         let mut trajectory = self.map.trajectory.write();
         let revision = self.map.revision() + 1;
         trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose.clone() });
         self.publish(revision, voxels)
     }
 
-    /// Adds finest voxels, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins with.
-    pub(super) fn add(self, voxels: &VoxelSet) {
-        self.add_to_shards(voxels);
+    /// Adds finest voxels and moments, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins
+    /// with.
+    pub(super) fn add(self, voxels: &VoxelSet, moments: &MomentSet) {
+        self.add_to_shards(voxels, moments);
     }
 
     /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
@@ -89,7 +90,10 @@ impl<'a> Committer<'a> {
         let mut shards: Vec<_> = self.map.shards.iter().map(|shard| shard.write()).collect();
         let mut trajectory = self.map.trajectory.write();
         let removed = shards.iter_mut().zip(&by_shard).map(|(shard, blocks)| shard.remove(blocks)).sum();
-        shards.iter_mut().for_each(|shard| shard.reset_if_empty(&self.map.settings));
+        for (shard, moments) in shards.iter_mut().zip(self.group_moments(&undo.moments)) {
+            shard.set_moments(&moments);
+            shard.reset_if_empty(&self.map.settings);
+        }
         let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         trajectory.withdraw(&undo.scans, committed.revision);
         self.remember(undo.request.as_ref(), committed, undo.scans.len());
@@ -118,23 +122,37 @@ impl<'a> Committer<'a> {
         by_shard
     }
 
-    /// Adds voxels to their shards: the write locks, taken in ascending order, and the number of voxels that were
-    /// absent. What is to be done is found out, and what has to grow is built, while readers go on; they wait only
-    /// while it is done.
-    fn add_to_shards(&self, voxels: &VoxelSet) -> (Vec<RwLockWriteGuard<'a, Shard>>, usize) {
-        let by_shard = self.group(voxels);
-        let touched = self.map.shards.iter().zip(&by_shard).filter(|(_, blocks)| !blocks.is_empty());
+    /// The moments of `set`, shard by shard.
+    fn group_moments(&self, set: &MomentSet) -> [Vec<(VoxelKey, Moments)>; SHARDS] {
+        let mut by_shard: [Vec<_>; SHARDS] = Default::default();
+        for &(voxel, moments) in set.as_slice() {
+            by_shard[self.map.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].push((voxel, moments));
+        }
+        by_shard
+    }
+
+    /// Adds voxels and the moments of points in them to their shards: the write locks, taken in ascending order, and
+    /// the number of voxels that were absent. What is to be done is found out, and what has to grow is built, while
+    /// readers go on; they wait only while it is done.
+    fn add_to_shards(
+        &self,
+        voxels: &VoxelSet,
+        moments: &MomentSet,
+    ) -> (Vec<RwLockWriteGuard<'a, Shard>>, usize) {
+        let (by_shard, moments) = (self.group(voxels), self.group_moments(moments));
+        let touched = (0..SHARDS).filter(|&i| !by_shard[i].is_empty());
         let planned: Vec<_> = touched
-            .map(|(shard, blocks)| {
-                let shard = shard.upgradable_read();
-                let addition = Addition::plan(&shard, blocks);
-                (shard, addition)
+            .map(|i| {
+                let shard = self.map.shards[i].upgradable_read();
+                let addition = Addition::plan(&shard, &by_shard[i]);
+                (i, shard, addition)
             })
             .collect();
         let mut added = 0;
-        let locked = planned.into_iter().map(|(shard, addition)| {
+        let locked = planned.into_iter().map(|(i, shard, addition)| {
             let mut shard = RwLockUpgradableReadGuard::upgrade(shard);
             added += addition.apply(&mut shard);
+            shard.add_moments(&moments[i]);
             shard
         });
         (locked.collect(), added)

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::{MapSettings, MapSettingsError, MultiResolutionMap, Requests, Trajectory};
-use crate::voxel::VoxelSet;
+use crate::voxel::{MomentSet, VoxelSet};
 
 /// What a map holds at one revision, besides its settings. Coarser levels and filters follow from the finest
 /// voxels.
@@ -13,6 +13,8 @@ pub struct MapContents {
     pub revision: u64,
     /// The finest voxels.
     pub voxels: VoxelSet,
+    /// Of the points in them.
+    pub moments: MomentSet,
     /// The accepted scans.
     pub trajectory: Trajectory,
     /// Answers to changes that were asked for under an id.
@@ -20,9 +22,9 @@ pub struct MapContents {
 }
 
 impl MapContents {
-    /// Voxels alone, at a revision.
+    /// Voxels alone, at a revision; their centres stand for the points.
     pub fn at(revision: u64, voxels: VoxelSet) -> Self {
-        Self { revision, voxels, ..Self::default() }
+        Self { revision, moments: MomentSet::of_centers(&voxels), voxels, ..Self::default() }
     }
 }
 
@@ -33,7 +35,8 @@ impl MultiResolutionMap {
         // a shard meanwhile, so that the view keeps both as they are.
         let view = self.view();
         let (trajectory, requests) = (self.trajectory().clone(), self.requests().clone());
-        MapContents { revision: view.revision(), voxels: view.voxels(), trajectory, requests }
+        let (voxels, moments) = (view.voxels(), view.moments());
+        MapContents { revision: view.revision(), voxels, moments, trajectory, requests }
     }
 
     /// The map of `settings` that holds `contents`.
@@ -42,7 +45,7 @@ impl MultiResolutionMap {
     /// When a setting is out of range.
     pub fn restore(settings: MapSettings, contents: MapContents) -> Result<Self, MapSettingsError> {
         let map = Self::new(settings)?;
-        map.committer().add(&contents.voxels);
+        map.committer().add(&contents.voxels, &contents.moments);
         *map.trajectory.write() = contents.trajectory;
         *map.requests.write() = contents.requests;
         map.revision.store(contents.revision, Ordering::Release);

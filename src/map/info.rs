@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::shard::Shard;
 use super::{MapView, MultiResolutionMap};
 use crate::voxel::VoxelKey;
 
@@ -27,16 +28,32 @@ pub struct LevelInfo {
     pub measured_rate: Option<f64>,
 }
 
+/// What a map holds at one revision.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapDescription {
+    /// Committed changes.
+    pub revision: u64,
+    /// Every level, finest first.
+    pub levels: Vec<LevelInfo>,
+    /// Bytes of memory of the exact sets of all levels.
+    pub set_bytes: usize,
+    /// Bytes of memory of the points' moments.
+    pub moment_bytes: usize,
+}
+
 impl MultiResolutionMap {
-    /// Describes every level, finest first, at one revision: (revision, levels, bytes of the exact sets).
+    /// Describes the map, at one revision.
     ///
     /// False positives are measured on `samples` absent neighbours of occupied voxels a level, drawn from `seed`.
-    pub fn describe(&self, samples: usize, seed: u64) -> (u64, Vec<LevelInfo>, usize) {
+    pub fn describe(&self, samples: usize, seed: u64) -> MapDescription {
         let view = self.view();
         let levels = (0..self.settings.levels).map(|level| self.describe_level(&view, level, samples, seed));
-        let levels = levels.collect();
-        let set_bytes = self.shards.iter().map(|shard| shard.read().set_bytes()).sum();
-        (view.revision(), levels, set_bytes)
+        MapDescription {
+            revision: view.revision(),
+            levels: levels.collect(),
+            set_bytes: view.shards().map(Shard::set_bytes).sum(),
+            moment_bytes: view.shards().map(Shard::moment_bytes).sum(),
+        }
     }
 
     fn describe_level(&self, view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> LevelInfo {

@@ -25,7 +25,7 @@ pub mod view;
 pub use change::{Change, DeletionRecord, Request, UndoRecord};
 pub use commit::{Committed, Committer};
 pub use contents::MapContents;
-pub use info::LevelInfo;
+pub use info::{LevelInfo, MapDescription};
 pub use lookup::Lookup;
 pub use name::{MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
 pub use observations::Observations;

@@ -1,9 +1,9 @@
 //! Which voxels would not be there without certain scans.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Change, WithdrawnScan};
-use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
+use super::{Change, MapContents, WithdrawnScan};
+use crate::voxel::{BlockMask, MomentSet, Moments, VoxelKey, VoxelSet};
 
 /// Who holds each voxel: scans that are to be undone, others, or both.
 ///
@@ -17,6 +17,10 @@ pub struct Observations {
     /// Scans that hold nothing any more, ascending.
     withdrawn: Vec<u64>,
     held: BTreeMap<VoxelKey, Held>,
+    /// As they are without the targets.
+    moments: BTreeMap<VoxelKey, Moments>,
+    /// The voxels whose moments the targets changed.
+    touched: BTreeSet<VoxelKey>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,16 +30,22 @@ struct Held {
 }
 
 impl Observations {
-    /// Begins with `base`, the finest voxels at a revision before that of any scan of `targets`; its holders are
+    /// Begins with `base`, what the map held at a revision before that of any scan of `targets`; its holders are
     /// others. No scan may lie before the base and be withdrawn after it.
-    pub fn new(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan], base: &VoxelSet) -> Self {
+    pub fn new(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan], base: &MapContents) -> Self {
         targets.sort_unstable();
         let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();
         withdrawn.sort_unstable();
         let held = |&(block, by_others): &(VoxelKey, BlockMask)| {
             (block, Held { by_targets: BlockMask::EMPTY, by_others })
         };
-        Self { targets, withdrawn, held: base.blocks().iter().map(held).collect() }
+        Self {
+            targets,
+            withdrawn,
+            held: base.voxels.blocks().iter().map(held).collect(),
+            moments: base.moments.as_slice().iter().copied().collect(),
+            touched: BTreeSet::new(),
+        }
     }
 
     /// The scans that are to be undone, by revision, ascending.
@@ -54,18 +64,32 @@ impl Observations {
                     let by = if is_target { &mut held.by_targets } else { &mut held.by_others };
                     *by = by.union(mask);
                 }
+                for &(voxel, moments) in scan.moments.as_slice() {
+                    match is_target {
+                        true => drop(self.touched.insert(voxel)),
+                        false => *self.moments.entry(voxel).or_default() += moments,
+                    }
+                }
             }
             Change::Deletion(deletion) => {
                 for (block, mask) in deletion.voxels.blocks() {
                     if let Some(Held { by_targets, by_others }) = self.held.get_mut(block) {
                         *by_targets = by_targets.difference(mask);
-                        *by_others = by_others.difference(mask);
+                        let before = std::mem::replace(by_others, by_others.difference(mask));
+                        self.moments.extend(by_others.rebuilt_moments(&before, *block));
                     }
                 }
             }
             // The scans that it took out were passed over where they went in.
             Change::Undo(_) => {}
         }
+    }
+
+    /// The moments of all voxels that the targets touched, as they are without them: what they were, and of no points
+    /// where nothing is left.
+    pub fn moments_without_targets(&self) -> MomentSet {
+        let moments = |&voxel| (voxel, self.moments.get(&voxel).copied().unwrap_or_default());
+        self.touched.iter().map(moments).collect()
     }
 
     /// The voxels that nobody but the targets holds.

@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
+use hashbrown::HashMap;
+
 use super::MapSettings;
 use super::occupied_voxel_list::{OccupiedVoxelList, tier_of};
 use super::room::Room;
 use crate::bloom::CountingBloomFilter;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, Moments, VoxelKey, VoxelSet};
 
 /// A block of a tier and its voxels.
 pub(super) type Block = (VoxelKey, BlockMask);
@@ -27,6 +29,8 @@ pub(super) struct Shard {
     pub(super) number: usize,
     pub(super) tiers: Vec<BlockTable>,
     pub(super) filters: Vec<CountingBloomFilter>,
+    /// Of the points in each voxel of [`MOMENT_LEVEL`](crate::voxel::MOMENT_LEVEL).
+    moments: HashMap<VoxelKey, Moments>,
 }
 
 impl Shard {
@@ -38,6 +42,7 @@ impl Shard {
             number,
             tiers: vec![BlockTable::with_capacity(0); tiers],
             filters: (0..settings.levels as usize).map(filter).collect(),
+            moments: HashMap::new(),
         }
     }
 
@@ -52,6 +57,33 @@ impl Shard {
     /// Bytes of memory of the exact sets.
     pub(super) fn set_bytes(&self) -> usize {
         self.tiers.iter().map(BlockTable::bytes).sum()
+    }
+
+    /// Bytes of memory of the moments.
+    pub(super) fn moment_bytes(&self) -> usize {
+        self.moments.allocation_size()
+    }
+
+    /// The moments of the points in a voxel of [`MOMENT_LEVEL`](crate::voxel::MOMENT_LEVEL).
+    pub(super) fn moments_of(&self, voxel: VoxelKey) -> Option<&Moments> {
+        self.moments.get(&voxel)
+    }
+
+    /// All moments, in no order.
+    pub(super) fn moments(&self) -> impl Iterator<Item = (VoxelKey, Moments)> + '_ {
+        self.moments.iter().map(|(&voxel, &moments)| (voxel, moments))
+    }
+
+    /// Adds the moments of points whose voxels are, or are about to be, occupied.
+    pub(super) fn add_moments(&mut self, moments: &[(VoxelKey, Moments)]) {
+        for &(voxel, added) in moments {
+            *self.moments.entry(voxel).or_default() += added;
+        }
+    }
+
+    /// Puts moments in the place of those that are there; none of no points are kept.
+    pub(super) fn set_moments(&mut self, moments: &[(VoxelKey, Moments)]) {
+        set_moments(&mut self.moments, moments.iter().copied());
     }
 
     /// The blocks of finest voxels.
@@ -89,6 +121,9 @@ impl Shard {
                 let gone = before.firsts(up).difference(&after.firsts(up));
                 gone.for_each_key(block, up, |key| filter.remove(key));
             }
+            if tier == 0 {
+                set_moments(&mut self.moments, after.rebuilt_moments(&before, block));
+            }
         }
         emptied
     }
@@ -108,6 +143,15 @@ impl Shard {
     pub(super) fn reset_if_empty(&mut self, settings: &MapSettings) {
         if self.is_empty() {
             *self = Self::new(self.number, settings);
+        }
+    }
+}
+
+fn set_moments(all: &mut HashMap<VoxelKey, Moments>, moments: impl IntoIterator<Item = (VoxelKey, Moments)>) {
+    for (voxel, moments) in moments {
+        match moments.is_empty() {
+            true => drop(all.remove(&voxel)),
+            false => drop(all.insert(voxel, moments)),
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::RobotName;
-use crate::geometry::Pose;
-use crate::voxel::VoxelSet;
+use crate::geometry::{Point, Pose};
+use crate::voxel::{Lattice, MomentSet, VoxelSet};
 
 /// A scan as it enters a map: everything that replaying the insertion needs, nothing that would have to be
 /// computed again in floating point.
@@ -14,6 +14,24 @@ pub struct ScanRecord {
     pub pose: TrajectoryPose,
     /// Every distinct finest voxel that the scan touches, known before or not.
     pub voxels: VoxelSet,
+    /// What its points add to the moments of their voxels.
+    pub moments: MomentSet,
+}
+
+impl ScanRecord {
+    /// What a scan of `points` (sensor frame) taken at `pose` does to a map on `lattice`. Points without a voxel are
+    /// left out and counted in `pose.points_skipped`.
+    pub fn of_points(mut pose: TrajectoryPose, points: &[Point], lattice: &Lattice) -> Self {
+        let quantise = lattice.from_points(&pose.map_from_sensor);
+        let (voxels, out_of_range) = VoxelSet::of_points(points, &quantise);
+        pose.points_skipped += out_of_range;
+        Self { pose, voxels, moments: MomentSet::of_points(points, &quantise) }
+    }
+
+    /// The same of voxels whose points are not known: the refinement of alignments learns nothing from it.
+    pub fn of_voxels(pose: TrajectoryPose, voxels: VoxelSet) -> Self {
+        Self { pose, voxels, moments: MomentSet::default() }
+    }
 }
 
 /// One accepted scan.
@@ -103,6 +121,13 @@ impl Trajectory {
     /// A robot's last accepted scan.
     pub fn last_of(&self, robot: &RobotName) -> Option<&TrajectoryPose> {
         self.last.get(robot).map(|&i| &self.poses[i])
+    }
+
+    /// A robot's last two accepted scans, the last one first.
+    pub fn last_two_of(&self, robot: &RobotName) -> Option<(&TrajectoryPose, &TrajectoryPose)> {
+        let last = *self.last.get(robot)?;
+        let before = self.poses[..last].iter().rev().find(|pose| pose.robot == *robot)?;
+        Some((&self.poses[last], before))
     }
 
     /// A robot's accepted scan of that number.

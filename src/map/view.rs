@@ -9,7 +9,8 @@ use super::sharding::{SHARDS, ShardsTouched};
 use super::{MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::voxel::{
-    BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
+    BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL,
+    MomentSet, Moments, VoxelKey, VoxelSet,
 };
 
 /// Read locks on some or all shards of a map. While it lives, what it covers does not change.
@@ -59,6 +60,11 @@ impl<'a> MapView<'a> {
         lookup::count(points, lattice_from_points, &self.level_view(level), lookup)
     }
 
+    /// The shards that the view covers.
+    pub(super) fn shards(&self) -> impl Iterator<Item = &Shard> {
+        self.shards.iter().flatten().map(|shard| &**shard)
+    }
+
     /// What the look-up kernels read of `level`.
     pub fn level_view(&self, level: u32) -> LevelView<'_> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
@@ -81,6 +87,28 @@ impl<'a> MapView<'a> {
     pub fn may_contain(&self, voxel: VoxelKey, level: u32) -> bool {
         let shard = self.map.sharding.shard_of(voxel.index(), level);
         self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).may_contain(voxel))
+    }
+
+    /// The moments of the points in `voxel` of [`MOMENT_LEVEL`]. None where the view does not cover it.
+    pub fn moments_of(&self, voxel: VoxelKey) -> Option<&Moments> {
+        let shard = self.map.sharding.shard_of(voxel.index(), MOMENT_LEVEL);
+        self.shards[shard].as_deref()?.moments_of(voxel)
+    }
+
+    /// All moments that the view covers.
+    pub fn moments(&self) -> MomentSet {
+        self.shards.iter().flatten().flat_map(|shard| shard.moments()).collect()
+    }
+
+    /// How many of `voxels` are not in the map. The view must cover them.
+    pub fn absent(&self, voxels: &VoxelSet) -> usize {
+        let absent = |&(block, mask): &(VoxelKey, BlockMask)| {
+            let finest = block.index().map(|i| i << BLOCK_LEVELS);
+            let shard = self.shards[self.map.sharding.shard_of(finest, 0)].as_deref();
+            let present = shard.map_or(BlockMask::EMPTY, |shard| shard.level(0).blocks().get(block));
+            mask.difference(&present).count(0)
+        };
+        voxels.blocks().iter().map(absent).sum()
     }
 
     /// All finest voxels that the view covers.

@@ -3,6 +3,7 @@
 //! A scan is a `Vec<Point>` in its sensor's frame, metres; a point with a NaN or infinite coordinate means "no
 //! return", and readers and sensors alike keep it.
 
+mod point_filter;
 mod reader;
 mod ride;
 mod route;
@@ -12,6 +13,7 @@ mod tour;
 mod tum;
 mod writer;
 
+pub use point_filter::{PointFilter, PointFilterError};
 pub use reader::{ReadError, read_points, scan_files};
 pub use scene::Scene;
 #[cfg(feature = "server")]

@@ -205,16 +205,17 @@ impl HostedMap {
     }
 
     pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
-        let (revision, levels, set_bytes) = self.map.describe(rate_samples, RATE_SEED);
+        let described = self.map.describe(rate_samples, RATE_SEED);
         let trajectory = self.map.trajectory();
         MapInfo {
             name: self.name.clone(),
-            state: self.state(revision),
+            state: self.state(described.revision),
             settings: *self.map.settings(),
-            levels,
+            levels: described.levels,
             scans: trajectory.poses().len(),
             robots: trajectory.robots(),
-            set_bytes,
+            set_bytes: described.set_bytes,
+            moment_bytes: described.moment_bytes,
             storage: self.storage(),
         }
     }
@@ -240,7 +241,7 @@ impl HostedMap {
 }
 
 /// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.
-fn bitmap(words: Vec<u64>, points: usize) -> Bytes {
+pub(super) fn bitmap(words: Vec<u64>, points: usize) -> Bytes {
     struct Owner(Vec<u64>);
     impl AsRef<[u8]> for Owner {
         fn as_ref(&self) -> &[u8] {

@@ -1,26 +1,31 @@
 //! How a scan enters a map: align, quantise, propose (paper III).
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use super::committing::{Prepared, Proposal, Step, Turn, record_of};
-use super::hosted_map::HostedMap;
-use super::{ErrorCode, ScanAnswer, ScanRequest, ServiceError, ServiceSettings};
-use crate::align::{Alignment, Guess, Verdict, align, judge_at};
-use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
-use crate::map::{Change, Committed, RobotName, ScanRecord, TrajectoryPose};
-use crate::voxel::VoxelSet;
+use super::hosted_map::{HostedMap, bitmap};
+use super::{
+    ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings,
+};
+use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align, judge_at};
+use crate::geometry::{Point, Pose, extrapolate, pose_difference, rotation_xyzw, translation_m};
+use crate::map::{Change, Committed, Lookup, ScanRecord, TrajectoryPose};
+use crate::scan::PointFilter;
 
 /// A scan reduced to the points that can be somewhere.
 struct UsableScan<'a> {
     request: &'a ScanRequest,
+    filter: PointFilter,
     points: Vec<Point>,
-    not_finite: usize,
+    skipped: usize,
     digest: u64,
 }
 
 /// Where a scan goes, and what that was decided on.
 struct Placement {
     alignment: Alignment,
+    align_time: Duration,
     /// It went to its guess because the map was empty: another may have come first meanwhile.
     as_first: bool,
 }
@@ -34,29 +39,48 @@ impl HostedMap {
         settings: &ServiceSettings,
     ) -> Result<Step<ScanAnswer>, ServiceError> {
         self.check_writable()?;
-        let scan = UsableScan::of(request)?;
+        let scan = UsableScan::of(request, settings)?;
         if let Some(answer) = self.replay(&scan)? {
             return Ok(Step::Answered(answer));
         }
         self.check_room(settings)?;
         let placement = self.place(&scan, settings)?;
-        if placement.alignment.verdict != Verdict::Accepted {
-            return Ok(Step::Answered(self.answer(&scan, placement.alignment)));
+        let answer = self.answer(&scan, &placement);
+        if !answer.accepted && !request.force {
+            return Ok(Step::Answered(answer));
         }
-        let (voxels, out_of_range) = self.quantise(&scan, &placement.alignment.map_from_sensor)?;
-        let pose = pose_of(&scan, placement.alignment, out_of_range);
-        let change = Change::Insertion(ScanRecord { pose: pose.clone(), voxels });
+        let scan_record = self.record(&scan, &placement.alignment)?;
+        if !request.at_guess && self.is_standing(&scan_record, &settings.standing) {
+            return Ok(Step::Answered(ScanAnswer { accepted: true, standing: true, ..answer }));
+        }
+        let points_skipped = scan_record.pose.points_skipped;
+        let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
         let prepared = Prepared { change, record, if_empty: placement.as_first, turn };
         let outcome = self.committing.propose(Proposal::Prepared(prepared.into()));
         let map = Arc::clone(self);
-        Ok(Step::Proposed(outcome, Box::new(move |committed| map.committed(pose, committed))))
+        let answer = ScanAnswer { points_skipped, ..answer };
+        Ok(Step::Proposed(outcome, Box::new(move |committed| map.committed(answer, committed))))
     }
 
     /// What to say of a scan that was committed.
-    fn committed(&self, pose: TrajectoryPose, committed: Committed) -> ScanAnswer {
+    fn committed(&self, answer: ScanAnswer, committed: Committed) -> ScanAnswer {
         let Committed { revision, voxels: new_voxels } = committed;
-        self.answer_of(&TrajectoryPose { revision, new_voxels, ..pose }, false)
+        ScanAnswer { accepted: true, new_voxels, state: self.state(revision), ..answer }
+    }
+
+    /// True of a scan that shows again what the robot's last one showed, from where that was taken.
+    fn is_standing(&self, record: &ScanRecord, settings: &StandingSettings) -> bool {
+        let trajectory = self.map.trajectory();
+        let Some(last) = trajectory.last_of(&record.pose.robot) else {
+            return false;
+        };
+        let (metres, degrees) = pose_difference(&last.map_from_sensor, &record.pose.map_from_sensor);
+        drop(trajectory);
+        metres <= settings.distance * self.map.lattice().resolution_m(0)
+            && degrees <= settings.rotation_deg
+            && self.map.view().absent(&record.voxels) as f64
+                <= settings.new_voxels * record.voxels.len() as f64
     }
 
     /// Says what [`HostedMap::propose_scan`] would; changes nothing.
@@ -65,9 +89,27 @@ impl HostedMap {
         request: &ScanRequest,
         settings: &ServiceSettings,
     ) -> Result<ScanAnswer, ServiceError> {
-        let scan = UsableScan::of(request)?;
+        request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
+        let scan = UsableScan::of(request, settings)?;
         let placement = self.place(&scan, settings)?;
-        Ok(self.answer(&scan, placement.alignment))
+        let foreground = request
+            .foreground_level
+            .map(|level| self.foreground(&scan, &placement.alignment.map_from_sensor, level));
+        Ok(ScanAnswer { foreground, ..self.answer(&scan, &placement) })
+    }
+
+    /// The points of the scan in no occupied voxel of `level`.
+    fn foreground(&self, scan: &UsableScan<'_>, map_from_sensor: &Pose, level: u32) -> Foreground {
+        let all = scan.request.points.as_slice();
+        let mut words = vec![0; all.len().div_ceil(64)];
+        let quantise = self.map.lattice().from_points(map_from_sensor);
+        self.map.view().query(all, &quantise, level, Lookup::Exact, &mut words);
+        for (word, points) in words.iter_mut().zip(all.chunks(64)) {
+            let counts = |(i, &point): (usize, &Point)| u64::from(scan.counts(point)) << i;
+            *word = !*word & points.iter().enumerate().map(counts).sum::<u64>();
+        }
+        let points = words.iter().map(|word| word.count_ones() as usize).sum();
+        Foreground { bitmap: bitmap(words, all.len()), points }
     }
 
     /// The first answer again, where this scan was accepted before.
@@ -80,7 +122,7 @@ impl HostedMap {
             return Ok(None);
         };
         if pose.digest == scan.digest {
-            return Ok(Some(self.answer_of(pose, true)));
+            return Ok(Some(self.answer_again(pose)));
         }
         let message = format!(
             "scan_id {scan_id} of robot {} was accepted at revision {} with other content: number new scans anew",
@@ -92,21 +134,24 @@ impl HostedMap {
     /// Decides where the scan goes.
     fn place(&self, scan: &UsableScan<'_>, settings: &ServiceSettings) -> Result<Placement, ServiceError> {
         let request = scan.request;
+        let start = Instant::now();
+        let method = request.method.unwrap_or(settings.alignment.method);
+        let settings = AlignmentSettings { method, ..settings.alignment };
         let first = self.map.is_empty();
-        let guess = self.resolve(&request.guess, &request.robot, first)?;
+        let guess = self.resolve(request, first)?;
         let alignment = if first {
-            trusted(guess, vec![0.0; self.map.settings().levels as usize])
+            Alignment::trusted(guess, self.map.settings().levels, &scan.points)
         } else if request.at_guess {
-            let judged = judge_at(&self.map, &scan.points, &guess, &settings.alignment);
-            trusted(guess, judged.level_overlaps)
+            judge_at(&self.map, &scan.points, &guess, &settings).on_the_callers_word()
         } else {
-            align(&self.map, &scan.points, &guess, &settings.alignment)
+            align(&self.map, &scan.points, &guess, &settings)
         };
-        Ok(Placement { alignment, as_first: first && !request.at_guess })
+        Ok(Placement { alignment, align_time: start.elapsed(), as_first: first && !request.at_guess })
     }
 
     /// The pose that a guess stands for.
-    fn resolve(&self, guess: &Guess, robot: &RobotName, first: bool) -> Result<Pose, ServiceError> {
+    fn resolve(&self, request: &ScanRequest, first: bool) -> Result<Pose, ServiceError> {
+        let ScanRequest { guess, robot, timestamp_ns, .. } = request;
         let last = || self.map.trajectory().last_of(robot).map(|pose| pose.map_from_sensor);
         let last_or_origin = || match last() {
             Some(pose) => Ok(pose),
@@ -123,23 +168,34 @@ impl HostedMap {
             Guess::Pose(map_from_sensor) => Ok(*map_from_sensor),
             Guess::Last => last_or_origin(),
             Guess::Motion(last_from_sensor) => Ok(last_or_origin()? * last_from_sensor),
+            Guess::ConstantVelocity => match self.map.trajectory().last_two_of(robot) {
+                Some((last, before)) => Ok(constant_velocity(before, last, *timestamp_ns)),
+                None => last_or_origin(),
+            },
         }
     }
 
-    /// The voxels that the scan touches, and how many of its points are beyond the map's range.
-    fn quantise(
-        &self,
-        scan: &UsableScan<'_>,
-        map_from_sensor: &Pose,
-    ) -> Result<(VoxelSet, usize), ServiceError> {
-        let (voxels, out_of_range) =
-            VoxelSet::of_points(&scan.points, &self.map.lattice().from_points(map_from_sensor));
-        if voxels.is_empty() {
+    /// What the scan does to the map where it was found to be.
+    fn record(&self, scan: &UsableScan<'_>, alignment: &Alignment) -> Result<ScanRecord, ServiceError> {
+        let pose = TrajectoryPose {
+            robot: scan.request.robot.clone(),
+            scan_id: scan.request.scan_id,
+            timestamp_ns: scan.request.timestamp_ns,
+            map_from_sensor: alignment.map_from_sensor,
+            revision: 0,
+            level_overlaps: alignment.level_overlaps.clone(),
+            iterations: alignment.iterations,
+            points_skipped: scan.skipped,
+            new_voxels: 0,
+            digest: scan.digest,
+        };
+        let record = ScanRecord::of_points(pose, &scan.points, self.map.lattice());
+        if record.voxels.is_empty() {
             let (min_m, end_m) = self.map.lattice().range_m();
             let message = format!("no point of the scan lies within the map's range of {min_m} to {end_m} m");
             return Err(ServiceError::invalid("scan_out_of_range", message));
         }
-        Ok((voxels, out_of_range))
+        Ok(record)
     }
 
     fn check_room(&self, settings: &ServiceSettings) -> Result<(), ServiceError> {
@@ -151,54 +207,61 @@ impl HostedMap {
         Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message))
     }
 
-    /// What to say of a scan that is in the map.
-    fn answer_of(&self, pose: &TrajectoryPose, replayed: bool) -> ScanAnswer {
+    /// The answer to a scan that was accepted before; what was only of its alignment's moment is not kept.
+    fn answer_again(&self, pose: &TrajectoryPose) -> ScanAnswer {
         ScanAnswer {
+            accepted: true,
             verdict: Verdict::Accepted,
+            reason: format!("accepted before, at revision {}", pose.revision),
             map_from_sensor: pose.map_from_sensor,
             level_overlaps: pose.level_overlaps.clone(),
+            inliers: 0.0,
+            fitness: 0.0,
+            information: None,
+            undetermined: Vec::new(),
             iterations: pose.iterations,
+            align_time: Duration::ZERO,
             points_skipped: pose.points_skipped,
             new_voxels: pose.new_voxels,
+            foreground: None,
             state: self.state(pose.revision),
-            replayed,
+            replayed: true,
+            standing: false,
         }
     }
 
     /// What to say of a scan that was not added.
-    fn answer(&self, scan: &UsableScan<'_>, alignment: Alignment) -> ScanAnswer {
+    fn answer(&self, scan: &UsableScan<'_>, placement: &Placement) -> ScanAnswer {
+        let alignment = &placement.alignment;
         ScanAnswer {
+            accepted: alignment.verdict == Verdict::Accepted,
             verdict: alignment.verdict,
+            reason: alignment.reason.clone(),
             map_from_sensor: alignment.map_from_sensor,
-            level_overlaps: alignment.level_overlaps,
+            level_overlaps: alignment.level_overlaps.clone(),
+            inliers: alignment.inliers,
+            fitness: alignment.fitness,
+            information: Some(alignment.information.rows()),
+            undetermined: alignment.undetermined.clone(),
             iterations: alignment.iterations,
-            points_skipped: scan.not_finite,
+            align_time: placement.align_time,
+            points_skipped: scan.skipped,
             new_voxels: 0,
+            foreground: None,
             state: self.state(self.map.revision()),
             replayed: false,
+            standing: false,
         }
     }
 }
 
-/// What the trajectory keeps of a scan, but for what its commit tells.
-fn pose_of(scan: &UsableScan<'_>, alignment: Alignment, out_of_range: usize) -> TrajectoryPose {
-    TrajectoryPose {
-        robot: scan.request.robot.clone(),
-        scan_id: scan.request.scan_id,
-        timestamp_ns: scan.request.timestamp_ns,
-        map_from_sensor: alignment.map_from_sensor,
-        revision: 0,
-        level_overlaps: alignment.level_overlaps,
-        iterations: alignment.iterations,
-        points_skipped: scan.not_finite + out_of_range,
-        new_voxels: 0,
-        digest: scan.digest,
-    }
-}
-
-/// An alignment that nobody had to find: the caller's word, or the first scan of the map.
-fn trusted(map_from_sensor: Pose, level_overlaps: Vec<f64>) -> Alignment {
-    Alignment { map_from_sensor, verdict: Verdict::Accepted, level_overlaps, iterations: 0, lookups: 0 }
+/// Where a robot is that goes on as it went from `before` to `last`.
+fn constant_velocity(before: &TrajectoryPose, last: &TrajectoryPose, timestamp_ns: Option<i64>) -> Pose {
+    let share = match [before.timestamp_ns, last.timestamp_ns, timestamp_ns] {
+        [Some(t0), Some(t1), Some(t2)] if t1 > t0 && t2 > t1 => (t2 - t1) as f64 / (t1 - t0) as f64,
+        _ => 1.0,
+    };
+    extrapolate(&before.map_from_sensor, &last.map_from_sensor, share)
 }
 
 impl<'a> UsableScan<'a> {
@@ -206,7 +269,7 @@ impl<'a> UsableScan<'a> {
     ///
     /// # Errors
     /// When no point is left, or one had to be left out of a strict request.
-    fn of(request: &'a ScanRequest) -> Result<Self, ServiceError> {
+    fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
         let all = request.points.as_slice();
         let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
         let not_finite = all.len() - points.len();
@@ -219,19 +282,41 @@ impl<'a> UsableScan<'a> {
             let message = format!("none of the scan's {not_finite} points is finite: nothing but no-returns");
             return Err(ServiceError::invalid("no_returns", message));
         }
-        Ok(Self { request, points, not_finite, digest: digest(request) })
+        let filter = request.filter.or(settings.filter_of(&request.robot));
+        let filter =
+            filter.checked().map_err(|error| ServiceError::invalid("bad_filter", error.to_string()))?;
+        let points: Vec<Point> = points.into_iter().filter(|&point| filter.keeps(point)).collect();
+        if points.is_empty() {
+            let message = format!(
+                "none of the scan's {} points passes {filter:?} of robot {}",
+                all.len(),
+                request.robot
+            );
+            return Err(ServiceError::invalid("all_points_filtered", message));
+        }
+        Ok(Self { request, filter, skipped: all.len() - points.len(), points, digest: digest(request) })
+    }
+
+    /// True of a point of the robot's surroundings.
+    fn counts(&self, point: Point) -> bool {
+        point.is_finite() && self.filter.keeps(point)
     }
 }
 
 /// Tells one request from another under the same id: points, guess, and whether to align.
 fn digest(request: &ScanRequest) -> u64 {
     let guess = match &request.guess {
-        Guess::Last => Vec::new(),
+        Guess::Last | Guess::ConstantVelocity => Vec::new(),
         Guess::Pose(pose) | Guess::Motion(pose) => {
             [&translation_m(pose)[..], &rotation_xyzw(pose)[..]].concat()
         }
     };
-    let kind = [u8::from(request.at_guess), u8::from(matches!(request.guess, Guess::Motion(_)))];
+    let guess_kind = match &request.guess {
+        Guess::Last | Guess::Pose(_) => 0,
+        Guess::Motion(_) => 1,
+        Guess::ConstantVelocity => 2,
+    };
+    let kind = [u8::from(request.at_guess), guess_kind];
     let checksum = crc32c::crc32c(bytemuck::cast_slice(request.points.as_slice()));
     let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(&guess));
     let checksum = crc32c::crc32c_append(checksum, &kind);

@@ -19,11 +19,11 @@ mod undo;
 pub use error::{ErrorCode, ServiceError};
 pub use limits::Limits;
 pub use request::{
-    Deletion, DeletionAnswer, DeletionTarget, MapFile, MapInfo, MapState, MapStorage, PointAnswer,
-    PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer, UndoTarget,
-    VoxelListing,
+    Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
+    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer,
+    UndoTarget, VoxelListing,
 };
-pub use settings::ServiceSettings;
+pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
 
 use std::sync::Arc;
 

@@ -38,7 +38,8 @@ impl HostedMap {
             }
             folder.observe(&mut observations, seen).map_err(unreadable)?;
             let voxels = observations.held_by_targets_alone();
-            Ok(Some(Change::Undo(UndoRecord { scans, voxels, request })))
+            let moments = observations.moments_without_targets();
+            Ok(Some(Change::Undo(UndoRecord { scans, voxels, moments, request })))
         };
         let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)));
         let map = Arc::clone(self);

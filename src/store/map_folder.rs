@@ -235,8 +235,8 @@ impl MapFolder {
             return Ok(None);
         };
         let path = self.path.join(snapshot_name(base));
-        let base_voxels = Snapshot::read(&*self.files, &path)?.contents.voxels;
-        let mut observations = Observations::new(scans.to_vec(), withdrawn, &base_voxels);
+        let base_contents = Snapshot::read(&*self.files, &path)?.contents;
+        let mut observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
         let head = self.observe(&mut observations, base)?;
         Ok(Some((observations, head)))
     }

@@ -18,7 +18,7 @@ use super::codec::Unreadable;
 use super::{FileSystem, StoreError, folder, pb};
 use crate::bloom::FilterSettings;
 use crate::map::{AnsweredRequest, MapContents, MapSettings, MultiResolutionMap, Trajectory, TrajectoryPose};
-use crate::voxel::{BlockMask, VoxelSet};
+use crate::voxel::{BlockMask, MomentSet, VoxelSet};
 
 /// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
 /// bytes, and neither withdrawn scans nor requests.
@@ -133,7 +133,7 @@ impl Snapshot {
     }
 
     fn to_message(&self) -> pb::Snapshot {
-        let MapContents { revision, voxels, trajectory, requests } = &self.contents;
+        let MapContents { revision, voxels, moments, trajectory, requests } = &self.contents;
         pb::Snapshot {
             uuid: self.uuid.as_bytes().to_vec().into(),
             resolution_m: self.settings.resolution_m,
@@ -147,6 +147,7 @@ impl Snapshot {
             voxels: Some(voxels.into()),
             withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
             requests: requests.iter().map(Into::into).collect(),
+            moments: Some(moments.into()),
         }
     }
 
@@ -158,12 +159,17 @@ impl Snapshot {
             message.trajectory.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?;
         let withdrawn = message.withdrawn.into_iter().map(Into::into).collect();
         let requests = message.requests.into_iter().map(AnsweredRequest::try_from);
+        let voxels = match message.voxels {
+            Some(voxels) => voxels.try_into()?,
+            None => voxels_of_version_1(&message.block_keys, &message.block_masks)?,
+        };
         let contents = MapContents {
             revision: message.revision,
-            voxels: match message.voxels {
-                Some(voxels) => voxels.try_into()?,
-                None => voxels_of_version_1(&message.block_keys, &message.block_masks)?,
+            moments: match message.moments {
+                Some(moments) => moments.try_into()?,
+                None => MomentSet::of_centers(&voxels),
             },
+            voxels,
             trajectory: Trajectory::new(poses, withdrawn),
             requests: requests.collect::<Result<_, _>>()?,
         };
@@ -197,7 +203,7 @@ mod tests {
     use super::*;
     use crate::geometry;
     use crate::map::{RequestId, RobotName, WithdrawnScan};
-    use crate::voxel::VoxelKey;
+    use crate::voxel::{Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
         let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
@@ -213,6 +219,7 @@ mod tests {
             new_voxels: 5000,
             digest: u64::MAX,
         };
+        let moments = Moments::from_numbers([3, -4, 5, 6, 7, -8, 9, 10, -11, 1 << 40]);
         let id = RequestId::new("undo-1").unwrap();
         let request = AnsweredRequest { id, digest: 9, revision: 42, voxels: 0, scans: 1 };
         Snapshot {
@@ -220,6 +227,7 @@ mod tests {
             settings: MapSettings::new(0.05, 4),
             contents: MapContents {
                 revision: 42,
+                moments: MomentSet::from_iter([(VoxelKey::new([1, -2, 0]).unwrap(), moments)]),
                 voxels: keys.collect(),
                 trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }]),
                 requests: [request].into_iter().collect(),
@@ -256,6 +264,16 @@ mod tests {
         let mut bytes = snapshot().encode().unwrap();
         bytes[8] = 3;
         assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 3"));
+    }
+
+    #[test]
+    fn a_file_without_moments_is_restored_with_those_of_voxel_centres() {
+        let mut message = snapshot().to_message();
+        message.moments = None;
+        let old = Snapshot::from_message(message).unwrap().contents;
+        assert_eq!(old.moments, MomentSet::of_centers(&old.voxels));
+        let points: i64 = old.moments.as_slice().iter().map(|(_, moments)| moments.count()).sum();
+        assert_eq!(points, 5000);
     }
 
     #[test]

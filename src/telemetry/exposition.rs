@@ -17,6 +17,10 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     for map in maps {
         family.gauge(&[("map", &map.name)], map.set_bytes);
     }
+    let mut family = Family::begin(text, "mrol_map_moment_bytes", "Bytes of the points' moments, by map");
+    for map in maps {
+        family.gauge(&[("map", &map.name)], map.moment_bytes);
+    }
     write_filters(text, maps);
     let mut family = Family::begin(text, "mrol_map_revision", "Committed changes, by map");
     for map in maps {

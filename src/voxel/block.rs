@@ -1,6 +1,6 @@
 //! Blocks of 8 x 8 x 8 voxels: three levels of the map in one 512-bit mask.
 
-use super::VoxelKey;
+use super::{Moments, VoxelKey};
 
 /// Levels that one block's mask holds.
 pub const BLOCK_LEVELS: u32 = 3;
@@ -167,6 +167,25 @@ impl BlockMask {
                 Some(Cell((w as u16) << 6 | bit as u16))
             })
         })
+    }
+
+    /// The moments of the voxels of `block` two levels up that had other descendants `before`: which of their points
+    /// lay in what is gone is not known, and so the centres of what remains stand for them.
+    pub(crate) fn rebuilt_moments(
+        &self,
+        before: &Self,
+        block: VoxelKey,
+    ) -> impl Iterator<Item = (VoxelKey, Moments)> + use<> {
+        let words = before.0.into_iter().zip(self.0).enumerate();
+        words.filter(|(_, (before, after))| before != after).map(move |(w, (_, after))| {
+            let voxel = Cell((w as u16) << 6).voxel(block).ancestor(BLOCK_LEVELS - 1);
+            (voxel, Moments::of_descendants(after))
+        })
+    }
+
+    /// The moments of the centres of `block`'s voxels, voxel by voxel two levels up.
+    pub(crate) fn moments(&self, block: VoxelKey) -> impl Iterator<Item = (VoxelKey, Moments)> + use<> {
+        self.rebuilt_moments(&Self::EMPTY, block)
     }
 
     /// This with the voxels of `other` as well.

@@ -104,15 +104,33 @@ impl LatticeFromPoints {
     /// The indices of the finest voxel that `point` falls in; none when it is not finite or out of range.
     #[inline(always)]
     pub fn index(&self, point: Point) -> Option<[i32; 3]> {
-        let [x, y, z] = point.xyz();
-        let quantise = |axis: usize| {
-            let [r0, r1, r2] = self.rotation[axis];
-            ((((r0 * x + r1 * y) + r2 * z) + self.translation[axis]) * self.per_resolution).floor()
-        };
-        let q: [f32; 3] = std::array::from_fn(quantise);
+        let q = self.scaled(point).map(f32::floor);
         // Comparisons with NaN are false, so this refuses what is not finite too.
         let in_range = q.iter().all(|c| (Self::QUANTISED_MIN..Self::QUANTISED_END).contains(c));
         in_range.then(|| q.map(|c| c as i32))
+    }
+
+    /// The point on the lattice, before it is rounded down.
+    #[inline(always)]
+    fn scaled(&self, point: Point) -> [f32; 3] {
+        let [x, y, z] = point.xyz();
+        std::array::from_fn(|axis| {
+            let [r0, r1, r2] = self.rotation[axis];
+            (((r0 * x + r1 * y) + r2 * z) + self.translation[axis]) * self.per_resolution
+        })
+    }
+
+    /// The voxel of `level` that `point` falls in, and how far from its centre, in whole `units` of its side; none
+    /// when the point is not finite or out of range.
+    pub(super) fn offset(&self, point: Point, level: u32, units: i64) -> Option<(VoxelKey, [i64; 3])> {
+        let index = self.index(point)?.map(|i| i >> level);
+        let side = f64::from(1u32 << level);
+        let scaled = self.scaled(point);
+        let offset = std::array::from_fn(|axis| {
+            let from_centre = f64::from(scaled[axis]) / side - f64::from(index[axis]) - 0.5;
+            (from_centre * units as f64).round() as i64
+        });
+        Some((VoxelKey::pack(index), offset))
     }
 
     /// The key of the finest voxel that `point` falls in; none when it is not finite or out of range.

@@ -6,6 +6,7 @@ mod block_table;
 mod grouping;
 mod key;
 mod lattice;
+mod moments;
 mod sample;
 mod set;
 
@@ -14,5 +15,6 @@ pub use block_table::BlockTable;
 pub(crate) use block_table::{BUCKET, Bucket, Slots};
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
+pub use moments::{MOMENT_LEVEL, MomentSet, Moments};
 pub use sample::{VolumetricSample, volumetric_sample};
 pub use set::VoxelSet;

@@ -1,6 +1,6 @@
 //! Volumetric sampling (paper III-A): one random point of each voxel of a sample lattice.
 
-use std::collections::HashMap;
+use hashbrown::HashMap;
 
 use super::{RESOLUTION_MAX_M, RESOLUTION_MIN_M};
 use crate::geometry::Point;
@@ -16,10 +16,12 @@ pub struct VolumetricSample {
 
 /// How near the number of sampled points has to come to the wish, as a fraction of it.
 const TOLERANCE: f64 = 0.05;
-/// Bisections of the sample resolution, at most.
-const BISECTIONS: usize = 16;
+/// Trials of the sample resolution, at most.
+const TRIALS: usize = 16;
+/// The first of them, metres.
+const FIRST_M: f64 = 0.25;
 
-/// Takes one random point of each voxel of a sample lattice, whose resolution is found by bisection so that
+/// Takes one random point of each voxel of a sample lattice, whose resolution is found by trial so that
 /// about `wish` points result (paper III-A: "the volumetric sample resolution is adjusted to produce
 /// approximately 1000 scan points").
 ///
@@ -33,18 +35,25 @@ pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> Volumetric
     }
     let (mut fine_m, mut coarse_m) = (RESOLUTION_MIN_M, RESOLUTION_MAX_M);
     let mut best = Vec::new();
-    let mut resolution_m = coarse_m;
-    for _ in 0..BISECTIONS {
-        let middle_m = (fine_m * coarse_m).sqrt();
-        let chosen = one_of_each_voxel(points, middle_m, seed);
+    let (mut resolution_m, mut trial_m) = (coarse_m, FIRST_M);
+    for _ in 0..TRIALS {
+        let chosen = one_of_each_voxel(points, trial_m, seed);
         let count = chosen.len();
         if best.is_empty() || count.abs_diff(wish) < best.len().abs_diff(wish) {
-            (best, resolution_m) = (chosen, middle_m);
+            (best, resolution_m) = (chosen, trial_m);
         }
         if count.abs_diff(wish) as f64 <= TOLERANCE * wish as f64 {
             break;
         }
-        if count > wish { fine_m = middle_m } else { coarse_m = middle_m }
+        if count > wish {
+            fine_m = trial_m
+        } else {
+            coarse_m = trial_m
+        }
+        // Voxels of a surface grow in number with the inverse square of their side.
+        let of_a_surface_m = trial_m * (count as f64 / wish as f64).sqrt();
+        let halfway_m = (fine_m * coarse_m).sqrt();
+        trial_m = if (fine_m..coarse_m).contains(&of_a_surface_m) { of_a_surface_m } else { halfway_m };
     }
     best.sort_unstable();
     VolumetricSample { points: best.into_iter().map(|i| points[i as usize]).collect(), resolution_m }
@@ -56,7 +65,7 @@ fn one_of_each_voxel(points: &[Point], resolution_m: f64, seed: u64) -> Vec<u32>
     let mut chosen = HashMap::with_capacity(points.len() / 16);
     for (place, point) in points.iter().enumerate() {
         // Unlike a map's lattice this one need not be exact at its borders or reach far: it saturates.
-        let voxel = point.xyz().map(|c| (c * per_resolution).floor() as i32);
+        let voxel = point.xyz().map(|c| floor(c * per_resolution));
         let ticket = (lottery(seed, place as u64), place as u32);
         let winner = chosen.entry(voxel).or_insert(ticket);
         *winner = ticket.min(*winner);
@@ -64,6 +73,12 @@ fn one_of_each_voxel(points: &[Point], resolution_m: f64, seed: u64) -> Vec<u32>
     let mut places: Vec<u32> = chosen.into_values().map(|(_, place)| place).collect();
     places.sort_unstable();
     places
+}
+
+/// Rounds down. Plain x86-64 has no instruction for it and would call a library.
+fn floor(c: f32) -> i32 {
+    let towards_zero = c as i32;
+    towards_zero - i32::from(towards_zero as f32 > c)
 }
 
 /// A number drawn for a point: SplitMix64 of the seed and its place, so that the smallest in a voxel is a

@@ -108,6 +108,7 @@ impl From<MapInfo> for pb::MapInfo {
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes as u64,
             storage: info.storage.map(Into::into),
+            moment_bytes: info.moment_bytes as u64,
         }
     }
 }
@@ -127,6 +128,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             robots: robots.in_field("map.robots")?,
             set_bytes: count_from(info.set_bytes),
             storage: info.storage.map(Into::into),
+            moment_bytes: count_from(info.moment_bytes),
         })
     }
 }

@@ -1,17 +1,22 @@
 //! Scans and what becomes of them (`mapping.proto`).
 
+use std::time::Duration;
+
+use bytes::Bytes;
+
 use super::types::count_from;
 use super::{InField, pb, required};
-use crate::align::{Guess, Verdict};
+use crate::align::{Direction, Guess, Method, Verdict};
 use crate::map::{MapName, RobotName};
-use crate::service::{ScanAnswer, ScanRequest, ServiceError};
+use crate::scan::PointFilter;
+use crate::service::{Foreground, ScanAnswer, ScanRequest, ServiceError};
 
 impl TryFrom<pb::InsertScanRequest> for (MapName, ScanRequest) {
     type Error = ServiceError;
 
     fn try_from(request: pb::InsertScanRequest) -> Result<Self, ServiceError> {
-        let scan = scan_from(request.scan, request.guess, request.at_guess)?;
-        Ok((MapName::new(&request.map)?, scan))
+        let scan = scan_from(request.scan, request.guess, request.at_guess, request.method)?;
+        Ok((MapName::new(&request.map)?, ScanRequest { force: request.force, ..scan }))
     }
 }
 
@@ -19,8 +24,9 @@ impl TryFrom<pb::AlignScanRequest> for (MapName, ScanRequest) {
     type Error = ServiceError;
 
     fn try_from(request: pb::AlignScanRequest) -> Result<Self, ServiceError> {
-        let scan = scan_from(request.scan, request.guess, request.at_guess)?;
-        Ok((MapName::new(&request.map)?, scan))
+        let scan = scan_from(request.scan, request.guess, request.at_guess, request.method)?;
+        let foreground_level = request.foreground_level;
+        Ok((MapName::new(&request.map)?, ScanRequest { foreground_level, ..scan }))
     }
 }
 
@@ -28,17 +34,60 @@ fn scan_from(
     scan: Option<pb::Scan>,
     guess: Option<pb::Guess>,
     at_guess: bool,
+    method: i32,
 ) -> Result<ScanRequest, ServiceError> {
     let scan = required(scan, "scan")?;
+    let filter = filter_from(&scan)?;
     Ok(ScanRequest {
-        robot: RobotName::new(&scan.robot).in_field("scan.robot")?,
         scan_id: scan.scan_id,
-        points: required(scan.points, "scan.points")?.try_into().in_field("scan.points")?,
         timestamp_ns: scan.timestamp_ns,
         guess: guess_from(guess)?,
         at_guess,
+        method: method_from(method)?,
+        filter,
         strict: scan.strict,
+        ..ScanRequest::new(
+            RobotName::new(&scan.robot).in_field("scan.robot")?,
+            required(scan.points, "scan.points")?.try_into().in_field("scan.points")?,
+        )
     })
+}
+
+fn filter_from(scan: &pb::Scan) -> Result<PointFilter, ServiceError> {
+    let body = |body: &pb::Box| -> Result<_, ServiceError> {
+        let min_m = required(body.min_m, "scan.body.min_m")?.into();
+        Ok((min_m, required(body.max_m, "scan.body.max_m")?.into()))
+    };
+    Ok(PointFilter {
+        range_min_m: scan.range_min_m,
+        range_max_m: scan.range_max_m,
+        body_m: scan.body.as_ref().map(body).transpose()?,
+    })
+}
+
+fn method_from(number: i32) -> Result<Option<Method>, ServiceError> {
+    match pb::Method::try_from(number) {
+        Ok(pb::Method::Unspecified) => Ok(None),
+        Ok(pb::Method::Refined) => Ok(Some(Method::Refined)),
+        Ok(pb::Method::Overlap) => Ok(Some(Method::Overlap)),
+        Ok(pb::Method::WeightedSum) => Ok(Some(Method::WeightedSum)),
+        Err(_) => {
+            let message =
+                format!("method must be 0, 1 (refined), 2 (overlap) or 3 (weighted sum), got {number}");
+            Err(ServiceError::invalid("bad_method", message))
+        }
+    }
+}
+
+impl From<Option<Method>> for pb::Method {
+    fn from(method: Option<Method>) -> Self {
+        match method {
+            None => Self::Unspecified,
+            Some(Method::Refined) => Self::Refined,
+            Some(Method::Overlap) => Self::Overlap,
+            Some(Method::WeightedSum) => Self::WeightedSum,
+        }
+    }
 }
 
 fn guess_from(guess: Option<pb::Guess>) -> Result<Guess, ServiceError> {
@@ -50,6 +99,11 @@ fn guess_from(guess: Option<pb::Guess>) -> Result<Guess, ServiceError> {
         pb::guess::Kind::LastFromSensor(motion) => {
             Ok(Guess::Motion(motion.try_into().in_field("guess.last_from_sensor")?))
         }
+        pb::guess::Kind::ConstantVelocity(true) => Ok(Guess::ConstantVelocity),
+        pb::guess::Kind::ConstantVelocity(false) => {
+            let message = "guess.constant_velocity must be true: leave the guess out for the last pose";
+            Err(ServiceError::invalid("bad_guess", message))
+        }
     }
 }
 
@@ -59,6 +113,7 @@ impl From<&Guess> for Option<pb::Guess> {
             Guess::Last => return None,
             Guess::Pose(pose) => pb::guess::Kind::MapFromSensor(pose.into()),
             Guess::Motion(motion) => pb::guess::Kind::LastFromSensor(motion.into()),
+            Guess::ConstantVelocity => pb::guess::Kind::ConstantVelocity(true),
         };
         Some(pb::Guess { kind: Some(kind) })
     }
@@ -66,27 +121,37 @@ impl From<&Guess> for Option<pb::Guess> {
 
 impl From<ScanRequest> for pb::Scan {
     fn from(scan: ScanRequest) -> Self {
+        let body = |(min_m, max_m): ([f64; 3], [f64; 3])| pb::Box {
+            min_m: Some(min_m.into()),
+            max_m: Some(max_m.into()),
+        };
         Self {
             robot: scan.robot.to_string(),
             scan_id: scan.scan_id,
             points: Some(scan.points.into()),
             timestamp_ns: scan.timestamp_ns,
             strict: scan.strict,
+            range_min_m: scan.filter.range_min_m,
+            range_max_m: scan.filter.range_max_m,
+            body: scan.filter.body_m.map(body),
         }
     }
 }
 
 impl From<(&MapName, ScanRequest)> for pb::InsertScanRequest {
     fn from((map, scan): (&MapName, ScanRequest)) -> Self {
-        let (guess, at_guess) = ((&scan.guess).into(), scan.at_guess);
-        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess }
+        let (guess, at_guess, force) = ((&scan.guess).into(), scan.at_guess, scan.force);
+        let method = pb::Method::from(scan.method).into();
+        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, force }
     }
 }
 
 impl From<(&MapName, ScanRequest)> for pb::AlignScanRequest {
     fn from((map, scan): (&MapName, ScanRequest)) -> Self {
-        let (guess, at_guess) = ((&scan.guess).into(), scan.at_guess);
-        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess }
+        let (guess, at_guess, foreground_level) =
+            ((&scan.guess).into(), scan.at_guess, scan.foreground_level);
+        let method = pb::Method::from(scan.method).into();
+        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, foreground_level }
     }
 }
 
@@ -95,6 +160,8 @@ impl From<Verdict> for pb::Verdict {
         match verdict {
             Verdict::Accepted => Self::Accepted,
             Verdict::LowOverlap => Self::LowOverlap,
+            Verdict::Undetermined => Self::Undetermined,
+            Verdict::Ambiguous => Self::Ambiguous,
         }
     }
 }
@@ -103,8 +170,10 @@ fn verdict_from(number: i32) -> Result<Verdict, ServiceError> {
     match pb::Verdict::try_from(number) {
         Ok(pb::Verdict::Accepted) => Ok(Verdict::Accepted),
         Ok(pb::Verdict::LowOverlap) => Ok(Verdict::LowOverlap),
+        Ok(pb::Verdict::Undetermined) => Ok(Verdict::Undetermined),
+        Ok(pb::Verdict::Ambiguous) => Ok(Verdict::Ambiguous),
         Ok(pb::Verdict::Unspecified) | Err(_) => {
-            let message = format!("alignment.verdict must be 1 or 2, got {number}");
+            let message = format!("alignment.verdict must lie in 1..=4, got {number}");
             Err(ServiceError::invalid("bad_verdict", message))
         }
     }
@@ -119,6 +188,42 @@ impl From<&ScanAnswer> for pb::Alignment {
             level_overlaps: answer.level_overlaps.clone(),
             iterations: answer.iterations,
             points_skipped: answer.points_skipped as u64,
+            reason: answer.reason.clone(),
+            inliers: answer.inliers,
+            fitness: answer.fitness,
+            information: answer.information.iter().flatten().flatten().copied().collect(),
+            undetermined: answer.undetermined.iter().map(Into::into).collect(),
+            align_ms: answer.align_time.as_secs_f64() * 1e3,
+        }
+    }
+}
+
+impl From<&Direction> for pb::Direction {
+    fn from(open: &Direction) -> Self {
+        Self { direction: open.direction.to_vec(), std_m: open.std_m }
+    }
+}
+
+impl TryFrom<pb::Direction> for Direction {
+    type Error = ServiceError;
+
+    fn try_from(open: pb::Direction) -> Result<Self, ServiceError> {
+        let direction = <[f64; 6]>::try_from(open.direction).map_err(|numbers| {
+            let message = format!("alignment.undetermined must be directions of 6, got {}", numbers.len());
+            ServiceError::invalid("bad_direction", message)
+        })?;
+        Ok(Self { direction, std_m: open.std_m })
+    }
+}
+
+/// The rows of a 6 x 6 matrix; none where there are no numbers.
+fn information_from(numbers: &[f64]) -> Result<Option<[[f64; 6]; 6]>, ServiceError> {
+    match numbers.as_chunks::<6>() {
+        ([], []) => Ok(None),
+        (&[a, b, c, d, e, f], []) => Ok(Some([a, b, c, d, e, f])),
+        _ => {
+            let message = format!("alignment.information must have 36 numbers, got {}", numbers.len());
+            Err(ServiceError::invalid("bad_information", message))
         }
     }
 }
@@ -126,11 +231,12 @@ impl From<&ScanAnswer> for pb::Alignment {
 impl From<ScanAnswer> for pb::InsertScanResponse {
     fn from(answer: ScanAnswer) -> Self {
         Self {
-            accepted: answer.accepted(),
+            accepted: answer.accepted,
             alignment: Some((&answer).into()),
             new_voxels: answer.new_voxels as u64,
             state: Some(answer.state.into()),
             replayed: answer.replayed,
+            standing: answer.standing,
         }
     }
 }
@@ -138,9 +244,11 @@ impl From<ScanAnswer> for pb::InsertScanResponse {
 impl From<ScanAnswer> for pb::AlignScanResponse {
     fn from(answer: ScanAnswer) -> Self {
         Self {
-            accepted: answer.accepted(),
+            accepted: answer.accepted,
             alignment: Some((&answer).into()),
             state: Some(answer.state.into()),
+            foreground_points: answer.foreground.as_ref().map_or(0, |foreground| foreground.points as u64),
+            foreground: answer.foreground.map_or_else(Bytes::new, |foreground| foreground.bitmap),
         }
     }
 }
@@ -153,9 +261,12 @@ impl TryFrom<pb::InsertScanResponse> for ScanAnswer {
             accepted: answer.accepted,
             alignment: answer.alignment,
             state: answer.state,
+            ..Default::default()
         };
         let judged = Self::try_from(judged)?;
-        Ok(Self { new_voxels: count_from(answer.new_voxels), replayed: answer.replayed, ..judged })
+        let (new_voxels, replayed, standing) =
+            (count_from(answer.new_voxels), answer.replayed, answer.standing);
+        Ok(Self { new_voxels, replayed, standing, ..judged })
     }
 }
 
@@ -166,14 +277,30 @@ impl TryFrom<pb::AlignScanResponse> for ScanAnswer {
         let alignment = required(answer.alignment, "alignment")?;
         let map_from_sensor = required(alignment.map_from_sensor, "alignment.map_from_sensor")?;
         Ok(Self {
+            accepted: answer.accepted,
             verdict: verdict_from(alignment.verdict)?,
+            reason: alignment.reason,
             map_from_sensor: map_from_sensor.try_into().in_field("alignment.map_from_sensor")?,
             level_overlaps: alignment.level_overlaps,
+            inliers: alignment.inliers,
+            fitness: alignment.fitness,
+            information: information_from(&alignment.information)?,
+            undetermined: alignment
+                .undetermined
+                .into_iter()
+                .map(Direction::try_from)
+                .collect::<Result<_, _>>()?,
             iterations: alignment.iterations,
+            align_time: Duration::try_from_secs_f64(alignment.align_ms / 1e3).unwrap_or_default(),
             points_skipped: count_from(alignment.points_skipped),
             new_voxels: 0,
+            foreground: (!answer.foreground.is_empty()).then_some(Foreground {
+                bitmap: answer.foreground,
+                points: count_from(answer.foreground_points),
+            }),
             state: required(answer.state, "state")?.try_into()?,
             replayed: false,
+            standing: false,
         })
     }
 }

@@ -184,6 +184,18 @@ pub fn points_pb(points: &[[f32; 3]]) -> Option<pb::Points> {
     Some(pb::Points { xyz_f32le: bytes_of(points).into(), xyz: Vec::new() })
 }
 
+/// A corner of three walls of 2 m, a point each 4 cm: nothing of a pose in it is open.
+pub fn corner() -> Vec<[f32; 3]> {
+    let wall = |normal: usize| {
+        (0..2500).map(move |i| {
+            let mut point = [(i % 50) as f32 * 0.04, (i / 50) as f32 * 0.04, 0.02];
+            point.rotate_right(normal);
+            point
+        })
+    };
+    (0..3).flat_map(wall).collect()
+}
+
 /// A scan that goes in where it says.
 pub fn scan_pb(map: &str, robot: &str, points: &[[f32; 3]]) -> pb::InsertScanRequest {
     pb::InsertScanRequest {
@@ -191,6 +203,7 @@ pub fn scan_pb(map: &str, robot: &str, points: &[[f32; 3]]) -> pb::InsertScanReq
         scan: Some(pb::Scan { robot: robot.into(), points: points_pb(points), ..Default::default() }),
         guess: guess_pb([0.0; 3]),
         at_guess: true,
+        ..Default::default()
     }
 }
 

@@ -129,5 +129,5 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
         level_overlaps: vec![rng.random(), rng.random()],
         ..TrajectoryPose::new(robot, Pose::translation(rng.random(), 0.0, 1.0 / 3.0))
     };
-    Change::Insertion(ScanRecord { pose, voxels })
+    Change::Insertion(ScanRecord::of_voxels(pose, voxels))
 }

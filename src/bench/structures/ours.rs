@@ -67,9 +67,12 @@ impl Structure for Kernel<'_> {
 
 /// Of a filter its plane and its counters; of the exact set the tables of all levels, since three levels share one.
 fn bytes(map: &MultiResolutionMap, level: u32, lookup: Lookup) -> usize {
-    let (_, levels, set_bytes) = map.describe(0, 0);
+    let described = map.describe(0, 0);
     match lookup {
-        Lookup::Exact => set_bytes,
-        Lookup::Bloom => levels[level as usize].plane_bytes + levels[level as usize].counter_bytes,
+        Lookup::Exact => described.set_bytes,
+        Lookup::Bloom => {
+            let level = &described.levels[level as usize];
+            level.plane_bytes + level.counter_bytes
+        }
     }
 }

@@ -139,7 +139,7 @@ impl Workload {
 pub fn add(map: &MultiResolutionMap, voxels: VoxelSet) {
     let Ok(robot) = RobotName::new("bench") else { return };
     let pose = TrajectoryPose::new(robot, Pose::identity());
-    map.committer().insert_scan(ScanRecord { pose, voxels });
+    map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 }
 
 #[cfg(test)]

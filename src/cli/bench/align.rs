@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::workload::{MapOptions, times};
+use crate::align::Method;
 use crate::bench::align::{Aligned, Scan, align_each};
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
@@ -15,7 +16,7 @@ use crate::cli::output::Output;
 use crate::cli::statistics::Statistics;
 use crate::cli::truth::true_poses;
 use crate::geometry::Point;
-use crate::map::Lookup;
+use crate::map::{Lookup, RobotName};
 use crate::scan::{Scene, read_points, scan_files, tours};
 
 const EXAMPLES: &str = "\
@@ -24,11 +25,11 @@ EXAMPLES:
   mrol bench align scans/ --resolution 0.05 --levels 5
   mrol bench align scans/ --resolution 0.1 --truth poses.txt --json
 
-Each scan but the first is aligned to the map of those before it, from the pose of the scan before, once by the
-Bloom filters and once by the exact sets; both get the same map. Of --repeats alignments of a scan the quickest
+Each scan but the first is aligned to the map of those before it, from the pose of the scan before: refined and by
+overlap alone, by the Bloom filters and by the exact sets; all get the same map. Of --repeats alignments of a scan the quickest
 counts. Errors are those against the true poses, where these are known; the map is then made at them.";
 
-/// Time alignments, by the Bloom filters and by the exact sets
+/// Time alignments, by method, by the Bloom filters and by the exact sets
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Align {
@@ -67,8 +68,11 @@ impl Align {
         let (scans_aligned, points) = (scans.len() - 1, count(points));
         output.say(format!("{scans_aligned} scans of {points} points each, about"))?;
         output.say(Line::HEAD)?;
-        let lookups = [Lookup::Bloom, Lookup::Exact];
-        let aligned = align_each(&scans, settings, &lookups, self.repeats).map_err(CliError::usage)?;
+        let ways = [Method::Refined, Method::Overlap]
+            .map(|method| [Lookup::Bloom, Lookup::Exact].map(|lookup| (method, lookup)));
+        let robot = RobotName::new("bench").map_err(CliError::failed)?;
+        let aligned = align_each(&scans, &robot, settings, ways.as_flattened(), self.repeats)
+            .map_err(CliError::usage)?;
         aligned.iter().try_for_each(|aligned| output.print(&Line::of(aligned)))
     }
 
@@ -102,6 +106,7 @@ fn finite(mut points: Vec<Point>) -> Vec<Point> {
 /// Of one method.
 #[derive(Serialize)]
 struct Line {
+    method: &'static str,
     lookup: &'static str,
     scans: usize,
     ms_median: f64,
@@ -115,13 +120,14 @@ struct Line {
 }
 
 impl Line {
-    const HEAD: &str = "look-ups  ms median     max        look-ups  ns a look-up  median error";
+    const HEAD: &str = "method   look-ups  ms median     max        look-ups  ns a look-up  median error";
 
     fn of(aligned: &Aligned) -> Self {
         let ms = Statistics::of(aligned.ms.clone());
         let of_errors =
             |pick: fn(&(f64, f64)) -> f64| Statistics::of(aligned.errors.iter().map(pick).collect());
         Self {
+            method: aligned.method.as_str(),
             lookup: aligned.lookup.as_str(),
             scans: aligned.ms.len(),
             ms_median: ms.map_or(0.0, |ms| ms.median),
@@ -136,9 +142,12 @@ impl Line {
 
 impl Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { lookup, ms_median, ms_max, ns_per_lookup, .. } = self;
+        let Self { method, lookup, ms_median, ms_max, ns_per_lookup, .. } = self;
         let lookups = count(self.lookups as usize);
-        write!(f, "{lookup:<8} {ms_median:>10.2} {ms_max:>7.2} {lookups:>15} {ns_per_lookup:>13.2}")?;
+        write!(
+            f,
+            "{method:<8} {lookup:<8} {ms_median:>10.2} {ms_max:>7.2} {lookups:>15} {ns_per_lookup:>13.2}"
+        )?;
         match (&self.error_m, &self.error_deg) {
             (Some(metres), Some(degrees)) => {
                 write!(f, "  {:.1} mm {:.3} deg", metres.median * 1e3, degrees.median)

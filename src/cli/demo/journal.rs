@@ -50,7 +50,7 @@ impl Journal {
     pub(super) fn enter(&mut self, news: News) -> Line {
         let answer = &news.answer;
         self.voxels += answer.new_voxels;
-        self.robot(news.robot).enter(answer.accepted(), news.error);
+        self.robot(news.robot).enter(answer.accepted, news.error);
         let told = self.told_lately();
         Line {
             seconds: self.start.elapsed().as_secs_f64(),

@@ -94,14 +94,12 @@ impl Robot {
     /// Ray-casts scan after scan, until nobody takes them any more.
     fn look_around(mut self, name: &RobotName, sender: &mpsc::Sender<ScanRequest>) {
         for (k, pose) in self.tour.poses.iter().enumerate() {
+            let points = self.tour.sensor.scan(&self.scene, pose, &mut self.rng);
             let scan = ScanRequest {
-                robot: name.clone(),
                 scan_id: Some(k as u64),
-                points: self.tour.sensor.scan(&self.scene, pose, &mut self.rng).into(),
-                timestamp_ns: None,
                 guess: guess(k, pose),
                 at_guess: k == 0,
-                strict: false,
+                ..ScanRequest::new(name.clone(), points.into())
             };
             if sender.blocking_send(scan).is_err() {
                 return;

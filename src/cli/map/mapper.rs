@@ -2,11 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use crate::align::{Alignment, AlignmentSettings, Verdict, align, judge_at};
+use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align, judge_at};
 use crate::cli::error::CliError;
-use crate::geometry::{Point, Pose};
+use crate::geometry::{Point, Pose, extrapolate};
 use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use crate::voxel::VoxelSet;
 
 /// Whose scans they are, in the map's trajectory.
 const ROBOT: &str = "mrol";
@@ -18,6 +17,9 @@ pub(super) struct Mapper {
     robot: RobotName,
     /// The last accepted pose, the paper's guess.
     last: Pose,
+    /// The one before it.
+    before: Option<Pose>,
+    guess: Guess,
 }
 
 /// What became of a scan.
@@ -40,12 +42,14 @@ impl Mapped {
 }
 
 impl Mapper {
-    pub(super) fn new(map: MapSettings, settings: AlignmentSettings) -> Result<Self, CliError> {
+    pub(super) fn new(map: MapSettings, settings: AlignmentSettings, guess: Guess) -> Result<Self, CliError> {
         Ok(Self {
             map: MultiResolutionMap::new(map).map_err(CliError::usage)?,
             settings,
             robot: RobotName::new(ROBOT).map_err(CliError::failed)?,
             last: Pose::identity(),
+            before: None,
+            guess,
         })
     }
 
@@ -77,11 +81,14 @@ impl Mapper {
     }
 
     fn place(&self, points: &[Point], known: Option<Pose>) -> Alignment {
-        let guess = known.unwrap_or(self.last);
+        let next = match (&self.guess, &self.before) {
+            (Guess::ConstantVelocity, Some(before)) => extrapolate(before, &self.last, 1.0),
+            _ => self.last,
+        };
+        let guess = known.unwrap_or(next);
         if self.map.is_empty() || known.is_some() {
             // Nothing to align to, or nothing to find out.
-            let judged = judge_at(&self.map, points, &guess, &self.settings);
-            return Alignment { verdict: Verdict::Accepted, ..judged };
+            return judge_at(&self.map, points, &guess, &self.settings).on_the_callers_word();
         }
         align(&self.map, points, &guess, &self.settings)
     }
@@ -89,12 +96,6 @@ impl Mapper {
     /// Adds a scan where it was found to be; the number of new voxels.
     fn commit(&mut self, k: usize, points: &[Point], alignment: &Alignment) -> Result<usize, String> {
         let map_from_sensor = alignment.map_from_sensor;
-        let (voxels, out_of_range) =
-            VoxelSet::of_points(points, &self.map.lattice().from_points(&map_from_sensor));
-        if voxels.is_empty() {
-            let (min_m, end_m) = self.map.lattice().range_m();
-            return Err(format!("no point of the scan lies within the map's range of {min_m} to {end_m} m"));
-        }
         let pose = TrajectoryPose {
             robot: self.robot.clone(),
             scan_id: Some(k as u64),
@@ -103,12 +104,18 @@ impl Mapper {
             revision: 0,
             level_overlaps: alignment.level_overlaps.clone(),
             iterations: alignment.iterations,
-            points_skipped: out_of_range,
+            points_skipped: 0,
             new_voxels: 0,
             digest: 0,
         };
+        let record = ScanRecord::of_points(pose, points, self.map.lattice());
+        if record.voxels.is_empty() {
+            let (min_m, end_m) = self.map.lattice().range_m();
+            return Err(format!("no point of the scan lies within the map's range of {min_m} to {end_m} m"));
+        }
+        self.before = (!self.map.is_empty()).then_some(self.last);
         self.last = map_from_sensor;
-        Ok(self.map.committer().insert_scan(ScanRecord { pose, voxels }).voxels)
+        Ok(self.map.committer().insert_scan(record).voxels)
     }
 
     /// The largest of the levels' expected false positive rates, as the filters are filled now.

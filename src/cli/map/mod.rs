@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use uuid::Uuid;
 
+use super::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use super::error::CliError;
 use super::output::Output;
 use super::parse::{self, LookupName};
@@ -19,7 +20,7 @@ use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::geometry::{Point, Pose};
 use crate::map::{LEVELS_DEFAULT, MapSettings};
-use crate::scan::{StampedPose, read_points, scan_files, write_trajectory};
+use crate::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
 use crate::store::{Disk, Snapshot};
 use ample::FalsePositives;
 use mapper::{Mapped, Mapper};
@@ -73,6 +74,14 @@ pub(super) struct Map {
     /// Share of a scan's points that must fall in occupied voxels for it to be accepted [default: 0.2]
     #[arg(long, value_name = "SHARE")]
     min_overlap: Option<f64>,
+    /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one
+    /// before it
+    #[arg(long, value_enum, default_value_t)]
+    guess: GuessName,
+    #[command(flatten)]
+    alignment: AlignmentOptions,
+    #[command(flatten)]
+    points: PointOptions,
     /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]
     #[arg(long, value_enum)]
     lookup: Option<LookupName>,
@@ -86,7 +95,8 @@ pub(super) struct Map {
 
 impl Map {
     pub(super) fn run(self, output: Output) -> Result<(), CliError> {
-        let mut mapper = Mapper::new(self.map_settings(), self.alignment_settings()?)?;
+        let mut mapper = Mapper::new(self.map_settings(), self.alignment_settings()?, self.guess.into())?;
+        let filter = self.points.filter().map_err(CliError::usage)?;
         let files = scan_files(&self.scans)?;
         let truth = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;
         self.trajectory_out.iter().chain(&self.out).try_for_each(|path| check_folder(path))?;
@@ -95,7 +105,7 @@ impl Map {
         let output = output.with_bar(files.len());
         output.say(run.head())?;
         for (k, file) in files.iter().enumerate() {
-            let points = usable_points(file)?;
+            let points = usable_points(file, &filter)?;
             let mapped = mapper.add(k, &points, run.guess(k)).map_err(|e| in_file(file, e))?;
             output.print(&run.note(k, file, &mapped))?;
             output.step();
@@ -118,6 +128,7 @@ impl Map {
     fn alignment_settings(&self) -> Result<AlignmentSettings, CliError> {
         let defaults = AlignmentSettings::default();
         let settings = AlignmentSettings {
+            method: self.alignment.method().unwrap_or(defaults.method),
             overlap_min: self.min_overlap.unwrap_or(defaults.overlap_min),
             lookup: self.lookup.map_or(defaults.lookup, Into::into),
             ..defaults
@@ -201,13 +212,21 @@ impl Run {
 }
 
 /// The points of a scan that can be somewhere.
-fn usable_points(file: &Path) -> Result<Vec<Point>, CliError> {
+fn usable_points(file: &Path, filter: &PointFilter) -> Result<Vec<Point>, CliError> {
     let mut points = read_points(file)?;
     let all = points.len();
     points.retain(|point| point.is_finite());
-    match (all, points.len()) {
-        (0, _) => Err(in_file(file, "no point in this file")),
-        (_, 0) => Err(in_file(file, format!("none of its {all} points is finite: nothing but no-returns"))),
+    let finite = points.len();
+    points.retain(|&point| filter.keeps(point));
+    match (all, finite, points.len()) {
+        (0, ..) => Err(in_file(file, "no point in this file")),
+        (_, 0, _) => {
+            Err(in_file(file, format!("none of its {all} points is finite: nothing but no-returns")))
+        }
+        (.., 0) => {
+            let problem = format!("none of its {finite} points passes --range-min, --range-max and --body");
+            Err(in_file(file, problem))
+        }
         _ => Ok(points),
     }
 }

@@ -16,8 +16,12 @@ pub(super) struct ScanLine {
     scan: String,
     accepted: bool,
     verdict: &'static str,
+    reason: String,
     map_from_sensor: [f64; 7],
     overlap: f64,
+    inliers: f64,
+    information: [[f64; 6]; 6],
+    iterations: u32,
     new_voxels: usize,
     voxels: usize,
     align_ms: f64,
@@ -36,8 +40,12 @@ impl ScanLine {
             scan,
             accepted: mapped.accepted(),
             verdict: mapped.alignment.verdict.as_str(),
+            reason: mapped.alignment.reason.clone(),
             map_from_sensor: seven(&mapped.alignment.map_from_sensor),
             overlap: mapped.alignment.overlap(),
+            inliers: mapped.alignment.inliers,
+            information: mapped.alignment.information.rows(),
+            iterations: mapped.alignment.iterations,
             new_voxels: mapped.new_voxels,
             voxels: mapped.voxels,
             align_ms: mapped.align_time.as_secs_f64() * 1e3,
@@ -52,7 +60,7 @@ impl ScanLine {
     pub(super) fn head(name_width: usize, with_errors: bool) -> String {
         let errors = if with_errors { "   error m      deg" } else { "" };
         format!(
-            "{:<name_width$}  verdict      overlap  {PLACE_HEAD}  new voxels        voxels  align ms  insert ms{errors}",
+            "{:<name_width$}  verdict       overlap  {PLACE_HEAD}  new voxels        voxels  align ms  insert ms{errors}",
             "scan"
         )
     }
@@ -62,7 +70,7 @@ impl Display for ScanLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:<width$}  {:<11}  {:>7.3}  {}  {:>10}  {:>12}  {:>8.1}  {:>9.1}",
+            "{:<width$}  {:<12}  {:>7.3}  {}  {:>10}  {:>12}  {:>8.1}  {:>9.1}",
             self.scan,
             self.verdict,
             self.overlap,
@@ -74,9 +82,11 @@ impl Display for ScanLine {
             width = self.name_width
         )?;
         match (self.error_m, self.error_deg) {
-            (Some(metres), Some(degrees)) => write!(f, "  {metres:>8.4}  {degrees:>7.3}"),
-            _ => Ok(()),
+            (Some(metres), Some(degrees)) => write!(f, "  {metres:>8.4}  {degrees:>7.3}")?,
+            _ if !self.accepted => write!(f, "  {}", self.reason)?,
+            _ => {}
         }
+        Ok(())
     }
 }
 

@@ -51,6 +51,7 @@ impl From<&UndoRecord> for pb::Undo {
         Self {
             scans: undo.scans.clone(),
             voxels: Some((&undo.voxels).into()),
+            moments: Some((&undo.moments).into()),
             request: undo.request.as_ref().map(Into::into),
         }
     }
@@ -66,6 +67,7 @@ impl TryFrom<pb::Undo> for UndoRecord {
         Ok(Self {
             scans: message.scans,
             voxels: required(message.voxels, "undo.voxels")?.try_into()?,
+            moments: message.moments.unwrap_or_default().try_into()?,
             request: message.request.map(Request::try_from).transpose()?,
         })
     }

@@ -48,7 +48,11 @@ impl TryFrom<pb::ScanPose> for TrajectoryPose {
 
 impl From<&ScanRecord> for pb::Insertion {
     fn from(scan: &ScanRecord) -> Self {
-        Self { pose: Some((&scan.pose).into()), voxels: Some((&scan.voxels).into()) }
+        Self {
+            pose: Some((&scan.pose).into()),
+            voxels: Some((&scan.voxels).into()),
+            moments: Some((&scan.moments).into()),
+        }
     }
 }
 
@@ -59,6 +63,7 @@ impl TryFrom<pb::Insertion> for ScanRecord {
         Ok(Self {
             pose: required(message.pose, "insertion.pose")?.try_into()?,
             voxels: required(message.voxels, "insertion.voxels")?.try_into()?,
+            moments: message.moments.unwrap_or_default().try_into()?,
         })
     }
 }

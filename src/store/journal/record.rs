@@ -63,10 +63,14 @@ mod tests {
     use super::*;
     use crate::geometry::Pose;
     use crate::map::{DeletionRecord, Request, RequestId, RobotName, ScanRecord, TrajectoryPose, UndoRecord};
-    use crate::voxel::{VoxelKey, VoxelSet};
+    use crate::voxel::{MomentSet, VoxelKey, VoxelSet};
 
     fn voxels(n: i32) -> VoxelSet {
         (0..n).filter_map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3])).collect()
+    }
+
+    fn moments() -> MomentSet {
+        MomentSet::of_centers(&voxels(500))
     }
 
     #[test]
@@ -82,9 +86,9 @@ mod tests {
         };
         let request = Some(Request { id: RequestId::new("x-1").unwrap(), digest: 3 });
         for change in [
-            Change::Insertion(ScanRecord { pose, voxels: voxels(5000) }),
+            Change::Insertion(ScanRecord { pose, voxels: voxels(5000), moments: moments() }),
             Change::Deletion(DeletionRecord { voxels: voxels(10), request: None }),
-            Change::Undo(UndoRecord { scans: vec![3, 9], voxels: voxels(0), request }),
+            Change::Undo(UndoRecord { scans: vec![3, 9], voxels: voxels(0), moments: moments(), request }),
         ] {
             let record = Record::of(&change).unwrap();
             assert_eq!(change_of(&record.payload, record.bytes).unwrap(), change);

@@ -56,13 +56,10 @@ impl Target {
         let lattice = Lattice::new(workload.resolution_m(), 1).map_err(CliError::failed)?;
         for voxels in workload.pieces() {
             let scan = ScanRequest {
-                robot: robot.clone(),
-                scan_id: None,
-                points: middles(&voxels, &lattice),
-                timestamp_ns: None,
                 guess: Guess::Pose(Pose::identity()),
                 at_guess: true,
                 strict: true,
+                ..ScanRequest::new(robot.clone(), middles(&voxels, &lattice))
             };
             self.voxels += self.client.insert_scan(&self.map, scan).await?.new_voxels;
         }

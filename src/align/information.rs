@@ -1,0 +1,96 @@
+//! What an alignment knows of a pose, direction by direction.
+
+use nalgebra::{Matrix6, SymmetricEigen, Vector6};
+
+use crate::geometry::Point;
+
+/// The information matrix (inverse covariance) of a pose.
+///
+/// Rows and columns are x y z (metres, along the map's axes) and rx ry rz (radians, about the map's axes through the
+/// sensor): what a pose graph takes as the weight of this measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseInformation {
+    matrix: Matrix6<f64>,
+    lever_m: f64,
+}
+
+/// A direction in which a pose may move without the scan telling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Direction {
+    /// A unit vector: x y z along the map's axes, then rotations about them through the sensor, each times the scan's
+    /// mean range, so that both are lengths.
+    pub direction: [f64; 6],
+    /// Standard deviation along it, metres; infinite where nothing holds it.
+    pub std_m: f64,
+}
+
+impl PoseInformation {
+    /// `matrix` of a pose found with `points` (sensor frame); their root mean square range makes rotations lengths.
+    pub(super) fn new(matrix: Matrix6<f64>, points: &[Point]) -> Self {
+        Self { matrix, lever_m: root_mean_square_range_m(points).max(f64::MIN_POSITIVE) }
+    }
+
+    /// Nothing known.
+    pub(super) fn none(points: &[Point]) -> Self {
+        Self::new(Matrix6::zeros(), points)
+    }
+
+    /// Row by row: 1 / m^2, 1 / (m rad), 1 / rad^2.
+    pub fn rows(&self) -> [[f64; 6]; 6] {
+        std::array::from_fn(|row| std::array::from_fn(|column| self.matrix[(row, column)]))
+    }
+
+    /// All six principal directions, the least known first.
+    pub fn directions(&self) -> Vec<Direction> {
+        let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / self.lever_m });
+        let scaled = Matrix6::from_diagonal(&scale) * self.matrix * Matrix6::from_diagonal(&scale);
+        let eigen = SymmetricEigen::new(scaled);
+        let mut directions: Vec<_> = (0..6)
+            .map(|i| Direction {
+                direction: eigen.eigenvectors.column(i).into_owned().into(),
+                std_m: 1.0 / eigen.eigenvalues[i].max(0.0).sqrt(),
+            })
+            .collect();
+        directions.sort_by(|a, b| b.std_m.total_cmp(&a.std_m));
+        directions
+    }
+
+    /// The directions that are known to no better than `std_m`.
+    pub fn undetermined(&self, std_m: f64) -> Vec<Direction> {
+        self.directions().into_iter().filter(|direction| direction.std_m > std_m).collect()
+    }
+}
+
+/// In this direction: "x 0.97 z -0.24 (std 0.031 m)".
+impl std::fmt::Display for Direction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let parts = ["x", "y", "z", "turn x", "turn y", "turn z"].into_iter().zip(self.direction);
+        for (name, part) in parts.filter(|(_, part)| part.abs() >= 0.1) {
+            write!(f, "{name} {part:.2} ")?;
+        }
+        write!(f, "(std {:.3} m)", self.std_m)
+    }
+}
+
+/// Of `points` from the sensor, metres; 0 without points.
+pub(super) fn root_mean_square_range_m(points: &[Point]) -> f64 {
+    let squares: f64 = points.iter().map(|point| point.to_f64().coords.norm_squared()).sum();
+    (squares / points.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_leaves_two_shifts_and_a_turn_open() {
+        let points = [Point::new(2.0, 0.0, 0.0), Point::new(-2.0, 0.0, 0.0)];
+        let held = Matrix6::from_diagonal(&Vector6::new(1e4, 0.0, 0.0, 0.0, 4e4, 4e4));
+        let information = PoseInformation::new(held, &points);
+        let open = information.undetermined(0.05);
+        assert_eq!(open.len(), 3);
+        assert!(open.iter().all(|open| open.std_m.is_infinite() && open.direction[0].abs() < 1e-12));
+        let held = information.directions()[5];
+        assert!((held.std_m - 0.01).abs() < 1e-12, "{held:?}");
+    }
+}

@@ -1,0 +1,112 @@
+//! The Gaussian of the points in a voxel.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::voxel::Moments;
+
+/// Points that make a Gaussian, at least: fewer say nothing of a surface.
+const POINTS_MIN: i64 = 6;
+/// The second largest variance must reach this fraction of the voxel's side squared. A single scan line in a voxel is
+/// a line, not a surface: to align to it would be to align to the sensor's pattern (paper III-B: the voxels "have to be
+/// large enough to cover gaps in the point cloud due to scan line spacing").
+const SPREAD_MIN: f64 = 0.005;
+/// How much a Gaussian holds its points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Softness {
+    /// By how much points are uncertain beyond the spread of the surface, metres.
+    pub(super) std_m: f64,
+    /// Directions in which the points spread by this fraction of the voxel's side squared hold nothing: there the
+    /// surface goes on, and only what was seen of it ends. A surface that fills its voxel spreads by 1/12.
+    pub(super) spread: f64,
+}
+
+/// Mean and principal axes of the points in a voxel, map frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Gaussian {
+    mean_m: Vector3<f64>,
+    /// Along `axes`, square metres.
+    variances: Vector3<f64>,
+    axes: Matrix3<f64>,
+    side_m: f64,
+    /// Inverse covariance, of the directions that are determined, 1 / m^2.
+    information: Matrix3<f64>,
+}
+
+impl Gaussian {
+    /// Of the points in a voxel around `center_m`, whose moments are in units of `unit_m`; none where they do not make
+    /// a surface.
+    pub(super) fn of(moments: &Moments, center_m: Vector3<f64>, side_m: f64, unit_m: f64) -> Option<Self> {
+        if moments.count() < POINTS_MIN {
+            return None;
+        }
+        let (mean, [xx, xy, xz, yy, yz, zz]) = moments.gaussian()?;
+        let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * (unit_m * unit_m);
+        let eigen = covariance.symmetric_eigen();
+        let mut ascending: [f64; 3] = eigen.eigenvalues.into();
+        ascending.sort_unstable_by(f64::total_cmp);
+        (ascending[1] >= SPREAD_MIN * side_m * side_m).then(|| Self {
+            mean_m: center_m + Vector3::from(mean) * unit_m,
+            variances: eigen.eigenvalues.map(|variance| variance.max(0.0)),
+            axes: eigen.eigenvectors,
+            side_m,
+            information: Matrix3::zeros(),
+        })
+    }
+
+    /// Takes points for uncertain by `softness.std_m` in every direction, on top of the surface's own spread.
+    pub(super) fn soften(&mut self, softness: Softness) {
+        let noise = softness.std_m * softness.std_m;
+        let without = 1.0 / (softness.spread * self.side_m * self.side_m + noise);
+        let information = self.variances.map(|variance| (1.0 / (variance + noise) - without).max(0.0));
+        self.information = self.axes * Matrix3::from_diagonal(&information) * self.axes.transpose();
+    }
+
+    /// The information matrix as last softened, 1 / m^2.
+    pub(super) fn information(&self) -> &Matrix3<f64> {
+        &self.information
+    }
+
+    /// From the mean to a point of the map frame, metres.
+    pub(super) fn to(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
+        point_m - self.mean_m
+    }
+
+    /// The squared Mahalanobis distance of a point of the map frame.
+    pub(super) fn distance_squared(&self, point_m: &Vector3<f64>) -> f64 {
+        let error = self.to(point_m);
+        error.dot(&(self.information * error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The Gaussian of points `step` units apart on a grid of `n` x `m` in the plane z = 10 units.
+    fn grid(n: i64, m: i64, step: i64) -> Option<Gaussian> {
+        let mut moments = Moments::default();
+        for (x, y) in (0..n).flat_map(|x| (0..m).map(move |y| (x, y))) {
+            moments += Moments::of_offset([(x - n / 2) * step, (y - m / 2) * step, 10]);
+        }
+        let mut gaussian =
+            Gaussian::of(&moments, Vector3::new(1.0, 2.0, 3.0), 1.0, 1.0 / Moments::UNITS as f64)?;
+        gaussian.soften(Softness { std_m: 0.01, spread: 1.0 / 24.0 });
+        Some(gaussian)
+    }
+
+    #[test]
+    fn a_surface_determines_its_normal_and_nothing_else() {
+        let surface = grid(20, 20, 200).unwrap();
+        let on_surface = Vector3::new(1.0, 2.0, 3.0 + 10.0 / Moments::UNITS as f64);
+        let far_along = surface.distance_squared(&(on_surface + Vector3::new(0.4, -0.3, 0.0)));
+        let off = surface.distance_squared(&(on_surface + Vector3::new(0.4, -0.3, 0.02)));
+        assert!(far_along < 1e-6, "{far_along}");
+        assert!((3.0..4.1).contains(&off), "{off}");
+    }
+
+    #[test]
+    fn a_scan_line_and_a_handful_of_points_are_no_surface() {
+        assert!(grid(100, 1, 40).is_none());
+        assert!(grid(2, 2, 1000).is_none());
+    }
+}

@@ -1,0 +1,134 @@
+//! The Gaussians of a map's voxels at several sizes, made as an alignment asks for them.
+
+use hashbrown::HashMap;
+use nalgebra::Vector3;
+
+use super::gaussian::{Gaussian, Softness};
+use crate::map::{MapView, MultiResolutionMap};
+use crate::voxel::{MOMENT_LEVEL, Moments, VoxelKey};
+
+/// Levels that have Gaussians: voxels of 4, 8 and 16 r_0. Where the finest are too thinly seen to show a surface, the
+/// coarser ones, sums of them, may.
+const SIZES: usize = 3;
+
+/// What a map's surfaces look like, near where a scan is thought to be. Kept for one alignment: the map may grow
+/// meanwhile, and what was asked before stays as it was.
+#[derive(Debug)]
+pub(super) struct VoxelGaussians {
+    resolution_m: f64,
+    softness: Softness,
+    sizes: [HashMap<VoxelKey, Option<u32>>; SIZES],
+    gaussians: Vec<Gaussian>,
+}
+
+impl VoxelGaussians {
+    pub(super) fn new(map: &MultiResolutionMap, softness: Softness) -> Self {
+        let resolution_m = map.lattice().resolution_m(0);
+        Self { resolution_m, softness, sizes: Default::default(), gaussians: Vec::new() }
+    }
+
+    /// See [`Gaussian::soften`].
+    pub(super) fn soften(&mut self, softness: Softness) {
+        self.softness = softness;
+        self.gaussians.iter_mut().for_each(|gaussian| gaussian.soften(softness));
+    }
+
+    /// Number of Gaussians made so far; those of [`VoxelGaussians::nearest`] are numbered below it.
+    pub(super) fn len(&self) -> usize {
+        self.gaussians.len()
+    }
+
+    /// The Gaussian of number `i`.
+    pub(super) fn get(&self, i: u32) -> &Gaussian {
+        &self.gaussians[i as usize]
+    }
+
+    /// The number of the Gaussian that a point of the map frame belongs to: that of its finest voxel that has one, or
+    /// of the neighbours across the nearest faces, or the same of larger voxels. (A surface on the border of two voxels
+    /// would otherwise hold on to the points on its own side alone.)
+    pub(super) fn nearest(&mut self, view: &MapView<'_>, point_m: &Vector3<f64>) -> Option<u32> {
+        (0..SIZES).find_map(|size| self.nearest_of(view, point_m, size))
+    }
+
+    fn nearest_of(&mut self, view: &MapView<'_>, point_m: &Vector3<f64>, size: usize) -> Option<u32> {
+        let scaled = point_m / self.side_m(size);
+        let index = scaled.map(|c| c.floor() as i32);
+        if let Some(own) = self.of_voxel(view, index.into(), size) {
+            return Some(own);
+        }
+        let mut nearest = None;
+        for axis in 0..3 {
+            let mut neighbour = index;
+            neighbour[axis] += if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
+            if let Some(i) = self.of_voxel(view, neighbour.into(), size) {
+                let distance = self.get(i).distance_squared(point_m);
+                if nearest.is_none_or(|(_, least)| distance < least) {
+                    nearest = Some((i, distance));
+                }
+            }
+        }
+        nearest.map(|(i, _)| i)
+    }
+
+    fn of_voxel(&mut self, view: &MapView<'_>, index: [i32; 3], size: usize) -> Option<u32> {
+        let voxel = VoxelKey::new(index)?;
+        if let Some(&known) = self.sizes[size].get(&voxel) {
+            return known;
+        }
+        let side_m = self.side_m(size);
+        let center_m = Vector3::from(index.map(|i| (f64::from(i) + 0.5) * side_m));
+        let unit_m = self.side_m(0) / Moments::UNITS as f64;
+        let gaussian = Gaussian::of(&moments_of(view, index, size), center_m, side_m, unit_m);
+        let number = gaussian.map(|mut gaussian| {
+            gaussian.soften(self.softness);
+            self.gaussians.push(gaussian);
+            self.gaussians.len() as u32 - 1
+        });
+        self.sizes[size].insert(voxel, number);
+        number
+    }
+
+    fn side_m(&self, size: usize) -> f64 {
+        self.resolution_m * f64::from(1u32 << (MOMENT_LEVEL as usize + size))
+    }
+}
+
+/// The moments of the points in a voxel `size` levels above those that keep them, about its centre.
+fn moments_of(view: &MapView<'_>, index: [i32; 3], size: usize) -> Moments {
+    let side = 1 << size;
+    let mut sum = Moments::default();
+    for child in (0..side * side * side).map(|i| [i % side, i / side % side, i / (side * side)]) {
+        let voxel = VoxelKey::new([0, 1, 2].map(|axis| index[axis] * side + child[axis]));
+        if let Some(moments) = voxel.and_then(|voxel| view.moments_of(voxel)) {
+            sum += moments.about(child.map(|c| i64::from(2 * c + 1 - side) * (Moments::UNITS / 2)));
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point, Pose};
+    use crate::map::{MapSettings, RobotName, ScanRecord, TrajectoryPose};
+    use crate::voxel::{Lattice, MomentSet};
+
+    #[test]
+    fn a_larger_voxel_has_the_moments_of_all_its_points() {
+        let map = MultiResolutionMap::new(MapSettings::new(0.25, 4)).unwrap();
+        let points: Vec<_> =
+            (0..200).map(|i| Point::new((i % 32) as f32 / 8.0, (i % 7) as f32 / 2.0, 1.5)).collect();
+        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
+
+        // The same points in a lattice four times as coarse, whose units are four times as long.
+        let coarse = MomentSet::of_points(&points, &Lattice::new(1.0, 1).unwrap().from_map());
+        let sum = moments_of(&map.view(), [0, 0, 0], 2);
+        let (_, expected) = coarse.as_slice()[0];
+        assert_eq!((sum.count(), coarse.as_slice().len()), (200, 1));
+        let scaled = expected.to_numbers();
+        let sum = sum.to_numbers();
+        assert_eq!(sum[1..4], [1, 2, 3].map(|i| scaled[i] * 4));
+        assert_eq!(sum[4..], [4, 5, 6, 7, 8, 9].map(|i| scaled[i] * 16));
+    }
+}

@@ -1,0 +1,153 @@
+//! Whether to believe an alignment, and why not.
+
+use super::refine::SurfaceFit;
+use super::{AlignmentSettings, Direction, PoseInformation};
+use crate::geometry::{Point, Pose};
+use crate::map::MultiResolutionMap;
+
+/// What an alignment is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The scan fits the map.
+    Accepted,
+    /// Too few of its points fall in occupied voxels.
+    LowOverlap,
+    /// It fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves a
+    /// direction open.
+    Undetermined,
+    /// Several starts ended at different poses that fit about equally well.
+    Ambiguous,
+}
+
+impl Verdict {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Accepted, Self::LowOverlap, Self::Undetermined, Self::Ambiguous];
+
+    /// `accepted`, `low_overlap`, `undetermined` or `ambiguous`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::LowOverlap => "low_overlap",
+            Self::Undetermined => "undetermined",
+            Self::Ambiguous => "ambiguous",
+        }
+    }
+}
+
+/// Where a scan was taken, and how it fits the map there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alignment {
+    /// The pose found.
+    pub map_from_sensor: Pose,
+    /// Whether to believe it.
+    pub verdict: Verdict,
+    /// Why, in a sentence with the figures.
+    pub reason: String,
+    /// Fraction of all points in occupied voxels by the exact set, level by level, finest first.
+    pub level_overlaps: Vec<f64>,
+    /// Fraction of a volumetric sample of the points that lie on the map's surfaces.
+    pub inliers: f64,
+    /// How closely they do, 0 to 1: the mean robust weight, where a point off every surface counts 0.
+    pub fitness: f64,
+    /// What the map's surfaces say of the pose.
+    pub information: PoseInformation,
+    /// Directions of the pose that they leave open.
+    pub undetermined: Vec<Direction>,
+    /// How far the refinement moved the end of the ascent, metres; turns count by the scan's root mean square range.
+    pub refined_by_m: f64,
+    /// Steps that moved the pose, over all stages.
+    pub iterations: u32,
+    /// Look-ups made, one a point and candidate pose; their expected number of false positives is what "the
+    /// filter is ample" is about (paper IV-B).
+    pub lookups: u64,
+}
+
+impl Alignment {
+    /// Fraction of all points in occupied voxels of level 0.
+    pub fn overlap(&self) -> f64 {
+        self.level_overlaps.first().copied().unwrap_or(0.0)
+    }
+
+    /// True where the ascent ended badly: little overlap, or far from where the refinement went.
+    pub(super) fn is_doubtful(&self, map: &MultiResolutionMap, settings: &AlignmentSettings) -> bool {
+        self.overlap() < settings.wide_start.overlap_below
+            || self.refined_by_m > settings.refinement_reach * map.lattice().resolution_m(0)
+    }
+
+    /// The same with another verdict, and why.
+    pub(super) fn but(self, verdict: Verdict, reason: String) -> Self {
+        Self { verdict, reason, ..self }
+    }
+}
+
+/// How a scan fits at a pose, before it is judged.
+#[derive(Debug)]
+pub(super) struct Fit {
+    pub(super) map_from_sensor: Pose,
+    /// How far the refinement moved the pose, metres; turns count by the points' range.
+    pub(super) refined_by_m: f64,
+    pub(super) level_overlaps: Vec<f64>,
+    pub(super) surfaces: SurfaceFit,
+    pub(super) iterations: u32,
+    pub(super) lookups: u64,
+}
+
+impl Fit {
+    /// The verdict on it: enough overlap, held in every direction, and found where the ascent had led.
+    pub(super) fn judged(self, map: &MultiResolutionMap, settings: &AlignmentSettings) -> Alignment {
+        let resolution_m = map.lattice().resolution_m(0);
+        let (overlap, overlap_min) = (self.level_overlaps[0], settings.overlap_min);
+        let open_m = settings.undetermined_std * resolution_m;
+        let reach_m = settings.refinement_reach * resolution_m;
+        let undetermined = self.surfaces.information.undetermined(open_m);
+        let (verdict, reason) = if overlap < overlap_min {
+            (Verdict::LowOverlap, format!("overlap {overlap:.3} is below overlap_min {overlap_min}"))
+        } else if let Some(worst) = undetermined.first() {
+            (Verdict::Undetermined, format!("open along {worst}, at most {open_m:.3} m is accepted"))
+        } else if self.refined_by_m > reach_m {
+            let moved_m = self.refined_by_m;
+            let reason =
+                format!("the refinement moved it by {moved_m:.3} m, at most {reach_m:.3} m is accepted");
+            (Verdict::Undetermined, reason)
+        } else {
+            (Verdict::Accepted, format!("overlap {overlap:.3} and held in every direction"))
+        };
+        Alignment {
+            map_from_sensor: self.map_from_sensor,
+            verdict,
+            reason,
+            level_overlaps: self.level_overlaps,
+            inliers: self.surfaces.inliers,
+            fitness: self.surfaces.fitness,
+            information: self.surfaces.information,
+            undetermined,
+            refined_by_m: self.refined_by_m,
+            iterations: self.iterations,
+            lookups: self.lookups,
+        }
+    }
+}
+
+impl Alignment {
+    /// An alignment that nobody had to find: the caller's word, or the first scan of a map.
+    pub fn trusted(map_from_sensor: Pose, levels: u32, points: &[Point]) -> Self {
+        Self {
+            map_from_sensor,
+            verdict: Verdict::Accepted,
+            reason: "the first scan of the map".into(),
+            level_overlaps: vec![0.0; levels as usize],
+            inliers: 0.0,
+            fitness: 0.0,
+            information: PoseInformation::none(points),
+            undetermined: Vec::new(),
+            refined_by_m: 0.0,
+            iterations: 0,
+            lookups: 0,
+        }
+    }
+
+    /// The same, accepted on the caller's word.
+    pub fn on_the_callers_word(self) -> Self {
+        self.but(Verdict::Accepted, "the caller's word".into())
+    }
+}

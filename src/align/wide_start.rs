@@ -1,0 +1,117 @@
+//! More guesses, where the ascent from the first one ends badly.
+
+use std::cmp::Reverse;
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+use super::ascent::Ascent;
+use super::overlap::Overlap;
+use super::{Alignment, AlignmentSettings, SampledScan, Verdict, climb, finish};
+use crate::geometry::{Pose, pose_difference};
+use crate::map::MultiResolutionMap;
+
+/// Turns of the further guesses about each axis, degrees: the basin of a coarsest level's ascent is some 20 wide.
+const TURNS_DEG: [f64; 4] = [-40.0, -20.0, 20.0, 40.0];
+/// Ends nearer than this many r_0 and [`SAME_DEG`] are one.
+const SAME_VOXELS: f64 = 4.0;
+const SAME_DEG: f64 = 5.0;
+/// Ends that are finished and judged.
+const FINISHED: usize = 2;
+
+/// Climbs from the most promising of many guesses around `guess`, and takes the better of them and `first`.
+///
+/// Ambiguous where an end elsewhere fits about as well.
+pub(super) fn align(
+    map: &MultiResolutionMap,
+    scan: &SampledScan<'_>,
+    guess: &Pose,
+    first: Alignment,
+    settings: &AlignmentSettings,
+) -> Alignment {
+    let coarse = map.settings().levels.saturating_sub(2);
+    let shift_m = map.lattice().resolution_m(coarse);
+    let guesses = around(guess, shift_m);
+    let overlap = Overlap::new(map, &scan.sample, coarse, settings.lookup);
+    let mut lookups = first.lookups + overlap.lookups() * guesses.len() as u64;
+    let guesses = highest(guesses, &overlap, settings.wide_start.ascents);
+
+    let climbed: Vec<_> =
+        guesses.into_iter().map(|guess| climb(map, scan, guess, coarse, settings)).collect();
+    lookups += climbed.iter().map(|ascent| ascent.lookups).sum::<u64>();
+    let finest = Overlap::new(map, &scan.sample, 0, settings.lookup);
+    let is_same = |a: &Pose, b: &Pose| {
+        let (metres, degrees) = pose_difference(a, b);
+        metres < SAME_VOXELS * map.lattice().resolution_m(0) && degrees < SAME_DEG
+    };
+    let mut ends: Vec<Pose> = Vec::new();
+    for end in highest(climbed.iter().map(|ascent| ascent.pose).collect(), &finest, climbed.len()) {
+        if ends.len() < FINISHED && !ends.iter().any(|known| is_same(known, &end)) {
+            ends.push(end);
+        }
+    }
+
+    let mut found: Vec<_> =
+        ends.into_iter().map(|end| finish(map, scan, Ascent::from(end), settings)).collect();
+    lookups += found.iter().map(|found| found.lookups).sum::<u64>();
+    let is_accepted = |found: &Alignment| found.verdict == Verdict::Accepted;
+    let better = |a: Alignment, b: &Alignment| match is_same(&a.map_from_sensor, &b.map_from_sensor) {
+        true if is_accepted(b) && !is_accepted(&a) => b.clone(),
+        false if b.fitness > a.fitness => b.clone(),
+        _ => a,
+    };
+    let best = Alignment { lookups, ..found.iter().fold(first.clone(), better) };
+    found.push(first);
+    let as_good = found.iter().find(|other| {
+        !is_same(&other.map_from_sensor, &best.map_from_sensor)
+            && other.fitness >= settings.wide_start.ambiguous_fitness * best.fitness
+    });
+    match as_good {
+        Some(other) if is_accepted(&best) => {
+            let (metres, degrees) = pose_difference(&other.map_from_sensor, &best.map_from_sensor);
+            let reason = format!(
+                "a pose {metres:.2} m and {degrees:.1} deg away fits about as well: {:.3} against {:.3}",
+                other.fitness, best.fitness
+            );
+            best.but(Verdict::Ambiguous, reason)
+        }
+        _ => best,
+    }
+}
+
+/// `guess` shifted along and turned about the map's axes, each alone and together.
+fn around(guess: &Pose, shift_m: f64) -> Vec<Pose> {
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let shifts = axes.into_iter().flat_map(|axis| [axis * shift_m, axis * -shift_m]);
+    let shifts: Vec<_> = std::iter::once(Vector3::zeros()).chain(shifts).collect();
+    let turns = axes.into_iter().flat_map(|axis| TURNS_DEG.map(|degrees| axis * degrees.to_radians()));
+    let turns = std::iter::once(Vector3::zeros()).chain(turns);
+    let moved = |turn: Vector3<f64>| {
+        let rotation = UnitQuaternion::from_scaled_axis(turn) * guess.rotation;
+        shifts
+            .iter()
+            .map(move |shift| Pose::from_parts(Translation3::from(*shift) * guess.translation, rotation))
+    };
+    turns.flat_map(moved).collect()
+}
+
+/// The `count` poses of highest overlap, the highest first; of equals the first.
+fn highest(poses: Vec<Pose>, overlap: &Overlap<'_>, count: usize) -> Vec<Pose> {
+    let heights = overlap.at(&poses);
+    let mut ranked: Vec<usize> = (0..poses.len()).collect();
+    ranked.sort_by_key(|&i| Reverse(heights[i]));
+    ranked.into_iter().take(count).map(|i| poses[i]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn guesses_surround_the_first_one() {
+        let guess = Pose::translation(1.0, 2.0, 3.0);
+        let poses = around(&guess, 0.5);
+        assert_eq!(poses.len(), 7 * 13);
+        assert_eq!(poses[0], guess);
+        assert!(poses.iter().all(|pose| pose_difference(pose, &guess).0 < 0.51));
+    }
+}

@@ -1,0 +1,71 @@
+//! Options of commands that align scans.
+
+use clap::ValueEnum;
+
+use super::parse;
+use crate::align::{Guess, Method};
+use crate::scan::{PointFilter, PointFilterError};
+
+/// How scans are aligned.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct AlignmentOptions {
+    /// How to align: the ascent on overlap and a refinement on the points' Gaussians, the ascent alone as in the paper,
+    /// or the older ascent on a weighted sum over the levels [default: refined]
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    Refined,
+    Overlap,
+    WeightedSum,
+}
+
+/// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum GuessName {
+    #[default]
+    Previous,
+    ConstantVelocity,
+}
+
+impl From<GuessName> for Guess {
+    fn from(name: GuessName) -> Self {
+        match name {
+            GuessName::Previous => Self::Last,
+            GuessName::ConstantVelocity => Self::ConstantVelocity,
+        }
+    }
+}
+
+impl AlignmentOptions {
+    pub(super) fn method(&self) -> Option<Method> {
+        self.method.map(|name| match name {
+            MethodName::Refined => Method::Refined,
+            MethodName::Overlap => Method::Overlap,
+            MethodName::WeightedSum => Method::WeightedSum,
+        })
+    }
+}
+
+/// Which points of scans count.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct PointOptions {
+    /// Skip points nearer to the sensor than this
+    #[arg(long, value_name = "METRES")]
+    range_min: Option<f64>,
+    /// Skip points farther from the sensor than this
+    #[arg(long, value_name = "METRES")]
+    range_max: Option<f64>,
+    /// Skip points in this box in the sensor frame, the robot itself: "x y z x y z"
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true, value_parser = parse::corners)]
+    body: Option<([f64; 3], [f64; 3])>,
+}
+
+impl PointOptions {
+    pub(super) fn filter(&self) -> Result<PointFilter, PointFilterError> {
+        let Self { range_min, range_max, body } = self;
+        PointFilter { range_min_m: *range_min, range_max_m: *range_max, body_m: *body }.checked()
+    }
+}
