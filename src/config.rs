@@ -81,13 +81,15 @@ pub struct LogConfig {
 }
 
 /// Threads for work that uses the CPU; 0 = one a core.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ThreadsConfig {
     /// For queries, listings and descriptions.
     pub query: usize,
     /// For alignments and changes.
     pub mapping: usize,
+    /// For searches with no guess, which take seconds and much memory each. 1.
+    pub localization: usize,
 }
 
 /// A counting Bloom filter.
@@ -172,6 +174,12 @@ pub struct LimitsConfig {
     pub map_file_bytes_max: usize,
     /// See [`Limits::min_revision_wait_max`]; seconds.
     pub min_revision_wait_max_s: f64,
+    /// See [`Limits::localization_time_max`]; seconds.
+    pub localization_time_max_s: f64,
+    /// See [`Limits::localization_candidates_max`].
+    pub localization_candidates_max: usize,
+    /// See [`Limits::localization_grid_bytes_max`].
+    pub localization_grid_bytes_max: usize,
 }
 
 impl Default for Config {
@@ -211,6 +219,12 @@ impl Default for LogConfig {
     }
 }
 
+impl Default for ThreadsConfig {
+    fn default() -> Self {
+        Self { query: 0, mapping: 0, localization: 1 }
+    }
+}
+
 impl Default for FilterConfig {
     fn default() -> Self {
         let FilterSettings { hashes, bits_per_key } = FilterSettings::default();
@@ -231,6 +245,9 @@ impl Default for LimitsConfig {
             jobs_waiting_max: limits.jobs_waiting_max,
             map_file_bytes_max: limits.map_file_bytes_max,
             min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
+            localization_time_max_s: limits.localization_time_max.as_secs_f64(),
+            localization_candidates_max: limits.localization_candidates_max,
+            localization_grid_bytes_max: limits.localization_grid_bytes_max,
         }
     }
 }
@@ -304,9 +321,13 @@ impl Config {
         if self.limits.message_bytes_max == 0 {
             return range("limits.message_bytes_max", "at least 1", "0".into());
         }
-        let wait = self.limits.min_revision_wait_max_s;
-        if !(0.0..=86_400.0).contains(&wait) {
-            return range("limits.min_revision_wait_max_s", "0 to 86400", wait.to_string());
+        for (key, seconds) in [
+            ("limits.min_revision_wait_max_s", self.limits.min_revision_wait_max_s),
+            ("limits.localization_time_max_s", self.limits.localization_time_max_s),
+        ] {
+            if !(0.0..=86_400.0).contains(&seconds) {
+                return range(key, "0 to 86400", seconds.to_string());
+            }
         }
         for (name, robot) in &self.robots {
             if let Err(error) = robot.filter().checked() {
@@ -325,6 +346,7 @@ impl Config {
             limits: self.limits.service_limits(),
             query_threads: self.threads.query,
             mapping_threads: self.threads.mapping,
+            localization_threads: self.threads.localization,
             alignment: AlignmentSettings {
                 method: self.alignment.method.into(),
                 ..AlignmentSettings::default()
@@ -364,6 +386,9 @@ impl LimitsConfig {
             jobs_waiting_max: self.jobs_waiting_max,
             map_file_bytes_max: self.map_file_bytes_max,
             min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
+            localization_time_max: Duration::from_secs_f64(self.localization_time_max_s),
+            localization_candidates_max: self.localization_candidates_max,
+            localization_grid_bytes_max: self.localization_grid_bytes_max,
         }
     }
 }

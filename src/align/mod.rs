@@ -6,6 +6,7 @@
 
 mod ascent;
 mod information;
+pub mod localize;
 mod overlap;
 mod refine;
 mod settings;

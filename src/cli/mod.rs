@@ -14,6 +14,7 @@ mod error;
 mod experiment;
 mod health;
 mod insert;
+mod localize;
 mod map;
 mod map_report;
 mod maps;
@@ -64,6 +65,7 @@ enum Command {
     Demo(demo::Demo),
     Map(map::Map),
     Insert(insert::Insert),
+    Localize(localize::Localize),
     Query(query::Query),
     Delete(delete::Delete),
     Undo(undo::UndoScans),
@@ -100,6 +102,7 @@ impl Command {
             Self::Demo(demo) => runtime::block_on(demo.run(output)),
             Self::Map(map) => map.run(output),
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
+            Self::Localize(localize) => runtime::block_on(localize.run(output)),
             Self::Query(query) => runtime::block_on(query.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Undo(undo) => runtime::block_on(undo.run(output)),

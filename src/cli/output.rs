@@ -35,6 +35,21 @@ impl Output {
         Self { bar, ..self }
     }
 
+    /// The same with a line on standard error that says what goes on, if that is a terminal.
+    pub(super) fn with_spinner(self) -> Self {
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, ..self }
+    }
+
+    /// Says what goes on now.
+    pub(super) fn tell(&self, message: String) {
+        self.bar.set_message(message);
+        self.bar.tick();
+    }
+
     /// One step of the bar is done.
     pub(super) fn step(&self) {
         self.bar.inc(1);

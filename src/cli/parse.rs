@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 
+use crate::align::localize::SearchBox;
 use crate::geometry::{self, Point, Pose};
 use crate::map::{Lookup, MapName, Region, RequestId, RobotName};
 
@@ -43,6 +44,17 @@ pub(super) fn cuboid(text: &str) -> Result<Region, String> {
 pub(super) fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
     Ok(([x0, y0, z0], [x1, y1, z1]))
+}
+
+/// "x y z x y z": smallest and largest corner of where a sensor may be, metres.
+pub(super) fn search_box(text: &str) -> Result<SearchBox, String> {
+    let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
+    SearchBox::new([x0, y0, z0], [x1, y1, z1]).map_err(|error| error.to_string())
+}
+
+/// "x,y,z".
+pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
+    numbers(text, "x,y,z")
 }
 
 /// "x y z r": centre and radius, metres.

@@ -41,8 +41,8 @@ use tonic::{Request, Response, Status};
 
 use crate::map::{MapName, Region, RobotName};
 use crate::service::{
-    Deletion, DeletionAnswer, MapInfo, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
-    TrajectoryAnswer, Undo, UndoAnswer, VoxelListing,
+    Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, PointAnswer, PointQuery,
+    ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, Undo, UndoAnswer, VoxelListing,
 };
 use crate::wire::{pb, restore_pieces};
 use connection::Connection;
@@ -175,6 +175,19 @@ impl Client {
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ClientError> {
         let request = self.request((map, scan));
         self.domain(self.connection.mapping().align_scan(request).await)
+    }
+
+    /// Says where in the map a scan was taken, with no guess. A scan that fits nowhere is an answer, not an error.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn localize(
+        &self,
+        map: &MapName,
+        scan: LocalizationRequest,
+    ) -> Result<LocalizationAnswer, ClientError> {
+        let request = self.request((map, scan));
+        self.domain(self.connection.mapping().localize(request).await)
     }
 
     /// Takes voxels out, with all their descendants.

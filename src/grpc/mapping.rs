@@ -42,6 +42,15 @@ impl Mapping for Adapter {
         Ok(Response::new(answer.into()))
     }
 
+    async fn localize(
+        &self,
+        request: Request<pb::LocalizeRequest>,
+    ) -> Result<Response<pb::LocalizeResponse>, Status> {
+        let (map, scan) = request.into_inner().try_into()?;
+        let answer = self.service.maps().localize(&map, scan).await?;
+        Ok(Response::new(answer.into()))
+    }
+
     async fn delete_voxels(
         &self,
         request: Request<pb::DeleteVoxelsRequest>,

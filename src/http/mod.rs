@@ -5,6 +5,7 @@ mod body;
 mod deletions;
 mod error;
 mod json;
+mod localization;
 mod maps;
 mod occupancy;
 mod parameters;
@@ -48,6 +49,7 @@ pub fn router(service: MeteredService, lifecycle: Lifecycle, message_bytes_max: 
         .route("/v1/maps/{map}", put(maps::create).get(maps::describe).delete(maps::delete))
         .route("/v1/maps/{map}/scans", post(scans::insert))
         .route("/v1/maps/{map}/alignment", post(scans::align))
+        .route("/v1/maps/{map}/localize", post(localization::localize))
         .route("/v1/maps/{map}/occupancy", post(occupancy::query))
         .route("/v1/maps/{map}/deletions", post(deletions::delete))
         .route("/v1/maps/{map}/undo", post(undo::undo))

@@ -23,6 +23,13 @@ pub struct Limits {
     pub map_file_bytes_max: usize,
     /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
     pub min_revision_wait_max: Duration,
+    /// How long a search with no guess may take. 60 s.
+    pub localization_time_max: Duration,
+    /// Candidates of one search, which keeps that many places. 16.
+    pub localization_candidates_max: usize,
+    /// Memory for the dilated levels of one search; a map that takes more is searched at a coarser resolution, or in
+    /// a box. 512 MiB.
+    pub localization_grid_bytes_max: usize,
 }
 
 impl Default for Limits {
@@ -36,6 +43,9 @@ impl Default for Limits {
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
             min_revision_wait_max: Duration::from_secs(10),
+            localization_time_max: Duration::from_secs(60),
+            localization_candidates_max: 16,
+            localization_grid_bytes_max: 512 << 20,
         }
     }
 }

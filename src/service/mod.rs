@@ -9,6 +9,7 @@ mod digest;
 mod error;
 mod hosted_map;
 mod limits;
+mod localization;
 mod map_file;
 mod mapping;
 mod pool;
@@ -18,6 +19,9 @@ mod undo;
 
 pub use error::{ErrorCode, ServiceError};
 pub use limits::Limits;
+pub use localization::{
+    CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, TIME_LIMIT_DEFAULT,
+};
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer,
@@ -34,6 +38,7 @@ use crate::store::OpeningProgress;
 use catalogue::Catalogue;
 use committing::{Refusal, Step};
 use hosted_map::{HostedMap, Saving};
+use localization::Caller;
 use map_file::from_file;
 use pool::Pool;
 
@@ -49,6 +54,8 @@ struct Inner {
     queries: Pool,
     /// For alignments, insertions and deletions.
     mapping: Pool,
+    /// For searches with no guess, which take seconds: no alignment waits for them.
+    localization: Pool,
 }
 
 /// Absent neighbours of occupied voxels on which a description measures each level's false positives.
@@ -68,6 +75,7 @@ impl MapService {
             catalogue: Catalogue::open(settings.data_dir.as_deref(), &settings.store, progress)?,
             queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
             mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
+            localization: Pool::new("mrol-localization", settings.localization_threads, waiting)?,
             settings,
         })))
     }
@@ -174,6 +182,25 @@ impl MapService {
         self.limits().check_points(scan.points.len())?;
         let inner = Arc::clone(&self.0);
         self.0.mapping.run(move || map.align_scan(&scan, &inner.settings)).await?
+    }
+
+    /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a scan without a usable point or with too many, a search box away from the map, a time
+    /// limit or number of candidates beyond the limits; `FailedPrecondition` where the map is empty;
+    /// `ResourceExhausted` where the map takes more than `localization_grid_bytes_max`; `NotFound`.
+    pub async fn localize(
+        &self,
+        map: &MapName,
+        request: LocalizationRequest,
+    ) -> Result<LocalizationAnswer, ServiceError> {
+        let map = self.map(map)?;
+        let request = request.within(self.limits())?;
+        let inner = Arc::clone(&self.0);
+        let caller = Caller::default();
+        let gone = caller.gone();
+        self.0.localization.run(move || map.localize(&request, &inner.settings, gone)).await?
     }
 
     /// Takes voxels out, with all their descendants.

@@ -23,6 +23,8 @@ pub struct ServiceSettings {
     pub query_threads: usize,
     /// Threads for alignments and changes; 0 = one a core.
     pub mapping_threads: usize,
+    /// Threads for searches with no guess; 0 = one a core.
+    pub localization_threads: usize,
     /// Of every alignment.
     pub alignment: AlignmentSettings,
     /// When a robot counts as standing.

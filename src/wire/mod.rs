@@ -6,6 +6,7 @@
 
 mod deletion;
 mod field;
+mod localization;
 mod map_file;
 mod maps;
 mod occupancy;
@@ -17,6 +18,7 @@ mod types;
 mod undo;
 
 pub(crate) use field::{InField, required};
+pub(crate) use localization::time_limit;
 pub use map_file::{restore_pieces, snapshot_pieces};
 pub use maps::create_map;
 pub use occupancy::{KEYS_PER_CHUNK, voxel_chunks};

@@ -166,7 +166,7 @@ impl From<Verdict> for pb::Verdict {
     }
 }
 
-fn verdict_from(number: i32) -> Result<Verdict, ServiceError> {
+pub(super) fn verdict_from(number: i32) -> Result<Verdict, ServiceError> {
     match pb::Verdict::try_from(number) {
         Ok(pb::Verdict::Accepted) => Ok(Verdict::Accepted),
         Ok(pb::Verdict::LowOverlap) => Ok(Verdict::LowOverlap),

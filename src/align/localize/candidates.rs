@@ -1,0 +1,93 @@
+//! From places of a search to ranked candidates.
+
+use super::basins::Basin;
+use super::dilated::DilatedLevels;
+use super::sample::SearchSample;
+use super::sight::blocked_share;
+use super::{Candidate, LocalizationSettings};
+use crate::align::{Alignment, AlignmentSettings, align};
+use crate::geometry::{Point, Pose, pose_difference};
+use crate::map::MultiResolutionMap;
+use crate::voxel::volumetric_sample;
+
+/// Points that a place is refined with before it is known to be among the best.
+const THINNED: usize = 3000;
+
+/// What refinement reads.
+pub(super) struct Refinement<'a> {
+    pub(super) map: &'a MultiResolutionMap,
+    pub(super) points: &'a [Point],
+    pub(super) levels: &'a DilatedLevels,
+    pub(super) sample: &'a SearchSample,
+    pub(super) settings: &'a LocalizationSettings,
+    pub(super) alignment: &'a AlignmentSettings,
+}
+
+impl Refinement<'_> {
+    /// The distinct candidates that the places lead to, best first: all by some of the scan's points, then the best
+    /// `wish` by all of them.
+    pub(super) fn candidates(&self, places: &[Basin], wish: usize) -> Vec<Candidate> {
+        let thinned = volumetric_sample(self.points, THINNED, self.alignment.seed).points;
+        let mut candidates: Vec<Candidate> = places
+            .iter()
+            .map(|place| self.at(&thinned, &place.map_from_sensor, self.share(place.score)))
+            .collect();
+        rank(&mut candidates);
+        let mut candidates = self.distinct(candidates);
+        for candidate in candidates.iter_mut().take(wish) {
+            *candidate = self.at(self.points, &candidate.map_from_sensor(), candidate.search_overlap);
+        }
+        rank(&mut candidates);
+        let mut candidates = self.distinct(candidates);
+        set_margins(&mut candidates);
+        candidates
+    }
+
+    fn share(&self, score: u16) -> f64 {
+        f64::from(score) / self.sample.points.len().max(1) as f64
+    }
+
+    fn at(&self, points: &[Point], guess: &Pose, search_overlap: f64) -> Candidate {
+        let alignment = self.refined(points, guess);
+        let blocked = blocked_share(self.levels, self.sample, &alignment.map_from_sensor);
+        Candidate { alignment, search_overlap, blocked, margin: None }
+    }
+
+    /// The alignment of `points` from a place. Where that ends badly there is nothing to try around it: the search has.
+    fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
+        let mut alignment = *self.alignment;
+        alignment.wide_start.ascents = 0;
+        align(self.map, points, guess, &alignment)
+    }
+
+    /// Without those that a better one is the same place as; that one takes over what their search found.
+    fn distinct(&self, ranked: Vec<Candidate>) -> Vec<Candidate> {
+        let radius_m = self.settings.basin_voxels * self.levels.finest().resolution_m();
+        let mut distinct: Vec<Candidate> = Vec::with_capacity(ranked.len());
+        for candidate in ranked {
+            let same = distinct.iter_mut().find(|better| {
+                let (metres, degrees) =
+                    pose_difference(&better.map_from_sensor(), &candidate.map_from_sensor());
+                metres < radius_m && degrees < self.settings.basin_deg
+            });
+            match same {
+                Some(better) => better.search_overlap = better.search_overlap.max(candidate.search_overlap),
+                None => distinct.push(candidate),
+            }
+        }
+        distinct
+    }
+}
+
+/// Best fit first; of equals the first stays first.
+fn rank(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| b.fit().total_cmp(&a.fit()));
+}
+
+fn set_margins(ranked: &mut [Candidate]) {
+    let fits: Vec<f64> = ranked.iter().map(Candidate::fit).collect();
+    for (place, candidate) in ranked.iter_mut().enumerate() {
+        let other = if place == 0 { fits.get(1) } else { fits.first() };
+        candidate.margin = other.map(|other| fits[place] - other);
+    }
+}

@@ -1,0 +1,239 @@
+//! A map's level and all its dilations in one grid.
+
+use crate::voxel::VoxelKey;
+
+/// Chebyshev distances beyond this many voxels are not told apart.
+pub(super) const REACH_MAX: u8 = 8;
+/// A voxel with nothing occupied within [`REACH_MAX`].
+const FAR: u8 = REACH_MAX + 1;
+
+/// The Chebyshev distance of every voxel of a box to the nearest occupied one, in voxels, up to [`REACH_MAX`].
+///
+/// The voxels at distance `k` or less *are* the level dilated by `k` voxels each way, so one byte a voxel serves
+/// every cell of the search, whatever its size.
+#[derive(Debug, Clone)]
+pub(super) struct DistanceField {
+    resolution_m: f64,
+    /// Index of the first voxel of the grid.
+    min: [i32; 3],
+    size: [usize; 3],
+    distances: Vec<u8>,
+}
+
+impl DistanceField {
+    /// Voxels of the grid around a box of voxels `min..=max`: the border is out of everybody's reach.
+    pub(super) fn grid(min: [i32; 3], max: [i32; 3]) -> [usize; 3] {
+        let border = 2 * usize::from(FAR);
+        std::array::from_fn(|axis| max[axis].abs_diff(min[axis]) as usize + 1 + border)
+    }
+
+    /// The field of `occupied` voxels of side `resolution_m`, all of them within `min..=max`.
+    pub(super) fn new(
+        occupied: impl Iterator<Item = VoxelKey>,
+        min: [i32; 3],
+        max: [i32; 3],
+        resolution_m: f64,
+    ) -> Self {
+        let size = Self::grid(min, max);
+        let distances = vec![FAR; size.iter().product()];
+        let mut field = Self { resolution_m, min: min.map(|i| i - i32::from(FAR)), size, distances };
+        for voxel in occupied {
+            let cell = field.cell(voxel.index());
+            field.distances[cell] = 0;
+        }
+        field.spread();
+        field
+    }
+
+    /// One voxel further each round: the smallest of 3 x 3 x 3 neighbours, axis by axis, and one.
+    fn spread(&mut self) {
+        let strides = [1, self.size[0], self.size[0] * self.size[1]];
+        let (mut from, mut to) = (vec![FAR; self.distances.len()], vec![FAR; self.distances.len()]);
+        for _ in 0..REACH_MAX {
+            from.copy_from_slice(&self.distances);
+            for stride in strides {
+                smallest_of_three(&from, stride, &mut to);
+                std::mem::swap(&mut from, &mut to);
+            }
+            for (distance, nearest) in self.distances.iter_mut().zip(&from) {
+                *distance = (*distance).min(*nearest + 1);
+            }
+        }
+    }
+
+    fn cell(&self, index: [i32; 3]) -> usize {
+        let [x, y, z] = std::array::from_fn(|axis| (index[axis] - self.min[axis]) as usize);
+        (z * self.size[1] + y) * self.size[0] + x
+    }
+
+    pub(super) fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
+    /// `point_m` (map frame) in voxels from the grid's corner.
+    pub(super) fn in_grid(&self, point_m: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| point_m[axis] / self.resolution_m - f64::from(self.min[axis]))
+    }
+
+    /// The distance at a place in the grid, in voxels from its corner; far, outside of it.
+    #[inline(always)]
+    pub(super) fn at(&self, place: [f32; 3]) -> u8 {
+        let [x, y, z] = std::array::from_fn(|axis| self.clamped(place[axis], axis));
+        self.distances[(z * self.size[1] + y) * self.size[0] + x]
+    }
+
+    /// The row of the grid that a coordinate falls in, or the border's on its side.
+    #[inline(always)]
+    fn clamped(&self, coordinate: f32, axis: usize) -> usize {
+        (coordinate.max(0.0) as usize).min(self.size[axis] - 1)
+    }
+
+    /// How many points are within reach of an occupied voxel, for the eight translations `grid_from_sensor` + {0,
+    /// `side`} an axis (x fastest). Zeros when none of them can exceed `floor`.
+    ///
+    /// This is where a search spends its time: rotate, translate, quantise, look up, as everywhere in this map, eight
+    /// look-ups a point.
+    pub(super) fn count_of_eight(
+        &self,
+        points: &[ReachingPoint],
+        grid_from_sensor: &GridFromSensor,
+        side: f32,
+        floor: u16,
+    ) -> [u16; 8] {
+        let strides = [1, self.size[0] as u32, (self.size[0] * self.size[1]) as u32];
+        let last = self.size.map(|size| (size - 1) as f32);
+        let mut counts = [0u16; 8];
+        let mut left = points.len();
+        for points in points.chunks(CHUNK) {
+            // Rows of the grid, low and high translation, axis by axis: two loops, so that the first is vectorised.
+            let mut rows = [[[0u32; CHUNK]; 2]; 3];
+            for axis in 0..3 {
+                let [r0, r1, r2] = grid_from_sensor.rotation[axis];
+                let [low, high] = &mut rows[axis];
+                for ((point, low), high) in points.iter().zip(low).zip(high) {
+                    let [x, y, z] = point.xyz;
+                    let place = r0 * x + r1 * y + r2 * z + grid_from_sensor.translation[axis];
+                    *low = whole(place, last[axis]) * strides[axis];
+                    *high = whole(place + side, last[axis]) * strides[axis];
+                }
+            }
+            let [xs, ys, zs] = &rows;
+            for (p, point) in points.iter().enumerate() {
+                for (i, count) in counts.iter_mut().enumerate() {
+                    let cell = xs[i & 1][p] + ys[i >> 1 & 1][p] + zs[i >> 2][p];
+                    *count += u16::from(self.distances[cell as usize] <= point.reach);
+                }
+            }
+            left -= points.len();
+            let highest = counts.iter().copied().max().unwrap_or(0);
+            if usize::from(highest) + left <= usize::from(floor) {
+                return [0; 8];
+            }
+        }
+        counts
+    }
+}
+
+/// A point in the sensor frame, metres, and how far from it an occupied voxel may be, in voxels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ReachingPoint {
+    pub(super) xyz: [f32; 3],
+    pub(super) reach: u8,
+}
+
+/// From metres in the sensor frame to voxels from the corner of a grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GridFromSensor {
+    /// Rows of the rotation matrix, over the resolution.
+    pub(super) rotation: [[f32; 3]; 3],
+    pub(super) translation: [f32; 3],
+}
+
+/// Points between two looks at whether it is worth going on.
+const CHUNK: usize = 32;
+
+/// The whole part of `place`, clamped to 0..=`last`.
+///
+/// Adding 2^23 leaves no bit for fractions: a conversion that vectorises without any unsafe code. It rounds to
+/// nearest, so half is taken off; a tie may go either way, which the slack of a bound allows for.
+#[inline(always)]
+fn whole(place: f32, last: f32) -> u32 {
+    const SHIFT: f32 = 8_388_608.0;
+    ((place - 0.5).clamp(0.0, last) + SHIFT).to_bits() - SHIFT.to_bits()
+}
+
+/// The smallest of each value and its neighbours a `stride` away; the ends of the grid are border.
+fn smallest_of_three(from: &[u8], stride: usize, to: &mut [u8]) {
+    let end = from.len() - 2 * stride;
+    let neighbours = from[..end].iter().zip(&from[stride..]).zip(&from[2 * stride..]);
+    for (smallest, ((a, b), c)) in to[stride..].iter_mut().zip(neighbours) {
+        *smallest = *a.min(b).min(c);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn voxels() -> impl Strategy<Value = Vec<[i32; 3]>> {
+        prop::collection::vec(prop::array::uniform3(-9..12i32), 1..12)
+    }
+
+    fn field(voxels: &[[i32; 3]], resolution_m: f64) -> DistanceField {
+        let ends = |pick: fn(i32, i32) -> i32| {
+            std::array::from_fn(|axis| voxels.iter().map(|v| v[axis]).reduce(pick).unwrap())
+        };
+        let keys = voxels.iter().map(|v| VoxelKey::new(*v).unwrap());
+        DistanceField::new(keys, ends(i32::min), ends(i32::max), resolution_m)
+    }
+
+    fn distance(voxels: &[[i32; 3]], index: [i32; 3]) -> u32 {
+        let to = |v: &[i32; 3]| (0..3).map(|axis| v[axis].abs_diff(index[axis])).max().unwrap();
+        voxels.iter().map(to).min().unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn every_voxel_knows_its_distance(voxels in voxels(), index in prop::array::uniform3(-30..30i32)) {
+            let field = field(&voxels, 0.5);
+            let place = field.in_grid(index.map(|i| (f64::from(i) + 0.5) * 0.5)).map(|c| c as f32);
+            prop_assert_eq!(u32::from(field.at(place)), distance(&voxels, index).min(u32::from(FAR)));
+        }
+
+        #[test]
+        fn eight_counts_are_those_of_points_looked_up_one_by_one(
+            voxels in voxels(),
+            points in prop::collection::vec((prop::array::uniform3(-80..80i16), 0u8..=9), 1..80),
+            corner in prop::array::uniform3(0..30i8),
+            side in 1..6i8,
+            floor in 0u16..60,
+        ) {
+            let field = field(&voxels, 1.0);
+            // Quarters of voxels, off the borders, so that every sum is exact.
+            let points: Vec<ReachingPoint> = points.into_iter().map(|(xyz, reach)| {
+                let reach = if reach == 9 { u8::MAX } else { reach };
+                ReachingPoint { xyz: xyz.map(|c| f32::from(c) / 4.0 + 0.125), reach }
+            }).collect();
+            let (corner, side) = (corner.map(f32::from), f32::from(side) / 2.0);
+            let turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+            let grid_from_sensor = GridFromSensor { rotation: turn, translation: corner };
+            let counts = field.count_of_eight(&points, &grid_from_sensor, side, floor);
+            let expected: [u16; 8] = std::array::from_fn(|i| {
+                let shift = [i & 1, i >> 1 & 1, i >> 2].map(|bit| bit as f32 * side);
+                let is_near = |point: &&ReachingPoint| {
+                    let [x, y, z] = point.xyz;
+                    let turned = [-y, x, z];
+                    field.at(std::array::from_fn(|axis| turned[axis] + corner[axis] + shift[axis])) <= point.reach
+                };
+                points.iter().filter(is_near).count() as u16
+            });
+            if counts == [0; 8] {
+                prop_assert!(expected.iter().all(|&count| count <= floor));
+            } else {
+                prop_assert_eq!(counts, expected);
+            }
+        }
+    }
+}

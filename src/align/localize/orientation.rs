@@ -1,0 +1,110 @@
+//! Which rotations a search considers.
+
+use std::f64::consts::PI;
+
+use nalgebra::{UnitQuaternion, UnitVector3, Vector3};
+
+use super::dilated::DilatedLevels;
+use super::normals::dominant_normals;
+use super::{Gravity, LocalizationSettings};
+use crate::geometry::Point;
+use crate::voxel::{Lattice, VoxelKey, VoxelSet};
+
+/// A family of rotations: an axis of the sensor points, up to a tilt, along an axis of the map, and the sensor
+/// is turned about it by any angle.
+///
+/// With z for the common axis, map_from_sensor = map_from_z * Rz(yaw) * exp(tilt_x, tilt_y, 0) * z_from_sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Orientation {
+    map_from_z: UnitQuaternion<f64>,
+    z_from_sensor: UnitQuaternion<f64>,
+}
+
+impl Orientation {
+    /// All rotations that bring `sensor` (sensor frame) near `map` (map frame).
+    pub(super) fn bringing(sensor: UnitVector3<f64>, map: UnitVector3<f64>) -> Self {
+        let to_z = |axis: UnitVector3<f64>| {
+            // Opposite vectors leave the axis of the turn open; any will do.
+            UnitQuaternion::rotation_between_axis(&axis, &Vector3::z_axis())
+                .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI))
+        };
+        Self { map_from_z: to_z(map).inverse(), z_from_sensor: to_z(sensor) }
+    }
+
+    /// The rotation at a yaw and a tilt, radians.
+    pub(super) fn turned(&self, yaw: f64, [tilt_x, tilt_y]: [f64; 2]) -> UnitQuaternion<f64> {
+        self.map_from_z
+            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw)
+            * UnitQuaternion::from_scaled_axis(Vector3::new(tilt_x, tilt_y, 0.0))
+            * self.z_from_sensor
+    }
+}
+
+/// The families of a search.
+#[derive(Debug)]
+pub(super) struct Orientations {
+    pub(super) families: Vec<Orientation>,
+    /// How far the common axis may lie off, each way in x and y, radians.
+    pub(super) tilt_max_rad: f64,
+    /// True when the scan's rotation is certainly among them.
+    pub(super) all: bool,
+}
+
+/// Directions of the map's surfaces that the scan's may be; most maps have a floor and a wall.
+const MAP_DIRECTIONS: usize = 2;
+/// Directions of the scan's surfaces; most scans show no more.
+const SCAN_DIRECTIONS: usize = 4;
+
+impl Orientations {
+    /// The turns about the way down where it is known. Where not, those that bring one of the scan's dominant surfaces
+    /// parallel to one of the map's, either way round: nobody can be sure that there is one.
+    pub(super) fn of(
+        points: &[Point],
+        levels: &DilatedLevels,
+        gravity: Option<&Gravity>,
+        settings: &LocalizationSettings,
+    ) -> Self {
+        if let Some(gravity) = gravity {
+            return Self {
+                families: vec![Orientation::bringing(gravity.in_sensor, gravity.in_map)],
+                tilt_max_rad: settings.gravity_tolerance_deg.to_radians(),
+                all: true,
+            };
+        }
+        let of_map = dominant_normals(&levels.voxels, MAP_DIRECTIONS);
+        let of_scan = dominant_normals(&voxels_of(points, levels.finest().resolution_m()), SCAN_DIRECTIONS);
+        let either_way = |map: UnitVector3<f64>| {
+            of_scan.iter().flat_map(move |scan| [*scan, -*scan].map(|scan| Orientation::bringing(scan, map)))
+        };
+        Self {
+            families: of_map.into_iter().flat_map(either_way).collect(),
+            tilt_max_rad: settings.surface_tolerance_deg.to_radians(),
+            all: false,
+        }
+    }
+}
+
+/// The voxels of a scan in its own frame. Coarser than any lattice's limit there is nothing to see.
+fn voxels_of(points: &[Point], resolution_m: f64) -> Vec<VoxelKey> {
+    let voxels = |lattice: Lattice| VoxelSet::of_points(points, &lattice.from_map()).0.iter().collect();
+    Lattice::new(resolution_m, 1).map_or_else(|_| Vec::new(), voxels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_untilted_rotation_brings_the_axes_together_at_any_yaw() {
+        let axes =
+            [Vector3::z_axis(), -Vector3::z_axis(), UnitVector3::new_normalize(Vector3::new(1.0, 2.0, -3.0))];
+        for (sensor, map) in axes.into_iter().flat_map(|a| axes.map(|b| (a, b))) {
+            let orientation = Orientation::bringing(sensor, map);
+            for yaw in [0.0, 1.0, 4.0] {
+                assert!((orientation.turned(yaw, [0.0; 2]) * sensor).angle(&map) < 1e-6);
+                let tilted = orientation.turned(yaw, [0.03, -0.04]) * sensor;
+                assert!((tilted.angle(&map) - 0.05).abs() < 1e-6);
+            }
+        }
+    }
+}

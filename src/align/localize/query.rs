@@ -1,0 +1,154 @@
+//! What is known beforehand of where a scan was taken.
+
+use nalgebra::{UnitVector3, Vector3};
+
+/// What to search for, and where.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LocalizationQuery {
+    /// Which way is down; any rotation is considered without.
+    pub gravity: Option<Gravity>,
+    /// Where the sensor may be; within the bulk of the map and around its trajectory without.
+    pub search_box: Option<SearchBox>,
+    /// Candidates wanted, at most.
+    pub candidates: usize,
+    /// Of the choice of the scan's points: the same seed gives the same answer, on every machine.
+    pub seed: u64,
+}
+
+/// Which way things fall, in both frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gravity {
+    pub(super) in_sensor: UnitVector3<f64>,
+    pub(super) in_map: UnitVector3<f64>,
+}
+
+/// Down in the frame of a map whose z axis points up.
+pub const MAP_DOWN: [f64; 3] = [0.0, 0.0, -1.0];
+
+/// A box in the map frame, metres; its sides may be infinite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchBox {
+    pub(super) min_m: [f64; 3],
+    pub(super) max_m: [f64; 3],
+}
+
+/// Why numbers say nothing of where a scan was taken.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum LocalizationQueryError {
+    /// A direction that is none.
+    #[error("{0} must be a finite direction other than zero, got {1:?}")]
+    Direction(&'static str, [f64; 3]),
+    /// A corner with NaN, or corners in the wrong order.
+    #[error("search_box.min_m must not exceed search_box.max_m in any axis, got {0:?} and {1:?}")]
+    Box([f64; 3], [f64; 3]),
+}
+
+impl Gravity {
+    /// Gravity as an accelerometer at rest tells it (its reading points up, so with the other sign), of any length,
+    /// in the sensor and in the map frame.
+    ///
+    /// # Errors
+    /// When one is not finite, or zero.
+    pub fn new(in_sensor: [f64; 3], in_map: [f64; 3]) -> Result<Self, LocalizationQueryError> {
+        let direction = |name, vector: [f64; 3]| {
+            let length = Vector3::from(vector).norm();
+            let usable = length.is_finite() && length > 0.0;
+            let unit = usable.then(|| UnitVector3::new_normalize(Vector3::from(vector)));
+            unit.ok_or(LocalizationQueryError::Direction(name, vector))
+        };
+        Ok(Self {
+            in_sensor: direction("gravity.in_sensor", in_sensor)?,
+            in_map: direction("gravity.in_map", in_map)?,
+        })
+    }
+
+    /// Unit vector, sensor frame.
+    pub fn in_sensor(&self) -> [f64; 3] {
+        self.in_sensor.into_inner().into()
+    }
+
+    /// Unit vector, map frame.
+    pub fn in_map(&self) -> [f64; 3] {
+        self.in_map.into_inner().into()
+    }
+}
+
+impl SearchBox {
+    /// The box from `min_m` to `max_m`.
+    ///
+    /// # Errors
+    /// When a coordinate is NaN or a smallest one exceeds its largest.
+    pub fn new(min_m: [f64; 3], max_m: [f64; 3]) -> Result<Self, LocalizationQueryError> {
+        let ordered = (0..3).all(|axis| min_m[axis] <= max_m[axis]);
+        if ordered { Ok(Self { min_m, max_m }) } else { Err(LocalizationQueryError::Box(min_m, max_m)) }
+    }
+
+    /// Smallest coordinates, metres.
+    pub fn min_m(&self) -> [f64; 3] {
+        self.min_m
+    }
+
+    /// Largest coordinates, metres.
+    pub fn max_m(&self) -> [f64; 3] {
+        self.max_m
+    }
+
+    /// The box of the voxels `low` to `high`.
+    pub(super) fn of_voxels(low: [i32; 3], high: [i32; 3], resolution_m: f64) -> Self {
+        let side = |i: i32| f64::from(i) * resolution_m;
+        Self { min_m: low.map(side), max_m: high.map(|i| side(i + 1)) }
+    }
+
+    /// The box with `by_m` more on each side.
+    pub(super) fn grown(self, by_m: f64) -> Self {
+        Self { min_m: self.min_m.map(|c| c - by_m), max_m: self.max_m.map(|c| c + by_m) }
+    }
+
+    /// The smallest box that holds this one and a point.
+    pub(super) fn holding(self, point_m: [f64; 3]) -> Self {
+        Self {
+            min_m: std::array::from_fn(|axis| self.min_m[axis].min(point_m[axis])),
+            max_m: std::array::from_fn(|axis| self.max_m[axis].max(point_m[axis])),
+        }
+    }
+
+    /// What both boxes hold; none where that is nothing.
+    pub(super) fn meet(self, other: Self) -> Option<Self> {
+        let min_m = std::array::from_fn(|axis| self.min_m[axis].max(other.min_m[axis]));
+        let max_m = std::array::from_fn(|axis| self.max_m[axis].min(other.max_m[axis]));
+        Self::new(min_m, max_m).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_may_have_any_length_but_none() {
+        let gravity = Gravity::new([0.0, 3.0, 4.0], MAP_DOWN).unwrap();
+        assert_eq!(gravity.in_sensor(), [0.0, 0.6, 0.8]);
+        for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0], [0.0, f64::MAX, f64::MAX]] {
+            let error = Gravity::new(bad, MAP_DOWN).unwrap_err().to_string();
+            assert!(error.contains("gravity.in_sensor"), "{error}");
+            assert!(Gravity::new(MAP_DOWN, bad).unwrap_err().to_string().contains("gravity.in_map"));
+        }
+    }
+
+    #[test]
+    fn a_box_needs_corners_in_order_and_may_be_endless() {
+        assert!(SearchBox::new([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]).is_ok());
+        for bad in [[-1.0, 1.0, 1.0], [f64::NAN, 1.0, 1.0]] {
+            let error = SearchBox::new([0.0; 3], bad).unwrap_err().to_string();
+            assert!(error.contains("search_box.min_m"), "{error}");
+        }
+    }
+
+    #[test]
+    fn boxes_meet_where_both_are() {
+        let cube = |low: f64, high: f64| SearchBox::new([low; 3], [high; 3]).unwrap();
+        assert_eq!(cube(0.0, 2.0).meet(cube(1.0, 3.0)), Some(cube(1.0, 2.0)));
+        assert_eq!(cube(0.0, 1.0).meet(cube(2.0, 3.0)), None);
+        assert_eq!(cube(0.0, 1.0).grown(1.0).holding([5.0; 3]), cube(-1.0, 5.0));
+    }
+}

@@ -1,0 +1,44 @@
+//! The points of a scan that a search looks at.
+
+use nalgebra::Point3;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use crate::geometry::Point;
+use crate::voxel::volumetric_sample;
+
+/// A few hundred points, even over the surfaces that a scan shows, in random order.
+#[derive(Debug, Clone)]
+pub(super) struct SearchSample {
+    /// Sensor frame.
+    pub(super) points: Vec<Point3<f64>>,
+    /// Distance from the sensor within which three quarters of them lie, metres: what a rotation is measured by.
+    pub(super) range_m: f64,
+}
+
+/// Points of the volumetric sample that one search point stands for. Thinned straight to a few hundred, a scan
+/// would be mostly its stray far points, each alone in a voxel of metres.
+const THINNING: usize = 20;
+/// Share of the points within [`SearchSample::range_m`].
+const RANGE_QUANTILE: f64 = 0.75;
+
+impl SearchSample {
+    /// Thins `points` (finite, at least one) to `wish` of them.
+    pub(super) fn of(points: &[Point], wish: usize, seed: u64) -> Self {
+        let mut sample = volumetric_sample(points, wish.saturating_mul(THINNING), seed).points;
+        // In random order the first points foretell the rest, so that hopeless cells are given up early.
+        sample.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+        sample.truncate(wish);
+        let points: Vec<Point3<f64>> = sample.into_iter().map(Point::to_f64).collect();
+        let mut ranges: Vec<f64> = points.iter().map(|point| point.coords.norm()).collect();
+        ranges.sort_unstable_by(f64::total_cmp);
+        let range_m = ranges[((ranges.len() - 1) as f64 * RANGE_QUANTILE) as usize];
+        Self { points, range_m }
+    }
+
+    /// The largest distance of a point from the sensor, metres.
+    pub(super) fn range_max_m(&self) -> f64 {
+        self.points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,289 @@
+//! Branch and bound over poses, best first.
+
+use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
+
+use super::basins::{Basin, Basins};
+use super::bound::{Bounds, PoseCell, Turned, eight};
+use super::{LocalizationSettings, SearchProgress};
+
+/// What a search found.
+#[derive(Debug)]
+pub(super) struct Found {
+    /// Best first.
+    pub(super) places: Vec<Basin>,
+    /// Nothing was left out.
+    pub(super) complete: bool,
+    /// Cells whose bound was taken.
+    pub(super) cells: u64,
+}
+
+/// A cell that waits to be divided, ordered by what is expected of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Waiting {
+    /// Its bound less what it is expected to lose until the finest depth: deep cells come first among equals, and so
+    /// good poses are found early, which prune the rest.
+    promise: i32,
+    bound: u16,
+    cell: PoseCell,
+}
+
+/// Share of the points that a bound is expected to lose with each halving.
+const LOSS_PER_HALVING: f64 = 0.04;
+/// Cells divided between two reports of progress.
+const CELLS_PER_REPORT: u32 = 64;
+
+/// A search under way.
+pub(super) struct Search<'a> {
+    bounds: &'a Bounds<'a>,
+    settings: &'a LocalizationSettings,
+    watch: &'a mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
+    waiting: BinaryHeap<Waiting>,
+    basins: Basins,
+    cells: u64,
+    complete: bool,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        bounds: &'a Bounds<'a>,
+        settings: &'a LocalizationSettings,
+        basins: Basins,
+        watch: &'a mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
+    ) -> Self {
+        Self { bounds, settings, watch, waiting: BinaryHeap::new(), basins, cells: 0, complete: true }
+    }
+
+    /// Finds the poses of highest overlap on the lattice of finest cells.
+    pub(super) fn run(mut self) -> Found {
+        if self.enter_roots().is_continue() && self.divide_best_first().is_continue() {
+            return self.found(true);
+        }
+        self.found(false)
+    }
+
+    fn found(self, to_the_end: bool) -> Found {
+        Found {
+            places: self.basins.found().to_vec(),
+            complete: to_the_end && self.complete,
+            cells: self.cells,
+        }
+    }
+
+    /// Bounds all cells of the coarsest depth.
+    fn enter_roots(&mut self) -> ControlFlow<()> {
+        let depth = self.settings.halvings;
+        let [nx, ny, nz] = self.bounds.cubes(depth);
+        for orientation in 0..self.bounds.orientations() {
+            for rotation in self.bounds.rotations.cells(depth) {
+                self.report()?;
+                let cell = PoseCell { depth, orientation, rotation, translation: [0; 3] };
+                let turned = self.bounds.turned(&cell);
+                for z in (0..nz).step_by(2) {
+                    for y in (0..ny).step_by(2) {
+                        for x in (0..nx).step_by(2) {
+                            self.enter_eight(PoseCell { translation: [x, y, z], ..cell }, &turned, u16::MAX);
+                        }
+                    }
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Divides the most promising cell, until none can hold a place worth knowing.
+    fn divide_best_first(&mut self) -> ControlFlow<()> {
+        let mut divided = 0u32;
+        while let Some(Waiting { bound, cell, .. }) = self.waiting.pop() {
+            divided = divided.wrapping_add(1);
+            if divided.is_multiple_of(CELLS_PER_REPORT) {
+                self.report()?;
+            }
+            if bound <= self.floor() || self.is_known(&cell, bound) {
+                continue;
+            }
+            if cell.depth == 0 {
+                self.basins.offer(Basin { map_from_sensor: self.bounds.center(&cell), score: bound });
+            } else {
+                self.divide(cell, bound);
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn divide(&mut self, cell: PoseCell, bound: u16) {
+        let depth = cell.depth - 1;
+        for rotation in self.bounds.rotations.children(cell.depth, cell.rotation) {
+            let first = PoseCell { depth, rotation, translation: cell.translation.map(|i| 2 * i), ..cell };
+            self.enter_eight(first, &self.bounds.turned(&first), bound);
+        }
+    }
+
+    /// Bounds `first` and its seven neighbours of the same parent, and lets those wait that are worth it.
+    fn enter_eight(&mut self, first: PoseCell, turned: &Turned<'_>, parent: u16) {
+        let floor = self.floor();
+        let counts = turned.bounds_of_eight(first.translation, floor);
+        self.cells += 8;
+        let loss = (LOSS_PER_HALVING * f64::from(self.bounds.points())) as i32;
+        for (translation, count) in eight(first.translation).zip(counts) {
+            let (cell, bound) = (PoseCell { translation, ..first }, count.min(parent));
+            if bound > floor && self.bounds.is_in_domain(&cell) {
+                let promise = i32::from(bound) - loss * cell.depth as i32;
+                self.waiting.push(Waiting { promise, bound, cell });
+            }
+        }
+        if self.waiting.len() > self.settings.cells_waiting_max {
+            self.drop_least_promising();
+        }
+    }
+
+    /// Cells bounded by this much or less are of no interest.
+    fn floor(&self) -> u16 {
+        let share = |share: f64, of: u16| (share * f64::from(of)) as u16;
+        share(self.settings.search_overlap_min, self.bounds.points())
+            .max(share(self.settings.search_share_of_best, self.basins.best()))
+            .max(self.basins.entry())
+    }
+
+    /// True when the whole cell is a place that is known, and better.
+    fn is_known(&self, cell: &PoseCell, bound: u16) -> bool {
+        let half_diagonal_m = self.bounds.side_m_at(cell.depth) / 2.0 * 3f64.sqrt();
+        let turn_rad = self.bounds.rotations.turn_rad(cell.depth);
+        self.basins.best() >= bound
+            && self.basins.cover(&self.bounds.center(cell), half_diagonal_m, turn_rad, bound)
+    }
+
+    /// Half of the cells have to go.
+    fn drop_least_promising(&mut self) {
+        let mut cells = std::mem::take(&mut self.waiting).into_sorted_vec();
+        let floor = self.floor();
+        cells.retain(|waiting| waiting.bound > floor);
+        let most = self.settings.cells_waiting_max / 2;
+        if cells.len() > most {
+            cells.drain(..cells.len() - most);
+            self.complete = false;
+        }
+        self.waiting = cells.into();
+    }
+
+    fn report(&mut self) -> ControlFlow<()> {
+        (self.watch)(&SearchProgress {
+            cells: self.cells,
+            waiting: self.waiting.len(),
+            best_overlap: f64::from(self.basins.best()) / f64::from(self.bounds.points().max(1)),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::align::localize::dilated::DilatedLevels;
+    use crate::align::localize::orientation::Orientation;
+    use crate::align::localize::rotation::RotationLattice;
+    use crate::align::localize::sample::SearchSample;
+    use crate::geometry::{Point, Pose};
+    use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+
+    /// Two walls and a post, seen from inside.
+    fn corner() -> Vec<Point> {
+        let wall = (0..40).flat_map(|i| (0..8).map(move |j| [i as f32 * 0.1 - 1.0, 1.55, j as f32 * 0.1]));
+        let other = (0..20).flat_map(|i| (0..8).map(move |j| [-1.05, i as f32 * 0.1 - 0.4, j as f32 * 0.1]));
+        let post = (0..8).map(|j| [1.25, 0.35, j as f32 * 0.1]);
+        wall.chain(other).chain(post).map(Point::from).collect()
+    }
+
+    struct Problem {
+        levels: DilatedLevels,
+        sample: SearchSample,
+        settings: LocalizationSettings,
+    }
+
+    impl Problem {
+        fn new() -> Self {
+            let map = MultiResolutionMap::new(MapSettings::new(0.1, 3)).unwrap();
+            let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+            map.committer().insert_scan(ScanRecord::of_points(pose, &corner(), map.lattice()));
+            let settings = LocalizationSettings {
+                resolutions_per_range: 10.0,
+                halvings: 3,
+                search_share_of_best: 0.0,
+                search_overlap_min: 0.3,
+                ..Default::default()
+            };
+            let sample = SearchSample::of(&corner(), 80, 1);
+            let levels = DilatedLevels::of(&map, &sample, None, &settings).unwrap();
+            Self { levels, sample, settings }
+        }
+
+        fn with_bounds<T>(&self, of: impl FnOnce(&Bounds<'_>) -> T) -> T {
+            let turn_rad =
+                self.settings.arc_share * self.levels.finest().resolution_m() / self.sample.range_m;
+            let rotations = RotationLattice::new(turn_rad, 0.0, self.settings.halvings + 1);
+            let upright = [Orientation::bringing(Vector3::z_axis(), Vector3::z_axis())];
+            of(&Bounds::new(&self.levels, &self.sample, &upright, rotations))
+        }
+
+        fn search(&self, watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>) -> Found {
+            self.with_bounds(|bounds| {
+                Search::new(bounds, &self.settings, Basins::new(0.4, 0.3, 16), watch).run()
+            })
+        }
+
+        /// The highest count of any finest cell, all of them looked at.
+        fn highest_by_force(&self) -> u16 {
+            self.with_bounds(|bounds| {
+                let [nx, ny, nz] = bounds.cubes(0);
+                let mut highest = 0;
+                for rotation in bounds.rotations.cells(0) {
+                    let cell = PoseCell { depth: 0, orientation: 0, rotation, translation: [0; 3] };
+                    let turned = bounds.turned(&cell);
+                    for (x, y, z) in (0..nx).step_by(2).flat_map(|x| {
+                        (0..ny).step_by(2).flat_map(move |y| (0..nz).step_by(2).map(move |z| (x, y, z)))
+                    }) {
+                        let counts = turned.bounds_of_eight([x, y, z], 0);
+                        for (translation, count) in eight([x, y, z]).zip(counts) {
+                            if bounds.is_in_domain(&PoseCell { translation, ..cell }) {
+                                highest = count.max(highest);
+                            }
+                        }
+                    }
+                }
+                highest
+            })
+        }
+    }
+
+    #[test]
+    fn the_best_place_is_the_best_of_all_poses_of_the_lattice() {
+        let problem = Problem::new();
+        let found = problem.search(&mut |_| ControlFlow::Continue(()));
+        assert!(found.complete);
+        assert_eq!(found.places[0].score, problem.highest_by_force());
+        assert!(found.places.windows(2).all(|pair| pair[0].score >= pair[1].score));
+    }
+
+    #[test]
+    fn a_search_that_is_stopped_says_so() {
+        let problem = Problem::new();
+        let at_once = problem.search(&mut |_| ControlFlow::Break(()));
+        assert!(!at_once.complete && at_once.places.is_empty() && at_once.cells == 0);
+
+        let all = problem.search(&mut |_| ControlFlow::Continue(())).cells;
+        let later = problem.search(&mut |progress| match progress.cells > all / 2 {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        });
+        assert!(!later.complete && later.cells < all);
+    }
+
+    #[test]
+    fn a_search_that_runs_out_of_room_says_so_and_still_finds_a_place() {
+        let mut problem = Problem::new();
+        problem.settings.cells_waiting_max = 200;
+        let found = problem.search(&mut |_| ControlFlow::Continue(()));
+        assert!(!found.complete && !found.places.is_empty());
+    }
+}

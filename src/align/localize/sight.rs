@@ -1,0 +1,81 @@
+//! Free space as evidence: what a sensor looked through cannot be there.
+
+use super::dilated::DilatedLevels;
+use super::sample::SearchSample;
+use crate::geometry::Pose;
+
+/// How far from everything, in voxels, a ray is out in the open again.
+const OPEN: u8 = 3;
+/// How long a ray is in occupied voxels, in voxels, before it is taken for passing through and not by their corners.
+const THROUGH: f32 = 1.0;
+/// A ray's steps where something is near, in voxels.
+const STEP: f32 = 0.5;
+
+/// The share of the sample's rays that pass through what the map holds and come out behind it, before they reach
+/// their points. 0 without points.
+///
+/// Coming out is what counts: a ray along a floor is within its voxels for metres before it ends there. The paper
+/// stores no free space (III-B); this is its converse, the rays of one scan against the occupied voxels.
+pub(super) fn blocked_share(levels: &DilatedLevels, sample: &SearchSample, map_from_sensor: &Pose) -> f64 {
+    let field = levels.finest();
+    let place = |point_m: nalgebra::Point3<f64>| field.in_grid(point_m.coords.into()).map(|c| c as f32);
+    let origin = place(map_from_sensor.translation.vector.into());
+    let is_blocked = |point: &&nalgebra::Point3<f64>| {
+        let end = place(map_from_sensor * **point);
+        let toward: [f32; 3] = std::array::from_fn(|axis| end[axis] - origin[axis]);
+        let length = toward.iter().map(|c| c * c).sum::<f32>().sqrt();
+        let (mut way, mut run, mut inside) = (0.0, 0.0, false);
+        while way < length {
+            let distance = field.at(std::array::from_fn(|axis| origin[axis] + toward[axis] * (way / length)));
+            run = if distance == 0 { run + STEP } else { 0.0 };
+            inside |= run >= THROUGH;
+            if inside && distance >= OPEN {
+                return true;
+            }
+            // Nothing is nearer than the distance, less the voxel that the ray is in.
+            way += f32::from(distance.saturating_sub(1)).max(STEP);
+        }
+        false
+    };
+    sample.points.iter().filter(is_blocked).count() as f64 / sample.points.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::localize::LocalizationSettings;
+    use crate::geometry::Point;
+    use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+
+    fn plane(x: f32, y: std::ops::Range<i32>) -> impl Iterator<Item = Point> {
+        y.flat_map(move |y| (-20..20).map(move |z| Point::new(x, y as f32 * 0.05, z as f32 * 0.05)))
+    }
+
+    /// The share of the rays from the origin to a wall at 4 m, in a map that holds it and `more`.
+    fn blocked(more: Vec<Point>) -> f64 {
+        let wall: Vec<Point> = plane(4.0, -20..20).collect();
+        let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
+        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let all = [wall.clone(), more].concat();
+        map.committer().insert_scan(ScanRecord::of_points(pose, &all, map.lattice()));
+        let sample = SearchSample::of(&wall, 200, 0);
+        let levels = DilatedLevels::of(&map, &sample, None, &LocalizationSettings::default()).unwrap();
+        blocked_share(&levels, &sample, &Pose::identity())
+    }
+
+    #[test]
+    fn a_wall_in_between_blocks_the_rays_through_it() {
+        assert_eq!(blocked(Vec::new()), 0.0);
+        assert_eq!(blocked(plane(2.0, -30..30).collect()), 1.0);
+        let half = blocked(plane(2.0, -30..0).collect());
+        assert!((0.4..0.6).contains(&half), "{half}");
+    }
+
+    #[test]
+    fn a_floor_that_rays_graze_and_a_wall_behind_block_nothing() {
+        let floor =
+            (0..80).flat_map(|x| (-30..30).map(move |y| Point::new(x as f32 * 0.05, y as f32 * 0.05, -1.05)));
+        assert_eq!(blocked(floor.collect()), 0.0);
+        assert_eq!(blocked(plane(6.0, -30..30).collect()), 0.0);
+    }
+}

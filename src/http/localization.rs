@@ -1,0 +1,181 @@
+//! `POST /v1/maps/{map}/localize`: where a scan was taken, with no guess.
+
+use axum::extract::State;
+use axum::response::Json;
+use serde::{Deserialize, Serialize};
+
+use super::Adapter;
+use super::body::Points;
+use super::error::HttpError;
+use super::json::{JsonPoints, JsonPose, JsonState};
+use super::parameters::{self, Map};
+use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
+use crate::service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, ServiceError};
+use crate::wire::time_limit;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LocalizationJson {
+    points: JsonPoints,
+    gravity: Option<GravityJson>,
+    search_box: Option<BoxJson>,
+    time_limit_s: Option<f64>,
+    #[serde(default)]
+    candidates: u32,
+    #[serde(default)]
+    seed: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GravityJson {
+    in_sensor: [f64; 3],
+    in_map: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxJson {
+    min_m: [f64; 3],
+    max_m: [f64; 3],
+}
+
+/// The same beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LocalizationParameters {
+    gravity: Option<String>,
+    map_gravity: Option<String>,
+    search_box: Option<String>,
+    time_limit_s: Option<f64>,
+    #[serde(default)]
+    candidates: u32,
+    #[serde(default)]
+    seed: u64,
+}
+
+type LocalizationBody = Points<LocalizationJson, LocalizationParameters>;
+
+#[derive(Serialize)]
+pub(super) struct LocalizationOut {
+    accepted: bool,
+    verdict: &'static str,
+    reason: String,
+    candidates: Vec<CandidateOut>,
+    exhaustive: bool,
+    cut_short: bool,
+    search_ms: f64,
+    points_skipped: usize,
+    #[serde(flatten)]
+    state: JsonState,
+}
+
+#[derive(Serialize)]
+struct CandidateOut {
+    map_from_sensor: JsonPose,
+    overlap: f64,
+    inliers: f64,
+    blocked: f64,
+    fit: f64,
+    margin: Option<f64>,
+}
+
+pub(super) async fn localize(
+    State(adapter): State<Adapter>,
+    Map(map): Map,
+    scan: LocalizationBody,
+) -> Result<Json<LocalizationOut>, HttpError> {
+    let answer = adapter.service.maps().localize(&map, scan.try_into()?).await?;
+    Ok(Json(answer.into()))
+}
+
+impl TryFrom<LocalizationBody> for LocalizationRequest {
+    type Error = ServiceError;
+
+    fn try_from(body: LocalizationBody) -> Result<Self, ServiceError> {
+        match body {
+            Points::Json(scan) => scan.try_into(),
+            Points::Bytes(points, rest) => rest.with(points),
+        }
+    }
+}
+
+impl TryFrom<LocalizationJson> for LocalizationRequest {
+    type Error = ServiceError;
+
+    fn try_from(scan: LocalizationJson) -> Result<Self, ServiceError> {
+        let gravity =
+            scan.gravity.map(|gravity| Gravity::new(gravity.in_sensor, gravity.in_map.unwrap_or(MAP_DOWN)));
+        let search_box = scan.search_box.map(|given| SearchBox::new(given.min_m, given.max_m));
+        Ok(Self {
+            points: scan.points.into(),
+            query: LocalizationQuery {
+                gravity: gravity.transpose()?,
+                search_box: search_box.transpose()?,
+                candidates: scan.candidates as usize,
+                seed: scan.seed,
+            },
+            time_limit: scan.time_limit_s.map(time_limit).transpose()?,
+        })
+    }
+}
+
+impl LocalizationParameters {
+    fn with(self, points: PointCloud) -> Result<LocalizationRequest, ServiceError> {
+        let gravity = match (&self.gravity, &self.map_gravity) {
+            (None, None) => None,
+            (Some(in_sensor), in_map) => {
+                let in_map =
+                    in_map.as_ref().map(|text| parameters::numbers(text, "map_gravity")).transpose()?;
+                Some(Gravity::new(parameters::numbers(in_sensor, "gravity")?, in_map.unwrap_or(MAP_DOWN))?)
+            }
+            (None, Some(_)) => {
+                let message = "map_gravity says nothing without gravity, the direction in the sensor frame";
+                return Err(ServiceError::invalid("missing_field", message));
+            }
+        };
+        let corners = |text: &String| -> Result<SearchBox, ServiceError> {
+            let [x0, y0, z0, x1, y1, z1] = parameters::numbers(text, "search_box")?;
+            Ok(SearchBox::new([x0, y0, z0], [x1, y1, z1])?)
+        };
+        Ok(LocalizationRequest {
+            points,
+            query: LocalizationQuery {
+                gravity,
+                search_box: self.search_box.as_ref().map(corners).transpose()?,
+                candidates: self.candidates as usize,
+                seed: self.seed,
+            },
+            time_limit: self.time_limit_s.map(time_limit).transpose()?,
+        })
+    }
+}
+
+impl From<LocalizationAnswer> for LocalizationOut {
+    fn from(answer: LocalizationAnswer) -> Self {
+        Self {
+            accepted: answer.accepted(),
+            verdict: answer.verdict.as_str(),
+            reason: answer.reason,
+            candidates: answer.candidates.iter().map(CandidateOut::from).collect(),
+            exhaustive: answer.exhaustive,
+            cut_short: answer.cut_short,
+            search_ms: answer.search_time.as_secs_f64() * 1e3,
+            points_skipped: answer.points_skipped,
+            state: answer.state.into(),
+        }
+    }
+}
+
+impl From<&CandidateAnswer> for CandidateOut {
+    fn from(candidate: &CandidateAnswer) -> Self {
+        Self {
+            map_from_sensor: (&candidate.map_from_sensor).into(),
+            overlap: candidate.overlap,
+            inliers: candidate.inliers,
+            blocked: candidate.blocked,
+            fit: candidate.fit,
+            margin: candidate.margin,
+        }
+    }
+}

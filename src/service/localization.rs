@@ -1,0 +1,195 @@
+//! Where a robot with no guess is in a map.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::hosted_map::HostedMap;
+use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings};
+use crate::align::Verdict;
+use crate::align::localize::{
+    Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
+    LocalizationSettings, localize,
+};
+use crate::geometry::{Point, Pose};
+
+/// Candidates of a request that does not say.
+pub const CANDIDATES_DEFAULT: usize = 5;
+/// How long a search takes at most where the request does not say.
+pub const TIME_LIMIT_DEFAULT: Duration = Duration::from_secs(10);
+
+/// Where was this scan taken?
+#[derive(Debug, Clone)]
+pub struct LocalizationRequest {
+    /// In the sensor frame; not finite = no return.
+    pub points: PointCloud,
+    /// What is known beforehand; its `candidates` are filled in where 0.
+    pub query: LocalizationQuery,
+    /// When to stop the search and answer with the best so far; [`TIME_LIMIT_DEFAULT`] without.
+    pub time_limit: Option<Duration>,
+}
+
+/// The places that a scan fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalizationAnswer {
+    /// Accepted only where the best candidate fits and no other place is as good.
+    pub verdict: Verdict,
+    /// Why, in a sentence with the figures.
+    pub reason: String,
+    /// Distinct places, best first.
+    pub candidates: Vec<CandidateAnswer>,
+    /// Every pose was considered: the way down was known, and the search ended by itself.
+    pub exhaustive: bool,
+    /// The search was stopped before its end.
+    pub cut_short: bool,
+    /// What the search and the refinement took.
+    pub search_time: Duration,
+    /// Points that were not finite.
+    pub points_skipped: usize,
+    /// That was searched.
+    pub state: MapState,
+}
+
+/// A place that a scan fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CandidateAnswer {
+    /// Where the sensor was.
+    pub map_from_sensor: Pose,
+    /// Fraction of the points in occupied voxels of level 0.
+    pub overlap: f64,
+    /// Fraction of a sample of the points that lie on the map's surfaces.
+    pub inliers: f64,
+    /// Fraction of the rays that pass through what the map holds.
+    pub blocked: f64,
+    /// Overlap times the fraction of the rays that are not blocked: what candidates are ranked by.
+    pub fit: f64,
+    /// Its fit less that of the best other candidate; none where there is no other.
+    pub margin: Option<f64>,
+}
+
+impl LocalizationAnswer {
+    /// The answer to a request of which `points_skipped` points were not finite.
+    pub fn of(found: Localization, points_skipped: usize, search_time: Duration, state: MapState) -> Self {
+        Self {
+            verdict: found.verdict,
+            reason: found.reason,
+            candidates: found.candidates.iter().map(CandidateAnswer::from).collect(),
+            exhaustive: found.exhaustive,
+            cut_short: found.cut_short,
+            search_time,
+            points_skipped,
+            state,
+        }
+    }
+
+    /// True when the first candidate is to be believed.
+    pub fn accepted(&self) -> bool {
+        self.verdict == Verdict::Accepted
+    }
+}
+
+impl From<&Candidate> for CandidateAnswer {
+    fn from(candidate: &Candidate) -> Self {
+        Self {
+            map_from_sensor: candidate.map_from_sensor(),
+            overlap: candidate.alignment.overlap(),
+            inliers: candidate.alignment.inliers,
+            blocked: candidate.blocked,
+            fit: candidate.fit(),
+            margin: candidate.margin,
+        }
+    }
+}
+
+impl LocalizationRequest {
+    /// The request within the limits, with its defaults.
+    ///
+    /// # Errors
+    /// Names what is beyond a limit.
+    pub(super) fn within(mut self, limits: &Limits) -> Result<Self, ServiceError> {
+        limits.check_points(self.points.len())?;
+        let (wish, most) = (self.query.candidates, limits.localization_candidates_max);
+        if wish > most {
+            let message = format!("candidates is {wish}, localization_candidates_max is {most}");
+            return Err(ServiceError::invalid("too_many_candidates", message));
+        }
+        if wish == 0 {
+            self.query.candidates = CANDIDATES_DEFAULT.min(most);
+        }
+        let time_max = limits.localization_time_max;
+        let time_limit = self.time_limit.unwrap_or(TIME_LIMIT_DEFAULT.min(time_max));
+        if time_limit > time_max {
+            let message = format!("time_limit is {time_limit:?}, localization_time_max is {time_max:?}");
+            return Err(ServiceError::invalid("time_limit_too_long", message));
+        }
+        self.time_limit = Some(time_limit);
+        Ok(self)
+    }
+}
+
+/// Tells work that nobody waits for it any more: the request that holds this was dropped.
+#[derive(Debug, Default)]
+pub(super) struct Caller(Arc<AtomicBool>);
+
+impl Caller {
+    /// True, from any thread, once the caller has gone.
+    pub(super) fn gone(&self) -> impl Fn() -> bool + Send + 'static {
+        let gone = Arc::clone(&self.0);
+        move || gone.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Caller {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl HostedMap {
+    /// Searches the map for the scan's place, until the time is up or the caller gone.
+    pub(super) fn localize(
+        &self,
+        request: &LocalizationRequest,
+        settings: &ServiceSettings,
+        caller_gone: impl Fn() -> bool,
+    ) -> Result<LocalizationAnswer, ServiceError> {
+        let start = Instant::now();
+        let time_limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
+        let all = request.points.as_slice();
+        let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
+        if points.is_empty() {
+            let message =
+                format!("none of the scan's {} points is finite: nothing but no-returns", all.len());
+            return Err(ServiceError::invalid("no_returns", message));
+        }
+        let grid_bytes_max = settings.limits.localization_grid_bytes_max;
+        let search = LocalizationSettings { grid_bytes_max, ..LocalizationSettings::default() };
+        let found = localize(&self.map, &points, &request.query, &search, &settings.alignment, &mut |_| {
+            if caller_gone() || start.elapsed() >= time_limit {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })?;
+        let state = self.state(found.revision);
+        Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
+    }
+}
+
+impl From<LocalizationQueryError> for ServiceError {
+    fn from(error: LocalizationQueryError) -> Self {
+        Self::invalid("bad_query", error.to_string())
+    }
+}
+
+impl From<LocalizationError> for ServiceError {
+    fn from(error: LocalizationError) -> Self {
+        let (code, reason) = match error {
+            LocalizationError::EmptyMap => (ErrorCode::FailedPrecondition, "map_empty"),
+            LocalizationError::NothingThere { .. } => (ErrorCode::InvalidArgument, "nothing_there"),
+            LocalizationError::TooLarge { .. } => (ErrorCode::ResourceExhausted, "search_too_large"),
+        };
+        Self::new(code, reason, error.to_string())
+    }
+}
