@@ -11,7 +11,6 @@ use super::json::{JsonPoints, JsonPose, JsonState};
 use super::parameters::{self, Map};
 use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use crate::service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, ServiceError};
-use crate::wire::time_limit;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -115,7 +114,7 @@ impl TryFrom<LocalizationJson> for LocalizationRequest {
                 candidates: scan.candidates as usize,
                 seed: scan.seed,
             },
-            time_limit: scan.time_limit_s.map(time_limit).transpose()?,
+            time_limit: scan.time_limit_s.map(LocalizationRequest::time_limit_of).transpose()?,
         })
     }
 }
@@ -146,7 +145,7 @@ impl LocalizationParameters {
                 candidates: self.candidates as usize,
                 seed: self.seed,
             },
-            time_limit: self.time_limit_s.map(time_limit).transpose()?,
+            time_limit: self.time_limit_s.map(LocalizationRequest::time_limit_of).transpose()?,
         })
     }
 }

@@ -103,6 +103,17 @@ impl From<&Candidate> for CandidateAnswer {
 }
 
 impl LocalizationRequest {
+    /// The time limit of so many seconds.
+    ///
+    /// # Errors
+    /// When the number is none, or negative.
+    pub fn time_limit_of(seconds: f64) -> Result<Duration, ServiceError> {
+        Duration::try_from_secs_f64(seconds).map_err(|_| {
+            let message = format!("time_limit_s must be a number of seconds from 0 on, got {seconds}");
+            ServiceError::invalid("bad_time_limit", message)
+        })
+    }
+
     /// The request within the limits, with its defaults.
     ///
     /// # Errors

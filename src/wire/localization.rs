@@ -22,7 +22,7 @@ impl TryFrom<pb::LocalizeRequest> for (MapName, LocalizationRequest) {
         let scan = LocalizationRequest {
             points: required(request.points, "points")?.try_into().in_field("points")?,
             query,
-            time_limit: request.time_limit_s.map(time_limit).transpose()?,
+            time_limit: request.time_limit_s.map(LocalizationRequest::time_limit_of).transpose()?,
         };
         Ok((MapName::new(&request.map)?, scan))
     }
@@ -37,17 +37,6 @@ fn box_from(search_box: pb::Box) -> Result<SearchBox, ServiceError> {
     let min_m = required(search_box.min_m, "search_box.min_m")?;
     let max_m = required(search_box.max_m, "search_box.max_m")?;
     Ok(SearchBox::new(min_m.into(), max_m.into())?)
-}
-
-/// The time limit of so many seconds.
-///
-/// # Errors
-/// When the number is none, or negative.
-pub(crate) fn time_limit(seconds: f64) -> Result<Duration, ServiceError> {
-    Duration::try_from_secs_f64(seconds).map_err(|_| {
-        let message = format!("time_limit_s must be a number of seconds from 0 on, got {seconds}");
-        ServiceError::invalid("bad_time_limit", message)
-    })
 }
 
 impl From<(&MapName, LocalizationRequest)> for pb::LocalizeRequest {

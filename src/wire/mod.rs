@@ -18,7 +18,6 @@ mod types;
 mod undo;
 
 pub(crate) use field::{InField, required};
-pub(crate) use localization::time_limit;
 pub use map_file::{restore_pieces, snapshot_pieces};
 pub use maps::create_map;
 pub use occupancy::{KEYS_PER_CHUNK, voxel_chunks};

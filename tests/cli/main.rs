@@ -8,6 +8,7 @@ mod doctor;
 mod errors;
 mod help;
 mod local;
+mod localize;
 #[path = "../process/mod.rs"]
 mod process;
 mod remote;

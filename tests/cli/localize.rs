@@ -1,0 +1,43 @@
+//! `mrol localize`: scans in a map file, and on a server.
+
+use mrol::geometry::{pose, pose_difference};
+
+use super::{Sequence, complaint, mrol, objects};
+
+#[test]
+fn a_scan_of_a_map_file_is_found_where_it_was_taken() {
+    let sequence = Sequence::of(3);
+    let (scans, truth, map) = (sequence.path("scans"), sequence.path("poses.txt"), sequence.path("map.mrol"));
+    objects(&["map", &scans, "--resolution", "0.05", "--truth", &truth, "--at-truth", "--out", &map]);
+    let down = sequence.poses[1].inverse_transform_vector(&nalgebra::Vector3::new(0.0, 0.0, -1.0));
+    let gravity = format!("{},{},{}", down.x, down.y, down.z);
+    let scan = sequence.path("scans/0001.ply");
+    let arguments = ["localize", "--map", &map, &scan, "--gravity", &gravity, "--candidates", "2"];
+    let found = objects(&arguments);
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0]["scan"].as_str(), found[0]["cut_short"].as_bool()), (Some("0001.ply"), Some(false)));
+    assert!(found[0]["candidates"].as_array().unwrap().len() <= 2);
+    let numbers: [f64; 7] =
+        serde_json::from_value(found[0]["candidates"][0]["map_from_sensor"].clone()).unwrap();
+    let [x, y, z, qx, qy, qz, qw] = numbers;
+    let (metres, degrees) = pose_difference(&pose([x, y, z], [qx, qy, qz, qw]).unwrap(), &sequence.poses[1]);
+    assert!(metres < 0.05 && degrees < 1.0, "{metres} m, {degrees} degrees: {}", found[0]["reason"]);
+
+    let output = mrol(&arguments).assert().success();
+    let table = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+    assert!(table.starts_with("0001.ply: ") && table.contains("exhaustive"), "{table}");
+}
+
+#[test]
+fn what_cannot_be_searched_is_said() {
+    let missing = complaint(&["localize", "scan.ply"], 2);
+    assert!(missing.contains("--map") || missing.contains("--name"), "{missing}");
+    let none = complaint(&["localize", "scan.ply", "--map", "m.mrol", "--gravity", "0,0,0"], 2);
+    assert!(none.contains("gravity.in_sensor"), "{none}");
+    let disordered = complaint(&["localize", "scan.ply", "--map", "m.mrol", "--box", "1 0 0 0 1 1"], 2);
+    assert!(disordered.contains("must not exceed"), "{disordered}");
+    let sequence = Sequence::of(1);
+    let scan = sequence.path("scans/0000.ply");
+    let gone = complaint(&["localize", &scan, "--map", &sequence.path("none.mrol")], 1);
+    assert!(gone.contains("none.mrol"), "{gone}");
+}
