@@ -149,7 +149,7 @@ fn a_square_room_without_furniture_fits_four_ways_round() {
     let scan = square(&mut ChaCha8Rng::seed_from_u64(2));
     let guess = Pose::rotation(Vector3::new(0.0, 0.0, 44f64.to_radians()));
     // Every end is doubted, so that others are looked for.
-    let wide_start = WideStartSettings { overlap_below: 1.0, ..WideStartSettings::default() };
+    let wide_start = WideStartSettings { fitness_below: 1.0, ..WideStartSettings::default() };
     let settings = AlignmentSettings { wide_start, ..AlignmentSettings::default() };
     let alignment = align(&map, &scan, &guess, &settings);
     assert_eq!(alignment.verdict, Verdict::Ambiguous, "{}", alignment.reason);

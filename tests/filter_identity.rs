@@ -7,7 +7,7 @@
 
 mod shared_scans;
 
-use mrol::align::{AlignmentSettings, Method, align};
+use mrol::align::{AlignmentSettings, Method, WideStartSettings, align};
 use mrol::bloom::FilterSettings;
 use mrol::geometry::{Point, Pose, pose_difference};
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
@@ -20,6 +20,16 @@ const AMPLE: FilterSettings = FilterSettings { hashes: 10, bits_per_key: 4096.0 
 /// The paper's filter that is too small has a tenth of the counters.
 const SMALL: FilterSettings = FilterSettings { hashes: 2, bits_per_key: 2.0 };
 
+/// No other guesses than the first.
+const NONE: WideStartSettings = WideStartSettings {
+    fitness_below: 0.0,
+    std_above: f64::MAX,
+    motion_above: f64::MAX,
+    motion_above_deg: f64::MAX,
+    ascents: 0,
+    ambiguous_fitness: 1.0,
+};
+
 struct Run {
     poses: Vec<Pose>,
     expected_false_positives: f64,
@@ -28,7 +38,8 @@ struct Run {
 /// Maps a sequence: the first scan at the origin, each next one aligned from the pose of the one before.
 fn map_sequence(scans: &[Vec<Point>], settings: MapSettings, lookup: Lookup, method: Method) -> Run {
     let map = MultiResolutionMap::new(settings).unwrap();
-    let alignment = AlignmentSettings { lookup, method, ..AlignmentSettings::default() };
+    // One ascent a scan: the bound below counts every look-up as one of an absent voxel.
+    let alignment = AlignmentSettings { lookup, method, wide_start: NONE, ..AlignmentSettings::default() };
     let mut run = Run { poses: vec![Pose::identity()], expected_false_positives: 0.0 };
     for (k, points) in scans.iter().enumerate() {
         if k > 0 {

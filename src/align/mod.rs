@@ -80,10 +80,11 @@ pub fn align(
     let scan = SampledScan::new(points, settings);
     let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
-    match found.is_doubtful(map, settings) {
+    let found = match found.is_doubtful(guess, map, settings) {
         true => wide_start::align(map, &scan, guess, found, settings),
         false => found,
-    }
+    };
+    found.within_reach_of(guess, map, settings)
 }
 
 /// Says how a scan fits the map where it is thought to be, without moving it.

@@ -67,6 +67,10 @@ pub struct AlignmentSettings {
     /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
     /// where anything holds it. 8.
     pub refinement_reach: f64,
+    /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 48.
+    pub reach: f64,
+    /// The same of its rotation, degrees. 60.
+    pub reach_deg: f64,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").
     pub lookup: Lookup,
@@ -97,8 +101,15 @@ impl RefinementSettings {
 /// Settings of the wide start: more guesses around the first one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WideStartSettings {
-    /// Overlap below which the end of the first ascent is not believed, and others are tried. 0.35; 0 never tries.
-    pub overlap_below: f64,
+    /// Fitness below which the end of the first ascent is not believed, and others are tried. 0.85; 0 never tries. A scan
+    /// of what the map shows has 0.9 or more, one that shows much new ground less: it pays a few times as long.
+    pub fitness_below: f64,
+    /// The same of a pose that is held to no better than this fraction of r_0 in some direction. 0.1.
+    pub std_above: f64,
+    /// The same of a pose farther from its guess than this many r_0. 12.
+    pub motion_above: f64,
+    /// The same of a pose that is turned by more than this against its guess, degrees. 30.
+    pub motion_above_deg: f64,
     /// Ascents of the guesses that look best, at most. 8.
     pub ascents: usize,
     /// Two ends are equally good where the worse fits at least this fraction as well as the better. 0.95.
@@ -123,6 +134,8 @@ impl Default for AlignmentSettings {
             overlap_min: 0.2,
             undetermined_std: 0.2,
             refinement_reach: 8.0,
+            reach: 48.0,
+            reach_deg: 60.0,
             lookup: Lookup::Bloom,
         }
     }
@@ -136,7 +149,14 @@ impl Default for RefinementSettings {
 
 impl Default for WideStartSettings {
     fn default() -> Self {
-        Self { overlap_below: 0.35, ascents: 8, ambiguous_fitness: 0.95 }
+        Self {
+            fitness_below: 0.85,
+            std_above: 0.1,
+            motion_above: 12.0,
+            motion_above_deg: 30.0,
+            ascents: 8,
+            ambiguous_fitness: 0.95,
+        }
     }
 }
 
@@ -177,6 +197,11 @@ impl AlignmentSettings {
             ("refinement.robust_scale", self.refinement.robust_scale),
             ("undetermined_std", self.undetermined_std),
             ("refinement_reach", self.refinement_reach),
+            ("reach", self.reach),
+            ("reach_deg", self.reach_deg),
+            ("wide_start.std_above", self.wide_start.std_above),
+            ("wide_start.motion_above", self.wide_start.motion_above),
+            ("wide_start.motion_above_deg", self.wide_start.motion_above_deg),
         ];
         if let Some(&(name, value)) = positive.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
         {
@@ -184,7 +209,7 @@ impl AlignmentSettings {
         }
         let fractions = [
             ("overlap_min", self.overlap_min),
-            ("wide_start.overlap_below", self.wide_start.overlap_below),
+            ("wide_start.fitness_below", self.wide_start.fitness_below),
             ("wide_start.ambiguous_fitness", self.wide_start.ambiguous_fitness),
         ];
         match fractions.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {

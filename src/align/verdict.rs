@@ -2,7 +2,7 @@
 
 use super::refine::SurfaceFit;
 use super::{AlignmentSettings, Direction, PoseInformation};
-use crate::geometry::{Point, Pose};
+use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 
 /// What an alignment is worth.
@@ -15,7 +15,8 @@ pub enum Verdict {
     /// It fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves a
     /// direction open.
     Undetermined,
-    /// Several starts ended at different poses that fit about equally well.
+    /// Several starts ended at different poses that fit about equally well, or it lies too far from the guess for others to
+    /// have been looked for.
     Ambiguous,
 }
 
@@ -68,10 +69,40 @@ impl Alignment {
         self.level_overlaps.first().copied().unwrap_or(0.0)
     }
 
-    /// True where the ascent ended badly: little overlap, or far from where the refinement went.
-    pub(super) fn is_doubtful(&self, map: &MultiResolutionMap, settings: &AlignmentSettings) -> bool {
-        self.overlap() < settings.wide_start.overlap_below
-            || self.refined_by_m > settings.refinement_reach * map.lattice().resolution_m(0)
+    /// True where other poses should be looked for: off the surfaces, far from where the refinement went, weakly held,
+    /// or far from the guess.
+    pub(super) fn is_doubtful(
+        &self,
+        guess: &Pose,
+        map: &MultiResolutionMap,
+        settings: &AlignmentSettings,
+    ) -> bool {
+        let (resolution_m, wide_start) = (map.lattice().resolution_m(0), &settings.wide_start);
+        let (metres, degrees) = pose_difference(guess, &self.map_from_sensor);
+        self.fitness < wide_start.fitness_below
+            || self.refined_by_m > settings.refinement_reach * resolution_m
+            || self.information.directions()[0].std_m > wide_start.std_above * resolution_m
+            || metres > wide_start.motion_above * resolution_m
+            || degrees > wide_start.motion_above_deg
+    }
+
+    /// Ambiguous where it would be accepted and lies farther from the guess than was searched.
+    pub(super) fn within_reach_of(
+        self,
+        guess: &Pose,
+        map: &MultiResolutionMap,
+        settings: &AlignmentSettings,
+    ) -> Self {
+        let (metres, degrees) = pose_difference(guess, &self.map_from_sensor);
+        let (reach_m, reach_deg) = (settings.reach * map.lattice().resolution_m(0), settings.reach_deg);
+        if self.verdict != Verdict::Accepted || metres <= reach_m && degrees <= reach_deg {
+            return self;
+        }
+        let reason = format!(
+            "it is {metres:.2} m and {degrees:.1} deg from the guess, within {reach_m:.2} m and {reach_deg} deg \
+             others were looked for"
+        );
+        self.but(Verdict::Ambiguous, reason)
     }
 
     /// The same with another verdict, and why.
@@ -110,7 +141,8 @@ impl Fit {
                 format!("the refinement moved it by {moved_m:.3} m, at most {reach_m:.3} m is accepted");
             (Verdict::Undetermined, reason)
         } else {
-            (Verdict::Accepted, format!("overlap {overlap:.3} and held in every direction"))
+            let held_m = self.surfaces.information.directions()[0].std_m;
+            (Verdict::Accepted, format!("overlap {overlap:.3}, held to {held_m:.4} m in every direction"))
         };
         Alignment {
             map_from_sensor: self.map_from_sensor,

@@ -50,6 +50,8 @@ pub(super) fn align(
         }
     }
 
+    // Of a small step the guess itself may be the best of all: the coarse levels lead away from it.
+    ends.push(*guess);
     let mut found: Vec<_> =
         ends.into_iter().map(|end| finish(map, scan, Ascent::from(end), settings)).collect();
     lookups += found.iter().map(|found| found.lookups).sum::<u64>();
