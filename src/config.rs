@@ -68,6 +68,9 @@ pub struct StoreConfig {
 pub struct ListenerConfig {
     /// Address and port; port 0 takes a free one.
     pub listen: SocketAddr,
+    /// The file of a Unix socket to serve at as well; none.
+    #[serde(default)]
+    pub socket: Option<PathBuf>,
 }
 
 /// The log.
@@ -184,7 +187,7 @@ pub struct LimitsConfig {
 
 impl Default for Config {
     fn default() -> Self {
-        let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into() };
+        let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into(), socket: None };
         Self {
             data_dir: "./mrol-data".into(),
             store: StoreConfig::default(),

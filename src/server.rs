@@ -1,19 +1,24 @@
 //! The daemon: both listeners, periodic saving, and going down within a bound.
 
+mod socket;
 mod starting;
 
 use std::io;
 use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::serve::ListenerExt;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio_stream::Stream;
+use tokio_stream::wrappers::UnixListenerStream;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
-use tonic::transport::server::TcpIncoming;
+use tonic::transport::server::{Connected, TcpIncoming};
 
 use crate::config::Config;
 use crate::lifecycle::Lifecycle;
@@ -22,6 +27,7 @@ use crate::store::OpeningProgress;
 use crate::telemetry::{MeteredService, Metrics, TelemetryError};
 use crate::wire::transport;
 use crate::{grpc, http};
+use socket::UnixSocket;
 use starting::Starting;
 
 /// Streams of one gRPC connection at once: with the size of a message it bounds what a client may hold.
@@ -49,6 +55,16 @@ pub enum ServerError {
         /// Why.
         error: io::Error,
     },
+    /// A Unix socket cannot be listened on.
+    #[error("{protocol} cannot listen on {}: {error}", path.display())]
+    Socket {
+        /// `http` or `grpc`.
+        protocol: &'static str,
+        /// The socket's file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
     /// Log or metrics.
     #[error(transparent)]
     Telemetry(#[from] TelemetryError),
@@ -71,6 +87,8 @@ pub struct Server {
     lifecycle: Lifecycle,
     http: Listener,
     grpc: Listener,
+    http_socket: Option<UnixSocket>,
+    grpc_socket: Option<UnixSocket>,
 }
 
 #[derive(Debug)]
@@ -80,10 +98,11 @@ struct Listener {
 }
 
 impl Server {
-    /// Binds both addresses and opens the maps. Meanwhile HTTP says at `/readyz` how far that has come.
+    /// Binds both addresses and opens the maps. Meanwhile HTTP says at `/readyz` how far that has come. Unix sockets
+    /// are made when that is done.
     ///
     /// # Errors
-    /// When a map cannot be read or an address is taken.
+    /// When a map cannot be read, an address is taken, or a socket cannot be made.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
         let settings = config.service_settings();
         let http = Listener::bind("http", config.http.listen).await?;
@@ -99,6 +118,8 @@ impl Server {
             lifecycle: Lifecycle::default(),
             http,
             grpc: Listener::bind("grpc", config.grpc.listen).await?,
+            http_socket: UnixSocket::bind("http", config.http.socket.as_deref())?,
+            grpc_socket: UnixSocket::bind("grpc", config.grpc.socket.as_deref())?,
             config,
         })
     }
@@ -113,6 +134,16 @@ impl Server {
         self.grpc.address
     }
 
+    /// The file of the Unix socket where HTTP is served, if there is one.
+    pub fn http_socket(&self) -> Option<&Path> {
+        self.http_socket.as_ref().map(|socket| socket.file.path())
+    }
+
+    /// The file of the Unix socket where gRPC is served, if there is one.
+    pub fn grpc_socket(&self) -> Option<&Path> {
+        self.grpc_socket.as_ref().map(|socket| socket.file.path())
+    }
+
     /// Serves until `shutdown`, then goes down: refuses what is new, waits `drain_seconds` at most for what is in
     /// flight, saves the maps.
     ///
@@ -122,7 +153,7 @@ impl Server {
     /// # Errors
     /// When a listener stops by itself, or the maps cannot be saved at the end.
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
-        let Self { config, service, lifecycle, http, grpc } = self;
+        let Self { config, service, lifecycle, http, grpc, http_socket, grpc_socket } = self;
         let bytes_max = config.limits.message_bytes_max;
         let (routes, health) = grpc::routes(service.clone(), lifecycle.clone(), bytes_max)?;
         let router = http::router(service.clone(), lifecycle.clone(), bytes_max);
@@ -130,8 +161,19 @@ impl Server {
 
         let idle = CancellationToken::new();
         let mut listeners = JoinSet::new();
-        listeners.spawn(serve_grpc(grpc.tcp, routes, lifecycle.clone()));
-        listeners.spawn(serve_http(http.tcp, router, idle.clone()));
+        let mut files = Vec::new();
+        if let Some(UnixSocket { listener, file }) = grpc_socket {
+            tracing::info!(grpc = %file.path().display(), "serving");
+            files.push(file);
+            listeners.spawn(serve_grpc(UnixListenerStream::new(listener), routes.clone(), lifecycle.clone()));
+        }
+        if let Some(UnixSocket { listener, file }) = http_socket {
+            tracing::info!(http = %file.path().display(), "serving");
+            files.push(file);
+            listeners.spawn(serve_http(listener, router.clone(), idle.clone()));
+        }
+        listeners.spawn(serve_grpc(incoming(grpc.tcp), routes, lifecycle.clone()));
+        listeners.spawn(serve_http(without_delay(http.tcp), router, idle.clone()));
         let housekeeping = tokio::spawn(keep_house(service.clone(), lifecycle.clone()));
         health.set_serving().await;
 
@@ -182,11 +224,26 @@ async fn closed(listeners: &mut JoinSet<Ended>) {
     while listeners.join_next().await.is_some() {}
 }
 
+fn incoming(listener: TcpListener) -> TcpIncoming {
+    TcpIncoming::from(listener).with_nodelay(Some(true)).with_keepalive(Some(transport::KEEPALIVE_INTERVAL))
+}
+
+fn without_delay(listener: TcpListener) -> impl axum::serve::Listener<Addr = SocketAddr> {
+    listener.tap_io(|connection| {
+        // A connection that refuses is slower, not broken.
+        let _ = connection.set_nodelay(true);
+    })
+}
+
 /// Stops accepting when the server is draining; ends when the last connection is closed, if ever.
-async fn serve_grpc(listener: TcpListener, routes: Routes, lifecycle: Lifecycle) -> Ended {
-    let incoming = TcpIncoming::from(listener)
-        .with_nodelay(Some(true))
-        .with_keepalive(Some(transport::KEEPALIVE_INTERVAL));
+async fn serve_grpc<C>(
+    incoming: impl Stream<Item = io::Result<C>>,
+    routes: Routes,
+    lifecycle: Lifecycle,
+) -> Ended
+where
+    C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
+{
     tonic::transport::Server::builder()
         .initial_stream_window_size(transport::STREAM_WINDOW_BYTES)
         .initial_connection_window_size(transport::CONNECTION_WINDOW_BYTES)
@@ -201,11 +258,11 @@ async fn serve_grpc(listener: TcpListener, routes: Routes, lifecycle: Lifecycle)
 }
 
 /// Stops accepting when no request is in flight any more; ends when the last connection is closed, if ever.
-async fn serve_http(listener: TcpListener, router: axum::Router, idle: CancellationToken) -> Ended {
-    let listener = listener.tap_io(|connection| {
-        // A connection that refuses is slower, not broken.
-        let _ = connection.set_nodelay(true);
-    });
+async fn serve_http<L>(listener: L, router: axum::Router, idle: CancellationToken) -> Ended
+where
+    L: axum::serve::Listener,
+    L::Addr: std::fmt::Debug,
+{
     axum::serve(listener, router)
         .with_graceful_shutdown(idle.cancelled_owned())
         .await

@@ -8,7 +8,7 @@ use super::parse;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ServerOptions {
-    /// The gRPC address of the server
+    /// The gRPC address of the server, or unix:PATH
     #[arg(long, env = "MROL_SERVER", default_value = "http://127.0.0.1:7334", value_name = "URL")]
     server: String,
 }

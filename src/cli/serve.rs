@@ -21,6 +21,7 @@ EXAMPLES:
   mrol serve --data-dir \"\"                       keep maps in memory only
   mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
                                                  take free ports and print them as JSON
+  mrol serve --grpc-socket /run/mrol/grpc.sock   clients on this machine connect to unix:/run/mrol/grpc.sock
   MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable
 
 The first line on standard output says where it serves; the log goes to standard error. Settings come from
@@ -50,6 +51,12 @@ pub(super) struct ServeOptions {
     /// Address of gRPC; port 0 takes a free one [default: 127.0.0.1:7334]
     #[arg(long, value_name = "ADDRESS")]
     grpc_listen: Option<SocketAddr>,
+    /// A Unix socket to serve gRPC at as well, for clients on this machine (unix:PATH)
+    #[arg(long, value_name = "PATH")]
+    grpc_socket: Option<PathBuf>,
+    /// A Unix socket to serve HTTP at as well (curl --unix-socket PATH)
+    #[arg(long, value_name = "PATH")]
+    http_socket: Option<PathBuf>,
     /// How log lines are written: text or json [default: text]
     #[arg(long, value_name = "FORMAT", value_parser = ["text", "json"])]
     log_format: Option<String>,
@@ -97,8 +104,8 @@ impl ServeOptions {
     pub(super) fn config(&self) -> Result<Config, ConfigError> {
         let options = json!({
             "data_dir": self.data_dir,
-            "http": {"listen": self.http_listen},
-            "grpc": {"listen": self.grpc_listen},
+            "http": {"listen": self.http_listen, "socket": self.http_socket},
+            "grpc": {"listen": self.grpc_listen, "socket": self.grpc_socket},
             "log": {"format": self.log_format, "level": self.log_level},
             "store": {
                 "durability": self.durability,

@@ -75,9 +75,10 @@ impl Connection {
 /// Where `url` leads, in full, and how to go there.
 fn endpoint(url: &str) -> Result<(String, Endpoint), ClientError> {
     let refused = |problem: &str| ClientError::Url { url: url.to_owned(), problem: problem.to_owned() };
-    let full = if url.contains("://") { url.to_owned() } else { format!("http://{url}") };
-    if !full.starts_with("http://") {
-        return Err(refused("only http:// is spoken"));
+    let is_socket = url.starts_with("unix:");
+    let full = if is_socket || url.contains("://") { url.to_owned() } else { format!("http://{url}") };
+    if !is_socket && !full.starts_with("http://") {
+        return Err(refused("only http:// and unix: are spoken"));
     }
     let endpoint = Endpoint::from_shared(full.clone()).map_err(|error| refused(&error.to_string()))?;
     let endpoint = endpoint
@@ -99,6 +100,7 @@ mod tests {
     fn an_address_may_come_without_its_scheme() {
         assert_eq!(endpoint("localhost:7334").unwrap().0, "http://localhost:7334");
         assert_eq!(endpoint("http://[::1]:7334").unwrap().0, "http://[::1]:7334");
+        assert_eq!(endpoint("unix:/run/mrol.sock").unwrap().0, "unix:/run/mrol.sock");
     }
 
     #[test]

@@ -55,7 +55,8 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects to the gRPC address of a server: `http://127.0.0.1:7334`, or without the scheme.
+    /// Connects to the gRPC address of a server: `http://127.0.0.1:7334`, or without the scheme; or
+    /// `unix:/run/mrol/grpc.sock`, a socket on the same machine.
     ///
     /// # Errors
     /// When the address is none, or nobody listens there.
