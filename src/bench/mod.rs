@@ -5,6 +5,7 @@
 
 pub mod align;
 pub mod compare;
+pub mod growth;
 pub mod insert;
 pub mod journal;
 pub mod readers;

@@ -1,6 +1,7 @@
 //! `mrol bench`: what everything costs on this machine.
 
 mod align;
+mod growth;
 mod insert;
 mod journal;
 mod lookup;
@@ -21,6 +22,7 @@ EXAMPLES:
   mrol bench lookup --voxels map.ply --points scan.ply --resolution 0.05
   mrol bench insert --workload site
   mrol bench journal --workload site                  what it costs that nothing is lost
+  mrol bench growth --workload site                   memory, and who waits, while ten million voxels go in
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench serve                                    a load of point queries on a server of its own
@@ -40,6 +42,7 @@ pub(super) struct Bench {
 enum What {
     Lookup(lookup::Lookup),
     Insert(insert::Insert),
+    Growth(growth::Growth),
     Journal(journal::Journal),
     Align(align::Align),
     Readers(readers::Readers),
@@ -51,6 +54,7 @@ impl Bench {
         match self.what {
             What::Lookup(lookup) => lookup.run(&output),
             What::Insert(insert) => insert.run(&output),
+            What::Growth(growth) => growth.run(&output),
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
             What::Readers(readers) => readers.run(&output),

@@ -67,6 +67,10 @@ impl WorkloadOptions {
         self.workload().queries(self.order(), self.points() * times, seed)
     }
 
+    pub(in crate::cli) fn seed(&self) -> u64 {
+        self.seed
+    }
+
     pub(in crate::cli) fn points(&self) -> usize {
         self.queries as usize
     }
