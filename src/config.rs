@@ -54,7 +54,7 @@ pub struct StoreConfig {
     /// `always`: what is acknowledged is synced; or an interval (`200ms`, `1s`) at which it is. `always`.
     #[serde(with = "as_text")]
     pub durability: Durability,
-    /// MiB of journal after which a map is written to a snapshot. 64.
+    /// MiB of journal after which a map is written to a snapshot. 32.
     pub snapshot_journal_mib: u64,
     /// Seconds after which a map that changed is written to a snapshot. 300.
     pub snapshot_interval_s: u64,

@@ -28,7 +28,9 @@ const WRITERS: usize = 4;
 const RESOLUTION_M: f64 = 0.1;
 const LEVELS: u32 = 4;
 /// Snapshots are written all the time, beside the writers.
-const OPTIONS: [&str; 2] = ["--snapshot-journal-mib", "1"];
+const SYNCED: [&str; 2] = ["--snapshot-journal-mib", "1"];
+/// The end of a process takes nothing that was written, synced or not.
+const WRITTEN: [&str; 4] = ["--snapshot-journal-mib", "1", "--durability", "100ms"];
 
 fn rounds() -> usize {
     std::env::var("MROL_CRASH_ROUNDS").map_or(20, |rounds| rounds.parse().unwrap())
@@ -230,7 +232,7 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
     let mut model = Model::default();
     let (mut unanswered, mut damaged) = (0, 0);
     for round in 0..rounds() {
-        let server = Process::start(folder, &OPTIONS);
+        let server = Process::start(folder, if round % 4 == 3 { &WRITTEN[..] } else { &SYNCED });
         let client = Client::connect(&server.grpc).await.unwrap();
         if round == 0 {
             let new = NewMap { levels: Some(LEVELS), ..NewMap::of(RESOLUTION_M) };

@@ -10,6 +10,7 @@ pub mod insert;
 pub mod journal;
 pub mod readers;
 pub mod stages;
+pub mod start;
 pub mod stopwatch;
 pub mod structures;
 pub mod workload;

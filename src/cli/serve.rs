@@ -67,7 +67,7 @@ pub(super) struct ServeOptions {
     /// [default: always]
     #[arg(long, value_name = "WHEN")]
     durability: Option<String>,
-    /// MiB of journal after which a map is written to a snapshot [default: 64]
+    /// MiB of journal after which a map is written to a snapshot [default: 32]
     #[arg(long, value_name = "MIB")]
     snapshot_journal_mib: Option<u64>,
     /// Seconds after which a map that changed is written to a snapshot [default: 300]

@@ -58,7 +58,8 @@ impl StoreError {
         Self::JournalDamaged { path, offset, reason, revision }
     }
 
-    pub(super) fn damaged(path: &Path, reason: impl Into<String>) -> Self {
+    /// The file, or what it is to hold, is wrong.
+    pub(crate) fn damaged(path: &Path, reason: impl Into<String>) -> Self {
         Self::Damaged { path: path.to_owned(), reason: reason.into() }
     }
 }

@@ -54,7 +54,7 @@ impl Display for Durability {
 pub struct StoreSettings {
     /// When a change may be acknowledged. Always synced.
     pub durability: Durability,
-    /// A map is written to a snapshot after so many bytes of journal. 64 MiB.
+    /// A map is written to a snapshot after so many bytes of journal. 32 MiB.
     pub snapshot_journal_bytes: u64,
     /// A map that changed is written to a snapshot after so long. 5 minutes.
     pub snapshot_interval: Duration,
@@ -69,7 +69,7 @@ impl Default for StoreSettings {
     fn default() -> Self {
         Self {
             durability: Durability::default(),
-            snapshot_journal_bytes: 64 << 20,
+            snapshot_journal_bytes: 32 << 20,
             snapshot_interval: Duration::from_secs(300),
             undo_revisions: 20_000,
             segment_bytes_max: 64 << 20,

@@ -1,7 +1,7 @@
 //! `mrol bench journal`: what durability costs.
 
 use std::fmt::{self, Display};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -69,7 +69,7 @@ impl Journal {
             .collect();
         for _ in 0..self.repeats {
             for (keeping, runs, journal) in &mut measured {
-                let folder = self.new_folder()?;
+                let folder = new_folder(self.folder.as_deref())?;
                 let (elapsed, bytes) =
                     insert(settings, &scans, *keeping, folder.path()).await.map_err(CliError::failed)?;
                 runs.push(scans.len(), elapsed);
@@ -82,14 +82,12 @@ impl Journal {
         };
         measured.iter().try_for_each(|measured| output.print(&line(measured)))
     }
+}
 
-    fn new_folder(&self) -> Result<tempfile::TempDir, CliError> {
-        let made = match &self.folder {
-            Some(folder) => tempfile::tempdir_in(folder),
-            None => tempfile::tempdir(),
-        };
-        made.map_err(|error| CliError::failed(format!("no folder can be made: {error}")))
-    }
+/// An empty folder, in `folder` or among temporary files.
+pub(super) fn new_folder(folder: Option<&Path>) -> Result<tempfile::TempDir, CliError> {
+    let made = folder.map_or_else(tempfile::tempdir, tempfile::tempdir_in);
+    made.map_err(|error| CliError::failed(format!("no folder can be made: {error}")))
 }
 
 #[derive(Serialize)]

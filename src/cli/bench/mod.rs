@@ -7,6 +7,7 @@ mod journal;
 mod lookup;
 mod readers;
 mod serve;
+mod start;
 pub(super) mod workload;
 
 use clap::Subcommand;
@@ -23,6 +24,7 @@ EXAMPLES:
   mrol bench insert --workload site
   mrol bench journal --workload site                  what it costs that nothing is lost
   mrol bench growth --workload site                   memory, and who waits, while ten million voxels go in
+  mrol bench start --workload site                    a start with ten million voxels
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench serve                                    a load of point queries on a server of its own
@@ -47,6 +49,7 @@ enum What {
     Align(align::Align),
     Readers(readers::Readers),
     Serve(serve::Serve),
+    Start(start::Start),
 }
 
 impl Bench {
@@ -58,6 +61,7 @@ impl Bench {
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
             What::Readers(readers) => readers.run(&output),
+            What::Start(start) => start.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),
         }
     }
