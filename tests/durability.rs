@@ -138,13 +138,9 @@ async fn a_server_that_is_starting_says_how_far_it_is() {
 
 #[tokio::test]
 async fn a_data_folder_of_version_1_is_opened() {
-    let data = released("data-1");
-    for _ in 0..2 {
-        let daemon = Daemon::start_in(released("data-1"), |_| {}).await;
-        let (revision, voxels) = daemon.contents("office").await;
-        assert_eq!((revision, voxels.len()), (4, 611));
-    }
-    let daemon = Daemon::start_in(data, |_| {}).await;
+    let daemon = Daemon::start_in(released("data-1"), |_| {}).await;
+    let (revision, voxels) = daemon.contents("office").await;
+    assert_eq!((revision, voxels.len()), (4, 611));
     let scans = json_of(daemon.get("/v1/maps/office/trajectory").await).await;
     assert_eq!(scans["poses"].as_array().unwrap().len(), 3);
     assert_eq!(scans["poses"][2]["revision"], 3);
@@ -154,6 +150,23 @@ async fn a_data_folder_of_version_1_is_opened() {
     let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
     assert_eq!(daemon.contents("office").await, before);
     assert!(!daemon.data.path().join("maps/office.mrol").exists());
+}
+
+/// Three scans and a deletion, a restart, two scans and an undo of the second scan, and `kill -9`.
+#[tokio::test]
+async fn a_data_folder_of_version_2_is_opened_with_its_journal() {
+    let daemon = Daemon::start_in(released("data-2"), |_| {}).await;
+    let (revision, voxels) = daemon.contents("office").await;
+    assert_eq!((revision, voxels.len()), (7, 847));
+    let scans = json_of(daemon.get("/v1/maps/office/trajectory").await).await;
+    let made: Vec<_> = scans["poses"].as_array().unwrap().iter().map(|pose| &pose["revision"]).collect();
+    assert_eq!(made, [1, 3, 5, 6]);
+    let undo = json!({"revision": 2, "request_id": "u-2"});
+    let again = json_of(daemon.post("/v1/maps/office/undo", undo).await).await;
+    assert_eq!((&again["replayed"], &again["removed"]), (&json!(true), &json!(212)));
+    // Observations reach back to the first scan.
+    let undone = json_of(daemon.post("/v1/maps/office/undo", json!({"revision": 1})).await).await;
+    assert_eq!(undone["scans"], 1);
 }
 
 #[tokio::test]

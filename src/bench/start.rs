@@ -6,11 +6,10 @@ use uuid::Uuid;
 
 use super::stopwatch::Runs;
 use super::workload::Queries;
-use crate::geometry::Pose;
 use crate::map::{Change, MapName, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
 use crate::service::{MapService, ServiceError, ServiceSettings};
 use crate::store::{DataDir, OpeningProgress, Record, Snapshot, StoreError, StoreSettings};
-use crate::voxel::VoxelSet;
+use crate::voxel::MomentSet;
 
 /// Bytes of snapshot and journal in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,26 +34,25 @@ pub fn keep(
     scan_points: usize,
     journal_bytes: u64,
 ) -> Result<Kept, StoreError> {
-    let snapshot = Snapshot::of(map, Uuid::new_v4());
+    let mut snapshot = Snapshot::of(map, Uuid::new_v4());
+    // A workload's map knows no points: as many moments as a map that robots made.
+    snapshot.contents.moments = MomentSet::of_centers(&snapshot.contents.voxels);
     let snapshot_bytes = snapshot.encode().map_or(0, |bytes| bytes.len());
     let name = MapName::new("bench").map_err(|e| StoreError::damaged(folder, e.to_string()))?;
     let kept = DataDir::open(folder, StoreSettings::default())?.create(&name, &snapshot)?;
-    let quantise = map.lattice().from_points(&points.map_from_points);
     for scan in points.points.chunks(scan_points).cycle() {
         if kept.used().journal.bytes >= journal_bytes {
             break;
         }
-        let record = record_of(VoxelSet::of_points(scan, &quantise).0, points.map_from_points);
-        kept.append(&[&record.map_err(|e| StoreError::damaged(folder, e))?])?;
+        let robot = RobotName::new("bench").map_err(|e| StoreError::damaged(folder, e.to_string()))?;
+        let pose = TrajectoryPose::new(robot, points.map_from_points);
+        let change = Change::Insertion(ScanRecord::of_points(pose, scan, map.lattice()));
+        let record = Record::of(&change).map_err(|e| StoreError::damaged(folder, e))?;
+        kept.append(&[&record])?;
     }
     kept.sync()?;
     let journal = kept.used().journal;
     Ok(Kept { snapshot_bytes, journal_bytes: journal.bytes, records: journal.records })
-}
-
-fn record_of(voxels: VoxelSet, map_from_sensor: Pose) -> Result<Record, String> {
-    let robot = RobotName::new("bench").map_err(|e| e.to_string())?;
-    Record::of(&Change::Insertion(ScanRecord { pose: TrajectoryPose::new(robot, map_from_sensor), voxels }))
 }
 
 /// Opens a service on the folder, `repeats` times: nanoseconds each.
