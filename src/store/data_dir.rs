@@ -18,8 +18,8 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::map_folder::{self, MapFolder, OpenedMap};
-use super::{Disk, FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder};
+use super::map_folder::{MapFolder, OpenedMap};
+use super::{Disk, FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, snapshot_files};
 use crate::map::MapName;
 
 const MAPS: &str = "maps";
@@ -106,8 +106,8 @@ impl DataDir {
     fn first_snapshot(&self, name: &MapName) -> Result<Snapshot, StoreError> {
         let path = self.path(name);
         let oldest =
-            map_folder::snapshot_revisions(&*self.files, &path)?.first().copied().unwrap_or_default();
-        Snapshot::read(&*self.files, &path.join(map_folder::snapshot_name(oldest)))
+            snapshot_files::snapshot_revisions(&*self.files, &path)?.first().copied().unwrap_or_default();
+        Snapshot::read(&*self.files, &path.join(snapshot_files::snapshot_name(oldest)))
     }
 
     /// Counts what opening the maps `names` will take.
@@ -116,7 +116,7 @@ impl DataDir {
     /// When a folder cannot be read.
     pub fn expect(&self, names: &[MapName], progress: &OpeningProgress) -> Result<(), StoreError> {
         for name in names {
-            progress.expect_map(map_folder::bytes_to_read(&*self.files, &self.path(name))?);
+            progress.expect_map(snapshot_files::bytes_to_read(&*self.files, &self.path(name))?);
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::journal::{self, Inspected};
-use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, map_folder};
+use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
 use crate::map::{MapName, MultiResolutionMap};
 
 /// What was found of a map.
@@ -70,8 +70,8 @@ fn read_snapshots(
     diagnosis: &mut Diagnosis,
 ) -> Result<Vec<Snapshot>, StoreError> {
     let mut snapshots: Vec<Snapshot> = Vec::new();
-    for revision in map_folder::snapshot_revisions(files, path)?.into_iter().rev() {
-        let file = path.join(map_folder::snapshot_name(revision));
+    for revision in snapshot_files::snapshot_revisions(files, path)?.into_iter().rev() {
+        let file = path.join(snapshot_files::snapshot_name(revision));
         match Snapshot::read(files, &file) {
             Ok(snapshot) if snapshot.contents.revision != revision => {
                 let found = snapshot.contents.revision;

@@ -14,7 +14,8 @@ use std::time::Instant;
 use parking_lot::Mutex;
 use uuid::Uuid;
 
-use super::journal::{Journal, JournalUse, Known, Record, Recovered, SegmentedJournal, first_revision};
+use super::journal::{Journal, JournalUse, Known, Record, Recovered, SegmentedJournal};
+use super::snapshot_files::{newest_good, set_aside, snapshot_name, snapshot_revisions};
 use super::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, retention};
 use crate::map::{MultiResolutionMap, Observations, WithdrawnScan};
 
@@ -278,66 +279,4 @@ impl MapFolder {
         let undo_from = journal.tail().map_or(journal.head() + 1, |tail| tail.max(oldest + 1));
         FolderUse { durable: journal.durable(), snapshot: newest, undo_from, journal: journal.used() }
     }
-}
-
-/// Bytes that opening the map in `folder` has to read: its newest snapshot, and the journal from there on.
-pub(super) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
-    let names = files.list(folder).map_err(StoreError::io(folder))?;
-    let newest = names.iter().filter_map(|name| snapshot_revision(name)).max().unwrap_or_default();
-    let segments: Vec<&String> = names.iter().filter(|name| first_revision(name).is_some()).collect();
-    let first = segments.partition_point(|name| first_revision(name) <= Some(newest + 1)).saturating_sub(1);
-    let snapshot = snapshot_name(newest);
-    let needed = segments[first..].iter().copied().chain(names.iter().filter(|&name| *name == snapshot));
-    needed.map(|name| files.size(&folder.join(name)).map_err(StoreError::io(folder.join(name)))).sum()
-}
-
-pub(super) fn snapshot_name(revision: u64) -> String {
-    format!("snapshot-{revision:020}.mrol")
-}
-
-fn snapshot_revision(name: &str) -> Option<u64> {
-    name.strip_prefix("snapshot-")?.strip_suffix(".mrol")?.parse().ok()
-}
-
-/// Revisions of the snapshots in `folder`, ascending.
-pub(super) fn snapshot_revisions(files: &dyn FileSystem, folder: &Path) -> Result<Vec<u64>, StoreError> {
-    let names = files.list(folder).map_err(StoreError::io(folder))?;
-    Ok(names.iter().filter_map(|name| snapshot_revision(name)).collect())
-}
-
-type Damaged = (u64, StoreError);
-
-/// The newest snapshot that can be read, and the newer ones that cannot, which leave `revisions`.
-fn newest_good(
-    files: &dyn FileSystem,
-    folder: &Path,
-    revisions: &mut Vec<u64>,
-    progress: &OpeningProgress,
-) -> Result<(Snapshot, Vec<Damaged>), StoreError> {
-    let mut damaged = Vec::new();
-    while let Some(&revision) = revisions.last() {
-        let path = folder.join(snapshot_name(revision));
-        progress.read(files.size(&path).map_err(StoreError::io(&path))?);
-        match Snapshot::read(files, &path) {
-            Ok(snapshot) if snapshot.contents.revision == revision => return Ok((snapshot, damaged)),
-            Ok(other) => {
-                let reason = format!("it holds revision {}, not that of its name", other.contents.revision);
-                damaged.push((revision, StoreError::damaged(&path, reason)));
-            }
-            Err(error @ StoreError::Damaged { .. }) => damaged.push((revision, error)),
-            Err(error) => return Err(error),
-        }
-        revisions.pop();
-    }
-    let none = || StoreError::damaged(folder, "no snapshot in it: restore one with `mrol restore`");
-    Err(damaged.into_iter().next().map_or_else(none, |(_, error)| error))
-}
-
-/// Gives damaged snapshots names under which nobody looks for them.
-fn set_aside(files: &dyn FileSystem, folder: &Path, damaged: &[Damaged]) -> Result<(), StoreError> {
-    for (revision, _) in damaged {
-        let path = folder.join(snapshot_name(*revision));
-        files.rename(&path, &path.with_extension("mrol.damaged")).map_err(StoreError::io(&path))?;
-    }
-    files.sync(folder).map_err(StoreError::io(folder))
 }

@@ -30,6 +30,7 @@ mod progress;
 mod retention;
 mod settings;
 mod snapshot;
+mod snapshot_files;
 
 pub use data_dir::DataDir;
 pub use error::StoreError;
