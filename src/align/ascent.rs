@@ -5,7 +5,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use super::AlignmentSettings;
 use super::overlap::Overlap;
 use crate::geometry::Pose;
-use crate::map::MultiResolutionMap;
+use crate::voxel::Lattice;
 
 /// How far one move shifts or turns the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,17 +16,17 @@ pub(super) struct Steps {
 
 impl Steps {
     /// dx = r_n and dtheta = 0.5 deg * 2^n by default.
-    pub(super) fn of_level(level: u32, map: &MultiResolutionMap, settings: &AlignmentSettings) -> Self {
+    pub(super) fn of_level(level: u32, lattice: &Lattice, settings: &AlignmentSettings) -> Self {
         Self {
-            translation_m: settings.translation_step * map.lattice().resolution_m(level),
+            translation_m: settings.translation_step * lattice.resolution_m(level),
             rotation_rad: settings.rotation_step_deg.to_radians() * f64::from(1u32 << level),
         }
     }
 
     /// dx = r_0 / 2 and dtheta = 0.25 deg by default.
-    pub(super) fn sub_voxel(map: &MultiResolutionMap, settings: &AlignmentSettings) -> Self {
+    pub(super) fn sub_voxel(lattice: &Lattice, settings: &AlignmentSettings) -> Self {
         Self {
-            translation_m: settings.sub_voxel_translation_step * map.lattice().resolution_m(0),
+            translation_m: settings.sub_voxel_translation_step * lattice.resolution_m(0),
             rotation_rad: settings.sub_voxel_rotation_step_deg.to_radians(),
         }
     }

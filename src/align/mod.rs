@@ -14,7 +14,7 @@ mod verdict;
 mod wide_start;
 
 pub use information::{Direction, PoseInformation};
-pub use overlap::{level_overlaps, overlap};
+pub use overlap::{OccupiedVoxels, level_overlaps, overlap};
 pub use settings::{
     AlignmentSettings, AlignmentSettingsError, Method, RefinementSettings, WideStartSettings,
 };
@@ -98,9 +98,22 @@ pub fn judge_at(
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
+/// The paper's method by itself (III-B, steps 1 to 5), on whatever knows occupied voxels: where it ends, not judged.
+pub fn ascend(
+    voxels: &dyn OccupiedVoxels,
+    points: &[Point],
+    guess: &Pose,
+    settings: &AlignmentSettings,
+) -> Pose {
+    let scan = SampledScan::new(points, settings);
+    let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
+    climb_sub_voxel(voxels, &scan, &mut ascent, settings);
+    ascent.pose
+}
+
 /// 2) - 4) Align iteratively at each level, coarse to fine, each from where the coarser one ended.
 fn climb(
-    map: &MultiResolutionMap,
+    voxels: &dyn OccupiedVoxels,
     scan: &SampledScan<'_>,
     guess: Pose,
     coarsest: u32,
@@ -109,15 +122,30 @@ fn climb(
     let mut ascent = Ascent::from(guess);
     for level in (0..=coarsest).rev() {
         let overlap = match settings.method {
-            Method::WeightedSum => Overlap::weighted_sum(map, &scan.sample, settings.lookup),
-            Method::Overlap | Method::Refined => Overlap::new(map, &scan.sample, level, settings.lookup),
+            Method::WeightedSum => Overlap::weighted_sum(voxels, &scan.sample, settings.lookup),
+            Method::Overlap | Method::Refined => Overlap::new(voxels, &scan.sample, level, settings.lookup),
         };
-        ascent.climb(&overlap, Steps::of_level(level, map, settings), settings.iterations_per_level_max);
+        let steps = Steps::of_level(level, voxels.lattice(), settings);
+        ascent.climb(&overlap, steps, settings.iterations_per_level_max);
     }
     ascent
 }
 
-/// 5) Sub-voxel alignment: with all points and small steps, or by [`refine`].
+/// 5) Sub-voxel alignment: with all points and small steps.
+fn climb_sub_voxel(
+    voxels: &dyn OccupiedVoxels,
+    scan: &SampledScan<'_>,
+    ascent: &mut Ascent,
+    settings: &AlignmentSettings,
+) {
+    let overlap = Overlap::new(voxels, scan.points, 0, settings.lookup);
+    for halvings in 0..=settings.sub_voxel_halvings {
+        let steps = Steps::sub_voxel(voxels.lattice(), settings).halved(halvings);
+        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max);
+    }
+}
+
+/// 5) as in the paper, or by [`refine`] in its place; and a verdict.
 fn finish(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
@@ -131,13 +159,7 @@ fn finish(
             ascent.pose = refined.map_from_sensor;
             ascent.iterations += refined.iterations;
         }
-        Method::Overlap | Method::WeightedSum => {
-            let overlap = Overlap::new(map, scan.points, 0, settings.lookup);
-            for halvings in 0..=settings.sub_voxel_halvings {
-                let steps = Steps::sub_voxel(map, settings).halved(halvings);
-                ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max);
-            }
-        }
+        Method::Overlap | Method::WeightedSum => climb_sub_voxel(map, scan, &mut ascent, settings),
     }
     let (metres, degrees) = pose_difference(&climbed, &ascent.pose);
     fit(

@@ -4,45 +4,69 @@ use std::ops::RangeInclusive;
 
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MultiResolutionMap};
+use crate::voxel::Lattice;
 
-/// The overlap of some points with one or more levels of a map, as a function of their pose.
-#[derive(Debug, Clone)]
-pub(super) struct Overlap<'a> {
-    map: &'a MultiResolutionMap,
-    points: &'a [Point],
-    levels: RangeInclusive<u32>,
-    lookup: Lookup,
+/// What alignment by overlap asks: of a map, or of another structure that is compared with it.
+pub trait OccupiedVoxels: std::fmt::Debug {
+    /// Its lattices.
+    fn lattice(&self) -> &Lattice;
+
+    /// Number of `points` in occupied voxels of `level`, for each of `poses` (map_from_points).
+    fn hits(&self, points: &[Point], poses: &[Pose], level: u32, lookup: Lookup) -> Vec<usize>;
 }
 
 /// Look-ups made under one set of locks: well below a millisecond, so that a committer never waits long.
 const LOOKUPS_PER_LOCK: usize = 50_000;
 
+impl OccupiedVoxels for MultiResolutionMap {
+    fn lattice(&self) -> &Lattice {
+        self.lattice()
+    }
+
+    fn hits(&self, points: &[Point], poses: &[Pose], level: u32, lookup: Lookup) -> Vec<usize> {
+        let poses_per_lock = (LOOKUPS_PER_LOCK / points.len().max(1)).max(1);
+        let hits = poses.chunks(poses_per_lock).flat_map(|poses| {
+            let view = self.view();
+            let count = |pose| view.count(points, &self.lattice().from_points(pose), level, lookup);
+            poses.iter().map(count).collect::<Vec<_>>()
+        });
+        hits.collect()
+    }
+}
+
+/// The overlap of some points with one or more levels of a map, as a function of their pose.
+#[derive(Debug, Clone)]
+pub(super) struct Overlap<'a> {
+    voxels: &'a dyn OccupiedVoxels,
+    points: &'a [Point],
+    levels: RangeInclusive<u32>,
+    lookup: Lookup,
+}
+
 impl<'a> Overlap<'a> {
     /// At one level.
-    pub(super) fn new(map: &'a MultiResolutionMap, points: &'a [Point], level: u32, lookup: Lookup) -> Self {
-        Self { map, points, levels: level..=level, lookup }
+    pub(super) fn new(
+        voxels: &'a dyn OccupiedVoxels,
+        points: &'a [Point],
+        level: u32,
+        lookup: Lookup,
+    ) -> Self {
+        Self { voxels, points, levels: level..=level, lookup }
     }
 
     /// At all levels, summed: a level counts twice as much as the next coarser one (paper \[9\]).
-    pub(super) fn weighted_sum(map: &'a MultiResolutionMap, points: &'a [Point], lookup: Lookup) -> Self {
-        Self { map, points, levels: 0..=map.settings().levels - 1, lookup }
+    pub(super) fn weighted_sum(voxels: &'a dyn OccupiedVoxels, points: &'a [Point], lookup: Lookup) -> Self {
+        Self { voxels, points, levels: 0..=voxels.lattice().levels() - 1, lookup }
     }
 
     /// Points whose voxel is occupied, for each candidate pose.
     pub(super) fn at(&self, poses: &[Pose]) -> Vec<usize> {
-        let poses_per_lock = (LOOKUPS_PER_LOCK / self.points.len().max(1)).max(1);
-        let counts = poses.chunks(poses_per_lock).flat_map(|poses| {
-            let view = self.map.view();
-            let count = |pose: &Pose| {
-                let quantise = self.map.lattice().from_points(pose);
-                let hits = |level: u32| {
-                    view.count(self.points, &quantise, level, self.lookup) << (self.levels.end() - level)
-                };
-                self.levels.clone().map(hits).sum::<usize>()
-            };
-            poses.iter().map(count).collect::<Vec<_>>()
-        });
-        counts.collect()
+        let mut heights = vec![0; poses.len()];
+        for level in self.levels.clone() {
+            let hits = self.voxels.hits(self.points, poses, level, self.lookup);
+            heights.iter_mut().zip(hits).for_each(|(sum, hits)| *sum += hits << (self.levels.end() - level));
+        }
+        heights
     }
 
     /// Look-ups that one pose costs.

@@ -5,9 +5,12 @@
 
 pub mod align;
 pub mod compare;
+pub mod convergence;
+pub mod drift;
 pub mod growth;
 pub mod insert;
 pub mod journal;
+pub mod mapping;
 pub mod readers;
 pub mod stages;
 pub mod start;

@@ -24,6 +24,7 @@ mod query;
 mod remote;
 mod runtime;
 mod scan_report;
+mod sequence;
 mod serve;
 mod snapshot;
 mod statistics;

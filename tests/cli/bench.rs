@@ -1,18 +1,8 @@
-//! `mrol bench` and `mrol experiment`: what is measured is there and makes sense; how fast it is, is not tested.
+//! `mrol bench`: what is measured is there and makes sense; how fast it is, is not tested.
 
+use super::{Sequence, complaint, mrol, number, objects, texts};
 use mrol::geometry::Point;
 use mrol::scan::{write_f32, write_ply};
-use serde_json::Value;
-
-use super::{Sequence, complaint, mrol, objects};
-
-fn number(line: &Value, field: &str) -> f64 {
-    line[field].as_f64().unwrap_or_else(|| panic!("{field} in {line}"))
-}
-
-fn texts<'a>(lines: &'a [Value], field: &str) -> Vec<&'a str> {
-    lines.iter().map(|line| line[field].as_str().unwrap()).collect()
-}
 
 #[test]
 fn structures_answer_alike_and_each_has_a_line() {
@@ -113,29 +103,4 @@ fn a_server_of_its_own_is_asked_by_every_protocol() {
         assert!(number(line, "p50_us") > 0.0 && number(line, "p99_us") >= number(line, "p50_us"), "{line}");
         assert!((0.03..0.2).contains(&number(line, "share_occupied")), "{line}");
     }
-}
-
-#[test]
-fn experiment_1_leaves_a_plot_and_its_numbers() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("new/results");
-    let out_dir = out.to_str().unwrap();
-    let lines = objects(&["experiment", "lookup", "--out", out_dir, "--runs", "3", "--points", "2000"]);
-    assert_eq!(lines.len(), 8);
-    let csv = std::fs::read_to_string(out.join("lookup.csv")).unwrap();
-    assert_eq!(csv.lines().count(), 1 + 8 * 3);
-    let svg = std::fs::read_to_string(out.join("lookup.svg")).unwrap();
-    assert!(texts(&lines, "stage").iter().all(|stage| svg.contains(stage) && csv.contains(stage)));
-}
-
-#[test]
-fn scaling_leaves_a_plot_and_tables() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let sizes = ["--sizes", "2000,20000", "--points", "2000", "--repeats", "1"];
-    let lines = objects(&[&["experiment", "scaling", "--out", out][..], &sizes].concat());
-    assert_eq!(lines.len(), 2 * 2 * 3);
-    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
-    assert_eq!((read("scaling.csv").lines().count(), read("scaling.md").lines().count()), (13, 4));
-    assert!(read("scaling.svg").contains("hashset, scan"));
 }

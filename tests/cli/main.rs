@@ -6,6 +6,7 @@ mod bench;
 mod demo;
 mod doctor;
 mod errors;
+mod experiment;
 mod help;
 mod local;
 mod localize;
@@ -32,6 +33,16 @@ fn objects(arguments: &[&str]) -> Vec<Value> {
     let output = mrol(arguments).arg("--json").assert().success().get_output().clone();
     let lines = String::from_utf8(output.stdout).unwrap();
     lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// A number of a printed object.
+fn number(line: &Value, field: &str) -> f64 {
+    line[field].as_f64().unwrap_or_else(|| panic!("{field} in {line}"))
+}
+
+/// A text of each of them.
+fn texts<'a>(lines: &'a [Value], field: &str) -> Vec<&'a str> {
+    lines.iter().map(|line| line[field].as_str().unwrap()).collect()
 }
 
 /// What a call says on standard error, which must end with `code`.

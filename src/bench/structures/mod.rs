@@ -3,6 +3,7 @@
 
 mod dense;
 mod hash_set;
+mod hash_tables;
 mod ours;
 mod paper;
 
@@ -14,6 +15,7 @@ use crate::map::{Lookup, MapView, MultiResolutionMap};
 use crate::voxel::{LatticeFromPoints, VoxelKey};
 pub use dense::{DENSE_BYTES_MAX, Dense, DenseTooLarge};
 pub use hash_set::{HashSet, hash_set_bytes};
+pub use hash_tables::HashTables;
 pub use ours::{Kernel, ThroughMap};
 pub use paper::PaperFilter;
 
@@ -116,6 +118,23 @@ fn occupied_by_key(
         stages::keys(points, lattice_from_points, level, keys);
         bits(keys, words, |&key| contains(key));
     }
+}
+
+/// How many points have a key that is contained; see [`occupied_by_key`].
+#[inline(always)]
+fn count_by_key(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    level: u32,
+    contains: impl Fn(u64) -> bool,
+) -> usize {
+    let mut keys = [0; CHUNK];
+    let count = |points: &[Point]| {
+        let keys = &mut keys[..points.len()];
+        stages::keys(points, lattice_from_points, level, keys);
+        keys.iter().filter(|&&key| contains(key)).count()
+    };
+    points.chunks(CHUNK).map(count).sum()
 }
 
 /// A bit for each item: item i is bit i % 64 of `words[i / 64]`.

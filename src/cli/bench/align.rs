@@ -3,8 +3,6 @@
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::workload::{MapOptions, times};
@@ -13,11 +11,10 @@ use crate::bench::align::{Aligned, Scan, align_each};
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
+use crate::cli::sequence;
 use crate::cli::statistics::Statistics;
-use crate::cli::truth::true_poses;
-use crate::geometry::Point;
 use crate::map::{Lookup, RobotName};
-use crate::scan::{Scene, read_points, scan_files, tours};
+use crate::scan::tours;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -58,7 +55,7 @@ pub(super) struct Align {
 impl Align {
     pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
         let settings = self.map.settings(self.resolution)?;
-        let scans = if self.scans.is_empty() { self.simulated() } else { self.scans_of_files(output)? };
+        let scans = self.scans(output)?;
         if scans.len() < 2 {
             return Err(CliError::failed(
                 "at least two scans are needed: the second is aligned to the first",
@@ -76,31 +73,14 @@ impl Align {
         aligned.iter().try_for_each(|aligned| output.print(&Line::of(aligned)))
     }
 
-    fn simulated(&self) -> Vec<Scan> {
-        let (scene, mut random) = (Scene::furnished(self.seed), ChaCha8Rng::seed_from_u64(self.seed));
-        let [lidar, _] = tours(self.scans_max.into());
-        let scan = |pose| Scan {
-            points: finite(lidar.sensor.scan(&scene, pose, &mut random)),
-            map_from_sensor: Some(*pose),
-        };
-        lidar.poses.iter().map(scan).collect()
+    fn scans(&self, output: &Output) -> Result<Vec<Scan>, CliError> {
+        let scans_max = self.scans_max.into();
+        if self.scans.is_empty() {
+            let [lidar, _] = tours(scans_max);
+            return Ok(sequence::simulate(&lidar, self.seed));
+        }
+        sequence::read(&self.scans, self.truth.as_deref(), scans_max, output)
     }
-
-    fn scans_of_files(&self, output: &Output) -> Result<Vec<Scan>, CliError> {
-        let mut files = scan_files(&self.scans)?;
-        files.truncate(self.scans_max.into());
-        let poses = self.truth.as_ref().map(|path| true_poses(path, files.len(), output)).transpose()?;
-        let read = |(k, file): (usize, &PathBuf)| {
-            let map_from_sensor = poses.as_ref().map(|poses| poses[k]);
-            Ok(Scan { points: finite(read_points(file)?), map_from_sensor })
-        };
-        files.iter().enumerate().map(read).collect()
-    }
-}
-
-fn finite(mut points: Vec<Point>) -> Vec<Point> {
-    points.retain(|point| point.is_finite());
-    points
 }
 
 /// Of one method.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::chart::{Curve, curves};
+use super::chart::{Axis, Curve, Panel, Scale, Style, panels};
 use super::table::{Table, folder};
 use crate::bench::compare::compare;
 use crate::bench::structures::{Structure, StructureName};
@@ -95,10 +95,15 @@ impl Scaling {
             csv.push([&voxels.to_string(), *order, structure, &ns, &rate]);
         }
         csv.write_csv(&self.out.join("scaling.csv"))?;
-        let curves_of_lines: Vec<Curve> = ORDERS.iter().flat_map(|order| of_order(lines, *order)).collect();
-        markdown(&curves_of_lines).write_markdown(&self.out.join("scaling.md"))?;
-        let title = "Time to look up a point of a site of 0.1 m, one core";
-        curves(&self.out.join("scaling.svg"), title, &curves_of_lines)
+        let curves: Vec<Curve> = ORDERS.iter().flat_map(|order| of_order(lines, *order)).collect();
+        markdown(&curves).write_markdown(&self.out.join("scaling.md"))?;
+        let panel = Panel {
+            title: "Time to look up a point of a site of 0.1 m, one core".into(),
+            x: Axis { name: "voxels", scale: Scale::Logarithmic },
+            y: Axis { name: "ns a point", scale: Scale::Linear },
+            curves,
+        };
+        panels(&self.out.join("scaling.svg"), &[panel])
     }
 }
 
@@ -126,7 +131,7 @@ fn of_order(lines: &[Line], order: Order) -> impl Iterator<Item = Curve> {
         Curve {
             name: format!("{structure}, {order_name}"),
             colour,
-            dashed: order == Order::Scan,
+            style: if order == Order::Scan { Style::Dashed } else { Style::Solid },
             points: own.map(|line| (line.voxels as f64, line.ns_per_point)).collect(),
         }
     })

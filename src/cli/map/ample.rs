@@ -7,20 +7,20 @@ use serde::Serialize;
 /// Every look-up is counted as one of an absent voxel, at the rate of the worst level: an upper bound. Below
 /// one, the filters are ample, and the poses are those of the exact sets (paper IV-B).
 #[derive(Debug, Default)]
-pub(super) struct FalsePositives {
+pub(in crate::cli) struct FalsePositives {
     lookups: u64,
     expected: f64,
 }
 
 impl FalsePositives {
     /// Counts the look-ups of one alignment, made at that false positive rate.
-    pub(super) fn add(&mut self, lookups: u64, rate: f64) {
+    pub(in crate::cli) fn add(&mut self, lookups: u64, rate: f64) {
         self.lookups += lookups;
         self.expected += lookups as f64 * rate;
     }
 
     /// What it comes to; `rate` is that at the end.
-    pub(super) fn summary(&self, rate: f64) -> FilterSummary {
+    pub(in crate::cli) fn summary(&self, rate: f64) -> FilterSummary {
         FilterSummary {
             lookups: self.lookups,
             expected_false_positive_rate: rate,
@@ -32,11 +32,11 @@ impl FalsePositives {
 
 /// See [`FalsePositives`].
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct FilterSummary {
-    pub(super) lookups: u64,
-    pub(super) expected_false_positive_rate: f64,
-    pub(super) expected_false_positives: f64,
-    pub(super) ample: bool,
+pub(in crate::cli) struct FilterSummary {
+    pub(in crate::cli) lookups: u64,
+    pub(in crate::cli) expected_false_positive_rate: f64,
+    pub(in crate::cli) expected_false_positives: f64,
+    pub(in crate::cli) ample: bool,
 }
 
 #[cfg(test)]

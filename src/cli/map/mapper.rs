@@ -11,7 +11,7 @@ use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord,
 const ROBOT: &str = "mrol";
 
 /// A map that grows scan by scan.
-pub(super) struct Mapper {
+pub(in crate::cli) struct Mapper {
     map: MultiResolutionMap,
     settings: AlignmentSettings,
     robot: RobotName,
@@ -23,26 +23,30 @@ pub(super) struct Mapper {
 }
 
 /// What became of a scan.
-pub(super) struct Mapped {
-    pub(super) alignment: Alignment,
+pub(in crate::cli) struct Mapped {
+    pub(in crate::cli) alignment: Alignment,
     /// Finest voxels that it added.
-    pub(super) new_voxels: usize,
+    pub(in crate::cli) new_voxels: usize,
     /// Finest voxels after it.
-    pub(super) voxels: usize,
+    pub(in crate::cli) voxels: usize,
     /// What the filters were expected to let through while it was aligned.
-    pub(super) false_positive_rate: f64,
-    pub(super) align_time: Duration,
-    pub(super) insert_time: Duration,
+    pub(in crate::cli) false_positive_rate: f64,
+    pub(in crate::cli) align_time: Duration,
+    pub(in crate::cli) insert_time: Duration,
 }
 
 impl Mapped {
-    pub(super) fn accepted(&self) -> bool {
+    pub(in crate::cli) fn accepted(&self) -> bool {
         self.alignment.verdict == Verdict::Accepted
     }
 }
 
 impl Mapper {
-    pub(super) fn new(map: MapSettings, settings: AlignmentSettings, guess: Guess) -> Result<Self, CliError> {
+    pub(in crate::cli) fn new(
+        map: MapSettings,
+        settings: AlignmentSettings,
+        guess: Guess,
+    ) -> Result<Self, CliError> {
         Ok(Self {
             map: MultiResolutionMap::new(map).map_err(CliError::usage)?,
             settings,
@@ -53,12 +57,12 @@ impl Mapper {
         })
     }
 
-    pub(super) fn map(&self) -> &MultiResolutionMap {
+    pub(in crate::cli) fn map(&self) -> &MultiResolutionMap {
         &self.map
     }
 
     /// True when the alignment asks the filters alone.
-    pub(super) fn asks_filters(&self) -> bool {
+    pub(in crate::cli) fn asks_filters(&self) -> bool {
         self.settings.lookup == Lookup::Bloom
     }
 
@@ -66,7 +70,12 @@ impl Mapper {
     ///
     /// # Errors
     /// When no point of it lies within the map's range.
-    pub(super) fn add(&mut self, k: usize, points: &[Point], known: Option<Pose>) -> Result<Mapped, String> {
+    pub(in crate::cli) fn add(
+        &mut self,
+        k: usize,
+        points: &[Point],
+        known: Option<Pose>,
+    ) -> Result<Mapped, String> {
         let false_positive_rate = if self.asks_filters() { self.false_positive_rate() } else { 0.0 };
         let start = Instant::now();
         let alignment = self.place(points, known);
@@ -119,7 +128,7 @@ impl Mapper {
     }
 
     /// The largest of the levels' expected false positive rates, as the filters are filled now.
-    pub(super) fn false_positive_rate(&self) -> f64 {
+    pub(in crate::cli) fn false_positive_rate(&self) -> f64 {
         let view = self.map.view();
         let of_level = |level| {
             let (mut voxels, mut expected) = (0.0, 0.0);

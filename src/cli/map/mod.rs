@@ -1,9 +1,9 @@
 //! `mrol map`: scans to a map in this process, without a server.
 
-mod ample;
-mod mapper;
+pub(super) mod ample;
+pub(super) mod mapper;
 mod report;
-mod truth_errors;
+pub(super) mod truth_errors;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -9,7 +9,7 @@ use crate::geometry::{Pose, pose_difference};
 ///
 /// The error of scan k is that of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first scan that was
 /// accepted: it does not matter where the map's origin lies.
-pub(super) struct TruthErrors {
+pub(in crate::cli) struct TruthErrors {
     truth: Vec<Pose>,
     /// E_0 and T_0.
     first: Option<(Pose, Pose)>,
@@ -19,23 +19,23 @@ pub(super) struct TruthErrors {
 
 /// What the errors come to.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct ErrorSummary {
-    pub(super) metres: Statistics,
-    pub(super) degrees: Statistics,
+pub(in crate::cli) struct ErrorSummary {
+    pub(in crate::cli) metres: Statistics,
+    pub(in crate::cli) degrees: Statistics,
 }
 
 impl TruthErrors {
-    pub(super) fn new(truth: Vec<Pose>) -> Self {
+    pub(in crate::cli) fn new(truth: Vec<Pose>) -> Self {
         Self { truth, first: None, metres: Vec::new(), degrees: Vec::new() }
     }
 
     /// T_k.
-    pub(super) fn pose(&self, k: usize) -> Pose {
+    pub(in crate::cli) fn pose(&self, k: usize) -> Pose {
         self.truth[k]
     }
 
     /// Notes that scan `k` was found at `map_from_sensor`; its error, metres and degrees.
-    pub(super) fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
+    pub(in crate::cli) fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
         let (found_first, true_first) = *self.first.get_or_insert((*map_from_sensor, self.truth[k]));
         let found = found_first.inv_mul(map_from_sensor);
         let error = pose_difference(&true_first.inv_mul(&self.truth[k]), &found);
@@ -45,7 +45,7 @@ impl TruthErrors {
     }
 
     /// None before the first scan.
-    pub(super) fn summary(&self) -> Option<ErrorSummary> {
+    pub(in crate::cli) fn summary(&self) -> Option<ErrorSummary> {
         let metres = Statistics::of(self.metres.clone())?;
         Some(ErrorSummary { metres, degrees: Statistics::of(self.degrees.clone())? })
     }
