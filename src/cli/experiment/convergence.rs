@@ -26,8 +26,9 @@ EXAMPLES:
 
 The source scan is aligned to a map of the target scan alone, from guesses that are off in a uniform direction and about
 a uniform axis, by up to 2 m and 40 degrees, both uniform. A trial converged that ends within 0.1 m and 1 degree of the
-truth. Line k of the truth belongs to the k-th scan of the folder that a scan lies in. Writes guesses.csv (target_from_
-source), convergence.csv (every trial) and convergence.md (a row for each 0.5 m and 10 degrees of offset).
+truth. Line k of the truth belongs to the k-th scan of the folder that a scan lies in. Writes guesses.csv (poses of the
+source in the target's frame), convergence.csv (every trial) and convergence.md (a row for each 0.5 m and 10 degrees of
+offset). 200 trials take some minutes.
 benches/peers/icp.py takes guesses.csv and adds others to the comparison.";
 
 const METHODS: [Method; 2] = [Method::Refined, Method::Overlap];
