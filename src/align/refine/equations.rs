@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
+use super::gaussian::Gaussian;
 use super::gaussians::VoxelGaussians;
 use crate::geometry::{Point, Pose};
 use crate::map::MapView;
@@ -20,8 +21,6 @@ pub(super) struct NormalEquations {
     pub(super) matched: usize,
     /// Points nearer to theirs than the robust scale.
     pub(super) inliers: usize,
-    /// Distinct Gaussians that have points.
-    surfaces: usize,
     /// Sum of each matched point's weight, 1 for one that lies on its surface.
     fitness: f64,
 }
@@ -42,51 +41,25 @@ impl NormalEquations {
             points: points.len(),
             matched: 0,
             inliers: 0,
-            surfaces: 0,
             fitness: 0.0,
         };
-        let rotation = pose.rotation.to_rotation_matrix();
-        let scale = robust_scale * robust_scale;
-        let mut seen = vec![false; gaussians.len()];
-        for point in points {
-            let from_sensor = rotation * point.to_f64().coords;
-            let in_map = from_sensor + pose.translation.vector;
-            let Some(number) = gaussians.nearest(view, &in_map) else {
-                continue;
-            };
-            seen.resize(seen.len().max(gaussians.len()), false);
-            equations.surfaces += usize::from(!std::mem::replace(&mut seen[number as usize], true));
-            let gaussian = gaussians.get(number);
-            let error = gaussian.to(&in_map);
-            let pull = gaussian.information() * error;
-            let distance = error.dot(&pull);
-            let fit = scale / (scale + distance);
+        for_each_match(points, pose, gaussians, view, robust_scale, |_, gaussian, matched| {
+            let weight = matched.fit * matched.fit;
             equations.matched += 1;
-            equations.inliers += usize::from(distance < scale);
-            equations.fitness += fit;
-            equations.add(&from_sensor, gaussian.information() * (fit * fit), pull * (fit * fit));
-        }
+            equations.inliers += usize::from(matched.is_inlier);
+            equations.fitness += matched.fit;
+            equations.hessian += hessian(&matched.from_sensor, &(gaussian.information() * weight));
+            let pull = gaussian.information() * matched.error * weight;
+            equations.pull(&matched.from_sensor, &pull);
+        });
         equations
     }
 
-    /// Adds a point whose error has the Jacobian (I, -\[p\]x), p from the sensor along the map's axes.
-    fn add(&mut self, from_sensor: &Vector3<f64>, weight: Matrix3<f64>, pull: Vector3<f64>) {
-        let cross = from_sensor.cross_matrix();
-        let weight_cross = weight * -cross;
-        let turning = cross * weight_cross;
-        for row in 0..3 {
-            for column in 0..3 {
-                self.hessian[(row, column)] += weight[(row, column)];
-                self.hessian[(row, column + 3)] += weight_cross[(row, column)];
-                self.hessian[(row + 3, column)] += weight_cross[(column, row)];
-                self.hessian[(row + 3, column + 3)] += turning[(row, column)];
-            }
-        }
-        let torque = from_sensor.cross(&pull);
+    fn pull(&mut self, from_sensor: &Vector3<f64>, pull: &Vector3<f64>) {
         let mut translation = self.gradient.fixed_rows_mut::<3>(0);
         translation += pull;
         let mut rotation = self.gradient.fixed_rows_mut::<3>(3);
-        rotation += torque;
+        rotation += from_sensor.cross(pull);
     }
 
     /// The change of pose that they ask for; none where they say nothing.
@@ -97,16 +70,78 @@ impl NormalEquations {
         Some(Step(-damped.cholesky()?.solve(&self.gradient)))
     }
 
-    /// The inverse covariance of the pose: the points of one voxel share what is wrong with its Gaussian, and so count
-    /// as one measurement together.
-    pub(super) fn information(&self) -> Matrix6<f64> {
-        self.hessian * (self.surfaces as f64 / self.matched.max(1) as f64)
-    }
-
     /// How well all points lie on surfaces: 1 where each does, a point without one adds nothing.
     pub(super) fn fitness(&self) -> f64 {
         self.fitness / self.points.max(1) as f64
     }
+}
+
+/// The inverse covariance of a pose at which points lie on surfaces.
+///
+/// The points of one voxel average their noise, but share what is wrong with its Gaussian: together they are one
+/// measurement with the variance of the Gaussian's floor and an n-th of its thickness.
+pub(super) fn information(
+    points: &[Point],
+    pose: &Pose,
+    gaussians: &mut VoxelGaussians,
+    view: &MapView<'_>,
+    robust_scale: f64,
+) -> Matrix6<f64> {
+    let mut surfaces: Vec<(f64, Matrix6<f64>)> = Vec::new();
+    for_each_match(points, pose, gaussians, view, robust_scale, |number, gaussian, matched| {
+        surfaces.resize(surfaces.len().max(number + 1), (0.0, Matrix6::zeros()));
+        let (count, sum) = &mut surfaces[number];
+        *count += 1.0;
+        *sum += hessian(&matched.from_sensor, &(gaussian.information() * (matched.fit * matched.fit)));
+    });
+    let held = surfaces.iter().enumerate().filter(|(_, (count, _))| *count > 0.0);
+    held.map(|(number, (count, sum))| sum * (gaussians.get(number as u32).averaging(*count) / count)).sum()
+}
+
+/// A point and the Gaussian that it belongs to.
+struct Match {
+    /// From the sensor to the point, along the map's axes, metres.
+    from_sensor: Vector3<f64>,
+    /// From the Gaussian's mean to the point, metres.
+    error: Vector3<f64>,
+    /// 1 on the surface, a half at the robust scale.
+    fit: f64,
+    /// Nearer than the robust scale.
+    is_inlier: bool,
+}
+
+fn for_each_match(
+    points: &[Point],
+    pose: &Pose,
+    gaussians: &mut VoxelGaussians,
+    view: &MapView<'_>,
+    robust_scale: f64,
+    mut f: impl FnMut(usize, &Gaussian, Match),
+) {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let scale = robust_scale * robust_scale;
+    for point in points {
+        let from_sensor = rotation * point.to_f64().coords;
+        let in_map = from_sensor + pose.translation.vector;
+        if let Some(number) = gaussians.nearest(view, &in_map) {
+            let gaussian = gaussians.get(number);
+            let distance = gaussian.distance_squared(&in_map);
+            let (error, fit) = (gaussian.to(&in_map), scale / (scale + distance));
+            f(number as usize, gaussian, Match { from_sensor, error, fit, is_inlier: distance < scale });
+        }
+    }
+}
+
+/// J^T W J of a point whose error has the Jacobian J = (I, -\[p\]x), p from the sensor along the map's axes.
+fn hessian(from_sensor: &Vector3<f64>, weight: &Matrix3<f64>) -> Matrix6<f64> {
+    let cross = from_sensor.cross_matrix();
+    let weight_cross = weight * -cross;
+    let mut hessian = Matrix6::zeros();
+    hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(weight);
+    hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&weight_cross);
+    hessian.fixed_view_mut::<3, 3>(3, 0).copy_from(&weight_cross.transpose());
+    hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&(cross * weight_cross));
+    hessian
 }
 
 /// A change of pose: metres along the map's axes, radians about them through the sensor.

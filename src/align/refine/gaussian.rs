@@ -28,6 +28,8 @@ pub(super) struct Gaussian {
     variances: Vector3<f64>,
     axes: Matrix3<f64>,
     side_m: f64,
+    /// Variance that it was softened by.
+    noise: f64,
     /// Inverse covariance, of the directions that are determined, 1 / m^2.
     information: Matrix3<f64>,
 }
@@ -49,6 +51,7 @@ impl Gaussian {
             variances: eigen.eigenvalues.map(|variance| variance.max(0.0)),
             axes: eigen.eigenvectors,
             side_m,
+            noise: f64::INFINITY,
             information: Matrix3::zeros(),
         })
     }
@@ -56,6 +59,7 @@ impl Gaussian {
     /// Takes points for uncertain by `softness.std_m` in every direction, on top of the surface's own spread.
     pub(super) fn soften(&mut self, softness: Softness) {
         let noise = softness.std_m * softness.std_m;
+        self.noise = noise;
         let without = 1.0 / (softness.spread * self.side_m * self.side_m + noise);
         let information = self.variances.map(|variance| (1.0 / (variance + noise) - without).max(0.0));
         self.information = self.axes * Matrix3::from_diagonal(&information) * self.axes.transpose();
@@ -64,6 +68,13 @@ impl Gaussian {
     /// The information matrix as last softened, 1 / m^2.
     pub(super) fn information(&self) -> &Matrix3<f64> {
         &self.information
+    }
+
+    /// By how much better `count` points together say where the surface is than one of them: they average its thickness, not
+    /// the noise that it was softened by.
+    pub(super) fn averaging(&self, count: f64) -> f64 {
+        let (thickness, noise) = (self.variances.min(), self.noise);
+        (thickness + noise) / (thickness / count + noise)
     }
 
     /// From the mean to a point of the map frame, metres.

@@ -33,11 +33,6 @@ impl VoxelGaussians {
         self.gaussians.iter_mut().for_each(|gaussian| gaussian.soften(softness));
     }
 
-    /// Number of Gaussians made so far; those of [`VoxelGaussians::nearest`] are numbered below it.
-    pub(super) fn len(&self) -> usize {
-        self.gaussians.len()
-    }
-
     /// The Gaussian of number `i`.
     pub(super) fn get(&self, i: u32) -> &Gaussian {
         &self.gaussians[i as usize]

@@ -13,7 +13,7 @@ use super::PoseInformation;
 use super::settings::RefinementSettings;
 use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
-use equations::NormalEquations;
+use equations::{NormalEquations, information};
 use gaussian::Softness;
 use gaussians::VoxelGaussians;
 
@@ -90,8 +90,10 @@ pub(super) fn surface_fit(
     let mut gaussians = VoxelGaussians::new(map, Softness { std_m, spread: SPREAD_TO_JUDGE });
     let equations =
         NormalEquations::of(points, map_from_sensor, &mut gaussians, &map.view(), settings.robust_scale);
+    let information =
+        information(points, map_from_sensor, &mut gaussians, &map.view(), settings.robust_scale);
     SurfaceFit {
-        information: PoseInformation::new(equations.information(), points),
+        information: PoseInformation::new(information, points),
         inliers: equations.inliers as f64 / points.len().max(1) as f64,
         fitness: equations.fitness(),
     }

@@ -58,6 +58,7 @@ impl Journal {
             scan: news.scan,
             scans: news.scans,
             verdict: answer.verdict.as_str(),
+            reason: answer.reason.clone(),
             overlap: answer.overlap(),
             error_m: news.error.0,
             error_deg: news.error.1,

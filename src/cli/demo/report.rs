@@ -67,6 +67,7 @@ pub(super) struct Line {
     #[serde(skip)]
     pub(super) scans: usize,
     pub(super) verdict: &'static str,
+    pub(super) reason: String,
     pub(super) overlap: f64,
     pub(super) error_m: f64,
     pub(super) error_deg: f64,
@@ -101,6 +102,10 @@ impl Display for Line {
         write!(f, "  {:>10}  {:>10}", count(self.new_voxels), count(self.voxels))?;
         let (rate, share) = (self.planner_points_per_s / 1e6, percent(self.planner_share_occupied));
         write!(f, "  {rate:>6.1} M points/s, {share:>6} occupied")?;
-        if self.verdict == "accepted" { Ok(()) } else { write!(f, "  REFUSED: {}", self.verdict) }
+        if self.verdict == "accepted" {
+            Ok(())
+        } else {
+            write!(f, "  REFUSED, {}: {}", self.verdict, self.reason)
+        }
     }
 }
