@@ -110,7 +110,7 @@ pub struct WideStartSettings {
     pub motion_above: f64,
     /// The same of a pose that is turned by more than this against its guess, degrees. 30.
     pub motion_above_deg: f64,
-    /// Ascents of the guesses that look best, at most. 8.
+    /// Ascents of the guesses that look best, at most. 8; 0 believes every end.
     pub ascents: usize,
     /// Two ends are equally good where the worse fits at least this fraction as well as the better. 0.95.
     pub ambiguous_fitness: f64,

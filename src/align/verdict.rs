@@ -79,6 +79,9 @@ impl Alignment {
     ) -> bool {
         let (resolution_m, wide_start) = (map.lattice().resolution_m(0), &settings.wide_start);
         let (metres, degrees) = pose_difference(guess, &self.map_from_sensor);
+        if wide_start.ascents == 0 {
+            return false;
+        }
         self.fitness < wide_start.fitness_below
             || self.refined_by_m > settings.refinement_reach * resolution_m
             || self.information.directions()[0].std_m > wide_start.std_above * resolution_m

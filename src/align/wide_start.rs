@@ -63,6 +63,16 @@ pub(super) fn align(
     };
     let best = Alignment { lookups, ..found.iter().fold(first.clone(), better) };
     found.push(first);
+    // Where starts far apart end at one pose, it is held, however far the refinement had to carry it.
+    let ended_there =
+        found.iter().filter(|found| is_same(&found.map_from_sensor, &best.map_from_sensor)).count();
+    let best = match best.verdict {
+        Verdict::Undetermined if best.undetermined.is_empty() && ended_there > 1 => {
+            let reason = format!("{ended_there} starts ended there, at overlap {:.3}", best.overlap());
+            best.but(Verdict::Accepted, reason)
+        }
+        _ => best,
+    };
     let as_good = found.iter().find(|other| {
         !is_same(&other.map_from_sensor, &best.map_from_sensor)
             && other.fitness >= settings.wide_start.ambiguous_fitness * best.fitness
