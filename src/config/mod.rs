@@ -1,5 +1,13 @@
 //! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
 
+mod limits;
+mod scans;
+mod store;
+
+pub use limits::LimitsConfig;
+pub use scans::{AlignmentConfig, MethodConfig, RobotConfig};
+pub use store::StoreConfig;
+
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -9,11 +17,10 @@ use figment::Figment;
 use figment::providers::{Env, Format, Serialized, Toml};
 use serde::{Deserialize, Serialize};
 
-use crate::align::{AlignmentSettings, Method};
+use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
-use crate::scan::{PointFilter, PointFilterError};
-use crate::service::{Limits, ServiceSettings, StandingSettings};
-use crate::store::{Durability, StoreSettings};
+use crate::scan::PointFilterError;
+use crate::service::{ServiceSettings, StandingSettings};
 use crate::telemetry::LogFormat;
 
 /// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
@@ -45,21 +52,6 @@ pub struct Config {
     pub robots: BTreeMap<String, RobotConfig>,
     /// Bounds on what callers may ask.
     pub limits: LimitsConfig,
-}
-
-/// How maps are kept; see [`StoreSettings`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StoreConfig {
-    /// `always`: what is acknowledged is synced; or an interval (`200ms`, `1s`) at which it is. `always`.
-    #[serde(with = "as_text")]
-    pub durability: Durability,
-    /// MiB of journal after which a map is written to a snapshot. 32.
-    pub snapshot_journal_mib: u64,
-    /// Seconds after which a map that changed is written to a snapshot. 300.
-    pub snapshot_interval_s: u64,
-    /// Revisions behind the newest within which a scan can be undone, at least. 20,000.
-    pub undo_revisions: u64,
 }
 
 /// Where a protocol is served.
@@ -105,86 +97,6 @@ pub struct FilterConfig {
     pub bits_per_voxel: f64,
 }
 
-/// How scans are aligned.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AlignmentConfig {
-    /// `refined`, `overlap` or `weighted_sum`, for requests that do not say. `refined`.
-    pub method: MethodConfig,
-}
-
-/// See [`Method`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MethodConfig {
-    /// [`Method::Refined`].
-    #[default]
-    Refined,
-    /// [`Method::Overlap`].
-    Overlap,
-    /// [`Method::WeightedSum`].
-    WeightedSum,
-}
-
-impl From<MethodConfig> for Method {
-    fn from(method: MethodConfig) -> Self {
-        match method {
-            MethodConfig::Refined => Self::Refined,
-            MethodConfig::Overlap => Self::Overlap,
-            MethodConfig::WeightedSum => Self::WeightedSum,
-        }
-    }
-}
-
-/// Which points of a robot's scans count; a request may say otherwise.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobotConfig {
-    /// Distance from the sensor, metres; nearer points are skipped.
-    pub range_min_m: Option<f64>,
-    /// Distance from the sensor, metres; farther points are skipped.
-    pub range_max_m: Option<f64>,
-    /// The robot's own body in the sensor frame, metres: smallest and largest corner.
-    pub body_m: Option<[[f64; 3]; 2]>,
-}
-
-impl RobotConfig {
-    fn filter(&self) -> PointFilter {
-        let body_m = self.body_m.map(|[min_m, max_m]| (min_m, max_m));
-        PointFilter { range_min_m: self.range_min_m, range_max_m: self.range_max_m, body_m }
-    }
-}
-
-/// The service's [`Limits`], and that of a message.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LimitsConfig {
-    /// Bytes of one HTTP body or one gRPC message. 32 MiB.
-    pub message_bytes_max: usize,
-    /// See [`Limits::points_per_request_max`].
-    pub points_per_request_max: usize,
-    /// See [`Limits::keys_per_request_max`].
-    pub keys_per_request_max: usize,
-    /// See [`Limits::maps_max`].
-    pub maps_max: usize,
-    /// See [`Limits::voxels_per_map_max`].
-    pub voxels_per_map_max: usize,
-    /// See [`Limits::listed_voxels_max`].
-    pub listed_voxels_max: usize,
-    /// See [`Limits::jobs_waiting_max`].
-    pub jobs_waiting_max: usize,
-    /// See [`Limits::map_file_bytes_max`].
-    pub map_file_bytes_max: usize,
-    /// See [`Limits::min_revision_wait_max`]; seconds.
-    pub min_revision_wait_max_s: f64,
-    /// See [`Limits::localization_time_max`]; seconds.
-    pub localization_time_max_s: f64,
-    /// See [`Limits::localization_candidates_max`].
-    pub localization_candidates_max: usize,
-    /// See [`Limits::localization_grid_bytes_max`].
-    pub localization_grid_bytes_max: usize,
-}
-
 impl Default for Config {
     fn default() -> Self {
         let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into(), socket: None };
@@ -200,18 +112,6 @@ impl Default for Config {
             alignment: AlignmentConfig::default(),
             robots: BTreeMap::new(),
             limits: LimitsConfig::default(),
-        }
-    }
-}
-
-impl Default for StoreConfig {
-    fn default() -> Self {
-        let store = StoreSettings::default();
-        Self {
-            durability: store.durability,
-            snapshot_journal_mib: store.snapshot_journal_bytes >> 20,
-            snapshot_interval_s: store.snapshot_interval.as_secs(),
-            undo_revisions: store.undo_revisions,
         }
     }
 }
@@ -232,26 +132,6 @@ impl Default for FilterConfig {
     fn default() -> Self {
         let FilterSettings { hashes, bits_per_key } = FilterSettings::default();
         Self { hashes, bits_per_voxel: bits_per_key }
-    }
-}
-
-impl Default for LimitsConfig {
-    fn default() -> Self {
-        let limits = Limits::default();
-        Self {
-            message_bytes_max: crate::wire::transport::MESSAGE_BYTES_MAX,
-            points_per_request_max: limits.points_per_request_max,
-            keys_per_request_max: limits.keys_per_request_max,
-            maps_max: limits.maps_max,
-            voxels_per_map_max: limits.voxels_per_map_max,
-            listed_voxels_max: limits.listed_voxels_max,
-            jobs_waiting_max: limits.jobs_waiting_max,
-            map_file_bytes_max: limits.map_file_bytes_max,
-            min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
-            localization_time_max_s: limits.localization_time_max.as_secs_f64(),
-            localization_candidates_max: limits.localization_candidates_max,
-            localization_grid_bytes_max: limits.localization_grid_bytes_max,
-        }
     }
 }
 
@@ -366,57 +246,6 @@ impl Config {
     }
 }
 
-impl StoreConfig {
-    fn settings(&self) -> StoreSettings {
-        StoreSettings {
-            durability: self.durability,
-            snapshot_journal_bytes: self.snapshot_journal_mib << 20,
-            snapshot_interval: Duration::from_secs(self.snapshot_interval_s),
-            undo_revisions: self.undo_revisions,
-            ..StoreSettings::default()
-        }
-    }
-}
-
-impl LimitsConfig {
-    fn service_limits(&self) -> Limits {
-        Limits {
-            points_per_request_max: self.points_per_request_max,
-            keys_per_request_max: self.keys_per_request_max,
-            maps_max: self.maps_max,
-            voxels_per_map_max: self.voxels_per_map_max,
-            listed_voxels_max: self.listed_voxels_max,
-            jobs_waiting_max: self.jobs_waiting_max,
-            map_file_bytes_max: self.map_file_bytes_max,
-            min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
-            localization_time_max: Duration::from_secs_f64(self.localization_time_max_s),
-            localization_candidates_max: self.localization_candidates_max,
-            localization_grid_bytes_max: self.localization_grid_bytes_max,
-        }
-    }
-}
-
-/// Values that are written as text.
-mod as_text {
-    use std::fmt::Display;
-    use std::str::FromStr;
-
-    use serde::de::Error;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(value)
-    }
-
-    pub(super) fn deserialize<'de, D, T>(deserializer: D) -> Result<T, D::Error>
-    where
-        D: Deserializer<'de>,
-        T: FromStr<Err: Display>,
-    {
-        String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
-    }
-}
-
 /// The variables that mean this program; see [`Config::load`].
 fn variables() -> Env {
     let top = ["data_dir", "drain_seconds"];
@@ -439,6 +268,7 @@ fn without_nulls(value: serde_json::Value) -> serde_json::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::service::Limits;
     use serde_json::json;
     use std::io::Write;
 

@@ -1,0 +1,56 @@
+//! How scans are aligned, and which of their points count.
+
+use serde::{Deserialize, Serialize};
+
+use crate::align::Method;
+use crate::scan::PointFilter;
+
+/// How scans are aligned.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AlignmentConfig {
+    /// `refined`, `overlap` or `weighted_sum`, for requests that do not say. `refined`.
+    pub method: MethodConfig,
+}
+
+/// See [`Method`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodConfig {
+    /// [`Method::Refined`].
+    #[default]
+    Refined,
+    /// [`Method::Overlap`].
+    Overlap,
+    /// [`Method::WeightedSum`].
+    WeightedSum,
+}
+
+impl From<MethodConfig> for Method {
+    fn from(method: MethodConfig) -> Self {
+        match method {
+            MethodConfig::Refined => Self::Refined,
+            MethodConfig::Overlap => Self::Overlap,
+            MethodConfig::WeightedSum => Self::WeightedSum,
+        }
+    }
+}
+
+/// Which points of a robot's scans count; a request may say otherwise.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotConfig {
+    /// Distance from the sensor, metres; nearer points are skipped.
+    pub range_min_m: Option<f64>,
+    /// Distance from the sensor, metres; farther points are skipped.
+    pub range_max_m: Option<f64>,
+    /// The robot's own body in the sensor frame, metres: smallest and largest corner.
+    pub body_m: Option<[[f64; 3]; 2]>,
+}
+
+impl RobotConfig {
+    pub(super) fn filter(&self) -> PointFilter {
+        let body_m = self.body_m.map(|[min_m, max_m]| (min_m, max_m));
+        PointFilter { range_min_m: self.range_min_m, range_max_m: self.range_max_m, body_m }
+    }
+}
