@@ -8,8 +8,8 @@
 //! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
 //!   point-cloud files and simulated sensors.
 //! * `store`: map files. `service`: the operations, once for every protocol.
-//! * `wire`: between generated and domain types. `grpc`, `http`, `client`: adapters. `server`, `cli`: the daemon and
-//!   the program.
+//! * `wire`: between generated and domain types. `access`: the operations by name, and who may ask for each. `grpc`,
+//!   `http`, `client`: adapters. `server`, `cli`: the daemon and the program.
 //!
 //! The first three lines know no runtime, no protocol and no serialisation, and are there without any feature:
 //!
@@ -35,6 +35,8 @@
 //! # }
 //! ```
 
+#[cfg(feature = "server")]
+pub mod access;
 pub mod align;
 #[cfg(feature = "server")]
 pub mod bench;

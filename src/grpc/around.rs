@@ -10,9 +10,10 @@ use tonic::{Code, Status};
 use tracing::Instrument;
 
 use super::{Adapter, deadline, status};
+use crate::access::Operation;
 
-/// Calls whose requests are counted one by one where they are answered, and not here.
-const STREAMS: [&str; 2] = ["QueryPointsStream", "InsertScanStream"];
+/// How much of an unknown path is repeated to who sent it.
+const PATH_LENGTH_MAX: usize = 80;
 
 /// Wraps the services' routes.
 pub(super) fn routes(routes: Router, adapter: &Adapter) -> Router {
@@ -20,60 +21,44 @@ pub(super) fn routes(routes: Router, adapter: &Adapter) -> Router {
 }
 
 async fn call(State(adapter): State<Adapter>, request: Request, next: Next) -> Response {
-    let (start, operation) = (Instant::now(), operation(request.uri().path()));
-    let deadline = deadline::of(request.headers());
-    let span = tracing::info_span!("grpc", operation);
-    let answer = deadline::within(deadline, next.run(request)).instrument(span);
-    let response = match adapter.lifecycle.admit(answer).await {
-        Ok(Ok(response)) => response,
-        Ok(Err(refusal)) | Err(refusal) => Status::from(refusal).into_http(),
+    let start = Instant::now();
+    let operation = Operation::of_call(request.uri().path());
+    // Whatever a client may send, it is one of few.
+    let name = operation.map_or("unknown", Operation::name);
+    let span = tracing::info_span!("grpc", operation = name);
+    let response = match operation {
+        Some(operation) => admitted(&adapter, operation, request, next).instrument(span).await,
+        None => no_such_call(&request).into_http(),
     };
     let code = code(&response);
-    if code != Code::Ok || !STREAMS.contains(&operation) {
-        adapter.service.metrics().request("grpc", operation, status::label(code), start.elapsed());
+    if code != Code::Ok || !operation.is_some_and(answers_message_by_message) {
+        adapter.service.metrics().request("grpc", name, status::label(code), start.elapsed());
     }
-    tracing::debug!(operation, code = status::label(code), elapsed = ?start.elapsed(), "grpc call");
+    tracing::debug!(operation = name, code = status::label(code), elapsed = ?start.elapsed(), "grpc call");
     response
+}
+
+async fn admitted(adapter: &Adapter, operation: Operation, request: Request, next: Next) -> Response {
+    let deadline = deadline::of(request.headers());
+    let answer = deadline::within(deadline, next.run(request));
+    let answer = match operation.is_probe() {
+        true => answer.await,
+        false => adapter.lifecycle.admit(answer).await.flatten(),
+    };
+    answer.unwrap_or_else(|refusal| Status::from(refusal).into_http())
+}
+
+/// True for calls whose requests are counted one by one where they are answered, and not here.
+fn answers_message_by_message(operation: Operation) -> bool {
+    matches!(operation, Operation::QueryPointsStream | Operation::InsertScanStream)
+}
+
+fn no_such_call(request: &Request) -> Status {
+    let path: String = request.uri().path().chars().take(PATH_LENGTH_MAX).collect();
+    Status::unimplemented(format!("no call {path}"))
 }
 
 /// The code of a call that failed; one that did not has none in its headers.
 fn code(response: &Response) -> Code {
     response.headers().get("grpc-status").map_or(Code::Ok, |value| Code::from_bytes(value.as_bytes()))
-}
-
-/// The name of a call for metrics and the log. Whatever a client may send, it is one of few.
-fn operation(path: &str) -> &'static str {
-    const OPERATIONS: [&str; 15] = [
-        "Occupancy/QueryPoints",
-        "Occupancy/QueryPointsStream",
-        "Occupancy/ListVoxels",
-        "Mapping/InsertScan",
-        "Mapping/InsertScanStream",
-        "Mapping/AlignScan",
-        "Mapping/DeleteVoxels",
-        "Mapping/UndoScans",
-        "Mapping/GetTrajectory",
-        "Maps/CreateMap",
-        "Maps/GetMap",
-        "Maps/ListMaps",
-        "Maps/DeleteMap",
-        "Maps/SnapshotMap",
-        "Maps/RestoreMap",
-    ];
-    let called = path.strip_prefix("/mrol.v1.").unwrap_or_default();
-    let known = OPERATIONS.into_iter().find(|operation| *operation == called);
-    known.and_then(|operation| operation.split('/').next_back()).unwrap_or("unknown")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_operation_is_a_call_of_the_contract_or_unknown() {
-        assert_eq!(operation("/mrol.v1.Maps/GetMap"), "GetMap");
-        for other in ["/mrol.v1.Maps/Other", "/mrol.v2.Maps/GetMap", "/", ""] {
-            assert_eq!(operation(other), "unknown");
-        }
-    }
 }

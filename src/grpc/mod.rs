@@ -49,17 +49,17 @@ pub fn routes(
                 .send_compressed(CompressionEncoding::Zstd)
         };
     }
-    let api = Routes::new(configured!(OccupancyServer))
-        .add_service(configured!(MappingServer))
-        .add_service(configured!(MapsServer));
-    let api = around::routes(api.into_axum_router(), &adapter);
-
     let (reporter, health) = tonic_health::server::health_reporter();
     let reflection = tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(pb::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
         .build_v1()?;
-    Ok((Routes::from(api).add_service(health).add_service(reflection), Health(reporter)))
+    let services = Routes::new(configured!(OccupancyServer))
+        .add_service(configured!(MappingServer))
+        .add_service(configured!(MapsServer))
+        .add_service(health)
+        .add_service(reflection);
+    Ok((around::routes(services.into_axum_router(), &adapter).into(), Health(reporter)))
 }
 
 /// Says by gRPC's health protocol whether the server serves: as a whole (the empty name) and each service.

@@ -7,6 +7,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
+use crate::access::Operation;
 use crate::service::{ErrorCode, ServiceError};
 
 /// A failed request.
@@ -14,6 +15,8 @@ use crate::service::{ErrorCode, ServiceError};
 pub(super) struct HttpError {
     status: StatusCode,
     error: ServiceError,
+    /// The methods that the route takes, where the request's is none of them.
+    allow: Option<String>,
 }
 
 /// The status of a failure, and its code as a word.
@@ -32,14 +35,14 @@ fn status_of(code: ErrorCode) -> (StatusCode, &'static str) {
 
 impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
-        Self { status: status_of(error.code).0, error }
+        Self { status: status_of(error.code).0, error, allow: None }
     }
 }
 
 impl HttpError {
     /// A request that is wrong in itself, in a way that HTTP has a status of its own for.
     pub(super) fn with_status(status: StatusCode, reason: &'static str, message: impl Into<String>) -> Self {
-        Self { status, error: ServiceError::invalid(reason, message) }
+        Self { status, error: ServiceError::invalid(reason, message), allow: None }
     }
 }
 
@@ -49,23 +52,36 @@ impl IntoResponse for HttpError {
         let (_, word) = status_of(code);
         let body = json!({"error": {"code": word, "reason": reason, "message": message}});
         let mut response = (self.status, Json(body)).into_response();
+        let headers = response.headers_mut();
         if code == ErrorCode::ResourceExhausted {
-            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+            headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        }
+        if let Some(allow) = self.allow.and_then(|methods| methods.parse().ok()) {
+            headers.insert(header::ALLOW, allow);
         }
         response
     }
 }
 
 /// The answer where no route is.
-pub(super) async fn no_such_route(request: Request) -> HttpError {
+pub(super) fn no_such_route(request: &Request) -> HttpError {
     let message = format!("no route {}", excerpt(request.uri().path()));
     ServiceError::new(ErrorCode::NotFound, "route_not_found", message).into()
 }
 
-/// The answer of a route that has other methods.
-pub(super) async fn no_such_method(request: Request) -> HttpError {
+/// The answer of a `route` that has other methods.
+pub(super) fn no_such_method(request: &Request, route: &str) -> HttpError {
+    let mut methods: Vec<_> = Operation::methods_of(route).collect();
+    if methods.contains(&"GET") {
+        methods.push("HEAD");
+    }
+    if methods.is_empty() {
+        let message = format!("{route} is served without a rule who may ask for it: a defect of the server");
+        return ServiceError::new(ErrorCode::Internal, "no_rule", message).into();
+    }
     let message = format!("{} does not take {}", excerpt(request.uri().path()), request.method());
-    HttpError::with_status(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", message)
+    let error = HttpError::with_status(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", message);
+    HttpError { allow: Some(methods.join(",")), ..error }
 }
 
 /// What a client sent, short enough to be repeated to it.

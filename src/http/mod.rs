@@ -10,6 +10,7 @@ mod maps;
 mod occupancy;
 mod parameters;
 mod probes;
+mod routes;
 mod scans;
 mod starting;
 mod trajectory;
@@ -23,7 +24,6 @@ use std::time::Duration;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::middleware::from_fn_with_state;
-use axum::routing::{get, post, put};
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::timeout::RequestBodyTimeoutLayer;
 
@@ -44,28 +44,11 @@ struct Adapter {
 /// All routes. Bodies of more than `message_bytes_max` are refused.
 pub fn router(service: MeteredService, lifecycle: Lifecycle, message_bytes_max: usize) -> Router {
     let adapter = Adapter { service, lifecycle, message_bytes_max };
-    let api = Router::new()
-        .route("/v1/maps", get(maps::list))
-        .route("/v1/maps/{map}", put(maps::create).get(maps::describe).delete(maps::delete))
-        .route("/v1/maps/{map}/scans", post(scans::insert))
-        .route("/v1/maps/{map}/alignment", post(scans::align))
-        .route("/v1/maps/{map}/localize", post(localization::localize))
-        .route("/v1/maps/{map}/occupancy", post(occupancy::query))
-        .route("/v1/maps/{map}/deletions", post(deletions::delete))
-        .route("/v1/maps/{map}/undo", post(undo::undo))
-        .route("/v1/maps/{map}/trajectory", get(trajectory::get))
-        .route("/v1/maps/{map}/voxels", get(voxels::list))
-        .fallback(error::no_such_route)
-        .method_not_allowed_fallback(error::no_such_method)
+    routes::of_operations()
         .layer(RequestBodyTimeoutLayer::new(BODY_SILENCE_MAX))
         .layer(DefaultBodyLimit::max(message_bytes_max))
         .layer(from_fn_with_state(adapter.clone(), around::request))
         .layer(PropagateRequestIdLayer::x_request_id())
-        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid));
-    let probes = Router::new()
-        .route("/livez", get(probes::live))
-        .route("/readyz", get(probes::ready))
-        .route("/metrics", get(probes::metrics))
-        .method_not_allowed_fallback(error::no_such_method);
-    probes.merge(api).with_state(adapter)
+        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
+        .with_state(adapter)
 }

@@ -1,0 +1,147 @@
+//! Every operation of the server, once: its name, its place in each protocol, and the scope that it takes.
+//!
+//! Both protocols look a request up here before anything else is done with it. What is not in the table is not
+//! answered, so nothing can be served without a rule.
+
+use super::Scope;
+use super::Scope::{Admin, Read, Write};
+
+/// Where HTTP has an operation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Route {
+    /// The method. What answers `GET` answers `HEAD`, too.
+    pub method: &'static str,
+    /// The path, with `{map}` where the map's name stands.
+    pub path: &'static str,
+}
+
+struct Row {
+    name: &'static str,
+    scope: Option<Scope>,
+    grpc: Option<&'static str>,
+    route: Option<Route>,
+}
+
+/// Makes [`Operation`] and its rows from one table.
+macro_rules! operations {
+    ($($name:ident: $scope:expr $(, grpc $grpc:literal)? $(, http $method:ident $path:literal)?;)+) => {
+        /// What a caller can ask for.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Operation {
+            $(
+                $(#[doc = concat!("gRPC `", $grpc, "`.")])?
+                $(#[doc = concat!("HTTP `", stringify!($method), " ", $path, "`.")])?
+                $name,
+            )+
+        }
+
+        impl Operation {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$name),+];
+
+            fn row(self) -> Row {
+                match self {
+                    $(Self::$name => Row {
+                        name: stringify!($name),
+                        scope: $scope,
+                        grpc: [$($grpc)?].first().copied(),
+                        route: [$(Route { method: stringify!($method), path: $path })?].first().copied(),
+                    },)+
+                }
+            }
+        }
+    };
+}
+
+// A scope of `None` asks for no key.
+operations! {
+    QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
+    QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
+    ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
+    InsertScan:        Some(Write), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
+    InsertScanStream:  Some(Write), grpc "/mrol.v1.Mapping/InsertScanStream";
+    AlignScan:         Some(Read),  grpc "/mrol.v1.Mapping/AlignScan",           http POST "/v1/maps/{map}/alignment";
+    Localize:          Some(Read),  grpc "/mrol.v1.Mapping/Localize",            http POST "/v1/maps/{map}/localize";
+    DeleteVoxels:      Some(Write), grpc "/mrol.v1.Mapping/DeleteVoxels",        http POST "/v1/maps/{map}/deletions";
+    UndoScans:         Some(Write), grpc "/mrol.v1.Mapping/UndoScans",           http POST "/v1/maps/{map}/undo";
+    GetTrajectory:     Some(Read),  grpc "/mrol.v1.Mapping/GetTrajectory",       http GET "/v1/maps/{map}/trajectory";
+    CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";
+    GetMap:            Some(Read),  grpc "/mrol.v1.Maps/GetMap",                 http GET "/v1/maps/{map}";
+    ListMaps:          Some(Read),  grpc "/mrol.v1.Maps/ListMaps",               http GET "/v1/maps";
+    DeleteMap:         Some(Admin), grpc "/mrol.v1.Maps/DeleteMap",              http DELETE "/v1/maps/{map}";
+    SnapshotMap:       Some(Read),  grpc "/mrol.v1.Maps/SnapshotMap";
+    RestoreMap:        Some(Admin), grpc "/mrol.v1.Maps/RestoreMap";
+    Reflect:           Some(Read),  grpc "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
+    HealthCheck:       None,        grpc "/grpc.health.v1.Health/Check";
+    HealthWatch:       None,        grpc "/grpc.health.v1.Health/Watch";
+    Live:              None,        http GET "/livez";
+    Ready:             None,        http GET "/readyz";
+    Metrics:           Some(Read),  http GET "/metrics";
+}
+
+impl Operation {
+    /// Its name for metrics and the log, the same in both protocols.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// The least scope of a key that may ask for it; none where no key is needed.
+    pub fn scope(self) -> Option<Scope> {
+        self.row().scope
+    }
+
+    /// The path of the gRPC call.
+    pub fn grpc(self) -> Option<&'static str> {
+        self.row().grpc
+    }
+
+    /// Where HTTP has it.
+    pub fn route(self) -> Option<Route> {
+        self.row().route
+    }
+
+    /// True for what orchestrators ask: answered while the server is going down, too.
+    pub fn is_probe(self) -> bool {
+        matches!(self, Self::HealthCheck | Self::HealthWatch | Self::Live | Self::Ready | Self::Metrics)
+    }
+
+    /// The operation of a gRPC call.
+    pub fn of_call(path: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|operation| operation.grpc() == Some(path))
+    }
+
+    /// The operation of an HTTP request to the route `path`.
+    pub fn of_request(method: &str, path: &str) -> Option<Self> {
+        let method = if method == "HEAD" { "GET" } else { method };
+        let asked = |route: Route| route.method == method && route.path == path;
+        Self::ALL.iter().copied().find(|operation| operation.route().is_some_and(asked))
+    }
+
+    /// The methods that the route `path` takes.
+    pub fn methods_of(path: &str) -> impl Iterator<Item = &'static str> {
+        let at = move |route: &Route| route.path == path;
+        Self::ALL.iter().filter_map(|operation| operation.route()).filter(at).map(|route| route.method)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_call_and_a_request_of_the_same_meaning_are_one_operation() {
+        let call = Operation::of_call("/mrol.v1.Mapping/Localize");
+        assert_eq!(call, Some(Operation::Localize));
+        assert_eq!(call, Operation::of_request("POST", "/v1/maps/{map}/localize"));
+        assert_eq!(Operation::of_request("HEAD", "/v1/maps"), Some(Operation::ListMaps));
+    }
+
+    #[test]
+    fn what_is_not_in_the_table_is_no_operation() {
+        for call in ["/mrol.v1.Maps/Other", "/mrol.v2.Maps/GetMap", "/", ""] {
+            assert_eq!(Operation::of_call(call), None);
+        }
+        assert_eq!(Operation::of_request("PATCH", "/v1/maps/{map}"), None);
+        assert_eq!(Operation::methods_of("/v1/maps/{map}").collect::<Vec<_>>(), ["PUT", "GET", "DELETE"]);
+    }
+}
