@@ -37,6 +37,8 @@
 
 #[cfg(feature = "server")]
 pub mod access;
+#[cfg(feature = "server")]
+pub mod admission;
 pub mod align;
 #[cfg(feature = "server")]
 pub mod bench;

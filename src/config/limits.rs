@@ -6,12 +6,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::service::Limits;
 
-/// The service's [`Limits`], and that of a message.
+/// The service's [`Limits`], and those of messages and connections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LimitsConfig {
     /// Bytes of one HTTP body or one gRPC message. 32 MiB.
     pub message_bytes_max: usize,
+    /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle, it
+    /// gives way. 1024.
+    pub connections_max: usize,
+    /// Seconds until a connection has to be secure and to begin to speak. 10.
+    pub connection_opening_max_s: f64,
+    /// Seconds that an HTTP connection may stay without a request, or take for a request's headers. 30.
+    pub http_idle_max_s: f64,
+    /// Seconds that a gRPC connection may stay without a call. 600.
+    pub grpc_idle_max_s: f64,
     /// See [`Limits::points_per_request_max`].
     pub points_per_request_max: usize,
     /// See [`Limits::keys_per_request_max`].
@@ -41,6 +50,10 @@ impl Default for LimitsConfig {
         let limits = Limits::default();
         Self {
             message_bytes_max: crate::wire::transport::MESSAGE_BYTES_MAX,
+            connections_max: 1024,
+            connection_opening_max_s: 10.0,
+            http_idle_max_s: 30.0,
+            grpc_idle_max_s: 600.0,
             points_per_request_max: limits.points_per_request_max,
             keys_per_request_max: limits.keys_per_request_max,
             maps_max: limits.maps_max,

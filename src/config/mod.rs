@@ -201,12 +201,20 @@ impl Config {
                 return range(key, "1 to 1048576", value.to_string());
             }
         }
-        if self.limits.message_bytes_max == 0 {
-            return range("limits.message_bytes_max", "at least 1", "0".into());
+        for (key, value) in [
+            ("limits.message_bytes_max", self.limits.message_bytes_max),
+            ("limits.connections_max", self.limits.connections_max),
+        ] {
+            if value == 0 {
+                return range(key, "at least 1", "0".into());
+            }
         }
         for (key, seconds) in [
             ("limits.min_revision_wait_max_s", self.limits.min_revision_wait_max_s),
             ("limits.localization_time_max_s", self.limits.localization_time_max_s),
+            ("limits.connection_opening_max_s", self.limits.connection_opening_max_s),
+            ("limits.http_idle_max_s", self.limits.http_idle_max_s),
+            ("limits.grpc_idle_max_s", self.limits.grpc_idle_max_s),
         ] {
             if !(0.0..=86_400.0).contains(&seconds) {
                 return range(key, "0 to 86400", seconds.to_string());

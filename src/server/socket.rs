@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use tokio::net::UnixListener;
 
 use super::ServerError;
+use super::protocol::Protocol;
 
 /// Who may connect: the server's user and group.
 const MODE: u32 = 0o660;
@@ -33,9 +34,10 @@ impl UnixSocket {
     ///
     /// # Errors
     /// When somebody answers there, the file is no socket, or none can be made.
-    pub(super) fn bind(protocol: &'static str, path: Option<&Path>) -> Result<Option<Self>, ServerError> {
+    pub(super) fn bind(protocol: Protocol, path: Option<&Path>) -> Result<Option<Self>, ServerError> {
         let Some(path) = path else { return Ok(None) };
-        let refused = |error| ServerError::Socket { protocol, path: path.to_owned(), error };
+        let refused =
+            |error| ServerError::Socket { protocol: protocol.as_str(), path: path.to_owned(), error };
         remove_stale(path).map_err(refused)?;
         Self::bind_at(path).map(Some).map_err(refused)
     }

@@ -1,0 +1,84 @@
+//! Sockets that are listened on: what they accept is a stream of bytes, wherever it came from.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rustix::net::sockopt;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::time::sleep;
+
+use super::ServerError;
+use super::protocol::Protocol;
+use super::socket::UnixSocket;
+use super::stream::Stream;
+use crate::wire::transport::KEEPALIVE_INTERVAL;
+
+/// How long to wait after an error that the next connection would meet as well: too many open files.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// A socket that is listened on. Dropping it ends that, and removes the file of a Unix socket.
+#[derive(Debug)]
+pub(super) enum Accepting {
+    Tcp(Arc<TcpListener>),
+    Unix(UnixSocket),
+}
+
+/// A TCP address that is listened on; a clone is another handle on the same socket.
+#[derive(Debug, Clone)]
+pub(super) struct TcpSocket {
+    pub(super) listener: Arc<TcpListener>,
+    pub(super) address: SocketAddr,
+}
+
+impl TcpSocket {
+    /// # Errors
+    /// When the address is taken, or is none of this machine's.
+    pub(super) async fn bind(protocol: Protocol, address: SocketAddr) -> Result<Self, ServerError> {
+        let listen = |error| ServerError::Listen { protocol: protocol.as_str(), address, error };
+        let listener = TcpListener::bind(address).await.map_err(listen)?;
+        let address = listener.local_addr().map_err(listen)?;
+        Ok(Self { listener: listener.into(), address })
+    }
+}
+
+impl Accepting {
+    /// The next connection. What goes wrong with one, or for lack of files for a while, does not end it.
+    pub(super) async fn next(&self) -> Stream {
+        loop {
+            match self.accept().await {
+                Ok(stream) => return stream,
+                Err(error) if is_of_one_connection(&error) => {}
+                Err(error) => {
+                    tracing::warn!(%error, "no connection can be accepted");
+                    sleep(PAUSE).await;
+                }
+            }
+        }
+    }
+
+    async fn accept(&self) -> io::Result<Stream> {
+        match self {
+            Self::Tcp(listener) => {
+                let (stream, _) = listener.accept().await?;
+                prepare(&stream);
+                Ok(Box::new(stream))
+            }
+            Self::Unix(UnixSocket { listener, .. }) => Ok(Box::new(listener.accept().await?.0)),
+        }
+    }
+}
+
+/// Answers go out at once; a peer that vanished without a word is found out.
+fn prepare(stream: &TcpStream) {
+    // A connection that refuses is slower, or stays for longer, and is not broken.
+    let _ = stream.set_nodelay(true);
+    let _ = sockopt::set_socket_keepalive(stream, true);
+    let _ = sockopt::set_tcp_keepidle(stream, KEEPALIVE_INTERVAL);
+}
+
+fn is_of_one_connection(error: &io::Error) -> bool {
+    use io::ErrorKind::{ConnectionAborted, ConnectionRefused, ConnectionReset};
+    matches!(error.kind(), ConnectionAborted | ConnectionRefused | ConnectionReset)
+}

@@ -1,0 +1,74 @@
+//! One connection, from its first byte to its last.
+
+use std::convert::Infallible;
+use std::pin::pin;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{Request, Response};
+use hyper::body::Incoming;
+use hyper::service::service_fn;
+use hyper_util::rt::TokioIo;
+use tokio::time::{sleep, timeout};
+use tokio_io_timeout::TimeoutStream;
+use tower::ServiceExt;
+
+use super::endpoint::Endpoint;
+use super::places::Place;
+use super::stream::{Count, Counted, Stream, secure};
+use crate::admission::HeldBody;
+
+/// How long a client may leave unread what it asked for.
+const UNREAD_MAX: Duration = Duration::from_secs(30);
+
+impl Endpoint {
+    /// Serves a connection until its client closes it, it has been idle for too long, another gets its place, or the
+    /// server is going down.
+    pub(super) async fn serve(self, stream: Stream, place: Place) {
+        tokio::select! {
+            () = self.serve_open(stream, &place) => {}
+            () = place.lost() => {}
+            () = self.cut.cancelled() => {}
+        }
+    }
+
+    async fn serve_open(&self, stream: Stream, place: &Place) {
+        let Ok(Ok(stream)) = timeout(self.bounds.opening_max, secure(stream)).await else {
+            return;
+        };
+        let (stream, bytes_read) = Counted::new(stream);
+        let mut stream = TimeoutStream::new(stream);
+        stream.set_write_timeout(Some(UNREAD_MAX));
+        let service = service_fn(|request| answer(self.router.clone(), place.clone(), request));
+        let mut connection = pin!(self.builder.serve_connection(TokioIo::new(Box::pin(stream)), service));
+        tokio::select! {
+            _ = &mut connection => return,
+            () = self.not_opened(bytes_read) => return,
+            () = place.idle_for(self.bounds.idle_max) => {}
+            () = self.closing.cancelled() => {}
+        }
+        connection.as_mut().graceful_shutdown();
+        // What goes wrong with a connection, its client sees; there is nobody else to tell.
+        let _ = connection.await;
+    }
+
+    /// Waits until it is clear that the client will never begin to speak.
+    async fn not_opened(&self, bytes_read: Count) {
+        sleep(self.bounds.opening_max).await;
+        if bytes_read.get() >= self.protocol.opening_bytes() {
+            std::future::pending().await
+        }
+    }
+}
+
+/// Answers a request; until the answer is sent, the connection is in use.
+async fn answer(
+    router: Router,
+    place: Place,
+    request: Request<Incoming>,
+) -> Result<Response<Body>, Infallible> {
+    let used = place.used();
+    let response = router.oneshot(request).await?;
+    Ok(response.map(|body| Body::new(HeldBody::new(body, used))))
+}

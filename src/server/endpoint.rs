@@ -1,0 +1,91 @@
+//! A protocol at its sockets: connections come, are served side by side, and go.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use hyper_util::rt::TokioExecutor;
+use hyper_util::server::conn::auto::Builder;
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+use super::accepting::Accepting;
+use super::places::Places;
+use super::protocol::Protocol;
+use crate::config::LimitsConfig;
+
+/// A protocol with its connections, whatever sockets they come from. A clone is another handle on the same ones.
+///
+/// ```text
+/// accepting --close()--> no more connections; each ends with the requests that it has in flight
+///           --cut()----> each ends now
+/// ```
+#[derive(Debug, Clone)]
+pub(super) struct Endpoint {
+    pub(super) protocol: Protocol,
+    pub(super) router: Router,
+    pub(super) bounds: Bounds,
+    pub(super) builder: Arc<Builder<TokioExecutor>>,
+    pub(super) closing: CancellationToken,
+    pub(super) cut: CancellationToken,
+    places: Places,
+    tasks: TaskTracker,
+}
+
+/// What a connection may take of the server's patience.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    /// Until it is secure and has begun to speak.
+    pub(super) opening_max: Duration,
+    /// Without a request.
+    pub(super) idle_max: Duration,
+}
+
+impl Endpoint {
+    pub(super) fn new(protocol: Protocol, router: Router, limits: &LimitsConfig) -> Self {
+        let opening_max = Duration::from_secs_f64(limits.connection_opening_max_s);
+        Self {
+            protocol,
+            router,
+            bounds: Bounds { opening_max, idle_max: protocol.idle_max(limits) },
+            builder: protocol.builder(limits).into(),
+            closing: CancellationToken::new(),
+            cut: CancellationToken::new(),
+            places: Places::new(limits.connections_max),
+            tasks: TaskTracker::new(),
+        }
+    }
+
+    /// Takes connections of `sockets` until told to close. One for which there is no place is closed at once: that
+    /// tells its client more than silence would.
+    pub(super) async fn accept(self, sockets: Accepting) {
+        loop {
+            let stream = tokio::select! {
+                biased;
+                () = self.closing.cancelled() => return,
+                stream = sockets.next() => stream,
+            };
+            match self.places.take() {
+                Some(place) => drop(self.tasks.spawn(self.clone().serve(stream, place))),
+                None => tracing::warn!(
+                    protocol = self.protocol.as_str(),
+                    "connections_max are in use: another is closed"
+                ),
+            }
+        }
+    }
+
+    pub(super) fn close(&self) {
+        self.closing.cancel();
+        self.tasks.close();
+    }
+
+    pub(super) fn cut(&self) {
+        self.cut.cancel();
+    }
+
+    /// Waits until the last connection is closed.
+    pub(super) async fn closed(&self) {
+        self.tasks.wait().await;
+    }
+}

@@ -1,0 +1,48 @@
+//! Why there is no server any more, or none from the beginning.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use crate::service::ServiceError;
+use crate::telemetry::TelemetryError;
+
+/// Why the server could not start, or stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// The maps cannot be opened.
+    #[error("the maps cannot be opened: {0}")]
+    Open(ServiceError),
+    /// An address cannot be listened on.
+    #[error("{protocol} cannot listen on {address}: {error}")]
+    Listen {
+        /// `http` or `grpc`.
+        protocol: &'static str,
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        error: io::Error,
+    },
+    /// A Unix socket cannot be listened on.
+    #[error("{protocol} cannot listen on {}: {error}", path.display())]
+    Socket {
+        /// `http` or `grpc`.
+        protocol: &'static str,
+        /// The socket's file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// Log or metrics.
+    #[error(transparent)]
+    Telemetry(#[from] TelemetryError),
+    /// The contract that was compiled in is broken.
+    #[error("reflection: {0}")]
+    Reflection(#[from] tonic_reflection::server::Error),
+    /// A part of the server stopped by itself.
+    #[error("{0} stopped: {1}")]
+    Stopped(&'static str, String),
+    /// The maps could not be written at the end.
+    #[error("the maps cannot be saved: {0}")]
+    Save(ServiceError),
+}
