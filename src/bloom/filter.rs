@@ -1,14 +1,7 @@
 //! The counting Bloom filter (paper II-A).
 
+use super::counters::{COUNTER_MAX, Counters, CountersOfWord};
 use super::{FilterSettings, Probe, expected_rate, unblocked_rate};
-
-/// A counter that reached this value no longer counts: it stays until the filter is rebuilt.
-const COUNTER_MAX: u64 = 15;
-const COUNTER_BITS: u32 = 4;
-const COUNTERS_PER_WORD: u32 = u64::BITS / COUNTER_BITS;
-/// The counters of one word of the plane.
-pub(crate) type Counters = [u64; COUNTER_BITS as usize];
-const NO_COUNT: Counters = [0; COUNTER_BITS as usize];
 
 /// A set of u64 keys that may answer "present" of an absent key, and never "absent" of a present one.
 ///
@@ -17,13 +10,12 @@ const NO_COUNT: Counters = [0; COUNTER_BITS as usize];
 /// counters  [ 4 words of 16 x 4 bits ]...        cold: how many keys set each bit, for removal
 /// ```
 ///
-/// A bit is set where its counter is not zero. Four bits are ample: at the default size a counter reaches 15
-/// about never, and one that does *saturates*: it is never decremented again, so that the filter may forget to
-/// forget but never denies a key. (Counters of a byte that wrap, as in the original code, do.)
-#[derive(Debug, Clone)]
+/// A bit is set where its counter is not zero. A change has two steps, so that who shares the filter with readers
+/// takes the first one beside them: *counting*, and then setting or clearing the plane's bits.
+#[derive(Debug)]
 pub struct CountingBloomFilter {
     plane: Vec<u64>,
-    counters: Vec<Counters>,
+    counters: Counters,
     settings: FilterSettings,
     keys: usize,
     capacity: usize,
@@ -35,7 +27,7 @@ impl CountingBloomFilter {
         let words = settings.words(capacity);
         Self {
             plane: vec![0; words],
-            counters: vec![NO_COUNT; words],
+            counters: Counters::zero(words),
             settings,
             keys: 0,
             capacity: capacity.max(1),
@@ -52,48 +44,60 @@ impl CountingBloomFilter {
     /// Adds a key that is absent.
     #[inline]
     pub fn insert(&mut self, key: u64) {
-        self.insert_at(self.probe(key));
-    }
-
-    /// Adds an absent key whose probe is known, of this filter.
-    #[inline]
-    pub(crate) fn insert_at(&mut self, probe: Probe) {
-        self.keys += 1;
-        self.plane[probe.word] |= probe.mask;
-        let counters = &mut self.counters[probe.word];
-        for_each_bit(probe.mask, |bit| {
-            let (part, shift) = place_of(bit);
-            // No branch: what a counter holds is not foreseen.
-            let may_count = counters[part] >> shift & COUNTER_MAX != COUNTER_MAX;
-            counters[part] += u64::from(may_count) << shift;
-        });
-    }
-
-    /// What a change at `probe` touches: a word of the plane, and its counters.
-    #[inline]
-    pub(crate) fn touched_at(&self, probe: Probe) -> (&u64, &Counters) {
-        (&self.plane[probe.word], &self.counters[probe.word])
+        let probe = self.probe(key);
+        let counted = self.count_in(probe);
+        self.set_bits(counted);
     }
 
     /// Takes out a key that is present: confirm that in the exact set first (paper II-A). Removing a key that
     /// was never inserted would take away what other keys rely on.
+    #[inline]
     pub fn remove(&mut self, key: u64) {
         let probe = self.probe(key);
         debug_assert!(self.contains(key), "a key is removed that was never inserted");
+        let cleared = self.count_out(probe);
+        self.clear_bits(cleared);
+    }
+
+    /// The first step of adding an absent key: it counts, and look-ups do not see it yet. The bits to set. One
+    /// thread at a time.
+    #[inline]
+    pub(crate) fn count_in(&self, probe: Probe) -> Probe {
+        self.counters.count_in(probe);
+        probe
+    }
+
+    /// The second one.
+    #[inline]
+    pub(crate) fn set_bits(&mut self, probe: Probe) {
+        self.keys += 1;
+        self.plane[probe.word] |= probe.mask;
+    }
+
+    /// The first step of taking a present key out: it counts no more, and look-ups still see it. The bits that no
+    /// other key sets. One thread at a time.
+    #[inline]
+    pub(crate) fn count_out(&self, probe: Probe) -> Probe {
+        Probe { mask: self.counters.count_out(probe), ..probe }
+    }
+
+    /// The second one: clears what no other key sets.
+    #[inline]
+    pub(crate) fn clear_bits(&mut self, cleared: Probe) {
         self.keys -= 1;
-        for_each_bit(probe.mask, |bit| {
-            let (word, shift) = place_of(bit);
-            let counters = &mut self.counters[probe.word][word];
-            match *counters >> shift & COUNTER_MAX {
-                COUNTER_MAX => {}
-                count => {
-                    *counters -= 1 << shift;
-                    if count == 1 {
-                        self.plane[probe.word] &= !(1 << bit);
-                    }
-                }
-            }
-        });
+        self.plane[cleared.word] &= !cleared.mask;
+    }
+
+    /// The word of the plane that a change at `probe` touches.
+    #[inline]
+    pub(crate) fn plane_at(&self, probe: Probe) -> &u64 {
+        &self.plane[probe.word]
+    }
+
+    /// Its counters.
+    #[inline]
+    pub(crate) fn counters_at(&self, probe: Probe) -> &CountersOfWord {
+        self.counters.of_word(probe.word)
     }
 
     /// Where `key` is, or would be.
@@ -129,39 +133,27 @@ impl CountingBloomFilter {
 
     /// Bytes of memory held: (plane, counters).
     pub fn bytes(&self) -> (usize, usize) {
-        (size_of_val(&self.plane[..]), size_of_val(&self.counters[..]))
+        (size_of_val(&self.plane[..]), self.counters.bytes())
     }
 
     /// Number of counters that are neither zero nor saturated, and of those that are saturated.
     pub fn counters_in_use(&self) -> (usize, usize) {
-        let counters = || {
-            self.counters.as_flattened().iter().flat_map(|word| {
-                (0..COUNTERS_PER_WORD).map(move |c| word >> (c * COUNTER_BITS) & COUNTER_MAX)
-            })
-        };
-        let saturated = counters().filter(|&c| c == COUNTER_MAX).count();
-        (counters().filter(|&c| c != 0).count() - saturated, saturated)
+        let saturated = self.counters.iter().filter(|&count| count == COUNTER_MAX).count();
+        (self.counters.iter().filter(|&count| count != 0).count() - saturated, saturated)
     }
 
     /// True when the filter holds exactly `keys`: each counter that is not saturated equals a recount, and the
     /// plane follows from the counters.
     pub fn is_recount_of(&self, keys: impl IntoIterator<Item = u64>) -> bool {
-        let mut recount =
-            Self { plane: vec![0; self.plane.len()], counters: vec![NO_COUNT; self.plane.len()], ..*self };
-        recount.keys = 0;
+        let words = self.plane.len();
+        let mut recount = Self { plane: vec![0; words], counters: Counters::zero(words), keys: 0, ..*self };
         keys.into_iter().for_each(|key| recount.insert(key));
         let bits = 0..self.plane.len() * u64::BITS as usize;
         self.keys == recount.keys && { bits }.all(|bit| {
             let (word, bit) = (bit / u64::BITS as usize, bit as u32 % u64::BITS);
-            let (count, set) = (self.count(word, bit), self.plane[word] >> bit & 1 == 1);
-            (count == COUNTER_MAX || count == recount.count(word, bit)) && set == (count != 0)
+            let (count, set) = (self.counters.of_bit(word, bit), self.plane[word] >> bit & 1 == 1);
+            (count == COUNTER_MAX || count == recount.counters.of_bit(word, bit)) && set == (count != 0)
         })
-    }
-
-    /// The counter of `bit` of the plane's `word`.
-    fn count(&self, word: usize, bit: u32) -> u64 {
-        let (part, shift) = place_of(bit);
-        self.counters[word][part] >> shift & COUNTER_MAX
     }
 
     /// The false positive rate to expect of this layout as it is filled now; see [`expected_rate`].
@@ -172,20 +164,6 @@ impl CountingBloomFilter {
     /// What eq. (1) of the paper gives for as many keys, bits and hashes.
     pub fn unblocked_rate(&self) -> f64 {
         unblocked_rate(self.keys, self.plane.len() * u64::BITS as usize, self.settings.hashes)
-    }
-}
-
-/// Where the counter of a bit of a word lies: in which word of the counters, and how far up.
-#[inline(always)]
-fn place_of(bit: u32) -> (usize, u32) {
-    ((bit / COUNTERS_PER_WORD) as usize, bit % COUNTERS_PER_WORD * COUNTER_BITS)
-}
-
-#[inline(always)]
-fn for_each_bit(mut mask: u64, mut f: impl FnMut(u32)) {
-    while mask != 0 {
-        f(mask.trailing_zeros());
-        mask &= mask - 1;
     }
 }
 

@@ -1,5 +1,6 @@
 //! Counting Bloom filters (paper II-A) over u64 keys.
 
+mod counters;
 mod filter;
 mod probe;
 mod rates;

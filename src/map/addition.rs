@@ -1,14 +1,16 @@
 //! What adding voxels to a shard comes to.
 
-use super::lookup::ahead::fetch;
+use super::bulk::{change_each, count_each, find_each, show_each};
 use super::room::Room;
 use super::shard::{Block, Shard, levels_of};
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::voxel::{BlockMask, BlockTable, VoxelKey, VoxelSet};
 
 /// What is to be done to a shard to add voxels at every level, found out while readers go on: under the write
-/// lock nothing is searched for, and nothing is rebuilt. It holds for the shard as it was planned for.
+/// lock nothing is searched for, nothing is counted, and nothing is rebuilt. It holds for the shard as it was planned
+/// for.
 #[derive(Debug)]
+#[must_use = "what is planned is counted already"]
 pub(super) struct Addition {
     tiers: Vec<OfTier>,
     levels: Vec<OfLevel>,
@@ -35,15 +37,12 @@ struct Gain {
 /// What becomes of a level's filter: as of a tier's table.
 #[derive(Debug)]
 enum OfLevel {
-    Gains(Vec<u64>),
+    Gains(Vec<Probe>),
     Grown(CountingBloomFilter),
 }
 
-/// Blocks, or keys, whose cache misses are under way at once.
-const AT_ONCE: usize = 32;
-
 impl Addition {
-    /// Finds out what adding `blocks` of finest voxels to `shard` comes to.
+    /// Finds out what adding `blocks` of finest voxels to `shard` comes to, and counts them.
     pub(super) fn plan(shard: &Shard, blocks: &[&Block]) -> Self {
         let mut plan = Self { tiers: Vec::new(), levels: Vec::new() };
         let mut created = plan.tier(shard, 0, blocks);
@@ -84,13 +83,15 @@ impl Addition {
         let before = shard.filters[0].len();
         for (table, addition) in shard.tiers.iter_mut().zip(self.tiers) {
             match addition {
-                OfTier::Gains(gains) => gains.iter().for_each(|gain| gain.add_to(table)),
+                OfTier::Gains(gains) => {
+                    change_each(table, &gains, |gain| gain.slot, |table, gain| gain.add_to(table))
+                }
                 OfTier::Grown(larger) => *table = larger,
             }
         }
         for (filter, addition) in shard.filters.iter_mut().zip(self.levels) {
             match addition {
-                OfLevel::Gains(keys) => insert_all(filter, &keys),
+                OfLevel::Gains(probes) => show_each(filter, &probes, CountingBloomFilter::set_bits),
                 OfLevel::Grown(larger) => *filter = larger,
             }
         }
@@ -131,40 +132,14 @@ impl OfLevel {
         let filter = &shard.filters[level];
         let need = filter.len() + keys.len();
         if need <= filter.capacity() {
-            return Self::Gains(keys);
+            return Self::Gains(count_each(filter, &keys, CountingBloomFilter::count_in));
         }
         let capacity = Room::of(shard.number, level).for_items(need);
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
         keys.reserve_exact(filter.len());
         shard.level(level as u32).for_each_key(|key| keys.push(key));
-        insert_all(&mut larger, &keys);
+        let counted = count_each(&larger, &keys, CountingBloomFilter::count_in);
+        show_each(&mut larger, &counted, CountingBloomFilter::set_bits);
         Self::Grown(larger)
-    }
-}
-
-/// Calls `f(block, slot, voxels there)` for each block, with the cache misses of many under way at once.
-fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut(&Block, Option<usize>, BlockMask)) {
-    for blocks in blocks.chunks(AT_ONCE) {
-        blocks.iter().for_each(|block| fetch(table.home(block.0)));
-        let mut found = [(None, BlockMask::EMPTY); AT_ONCE];
-        for (found, block) in found.iter_mut().zip(blocks) {
-            let slot = table.find(block.0);
-            *found = (slot, slot.map_or(BlockMask::EMPTY, |slot| *table.at(slot)));
-        }
-        blocks.iter().zip(found).for_each(|(block, (slot, voxels))| f(block, slot, voxels));
-    }
-}
-
-/// Adds absent keys to a filter, with the cache misses of many under way at once.
-fn insert_all(filter: &mut CountingBloomFilter, keys: &[u64]) {
-    for keys in keys.chunks(AT_ONCE) {
-        let mut probes = [Probe::default(); AT_ONCE];
-        for (probe, &key) in probes.iter_mut().zip(keys) {
-            *probe = filter.probe(key);
-            let (word, counters) = filter.touched_at(*probe);
-            fetch(word);
-            fetch(counters);
-        }
-        probes[..keys.len()].iter().for_each(|&probe| filter.insert_at(probe));
     }
 }

@@ -5,10 +5,12 @@ use std::sync::atomic::Ordering;
 use parking_lot::{MutexGuard, RwLockUpgradableReadGuard, RwLockWriteGuard};
 
 use super::addition::Addition;
+use super::moments::{MomentLocks, MomentsOfShard};
+use super::removal::Removal;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
 use super::{AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, UndoRecord};
-use crate::voxel::{BLOCK_LEVELS, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
 #[derive(Debug)]
@@ -51,7 +53,7 @@ impl<'a> Committer<'a> {
     }
 
     fn insert(self, scan: &ScanRecord) -> Committed {
-        let (_shards, voxels) = self.add_to_shards(&scan.voxels, &scan.moments);
+        let (_locks, voxels) = self.add_to_shards(&scan.voxels, &scan.moments);
         let mut trajectory = self.map.trajectory.write();
         let revision = self.map.revision() + 1;
         trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose.clone() });
@@ -72,12 +74,12 @@ impl<'a> Committer<'a> {
 
     fn delete(self, voxels: &VoxelSet, request: Option<&Request>) -> Committed {
         let by_shard = self.group(voxels);
-        let mut shards = self.lock(&by_shard);
-        let removed = shards.iter_mut().map(|(i, shard)| shard.remove(&by_shard[*i])).sum();
+        let planned = self.plan(touched(&by_shard), |i, shard| Removal::plan(shard, &by_shard[i]));
+        let removed = removed_by(&planned);
         if removed == 0 {
             return Committed { revision: self.map.revision(), voxels: 0 };
         }
-        shards.iter_mut().for_each(|(_, shard)| shard.reset_if_empty(&self.map.settings));
+        let _locks = self.take_out(planned, &Default::default());
         let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         self.remember(request, committed, 0);
         self.publish(committed.revision, committed.voxels)
@@ -87,13 +89,10 @@ impl<'a> Committer<'a> {
     fn undo(self, undo: &UndoRecord) -> Committed {
         let by_shard = self.group(&undo.voxels);
         // All of them, so that nobody who has a view of the whole map sees the trajectory change.
-        let mut shards: Vec<_> = self.map.shards.iter().map(|shard| shard.write()).collect();
+        let planned = self.plan(0..SHARDS, |i, shard| Removal::plan(shard, &by_shard[i]));
+        let removed = removed_by(&planned);
+        let _locks = self.take_out(planned, &self.map.moments.group(&undo.moments));
         let mut trajectory = self.map.trajectory.write();
-        let removed = shards.iter_mut().zip(&by_shard).map(|(shard, blocks)| shard.remove(blocks)).sum();
-        for (shard, moments) in shards.iter_mut().zip(self.group_moments(&undo.moments)) {
-            shard.set_moments(&moments);
-            shard.reset_if_empty(&self.map.settings);
-        }
         let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         trajectory.withdraw(&undo.scans, committed.revision);
         self.remember(undo.request.as_ref(), committed, undo.scans.len());
@@ -122,44 +121,80 @@ impl<'a> Committer<'a> {
         by_shard
     }
 
-    /// The moments of `set`, shard by shard.
-    fn group_moments(&self, set: &MomentSet) -> [Vec<(VoxelKey, Moments)>; SHARDS] {
-        let mut by_shard: [Vec<_>; SHARDS] = Default::default();
-        for &(voxel, moments) in set.as_slice() {
-            by_shard[self.map.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].push((voxel, moments));
-        }
-        by_shard
-    }
-
-    /// Adds voxels and the moments of points in them to their shards: the write locks, taken in ascending order, and
-    /// the number of voxels that were absent. What is to be done is found out, and what has to grow is built, while
-    /// readers go on; they wait only while it is done.
-    fn add_to_shards(
-        &self,
-        voxels: &VoxelSet,
-        moments: &MomentSet,
-    ) -> (Vec<RwLockWriteGuard<'a, Shard>>, usize) {
-        let (by_shard, moments) = (self.group(voxels), self.group_moments(moments));
-        let touched = (0..SHARDS).filter(|&i| !by_shard[i].is_empty());
-        let planned: Vec<_> = touched
-            .map(|i| {
-                let shard = self.map.shards[i].upgradable_read();
-                let addition = Addition::plan(&shard, &by_shard[i]);
-                (i, shard, addition)
-            })
-            .collect();
+    /// Adds voxels and the moments of points in them; the number of voxels that were absent.
+    fn add_to_shards(&self, voxels: &VoxelSet, moments: &MomentSet) -> (Locks<'a>, usize) {
+        let (by_shard, moments) = (self.group(voxels), self.map.moments.group(moments));
+        let planned = self.plan(touched(&by_shard), |i, shard| Addition::plan(shard, &by_shard[i]));
+        let added_moments = planned.iter().map(|(at, _)| (at.number, &moments[at.number]));
+        let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments));
         let mut added = 0;
-        let locked = planned.into_iter().map(|(i, shard, addition)| {
-            let mut shard = RwLockUpgradableReadGuard::upgrade(shard);
-            added += addition.apply(&mut shard);
-            shard.add_moments(&moments[i]);
-            shard
-        });
-        (locked.collect(), added)
+        let shards = carry_out(planned, |shard, addition| added += addition.apply(shard));
+        (Locks { _moments: moments, _shards: shards }, added)
     }
 
-    fn lock(&self, by_shard: &[Vec<&Block>; SHARDS]) -> Vec<(usize, RwLockWriteGuard<'a, Shard>)> {
-        let touched = (0..SHARDS).filter(|&i| !by_shard[i].is_empty());
-        touched.map(|i| (i, self.map.shards[i].write())).collect()
+    /// Takes voxels out. Their moments are rebuilt from what remains, or become `moments` where those are known.
+    fn take_out(&self, planned: Plans<'a, Removal>, moments: &[MomentsOfShard; SHARDS]) -> Locks<'a> {
+        let changed =
+            planned.iter().map(|(at, removal)| (at.number, [removal.moments(), &moments[at.number]]));
+        let moments = self.map.moments.change(changed, |shard, moments| {
+            moments.into_iter().for_each(|moments| shard.set(moments));
+            shard.reset_if_empty();
+        });
+        let shards = carry_out(planned, |shard, removal| {
+            removal.apply(shard);
+            shard.reset_if_empty(&self.map.settings);
+        });
+        Locks { _moments: moments, _shards: shards }
     }
+
+    /// Finds out what a change of some shards comes to, and builds what it needs, while readers go on.
+    fn plan<P>(
+        &self,
+        shards: impl IntoIterator<Item = usize>,
+        mut plan: impl FnMut(usize, &Shard) -> P,
+    ) -> Plans<'a, P> {
+        let planned = |number: usize| {
+            let shard = self.map.shards[number].upgradable_read();
+            let plan = plan(number, &shard);
+            (Planned { number, shard }, plan)
+        };
+        shards.into_iter().map(planned).collect()
+    }
+}
+
+/// Parts of a change, one a shard, ascending.
+type Plans<'a, P> = Vec<(Planned<'a>, P)>;
+
+/// A shard that nobody else changes; readers go on.
+struct Planned<'a> {
+    number: usize,
+    shard: RwLockUpgradableReadGuard<'a, Shard>,
+}
+
+/// Keeps readers of what changed waiting until the change is published.
+struct Locks<'a> {
+    _moments: MomentLocks<'a>,
+    _shards: Vec<RwLockWriteGuard<'a, Shard>>,
+}
+
+/// The shards that have a part of a change, ascending.
+fn touched(by_shard: &[Vec<&Block>; SHARDS]) -> impl Iterator<Item = usize> {
+    (0..SHARDS).filter(|&i| !by_shard[i].is_empty())
+}
+
+fn removed_by(planned: &Plans<'_, Removal>) -> usize {
+    planned.iter().map(|(_, removal)| removal.voxels()).sum()
+}
+
+/// Does what is planned under the write locks, which are taken in ascending order.
+fn carry_out<'a, P>(
+    planned: Plans<'a, P>,
+    mut apply: impl FnMut(&mut Shard, P),
+) -> Vec<RwLockWriteGuard<'a, Shard>> {
+    let lock = |(Planned { shard, .. }, plan)| {
+        let mut shard = RwLockUpgradableReadGuard::upgrade(shard);
+        apply(&mut shard, plan);
+        shard
+    };
+    planned.into_iter().map(lock).collect()
 }

@@ -33,9 +33,9 @@ impl MultiResolutionMap {
     pub fn contents(&self) -> MapContents {
         // Locks in the order in which committers take them; every change of the trajectory or the requests holds
         // a shard meanwhile, so that the view keeps both as they are.
-        let view = self.view();
+        let (moments, view) = (self.moments(), self.view());
         let (trajectory, requests) = (self.trajectory().clone(), self.requests().clone());
-        let (voxels, moments) = (view.voxels(), view.moments());
+        let (voxels, moments) = (view.voxels(), moments.to_set());
         MapContents { revision: view.revision(), voxels, moments, trajectory, requests }
     }
 

@@ -46,13 +46,13 @@ impl MultiResolutionMap {
     ///
     /// False positives are measured on `samples` absent neighbours of occupied voxels a level, drawn from `seed`.
     pub fn describe(&self, samples: usize, seed: u64) -> MapDescription {
-        let view = self.view();
+        let (moments, view) = (self.moments(), self.view());
         let levels = (0..self.settings.levels).map(|level| self.describe_level(&view, level, samples, seed));
         MapDescription {
             revision: view.revision(),
             levels: levels.collect(),
             set_bytes: view.shards().map(Shard::set_bytes).sum(),
-            moment_bytes: view.shards().map(Shard::moment_bytes).sum(),
+            moment_bytes: moments.bytes(),
         }
     }
 

@@ -5,15 +5,18 @@
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
 mod addition;
+mod bulk;
 mod change;
 pub mod commit;
 mod contents;
 mod info;
 pub mod lookup;
+mod moments;
 mod name;
 mod observations;
 mod occupied_voxel_list;
 mod region;
+mod removal;
 mod requests;
 mod room;
 mod settings;
@@ -27,6 +30,7 @@ pub use commit::{Committed, Committer};
 pub use contents::MapContents;
 pub use info::{LevelInfo, MapDescription};
 pub use lookup::Lookup;
+pub use moments::MomentsView;
 pub use name::{MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
 pub use observations::Observations;
 pub use occupied_voxel_list::OccupiedVoxelList;
@@ -43,6 +47,7 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 
 use crate::geometry::{Point, Pose};
 use crate::voxel::Lattice;
+use moments::ShardedMoments;
 use shard::Shard;
 use sharding::{Sharding, ShardsTouched};
 
@@ -58,6 +63,7 @@ pub struct MultiResolutionMap {
     settings: MapSettings,
     lattice: Lattice,
     sharding: Sharding,
+    moments: ShardedMoments,
     shards: [RwLock<Shard>; SHARDS],
     trajectory: RwLock<Trajectory>,
     requests: RwLock<Requests>,
@@ -71,11 +77,12 @@ impl MultiResolutionMap {
     /// # Errors
     /// When a setting is out of range; the error names it and the range.
     pub fn new(settings: MapSettings) -> Result<Self, MapSettingsError> {
-        let lattice = settings.lattice()?;
+        let (lattice, sharding) = (settings.lattice()?, Sharding::new(settings.levels));
         Ok(Self {
             settings,
             lattice,
-            sharding: Sharding::new(settings.levels),
+            sharding,
+            moments: ShardedMoments::new(sharding),
             shards: std::array::from_fn(|i| RwLock::new(Shard::new(i, &settings))),
             trajectory: RwLock::default(),
             requests: RwLock::default(),
@@ -127,6 +134,12 @@ impl MultiResolutionMap {
     /// Locks what `points`, placed at `map_from_points`, can fall in.
     pub fn view_of(&self, points: &[Point], map_from_points: &Pose) -> MapView<'_> {
         MapView::lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
+    }
+
+    /// Locks the moments of the map's points for reading, at one revision; before a view of the voxels, where both
+    /// are needed.
+    pub fn moments(&self) -> MomentsView<'_> {
+        self.moments.view()
     }
 
     /// Waits for the turn to change the map.

@@ -2,13 +2,11 @@
 
 use std::ops::Range;
 
-use hashbrown::HashMap;
-
 use super::MapSettings;
 use super::occupied_voxel_list::{OccupiedVoxelList, tier_of};
 use super::room::Room;
 use crate::bloom::CountingBloomFilter;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, Moments, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, VoxelKey, VoxelSet};
 
 /// A block of a tier and its voxels.
 pub(super) type Block = (VoxelKey, BlockMask);
@@ -23,14 +21,12 @@ pub(super) type Block = (VoxelKey, BlockMask);
 ///
 /// So a coarse voxel is there exactly as long as it has a child, and nothing counts children. Every level has a
 /// counting Bloom filter of its own.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Shard {
     /// Which of the map's shards it is.
     pub(super) number: usize,
     pub(super) tiers: Vec<BlockTable>,
     pub(super) filters: Vec<CountingBloomFilter>,
-    /// Of the points in each voxel of [`MOMENT_LEVEL`](crate::voxel::MOMENT_LEVEL).
-    moments: HashMap<VoxelKey, Moments>,
 }
 
 impl Shard {
@@ -42,7 +38,6 @@ impl Shard {
             number,
             tiers: vec![BlockTable::with_capacity(0); tiers],
             filters: (0..settings.levels as usize).map(filter).collect(),
-            moments: HashMap::new(),
         }
     }
 
@@ -59,73 +54,9 @@ impl Shard {
         self.tiers.iter().map(BlockTable::bytes).sum()
     }
 
-    /// Bytes of memory of the moments.
-    pub(super) fn moment_bytes(&self) -> usize {
-        self.moments.allocation_size()
-    }
-
-    /// The moments of the points in a voxel of [`MOMENT_LEVEL`](crate::voxel::MOMENT_LEVEL).
-    pub(super) fn moments_of(&self, voxel: VoxelKey) -> Option<&Moments> {
-        self.moments.get(&voxel)
-    }
-
-    /// All moments, in no order.
-    pub(super) fn moments(&self) -> impl Iterator<Item = (VoxelKey, Moments)> + '_ {
-        self.moments.iter().map(|(&voxel, &moments)| (voxel, moments))
-    }
-
-    /// Adds the moments of points whose voxels are, or are about to be, occupied.
-    pub(super) fn add_moments(&mut self, moments: &[(VoxelKey, Moments)]) {
-        for &(voxel, added) in moments {
-            *self.moments.entry(voxel).or_default() += added;
-        }
-    }
-
-    /// Puts moments in the place of those that are there; none of no points are kept.
-    pub(super) fn set_moments(&mut self, moments: &[(VoxelKey, Moments)]) {
-        set_moments(&mut self.moments, moments.iter().copied());
-    }
-
     /// The blocks of finest voxels.
     pub(super) fn blocks(&self) -> impl Iterator<Item = (VoxelKey, BlockMask)> + '_ {
         self.tiers[0].iter()
-    }
-
-    /// Takes out voxels at every level; the number of finest voxels that were present.
-    pub(super) fn remove(&mut self, blocks: &[&Block]) -> usize {
-        let before = self.filters[0].len();
-        let mut emptied = self.remove_tier(0, blocks.iter().copied());
-        for tier in 1..self.tiers.len() {
-            let blocks: VoxelSet = emptied.into_iter().collect();
-            emptied = self.remove_tier(tier, blocks.blocks());
-        }
-        before - self.filters[0].len()
-    }
-
-    /// Takes voxels out of one tier; the blocks that lost their last one. The set says which voxels are there
-    /// before the filter is told to forget them (paper II-A).
-    fn remove_tier<'a>(&mut self, tier: usize, blocks: impl IntoIterator<Item = &'a Block>) -> Vec<VoxelKey> {
-        let mut emptied = Vec::new();
-        let filters = filters_of(&mut self.filters, tier);
-        for &(block, ref mask) in blocks {
-            let before = self.tiers[tier].get(block);
-            let after = before.difference(mask);
-            if after == before {
-                continue;
-            }
-            self.tiers[tier].set(block, after);
-            if after.is_empty() {
-                emptied.push(block);
-            }
-            for (up, filter) in (0..).zip(filters.iter_mut()) {
-                let gone = before.firsts(up).difference(&after.firsts(up));
-                gone.for_each_key(block, up, |key| filter.remove(key));
-            }
-            if tier == 0 {
-                set_moments(&mut self.moments, after.rebuilt_moments(&before, block));
-            }
-        }
-        emptied
     }
 
     /// The finest voxels below `blocks` of `tier`, of those that are there.
@@ -145,21 +76,6 @@ impl Shard {
             *self = Self::new(self.number, settings);
         }
     }
-}
-
-fn set_moments(all: &mut HashMap<VoxelKey, Moments>, moments: impl IntoIterator<Item = (VoxelKey, Moments)>) {
-    for (voxel, moments) in moments {
-        match moments.is_empty() {
-            true => drop(all.remove(&voxel)),
-            false => drop(all.insert(voxel, moments)),
-        }
-    }
-}
-
-/// The filters of the levels that `tier` serves.
-fn filters_of(filters: &mut [CountingBloomFilter], tier: usize) -> &mut [CountingBloomFilter] {
-    let levels = levels_of(tier, filters.len());
-    &mut filters[levels]
 }
 
 /// The levels that `tier` serves, of a map that has `levels` of them.

@@ -9,8 +9,7 @@ use super::sharding::{SHARDS, ShardsTouched};
 use super::{MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::voxel::{
-    BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL,
-    MomentSet, Moments, VoxelKey, VoxelSet,
+    BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
 };
 
 /// Read locks on some or all shards of a map. While it lives, what it covers does not change.
@@ -87,17 +86,6 @@ impl<'a> MapView<'a> {
     pub fn may_contain(&self, voxel: VoxelKey, level: u32) -> bool {
         let shard = self.map.sharding.shard_of(voxel.index(), level);
         self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).may_contain(voxel))
-    }
-
-    /// The moments of the points in `voxel` of [`MOMENT_LEVEL`]. None where the view does not cover it.
-    pub fn moments_of(&self, voxel: VoxelKey) -> Option<&Moments> {
-        let shard = self.map.sharding.shard_of(voxel.index(), MOMENT_LEVEL);
-        self.shards[shard].as_deref()?.moments_of(voxel)
-    }
-
-    /// All moments that the view covers.
-    pub fn moments(&self) -> MomentSet {
-        self.shards.iter().flatten().flat_map(|shard| shard.moments()).collect()
     }
 
     /// How many of `voxels` are not in the map. The view must cover them.

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6}
 use super::gaussian::Gaussian;
 use super::gaussians::VoxelGaussians;
 use crate::geometry::{Point, Pose};
-use crate::map::MapView;
+use crate::map::MomentsView;
 
 /// What all points say together of how the pose should change.
 ///
@@ -32,7 +32,7 @@ impl NormalEquations {
         points: &[Point],
         pose: &Pose,
         gaussians: &mut VoxelGaussians,
-        view: &MapView<'_>,
+        moments: &MomentsView<'_>,
         robust_scale: f64,
     ) -> Self {
         let mut equations = Self {
@@ -43,7 +43,7 @@ impl NormalEquations {
             inliers: 0,
             fitness: 0.0,
         };
-        for_each_match(points, pose, gaussians, view, robust_scale, |_, gaussian, matched| {
+        for_each_match(points, pose, gaussians, moments, robust_scale, |_, gaussian, matched| {
             let weight = matched.fit * matched.fit;
             equations.matched += 1;
             equations.inliers += usize::from(matched.is_inlier);
@@ -84,11 +84,11 @@ pub(super) fn information(
     points: &[Point],
     pose: &Pose,
     gaussians: &mut VoxelGaussians,
-    view: &MapView<'_>,
+    moments: &MomentsView<'_>,
     robust_scale: f64,
 ) -> Matrix6<f64> {
     let mut surfaces: Vec<(f64, Matrix6<f64>)> = Vec::new();
-    for_each_match(points, pose, gaussians, view, robust_scale, |number, gaussian, matched| {
+    for_each_match(points, pose, gaussians, moments, robust_scale, |number, gaussian, matched| {
         surfaces.resize(surfaces.len().max(number + 1), (0.0, Matrix6::zeros()));
         let (count, sum) = &mut surfaces[number];
         *count += 1.0;
@@ -114,7 +114,7 @@ fn for_each_match(
     points: &[Point],
     pose: &Pose,
     gaussians: &mut VoxelGaussians,
-    view: &MapView<'_>,
+    moments: &MomentsView<'_>,
     robust_scale: f64,
     mut f: impl FnMut(usize, &Gaussian, Match),
 ) {
@@ -123,7 +123,7 @@ fn for_each_match(
     for point in points {
         let from_sensor = rotation * point.to_f64().coords;
         let in_map = from_sensor + pose.translation.vector;
-        if let Some(number) = gaussians.nearest(view, &in_map) {
+        if let Some(number) = gaussians.nearest(moments, &in_map) {
             let gaussian = gaussians.get(number);
             let distance = gaussian.distance_squared(&in_map);
             let (error, fit) = (gaussian.to(&in_map), scale / (scale + distance));

@@ -4,7 +4,7 @@ use hashbrown::HashMap;
 use nalgebra::Vector3;
 
 use super::gaussian::{Gaussian, Softness};
-use crate::map::{MapView, MultiResolutionMap};
+use crate::map::{MomentsView, MultiResolutionMap};
 use crate::voxel::{MOMENT_LEVEL, Moments, VoxelKey};
 
 /// Levels that have Gaussians: voxels of 4, 8 and 16 r_0. Where the finest are too thinly seen to show a surface, the
@@ -41,21 +41,21 @@ impl VoxelGaussians {
     /// The number of the Gaussian that a point of the map frame belongs to: that of its finest voxel that has one, or
     /// of the neighbours across the nearest faces, or the same of larger voxels. (A surface on the border of two voxels
     /// would otherwise hold on to the points on its own side alone.)
-    pub(super) fn nearest(&mut self, view: &MapView<'_>, point_m: &Vector3<f64>) -> Option<u32> {
-        (0..SIZES).find_map(|size| self.nearest_of(view, point_m, size))
+    pub(super) fn nearest(&mut self, moments: &MomentsView<'_>, point_m: &Vector3<f64>) -> Option<u32> {
+        (0..SIZES).find_map(|size| self.nearest_of(moments, point_m, size))
     }
 
-    fn nearest_of(&mut self, view: &MapView<'_>, point_m: &Vector3<f64>, size: usize) -> Option<u32> {
+    fn nearest_of(&mut self, moments: &MomentsView<'_>, point_m: &Vector3<f64>, size: usize) -> Option<u32> {
         let scaled = point_m / self.side_m(size);
         let index = scaled.map(|c| c.floor() as i32);
-        if let Some(own) = self.of_voxel(view, index.into(), size) {
+        if let Some(own) = self.of_voxel(moments, index.into(), size) {
             return Some(own);
         }
         let mut nearest = None;
         for axis in 0..3 {
             let mut neighbour = index;
             neighbour[axis] += if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
-            if let Some(i) = self.of_voxel(view, neighbour.into(), size) {
+            if let Some(i) = self.of_voxel(moments, neighbour.into(), size) {
                 let distance = self.get(i).distance_squared(point_m);
                 if nearest.is_none_or(|(_, least)| distance < least) {
                     nearest = Some((i, distance));
@@ -65,7 +65,7 @@ impl VoxelGaussians {
         nearest.map(|(i, _)| i)
     }
 
-    fn of_voxel(&mut self, view: &MapView<'_>, index: [i32; 3], size: usize) -> Option<u32> {
+    fn of_voxel(&mut self, moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Option<u32> {
         let voxel = VoxelKey::new(index)?;
         if let Some(&known) = self.sizes[size].get(&voxel) {
             return known;
@@ -73,7 +73,7 @@ impl VoxelGaussians {
         let side_m = self.side_m(size);
         let center_m = Vector3::from(index.map(|i| (f64::from(i) + 0.5) * side_m));
         let unit_m = self.side_m(0) / Moments::UNITS as f64;
-        let gaussian = Gaussian::of(&moments_of(view, index, size), center_m, side_m, unit_m);
+        let gaussian = Gaussian::of(&moments_of(moments, index, size), center_m, side_m, unit_m);
         let number = gaussian.map(|mut gaussian| {
             gaussian.soften(self.softness);
             self.gaussians.push(gaussian);
@@ -89,12 +89,12 @@ impl VoxelGaussians {
 }
 
 /// The moments of the points in a voxel `size` levels above those that keep them, about its centre.
-fn moments_of(view: &MapView<'_>, index: [i32; 3], size: usize) -> Moments {
+fn moments_of(moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Moments {
     let side = 1 << size;
     let mut sum = Moments::default();
     for child in (0..side * side * side).map(|i| [i % side, i / side % side, i / (side * side)]) {
         let voxel = VoxelKey::new([0, 1, 2].map(|axis| index[axis] * side + child[axis]));
-        if let Some(moments) = voxel.and_then(|voxel| view.moments_of(voxel)) {
+        if let Some(moments) = voxel.and_then(|voxel| moments.of(voxel)) {
             sum += moments.about(child.map(|c| i64::from(2 * c + 1 - side) * (Moments::UNITS / 2)));
         }
     }
@@ -118,7 +118,7 @@ mod tests {
 
         // The same points in a lattice four times as coarse, whose units are four times as long.
         let coarse = MomentSet::of_points(&points, &Lattice::new(1.0, 1).unwrap().from_map());
-        let sum = moments_of(&map.view(), [0, 0, 0], 2);
+        let sum = moments_of(&map.moments(), [0, 0, 0], 2);
         let (_, expected) = coarse.as_slice()[0];
         assert_eq!((sum.count(), coarse.as_slice().len()), (200, 1));
         let scaled = expected.to_numbers();

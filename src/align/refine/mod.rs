@@ -65,7 +65,7 @@ pub(super) fn refine(
         for _ in 0..settings.iterations_per_stage_max {
             let pose = &refined.map_from_sensor;
             let equations =
-                NormalEquations::of(points, pose, &mut gaussians, &map.view(), settings.robust_scale);
+                NormalEquations::of(points, pose, &mut gaussians, &map.moments(), settings.robust_scale);
             let Some(step) = equations.solve() else {
                 return refined;
             };
@@ -89,9 +89,9 @@ pub(super) fn surface_fit(
     let std_m = settings.std_m(map.lattice().resolution_m(0));
     let mut gaussians = VoxelGaussians::new(map, Softness { std_m, spread: SPREAD_TO_JUDGE });
     let equations =
-        NormalEquations::of(points, map_from_sensor, &mut gaussians, &map.view(), settings.robust_scale);
+        NormalEquations::of(points, map_from_sensor, &mut gaussians, &map.moments(), settings.robust_scale);
     let information =
-        information(points, map_from_sensor, &mut gaussians, &map.view(), settings.robust_scale);
+        information(points, map_from_sensor, &mut gaussians, &map.moments(), settings.robust_scale);
     SurfaceFit {
         information: PoseInformation::new(information, points),
         inliers: equations.inliers as f64 / points.len().max(1) as f64,

@@ -1,0 +1,113 @@
+//! The moments of a map's points: what alignments refine poses on.
+
+use hashbrown::HashMap;
+use parking_lot::{RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+use super::sharding::{SHARDS, Sharding};
+use crate::voxel::{MOMENT_LEVEL, MomentSet, Moments, VoxelKey};
+
+/// The moments of the points in each voxel of [`MOMENT_LEVEL`], in shards like the voxels themselves.
+///
+/// They have locks of their own, since look-ups, which are many, never ask for them, and a table that grows here may
+/// take a while. Who takes both kinds of locks takes these first.
+#[derive(Debug)]
+pub(super) struct ShardedMoments {
+    sharding: Sharding,
+    shards: [RwLock<MomentShard>; SHARDS],
+}
+
+/// Those of one shard.
+#[derive(Debug, Default)]
+pub(super) struct MomentShard(HashMap<VoxelKey, Moments>);
+
+/// Read locks on all moments of a map: while it lives, they do not change.
+#[derive(Debug)]
+pub struct MomentsView<'a> {
+    sharding: Sharding,
+    shards: [RwLockReadGuard<'a, MomentShard>; SHARDS],
+}
+
+/// Keeps who refines waiting until a change is published.
+pub(super) type MomentLocks<'a> = Vec<RwLockWriteGuard<'a, MomentShard>>;
+
+/// Moments of voxels of one shard.
+pub(super) type MomentsOfShard = Vec<(VoxelKey, Moments)>;
+
+impl ShardedMoments {
+    pub(super) fn new(sharding: Sharding) -> Self {
+        Self { sharding, shards: Default::default() }
+    }
+
+    /// Locks them for reading, in ascending order.
+    pub(super) fn view(&self) -> MomentsView<'_> {
+        let shards = std::array::from_fn(|i| self.shards[i].read());
+        MomentsView { sharding: self.sharding, shards }
+    }
+
+    /// Changes some shards, in ascending order, each by what comes with its number.
+    pub(super) fn change<T>(
+        &self,
+        parts: impl IntoIterator<Item = (usize, T)>,
+        mut change: impl FnMut(&mut MomentShard, T),
+    ) -> MomentLocks<'_> {
+        let changed = |(number, part): (usize, T)| {
+            let mut shard = self.shards[number].write();
+            change(&mut shard, part);
+            shard
+        };
+        parts.into_iter().map(changed).collect()
+    }
+
+    /// The moments of `set`, shard by shard.
+    pub(super) fn group(&self, set: &MomentSet) -> [MomentsOfShard; SHARDS] {
+        let mut by_shard: [MomentsOfShard; SHARDS] = Default::default();
+        for &(voxel, moments) in set.as_slice() {
+            by_shard[self.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].push((voxel, moments));
+        }
+        by_shard
+    }
+}
+
+impl MomentShard {
+    /// Adds the moments of points whose voxels are, or are about to be, occupied.
+    pub(super) fn add(&mut self, moments: &[(VoxelKey, Moments)]) {
+        for &(voxel, added) in moments {
+            *self.0.entry(voxel).or_default() += added;
+        }
+    }
+
+    /// Puts moments in the place of those that are there; none of no points are kept.
+    pub(super) fn set(&mut self, moments: &[(VoxelKey, Moments)]) {
+        for &(voxel, moments) in moments {
+            match moments.is_empty() {
+                true => drop(self.0.remove(&voxel)),
+                false => drop(self.0.insert(voxel, moments)),
+            }
+        }
+    }
+
+    /// Gives back the memory of a shard that lost its last moments.
+    pub(super) fn reset_if_empty(&mut self) {
+        if self.0.is_empty() {
+            *self = Self::default();
+        }
+    }
+}
+
+impl MomentsView<'_> {
+    /// The moments of the points in a voxel of [`MOMENT_LEVEL`].
+    pub fn of(&self, voxel: VoxelKey) -> Option<&Moments> {
+        self.shards[self.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].0.get(&voxel)
+    }
+
+    /// All of them.
+    pub fn to_set(&self) -> MomentSet {
+        let all = self.shards.iter().flat_map(|shard| &shard.0);
+        all.map(|(&voxel, &moments)| (voxel, moments)).collect()
+    }
+
+    /// Bytes of memory held.
+    pub fn bytes(&self) -> usize {
+        self.shards.iter().map(|shard| shard.0.allocation_size()).sum()
+    }
+}
