@@ -57,6 +57,8 @@ pub mod http;
 #[cfg(feature = "server")]
 pub mod lifecycle;
 pub mod map;
+#[cfg(feature = "server")]
+pub mod reload;
 pub mod scan;
 #[cfg(feature = "server")]
 pub mod server;

@@ -3,7 +3,9 @@
 mod accepting;
 mod connection;
 mod endpoint;
+mod entrance;
 mod error;
+mod files;
 mod housekeeping;
 mod places;
 mod protocol;
@@ -13,7 +15,8 @@ mod starting;
 mod stream;
 
 pub use error::ServerError;
-pub use signal::shutdown_signal;
+pub use files::ReloadedFiles;
+pub use signal::{reload_on_hangup, shutdown_signal};
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -23,6 +26,7 @@ use std::time::Duration;
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
+use crate::access::{Access, Gate};
 use crate::config::Config;
 use crate::lifecycle::Lifecycle;
 use crate::service::MapService;
@@ -43,6 +47,7 @@ const CLOSING_MAX: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Server {
     config: Config,
+    access: Access,
     service: MeteredService,
     lifecycle: Lifecycle,
     http: TcpSocket,
@@ -56,8 +61,10 @@ impl Server {
     /// are made when that is done.
     ///
     /// # Errors
-    /// When a map cannot be read, an address is taken, or a socket cannot be made.
+    /// When a map or the keys cannot be read, an address is taken, or a socket cannot be made; where there are no keys
+    /// and an address can be reached from elsewhere, unless the settings allow that.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
+        let access = entrance::access(&config)?;
         let settings = config.service_settings();
         let http = TcpSocket::bind(Protocol::Http, config.http.listen).await?;
         let progress = Arc::new(OpeningProgress::default());
@@ -69,6 +76,7 @@ impl Server {
             .map_err(ServerError::Open)?;
         Ok(Self {
             service: MeteredService::new(service, Metrics::new()?),
+            access,
             lifecycle: Lifecycle::default(),
             http,
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen).await?,
@@ -98,6 +106,11 @@ impl Server {
         self.grpc_socket.as_ref().map(|socket| socket.file.path())
     }
 
+    /// The files that are read again while it runs.
+    pub fn files(&self) -> ReloadedFiles {
+        ReloadedFiles::new(self.access.clone(), self.service.metrics().clone())
+    }
+
     /// Serves until `shutdown`, then goes down: refuses what is new, waits `drain_seconds` at most for what is in
     /// flight, saves the maps.
     ///
@@ -107,16 +120,18 @@ impl Server {
     /// # Errors
     /// When a listener stops by itself, or the maps cannot be saved at the end.
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
-        let Self { config, service, lifecycle, .. } = &self;
+        let Self { config, access, service, lifecycle, .. } = &self;
         let bytes_max = config.limits.message_bytes_max;
-        let (routes, health) = grpc::routes(service.clone(), lifecycle.clone(), bytes_max)?;
-        let router = http::router(service.clone(), lifecycle.clone(), bytes_max);
+        let gate = Gate::new(access.clone(), service.clone());
+        let (routes, health) = grpc::routes(gate.clone(), lifecycle.clone(), bytes_max)?;
+        let router = http::router(gate, lifecycle.clone(), bytes_max);
         let grpc = Endpoint::new(Protocol::Grpc, routes.into_axum_router(), &config.limits);
         let http = Endpoint::new(Protocol::Http, router, &config.limits);
 
         let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
+        let files = self.files();
         let mut accepting = self.accept(&grpc, &http);
-        let housekeeping = tokio::spawn(keep_house(service.clone(), lifecycle.clone()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), files, lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {

@@ -9,7 +9,7 @@ const LAYERS: [&[&str]; 7] = [
     &["map", "align", "scan"],
     &["store"],
     &["service"],
-    &["bench", "wire", "config", "telemetry", "lifecycle", "admission", "access"],
+    &["bench", "wire", "config", "telemetry", "lifecycle", "admission", "reload", "access"],
     &["grpc", "http", "client"],
     &["server", "cli", "main"],
 ];

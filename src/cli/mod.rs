@@ -14,6 +14,7 @@ mod error;
 mod experiment;
 mod health;
 mod insert;
+mod key;
 mod localize;
 mod map;
 mod map_report;
@@ -74,6 +75,7 @@ enum Command {
     Bench(bench::Bench),
     Experiment(experiment::Experiment),
     Health(health::Health),
+    Key(key::Keys),
     Snapshot(snapshot::TakeSnapshots),
     Restore(snapshot::Restore),
     Doctor(doctor::Doctor),
@@ -111,6 +113,7 @@ impl Command {
             Self::Bench(bench) => bench.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Health(health) => runtime::block_on(health.run(output)),
+            Self::Key(key) => key.run(&output),
             Self::Snapshot(snapshot) => runtime::block_on(snapshot.run(output)),
             Self::Restore(restore) => runtime::block_on(restore.run(output)),
             Self::Doctor(doctor) => doctor.run(output),

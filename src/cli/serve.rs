@@ -11,13 +11,14 @@ use serde_json::json;
 use super::error::CliError;
 use super::output::Output;
 use crate::config::{Config, ConfigError};
-use crate::server::{Server, shutdown_signal};
+use crate::server::{Server, reload_on_hangup, shutdown_signal};
 use crate::telemetry::start_logging;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol serve                                     maps are kept in ./mrol-data
-  mrol serve --data-dir /var/lib/mrol --http-listen 0.0.0.0:7333 --grpc-listen 0.0.0.0:7334
+  mrol serve --data-dir /var/lib/mrol --keys-file keys.toml --http-listen 0.0.0.0:7333 --grpc-listen 0.0.0.0:7334
+                                                 for other machines, which need keys (`mrol key new`)
   mrol serve --data-dir \"\"                       keep maps in memory only
   mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
                                                  take free ports and print them as JSON
@@ -57,6 +58,12 @@ pub(super) struct ServeOptions {
     /// A Unix socket to serve HTTP at as well (curl --unix-socket PATH)
     #[arg(long, value_name = "PATH")]
     http_socket: Option<PathBuf>,
+    /// The file of keys that callers need, made by `mrol key new`; read again when it changes
+    #[arg(long, value_name = "FILE")]
+    keys_file: Option<PathBuf>,
+    /// Listen off this machine's loopback without keys: whoever reaches the ports may do everything
+    #[arg(long)]
+    insecure_open: bool,
     /// How log lines are written: text or json [default: text]
     #[arg(long, value_name = "FORMAT", value_parser = ["text", "json"])]
     log_format: Option<String>,
@@ -90,6 +97,7 @@ impl Serve {
             () = &mut shutdown => return Ok(()),
             () = std::future::ready(()) => {}
         }
+        tokio::spawn(reload_on_hangup(server.files()));
         match output.print(&Serving::of(&server)) {
             // A daemon need not have a reader.
             Ok(()) | Err(CliError::OutputClosed) => {}
@@ -106,6 +114,7 @@ impl ServeOptions {
             "data_dir": self.data_dir,
             "http": {"listen": self.http_listen, "socket": self.http_socket},
             "grpc": {"listen": self.grpc_listen, "socket": self.grpc_socket},
+            "access": {"keys_file": self.keys_file, "open": self.insecure_open.then_some(true)},
             "log": {"format": self.log_format, "level": self.log_level},
             "store": {
                 "durability": self.durability,

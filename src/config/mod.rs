@@ -1,9 +1,11 @@
 //! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
 
+mod access;
 mod limits;
 mod scans;
 mod store;
 
+pub use access::AccessConfig;
 pub use limits::LimitsConfig;
 pub use scans::{AlignmentConfig, MethodConfig, RobotConfig};
 pub use store::StoreConfig;
@@ -40,6 +42,8 @@ pub struct Config {
     pub http: ListenerConfig,
     /// The gRPC listener; 127.0.0.1:7334.
     pub grpc: ListenerConfig,
+    /// Who may do what.
+    pub access: AccessConfig,
     /// The log.
     pub log: LogConfig,
     /// Threads for work that uses the CPU.
@@ -106,6 +110,7 @@ impl Default for Config {
             drain_seconds: 10,
             http: listener(7333),
             grpc: listener(7334),
+            access: AccessConfig::default(),
             log: LogConfig::default(),
             threads: ThreadsConfig::default(),
             filter: FilterConfig::default(),

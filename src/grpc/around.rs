@@ -1,4 +1,5 @@
-//! What happens around every call: its span, its deadline, the refusal while draining, its count.
+//! What happens around every call: whether its caller may ask for it, its span, its deadline, the refusal while
+//! draining, its count.
 
 use std::time::Instant;
 
@@ -9,43 +10,69 @@ use axum::response::Response;
 use tonic::{Code, Status};
 use tracing::Instrument;
 
-use super::{Adapter, deadline, status};
-use crate::access::Operation;
+use super::{deadline, status};
+use crate::access::{Authorized, Gate, Operation};
+use crate::lifecycle::Lifecycle;
 
 /// How much of an unknown path is repeated to who sent it.
 const PATH_LENGTH_MAX: usize = 80;
 
-/// Wraps the services' routes.
-pub(super) fn routes(routes: Router, adapter: &Adapter) -> Router {
-    routes.layer(from_fn_with_state(adapter.clone(), call))
+/// What calls pass before a handler sees them.
+#[derive(Debug, Clone)]
+pub(super) struct Around {
+    gate: Gate,
+    lifecycle: Lifecycle,
 }
 
-async fn call(State(adapter): State<Adapter>, request: Request, next: Next) -> Response {
+impl Around {
+    pub(super) fn new(gate: Gate, lifecycle: Lifecycle) -> Self {
+        Self { gate, lifecycle }
+    }
+
+    /// Wraps the services' routes.
+    pub(super) fn wrap(self, routes: Router) -> Router {
+        routes.layer(from_fn_with_state(self, call))
+    }
+
+    /// Gives the call what its handler works with, if its caller may ask for it.
+    fn authorized(&self, operation: Operation, call: &mut Request) -> Result<Operation, Status> {
+        let authorized = self.gate.authorize(operation, call.headers_mut())?;
+        call.extensions_mut().insert(authorized);
+        Ok(operation)
+    }
+
+    async fn answer(&self, operation: Operation, call: Request, next: Next) -> Response {
+        let key = call.extensions().get::<Authorized>().and_then(|authorized| authorized.caller.name());
+        let span = tracing::info_span!("grpc", operation = operation.name(), key);
+        if let Some(key) = key {
+            self.gate.metrics().key_used("grpc", key);
+        }
+        let deadline = deadline::of(call.headers());
+        let answer = deadline::within(deadline, next.run(call)).instrument(span);
+        let answer = match operation.is_probe() {
+            true => answer.await,
+            false => self.lifecycle.admit(answer).await.flatten(),
+        };
+        answer.unwrap_or_else(|refusal| Status::from(refusal).into_http())
+    }
+}
+
+async fn call(State(around): State<Around>, mut request: Request, next: Next) -> Response {
     let start = Instant::now();
     let operation = Operation::of_call(request.uri().path());
     // Whatever a client may send, it is one of few.
     let name = operation.map_or("unknown", Operation::name);
-    let span = tracing::info_span!("grpc", operation = name);
-    let response = match operation {
-        Some(operation) => admitted(&adapter, operation, request, next).instrument(span).await,
-        None => no_such_call(&request).into_http(),
+    let authorized = operation.ok_or_else(|| no_such_call(&request));
+    let response = match authorized.and_then(|operation| around.authorized(operation, &mut request)) {
+        Ok(operation) => around.answer(operation, request, next).await,
+        Err(refusal) => refusal.into_http(),
     };
     let code = code(&response);
     if code != Code::Ok || !operation.is_some_and(answers_message_by_message) {
-        adapter.service.metrics().request("grpc", name, status::label(code), start.elapsed());
+        around.gate.metrics().request("grpc", name, status::label(code), start.elapsed());
     }
     tracing::debug!(operation = name, code = status::label(code), elapsed = ?start.elapsed(), "grpc call");
     response
-}
-
-async fn admitted(adapter: &Adapter, operation: Operation, request: Request, next: Next) -> Response {
-    let deadline = deadline::of(request.headers());
-    let answer = deadline::within(deadline, next.run(request));
-    let answer = match operation.is_probe() {
-        true => answer.await,
-        false => adapter.lifecycle.admit(answer).await.flatten(),
-    };
-    answer.unwrap_or_else(|refusal| Status::from(refusal).into_http())
 }
 
 /// True for calls whose requests are counted one by one where they are answered, and not here.

@@ -2,8 +2,9 @@
 
 use tonic::{Request, Response, Status, Streaming};
 
-use super::Adapter;
 use super::stream::{Answers, Message};
+use super::{Adapter, service_of};
+use crate::access::Operation;
 use crate::map::{MapName, RobotName};
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
@@ -16,8 +17,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::InsertScanRequest>,
     ) -> Result<Response<pb::InsertScanResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
-        let answer = self.service.insert_scan(&map, scan).await?;
+        let answer = service.insert_scan(&map, scan).await?;
         Ok(Response::new(answer.into()))
     }
 
@@ -25,11 +27,12 @@ impl Mapping for Adapter {
         &self,
         requests: Request<Streaming<pb::InsertScanRequest>>,
     ) -> Result<Response<Self::InsertScanStreamStream>, Status> {
-        let answers = self.answer_in_order("InsertScanStream", requests, |service, request| async move {
-            let (map, scan) = request.try_into()?;
-            let answer = service.insert_scan(&map, scan).await?;
-            Ok(answer.into())
-        });
+        let answers =
+            self.answer_in_order(Operation::InsertScanStream, requests, |service, request| async move {
+                let (map, scan) = request.try_into()?;
+                let answer = service.insert_scan(&map, scan).await?;
+                Ok(answer.into())
+            })?;
         Ok(Response::new(answers))
     }
 
@@ -37,8 +40,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::AlignScanRequest>,
     ) -> Result<Response<pb::AlignScanResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
-        let answer = self.service.maps().align_scan(&map, scan).await?;
+        let answer = service.maps().align_scan(&map, scan).await?;
         Ok(Response::new(answer.into()))
     }
 
@@ -46,8 +50,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::LocalizeRequest>,
     ) -> Result<Response<pb::LocalizeResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
-        let answer = self.service.maps().localize(&map, scan).await?;
+        let answer = service.maps().localize(&map, scan).await?;
         Ok(Response::new(answer.into()))
     }
 
@@ -55,8 +60,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::DeleteVoxelsRequest>,
     ) -> Result<Response<pb::DeleteVoxelsResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, deletion) = request.into_inner().try_into()?;
-        let answer = self.service.delete_voxels(&map, deletion).await?;
+        let answer = service.delete_voxels(&map, deletion).await?;
         Ok(Response::new(answer.into()))
     }
 
@@ -64,8 +70,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::UndoScansRequest>,
     ) -> Result<Response<pb::UndoScansResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, undo) = request.into_inner().try_into()?;
-        let answer = self.service.undo_scans(&map, undo).await?;
+        let answer = service.undo_scans(&map, undo).await?;
         Ok(Response::new(answer.into()))
     }
 
@@ -73,8 +80,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::GetTrajectoryRequest>,
     ) -> Result<Response<pb::GetTrajectoryResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, robot): (MapName, Option<RobotName>) = request.into_inner().try_into()?;
-        let answer = self.service.maps().trajectory(&map, robot.as_ref()).await?;
+        let answer = service.maps().trajectory(&map, robot.as_ref()).await?;
         Ok(Response::new(answer.into()))
     }
 }

@@ -4,9 +4,10 @@ use bytes::{Bytes, BytesMut};
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::Adapter;
+use super::{Adapter, service_of};
+use crate::access::Authorized;
 use crate::map::MapName;
-use crate::service::ServiceError;
+use crate::service::{MapReach, ServiceError};
 use crate::wire::{self, pb, snapshot_pieces};
 use pb::maps_server::Maps;
 
@@ -18,7 +19,8 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::CreateMapRequest>,
     ) -> Result<Response<pb::CreateMapResponse>, Status> {
-        let service = self.service.maps();
+        let service = service_of(&request)?;
+        let service = service.maps();
         let (name, settings) = wire::create_map(request.into_inner(), service.default_filter())?;
         let answer = service.create_map(name, settings).await?;
         Ok(Response::new(answer.into()))
@@ -28,16 +30,18 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::GetMapRequest>,
     ) -> Result<Response<pb::GetMapResponse>, Status> {
+        let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
-        let info = self.service.maps().map_info(&name).await?;
+        let info = service.maps().map_info(&name).await?;
         Ok(Response::new(info.into()))
     }
 
     async fn list_maps(
         &self,
-        _: Request<pb::ListMapsRequest>,
+        request: Request<pb::ListMapsRequest>,
     ) -> Result<Response<pb::ListMapsResponse>, Status> {
-        let maps = self.service.maps().list_maps().await?;
+        let service = service_of(&request)?;
+        let maps = service.maps().list_maps().await?;
         Ok(Response::new(maps.into()))
     }
 
@@ -45,8 +49,9 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::DeleteMapRequest>,
     ) -> Result<Response<pb::DeleteMapResponse>, Status> {
+        let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
-        self.service.maps().delete_map(&name).await?;
+        service.maps().delete_map(&name).await?;
         Ok(Response::new(pb::DeleteMapResponse {}))
     }
 
@@ -54,8 +59,9 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::SnapshotMapRequest>,
     ) -> Result<Response<Self::SnapshotMapStream>, Status> {
+        let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
-        let file = self.service.maps().snapshot_map(&name).await?;
+        let file = service.maps().snapshot_map(&name).await?;
         let held = self.lifecycle.hold();
         let pieces = snapshot_pieces(file).map(move |piece| {
             let _until_sent = &held;
@@ -68,30 +74,37 @@ impl Maps for Adapter {
         &self,
         pieces: Request<Streaming<pb::RestoreMapRequest>>,
     ) -> Result<Response<pb::RestoreMapResponse>, Status> {
-        let service = self.service.maps();
-        let (name, file) = gather(pieces.into_inner(), service.limits().map_file_bytes_max).await?;
+        let Authorized { caller, service } = Authorized::of(pieces.extensions())?.clone();
+        let service = service.maps();
+        let most = service.limits().map_file_bytes_max;
+        let (name, file) = gather(pieces.into_inner(), caller.reach(), most).await?;
         let info = service.restore_map(name, file).await?;
         Ok(Response::new(pb::RestoreMapResponse { map: Some(info.into()) }))
     }
 }
 
-/// The name and the bytes of a file that comes in pieces; one of more than `most` bytes is refused.
+/// The name and the bytes of a file that comes in pieces. One of more than `most` bytes is refused, and one for a map
+/// that the caller may not name, before the second piece.
 async fn gather(
     mut pieces: Streaming<pb::RestoreMapRequest>,
+    reach: &MapReach,
     most: usize,
 ) -> Result<(MapName, Bytes), Status> {
-    let (mut map, mut file) = (String::new(), BytesMut::new());
-    while let Some(piece) = pieces.message().await? {
-        if map.is_empty() {
-            map = piece.map;
-        }
+    let mut piece = pieces.message().await?.unwrap_or_default();
+    let name = map_name(&piece.map)?;
+    reach.permit(&name)?;
+    let mut file = BytesMut::new();
+    loop {
         if file.len() + piece.data.len() > most {
             let message = format!("map_file_bytes_max is {most}: the map file is larger");
             return Err(ServiceError::invalid("map_file_too_large", message).into());
         }
         file.extend_from_slice(&piece.data);
+        match pieces.message().await? {
+            Some(next) => piece = next,
+            None => return Ok((name, file.freeze())),
+        }
     }
-    Ok((map_name(&map)?, file.freeze()))
 }
 
 fn map_name(text: &str) -> Result<MapName, ServiceError> {

@@ -8,23 +8,31 @@ mod occupancy;
 mod status;
 mod stream;
 
+use tonic::Request;
 use tonic::codec::CompressionEncoding;
 use tonic::service::Routes;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
+use crate::access::{Authorized, Gate};
 use crate::lifecycle::Lifecycle;
+use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 use crate::wire::pb;
+use around::Around;
 use pb::mapping_server::{self, MappingServer};
 use pb::maps_server::{self, MapsServer};
 use pb::occupancy_server::{self, OccupancyServer};
 
-/// What every handler has at hand.
+/// What every handler has at hand, besides the service that its caller may use.
 #[derive(Debug, Clone)]
 struct Adapter {
-    service: MeteredService,
     lifecycle: Lifecycle,
+}
+
+/// What the caller of `request` may use.
+fn service_of<T>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
+    Ok(Authorized::of(request.extensions())?.service.clone())
 }
 
 /// The three services, health and reflection. Messages of more than `message_bytes_max` are refused.
@@ -32,11 +40,11 @@ struct Adapter {
 /// # Errors
 /// When the contract that was compiled in cannot be read.
 pub fn routes(
-    service: MeteredService,
+    gate: Gate,
     lifecycle: Lifecycle,
     message_bytes_max: usize,
 ) -> Result<(Routes, Health), tonic_reflection::server::Error> {
-    let adapter = Adapter { service, lifecycle };
+    let adapter = Adapter { lifecycle: lifecycle.clone() };
     // Each generated server has the same methods, but no trait names them.
     macro_rules! configured {
         ($server:ident) => {
@@ -59,7 +67,7 @@ pub fn routes(
         .add_service(configured!(MapsServer))
         .add_service(health)
         .add_service(reflection);
-    Ok((around::routes(services.into_axum_router(), &adapter).into(), Health(reporter)))
+    Ok((Around::new(gate, lifecycle).wrap(services.into_axum_router()).into(), Health(reporter)))
 }
 
 /// Says by gRPC's health protocol whether the server serves: as a whole (the empty name) and each service.

@@ -3,8 +3,9 @@
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::Adapter;
 use super::stream::{Answers, Message};
+use super::{Adapter, service_of};
+use crate::access::Operation;
 use crate::wire::{pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
 
@@ -17,8 +18,9 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::QueryPointsRequest>,
     ) -> Result<Response<pb::QueryPointsResponse>, Status> {
+        let service = service_of(&request)?;
         let (map, query) = request.into_inner().try_into()?;
-        let answer = self.service.query_points(&map, query).await?;
+        let answer = service.query_points(&map, query).await?;
         Ok(Response::new(answer.into()))
     }
 
@@ -26,11 +28,12 @@ impl Occupancy for Adapter {
         &self,
         requests: Request<Streaming<pb::QueryPointsRequest>>,
     ) -> Result<Response<Self::QueryPointsStreamStream>, Status> {
-        let answers = self.answer_in_order("QueryPointsStream", requests, |service, request| async move {
-            let (map, query) = request.try_into()?;
-            let answer = service.query_points(&map, query).await?;
-            Ok(answer.into())
-        });
+        let answers =
+            self.answer_in_order(Operation::QueryPointsStream, requests, |service, request| async move {
+                let (map, query) = request.try_into()?;
+                let answer = service.query_points(&map, query).await?;
+                Ok(answer.into())
+            })?;
         Ok(Response::new(answers))
     }
 
@@ -38,8 +41,9 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::ListVoxelsRequest>,
     ) -> Result<Response<Self::ListVoxelsStream>, Status> {
+        let service = service_of(&request)?;
         let (map, level, region) = request.into_inner().try_into()?;
-        let listing = self.service.maps().list_voxels(&map, level, region).await?;
+        let listing = service.maps().list_voxels(&map, level, region).await?;
         let held = self.lifecycle.hold();
         let chunks = voxel_chunks(listing).map(move |chunk| {
             let _until_sent = &held;

@@ -12,6 +12,8 @@ pub(super) const REASON: &str = "mrol-reason";
 fn code(code: ErrorCode) -> Code {
     match code {
         ErrorCode::InvalidArgument => Code::InvalidArgument,
+        ErrorCode::Unauthenticated => Code::Unauthenticated,
+        ErrorCode::PermissionDenied => Code::PermissionDenied,
         ErrorCode::NotFound => Code::NotFound,
         ErrorCode::Conflict => Code::AlreadyExists,
         ErrorCode::FailedPrecondition => Code::FailedPrecondition,

@@ -7,7 +7,8 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Status, Streaming};
 
 use super::{Adapter, status};
-use crate::lifecycle;
+use crate::access::{Authorized, Operation};
+use crate::lifecycle::{self, Lifecycle};
 use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 
@@ -25,13 +26,14 @@ pub(super) trait Message: Send + 'static {
 
 impl Adapter {
     /// Answers each request by `handle`, in order, while the next ones are read. The stream ends with the first
-    /// failure's status, or `Unavailable` once the server is going down and the request in hand is answered.
+    /// failure's status, or `Unavailable` once the server is going down and the request in hand is answered; likewise
+    /// `Unauthenticated` once the caller's key counts no longer.
     pub(super) fn answer_in_order<M, A, H, F>(
         &self,
-        operation: &'static str,
+        operation: Operation,
         requests: Request<Streaming<M>>,
         handle: H,
-    ) -> Answers<A>
+    ) -> Result<Answers<A>, Status>
     where
         M: Message,
         A: Send + 'static,
@@ -40,7 +42,9 @@ impl Adapter {
     {
         let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let (outbox, answers) = mpsc::channel(MESSAGES_AHEAD_MAX);
-        let worker = Worker { adapter: self.clone(), operation, handle, map: String::new() };
+        let lifecycle = self.lifecycle.clone();
+        let authorized = Authorized::of(requests.extensions())?.clone();
+        let worker = Worker { lifecycle, authorized, operation, handle, map: String::new() };
         tokio::spawn(async move {
             tokio::select! {
                 // The worker's end ends the reader too.
@@ -48,7 +52,7 @@ impl Adapter {
                 () = read_into(inbox, requests.into_inner()) => {}
             }
         });
-        ReceiverStream::new(answers)
+        Ok(ReceiverStream::new(answers))
     }
 }
 
@@ -65,8 +69,9 @@ async fn read_into<M>(inbox: Sender<Result<M, Status>>, mut requests: Streaming<
 }
 
 struct Worker<H> {
-    adapter: Adapter,
-    operation: &'static str,
+    lifecycle: Lifecycle,
+    authorized: Authorized,
+    operation: Operation,
     handle: H,
     /// The last request's.
     map: String,
@@ -82,7 +87,8 @@ impl<H> Worker<H> {
         loop {
             let answer = tokio::select! {
                 biased;
-                () = self.adapter.lifecycle.draining() => Err(lifecycle::draining().into()),
+                () = self.lifecycle.draining() => Err(lifecycle::draining().into()),
+                withdrawn = self.authorized.caller.withdrawn() => Err(withdrawn.into()),
                 request = inbox.recv() => match request {
                     Some(request) => self.answer(request).await,
                     None => return,
@@ -108,8 +114,8 @@ impl<H> Worker<H> {
             Err(unreadable) => Err(unreadable),
         };
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
-        let metrics = self.adapter.service.metrics();
-        metrics.request("grpc", self.operation, status::label(code), start.elapsed());
+        let metrics = self.authorized.service.metrics();
+        metrics.request("grpc", self.operation.name(), status::label(code), start.elapsed());
         answer
     }
 
@@ -123,7 +129,7 @@ impl<H> Worker<H> {
             map if map.is_empty() => map.clone_from(&self.map),
             map => self.map.clone_from(map),
         }
-        let handled = (self.handle)(self.adapter.service.clone(), request);
-        self.adapter.lifecycle.admit(handled).await?
+        let handled = (self.handle)(self.authorized.service.clone(), request);
+        self.lifecycle.admit(handled).await?
     }
 }

@@ -1,43 +1,64 @@
-//! What happens around every request: its operation, its span, the refusal while draining, its count.
+//! What happens around every request: whether its caller may ask for it, its span, the refusal while draining, its
+//! count.
 
 use std::time::Instant;
 
-use axum::extract::{MatchedPath, Request, State};
+use axum::extract::{FromRequestParts, MatchedPath, Request, State};
+use axum::http::request::Parts;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use tower_http::request_id::RequestId;
 use tracing::Instrument;
 
-use super::Adapter;
 use super::error::{self, HttpError};
-use crate::access::Operation;
+use crate::access::{Authorized, Gate, Operation};
+use crate::lifecycle::Lifecycle;
+use crate::telemetry::MeteredService;
 
-pub(super) async fn request(State(adapter): State<Adapter>, request: Request, next: Next) -> Response {
+/// What requests pass before a handler sees them.
+#[derive(Debug, Clone)]
+pub(super) struct Around {
+    pub(super) gate: Gate,
+    pub(super) lifecycle: Lifecycle,
+}
+
+pub(super) async fn request(State(around): State<Around>, mut request: Request, next: Next) -> Response {
     let start = Instant::now();
     let operation = operation(&request);
     // Whatever a client may send, it is one of few.
     let name = operation.as_ref().map_or("unknown", |operation| operation.name());
-    let id = request.extensions().get::<RequestId>().and_then(|id| id.header_value().to_str().ok());
-    let span = tracing::info_span!("http", operation = name, request_id = id);
-    let response = match operation {
-        Ok(operation) => admitted(&adapter, operation, next.run(request)).instrument(span).await,
-        Err(none) => none.into_response(),
+    let response = match operation.and_then(|operation| around.authorized(operation, &mut request)) {
+        Ok(operation) => around.answer(operation, request, next).await,
+        Err(refusal) => refusal.into_response(),
     };
     let (status, elapsed) = (response.status(), start.elapsed());
-    adapter.service.metrics().request("http", name, status.as_str().to_owned(), elapsed);
+    around.gate.metrics().request("http", name, status.as_str().to_owned(), elapsed);
     tracing::debug!(operation = name, status = status.as_u16(), ?elapsed, "http request");
     response
 }
 
-async fn admitted(
-    adapter: &Adapter,
-    operation: Operation,
-    answer: impl Future<Output = Response>,
-) -> Response {
-    if operation.is_probe() {
-        return answer.await;
+impl Around {
+    /// Gives the request what its handler works with, if its caller may ask for it.
+    fn authorized(&self, operation: Operation, request: &mut Request) -> Result<Operation, HttpError> {
+        let authorized = self.gate.authorize(operation, request.headers_mut())?;
+        request.extensions_mut().insert(authorized);
+        Ok(operation)
     }
-    adapter.lifecycle.admit(answer).await.unwrap_or_else(|refusal| HttpError::from(refusal).into_response())
+
+    async fn answer(&self, operation: Operation, request: Request, next: Next) -> Response {
+        let id = request.extensions().get::<RequestId>().and_then(|id| id.header_value().to_str().ok());
+        let key = request.extensions().get::<Authorized>().and_then(|authorized| authorized.caller.name());
+        let span = tracing::info_span!("http", operation = operation.name(), request_id = id, key);
+        if let Some(key) = key {
+            self.gate.metrics().key_used("http", key);
+        }
+        let answer = next.run(request).instrument(span);
+        if operation.is_probe() {
+            return answer.await;
+        }
+        let answer = self.lifecycle.admit(answer).await;
+        answer.unwrap_or_else(|refusal| HttpError::from(refusal).into_response())
+    }
 }
 
 /// What the request asks for, or the answer where that is nothing there is.
@@ -47,4 +68,15 @@ fn operation(request: &Request) -> Result<Operation, HttpError> {
     };
     let operation = Operation::of_request(request.method().as_str(), route.as_str());
     operation.ok_or_else(|| error::no_such_method(request, route.as_str()))
+}
+
+/// The service, with the maps that the caller may name.
+pub(super) struct Service(pub(super) MeteredService);
+
+impl<S: Sync> FromRequestParts<S> for Service {
+    type Rejection = HttpError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, HttpError> {
+        Ok(Self(Authorized::of(&parts.extensions)?.service.clone()))
+    }
 }

@@ -1,10 +1,9 @@
 //! `POST /v1/maps/{map}/deletions`: take voxels out.
 
-use axum::extract::State;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonState};
@@ -58,11 +57,11 @@ pub(super) struct DeletionOut {
 }
 
 pub(super) async fn delete(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     deletion: DeletionBody,
 ) -> Result<Json<DeletionOut>, HttpError> {
-    let answer = adapter.service.delete_voxels(&map, deletion.try_into()?).await?;
+    let answer = service.delete_voxels(&map, deletion.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 

@@ -23,6 +23,8 @@ pub(super) struct HttpError {
 fn status_of(code: ErrorCode) -> (StatusCode, &'static str) {
     match code {
         ErrorCode::InvalidArgument => (StatusCode::BAD_REQUEST, "invalid_argument"),
+        ErrorCode::Unauthenticated => (StatusCode::UNAUTHORIZED, "unauthenticated"),
+        ErrorCode::PermissionDenied => (StatusCode::FORBIDDEN, "permission_denied"),
         ErrorCode::NotFound => (StatusCode::NOT_FOUND, "not_found"),
         ErrorCode::Conflict => (StatusCode::CONFLICT, "conflict"),
         ErrorCode::FailedPrecondition => (StatusCode::PRECONDITION_FAILED, "failed_precondition"),
@@ -55,6 +57,9 @@ impl IntoResponse for HttpError {
         let headers = response.headers_mut();
         if code == ErrorCode::ResourceExhausted {
             headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        }
+        if code == ErrorCode::Unauthenticated {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"mrol\""));
         }
         if let Some(allow) = self.allow.and_then(|methods| methods.parse().ok()) {
             headers.insert(header::ALLOW, allow);

@@ -1,10 +1,9 @@
 //! `POST /v1/maps/{map}/localize`: where a scan was taken, with no guess.
 
-use axum::extract::State;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonPose, JsonState};
@@ -80,11 +79,11 @@ struct CandidateOut {
 }
 
 pub(super) async fn localize(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     scan: LocalizationBody,
 ) -> Result<Json<LocalizationOut>, HttpError> {
-    let answer = adapter.service.maps().localize(&map, scan.try_into()?).await?;
+    let answer = service.maps().localize(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 

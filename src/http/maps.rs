@@ -1,11 +1,10 @@
 //! `/v1/maps`: make, describe, list and delete maps.
 
-use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::body;
 use super::error::HttpError;
 use super::json::JsonState;
@@ -96,31 +95,28 @@ pub(super) struct MapsOut {
 }
 
 pub(super) async fn create(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(name): Map,
     body::Json(settings): body::Json<SettingsIn>,
 ) -> Result<(StatusCode, Json<MapOut>), HttpError> {
-    let service = adapter.service.maps();
+    let service = service.maps();
     let (info, created) = service.create_map(name, settings.or(service.default_filter())).await?;
     let status = if created { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(info.into())))
 }
 
-pub(super) async fn describe(
-    State(adapter): State<Adapter>,
-    Map(name): Map,
-) -> Result<Json<MapOut>, HttpError> {
-    let info = adapter.service.maps().map_info(&name).await?;
+pub(super) async fn describe(Service(service): Service, Map(name): Map) -> Result<Json<MapOut>, HttpError> {
+    let info = service.maps().map_info(&name).await?;
     Ok(Json(info.into()))
 }
 
-pub(super) async fn list(State(adapter): State<Adapter>) -> Result<Json<MapsOut>, HttpError> {
-    let maps = adapter.service.maps().list_maps().await?;
+pub(super) async fn list(Service(service): Service) -> Result<Json<MapsOut>, HttpError> {
+    let maps = service.maps().list_maps().await?;
     Ok(Json(MapsOut { maps: maps.into_iter().map(Into::into).collect() }))
 }
 
-pub(super) async fn delete(State(adapter): State<Adapter>, Map(name): Map) -> Result<StatusCode, HttpError> {
-    adapter.service.maps().delete_map(&name).await?;
+pub(super) async fn delete(Service(service): Service, Map(name): Map) -> Result<StatusCode, HttpError> {
+    service.maps().delete_map(&name).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

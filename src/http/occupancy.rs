@@ -1,11 +1,10 @@
 //! `POST /v1/maps/{map}/occupancy`: are these points in occupied voxels?
 
-use axum::extract::State;
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonLookup, JsonPoints, JsonPose, JsonState};
@@ -49,7 +48,7 @@ struct AnswerJson {
 
 /// Answers in the form of the question: JSON, or a bitmap.
 pub(super) async fn query(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     body: Points<QueryJson, QueryParameters>,
 ) -> Result<Response, HttpError> {
@@ -57,7 +56,7 @@ pub(super) async fn query(
         Points::Json(query) => (query.try_into()?, as_json),
         Points::Bytes(points, rest) => (rest.with(points)?, as_bitmap),
     };
-    let answer = adapter.service.query_points(&map, query).await?;
+    let answer = service.query_points(&map, query).await?;
     Ok(answer_with(answer))
 }
 

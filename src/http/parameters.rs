@@ -7,12 +7,13 @@ use serde::de::DeserializeOwned;
 
 use super::Adapter;
 use super::error::{HttpError, excerpt};
+use crate::access::Authorized;
 use crate::geometry::{self, Pose};
 use crate::map::{MapName, RequestId};
 use crate::service::ServiceError;
 use crate::wire::InField;
 
-/// The `{map}` of a route.
+/// The `{map}` of a route, which the caller may name: who may not is told so before a body is read.
 pub(super) struct Map(pub(super) MapName);
 
 impl FromRequestParts<Adapter> for Map {
@@ -21,7 +22,9 @@ impl FromRequestParts<Adapter> for Map {
     async fn from_request_parts(parts: &mut Parts, adapter: &Adapter) -> Result<Self, HttpError> {
         let path = Path::<String>::from_request_parts(parts, adapter).await;
         let text = path.map_err(|rejection| ServiceError::invalid("bad_name", rejection.body_text()))?;
-        Ok(Self(MapName::new(&text).map_err(ServiceError::from)?))
+        let name = MapName::new(&text).map_err(ServiceError::from)?;
+        Authorized::of(&parts.extensions)?.caller.reach().permit(&name)?;
+        Ok(Self(name))
     }
 }
 

@@ -7,6 +7,7 @@ use axum::response::IntoResponse;
 use serde_json::{Value, json};
 
 use super::Adapter;
+use super::around::Service;
 use crate::map::MapName;
 
 /// `GET /livez`: 200 while the process lives.
@@ -15,12 +16,15 @@ pub(super) async fn live() -> &'static str {
 }
 
 /// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not. Maps that take no changes since
-/// their journal failed are named; they answer queries all the same.
-pub(super) async fn ready(State(adapter): State<Adapter>) -> (StatusCode, Json<Value>) {
+/// their journal failed are named to whoever may name them; they answer queries all the same.
+pub(super) async fn ready(
+    State(adapter): State<Adapter>,
+    Service(service): Service,
+) -> (StatusCode, Json<Value>) {
     if adapter.lifecycle.is_draining() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
     } else {
-        let maps = adapter.service.maps().read_only_maps();
+        let maps = service.maps().read_only_maps();
         let named = |(map, reason): &(MapName, String)| json!({"map": map.as_str(), "reason": reason});
         let read_only: Vec<Value> = maps.iter().map(named).collect();
         let mut body = json!({"ready": true});
@@ -32,12 +36,12 @@ pub(super) async fn ready(State(adapter): State<Adapter>) -> (StatusCode, Json<V
 }
 
 /// `GET /metrics`: Prometheus' text form.
-pub(super) async fn metrics(State(adapter): State<Adapter>) -> impl IntoResponse {
-    let maps = adapter.service.maps().list_maps().await.unwrap_or_else(|error| {
+pub(super) async fn metrics(Service(service): Service) -> impl IntoResponse {
+    let maps = service.maps().list_maps().await.unwrap_or_else(|error| {
         // The counters say most when the server is overloaded, so they are told without the maps.
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    let text = adapter.service.metrics().render(&maps);
+    let text = service.metrics().render(&maps);
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text)
 }

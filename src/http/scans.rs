@@ -1,10 +1,9 @@
 //! `POST /v1/maps/{map}/scans` and `/alignment`: insert a scan, or only align it.
 
-use axum::extract::State;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonPose, JsonState};
@@ -128,20 +127,20 @@ impl From<Direction> for DirectionOut {
 }
 
 pub(super) async fn insert(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     scan: ScanBody,
 ) -> Result<Json<ScanOut>, HttpError> {
-    let answer = adapter.service.insert_scan(&map, scan.try_into()?).await?;
+    let answer = service.insert_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 
 pub(super) async fn align(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     scan: ScanBody,
 ) -> Result<Json<ScanOut>, HttpError> {
-    let answer = adapter.service.maps().align_scan(&map, scan.try_into()?).await?;
+    let answer = service.maps().align_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 

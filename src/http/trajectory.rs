@@ -1,10 +1,9 @@
 //! `GET /v1/maps/{map}/trajectory`: the poses of the accepted scans, of all robots or of `?robot=`.
 
-use axum::extract::State;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::error::HttpError;
 use super::json::{JsonPose, JsonState};
 use super::parameters::{Map, Parameters};
@@ -36,12 +35,12 @@ struct PoseOut {
 }
 
 pub(super) async fn get(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     Parameters(query): Parameters<TrajectoryQuery>,
 ) -> Result<Json<TrajectoryOut>, HttpError> {
     let robot = query.robot.map(|name| RobotName::new(&name)).transpose().map_err(ServiceError::from)?;
-    let answer = adapter.service.maps().trajectory(&map, robot.as_ref()).await?;
+    let answer = service.maps().trajectory(&map, robot.as_ref()).await?;
     Ok(Json(answer.into()))
 }
 

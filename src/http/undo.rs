@@ -1,10 +1,9 @@
 //! `POST /v1/maps/{map}/undo`: take scans out again.
 
-use axum::extract::State;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::Adapter;
+use super::around::Service;
 use super::body;
 use super::error::HttpError;
 use super::json::JsonState;
@@ -33,11 +32,11 @@ pub(super) struct UndoOut {
 }
 
 pub(super) async fn undo(
-    State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     body::Json(undo): body::Json<UndoIn>,
 ) -> Result<Json<UndoOut>, HttpError> {
-    let answer = adapter.service.undo_scans(&map, undo.try_into()?).await?;
+    let answer = service.undo_scans(&map, undo.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 

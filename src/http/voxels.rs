@@ -10,6 +10,7 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 
 use super::Adapter;
+use super::around::Service;
 use super::error::HttpError;
 use super::json::JsonState;
 use super::parameters::{Map, Parameters, numbers};
@@ -40,11 +41,12 @@ struct Head {
 
 pub(super) async fn list(
     State(adapter): State<Adapter>,
+    Service(service): Service,
     Map(map): Map,
     Parameters(query): Parameters<VoxelsQuery>,
 ) -> Result<Response, HttpError> {
     let (level, region) = (query.level, query.region()?);
-    let listing = adapter.service.maps().list_voxels(&map, level, region).await?;
+    let listing = service.maps().list_voxels(&map, level, region).await?;
     let head = Head { level, resolution_m: listing.resolution_m, state: listing.state.into() };
     let held = adapter.lifecycle.hold();
     let chunks = chunks(head, listing.keys)?.map(move |chunk| {

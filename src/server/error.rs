@@ -4,6 +4,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use crate::access::KeyFileError;
 use crate::service::ServiceError;
 use crate::telemetry::TelemetryError;
 
@@ -33,6 +34,21 @@ pub enum ServerError {
         /// Why.
         error: io::Error,
     },
+    /// Without keys, other machines could do everything.
+    #[error(
+        "{protocol} would let whoever reaches {address} do everything: name a file of keys (access.keys_file or \
+         --keys-file; `mrol key new` makes keys), listen on loopback, or say that this is meant (access.open or \
+         --insecure-open)"
+    )]
+    Unguarded {
+        /// `http` or `grpc`.
+        protocol: &'static str,
+        /// The address.
+        address: SocketAddr,
+    },
+    /// The file of keys is none.
+    #[error("access.keys_file: {0}")]
+    Keys(#[from] KeyFileError),
     /// Log or metrics.
     #[error(transparent)]
     Telemetry(#[from] TelemetryError),

@@ -1,4 +1,6 @@
-//! What tells the process to end.
+//! What tells the process to end, or to read its files again.
+
+use super::ReloadedFiles;
 
 /// Waits for the process to be told to end: ctrl-c, or SIGTERM where there is one.
 pub async fn shutdown_signal() {
@@ -31,4 +33,21 @@ async fn terminated() {
 #[cfg(not(unix))]
 async fn terminated() {
     std::future::pending().await
+}
+
+/// Reads `files` again each time that the process gets SIGHUP, for ever. Where there are none, the signal keeps its
+/// meaning and ends the process.
+pub async fn reload_on_hangup(files: ReloadedFiles) {
+    use tokio::signal::unix::{SignalKind, signal};
+    if !files.exist() {
+        return;
+    }
+    match signal(SignalKind::hangup()) {
+        Ok(mut signal) => {
+            while signal.recv().await.is_some() {
+                files.reload().await;
+            }
+        }
+        Err(error) => tracing::error!(%error, "sighup cannot be heard"),
+    }
 }

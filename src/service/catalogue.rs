@@ -9,7 +9,8 @@ use parking_lot::RwLock;
 use uuid::Uuid;
 
 use super::hosted_map::{HostedMap, Saving};
-use super::{ErrorCode, ServiceError};
+use super::reach::Reachable;
+use super::{ErrorCode, MapReach, ServiceError};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap};
 use crate::store::{Cut, DataDir, OpeningProgress, Snapshot, StoreError, StoreSettings};
@@ -43,21 +44,27 @@ impl Catalogue {
         Ok(Self { maps: RwLock::new(maps), data_dir: data_dir.map(Arc::new), writing: Default::default() })
     }
 
-    pub(super) fn get(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
+    pub(super) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
+        let name = name.name();
         self.maps.read().get(name).cloned().ok_or_else(|| {
             let message = format!("map {name} does not exist: make it first, or list the maps there are");
             ServiceError::new(ErrorCode::NotFound, "map_not_found", message)
         })
     }
 
-    pub(super) fn all(&self) -> Vec<Arc<HostedMap>> {
+    /// The maps that a caller may name.
+    pub(super) fn within(&self, reach: &MapReach) -> Vec<Arc<HostedMap>> {
+        self.maps.read().values().filter(|map| reach.covers(&map.name)).cloned().collect()
+    }
+
+    fn all(&self) -> Vec<Arc<HostedMap>> {
         self.maps.read().values().cloned().collect()
     }
 
     /// The map of that name; true when it was not there.
     pub(super) async fn create(
         &self,
-        name: MapName,
+        name: Reachable,
         settings: MapSettings,
         maps_max: usize,
     ) -> Result<(Arc<HostedMap>, bool), ServiceError> {
@@ -67,23 +74,24 @@ impl Catalogue {
         }
         self.check_room(maps_max)?;
         let empty = Snapshot::of(&MultiResolutionMap::new(settings)?, Uuid::new_v4());
-        self.add(name, empty).await.map(|map| (map, true))
+        self.add(name.name(), empty).await.map(|map| (map, true))
     }
 
     /// The map of `snapshot` under a name that is free.
     pub(super) async fn restore(
         &self,
-        name: MapName,
+        name: Reachable,
         snapshot: Snapshot,
         maps_max: usize,
     ) -> Result<Arc<HostedMap>, ServiceError> {
         let _writing = self.writing.lock().await;
         if self.get(&name).is_ok() {
-            let message = format!("map {name} exists: delete it first, or restore under another name");
+            let message =
+                format!("map {} exists: delete it first, or restore under another name", name.name());
             return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
         }
         self.check_room(maps_max)?;
-        self.add(name, snapshot).await
+        self.add(name.name(), snapshot).await
     }
 
     fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
@@ -96,25 +104,25 @@ impl Catalogue {
     }
 
     /// Takes a map into the catalogue, kept and named; the caller holds `writing`.
-    async fn add(&self, name: MapName, snapshot: Snapshot) -> Result<Arc<HostedMap>, ServiceError> {
+    async fn add(&self, name: &MapName, snapshot: Snapshot) -> Result<Arc<HostedMap>, ServiceError> {
         let (snapshot, kept_name) = (Arc::new(snapshot), name.clone());
         let kept = Arc::clone(&snapshot);
         let folder = self.on_disk(move |data_dir| data_dir.create(&kept_name, &kept)).await?;
         let (uuid, map) = (snapshot.uuid, Arc::unwrap_or_clone(snapshot).restore()?);
         let map = Arc::new(HostedMap::new(name.clone(), uuid, map, folder)?);
-        self.maps.write().insert(name, Arc::clone(&map));
+        self.maps.write().insert(name.clone(), Arc::clone(&map));
         Ok(map)
     }
 
-    pub(super) async fn delete(&self, name: &MapName) -> Result<(), ServiceError> {
+    pub(super) async fn delete(&self, name: &Reachable) -> Result<(), ServiceError> {
         let _writing = self.writing.lock().await;
         let map = self.get(name)?;
         self.on_disk({
-            let (name, uuid) = (name.clone(), map.uuid);
+            let (name, uuid) = (map.name.clone(), map.uuid);
             move |data_dir| data_dir.remove(&name, uuid)
         })
         .await?;
-        self.maps.write().remove(name);
+        self.maps.write().remove(&map.name);
         // Who still holds the map may read it, but nothing is kept of it any more.
         map.committing.end();
         Ok(())

@@ -10,6 +10,10 @@ use crate::voxel::SettingError;
 pub enum ErrorCode {
     /// The request can never succeed as it is.
     InvalidArgument,
+    /// The caller has no key, or none that is known.
+    Unauthenticated,
+    /// The caller's key is not for this; `reason` says what is missing.
+    PermissionDenied,
     /// No such map.
     NotFound,
     /// It exists already and is not the same.

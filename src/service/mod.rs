@@ -13,6 +13,7 @@ mod localization;
 mod map_file;
 mod mapping;
 mod pool;
+mod reach;
 mod request;
 mod settings;
 mod undo;
@@ -22,6 +23,7 @@ pub use limits::Limits;
 pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, TIME_LIMIT_DEFAULT,
 };
+pub use reach::MapReach;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer,
@@ -42,9 +44,14 @@ use localization::Caller;
 use map_file::from_file;
 use pool::Pool;
 
-/// All operations on all maps. A clone is another handle on the same maps.
+/// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
+///
+/// Each operation fails with `PermissionDenied` where the handle may not name the map.
 #[derive(Debug, Clone)]
-pub struct MapService(Arc<Inner>);
+pub struct MapService {
+    inner: Arc<Inner>,
+    reach: MapReach,
+}
 
 #[derive(Debug)]
 struct Inner {
@@ -71,23 +78,29 @@ impl MapService {
         settings.alignment.checked().map_err(|e| ServiceError::invalid("bad_settings", e.to_string()))?;
         settings.filter.checked()?;
         let waiting = settings.limits.jobs_waiting_max;
-        Ok(Self(Arc::new(Inner {
+        let inner = Inner {
             catalogue: Catalogue::open(settings.data_dir.as_deref(), &settings.store, progress)?,
             queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
             mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
             localization: Pool::new("mrol-localization", settings.localization_threads, waiting)?,
             settings,
-        })))
+        };
+        Ok(Self { inner: Arc::new(inner), reach: MapReach::Every })
+    }
+
+    /// The same maps for a caller who may name no others than those of `reach`.
+    pub fn limited_to(&self, reach: MapReach) -> Self {
+        Self { inner: Arc::clone(&self.inner), reach }
     }
 
     /// The bounds on what callers may ask.
     pub fn limits(&self) -> &Limits {
-        &self.0.settings.limits
+        &self.inner.settings.limits
     }
 
     /// The filter of maps whose makers do not say.
     pub fn default_filter(&self) -> crate::bloom::FilterSettings {
-        self.0.settings.filter
+        self.inner.settings.filter
     }
 
     /// Makes a map; true when it was not there. The same settings again are fine.
@@ -100,7 +113,8 @@ impl MapService {
         name: MapName,
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
-        let inner = Arc::clone(&self.0);
+        let name = self.reach.check(&name)?;
+        let inner = Arc::clone(&self.inner);
         let create =
             async move { inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await };
         let (map, created) = to_its_end(create).await?;
@@ -115,19 +129,19 @@ impl MapService {
         self.describe(self.map(name)?).await
     }
 
-    /// Describes all maps, by name.
+    /// Describes all maps that the caller may name, by name.
     ///
     /// # Errors
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
-        let maps = self.0.catalogue.all();
+        let maps = self.inner.catalogue.within(&self.reach);
         let describe = move || maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
-        self.0.queries.run(describe).await
+        self.inner.queries.run(describe).await
     }
 
     /// The maps that take no changes since their journal failed, by name, with the reason.
     pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
-        let maps = self.0.catalogue.all();
+        let maps = self.inner.catalogue.within(&self.reach);
         maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
     }
 
@@ -136,7 +150,7 @@ impl MapService {
     /// # Errors
     /// `NotFound` without such a map; `Internal` when its file cannot be removed.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
-        let (inner, name) = (Arc::clone(&self.0), name.clone());
+        let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
         to_its_end(async move { inner.catalogue.delete(&name).await }).await
     }
 
@@ -157,7 +171,7 @@ impl MapService {
         if query.points.len() <= pool::INLINE_POINTS {
             return map.query(&query);
         }
-        self.0.queries.run(move || map.query(&query)).await?
+        self.inner.queries.run(move || map.query(&query)).await?
     }
 
     /// Aligns a scan and, where it fits, adds it.
@@ -169,7 +183,7 @@ impl MapService {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let turn = Arc::new(map.turn_of(&scan.robot).await);
-        let (inner, scan) = (Arc::clone(&self.0), Arc::new(scan));
+        let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
         self.carry_through(move || map.propose_scan(&scan, Arc::clone(&turn), &inner.settings)).await
     }
 
@@ -180,8 +194,8 @@ impl MapService {
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
-        let inner = Arc::clone(&self.0);
-        self.0.mapping.run(move || map.align_scan(&scan, &inner.settings)).await?
+        let inner = Arc::clone(&self.inner);
+        self.inner.mapping.run(move || map.align_scan(&scan, &inner.settings)).await?
     }
 
     /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
@@ -197,10 +211,10 @@ impl MapService {
     ) -> Result<LocalizationAnswer, ServiceError> {
         let map = self.map(map)?;
         let request = request.within(self.limits())?;
-        let inner = Arc::clone(&self.0);
+        let inner = Arc::clone(&self.inner);
         let caller = Caller::default();
         let gone = caller.gone();
-        self.0.localization.run(move || map.localize(&request, &inner.settings, gone)).await?
+        self.inner.localization.run(move || map.localize(&request, &inner.settings, gone)).await?
     }
 
     /// Takes voxels out, with all their descendants.
@@ -261,7 +275,7 @@ impl MapService {
         let map = self.map(map)?;
         map.check_level(level)?;
         let most = self.limits().listed_voxels_max;
-        self.0.queries.run(move || map.list(level, region.as_ref(), most)).await?
+        self.inner.queries.run(move || map.list(level, region.as_ref(), most)).await?
     }
 
     /// A map as a map file, at one revision.
@@ -270,7 +284,7 @@ impl MapService {
     /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let map = self.map(name)?;
-        self.0.queries.run(move || map.to_file()).await?
+        self.inner.queries.run(move || map.to_file()).await?
     }
 
     /// Makes a map from a map file, under a uuid of its own.
@@ -279,9 +293,10 @@ impl MapService {
     /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
     /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`.
     pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
-        let inner = Arc::clone(&self.0);
-        let snapshot = self.0.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
-        let inner = Arc::clone(&self.0);
+        let name = self.reach.check(&name)?;
+        let inner = Arc::clone(&self.inner);
+        let snapshot = self.inner.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
+        let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
         let map = to_its_end(async move { inner.catalogue.restore(name, snapshot, maps_max).await }).await?;
         self.describe(map).await
@@ -292,7 +307,7 @@ impl MapService {
     /// # Errors
     /// `Internal` when a file cannot be written; the others are written all the same.
     pub async fn save(&self) -> Result<usize, ServiceError> {
-        self.0.catalogue.save(Saving::Changed).await
+        self.inner.catalogue.save(Saving::Changed).await
     }
 
     /// The same for the maps with much journal or an old snapshot; to be called every now and then.
@@ -300,7 +315,7 @@ impl MapService {
     /// # Errors
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
-        self.0.catalogue.save(Saving::Due).await
+        self.inner.catalogue.save(Saving::Due).await
     }
 
     /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile.
@@ -309,7 +324,7 @@ impl MapService {
         propose: impl Fn() -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
-            match self.0.mapping.run(propose.clone()).await?? {
+            match self.inner.mapping.run(propose.clone()).await?? {
                 Step::Answered(answer) => return Ok(answer),
                 Step::Proposed(outcome, answer) => match outcome.await.map_err(committing_ended)? {
                     Ok(committed) => return Ok(answer(committed)),
@@ -321,11 +336,11 @@ impl MapService {
     }
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
-        self.0.catalogue.get(name)
+        self.inner.catalogue.get(&self.reach.check(name)?)
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
-        self.0.queries.run(move || map.describe(RATE_SAMPLES)).await
+        self.inner.queries.run(move || map.describe(RATE_SAMPLES)).await
     }
 }
 

@@ -3,8 +3,8 @@
 use super::Metrics;
 use crate::map::MapName;
 use crate::service::{
-    Deletion, DeletionAnswer, MapService, PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError,
-    Undo, UndoAnswer,
+    Deletion, DeletionAnswer, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer, ScanRequest,
+    ServiceError, Undo, UndoAnswer,
 };
 
 /// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
@@ -19,6 +19,11 @@ impl MeteredService {
     /// `service`, counted in `metrics`.
     pub fn new(service: MapService, metrics: Metrics) -> Self {
         Self { service, metrics }
+    }
+
+    /// The same for a caller who may name no others than the maps of `reach`.
+    pub fn limited_to(&self, reach: MapReach) -> Self {
+        Self { service: self.service.limited_to(reach), metrics: self.metrics.clone() }
     }
 
     /// The service itself.

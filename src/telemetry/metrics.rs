@@ -3,7 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use metrics::{SharedString, counter, describe_counter, describe_histogram, histogram, with_local_recorder};
+use metrics::{
+    SharedString, counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram,
+    with_local_recorder,
+};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
 use super::exposition;
@@ -18,6 +21,8 @@ const SECONDS_BUCKETS: [f64; 14] =
 
 const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
+const KEY_REQUESTS: &str = "mrol_key_requests_total";
+const FILE_IN_FORCE: &str = "mrol_file_in_force";
 const POINTS_QUERIED: &str = "mrol_points_queried_total";
 const SCANS: &str = "mrol_scans_total";
 const SCANS_UNDONE: &str = "mrol_scans_undone_total";
@@ -56,6 +61,16 @@ impl Metrics {
                 .increment(1);
             histogram!(REQUEST_SECONDS, "protocol" => protocol, "operation" => operation).record(elapsed);
         });
+    }
+
+    /// Counts a call or request that was let in with a key.
+    pub fn key_used(&self, protocol: &'static str, key: &str) {
+        self.record(|| counter!(KEY_REQUESTS, "protocol" => protocol, "key" => key.to_owned()).increment(1));
+    }
+
+    /// Says whether what a file holds is in force: false where it changed into something that cannot be used.
+    pub fn file_in_force(&self, file: &'static str, in_force: bool) {
+        self.record(|| gauge!(FILE_IN_FORCE, "file" => file).set(f64::from(u8::from(in_force))));
     }
 
     /// Counts points that were answered.
@@ -105,6 +120,11 @@ impl Metrics {
 fn describe() {
     describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
     describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
+    describe_counter!(KEY_REQUESTS, "Calls and requests let in, by protocol and name of their key");
+    describe_gauge!(
+        FILE_IN_FORCE,
+        "0 where a file changed into what cannot be used, and what it held before goes on"
+    );
     describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
     describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
     describe_counter!(SCANS_UNDONE, "Scans taken out again, by map");

@@ -18,11 +18,17 @@ pub struct Process {
 impl Process {
     /// With its maps in `data_dir`, and more options.
     pub fn start(data_dir: &str, options: &[&str]) -> Self {
+        Self::start_with_log(data_dir, options, "error", Stdio::inherit())
+    }
+
+    /// The same with its log, of `level` and above, in `log`.
+    pub fn start_with_log(data_dir: &str, options: &[&str], level: &str, log: Stdio) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_mrol"))
-            .args(["serve", "--json", "--data-dir", data_dir, "--log-level", "error"])
+            .args(["serve", "--json", "--data-dir", data_dir, "--log-level", level])
             .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
             .args(options)
             .stdout(Stdio::piped())
+            .stderr(log)
             .spawn()
             .expect("the program");
         let mut line = String::new();

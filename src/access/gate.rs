@@ -1,0 +1,92 @@
+//! Where every request comes in.
+
+use axum::http::header::AUTHORIZATION;
+use axum::http::{Extensions, HeaderMap};
+
+use super::{Access, Caller, Operation, Secret};
+use crate::service::{ErrorCode, ServiceError};
+use crate::telemetry::{MeteredService, Metrics};
+
+/// The only holder of a service that reaches every map. Handlers get theirs of [`Gate::authorize`], so that none can
+/// reach more than its caller may.
+#[derive(Debug, Clone)]
+pub struct Gate {
+    access: Access,
+    service: MeteredService,
+}
+
+/// What a request that was let in is answered with.
+#[derive(Debug, Clone)]
+pub struct Authorized {
+    /// Who asks.
+    pub caller: Caller,
+    /// The maps that the caller may name.
+    pub service: MeteredService,
+}
+
+impl Authorized {
+    /// What a request was let in with; the layers around the handlers have put it there.
+    ///
+    /// # Errors
+    /// `Internal` where nobody asked: a handler was served past them.
+    pub fn of(extensions: &Extensions) -> Result<&Self, ServiceError> {
+        extensions.get().ok_or_else(|| {
+            let message = "nobody asked who may do this: a defect of the server";
+            ServiceError::new(ErrorCode::Internal, "not_authorized", message)
+        })
+    }
+}
+
+impl Gate {
+    /// Lets in to `service` whom `access` allows.
+    pub fn new(access: Access, service: MeteredService) -> Self {
+        Self { access, service }
+    }
+
+    /// Lets a request in. The secret is taken out of its headers, so that nothing further in can show it.
+    ///
+    /// # Errors
+    /// `Unauthenticated` and `PermissionDenied`, as [`Access::authorize`] says.
+    pub fn authorize(
+        &self,
+        operation: Operation,
+        headers: &mut HeaderMap,
+    ) -> Result<Authorized, ServiceError> {
+        let secret = taken_from(headers);
+        let caller = self.access.authorize(operation, secret.as_ref())?;
+        let service = self.service.limited_to(caller.reach().clone());
+        Ok(Authorized { caller, service })
+    }
+
+    /// Where requests are counted.
+    pub fn metrics(&self) -> &Metrics {
+        self.service.metrics()
+    }
+}
+
+/// The secret of `authorization: Bearer <secret>`.
+fn taken_from(headers: &mut HeaderMap) -> Option<Secret> {
+    let value = headers.remove(AUTHORIZATION)?;
+    let (scheme, secret) = value.to_str().ok()?.split_once(' ')?;
+    scheme.eq_ignore_ascii_case("bearer").then(|| Secret::new(secret.trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_secret_is_taken_out_of_the_headers() {
+        let taken = |value: &'static str| {
+            let mut headers = HeaderMap::from_iter([(AUTHORIZATION, value.parse().unwrap())]);
+            let secret = taken_from(&mut headers);
+            assert!(headers.is_empty());
+            secret.map(|secret| secret.reveal().to_owned())
+        };
+        assert_eq!(taken("Bearer mrol_1").as_deref(), Some("mrol_1"));
+        assert_eq!(taken("bearer  mrol_1 ").as_deref(), Some("mrol_1"));
+        for none in ["Basic bXJvbA==", "mrol_1", "Bearer"] {
+            assert_eq!(taken(none), None, "{none}");
+        }
+    }
+}

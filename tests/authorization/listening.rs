@@ -1,0 +1,64 @@
+//! Off loopback, a server without keys does not start.
+
+use mrol::access::Scope;
+use mrol::config::Config;
+use mrol::server::{Server, ServerError};
+
+use crate::keyring::Keyring;
+
+fn everywhere() -> Config {
+    let mut config = Config { data_dir: "".into(), ..Config::default() };
+    config.http.listen = "127.0.0.1:0".parse().unwrap();
+    config.grpc.listen = "0.0.0.0:0".parse().unwrap();
+    config
+}
+
+#[tokio::test]
+async fn off_loopback_it_needs_keys_or_a_word_that_this_is_meant() {
+    let refused = Server::bind(everywhere()).await.unwrap_err();
+    assert!(matches!(refused, ServerError::Unguarded { protocol: "grpc", .. }), "{refused}");
+    assert!(refused.to_string().contains("mrol key new") && refused.to_string().contains("--insecure-open"));
+
+    let mut meant = everywhere();
+    meant.access.open = true;
+    Server::bind(meant).await.unwrap();
+
+    let keyring = Keyring::empty();
+    keyring.add("a", Scope::Read, None);
+    let mut guarded = everywhere();
+    guarded.access.keys_file = Some(keyring.file());
+    Server::bind(guarded).await.unwrap();
+}
+
+#[tokio::test]
+async fn keys_that_cannot_be_read_keep_it_from_starting() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    let start = async |text: Option<&str>| {
+        if let Some(text) = text {
+            std::fs::write(&file, text).unwrap();
+        }
+        let mut config = everywhere();
+        config.access.keys_file = Some(file.clone());
+        Server::bind(config).await.unwrap_err().to_string()
+    };
+    let named = |error: &str| error.starts_with("access.keys_file: ") && error.contains("keys.toml");
+    let hash = "0".repeat(64);
+    let key = |rest: &str| format!("[[key]]\nname = \"a\"\nsha256 = \"{hash}\"\nscope = \"read\"\n{rest}");
+    for (text, problem) in [
+        (None, "No such file"),
+        (Some(String::new()), "there is no [[key]]"),
+        (Some("key = 1".into()), "line 1 must belong"),
+        (Some(key("secret = \"mrol_1\"")), "line "),
+        (Some(key("maps = []")), "key 1: maps must name a map"),
+        (Some(key("maps = [\"../a\"]")), "key 1: maps must be names"),
+        (Some(key("").replace(&hash, "mrol_12345")), "key 1: sha256 must be the 64"),
+        (Some(key("").replace("read", "root")), "key 1: scope must be read, write or admin"),
+        (Some(key("").replace("\"a\"", "\"a b\"")), "key 1: name must be 1 to 64"),
+        (Some(key("") + &key("").replace("\"a\"", "\"b\"")), "key 2: another key has that sha256"),
+    ] {
+        let error = start(text.as_deref()).await;
+        assert!(named(&error) && error.contains(problem), "{text:?}: {error}");
+        assert!(!error.contains("mrol_1"), "{error}");
+    }
+}

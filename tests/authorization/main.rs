@@ -1,0 +1,17 @@
+//! Who may do what: every RPC and every route has a rule, and the rule holds.
+
+#![cfg(feature = "server")]
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod asking;
+#[path = "../common/mod.rs"]
+mod common;
+mod disclosure;
+mod keyring;
+mod listening;
+mod paths;
+#[path = "../process/mod.rs"]
+mod process;
+mod reloading;
+mod requests;
+mod table;
