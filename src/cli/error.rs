@@ -1,6 +1,6 @@
 //! Why a command failed, and with which exit code.
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
@@ -45,14 +45,23 @@ impl CliError {
 
     /// Says it on standard error; the process's exit code.
     pub(super) fn report(self) -> ExitCode {
-        let (message, code) = match self {
-            Self::Usage(message) => (message, 2),
-            Self::Failed(message) => (message, 1),
+        let code = match self {
+            Self::Usage(_) => 2,
+            Self::Failed(_) => 1,
             Self::OutputClosed => return ExitCode::SUCCESS,
         };
         // Where standard error is closed too, the exit code says it all.
-        let _ = writeln!(io::stderr(), "error: {message}");
+        let _ = writeln!(io::stderr(), "error: {self}");
         ExitCode::from(code)
+    }
+}
+
+impl Display for CliError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(message) | Self::Failed(message) => f.write_str(message),
+            Self::OutputClosed => f.write_str("nobody reads the output any more"),
+        }
     }
 }
 

@@ -7,6 +7,7 @@ mod journal;
 mod lookup;
 mod readers;
 mod serve;
+mod soak;
 mod start;
 pub(super) mod workload;
 
@@ -28,6 +29,7 @@ EXAMPLES:
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench serve                                    a load of point queries on a server of its own
+  mrol bench soak                                     an hour under a fleet's load: memory, errors
 
 Figures are medians of several runs; give the machine nothing else to do meanwhile. `mrol bench WHAT --help`
 explains each.";
@@ -49,6 +51,7 @@ enum What {
     Align(align::Align),
     Readers(readers::Readers),
     Serve(serve::Serve),
+    Soak(soak::Soak),
     Start(start::Start),
 }
 
@@ -63,6 +66,7 @@ impl Bench {
             What::Readers(readers) => readers.run(&output),
             What::Start(start) => start.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),
+            What::Soak(soak) => runtime::block_on(soak.run(output)),
         }
     }
 }

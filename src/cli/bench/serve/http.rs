@@ -13,13 +13,13 @@ use crate::service::PointCloud;
 const ANSWER_BYTES_MAX: usize = 1 << 20;
 
 /// A connection, and where it asks.
-pub(super) struct HttpConnection {
+pub(in crate::cli::bench) struct HttpConnection {
     client: Client<HttpConnector, Body>,
     uri: Uri,
 }
 
 impl HttpConnection {
-    pub(super) fn to(url: &str) -> Result<Self, CliError> {
+    pub(in crate::cli::bench) fn to(url: &str) -> Result<Self, CliError> {
         let uri = url.parse().map_err(|error| CliError::usage(format!("{url}: {error}")))?;
         let mut connector = HttpConnector::new();
         connector.set_nodelay(true);
@@ -27,7 +27,7 @@ impl HttpConnection {
     }
 
     /// Asks about `points`; how many are occupied.
-    pub(super) async fn ask(&self, points: PointCloud) -> Result<usize, CliError> {
+    pub(in crate::cli::bench) async fn ask(&self, points: PointCloud) -> Result<usize, CliError> {
         let request =
             Request::post(self.uri.clone()).header(header::CONTENT_TYPE, "application/octet-stream");
         let request = request.body(Body::from(points.into_bytes())).map_err(CliError::failed)?;

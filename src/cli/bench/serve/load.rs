@@ -11,6 +11,7 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::connect;
 use super::http::HttpConnection;
+use crate::bench::workload::Queries;
 use crate::cli::error::CliError;
 use crate::geometry::{Pose, rotation_xyzw, translation_m};
 use crate::map::{Lookup, MapName};
@@ -23,14 +24,23 @@ const LATENCY_DIGITS: u8 = 3;
 
 /// What is asked, message after message.
 #[derive(Debug, Clone)]
-pub(super) struct Question {
-    pub(super) messages: Arc<[PointCloud]>,
-    pub(super) map_from_points: Pose,
-    pub(super) lookup: Lookup,
+pub(in crate::cli::bench) struct Question {
+    messages: Arc<[PointCloud]>,
+    map_from_points: Pose,
+    lookup: Lookup,
 }
 
 impl Question {
-    fn query(&self, message: usize) -> PointQuery {
+    /// Messages of `points` points each, all of `queries` in turn.
+    pub(in crate::cli::bench) fn of(queries: &Queries, points: usize, lookup: Lookup) -> Self {
+        let mut endless = queries.points.iter().cycle().copied();
+        let messages = queries.points.len().div_ceil(points);
+        let message = |_| PointCloud::from(endless.by_ref().take(points).collect::<Vec<_>>());
+        let messages = (0..messages).map(message).collect();
+        Self { messages, map_from_points: queries.map_from_points, lookup }
+    }
+
+    pub(in crate::cli::bench) fn query(&self, message: usize) -> PointQuery {
         PointQuery {
             points: self.points(message),
             map_from_points: Some(self.map_from_points),
@@ -41,12 +51,12 @@ impl Question {
         }
     }
 
-    fn points(&self, message: usize) -> PointCloud {
+    pub(in crate::cli::bench) fn points(&self, message: usize) -> PointCloud {
         self.messages[message % self.messages.len()].clone()
     }
 
     /// All of it but the points, as an address.
-    pub(super) fn url(&self, server: &str, map: &MapName) -> String {
+    pub(in crate::cli::bench) fn url(&self, server: &str, map: &MapName) -> String {
         let ([x, y, z], [qx, qy, qz, qw]) =
             (translation_m(&self.map_from_points), rotation_xyzw(&self.map_from_points));
         let lookup = self.lookup.as_str();

@@ -11,17 +11,18 @@ use std::time::Duration;
 use clap::ValueEnum;
 
 use super::workload::{MapOptions, WorkloadOptions};
-use crate::bench::workload::Queries;
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
 use crate::cli::parse::LookupName;
 use crate::client::Client;
-use crate::service::PointCloud;
+pub(super) use http::HttpConnection;
+pub(super) use load::Question;
+pub(super) use target::Target;
+
 use daemon::Daemon;
-use load::{Load, Question};
+use load::Load;
 use report::Line;
-use target::Target;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -121,7 +122,7 @@ impl Serve {
         output.say(Line::HEAD)?;
         let queries = self.workload.queries(1);
         for &points in &self.points {
-            let question = self.question(&queries, points);
+            let question = Question::of(&queries, points, self.lookup.into());
             for &protocol in &self.protocols {
                 let Some(load) = self.load(protocol, target, &question) else { continue };
                 // Until connections, windows and caches are as they will be.
@@ -131,18 +132,6 @@ impl Serve {
             }
         }
         Ok(())
-    }
-
-    /// Messages of `points` points each, all of the workload's points in turn.
-    fn question(&self, queries: &Queries, points: usize) -> Question {
-        let mut endless = queries.points.iter().cycle().copied();
-        let messages = queries.points.len().div_ceil(points);
-        let message = |_| PointCloud::from(endless.by_ref().take(points).collect::<Vec<_>>());
-        Question {
-            messages: (0..messages).map(message).collect(),
-            map_from_points: queries.map_from_points,
-            lookup: self.lookup.into(),
-        }
     }
 
     fn load(&self, protocol: Protocol, target: &Target, question: &Question) -> Option<Load> {
@@ -164,6 +153,6 @@ fn message_points(text: &str) -> Result<usize, String> {
     (1..=2_000_000).contains(&points).then_some(points).ok_or_else(|| format!("1 to 2000000, got {points}"))
 }
 
-async fn connect(url: &str) -> Result<Client, CliError> {
+pub(super) async fn connect(url: &str) -> Result<Client, CliError> {
     Ok(Client::connect(url).await?)
 }

@@ -14,16 +14,17 @@ use crate::service::{PointCloud, ScanRequest};
 use crate::voxel::{Lattice, VoxelSet};
 
 /// A map of a workload, under a name that no other map has.
-pub(super) struct Target {
-    pub(super) grpc: String,
-    pub(super) http: Option<String>,
-    pub(super) map: MapName,
-    pub(super) voxels: usize,
+pub(in crate::cli::bench) struct Target {
+    pub(in crate::cli::bench) grpc: String,
+    pub(in crate::cli::bench) http: Option<String>,
+    pub(in crate::cli::bench) map: MapName,
+    pub(in crate::cli::bench) resolution_m: f64,
+    pub(in crate::cli::bench) voxels: usize,
     client: Client,
 }
 
 impl Target {
-    pub(super) async fn make(
+    pub(in crate::cli::bench) async fn make(
         grpc: &str,
         http: Option<String>,
         workload: Workload,
@@ -39,7 +40,8 @@ impl Target {
             filter_bits_per_voxel: Some(settings.filter.bits_per_key),
         };
         client.create_map(&map, new_map).await?;
-        let mut target = Self { grpc: grpc.to_owned(), http, map, voxels: 0, client };
+        let resolution_m = settings.resolution_m;
+        let mut target = Self { grpc: grpc.to_owned(), http, map, resolution_m, voxels: 0, client };
         match target.fill(workload).await {
             Ok(()) => Ok(target),
             Err(error) => {
@@ -66,7 +68,7 @@ impl Target {
         Ok(())
     }
 
-    pub(super) async fn delete(self) -> Result<(), CliError> {
+    pub(in crate::cli::bench) async fn delete(self) -> Result<(), CliError> {
         Ok(self.client.delete_map(&self.map).await?)
     }
 }

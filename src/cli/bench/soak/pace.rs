@@ -1,0 +1,72 @@
+//! When the next operation is due.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use tokio::time::sleep_until;
+
+/// Numbers operations for all who carry them out, as fast as they are done or at a rate.
+#[derive(Debug)]
+pub(super) struct Pace {
+    start: Instant,
+    time: Duration,
+    /// Operations a second; none for as fast as they are done.
+    rate: Option<f64>,
+    first: u64,
+    next: AtomicU64,
+}
+
+/// An operation that is to be carried out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Due {
+    /// Its number.
+    pub(super) number: u64,
+    /// When it was due. At a rate, who comes late to it makes it wait: that is part of what it took.
+    pub(super) since: Instant,
+}
+
+impl Pace {
+    /// Begins now, and ends after `time`. Numbers begin at `first`.
+    pub(super) fn new(rate: Option<f64>, time: Duration, first: u64) -> Self {
+        Self { start: Instant::now(), time, rate, first, next: AtomicU64::new(first) }
+    }
+
+    /// The number that comes next.
+    pub(super) fn next(&self) -> u64 {
+        self.next.load(Ordering::Relaxed)
+    }
+
+    /// Waits until an operation is due; none when the time is over.
+    pub(super) async fn due(&self) -> Option<Due> {
+        let number = self.next.fetch_add(1, Ordering::Relaxed);
+        let since = match self.rate {
+            Some(rate) => self.start + Duration::from_secs_f64((number - self.first) as f64 / rate),
+            None => Instant::now(),
+        };
+        if since - self.start >= self.time {
+            return None;
+        }
+        sleep_until(since.into()).await;
+        Some(Due { number, since })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn operations_are_due_at_their_rate_whoever_is_late() {
+        let pace = Pace::new(Some(100.0), Duration::from_millis(50), 7);
+        let first = pace.due().await.unwrap();
+        tokio::time::sleep(Duration::from_millis(30)).await;
+        let second = pace.due().await.unwrap();
+        assert_eq!((first.number, second.number), (7, 8));
+        assert_eq!(second.since - first.since, Duration::from_millis(10));
+        assert!(second.since.elapsed() >= Duration::from_millis(19));
+        for _ in 2..5 {
+            assert!(pace.due().await.is_some());
+        }
+        assert!(pace.due().await.is_none());
+    }
+}
