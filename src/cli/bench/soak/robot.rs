@@ -139,7 +139,7 @@ impl Member for Robot {
         let step = Step::after(self.steps);
         self.steps = if step == Step::DeleteMap { 0 } else { self.steps + 1 };
         match step {
-            Step::MakeMap => self.client.create_map(&self.own, self.settings.clone()).await.map(drop)?,
+            Step::MakeMap => self.client.create_map(&self.own, self.settings).await.map(drop)?,
             Step::Scan => {
                 // A few thinned turns are too little for others to overlap with.
                 let at_guess = self.steps <= SCANS / 2;
