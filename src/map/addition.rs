@@ -41,6 +41,9 @@ enum OfLevel {
     Grown(CountingBloomFilter),
 }
 
+/// Keys of a larger filter that are counted before they are shown: what is counted is a list.
+const REBUILT_AT_ONCE: usize = 1024;
+
 impl Addition {
     /// Finds out what adding `blocks` of finest voxels to `shard` comes to, and counts them.
     pub(super) fn plan(shard: &Shard, blocks: &[&Block]) -> Self {
@@ -138,8 +141,10 @@ impl OfLevel {
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
         keys.reserve_exact(filter.len());
         shard.level(level as u32).for_each_key(|key| keys.push(key));
-        let counted = count_each(&larger, &keys, CountingBloomFilter::count_in);
-        show_each(&mut larger, &counted, CountingBloomFilter::set_bits);
+        for keys in keys.chunks(REBUILT_AT_ONCE) {
+            let counted = count_each(&larger, keys, CountingBloomFilter::count_in);
+            show_each(&mut larger, &counted, CountingBloomFilter::set_bits);
+        }
         Self::Grown(larger)
     }
 }

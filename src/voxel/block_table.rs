@@ -7,11 +7,17 @@ const VACANT: u64 = u64::MAX;
 /// Slots of a bucket: eight keys are one cache line.
 pub(crate) const BUCKET: usize = 8;
 /// The keys of one bucket: those in use first.
-pub(crate) type Bucket = [u64; BUCKET];
-const VACANT_BUCKET: Bucket = [VACANT; BUCKET];
+pub(crate) type Bucket = CacheLine<[u64; BUCKET]>;
+const VACANT_BUCKET: Bucket = CacheLine([VACANT; BUCKET]);
+const EMPTY_MASK: CacheLine<BlockMask> = CacheLine(BlockMask::EMPTY);
 /// Slots for each block, at least. At 2 one bucket in twenty is full (a Poisson tail), just after growth one in fifty:
 /// nearly every search ends in the bucket where it began, and a wide look-up seldom has to leave its way.
 const SLOTS_A_BLOCK: usize = 2;
+
+/// What a look-up fetches in one piece: a bucket, or a block's mask. Vectors of them begin where a cache line does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub(crate) struct CacheLine<T>(pub(crate) T);
 
 /// A byte of a key for each slot of a bucket, none of them zero; zero where the slot is vacant.
 pub(crate) type Tags = u64;
@@ -32,7 +38,7 @@ pub(crate) type Tags = u64;
 pub struct BlockTable {
     tags: Vec<Tags>,
     keys: Vec<Bucket>,
-    masks: Vec<BlockMask>,
+    masks: Vec<CacheLine<BlockMask>>,
     len: usize,
 }
 
@@ -44,7 +50,7 @@ impl BlockTable {
         Self {
             tags: vec![0; buckets],
             keys: vec![VACANT_BUCKET; buckets],
-            masks: vec![BlockMask::EMPTY; buckets * BUCKET],
+            masks: vec![EMPTY_MASK; buckets * BUCKET],
             len: 0,
         }
     }
@@ -77,7 +83,7 @@ impl BlockTable {
     /// The voxels of `block`; none of them when the block is absent.
     #[inline]
     pub fn get(&self, block: VoxelKey) -> BlockMask {
-        self.slots().find(block.to_bits()).map_or(BlockMask::EMPTY, |slot| self.masks[slot])
+        self.slots().find(block.to_bits()).map_or(BlockMask::EMPTY, |slot| self.masks[slot].0)
     }
 
     /// True when the voxel at `index`, or at `level` (0, 1 or 2) its ancestor, is occupied.
@@ -102,13 +108,13 @@ impl BlockTable {
     /// The voxels of the block at `slot`.
     #[inline]
     pub(crate) fn at(&self, slot: usize) -> &BlockMask {
-        &self.masks[slot]
+        &self.masks[slot].0
     }
 
     /// The same, to be added to.
     #[inline]
     pub(crate) fn at_mut(&mut self, slot: usize) -> &mut BlockMask {
-        &mut self.masks[slot]
+        &mut self.masks[slot].0
     }
 
     /// The mask of `block` to be added to, which is empty where the block was absent. The caller leaves at
@@ -120,7 +126,7 @@ impl BlockTable {
             Some(slot) => slot,
             None => self.add(key),
         };
-        &mut self.masks[slot]
+        &mut self.masks[slot].0
     }
 
     /// The slot of a key that was absent.
@@ -136,7 +142,7 @@ impl BlockTable {
         self.len += 1;
         let mut bucket = Slots::home(key, self.keys.len());
         loop {
-            if let Some(place) = self.keys[bucket].iter().position(|&k| k == VACANT) {
+            if let Some(place) = self.keys[bucket].0.iter().position(|&k| k == VACANT) {
                 let slot = bucket * BUCKET + place;
                 self.set_key(slot, key);
                 return slot;
@@ -161,11 +167,11 @@ impl BlockTable {
 
     /// Empties `slot`, and where that makes room in a full bucket, pulls back a key that had to go past it.
     fn vacate(&mut self, slot: usize) {
-        let (bucket, was_full) = (slot / BUCKET, self.keys[slot / BUCKET][BUCKET - 1] != VACANT);
-        let last = (0..BUCKET).rev().find(|&i| self.keys[bucket][i] != VACANT).unwrap_or_default();
+        let (bucket, was_full) = (slot / BUCKET, self.keys[slot / BUCKET].0[BUCKET - 1] != VACANT);
+        let last = (0..BUCKET).rev().find(|&i| self.keys[bucket].0[i] != VACANT).unwrap_or_default();
         self.relocate(bucket * BUCKET + last, slot);
         if was_full && let Some(displaced) = self.displaced_past(bucket) {
-            let (key, mask) = (self.keys[displaced / BUCKET][displaced % BUCKET], self.masks[displaced]);
+            let (key, mask) = (self.keys[displaced / BUCKET].0[displaced % BUCKET], self.masks[displaced]);
             self.set_key(bucket * BUCKET + BUCKET - 1, key);
             self.masks[bucket * BUCKET + BUCKET - 1] = mask;
             self.vacate(displaced);
@@ -174,15 +180,15 @@ impl BlockTable {
 
     /// Moves a key and its mask; `from` is vacant afterwards.
     fn relocate(&mut self, from: usize, to: usize) {
-        self.set_key(to, self.keys[from / BUCKET][from % BUCKET]);
+        self.set_key(to, self.keys[from / BUCKET].0[from % BUCKET]);
         self.masks[to] = self.masks[from];
         self.set_key(from, VACANT);
-        self.masks[from] = BlockMask::EMPTY;
+        self.masks[from] = EMPTY_MASK;
     }
 
     fn set_key(&mut self, slot: usize, key: u64) {
         let (bucket, place) = (slot / BUCKET, slot % BUCKET);
-        self.keys[bucket][place] = key;
+        self.keys[bucket].0[place] = key;
         let tag = if key == VACANT { 0 } else { Slots::tag(Slots::hash(key)) };
         let shift = place * 8;
         self.tags[bucket] = self.tags[bucket] & !(0xff << shift) | tag << shift;
@@ -196,10 +202,10 @@ impl BlockTable {
         while at != bucket {
             let passed =
                 |key: u64| key != VACANT && distance(Slots::home(key, buckets), at) >= distance(bucket, at);
-            if let Some(place) = self.keys[at].iter().position(|&key| passed(key)) {
+            if let Some(place) = self.keys[at].0.iter().position(|&key| passed(key)) {
                 return Some(at * BUCKET + place);
             }
-            if self.keys[at][BUCKET - 1] == VACANT {
+            if self.keys[at].0[BUCKET - 1] == VACANT {
                 return None;
             }
             at = self.after(at);
@@ -218,8 +224,8 @@ impl BlockTable {
 
     /// All blocks, in no order.
     pub fn iter(&self) -> impl Iterator<Item = (VoxelKey, BlockMask)> + '_ {
-        let occupied = |(&key, &mask): (&u64, &BlockMask)| Some((VoxelKey::from_bits(key)?, mask));
-        self.keys.as_flattened().iter().zip(&self.masks).filter_map(occupied)
+        let occupied = |(key, mask): (u64, &CacheLine<BlockMask>)| Some((VoxelKey::from_bits(key)?, mask.0));
+        self.keys.iter().flat_map(|bucket| bucket.0).zip(&self.masks).filter_map(occupied)
     }
 }
 
@@ -228,13 +234,12 @@ impl BlockTable {
 pub(crate) struct Slots<'a> {
     pub(crate) tags: &'a [Tags],
     pub(crate) keys: &'a [Bucket],
-    pub(crate) masks: &'a [BlockMask],
+    pub(crate) masks: &'a [CacheLine<BlockMask>],
 }
 
 impl Slots<'static> {
     /// Those of a table without a block.
-    pub(crate) const NONE: Self =
-        Self { tags: &[0], keys: &[VACANT_BUCKET], masks: &[BlockMask::EMPTY; BUCKET] };
+    pub(crate) const NONE: Self = Self { tags: &[0], keys: &[VACANT_BUCKET], masks: &[EMPTY_MASK; BUCKET] };
 }
 
 impl Slots<'_> {
@@ -267,7 +272,7 @@ impl Slots<'_> {
 
     /// True when a search must go on past the bucket: its vacant slots come last.
     #[inline(always)]
-    pub(crate) fn is_full(bucket: &Bucket) -> bool {
+    pub(crate) fn is_full(bucket: &[u64; BUCKET]) -> bool {
         bucket[BUCKET - 1] != VACANT
     }
 
@@ -276,7 +281,7 @@ impl Slots<'_> {
     pub(crate) fn find(self, key: u64) -> Option<usize> {
         let mut bucket = Self::home(key, self.keys.len());
         loop {
-            let keys = &self.keys[bucket];
+            let keys = &self.keys[bucket].0;
             // All eight compared at once: this compiles to vector instructions, a search that stops would not.
             let equal = (0..BUCKET).fold(0u32, |equal, i| equal | u32::from(keys[i] == key) << i);
             if equal != 0 {
@@ -292,7 +297,7 @@ impl Slots<'_> {
     /// True when a voxel within the ancestor of `cell` of `block`, `level` levels up, is occupied.
     #[inline(always)]
     pub(crate) fn contains(self, block: VoxelKey, cell: Cell, level: u32) -> bool {
-        self.find(block.to_bits()).is_some_and(|slot| self.masks[slot].contains(cell, level))
+        self.find(block.to_bits()).is_some_and(|slot| self.masks[slot].0.contains(cell, level))
     }
 }
 
@@ -332,12 +337,12 @@ mod tests {
         #[test]
         fn keys_that_overflow_are_found_and_removed(order in Just((0..37).collect::<Vec<i32>>()).prop_shuffle()) {
             let mut table = BlockTable::with_capacity(0);
-            (table.keys, table.masks) = (vec![VACANT_BUCKET; 5], vec![BlockMask::EMPTY; 40]);
+            (table.keys, table.masks) = (vec![VACANT_BUCKET; 5], vec![EMPTY_MASK; 40]);
             table.tags = vec![0; 5];
             let block = |x: i32| VoxelKey::pack([x, 3, -9]);
             for &x in &order {
                 let slot = table.add_in_room(block(x).to_bits());
-                table.masks[slot].insert(Cell::from_bits(x as u16));
+                table.masks[slot].0.insert(Cell::from_bits(x as u16));
             }
             for (gone, &x) in order.iter().enumerate() {
                 prop_assert!(order[gone..].iter().all(|&y| table.get(block(y)).contains(Cell::from_bits(y as u16), 0)));
@@ -357,7 +362,7 @@ mod tests {
                 table.entry(VoxelKey::pack([x, y, x / 8])).insert(Cell::from_bits(0));
             }
         }
-        let full = table.keys.iter().filter(|bucket| bucket[BUCKET - 1] != VACANT).count();
+        let full = table.keys.iter().filter(|bucket| bucket.0[BUCKET - 1] != VACANT).count();
         let share = full as f64 / table.keys.len() as f64;
         assert!((0.01..0.1).contains(&share), "{share} of the buckets are full");
     }

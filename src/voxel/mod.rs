@@ -12,7 +12,7 @@ mod set;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
 pub use block_table::BlockTable;
-pub(crate) use block_table::{BUCKET, Bucket, Slots};
+pub(crate) use block_table::{BUCKET, Bucket, CacheLine, Slots};
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
 pub use moments::{MOMENT_LEVEL, MomentSet, Moments};

@@ -12,7 +12,6 @@ mod registers;
 pub(super) mod stages;
 
 use std::arch::x86_64::*;
-use std::mem::MaybeUninit;
 
 use super::{LevelView, Lookup};
 use crate::geometry::Point;
@@ -29,6 +28,7 @@ pub(super) fn is_available() -> bool {
     is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512cd")
+        && is_x86_feature_detected!("popcnt")
 }
 
 /// See [`super::occupied`]. Must only be called where [`is_available`].
@@ -56,22 +56,34 @@ pub(super) fn occupied(
 /// Structures up to this size are taken to lie in the core's own caches, where a prefetch only costs.
 const NEAR_BYTES: usize = 1 << 20;
 
-/// Words whose points are located ahead where the structure is larger: some hundred cache misses are under way. Out-of-order execution alone
-/// reaches over two or three groups of sixteen points.
-const AHEAD: usize = 2;
+/// Points of a word of answers, and sixteens of them.
+const WORD: usize = 64;
+const GROUPS: usize = WORD / LANES;
 
-/// How the voxels of sixteen points are looked up: where to look, which may start the fetch, and what is there.
+/// How the voxels of a word of points are looked up: where to look, which may start the fetch, and what is there.
 trait Probe {
     /// What the probe keeps in registers.
     type Registers<'a>;
-    /// Where to look.
+    /// Sixteen voxels on their way.
     type Located;
+    /// Where to look for a word of voxels.
+    type Word;
+    /// What is known from the word before.
+    type Memory: Default;
+
+    /// What a word is before it is sought.
+    const NO_WORD: Self::Word;
+
+    /// Words that are sought ahead where the structure is large, so that many cache misses are under way; out-of-order
+    /// execution alone reaches over two or three groups of sixteen points.
+    const AHEAD: usize;
 
     /// # Safety
     /// Needs AVX-512 F, DQ and CD.
     unsafe fn load<'a>(view: &'a LevelView<'_>) -> Self::Registers<'a>;
 
-    /// Computes where to look for sixteen voxels of the view's level, and with `FETCH` starts fetching that.
+    /// Takes up sixteen voxels of the view's level; with `FETCH` it may start fetching what they need. Those that are
+    /// none are not `valid`, and what is answered of them does not count.
     ///
     /// # Safety
     /// Needs AVX-512 F, DQ and CD; the view must still live.
@@ -79,24 +91,32 @@ trait Probe {
         r: &Self::Registers<'_>,
         index: [__m512i; 3],
         shard: __m512i,
+        valid: u16,
     ) -> Self::Located;
 
-    /// A bit for each of the sixteen: is it occupied?
+    /// Finds out where to look for a whole word, and with `FETCH` starts fetching that. Words come in their order.
     ///
     /// # Safety
-    /// Needs AVX-512 F, DQ and CD; the view must still live.
-    unsafe fn answer(r: &Self::Registers<'_>, located: &Self::Located) -> u16;
-}
+    /// As for `locate`.
+    unsafe fn seek<const FETCH: bool>(
+        r: &Self::Registers<'_>,
+        memory: &mut Self::Memory,
+        located: [Self::Located; GROUPS],
+        word: &mut Self::Word,
+    );
 
-/// Points of a word of answers, and sixteens of them.
-const WORD: usize = 64;
-const GROUPS: usize = WORD / LANES;
+    /// A bit for each of the voxels: is it occupied? Words come in their order.
+    ///
+    /// # Safety
+    /// As for `locate`; the word was sought.
+    unsafe fn answer(r: &Self::Registers<'_>, memory: &mut Self::Memory, word: &Self::Word) -> u64;
+}
 
 /// Answers for the points of each word as soon as they are located.
 ///
 /// # Safety
 /// Needs AVX-512 F, DQ and CD, and a word of `occupied` for each 64 points.
-#[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+#[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
 unsafe fn run_near<P: Probe>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
@@ -105,114 +125,124 @@ unsafe fn run_near<P: Probe>(
 ) -> bool {
     // SAFETY: the features are there, and the view lives.
     unsafe {
-        let steps = Steps::<P, false>::load(lattice_from_points, view);
-        let mut all_have_a_voxel = true;
-        for (word, points) in occupied.iter_mut().zip(points.chunks(WORD)) {
-            let located = steps.locate(points);
-            all_have_a_voxel &= located.all_have_a_voxel;
-            *word = steps.answer(&located);
+        let mut steps = Steps::<P, false>::load(lattice_from_points, view);
+        let (mut word, mut all_have_a_voxel) = (Word::of(P::NO_WORD), true);
+        for (answers, points) in occupied.iter_mut().zip(points.chunks(WORD)) {
+            steps.locate(points, &mut word);
+            all_have_a_voxel &= word.all_have_a_voxel;
+            *answers = steps.answer(&word);
         }
         all_have_a_voxel
     }
 }
 
-/// Locates the points of each word [`AHEAD`] words before it answers for them.
+/// Seeks the points of each word [`Probe::AHEAD`] words before it answers for them.
 ///
 /// # Safety
 /// Needs AVX-512 F, DQ and CD, and a word of `occupied` for each 64 points.
-#[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+#[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
 unsafe fn run_far<P: Probe>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
     occupied: &mut [u64],
 ) -> bool {
-    const PLACES: usize = AHEAD + 1;
+    const PLACES: usize = 4;
+    const { assert!(P::AHEAD < PLACES) };
     // SAFETY: the features are there, and the view lives. What is answered for was located before.
     unsafe {
-        let steps = Steps::<P, true>::load(lattice_from_points, view);
-        let mut under_way = [const { MaybeUninit::<Word<P::Located>>::uninit() }; PLACES];
+        let mut steps = Steps::<P, true>::load(lattice_from_points, view);
+        let mut under_way = [const { Word::of(P::NO_WORD) }; PLACES];
         let mut words = points.chunks(WORD).enumerate();
         let mut all_have_a_voxel = true;
-        let mut locate_next = |under_way: &mut [MaybeUninit<Word<P::Located>>; PLACES]| {
+        let mut locate_next = |steps: &mut Steps<'_, P, true>, under_way: &mut [Word<P::Word>; PLACES]| {
             if let Some((i, points)) = words.next() {
-                let located = under_way[i % PLACES].write(steps.locate(points));
-                all_have_a_voxel &= located.all_have_a_voxel;
+                let word = &mut under_way[i % PLACES];
+                steps.locate(points, word);
+                all_have_a_voxel &= word.all_have_a_voxel;
             }
         };
-        (0..AHEAD).for_each(|_| locate_next(&mut under_way));
-        for (i, word) in occupied.iter_mut().enumerate() {
-            locate_next(&mut under_way);
-            *word = steps.answer(under_way[i % PLACES].assume_init_ref());
+        (0..P::AHEAD).for_each(|_| locate_next(&mut steps, &mut under_way));
+        for (i, answers) in occupied.iter_mut().enumerate() {
+            locate_next(&mut steps, &mut under_way);
+            *answers = steps.answer(&under_way[i % PLACES]);
         }
         all_have_a_voxel
     }
 }
 
 /// Where to look for the points of a word.
-struct Word<L> {
-    located: [L; GROUPS],
+struct Word<W> {
+    voxels: W,
     /// A bit for each point that has a voxel.
     has_voxel: u64,
     all_have_a_voxel: bool,
+}
+
+impl<W> Word<W> {
+    const fn of(voxels: W) -> Self {
+        Self { voxels, has_voxel: 0, all_have_a_voxel: false }
+    }
 }
 
 /// The steps of a look-up, and what they keep in registers.
 struct Steps<'a, P: Probe, const FETCH: bool> {
     place: Place,
     registers: P::Registers<'a>,
+    memory: P::Memory,
 }
 
 impl<'a, P: Probe, const FETCH: bool> Steps<'a, P, FETCH> {
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn load(lattice_from_points: &LatticeFromPoints, view: &'a LevelView<'_>) -> Self {
+        let memory = P::Memory::default();
         // SAFETY: the features are there.
-        unsafe { Self { place: Place::load(lattice_from_points, view), registers: P::load(view) } }
+        unsafe { Self { place: Place::load(lattice_from_points, view), registers: P::load(view), memory } }
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn locate(&self, points: &[Point]) -> Word<P::Located> {
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn locate(&mut self, points: &[Point], word: &mut Word<P::Word>) {
         let Some(points) = points.first_chunk::<WORD>() else {
             // SAFETY: as for this function.
-            return unsafe { self.locate_last(points) };
+            return unsafe { self.locate_last(points, word) };
         };
-        let (mut has_voxel, mut group) = (0, 0);
         let groups = points.as_chunks::<LANES>().0;
+        let (mut has_voxel, mut group) = (0, 0);
         let mut locate = |points: &[Point; LANES]| {
             // SAFETY: the features are there, and the view lives.
             unsafe {
                 let (index, shard, valid) = self.place.of(points);
                 has_voxel |= u64::from(valid) << (group * LANES);
                 group += 1;
-                P::locate::<FETCH>(&self.registers, index, shard)
+                P::locate::<FETCH>(&self.registers, index, shard, valid)
             }
         };
         let located = [locate(&groups[0]), locate(&groups[1]), locate(&groups[2]), locate(&groups[3])];
-        Word { located, has_voxel, all_have_a_voxel: has_voxel == u64::MAX }
+        // SAFETY: as for this function.
+        unsafe { P::seek::<FETCH>(&self.registers, &mut self.memory, located, &mut word.voxels) };
+        word.has_voxel = has_voxel;
+        word.all_have_a_voxel = has_voxel == u64::MAX;
     }
 
     /// The same for fewer points than a word has bits.
     #[cold]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn locate_last(&self, points: &[Point]) -> Word<P::Located> {
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn locate_last(&mut self, points: &[Point], word: &mut Word<P::Word>) {
         let mut padded = [Point::new(0.0, 0.0, 0.0); WORD];
         padded[..points.len()].copy_from_slice(points);
         // SAFETY: as for this function.
-        let word = unsafe { self.locate(&padded) };
+        unsafe { self.locate(&padded, word) };
         let present = (1 << points.len()) - 1;
-        let has_voxel = word.has_voxel & present;
-        Word { has_voxel, all_have_a_voxel: has_voxel == present, ..word }
+        word.has_voxel &= present;
+        word.all_have_a_voxel = word.has_voxel == present;
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn answer(&self, word: &Word<P::Located>) -> u64 {
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn answer(&mut self, word: &Word<P::Word>) -> u64 {
         // SAFETY: as for this function.
-        let answer = |group: usize| unsafe {
-            u64::from(P::answer(&self.registers, &word.located[group])) << (group * LANES)
-        };
-        (answer(0) | answer(1) | answer(2) | answer(3)) & word.has_voxel
+        unsafe { P::answer(&self.registers, &mut self.memory, &word.voxels) & word.has_voxel }
     }
 }

@@ -108,7 +108,7 @@ pub fn occupied(
 }
 
 /// Points that an exact look-up takes one way or the other.
-const EXACT_CHUNK: usize = 1024;
+const EXACT_CHUNK: usize = 4096;
 /// One point in so many is occupied, at most, where asking the filter first pays.
 const SPARSE: usize = 8;
 

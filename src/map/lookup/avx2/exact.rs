@@ -44,7 +44,7 @@ impl Probe for Tables<'_> {
         for i in 0..points {
             let slots = self.view.blocks[batch.shard[i] as usize];
             if let Some(slot) = find(slots, keys[i], buckets[i] as usize) {
-                masks[i] = &slots.masks[slot];
+                masks[i] = &slots.masks[slot].0;
                 prefetch((&raw const masks[i].0[cells[i] as usize >> 6]).expose_provenance() as u64);
             }
         }
@@ -63,7 +63,7 @@ const _: () = assert!(size_of::<Bucket>() == 64, "as the shift above takes it");
 #[inline]
 #[target_feature(enable = "avx2")]
 fn find(slots: Slots<'_>, key: u64, bucket: usize) -> Option<usize> {
-    let keys = &slots.keys[bucket];
+    let keys = &slots.keys[bucket].0;
     let wanted = _mm256_set1_epi64x(key as i64);
     let half = |i: usize| {
         // SAFETY: half a bucket is four u64, one register.

@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
-use super::Probe;
-use super::registers::{PerShard, addresses, gather, lengths, mix, pack, prefetch, scale, widen};
+use super::registers::{PerShard, addresses, eight_of, gather, lengths, mix, pack, prefetch, scale, widen};
+use super::{GROUPS, LANES, Probe};
 use crate::bloom::{HASH_A, HASH_B, HASH_C};
 use crate::map::lookup::LevelView;
 
@@ -16,13 +16,20 @@ pub(super) struct BloomRegisters {
     pub(super) hashes: u32,
 }
 
+/// Addresses of words of the planes, and the bits that count there; eight voxels a register.
+type Located = ([__m512i; 2], [__m512i; 2]);
+
 impl<const HASHES: u32> Probe for Bloom<HASHES> {
     type Registers<'a> = BloomRegisters;
-    /// Addresses of words of the planes, and the bits that count there; eight voxels a register.
-    type Located = ([__m512i; 2], [__m512i; 2]);
+    type Located = Located;
+    type Word = [Located; GROUPS];
+    type Memory = ();
+
+    const AHEAD: usize = 2;
+    const NO_WORD: Self::Word = [([eight_of(0); 2], [eight_of(0); 2]); GROUPS];
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
         BloomRegisters {
             plane: PerShard::load(addresses(view.planes)),
@@ -32,12 +39,13 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn locate<const FETCH: bool>(
         r: &BloomRegisters,
         index: [__m512i; 3],
         shard: __m512i,
-    ) -> Self::Located {
+        _: u16,
+    ) -> Located {
         let (keys, shards) = (pack(index), widen(shard));
         let hashes = if HASHES == 0 { r.hashes } else { HASHES };
         let (a, b) = (r.word_of(keys[0], shards[0], hashes), r.word_of(keys[1], shards[1], hashes));
@@ -51,15 +59,36 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
         ([a.0, b.0], [a.1, b.1])
     }
 
+    /// Nothing is left to find out: neighbours' words lie apart.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn answer(_: &BloomRegisters, (addresses, masks): &Self::Located) -> u16 {
-        // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
-        let words = addresses.map(|a| unsafe { gather(a) });
-        let hit =
-            |half: usize| _mm512_cmpeq_epi64_mask(_mm512_and_si512(words[half], masks[half]), masks[half]);
-        u16::from(hit(0)) | u16::from(hit(1)) << 8
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn seek<const FETCH: bool>(
+        _: &BloomRegisters,
+        (): &mut (),
+        located: [Located; GROUPS],
+        word: &mut [Located; GROUPS],
+    ) {
+        *word = located;
     }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn answer(_: &BloomRegisters, (): &mut (), word: &[Located; GROUPS]) -> u64 {
+        // SAFETY: as for this function.
+        let answer = |group: usize| unsafe { u64::from(sixteen(&word[group])) << (group * LANES) };
+        answer(0) | answer(1) | answer(2) | answer(3)
+    }
+}
+
+/// # Safety
+/// Needs AVX-512 F; the view must still live.
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn sixteen((addresses, masks): &Located) -> u16 {
+    // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
+    let words = addresses.map(|a| unsafe { gather(a) });
+    let hit = |half: usize| _mm512_cmpeq_epi64_mask(_mm512_and_si512(words[half], masks[half]), masks[half]);
+    u16::from(hit(0)) | u16::from(hit(1)) << 8
 }
 
 impl BloomRegisters {

@@ -3,13 +3,24 @@
 use std::arch::x86_64::*;
 
 use super::registers::{
-    PerShard, addresses, gather, lanes, lengths, mix, pack, prefetch, scale, to_array, widen,
+    PerShard, addresses, eight_of, gather, lanes, lengths, load, mix, pack, prefetch, scale, store, to_array,
+    widen,
 };
-use super::{LANES, Probe};
-use crate::map::lookup::{LevelView, scalar};
-use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, Cell, Slots, VoxelKey};
+use super::{GROUPS, LANES, Probe, WORD};
+use crate::map::lookup::LevelView;
+use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CacheLine, Cell, Slots};
 
 /// The table of blocks.
+///
+/// Neighbours in a scan lie in one block more often than not: a point beside the one before it, or beside what the
+/// sensor saw one turn of its lasers ago, which for 16, 32 or 64 of them is the same lane of the word before. A block
+/// that is known from either is not searched for.
+///
+/// ```text
+/// locate   blocks and cells of sixteen voxels
+/// seek     those of 64 in a new block are sought: tags say which slots may be theirs; keys and masks are fetched
+/// answer   the keys decide; each voxel gets the address of its block's mask, and asks for its word there
+/// ```
 pub(super) struct Exact;
 
 pub(super) struct ExactRegisters<'a> {
@@ -18,33 +29,104 @@ pub(super) struct ExactRegisters<'a> {
     keys: PerShard,
     masks: PerShard,
     buckets: PerShard,
+    /// All lanes where a block is larger than a region and has a part in each of several shards: a block that is known
+    /// from one is sought in the other all the same.
+    always: u8,
 }
 
-/// Eight voxels on their way through the table.
-///
-/// A bucket's tags say which slot may hold the block, and so where its key and the voxel's word are: both are
-/// fetched at once. That the key is the block's is checked when it is there.
+/// Eights of voxels in a word: what a register holds.
+const EIGHTS: usize = WORD / 8;
+/// A register more than there are voxels: whole registers are stored behind one another.
+const QUEUE: usize = WORD + 8;
+
+/// Sixteen voxels.
 pub(super) struct Located {
+    blocks: [__m512i; 2],
+    cells: [__m512i; 2],
+    shards: [__m512i; 2],
+}
+
+/// A word of voxels.
+pub(super) struct ExactWord {
+    cells: [__m512i; EIGHTS],
+    /// Lanes in another block than the lane before them.
+    heads: [u8; EIGHTS],
+    /// Those of them that are sought, since they lie in another block than the same lane of the word before.
+    sought: [u8; EIGHTS],
+    searches: [Search; EIGHTS],
+    /// How many of the searches are this word's.
+    searches_used: usize,
+}
+
+/// What is known from the word before.
+pub(super) struct ExactMemory {
+    blocks: [__m512i; EIGHTS],
+    /// Addresses of the blocks' masks.
+    masks: [__m512i; EIGHTS],
+    /// Blocks that are sought, and their shards.
+    queue: ([u64; QUEUE], [u64; QUEUE]),
+    /// Addresses of the masks that were found.
+    found: [u64; QUEUE],
+}
+
+/// Eight blocks on their way through the table.
+///
+/// A bucket's tags say which slot may hold a block, and so where its key and its mask are: both are fetched at once.
+/// That the key is the block's is checked when it is there.
+#[derive(Clone, Copy)]
+struct Search {
     blocks: __m512i,
-    cells: __m512i,
-    /// Addresses of the keys of the first slots whose tags fit, and of the voxels' words in their masks.
+    shards: __m512i,
+    /// Addresses of the keys of the first slots whose tags fit, and of the masks.
     keys: __m512i,
-    words: __m512i,
+    masks: __m512i,
     /// Those with such a slot.
     tagged: u8,
     /// Those whose home bucket is full: the block may be in another.
     full: u8,
 }
 
-/// What a voxel without a slot reads.
-static NOTHING: u64 = 0;
+/// Stands for the blocks of points without a voxel; no key sets bit 63.
+const NO_BLOCK: __m512i = eight_of(u64::MAX);
+/// The mask of a block that is not there.
+static ABSENT: CacheLine<BlockMask> = CacheLine(BlockMask::EMPTY);
+
+impl Default for ExactMemory {
+    /// Known is what is not there.
+    #[inline(always)]
+    fn default() -> Self {
+        let absent = eight_of((&raw const ABSENT).expose_provenance() as u64);
+        Self {
+            blocks: [NO_BLOCK; EIGHTS],
+            masks: [absent; EIGHTS],
+            queue: ([0; QUEUE], [0; QUEUE]),
+            found: [0; QUEUE],
+        }
+    }
+}
 
 impl Probe for Exact {
     type Registers<'a> = ExactRegisters<'a>;
-    type Located = [Located; 2];
+    type Located = Located;
+    type Word = ExactWord;
+    type Memory = ExactMemory;
+
+    /// One more than for filters: a word of neighbours needs few lines.
+    const AHEAD: usize = 3;
+    const NO_WORD: ExactWord = {
+        let none = eight_of(0);
+        let search = Search { blocks: none, shards: none, keys: none, masks: none, tagged: 0, full: 0 };
+        ExactWord {
+            cells: [none; EIGHTS],
+            heads: [0; EIGHTS],
+            sought: [0; EIGHTS],
+            searches: [search; EIGHTS],
+            searches_used: 0,
+        }
+    };
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn load<'a>(view: &'a LevelView<'_>) -> ExactRegisters<'a> {
         ExactRegisters {
             view,
@@ -52,30 +134,97 @@ impl Probe for Exact {
             keys: PerShard::load(addresses(view.blocks.map(|slots| slots.keys))),
             masks: PerShard::load(addresses(view.blocks.map(|slots| slots.masks))),
             buckets: PerShard::load(lengths(view.blocks.map(|slots| slots.keys))),
+            always: if BLOCK_LEVELS - view.up > view.region_shift { u8::MAX } else { 0 },
         }
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn locate<const FETCH: bool>(
         r: &ExactRegisters<'_>,
         index: [__m512i; 3],
         shard: __m512i,
-    ) -> [Located; 2] {
+        valid: u16,
+    ) -> Located {
         let up = r.view.up;
         let (left, right) = (_mm_cvtsi32_si128(up as i32), _mm_cvtsi32_si128((BLOCK_LEVELS - up) as i32));
-        let blocks = pack(index.map(|i| _mm512_sra_epi32(i, right)));
+        let [a, b] = pack(index.map(|i| _mm512_sra_epi32(i, right)));
+        // What is out of range may have the key of a block in another shard.
+        let blocks = [
+            _mm512_mask_mov_epi64(NO_BLOCK, valid as u8, a),
+            _mm512_mask_mov_epi64(NO_BLOCK, (valid >> 8) as u8, b),
+        ];
         let cells = widen(cell(index.map(|i| _mm512_sll_epi32(i, left))));
-        let shards = widen(shard);
-        // SAFETY: as for this function.
-        [0, 1].map(|half| unsafe { r.locate::<FETCH>(blocks[half], cells[half], shards[half]) })
+        Located { blocks, cells, shards: widen(shard) }
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn answer(r: &ExactRegisters<'_>, [a, b]: &[Located; 2]) -> u16 {
-        // SAFETY: as for this function.
-        unsafe { u16::from(r.answer(a)) | u16::from(r.answer(b)) << 8 }
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn seek<const FETCH: bool>(
+        r: &ExactRegisters<'_>,
+        memory: &mut ExactMemory,
+        located: [Located; GROUPS],
+        word: &mut ExactWord,
+    ) {
+        let sought = word.queue_new_blocks(&located, memory, r.always);
+        word.searches_used = sought.div_ceil(8);
+        for (i, search) in word.searches[..word.searches_used].iter_mut().enumerate() {
+            let (blocks, shards) = (load(&memory.queue.0, 8 * i), load(&memory.queue.1, 8 * i));
+            // SAFETY: as for this function.
+            *search = unsafe { r.search::<FETCH>(blocks, shards) };
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn answer(r: &ExactRegisters<'_>, memory: &mut ExactMemory, word: &ExactWord) -> u64 {
+        for (i, search) in word.searches[..word.searches_used].iter().enumerate() {
+            // SAFETY: as for this function.
+            store(&mut memory.found, 8 * i, unsafe { r.masks_of(search) });
+        }
+        let (mut hits, mut taken, mut before) = (0, 0, memory.masks[EIGHTS - 1]);
+        for i in 0..EIGHTS {
+            let found = load(&memory.found, taken);
+            let heads = _mm512_mask_expand_epi64(memory.masks[i], word.sought[i], found);
+            taken += word.sought[i].count_ones() as usize;
+            before = _mm512_permutex2var_epi64(heads, latest_of(word.heads[i]), before);
+            memory.masks[i] = before;
+            let addresses =
+                _mm512_add_epi64(before, _mm512_slli_epi64::<3>(_mm512_srli_epi64::<6>(word.cells[i])));
+            // SAFETY: each address is of a word of a mask that the view keeps alive, or of `ABSENT`.
+            let words = unsafe { gather(addresses) };
+            let hit = _mm512_test_epi64_mask(words, within(word.cells[i], r.view.up));
+            hits |= u64::from(hit) << (8 * i);
+        }
+        hits
+    }
+}
+
+impl ExactWord {
+    /// Finds the blocks that are not known yet; the number of them.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn queue_new_blocks(
+        &mut self,
+        located: &[Located; GROUPS],
+        memory: &mut ExactMemory,
+        always: u8,
+    ) -> usize {
+        let (mut queued, mut before) = (0, memory.blocks[EIGHTS - 1]);
+        for i in 0..EIGHTS {
+            let Located { blocks, cells, shards } = &located[i / 2];
+            let blocks = blocks[i % 2];
+            self.cells[i] = cells[i % 2];
+            let heads = _mm512_cmpneq_epi64_mask(blocks, _mm512_alignr_epi64::<7>(blocks, before)) | always;
+            let sought = heads & (_mm512_cmpneq_epi64_mask(blocks, memory.blocks[i]) | always);
+            (self.heads[i], self.sought[i]) = (heads, sought);
+            store(&mut memory.queue.0, queued, _mm512_maskz_compress_epi64(sought, blocks));
+            store(&mut memory.queue.1, queued, _mm512_maskz_compress_epi64(sought, shards[i % 2]));
+            queued += sought.count_ones() as usize;
+            memory.blocks[i] = blocks;
+            before = blocks;
+        }
+        queued
     }
 }
 
@@ -83,8 +232,8 @@ impl ExactRegisters<'_> {
     /// # Safety
     /// Needs AVX-512 F, DQ and CD; the view must still live.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn locate<const FETCH: bool>(&self, blocks: __m512i, cells: __m512i, shards: __m512i) -> Located {
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn search<const FETCH: bool>(&self, blocks: __m512i, shards: __m512i) -> Search {
         let h = mix(blocks, Slots::HASH_A, Slots::HASH_B);
         let bucket = scale(h, self.buckets.of(shards));
         let tags_address = _mm512_add_epi64(self.tags.of(shards), _mm512_slli_epi64::<3>(bucket));
@@ -97,53 +246,85 @@ impl ExactRegisters<'_> {
         let tagged = _mm512_test_epi64_mask(fits, fits);
         let keys =
             _mm512_add_epi64(self.keys.of(shards), _mm512_add_epi64(_mm512_slli_epi64::<6>(bucket), place));
-        let mask = _mm512_add_epi64(_mm512_slli_epi64::<9>(bucket), _mm512_slli_epi64::<3>(place));
-        let word = _mm512_slli_epi64::<3>(_mm512_srli_epi64::<6>(cells));
-        let words = _mm512_add_epi64(_mm512_add_epi64(self.masks.of(shards), mask), word);
-        let nothing = _mm512_set1_epi64((&raw const NOTHING).expose_provenance() as i64);
-        let (keys, words) =
-            (_mm512_mask_mov_epi64(nothing, tagged, keys), _mm512_mask_mov_epi64(nothing, tagged, words));
+        let slot = _mm512_add_epi64(_mm512_slli_epi64::<9>(bucket), _mm512_slli_epi64::<3>(place));
+        let masks = _mm512_add_epi64(self.masks.of(shards), slot);
+        let (keys, masks) =
+            (_mm512_mask_mov_epi64(absent(), tagged, keys), _mm512_mask_mov_epi64(absent(), tagged, masks));
         if FETCH {
             // SAFETY: a prefetch never faults.
             unsafe {
                 prefetch(keys);
-                prefetch(words);
+                prefetch(masks);
             }
         }
         let full = _mm512_test_epi64_mask(tags, _mm512_set1_epi64(0xff << 56));
-        Located { blocks, cells, keys, words, tagged, full }
+        Search { blocks, shards, keys, masks, tagged, full }
     }
 
+    /// The addresses of the blocks' masks.
+    ///
     /// # Safety
-    /// As for `locate`.
+    /// As for `search`.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd")]
-    unsafe fn answer(&self, found: &Located) -> u8 {
-        // SAFETY: each address is of a key, or of a word of a mask, that the view keeps alive, or of `NOTHING`.
-        let (keys, words) = unsafe { (gather(found.keys), gather(found.words)) };
-        let is_block = _mm512_cmpeq_epi64_mask(keys, found.blocks) & found.tagged;
-        let hits = _mm512_test_epi64_mask(words, within(found.cells, self.view.up)) & is_block;
-        let elsewhere = !is_block & (found.tagged | found.full);
-        if elsewhere == 0 { hits } else { hits | self.answer_elsewhere(found, elsewhere) }
+    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    unsafe fn masks_of(&self, search: &Search) -> __m512i {
+        // SAFETY: each address is of a key that the view keeps alive, or of `ABSENT`.
+        let keys = unsafe { gather(search.keys) };
+        let is_block = _mm512_cmpeq_epi64_mask(keys, search.blocks) & search.tagged;
+        let masks = _mm512_mask_mov_epi64(absent(), is_block, search.masks);
+        let elsewhere = !is_block & (search.tagged | search.full);
+        if elsewhere == 0 { masks } else { self.masks_elsewhere(search, masks, elsewhere) }
     }
 
-    /// The answers for voxels whose blocks are not in the first slots whose tags fit.
+    /// Those of blocks that are not in the first slots whose tags fit as well.
     #[cold]
     #[target_feature(enable = "avx512f")]
-    fn answer_elsewhere(&self, found: &Located, elsewhere: u8) -> u8 {
-        let [blocks, cells] = [found.blocks, found.cells].map(|lanes| to_array(lanes));
-        let contains = |&lane: &usize| {
-            let voxel = VoxelKey::from_bits(blocks[lane])
-                .map(|block| Cell::from_bits(cells[lane] as u16).voxel(block).ancestor(self.view.up));
-            voxel.is_some_and(|voxel| scalar::exact(self.view, voxel.index()))
-        };
-        let lanes = (0..8).filter(|lane| elsewhere >> lane & 1 == 1);
-        lanes.filter(contains).fold(0, |hits, lane| hits | 1 << lane)
+    fn masks_elsewhere(&self, search: &Search, masks: __m512i, elsewhere: u8) -> __m512i {
+        let [blocks, shards, mut masks] = [search.blocks, search.shards, masks].map(|lanes| to_array(lanes));
+        for lane in (0..8).filter(|lane| elsewhere >> lane & 1 == 1) {
+            let slots = self.view.blocks[shards[lane] as usize];
+            if let Some(slot) = slots.find(blocks[lane]) {
+                masks[lane] = (&raw const slots.masks[slot]).expose_provenance() as u64;
+            }
+        }
+        load(&masks, 0)
     }
 }
 
-const _: () =
-    assert!(size_of::<Bucket>() == 64 && size_of::<BlockMask>() == 64, "as the shifts above take them");
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn absent() -> __m512i {
+    _mm512_set1_epi64((&raw const ABSENT).expose_provenance() as i64)
+}
+
+/// For each of eight lanes the latest head, itself or before it; the last lane of the eight before where there is none.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn latest_of(heads: u8) -> __m512i {
+    const LAST_BEFORE: u8 = 15;
+    static LATEST: [[u8; 8]; 256] = {
+        let mut latest = [[LAST_BEFORE; 8]; 256];
+        let mut heads = 0;
+        while heads < 256 {
+            let (mut lane, mut head) = (0, LAST_BEFORE);
+            while lane < 8 {
+                if heads >> lane & 1 == 1 {
+                    head = lane as u8;
+                }
+                latest[heads][lane] = head;
+                lane += 1;
+            }
+            heads += 1;
+        }
+        latest
+    };
+    _mm512_cvtepu8_epi64(_mm_cvtsi64_si128(i64::from_le_bytes(LATEST[usize::from(heads)])))
+}
+
+const _: () = assert!(
+    size_of::<Bucket>() == 64 && size_of::<CacheLine<BlockMask>>() == 64,
+    "as the shifts above take them"
+);
 
 /// The top bit of each byte of `tags` that is the tag of a key with hash `h`; of bytes beyond the first such, it may be
 /// set without reason. The twin of `Slots::tag`.

@@ -7,6 +7,12 @@ use crate::map::sharding::SHARDS;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
 
+/// A value in all eight lanes, for what is made before the features are known to be there.
+pub(super) const fn eight_of(value: u64) -> __m512i {
+    // SAFETY: eight u64 are one register.
+    unsafe { std::mem::transmute::<[u64; 8], __m512i>([value; 8]) }
+}
+
 #[inline]
 #[target_feature(enable = "avx512f")]
 pub(super) fn lanes(values: &[i32; LANES]) -> __m512i {
@@ -113,6 +119,28 @@ pub(super) unsafe fn gather(addresses: __m512i) -> __m512i {
         let four = |i: usize| _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(pair(i)), pair(i + 2));
         _mm512_castpd_si512(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(four(0)), four(4)))
     }
+}
+
+/// Eight of `values` from the `first` on.
+///
+/// # Panics
+/// When there are not as many.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn load(values: &[u64], first: usize) -> __m512i {
+    // SAFETY: eight u64 are one register.
+    unsafe { _mm512_loadu_si512(values[first..first + 8].as_ptr().cast()) }
+}
+
+/// The inverse of [`load`].
+///
+/// # Panics
+/// As for that.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn store(values: &mut [u64], first: usize, register: __m512i) {
+    // SAFETY: eight u64 are one register.
+    unsafe { _mm512_storeu_si512(values[first..first + 8].as_mut_ptr().cast(), register) }
 }
 
 #[inline]
