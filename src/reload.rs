@@ -1,8 +1,8 @@
 //! What is read from files and may change while the server runs: keys, certificates.
 
 use std::fs::{self, Metadata};
-use std::os::unix::fs::MetadataExt;
-use std::path::PathBuf;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
@@ -107,6 +107,11 @@ impl<T, E> std::fmt::Debug for Reloaded<T, E> {
     }
 }
 
+/// True where everybody on the machine may read or write a file: not for what is secret.
+pub fn is_open_to_others(file: &Path) -> bool {
+    fs::metadata(file).is_ok_and(|file| file.permissions().mode() & 0o006 != 0)
+}
+
 fn appearances(files: &[PathBuf]) -> Vec<Option<Appearance>> {
     files.iter().map(|file| fs::metadata(file).ok().map(|file| appearance(&file))).collect()
 }
@@ -118,7 +123,6 @@ fn appearance(file: &Metadata) -> Appearance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     type Number = Reloaded<u32, String>;
 

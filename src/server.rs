@@ -13,10 +13,12 @@ mod signal;
 mod socket;
 mod starting;
 mod stream;
+mod tls;
 
 pub use error::ServerError;
 pub use files::ReloadedFiles;
 pub use signal::{reload_on_hangup, shutdown_signal};
+pub use tls::TlsError;
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -39,6 +41,7 @@ use housekeeping::keep_house;
 use protocol::Protocol;
 use socket::UnixSocket;
 use starting::Starting;
+use tls::Tls;
 
 /// How long connections have to close once their requests are done: what is left then is idle or half open.
 const CLOSING_MAX: Duration = Duration::from_secs(1);
@@ -48,6 +51,7 @@ const CLOSING_MAX: Duration = Duration::from_secs(1);
 pub struct Server {
     config: Config,
     access: Access,
+    tls: Option<Tls>,
     service: MeteredService,
     lifecycle: Lifecycle,
     http: TcpSocket,
@@ -61,14 +65,14 @@ impl Server {
     /// are made when that is done.
     ///
     /// # Errors
-    /// When a map or the keys cannot be read, an address is taken, or a socket cannot be made; where there are no keys
+    /// When a map, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
     /// and an address can be reached from elsewhere, unless the settings allow that.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
-        let access = entrance::access(&config)?;
+        let (access, tls) = (entrance::access(&config)?, Tls::of(&config.tls)?);
         let settings = config.service_settings();
         let http = TcpSocket::bind(Protocol::Http, config.http.listen).await?;
         let progress = Arc::new(OpeningProgress::default());
-        let starting = Starting::serve(&http, Arc::clone(&progress), &config.limits);
+        let starting = Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits);
         let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
         starting.end().await;
         let service = opened
@@ -77,6 +81,7 @@ impl Server {
         Ok(Self {
             service: MeteredService::new(service, Metrics::new()?),
             access,
+            tls,
             lifecycle: Lifecycle::default(),
             http,
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen).await?,
@@ -106,9 +111,14 @@ impl Server {
         self.grpc_socket.as_ref().map(|socket| socket.file.path())
     }
 
+    /// True where TCP connections are secured.
+    pub fn is_secured(&self) -> bool {
+        self.tls.is_some()
+    }
+
     /// The files that are read again while it runs.
     pub fn files(&self) -> ReloadedFiles {
-        ReloadedFiles::new(self.access.clone(), self.service.metrics().clone())
+        ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone())
     }
 
     /// Serves until `shutdown`, then goes down: refuses what is new, waits `drain_seconds` at most for what is in
@@ -120,13 +130,13 @@ impl Server {
     /// # Errors
     /// When a listener stops by itself, or the maps cannot be saved at the end.
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
-        let Self { config, access, service, lifecycle, .. } = &self;
+        let Self { config, access, tls, service, lifecycle, .. } = &self;
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
         let (routes, health) = grpc::routes(gate.clone(), lifecycle.clone(), bytes_max)?;
         let router = http::router(gate, lifecycle.clone(), bytes_max);
-        let grpc = Endpoint::new(Protocol::Grpc, routes.into_axum_router(), &config.limits);
-        let http = Endpoint::new(Protocol::Http, router, &config.limits);
+        let grpc = Endpoint::new(Protocol::Grpc, routes.into_axum_router(), tls.clone(), &config.limits);
+        let http = Endpoint::new(Protocol::Http, router, tls.clone(), &config.limits);
 
         let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
         let files = self.files();

@@ -12,7 +12,7 @@
 //! any value: somebody may have put a secret where none belongs.
 
 use std::io::Write;
-use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+use std::os::unix::fs::{MetadataExt, fchown};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -81,11 +81,6 @@ pub(super) fn read(path: &Path) -> Result<Vec<Key>, KeyFileError> {
     let text = fs::read_to_string(path).map_err(|error| in_file(path, error))?;
     let keys = parse(path, &text)?;
     if keys.is_empty() { Err(KeyFileError::Empty(path.to_owned())) } else { Ok(keys) }
-}
-
-/// True where everybody on the machine may read or write the file.
-pub(super) fn is_open_to_others(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|file| file.permissions().mode() & 0o006 != 0)
 }
 
 /// Adds a key to a file, which is made where there is none, for its owner alone. It is replaced as a whole, so that a

@@ -7,6 +7,7 @@ use subtle::ConditionallySelectable;
 
 use super::key_file::{self, KeyFileError};
 use super::{Key, Secret};
+use crate::reload::is_open_to_others;
 
 /// All keys of a file.
 #[derive(Debug)]
@@ -19,7 +20,7 @@ impl Keys {
     /// When the file cannot be read or holds something else than keys; nothing is withdrawn then.
     pub(super) fn read(path: &Path, former: Option<&Self>) -> Result<Self, KeyFileError> {
         let keys = key_file::read(path)?;
-        if key_file::is_open_to_others(path) {
+        if is_open_to_others(path) {
             tracing::warn!(path = %path.display(), "everybody on this machine may read or write the file of keys");
         }
         Ok(Self::after(former, keys))

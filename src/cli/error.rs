@@ -68,7 +68,7 @@ impl Display for CliError {
 impl From<ClientError> for CliError {
     fn from(error: ClientError) -> Self {
         match error {
-            ClientError::Url { .. } => Self::usage(error),
+            ClientError::Url { .. } | ClientError::Credentials(_) => Self::usage(error),
             _ => Self::failed(error),
         }
     }

@@ -4,7 +4,6 @@ use std::fmt::{self, Display};
 use std::time::Duration;
 
 use serde::Serialize;
-use tonic::transport::Endpoint;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
@@ -18,7 +17,7 @@ EXAMPLES:
   mrol health                                    is the server on this machine ready?
   mrol health --server http://10.0.0.5:7334 && echo ready
 
-Asks by gRPC's health protocol, as load balancers do. The exit code is 0 where the server serves, and 1 where it
+Asks by gRPC's health protocol, as load balancers do, without a key. The exit code is 0 where the server serves, and 1 where it
 drains, cannot be reached or does not answer within two seconds: made for a container's health check.";
 
 /// Ask whether a server is ready; the exit code is the answer
@@ -45,21 +44,17 @@ impl Display for Serving {
 
 impl Health {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let serving = tokio::time::timeout(PATIENCE, is_serving(self.server.url().to_owned())).await;
+        let serving = tokio::time::timeout(PATIENCE, is_serving(&self.server)).await;
         let serving = serving.map_err(|_| CliError::failed(format!("no answer within {PATIENCE:?}")))??;
         output.print(&Serving { serving })?;
         if serving { Ok(()) } else { Err(CliError::failed("the server is going down")) }
     }
 }
 
-async fn is_serving(url: String) -> Result<bool, CliError> {
-    let endpoint = Endpoint::from_shared(url.clone()).map_err(|e| CliError::usage(format!("{url}: {e}")))?;
-    let channel = endpoint
-        .connect()
-        .await
-        .map_err(|_| CliError::failed(format!("{url} cannot be reached: is `mrol serve` running there?")))?;
+async fn is_serving(server: &ServerOptions) -> Result<bool, CliError> {
+    let channel = server.connect().await?.channel();
     // The empty name asks about the server as a whole.
     let answer = HealthClient::new(channel).check(HealthCheckRequest { service: String::new() }).await;
-    let answer = answer.map_err(|status| CliError::failed(format!("{url}: {}", status.message())))?;
+    let answer = answer.map_err(|status| CliError::failed(status.message()))?;
     Ok(answer.into_inner().status() == ServingStatus::Serving)
 }

@@ -18,6 +18,7 @@ EXAMPLES:
   mrol key new --name planner --scope read --file keys.toml
   mrol key new --name r1 --scope write --maps hall,office --file keys.toml
   mrol serve --keys-file keys.toml               asks for keys, and reads the file again when it changes
+  MROL_KEY=mrol_... mrol maps list               shows one; or --key-file FILE, --key SECRET
 
 read: everything that changes nothing. write: scans, deletions and undo as well. admin: makes, restores and deletes maps
 as well.

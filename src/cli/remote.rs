@@ -1,26 +1,96 @@
-//! Which server, and which map there.
+//! Which server, which map there, and with which rights.
 
-use crate::client::Client;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::client::{Client, Credentials};
 use crate::map::MapName;
 
 use super::error::CliError;
 use super::parse;
 
+/// What these options stand under in a command's help.
+const HEADING: &str = "Access";
+
 #[derive(Debug, clap::Args)]
 pub(super) struct ServerOptions {
-    /// The gRPC address of the server, or unix:PATH
+    /// The gRPC address of the server: http://, https:// or unix:PATH
     #[arg(long, env = "MROL_SERVER", default_value = "http://127.0.0.1:7334", value_name = "URL")]
     server: String,
+    #[command(flatten)]
+    credentials: CredentialOptions,
 }
 
+/// What is shown to a server that asks for it, and who is taken for one.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct CredentialOptions {
+    /// The secret of a key. Other users of this machine see options: better the variable, or a file
+    #[arg(long, help_heading = HEADING, env = "MROL_KEY", value_name = "SECRET", hide_env_values = true)]
+    key: Option<Hidden>,
+    /// A file with the secret of a key
+    #[arg(long, help_heading = HEADING, env = "MROL_KEY_FILE", value_name = "FILE", conflicts_with = "key")]
+    key_file: Option<PathBuf>,
+    /// Certificates (PEM) of who may sign the server's [default: whom this system trusts]
+    #[arg(long, help_heading = HEADING, env = "MROL_CA", value_name = "FILE")]
+    ca: Option<PathBuf>,
+    /// The certificate (PEM) to show to a server that asks for one
+    #[arg(long, help_heading = HEADING, env = "MROL_CLIENT_CERT", value_name = "FILE", requires = "client_key")]
+    client_cert: Option<PathBuf>,
+    /// Its private key (PEM)
+    #[arg(long, help_heading = HEADING, env = "MROL_CLIENT_KEY", value_name = "FILE", requires = "client_cert")]
+    client_key: Option<PathBuf>,
+}
+
+/// What no output of ours repeats.
+#[derive(Clone)]
+struct Hidden(String);
+
 impl ServerOptions {
-    pub(super) fn url(&self) -> &str {
-        &self.server
+    pub(super) async fn connect(&self) -> Result<Client, CliError> {
+        Ok(Client::connect_with(&self.server, &self.credentials.read()?).await?)
+    }
+}
+
+impl CredentialOptions {
+    /// What the options name.
+    pub(super) fn read(&self) -> Result<Credentials, CliError> {
+        let mut credentials = Credentials::default();
+        if let Some(secret) = self.secret()? {
+            credentials = credentials.with_key(&secret)?;
+        }
+        if let Some(ca) = &self.ca {
+            credentials = credentials.with_server_ca(&read(ca)?)?;
+        }
+        if let (Some(certificate), Some(key)) = (&self.client_cert, &self.client_key) {
+            credentials = credentials.with_identity(&read(certificate)?, &read(key)?)?;
+        }
+        Ok(credentials)
     }
 
-    pub(super) async fn connect(&self) -> Result<Client, CliError> {
-        Ok(Client::connect(&self.server).await?)
+    /// The secret to show, where there is one.
+    pub(super) fn secret(&self) -> Result<Option<String>, CliError> {
+        match (&self.key, &self.key_file) {
+            (Some(Hidden(secret)), _) => Ok(Some(secret.clone())),
+            (None, Some(file)) => Ok(Some(String::from_utf8_lossy(&read(file)?).trim().to_owned())),
+            (None, None) => Ok(None),
+        }
     }
+}
+
+impl From<String> for Hidden {
+    fn from(secret: String) -> Self {
+        Self(secret)
+    }
+}
+
+impl std::fmt::Debug for Hidden {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Hidden(..)")
+    }
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, CliError> {
+    fs::read(file).map_err(|error| CliError::failed(format!("{}: {error}", file.display())))
 }
 
 #[derive(Debug, clap::Args)]

@@ -19,6 +19,8 @@ EXAMPLES:
   mrol serve                                     maps are kept in ./mrol-data
   mrol serve --data-dir /var/lib/mrol --keys-file keys.toml --http-listen 0.0.0.0:7333 --grpc-listen 0.0.0.0:7334
                                                  for other machines, which need keys (`mrol key new`)
+  mrol serve --keys-file keys.toml --tls-certificate server.pem --tls-key server.key --grpc-listen 0.0.0.0:7334
+                                                 the same over TLS
   mrol serve --data-dir \"\"                       keep maps in memory only
   mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
                                                  take free ports and print them as JSON
@@ -61,6 +63,15 @@ pub(super) struct ServeOptions {
     /// The file of keys that callers need, made by `mrol key new`; read again when it changes
     #[arg(long, value_name = "FILE")]
     keys_file: Option<PathBuf>,
+    /// The server's certificate (PEM) for TLS, its signers after it; read again when it changes
+    #[arg(long, value_name = "FILE")]
+    tls_certificate: Option<PathBuf>,
+    /// Its private key (PEM)
+    #[arg(long, value_name = "FILE")]
+    tls_key: Option<PathBuf>,
+    /// Certificates (PEM) of who may sign those of clients, which then need one to connect
+    #[arg(long, value_name = "FILE")]
+    tls_client_ca: Option<PathBuf>,
     /// Listen off this machine's loopback without keys: whoever reaches the ports may do everything
     #[arg(long)]
     insecure_open: bool,
@@ -115,6 +126,7 @@ impl ServeOptions {
             "http": {"listen": self.http_listen, "socket": self.http_socket},
             "grpc": {"listen": self.grpc_listen, "socket": self.grpc_socket},
             "access": {"keys_file": self.keys_file, "open": self.insecure_open.then_some(true)},
+            "tls": {"certificate": self.tls_certificate, "key": self.tls_key, "client_ca": self.tls_client_ca},
             "log": {"format": self.log_format, "level": self.log_level},
             "store": {
                 "durability": self.durability,
@@ -132,16 +144,19 @@ impl ServeOptions {
 pub(super) struct Serving {
     pub(super) http: SocketAddr,
     pub(super) grpc: SocketAddr,
+    /// Whether a client has to speak TLS.
+    pub(super) tls: bool,
 }
 
 impl Serving {
     pub(super) fn of(server: &Server) -> Self {
-        Self { http: server.http_address(), grpc: server.grpc_address() }
+        Self { http: server.http_address(), grpc: server.grpc_address(), tls: server.is_secured() }
     }
 }
 
 impl Display for Serving {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "mrol serves http://{} (HTTP) and http://{} (gRPC)", self.http, self.grpc)
+        let scheme = if self.tls { "https" } else { "http" };
+        write!(f, "mrol serves {scheme}://{} (HTTP) and {scheme}://{} (gRPC)", self.http, self.grpc)
     }
 }

@@ -4,10 +4,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio_stream::StreamExt;
+use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Response, Status, Streaming};
 
-use super::{Answers, ClientError};
+use super::credentials::ShownKey;
+use super::error::root_cause;
+use super::{Answers, ClientError, Credentials};
 use crate::service::ServiceError;
 use crate::wire::{pb, transport};
 use pb::mapping_client::MappingClient;
@@ -16,36 +19,44 @@ use pb::occupancy_client::OccupancyClient;
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A channel to a server, and its address for error messages.
+/// A channel to a server, what is shown to it, and its address for error messages.
 #[derive(Debug, Clone)]
 pub(super) struct Connection {
     channel: Channel,
+    key: ShownKey,
     url: Arc<str>,
 }
 
+/// A channel whose calls show the key.
+type Keyed = InterceptedService<Channel, ShownKey>;
+
 impl Connection {
-    pub(super) async fn open(url: &str) -> Result<Self, ClientError> {
-        let (url, endpoint) = endpoint(url)?;
+    pub(super) async fn open(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
+        let (url, endpoint) = endpoint(url, credentials)?;
         match endpoint.connect().await {
-            Ok(channel) => Ok(Self { channel, url: url.into() }),
+            Ok(channel) => Ok(Self { channel, key: credentials.key(), url: url.into() }),
             Err(error) => Err(ClientError::unreachable(url, &error)),
         }
     }
 
-    pub(super) fn occupancy(&self) -> OccupancyClient<Channel> {
-        OccupancyClient::new(self.channel.clone())
+    pub(super) fn channel(&self) -> Channel {
+        self.channel.clone()
+    }
+
+    pub(super) fn occupancy(&self) -> OccupancyClient<Keyed> {
+        OccupancyClient::with_interceptor(self.channel(), self.key.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
             .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
-    pub(super) fn mapping(&self) -> MappingClient<Channel> {
-        MappingClient::new(self.channel.clone())
+    pub(super) fn mapping(&self) -> MappingClient<Keyed> {
+        MappingClient::with_interceptor(self.channel(), self.key.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
             .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
 
-    pub(super) fn maps(&self) -> MapsClient<Channel> {
-        MapsClient::new(self.channel.clone())
+    pub(super) fn maps(&self) -> MapsClient<Keyed> {
+        MapsClient::with_interceptor(self.channel(), self.key.clone())
             .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
             .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
     }
@@ -73,14 +84,22 @@ impl Connection {
 }
 
 /// Where `url` leads, in full, and how to go there.
-fn endpoint(url: &str) -> Result<(String, Endpoint), ClientError> {
+fn endpoint(url: &str, credentials: &Credentials) -> Result<(String, Endpoint), ClientError> {
     let refused = |problem: &str| ClientError::Url { url: url.to_owned(), problem: problem.to_owned() };
-    let is_socket = url.starts_with("unix:");
-    let full = if is_socket || url.contains("://") { url.to_owned() } else { format!("http://{url}") };
-    if !is_socket && !full.starts_with("http://") {
-        return Err(refused("only http:// and unix: are spoken"));
+    let full = match url.starts_with("unix:") || url.contains("://") {
+        true => url.to_owned(),
+        false if credentials.want_tls() => format!("https://{url}"),
+        false => format!("http://{url}"),
+    };
+    let is_secure = full.starts_with("https://");
+    if !is_secure && !full.starts_with("http://") && !full.starts_with("unix:") {
+        return Err(refused("only http://, https:// and unix: are spoken"));
+    }
+    if !is_secure && credentials.want_tls() {
+        return Err(refused("certificates are of no use but with https://"));
     }
     let endpoint = Endpoint::from_shared(full.clone()).map_err(|error| refused(&error.to_string()))?;
+    let endpoint = if is_secure { secured(endpoint, credentials)? } else { endpoint };
     let endpoint = endpoint
         .connect_timeout(CONNECT_TIMEOUT)
         .tcp_nodelay(true)
@@ -92,21 +111,33 @@ fn endpoint(url: &str) -> Result<(String, Endpoint), ClientError> {
     Ok((full, endpoint))
 }
 
+fn secured(endpoint: Endpoint, credentials: &Credentials) -> Result<Endpoint, ClientError> {
+    let unusable = |error| ClientError::Credentials(format!("TLS cannot be spoken: {}", root_cause(&error)));
+    endpoint.tls_config(credentials.tls()).map_err(unusable)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn an_address_may_come_without_its_scheme() {
-        assert_eq!(endpoint("localhost:7334").unwrap().0, "http://localhost:7334");
-        assert_eq!(endpoint("http://[::1]:7334").unwrap().0, "http://[::1]:7334");
-        assert_eq!(endpoint("unix:/run/mrol.sock").unwrap().0, "unix:/run/mrol.sock");
+        let none = Credentials::default();
+        let full = |url, credentials| endpoint(url, credentials).map(|(full, _)| full).unwrap();
+        assert_eq!(full("localhost:7334", &none), "http://localhost:7334");
+        assert_eq!(full("http://[::1]:7334", &none), "http://[::1]:7334");
+        assert_eq!(full("unix:/run/mrol.sock", &none), "unix:/run/mrol.sock");
+        let ca = b"-----BEGIN CERTIFICATE-----\nAA==\n-----END CERTIFICATE-----\n";
+        let trusting = Credentials::default().with_server_ca(ca).unwrap();
+        assert_eq!(full("localhost:7334", &trusting), "https://localhost:7334");
+        let in_the_clear = endpoint("http://localhost:7334", &trusting).unwrap_err().to_string();
+        assert!(in_the_clear.contains("certificates are of no use"), "{in_the_clear}");
     }
 
     #[test]
     fn an_address_that_is_none_is_repeated_in_the_error() {
-        for bad in ["https://127.0.0.1:7334", "", "http://a b", "ftp://x"] {
-            let error = endpoint(bad).unwrap_err().to_string();
+        for bad in ["", "http://a b", "ftp://x"] {
+            let error = endpoint(bad, &Credentials::default()).unwrap_err().to_string();
             assert!(error.starts_with(&format!("{bad:?} is no server address")), "{error}");
         }
     }
@@ -114,7 +145,8 @@ mod tests {
     #[tokio::test]
     async fn a_server_that_is_not_there_is_named_with_what_to_do() {
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-        let error = Connection::open(&free.to_string()).await.unwrap_err().to_string();
+        let error =
+            Connection::open(&free.to_string(), &Credentials::default()).await.unwrap_err().to_string();
         assert!(error.contains(&format!("http://{free}")) && error.contains("mrol serve"), "{error}");
     }
 }

@@ -9,6 +9,9 @@ use crate::service::ServiceError;
 /// The metadata that holds the server's word for programs.
 const REASON: &str = "mrol-reason";
 
+/// How TLS begins to say what is wrong with a server's certificate.
+const BAD_CERTIFICATE: &str = "invalid peer certificate";
+
 /// A call that failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClientError {
@@ -20,12 +23,23 @@ pub enum ClientError {
         /// What is wrong with it.
         problem: String,
     },
+    /// What the client would show, or trust, cannot be used.
+    #[error("{0}")]
+    Credentials(String),
     /// Nobody answers at the address.
     #[error("cannot connect to {url}: {cause}; is `mrol serve` running there?")]
     Unreachable {
         /// The server's address.
         url: String,
         /// What the system said.
+        cause: String,
+    },
+    /// Somebody answers at the address with a certificate that nobody trusted has signed for it.
+    #[error("{url} cannot be trusted: {cause}; `--ca` names the authority that signs its certificate")]
+    Untrusted {
+        /// The server's address.
+        url: String,
+        /// What is wrong with its certificate.
         cause: String,
     },
     /// The connection broke in the middle of a call.
@@ -69,7 +83,10 @@ impl ClientError {
     }
 
     pub(super) fn unreachable(url: String, error: &dyn Error) -> Self {
-        Self::Unreachable { url, cause: root_cause(error) }
+        match root_cause(error) {
+            cause if cause.starts_with(BAD_CERTIFICATE) => Self::Untrusted { url, cause },
+            cause => Self::Unreachable { url, cause },
+        }
     }
 
     /// What a status says: those that came over the wire have no source, those made on this side have.
@@ -98,7 +115,7 @@ fn in_brackets(reason: Option<&str>) -> String {
 }
 
 /// The innermost cause: "connection refused" rather than "transport error".
-fn root_cause(error: &dyn Error) -> String {
+pub(super) fn root_cause(error: &dyn Error) -> String {
     let mut cause = error;
     while let Some(inner) = cause.source() {
         cause = inner;

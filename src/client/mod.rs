@@ -26,17 +26,20 @@
 
 mod answers;
 mod connection;
+mod credentials;
 mod error;
 mod new_map;
 mod streams;
 
 pub use answers::Answers;
+pub use credentials::Credentials;
 pub use error::ClientError;
 pub use new_map::NewMap;
 
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
+use tonic::transport::Channel;
 use tonic::{Request, Response, Status};
 
 use crate::map::{MapName, Region, RobotName};
@@ -55,13 +58,26 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects to the gRPC address of a server: `http://127.0.0.1:7334`, or without the scheme; or
-    /// `unix:/run/mrol/grpc.sock`, a socket on the same machine.
+    /// Connects to the gRPC address of a server that asks for no key: `http://127.0.0.1:7334`, or without the scheme;
+    /// `https://robot-7:7334`; or `unix:/run/mrol/grpc.sock`, a socket on the same machine.
     ///
     /// # Errors
     /// When the address is none, or nobody listens there.
     pub async fn connect(url: &str) -> Result<Self, ClientError> {
-        Ok(Self { connection: Connection::open(url).await?, timeout: None })
+        Self::connect_with(url, &Credentials::default()).await
+    }
+
+    /// The same, with a key to show or a certificate to trust or show.
+    ///
+    /// # Errors
+    /// When the address is none, nobody listens there, or the two do not trust each other.
+    pub async fn connect_with(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
+        Ok(Self { connection: Connection::open(url, credentials).await?, timeout: None })
+    }
+
+    /// The connection itself, without the key: for what else the server speaks, as gRPC's health protocol.
+    pub fn channel(&self) -> Channel {
+        self.connection.channel()
     }
 
     /// The same connection, with a deadline for every call that is not a stream: the server gives up at it, and

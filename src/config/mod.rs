@@ -4,11 +4,13 @@ mod access;
 mod limits;
 mod scans;
 mod store;
+mod tls;
 
 pub use access::AccessConfig;
 pub use limits::LimitsConfig;
 pub use scans::{AlignmentConfig, MethodConfig, RobotConfig};
 pub use store::StoreConfig;
+pub use tls::TlsConfig;
 
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -44,6 +46,8 @@ pub struct Config {
     pub grpc: ListenerConfig,
     /// Who may do what.
     pub access: AccessConfig,
+    /// How connections are secured.
+    pub tls: TlsConfig,
     /// The log.
     pub log: LogConfig,
     /// Threads for work that uses the CPU.
@@ -111,6 +115,7 @@ impl Default for Config {
             http: listener(7333),
             grpc: listener(7334),
             access: AccessConfig::default(),
+            tls: TlsConfig::default(),
             log: LogConfig::default(),
             threads: ThreadsConfig::default(),
             filter: FilterConfig::default(),
@@ -158,6 +163,14 @@ pub enum ConfigError {
         range: &'static str,
         /// What it is.
         value: String,
+    },
+    /// A setting that another one needs.
+    #[error("{needed} is missing: {by} is of no use without it")]
+    Missing {
+        /// The setting that is not there.
+        needed: &'static str,
+        /// The one that is.
+        by: &'static str,
     },
     /// Numbers of a robot's table that make no filter.
     #[error("robots.{name}: {error}")]
@@ -224,6 +237,9 @@ impl Config {
             if !(0.0..=86_400.0).contains(&seconds) {
                 return range(key, "0 to 86400", seconds.to_string());
             }
+        }
+        if let Some((needed, by)) = self.tls.missing() {
+            return Err(ConfigError::Missing { needed, by });
         }
         for (name, robot) in &self.robots {
             if let Err(error) = robot.filter().checked() {
@@ -326,6 +342,9 @@ mod tests {
             "{durability}"
         );
         assert!(error("[limits]\nmin_revision_wait_max_s = -1").contains("min_revision_wait_max_s"));
+        assert!(error("[tls]\nkey = \"a\"").contains("tls.certificate is missing"));
+        assert!(error("[tls]\ncertificate = \"a\"").contains("tls.key is missing"));
+        assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
         assert!(error("[log]\nformat = \"xml\"").contains("xml"));
         let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();
         assert!(missing.to_string().contains("no-such-file.toml"));

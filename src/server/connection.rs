@@ -12,6 +12,7 @@ use hyper::service::service_fn;
 use hyper_util::rt::TokioIo;
 use tokio::time::{sleep, timeout};
 use tokio_io_timeout::TimeoutStream;
+use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt;
 
 use super::endpoint::Endpoint;
@@ -25,17 +26,22 @@ const UNREAD_MAX: Duration = Duration::from_secs(30);
 impl Endpoint {
     /// Serves a connection until its client closes it, it has been idle for too long, another gets its place, or the
     /// server is going down.
-    pub(super) async fn serve(self, stream: Stream, place: Place) {
+    pub(super) async fn serve(self, stream: Stream, tls: Option<TlsAcceptor>, place: Place) {
         tokio::select! {
-            () = self.serve_open(stream, &place) => {}
+            () = self.serve_open(stream, tls, &place) => {}
             () = place.lost() => {}
             () = self.cut.cancelled() => {}
         }
     }
 
-    async fn serve_open(&self, stream: Stream, place: &Place) {
-        let Ok(Ok(stream)) = timeout(self.bounds.opening_max, secure(stream)).await else {
-            return;
+    async fn serve_open(&self, stream: Stream, tls: Option<TlsAcceptor>, place: &Place) {
+        let stream = match timeout(self.bounds.opening_max, secure(stream, tls)).await {
+            Ok(Ok(stream)) => stream,
+            Ok(Err(error)) => {
+                tracing::debug!(protocol = self.protocol.as_str(), %error, "a connection could not be secured");
+                return;
+            }
+            Err(_) => return,
         };
         let (stream, bytes_read) = Counted::new(stream);
         let mut stream = TimeoutStream::new(stream);

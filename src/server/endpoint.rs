@@ -6,12 +6,14 @@ use std::time::Duration;
 use axum::Router;
 use hyper_util::rt::TokioExecutor;
 use hyper_util::server::conn::auto::Builder;
+use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use super::accepting::Accepting;
 use super::places::Places;
 use super::protocol::Protocol;
+use super::tls::Tls;
 use crate::config::LimitsConfig;
 
 /// A protocol with its connections, whatever sockets they come from. A clone is another handle on the same ones.
@@ -28,6 +30,7 @@ pub(super) struct Endpoint {
     pub(super) builder: Arc<Builder<TokioExecutor>>,
     pub(super) closing: CancellationToken,
     pub(super) cut: CancellationToken,
+    tls: Option<Tls>,
     places: Places,
     tasks: TaskTracker,
 }
@@ -42,7 +45,7 @@ pub(super) struct Bounds {
 }
 
 impl Endpoint {
-    pub(super) fn new(protocol: Protocol, router: Router, limits: &LimitsConfig) -> Self {
+    pub(super) fn new(protocol: Protocol, router: Router, tls: Option<Tls>, limits: &LimitsConfig) -> Self {
         let opening_max = Duration::from_secs_f64(limits.connection_opening_max_s);
         Self {
             protocol,
@@ -51,6 +54,7 @@ impl Endpoint {
             builder: protocol.builder(limits).into(),
             closing: CancellationToken::new(),
             cut: CancellationToken::new(),
+            tls,
             places: Places::new(limits.connections_max),
             tasks: TaskTracker::new(),
         }
@@ -66,13 +70,22 @@ impl Endpoint {
                 stream = sockets.next() => stream,
             };
             match self.places.take() {
-                Some(place) => drop(self.tasks.spawn(self.clone().serve(stream, place))),
+                Some(place) => {
+                    let tls = self.tls_at(&sockets);
+                    self.tasks.spawn(self.clone().serve(stream, tls, place));
+                }
                 None => tracing::warn!(
                     protocol = self.protocol.as_str(),
                     "connections_max are in use: another is closed"
                 ),
             }
         }
+    }
+
+    /// What a new connection is secured with: none of the same machine is.
+    fn tls_at(&self, sockets: &Accepting) -> Option<TlsAcceptor> {
+        let tls = self.tls.as_ref().filter(|_| matches!(sockets, Accepting::Tcp(_)));
+        tls.map(|tls| tls.acceptor(self.protocol))
     }
 
     pub(super) fn close(&self) {

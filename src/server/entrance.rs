@@ -20,6 +20,9 @@ pub(super) fn access(config: &Config) -> Result<Access, ServerError> {
             let access = Access::by_keys_of(file, *open_metrics)?;
             let keys = access.keys().map_or(0, |keys| keys.current().len());
             tracing::info!(file = %file.display(), keys, "keys are asked for");
+            if let Some((protocol, address)) = reachable.filter(|_| config.tls.certificate.is_none()) {
+                tracing::warn!(protocol, %address, "keys travel in the clear: TLS needs tls.certificate and tls.key");
+            }
             Ok(access)
         }
         (None, Some((protocol, address))) if !open => Err(ServerError::Unguarded { protocol, address }),

@@ -4,6 +4,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use super::TlsError;
 use crate::access::KeyFileError;
 use crate::service::ServiceError;
 use crate::telemetry::TelemetryError;
@@ -49,6 +50,9 @@ pub enum ServerError {
     /// The file of keys is none.
     #[error("access.keys_file: {0}")]
     Keys(#[from] KeyFileError),
+    /// Connections cannot be secured.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// Log or metrics.
     #[error(transparent)]
     Telemetry(#[from] TelemetryError),

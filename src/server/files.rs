@@ -1,18 +1,21 @@
 //! Files that may change while the server runs.
 
+use super::tls::Tls;
 use crate::access::Access;
-use crate::reload::Reload;
+use crate::reload::{Reload, Reloaded};
 use crate::telemetry::Metrics;
 
 /// What of a server's settings is read again. A clone is another handle on the same.
 #[derive(Debug, Clone)]
 pub struct ReloadedFiles {
     access: Access,
+    tls: Option<Tls>,
     metrics: Metrics,
 }
 
-/// What the file of keys is called in the log and metrics.
+/// What the files are called in the log and metrics.
 const KEYS: &str = "keys";
+const CERTIFICATES: &str = "certificates";
 
 /// How to look at a file.
 #[derive(Debug, Clone, Copy)]
@@ -21,17 +24,28 @@ enum Look {
     Anyway,
 }
 
-impl ReloadedFiles {
-    pub(super) fn new(access: Access, metrics: Metrics) -> Self {
-        if access.keys().is_some() {
-            metrics.file_in_force(KEYS, true);
+impl Look {
+    fn at<T, E: ToString>(self, files: &Reloaded<T, E>) -> Reload<E> {
+        match self {
+            Self::IfChanged => files.refresh(),
+            Self::Anyway => files.reload(),
         }
-        Self { access, metrics }
+    }
+}
+
+impl ReloadedFiles {
+    pub(super) fn new(access: Access, tls: Option<Tls>, metrics: Metrics) -> Self {
+        for (file, is_there) in [(KEYS, access.keys().is_some()), (CERTIFICATES, tls.is_some())] {
+            if is_there {
+                metrics.file_in_force(file, true);
+            }
+        }
+        Self { access, tls, metrics }
     }
 
     /// True where there are any.
     pub fn exist(&self) -> bool {
-        self.access.keys().is_some()
+        self.access.keys().is_some() || self.tls.is_some()
     }
 
     /// Reads those that changed. One that cannot be used is logged and counted, and what it held before goes on.
@@ -48,11 +62,8 @@ impl ReloadedFiles {
         let files = self.clone();
         // A file system may take its time.
         let looked = tokio::task::spawn_blocking(move || {
-            let keys = files.access.keys().map(|keys| match look {
-                Look::IfChanged => keys.refresh(),
-                Look::Anyway => keys.reload(),
-            });
-            files.tell(KEYS, keys);
+            files.tell(KEYS, files.access.keys().map(|keys| look.at(keys)));
+            files.tell(CERTIFICATES, files.tls.as_ref().map(|tls| look.at(tls.files())));
         });
         if let Err(error) = looked.await {
             tracing::error!(%error, "files cannot be looked at");

@@ -9,6 +9,7 @@ use super::CLOSING_MAX;
 use super::accepting::{Accepting, TcpSocket};
 use super::endpoint::Endpoint;
 use super::protocol::Protocol;
+use super::tls::Tls;
 use crate::config::LimitsConfig;
 use crate::http;
 use crate::store::OpeningProgress;
@@ -21,8 +22,13 @@ pub(super) struct Starting {
 
 impl Starting {
     /// Begins to answer at `socket`.
-    pub(super) fn serve(socket: &TcpSocket, progress: Arc<OpeningProgress>, limits: &LimitsConfig) -> Self {
-        let endpoint = Endpoint::new(Protocol::Http, http::starting(progress), limits);
+    pub(super) fn serve(
+        socket: &TcpSocket,
+        tls: Option<Tls>,
+        progress: Arc<OpeningProgress>,
+        limits: &LimitsConfig,
+    ) -> Self {
+        let endpoint = Endpoint::new(Protocol::Http, http::starting(progress), tls, limits);
         let socket = Accepting::Tcp(Arc::clone(&socket.listener));
         let accepting = tokio::spawn(endpoint.clone().accept(socket));
         Self { endpoint, accepting }

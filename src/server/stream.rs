@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::{Context, Poll};
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio_rustls::TlsAcceptor;
 
 /// Bytes in both directions, over TCP or a Unix socket, in the clear or not.
 pub(super) type Stream = Box<dyn Duplex>;
@@ -15,14 +16,17 @@ pub(super) trait Duplex: AsyncRead + AsyncWrite + Send + Unpin + 'static {}
 
 impl<T: AsyncRead + AsyncWrite + Send + Unpin + 'static> Duplex for T {}
 
-/// Makes a stream secure, where that is asked for: what comes back is in the clear.
+/// Makes a stream secure, where there is something to secure it with: what comes back is in the clear.
 ///
 /// Runs in the connection's own task and within its time for opening, so that no handshake keeps others waiting.
 ///
 /// # Errors
 /// When the peer fails the handshake.
-pub(super) async fn secure(stream: Stream) -> io::Result<Stream> {
-    Ok(stream)
+pub(super) async fn secure(stream: Stream, tls: Option<TlsAcceptor>) -> io::Result<Stream> {
+    match tls {
+        Some(tls) => Ok(Box::new(tls.accept(stream).await?)),
+        None => Ok(stream),
+    }
 }
 
 /// A stream whose bytes from the peer are counted.

@@ -115,6 +115,14 @@ async fn no_secret_is_ever_in_the_log() {
         assert!(start.elapsed() < PATIENCE, "the file is not looked at");
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
+    // Told to read it at once, it says the same, and lives on.
+    let complaints = || said().matches("keys.toml: line").count();
+    let before = complaints();
+    server.signal("HUP");
+    while complaints() == before {
+        assert!(start.elapsed() < PATIENCE, "the signal is not heard");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
     assert_eq!(server.stop(), Some(0));
     // It is the log of these requests, with what the crates below say of them.
     assert!(

@@ -39,10 +39,16 @@ impl Process {
         Self { child, http: address("http"), grpc: address("grpc") }
     }
 
+    /// Sends it a signal, by its name.
+    pub fn signal(&self, name: &str) {
+        let sent =
+            Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status().expect("kill");
+        assert!(sent.success());
+    }
+
     /// Tells it to end, as a service manager does; its exit code.
     pub fn stop(mut self) -> Option<i32> {
-        let told = Command::new("kill").arg(self.child.id().to_string()).status().expect("kill");
-        assert!(told.success());
+        self.signal("TERM");
         self.child.wait().expect("its end").code()
     }
 

@@ -4,7 +4,7 @@ use crate::cli::serve::Serving;
 
 /// Commands that look around in the demonstration's daemon, and where to read on.
 pub(super) fn text(serving: &Serving, once: bool) -> String {
-    let Serving { http, grpc } = serving;
+    let Serving { http, grpc, .. } = serving;
     let lead = match once {
         true => "Without --once the daemon stays up for a look around:",
         false => "Look around, in another terminal:",

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::connect;
+use super::address::{GrpcAddress, HttpAddress};
 use super::http::HttpConnection;
 use crate::bench::workload::Queries;
 use crate::cli::error::CliError;
@@ -56,20 +56,24 @@ impl Question {
     }
 
     /// All of it but the points, as an address.
-    pub(in crate::cli::bench) fn url(&self, server: &str, map: &MapName) -> String {
+    pub(in crate::cli::bench) fn asked_at(&self, server: &HttpAddress, map: &MapName) -> HttpAddress {
         let ([x, y, z], [qx, qy, qz, qw]) =
             (translation_m(&self.map_from_points), rotation_xyzw(&self.map_from_points));
         let lookup = self.lookup.as_str();
-        format!("{server}/v1/maps/{map}/occupancy?lookup={lookup}&pose={x},{y},{z},{qx},{qy},{qz},{qw}")
+        let url = format!(
+            "{}/v1/maps/{map}/occupancy?lookup={lookup}&pose={x},{y},{z},{qx},{qy},{qz},{qw}",
+            server.url
+        );
+        HttpAddress { url, ..server.clone() }
     }
 }
 
 /// A way to ask.
 #[derive(Debug, Clone)]
 pub(super) enum Load {
-    Unary { server: String, map: MapName, question: Question },
-    Stream { server: String, map: MapName, question: Question, in_flight: usize },
-    Http { url: String, question: Question },
+    Unary { server: GrpcAddress, map: MapName, question: Question },
+    Stream { server: GrpcAddress, map: MapName, question: Question, in_flight: usize },
+    Http { http: HttpAddress, question: Question },
 }
 
 /// All answers of some time.
@@ -125,19 +129,19 @@ impl Load {
             Self::Stream { server, map, question, in_flight } => {
                 stream(&server, &map, &question, first, in_flight, time).await
             }
-            Self::Http { url, question } => http(&url, &question, first, time).await,
+            Self::Http { http, question } => over_http(&http, &question, first, time).await,
         }
     }
 }
 
 async fn unary(
-    server: &str,
+    server: &GrpcAddress,
     map: &MapName,
     question: &Question,
     first: usize,
     time: Duration,
 ) -> Result<Answered, CliError> {
-    let client = connect(server).await?;
+    let client = server.connect().await?;
     let (mut answered, start) = (Answered::none()?, Instant::now());
     for message in first.. {
         let asked = Instant::now();
@@ -150,8 +154,13 @@ async fn unary(
     Ok(answered)
 }
 
-async fn http(url: &str, question: &Question, first: usize, time: Duration) -> Result<Answered, CliError> {
-    let connection = HttpConnection::to(url)?;
+async fn over_http(
+    address: &HttpAddress,
+    question: &Question,
+    first: usize,
+    time: Duration,
+) -> Result<Answered, CliError> {
+    let connection = HttpConnection::to(address)?;
     let (mut answered, start) = (Answered::none()?, Instant::now());
     for message in first.. {
         let asked = Instant::now();
@@ -168,14 +177,14 @@ async fn http(url: &str, question: &Question, first: usize, time: Duration) -> R
 
 /// One stream, on which the next message is sent for each that is answered.
 async fn stream(
-    server: &str,
+    server: &GrpcAddress,
     map: &MapName,
     question: &Question,
     first: usize,
     in_flight: usize,
     time: Duration,
 ) -> Result<Answered, CliError> {
-    let client = connect(server).await?;
+    let client = server.connect().await?;
     let (mut answered, start) = (Answered::none()?, Instant::now());
     let (sender, questions) = mpsc::channel(in_flight);
     let mut answers = client.query_stream(map, ReceiverStream::new(questions)).await?;

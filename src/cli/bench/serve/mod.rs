@@ -1,5 +1,6 @@
 //! `mrol bench serve`: a load of point queries on a server.
 
+mod address;
 mod daemon;
 mod http;
 mod load;
@@ -15,7 +16,8 @@ use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
 use crate::cli::parse::LookupName;
-use crate::client::Client;
+use crate::cli::remote::CredentialOptions;
+pub(super) use address::{GrpcAddress, HttpAddress};
 pub(super) use http::HttpConnection;
 pub(super) use load::Question;
 pub(super) use target::Target;
@@ -56,6 +58,8 @@ pub(super) struct Serve {
     #[arg(long, value_name = "URL", requires = "server")]
     http: Option<String>,
     #[command(flatten)]
+    credentials: CredentialOptions,
+    #[command(flatten)]
     workload: WorkloadOptions,
     #[command(flatten)]
     map: MapOptions,
@@ -89,7 +93,7 @@ impl Serve {
             None => Some(Daemon::start().await?),
         };
         let (grpc, http) = self.addresses(daemon.as_ref(), &output)?;
-        let target = Target::make(&grpc, http, workload, &self.map).await?;
+        let target = Target::make(grpc, http, workload, &self.map).await?;
         let measured = self.measure(&target, time, &output).await;
         target.delete().await?;
         if let Some(daemon) = daemon {
@@ -103,16 +107,20 @@ impl Serve {
         &self,
         daemon: Option<&Daemon>,
         output: &Output,
-    ) -> Result<(String, Option<String>), CliError> {
-        let serving = daemon.map(Daemon::serving);
-        let Some(serving) = serving else {
-            let http = self.http.as_ref().map(|url| url.trim_end_matches('/').to_owned());
-            if http.is_none() && self.protocols.contains(&Protocol::Http) {
-                output.note("http is left out: --http says where the server has it");
-            }
-            return Ok((self.server.clone().unwrap_or_default(), http));
+    ) -> Result<(GrpcAddress, Option<HttpAddress>), CliError> {
+        if let Some(serving) = daemon.map(Daemon::serving) {
+            let (grpc, http) = (serving.grpc.to_string(), format!("http://{}", serving.http));
+            return Ok((GrpcAddress::open(grpc), Some(HttpAddress::open(http))));
+        }
+        if self.http.is_none() && self.protocols.contains(&Protocol::Http) {
+            output.note("http is left out: --http says where the server has it");
+        }
+        let url = self.server.clone().unwrap_or_default();
+        let http = match &self.http {
+            Some(url) => Some(HttpAddress::new(url, self.credentials.secret()?.as_deref())?),
+            None => None,
         };
-        Ok((serving.grpc.to_string(), Some(format!("http://{}", serving.http))))
+        Ok((GrpcAddress { url, credentials: self.credentials.read()? }, http))
     }
 
     async fn measure(&self, target: &Target, time: Duration, output: &Output) -> Result<(), CliError> {
@@ -142,7 +150,7 @@ impl Serve {
                 Some(Load::Stream { server, map, question, in_flight: self.in_flight.into() })
             }
             Protocol::Http => {
-                target.http.as_ref().map(|url| Load::Http { url: question.url(url, &map), question })
+                target.http.as_ref().map(|http| Load::Http { http: question.asked_at(http, &map), question })
             }
         }
     }
@@ -151,8 +159,4 @@ impl Serve {
 fn message_points(text: &str) -> Result<usize, String> {
     let points: usize = text.parse().map_err(|_| format!("{text:?} is no number"))?;
     (1..=2_000_000).contains(&points).then_some(points).ok_or_else(|| format!("1 to 2000000, got {points}"))
-}
-
-pub(super) async fn connect(url: &str) -> Result<Client, CliError> {
-    Ok(Client::connect(url).await?)
 }

@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use super::connect;
+use super::address::{GrpcAddress, HttpAddress};
 use crate::align::Guess;
 use crate::bench::workload::Workload;
 use crate::cli::bench::workload::MapOptions;
@@ -15,8 +15,8 @@ use crate::voxel::{Lattice, VoxelSet};
 
 /// A map of a workload, under a name that no other map has.
 pub(in crate::cli::bench) struct Target {
-    pub(in crate::cli::bench) grpc: String,
-    pub(in crate::cli::bench) http: Option<String>,
+    pub(in crate::cli::bench) grpc: GrpcAddress,
+    pub(in crate::cli::bench) http: Option<HttpAddress>,
     pub(in crate::cli::bench) map: MapName,
     pub(in crate::cli::bench) resolution_m: f64,
     pub(in crate::cli::bench) voxels: usize,
@@ -25,12 +25,12 @@ pub(in crate::cli::bench) struct Target {
 
 impl Target {
     pub(in crate::cli::bench) async fn make(
-        grpc: &str,
-        http: Option<String>,
+        grpc: GrpcAddress,
+        http: Option<HttpAddress>,
         workload: Workload,
         options: &MapOptions,
     ) -> Result<Self, CliError> {
-        let client = connect(grpc).await?;
+        let client = grpc.connect().await?;
         let map = MapName::new(&format!("bench-{}", Uuid::new_v4())).map_err(CliError::failed)?;
         let settings = options.settings(workload.resolution_m())?;
         let new_map = NewMap {
@@ -41,7 +41,7 @@ impl Target {
         };
         client.create_map(&map, new_map).await?;
         let resolution_m = settings.resolution_m;
-        let mut target = Self { grpc: grpc.to_owned(), http, map, resolution_m, voxels: 0, client };
+        let mut target = Self { grpc, http, map, resolution_m, voxels: 0, client };
         match target.fill(workload).await {
             Ok(()) => Ok(target),
             Err(error) => {

@@ -4,7 +4,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::fleet::Member;
-use crate::cli::bench::serve::{HttpConnection, Question, Target, connect};
+use crate::cli::bench::serve::{HttpAddress, HttpConnection, Question, Target};
 use crate::cli::error::CliError;
 use crate::client::{Answers, Client};
 use crate::map::MapName;
@@ -21,11 +21,11 @@ pub(super) struct Planner {
 
 impl Planner {
     pub(super) async fn new(target: &Target, question: Question) -> Result<Self, CliError> {
-        let client = connect(&target.grpc).await?;
-        let http = target.http.as_deref().unwrap_or_default();
+        let client = target.grpc.connect().await?;
+        let http = target.http.clone().unwrap_or_else(|| HttpAddress::open(""));
         Ok(Self {
             map: target.map.clone(),
-            http: HttpConnection::to(&question.url(http, &target.map))?,
+            http: HttpConnection::to(&question.asked_at(&http, &target.map))?,
             stream: QueryStream::open(&client, &target.map).await?,
             client,
             question,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::fleet::Member;
 use crate::align::Guess;
 use crate::bench::workload::Queries;
-use crate::cli::bench::serve::{Target, connect};
+use crate::cli::bench::serve::Target;
 use crate::cli::error::CliError;
 use crate::client::{Client, NewMap};
 use crate::geometry::{Point, Pose};
@@ -91,7 +91,7 @@ impl Robot {
         Ok(Self {
             own: MapName::new(&format!("{name}-own")).map_err(CliError::failed)?,
             name: RobotName::new(&name).map_err(CliError::failed)?,
-            client: connect(&target.grpc).await?,
+            client: target.grpc.connect().await?,
             seen,
             shared: target.map.clone(),
             settings: NewMap::of(target.resolution_m),

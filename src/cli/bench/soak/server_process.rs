@@ -11,6 +11,7 @@ use tokio::process::{Child, Command};
 use tokio::time::timeout;
 
 use super::memory::resident_bytes;
+use crate::cli::bench::serve::{GrpcAddress, HttpAddress};
 use crate::cli::error::CliError;
 
 /// How long it may take to go down, beyond the ten seconds of its drain.
@@ -57,13 +58,13 @@ impl ServerProcess {
     }
 
     /// Its gRPC address.
-    pub(super) fn grpc(&self) -> &str {
-        &self.serving.grpc
+    pub(super) fn grpc(&self) -> GrpcAddress {
+        GrpcAddress::open(&self.serving.grpc)
     }
 
-    /// Its HTTP address, as a URL.
-    pub(super) fn http(&self) -> String {
-        format!("http://{}", self.serving.http)
+    /// Its HTTP address.
+    pub(super) fn http(&self) -> HttpAddress {
+        HttpAddress::open(format!("http://{}", self.serving.http))
     }
 
     /// Memory that it has resident.

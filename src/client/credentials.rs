@@ -1,0 +1,146 @@
+//! How a client shows who it is, and whom it takes for the server.
+
+use std::fmt;
+
+use tonic::metadata::{Ascii, MetadataValue};
+use tonic::service::Interceptor;
+use tonic::transport::{Certificate, ClientTlsConfig, Identity};
+use tonic::{Request, Status};
+
+use super::ClientError;
+
+/// What a client shows to a server that asks for it, and whom it trusts. Nothing, and whom the system trusts, by
+/// default.
+#[derive(Clone, Default)]
+pub struct Credentials {
+    key: ShownKey,
+    server_ca: Option<Certificate>,
+    identity: Option<Identity>,
+}
+
+/// The key that goes with every call.
+#[derive(Clone, Default)]
+pub(super) struct ShownKey(Option<MetadataValue<Ascii>>);
+
+impl Credentials {
+    /// Shows the secret of a key with every call.
+    ///
+    /// # Errors
+    /// When it has characters that no secret has. The error does not repeat it.
+    pub fn with_key(self, secret: &str) -> Result<Self, ClientError> {
+        let problem = "the key must be the secret that `mrol key new` prints, in one line";
+        let secret = secret.trim();
+        let value = format!("Bearer {secret}").parse::<MetadataValue<Ascii>>();
+        let Some(mut key) =
+            value.ok().filter(|_| !secret.is_empty() && !secret.contains(char::is_whitespace))
+        else {
+            return Err(ClientError::Credentials(problem.into()));
+        };
+        key.set_sensitive(true);
+        Ok(Self { key: ShownKey(Some(key)), ..self })
+    }
+
+    /// Trusts servers whose certificate is signed by one of these (PEM), and no others.
+    ///
+    /// # Errors
+    /// When there is no certificate in it.
+    pub fn with_server_ca(self, pem: &[u8]) -> Result<Self, ClientError> {
+        has_block(pem, "CERTIFICATE", "the server's authority")?;
+        Ok(Self { server_ca: Some(Certificate::from_pem(pem)), ..self })
+    }
+
+    /// Shows a certificate (PEM, its signers after it), as mutual TLS asks for, and proves it with its private key.
+    ///
+    /// # Errors
+    /// When there is no certificate or no key.
+    pub fn with_identity(self, certificate: &[u8], key: &[u8]) -> Result<Self, ClientError> {
+        has_block(certificate, "CERTIFICATE", "the client's certificate")?;
+        has_block(key, "PRIVATE KEY", "the client's private key")?;
+        Ok(Self { identity: Some(Identity::from_pem(certificate, key)), ..self })
+    }
+
+    pub(super) fn key(&self) -> ShownKey {
+        self.key.clone()
+    }
+
+    /// True where nothing of this makes sense without TLS.
+    pub(super) fn want_tls(&self) -> bool {
+        self.server_ca.is_some() || self.identity.is_some()
+    }
+
+    pub(super) fn tls(&self) -> ClientTlsConfig {
+        let trusting = match &self.server_ca {
+            Some(ca) => ClientTlsConfig::new().ca_certificate(ca.clone()),
+            None => ClientTlsConfig::new().with_native_roots(),
+        };
+        match &self.identity {
+            Some(identity) => trusting.identity(identity.clone()),
+            None => trusting,
+        }
+    }
+}
+
+impl Interceptor for ShownKey {
+    fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
+        if let Some(key) = &self.0 {
+            request.metadata_mut().insert("authorization", key.clone());
+        }
+        Ok(request)
+    }
+}
+
+impl fmt::Debug for ShownKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "ShownKey(..)" } else { "ShownKey(none)" })
+    }
+}
+
+impl fmt::Debug for Credentials {
+    /// Says what there is, and nothing of it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Credentials")
+            .field("key", &self.key.0.is_some())
+            .field("server_ca", &self.server_ca.is_some())
+            .field("identity", &self.identity.is_some())
+            .finish()
+    }
+}
+
+/// What holds no such block of PEM would be taken for a store of nothing, and the cause told much later.
+fn has_block(pem: &[u8], block: &str, what: &str) -> Result<(), ClientError> {
+    let text = String::from_utf8_lossy(pem);
+    let begins = text.lines().any(|line| line.starts_with("-----BEGIN ") && line.contains(block));
+    let missing = || ClientError::Credentials(format!("{what} must be PEM with a {block} in it"));
+    begins.then_some(()).ok_or_else(missing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_shown_to_the_server_and_to_nobody_else() {
+        let credentials = Credentials::default().with_key(" mrol_1\n").unwrap();
+        assert!(!format!("{credentials:?} {:?}", credentials.key()).contains("mrol_1"));
+        let request = credentials.key().call(Request::new(())).unwrap();
+        assert_eq!(request.metadata().get("authorization").unwrap(), "Bearer mrol_1");
+        assert!(!format!("{request:?}").contains("mrol_1"));
+    }
+
+    #[test]
+    fn what_is_no_secret_is_not_repeated() {
+        for bad in ["", " ", "mrol_1\nmrol_2", "mrol 1", "mrol_1\u{7f}"] {
+            let error = Credentials::default().with_key(bad).unwrap_err().to_string();
+            assert!(error.contains("mrol key new") && !error.contains("mrol_1"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_pem_is_told_at_once() {
+        let pem = b"-----BEGIN CERTIFICATE-----\nAA==\n-----END CERTIFICATE-----\n";
+        assert!(Credentials::default().with_server_ca(pem).is_ok());
+        assert!(Credentials::default().with_server_ca(b"DER").is_err());
+        let error = Credentials::default().with_identity(pem, pem).unwrap_err().to_string();
+        assert!(error.contains("private key must be PEM"), "{error}");
+    }
+}

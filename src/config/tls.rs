@@ -1,0 +1,29 @@
+//! Certificates.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// How TCP connections of both protocols are secured; in the clear without a certificate. Unix sockets never are.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TlsConfig {
+    /// The server's certificate, PEM, its signers after it.
+    pub certificate: Option<PathBuf>,
+    /// Its private key, PEM.
+    pub key: Option<PathBuf>,
+    /// Certificates, PEM, of who may sign those of clients: without one of theirs nobody may connect.
+    pub client_ca: Option<PathBuf>,
+}
+
+impl TlsConfig {
+    /// What lacks, as a setting, and the setting that needs it.
+    pub(super) fn missing(&self) -> Option<(&'static str, &'static str)> {
+        match (&self.certificate, &self.key, &self.client_ca) {
+            (None, Some(_), _) => Some(("tls.certificate", "tls.key")),
+            (Some(_), None, _) => Some(("tls.key", "tls.certificate")),
+            (None, None, Some(_)) => Some(("tls.certificate", "tls.client_ca")),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! TLS: certificates from files that are read again when they change.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::crypto::{CryptoProvider, ring};
+use tokio_rustls::rustls::pki_types::pem::{self, PemObject};
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use tokio_rustls::rustls::server::danger::ClientCertVerifier;
+use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
+use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
+
+use super::protocol::Protocol;
+use crate::config::TlsConfig;
+use crate::reload::{Reloaded, is_open_to_others};
+
+/// Why connections cannot be secured.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// A file that cannot be read, or is no PEM.
+    #[error("{setting}: {}: {problem}", path.display())]
+    File {
+        /// Which of the settings.
+        setting: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The certificate and the key do not go together, or the certificate is none.
+    #[error("tls.certificate and tls.key: {0}")]
+    Certificate(rustls::Error),
+    /// The authority of clients' certificates is none.
+    #[error("tls.client_ca: {0}")]
+    ClientCa(#[from] VerifierBuilderError),
+}
+
+/// What TCP connections are secured with. A clone is another handle on the same certificates.
+#[derive(Debug, Clone)]
+pub(super) struct Tls(Arc<Reloaded<Certificates, TlsError>>);
+
+/// As they were when the files were last read; connections that were made with former ones go on.
+pub(super) struct Certificates {
+    http: TlsAcceptor,
+    grpc: TlsAcceptor,
+}
+
+impl Tls {
+    /// The certificates that the settings name, if any.
+    ///
+    /// # Errors
+    /// When they cannot be used.
+    pub(super) fn of(settings: &TlsConfig) -> Result<Option<Self>, TlsError> {
+        let (Some(certificate), Some(key)) = (&settings.certificate, &settings.key) else {
+            return Ok(None);
+        };
+        let files = [Some(certificate), Some(key), settings.client_ca.as_ref()];
+        let files = files.into_iter().flatten().cloned().collect();
+        let (certificate, key, client_ca) = (certificate.clone(), key.clone(), settings.client_ca.clone());
+        let read =
+            move |_: Option<&Certificates>| Certificates::read(&certificate, &key, client_ca.as_deref());
+        Ok(Some(Self(Arc::new(Reloaded::new(files, read)?))))
+    }
+
+    /// The files, to be read again.
+    pub(super) fn files(&self) -> &Reloaded<Certificates, TlsError> {
+        &self.0
+    }
+
+    /// What a new connection is secured with.
+    pub(super) fn acceptor(&self, protocol: Protocol) -> TlsAcceptor {
+        let certificates = self.0.current();
+        match protocol {
+            Protocol::Http => certificates.http.clone(),
+            Protocol::Grpc => certificates.grpc.clone(),
+        }
+    }
+}
+
+impl Certificates {
+    fn read(certificate: &Path, key: &Path, client_ca: Option<&Path>) -> Result<Self, TlsError> {
+        if is_open_to_others(key) {
+            tracing::warn!(path = %key.display(), "everybody on this machine may read or write the private key");
+        }
+        let provider = Arc::new(ring::default_provider());
+        let chain = certificates_of("tls.certificate", certificate)?;
+        let key = PrivateKeyDer::from_pem_file(key).map_err(in_file("tls.key", key))?;
+        let verifier = client_ca.map(|path| verifier(path, &provider)).transpose()?;
+        let config = ServerConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .map_err(TlsError::Certificate)?;
+        let config = match verifier {
+            Some(verifier) => config.with_client_cert_verifier(verifier),
+            None => config.with_no_client_auth(),
+        };
+        let config = config.with_single_cert(chain, key).map_err(TlsError::Certificate)?;
+        let speaking = |protocols: &[&str]| {
+            let mut config = config.clone();
+            config.alpn_protocols = protocols.iter().map(|protocol| protocol.as_bytes().to_vec()).collect();
+            TlsAcceptor::from(Arc::new(config))
+        };
+        Ok(Self { http: speaking(&["h2", "http/1.1"]), grpc: speaking(&["h2"]) })
+    }
+}
+
+/// Refuses clients without a certificate that one of the file's has signed.
+fn verifier(path: &Path, provider: &Arc<CryptoProvider>) -> Result<Arc<dyn ClientCertVerifier>, TlsError> {
+    let mut roots = RootCertStore::empty();
+    for certificate in certificates_of("tls.client_ca", path)? {
+        roots.add(certificate).map_err(|error| problem("tls.client_ca", path, error))?;
+    }
+    Ok(WebPkiClientVerifier::builder_with_provider(Arc::new(roots), Arc::clone(provider)).build()?)
+}
+
+fn certificates_of(setting: &'static str, path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+    let certificates = CertificateDer::pem_file_iter(path).map_err(in_file(setting, path))?;
+    let certificates: Vec<_> = certificates.collect::<Result<_, _>>().map_err(in_file(setting, path))?;
+    if certificates.is_empty() {
+        return Err(problem(setting, path, "there is no certificate in it"));
+    }
+    Ok(certificates)
+}
+
+/// What is wrong with a file, without anything that it holds.
+fn in_file(setting: &'static str, path: &Path) -> impl Fn(pem::Error) -> TlsError {
+    move |error| match error {
+        pem::Error::Io(error) => problem(setting, path, error),
+        pem::Error::NoItemsFound => problem(setting, path, "there is none in it"),
+        _ => problem(setting, path, "it must be PEM"),
+    }
+}
+
+fn problem(setting: &'static str, path: &Path, problem: impl ToString) -> TlsError {
+    TlsError::File { setting, path: path.to_owned(), problem: problem.to_string() }
+}
