@@ -7,7 +7,7 @@
 
 use std::error::Error;
 
-use mrol::client::Client;
+use mrol::client::{Client, Credentials};
 use mrol::geometry::Point;
 use mrol::map::{Lookup, MapName};
 use mrol::service::PointQuery;
@@ -33,7 +33,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
         min_revision: None,
         map_uuid: None,
     };
-    let answer = Client::connect(&url).await?.query_points(&map, query).await?;
+    let client = Client::connect_with(&url, &credentials()?).await?;
+    let answer = client.query_points(&map, query).await?;
 
     let occupied = |i: usize| answer.occupied[i / 8] >> (i % 8) & 1 == 1;
     for row in 0..ROWS {
@@ -43,6 +44,14 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let revision = answer.state.revision;
     println!("{} of {} points are occupied at revision {revision}", answer.points_occupied, answer.points);
     Ok(())
+}
+
+/// A server on loopback may ask for no key; others do.
+fn credentials() -> Result<Credentials, Box<dyn Error>> {
+    match std::env::var("MROL_KEY") {
+        Ok(secret) => Ok(Credentials::default().with_key(&secret)?),
+        Err(_) => Ok(Credentials::default()),
+    }
 }
 
 fn place(column: usize, row: usize) -> Point {

@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use mrol::client::{Client, NewMap};
+use mrol::client::{Client, Credentials, NewMap};
 use mrol::geometry::{Point, translation_m};
 use mrol::map::{MapName, RobotName};
 use mrol::scan::{Scene, read_points, scan_files, tours};
@@ -29,7 +29,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
         None => simulated(),
     };
 
-    let client = Client::connect(&url).await?;
+    let client = Client::connect_with(&url, &credentials()?).await?;
     client.create_map(&map, NewMap::of(0.05)).await?;
     let requests = scans.into_iter().map(move |points| ScanRequest::new(robot.clone(), points.into()));
     let mut answers = client.insert_scans(&map, tokio_stream::iter(requests)).await?;
@@ -43,6 +43,14 @@ async fn main() -> Result<(), Box<dyn Error>> {
         );
     }
     Ok(())
+}
+
+/// A server on loopback may ask for no key; others do, and to make a map for one of scope admin.
+fn credentials() -> Result<Credentials, Box<dyn Error>> {
+    match std::env::var("MROL_KEY") {
+        Ok(secret) => Ok(Credentials::default().with_key(&secret)?),
+        Err(_) => Ok(Credentials::default()),
+    }
 }
 
 fn simulated() -> Vec<Vec<Point>> {

@@ -48,3 +48,32 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         | Operation::HealthWatch => return None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::access::{Access, Gate};
+    use crate::http::around::{self, Around};
+    use crate::lifecycle::Lifecycle;
+    use crate::service::{MapService, ServiceSettings};
+    use crate::store::OpeningProgress;
+    use crate::telemetry::{MeteredService, Metrics};
+    use axum::body::{Body, to_bytes};
+    use axum::http::{Request, StatusCode};
+    use axum::middleware::from_fn_with_state;
+    use axum::routing::get;
+    use tower::ServiceExt;
+
+    #[tokio::test]
+    async fn what_somebody_serves_without_a_rule_is_refused_as_a_defect() {
+        let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let gate = Gate::new(Access::open(), MeteredService::new(service, Metrics::new().unwrap()));
+        let around = Around { gate, lifecycle: Lifecycle::default() };
+        let stray = Router::new().route("/stray", get(async || "open to all"));
+        let stray = stray.layer(from_fn_with_state(around, around::request));
+        let answer = stray.oneshot(Request::get("/stray").body(Body::empty()).unwrap()).await.unwrap();
+        assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
+        let said = to_bytes(answer.into_body(), 1000).await.unwrap();
+        assert!(String::from_utf8_lossy(&said).contains("no_rule"), "{said:?}");
+    }
+}

@@ -12,6 +12,7 @@ mod limits;
 mod localization;
 mod map_file;
 mod mapping;
+mod maps;
 mod pool;
 mod reach;
 mod request;
@@ -33,15 +34,12 @@ pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
 
 use std::sync::Arc;
 
-use bytes::Bytes;
-
-use crate::map::{MapName, MapSettings, Region, RobotName};
+use crate::map::{MapName, Region, RobotName};
 use crate::store::OpeningProgress;
 use catalogue::Catalogue;
 use committing::{Refusal, Step};
-use hosted_map::{HostedMap, Saving};
+use hosted_map::HostedMap;
 use localization::Caller;
-use map_file::from_file;
 use pool::Pool;
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
@@ -64,9 +62,6 @@ struct Inner {
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
 }
-
-/// Absent neighbours of occupied voxels on which a description measures each level's false positives.
-const RATE_SAMPLES: usize = 4096;
 
 impl MapService {
     /// Opens the service with the maps of its data folder; `progress` tells how far that has come. Reads files: not
@@ -101,57 +96,6 @@ impl MapService {
     /// The filter of maps whose makers do not say.
     pub fn default_filter(&self) -> crate::bloom::FilterSettings {
         self.inner.settings.filter
-    }
-
-    /// Makes a map; true when it was not there. The same settings again are fine.
-    ///
-    /// # Errors
-    /// `InvalidArgument` for settings out of range, `Conflict` where it exists with others, `ResourceExhausted`
-    /// beyond `maps_max`.
-    pub async fn create_map(
-        &self,
-        name: MapName,
-        settings: MapSettings,
-    ) -> Result<(MapInfo, bool), ServiceError> {
-        let name = self.reach.check(&name)?;
-        let inner = Arc::clone(&self.inner);
-        let create =
-            async move { inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await };
-        let (map, created) = to_its_end(create).await?;
-        Ok((self.describe(map).await?, created))
-    }
-
-    /// Describes a map.
-    ///
-    /// # Errors
-    /// `NotFound` without such a map.
-    pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
-        self.describe(self.map(name)?).await
-    }
-
-    /// Describes all maps that the caller may name, by name.
-    ///
-    /// # Errors
-    /// `ResourceExhausted` when too many jobs wait.
-    pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
-        let maps = self.inner.catalogue.within(&self.reach);
-        let describe = move || maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
-        self.inner.queries.run(describe).await
-    }
-
-    /// The maps that take no changes since their journal failed, by name, with the reason.
-    pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
-        let maps = self.inner.catalogue.within(&self.reach);
-        maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
-    }
-
-    /// Takes a map out, in memory and on disk.
-    ///
-    /// # Errors
-    /// `NotFound` without such a map; `Internal` when its file cannot be removed.
-    pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
-        let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
-        to_its_end(async move { inner.catalogue.delete(&name).await }).await
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -278,46 +222,6 @@ impl MapService {
         self.inner.queries.run(move || map.list(level, region.as_ref(), most)).await?
     }
 
-    /// A map as a map file, at one revision.
-    ///
-    /// # Errors
-    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait.
-    pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
-        let map = self.map(name)?;
-        self.inner.queries.run(move || map.to_file()).await?
-    }
-
-    /// Makes a map from a map file, under a uuid of its own.
-    ///
-    /// # Errors
-    /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
-    /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`.
-    pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
-        let name = self.reach.check(&name)?;
-        let inner = Arc::clone(&self.inner);
-        let snapshot = self.inner.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
-        let inner = Arc::clone(&self.inner);
-        let maps_max = self.limits().maps_max;
-        let map = to_its_end(async move { inner.catalogue.restore(name, snapshot, maps_max).await }).await?;
-        self.describe(map).await
-    }
-
-    /// Writes snapshots of the maps that changed since their last one; the number of them.
-    ///
-    /// # Errors
-    /// `Internal` when a file cannot be written; the others are written all the same.
-    pub async fn save(&self) -> Result<usize, ServiceError> {
-        self.inner.catalogue.save(Saving::Changed).await
-    }
-
-    /// The same for the maps with much journal or an old snapshot; to be called every now and then.
-    ///
-    /// # Errors
-    /// As for [`MapService::save`].
-    pub async fn save_due(&self) -> Result<usize, ServiceError> {
-        self.inner.catalogue.save(Saving::Due).await
-    }
-
     /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile.
     async fn carry_through<A: Send + 'static>(
         &self,
@@ -338,21 +242,9 @@ impl MapService {
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
         self.inner.catalogue.get(&self.reach.check(name)?)
     }
-
-    async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
-        self.inner.queries.run(move || map.describe(RATE_SAMPLES)).await
-    }
 }
 
 /// The map's thread is gone, by a defect.
 fn committing_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
     ServiceError::new(ErrorCode::Internal, "job_panicked", "the change failed by a defect of the server")
-}
-
-/// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
-async fn to_its_end<T: Send + 'static>(
-    change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
-) -> Result<T, ServiceError> {
-    let done = tokio::spawn(change).await;
-    done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
 }

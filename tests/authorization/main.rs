@@ -7,6 +7,7 @@ mod asking;
 #[path = "../common/mod.rs"]
 mod common;
 mod disclosure;
+mod early;
 mod keyring;
 mod listening;
 mod paths;

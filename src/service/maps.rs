@@ -1,0 +1,118 @@
+//! Maps as a whole: made, described, listed, deleted; out of a server and into one; saved.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+
+use super::hosted_map::{HostedMap, Saving};
+use super::map_file::from_file;
+use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError};
+use crate::map::{MapName, MapSettings};
+
+/// Absent neighbours of occupied voxels on which a description measures each level's false positives.
+const RATE_SAMPLES: usize = 4096;
+
+impl MapService {
+    /// Makes a map; true when it was not there. The same settings again are fine.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for settings out of range, `Conflict` where it exists with others, `ResourceExhausted`
+    /// beyond `maps_max`.
+    pub async fn create_map(
+        &self,
+        name: MapName,
+        settings: MapSettings,
+    ) -> Result<(MapInfo, bool), ServiceError> {
+        let name = self.reach.check(&name)?;
+        let inner = Arc::clone(&self.inner);
+        let create =
+            async move { inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await };
+        let (map, created) = to_its_end(create).await?;
+        Ok((self.describe(map).await?, created))
+    }
+
+    /// Describes a map.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map.
+    pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
+        self.describe(self.map(name)?).await
+    }
+
+    /// Describes all maps that the caller may name, by name.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` when too many jobs wait.
+    pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
+        let maps = self.inner.catalogue.within(&self.reach);
+        let describe = move || maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
+        self.inner.queries.run(describe).await
+    }
+
+    /// The maps that take no changes since their journal failed, by name, with the reason.
+    pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
+        let maps = self.inner.catalogue.within(&self.reach);
+        maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
+    }
+
+    /// Takes a map out, in memory and on disk.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `Internal` when its file cannot be removed.
+    pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
+        let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
+        to_its_end(async move { inner.catalogue.delete(&name).await }).await
+    }
+
+    /// A map as a map file, at one revision.
+    ///
+    /// # Errors
+    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait.
+    pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
+        let map = self.map(name)?;
+        self.inner.queries.run(move || map.to_file()).await?
+    }
+
+    /// Makes a map from a map file, under a uuid of its own.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
+    /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`.
+    pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
+        let name = self.reach.check(&name)?;
+        let inner = Arc::clone(&self.inner);
+        let snapshot = self.inner.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
+        let inner = Arc::clone(&self.inner);
+        let maps_max = self.limits().maps_max;
+        let map = to_its_end(async move { inner.catalogue.restore(name, snapshot, maps_max).await }).await?;
+        self.describe(map).await
+    }
+
+    /// Writes snapshots of the maps that changed since their last one; the number of them.
+    ///
+    /// # Errors
+    /// `Internal` when a file cannot be written; the others are written all the same.
+    pub async fn save(&self) -> Result<usize, ServiceError> {
+        self.inner.catalogue.save(Saving::Changed).await
+    }
+
+    /// The same for the maps with much journal or an old snapshot; to be called every now and then.
+    ///
+    /// # Errors
+    /// As for [`MapService::save`].
+    pub async fn save_due(&self) -> Result<usize, ServiceError> {
+        self.inner.catalogue.save(Saving::Due).await
+    }
+
+    async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
+        self.inner.queries.run(move || map.describe(RATE_SAMPLES)).await
+    }
+}
+
+/// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
+async fn to_its_end<T: Send + 'static>(
+    change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
+) -> Result<T, ServiceError> {
+    let done = tokio::spawn(change).await;
+    done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
+}
