@@ -1,5 +1,6 @@
 //! Which shard a voxel belongs to.
 
+use super::lookup::bounds::bounds;
 use crate::geometry::{Point, Pose};
 use crate::voxel::Lattice;
 
@@ -113,31 +114,6 @@ fn touched_in(ranges: [(i64, i64); 3]) -> ShardsTouched {
 pub(super) fn shard_of_region([x, y, z]: [i32; 3]) -> usize {
     let colour = x.wrapping_add(z).wrapping_add(y.wrapping_add(z) << 2);
     colour as usize & (SHARDS - 1)
-}
-
-/// Coordinates that are compared at once: those of eight points, so that both bounds stay in registers.
-const LANES: usize = 24;
-
-/// Smallest and largest coordinates of the points. NaN is passed over.
-fn bounds(points: &[Point]) -> Option<([f32; 3], [f32; 3])> {
-    let coordinates: &[[u8; 4]] = bytemuck::cast_slice(points);
-    let (mut min, mut max) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-    let mut widen = |lanes: &[[u8; 4]]| {
-        for ((min, max), bytes) in min.iter_mut().zip(&mut max).zip(lanes) {
-            let c = f32::from_le_bytes(*bytes);
-            // Not f32::min: this form compiles to one instruction and passes over NaN as well.
-            *min = if c < *min { c } else { *min };
-            *max = if c > *max { c } else { *max };
-        }
-    };
-    let (whole, rest) = coordinates.as_chunks::<LANES>();
-    whole.iter().for_each(|lanes| widen(lanes));
-    widen(rest);
-    let of_axis = |lanes: [f32; LANES], pick: fn(f32, f32) -> f32| -> [f32; 3] {
-        std::array::from_fn(|axis| lanes[axis..].iter().step_by(3).copied().fold(lanes[axis], pick))
-    };
-    let (min, max) = (of_axis(min, f32::min), of_axis(max, f32::max));
-    (0..3).all(|axis| min[axis] <= max[axis]).then_some((min, max))
 }
 
 #[cfg(test)]

@@ -44,11 +44,17 @@ pub(super) fn occupied(
     // SAFETY: the caller checked for the features; `occupied` holds a bit a point (asserted by our caller).
     unsafe {
         match (lookup, view.hashes, far) {
-            (Lookup::Exact, _, false) => run_near::<Exact>(points, lattice_from_points, view, occupied),
-            (Lookup::Exact, _, true) => run_far::<Exact>(points, lattice_from_points, view, occupied),
-            (Lookup::Bloom, 2, false) => run_near::<Bloom<2>>(points, lattice_from_points, view, occupied),
-            (Lookup::Bloom, 2, true) => run_far::<Bloom<2>>(points, lattice_from_points, view, occupied),
-            (Lookup::Bloom, _, _) => run_far::<Bloom<0>>(points, lattice_from_points, view, occupied),
+            (Lookup::Exact, _, false) => {
+                run_near::<Exact<false>>(points, lattice_from_points, view, occupied)
+            }
+            (Lookup::Exact, _, true) => run_far::<Exact<true>>(points, lattice_from_points, view, occupied),
+            (Lookup::Bloom, 2, false) => {
+                run_near::<Bloom<2, false>>(points, lattice_from_points, view, occupied)
+            }
+            (Lookup::Bloom, 2, true) => {
+                run_far::<Bloom<2, true>>(points, lattice_from_points, view, occupied)
+            }
+            (Lookup::Bloom, _, _) => run_far::<Bloom<0, true>>(points, lattice_from_points, view, occupied),
         }
     }
 }
@@ -61,6 +67,8 @@ const WORD: usize = 64;
 const GROUPS: usize = WORD / LANES;
 
 /// How the voxels of a word of points are looked up: where to look, which may start the fetch, and what is there.
+///
+/// Each probe has one runner, and each step of it one caller: so all of them become one loop.
 trait Probe {
     /// What the probe keeps in registers.
     type Registers<'a>;
@@ -82,23 +90,23 @@ trait Probe {
     /// Needs AVX-512 F, DQ and CD.
     unsafe fn load<'a>(view: &'a LevelView<'_>) -> Self::Registers<'a>;
 
-    /// Takes up sixteen voxels of the view's level; with `FETCH` it may start fetching what they need. Those that are
-    /// none are not `valid`, and what is answered of them does not count.
+    /// Takes up sixteen voxels of the view's level. Those that are none are not `valid`, and what is answered of them
+    /// does not count.
     ///
     /// # Safety
     /// Needs AVX-512 F, DQ and CD; the view must still live.
-    unsafe fn locate<const FETCH: bool>(
+    unsafe fn locate(
         r: &Self::Registers<'_>,
         index: [__m512i; 3],
         shard: __m512i,
         valid: u16,
     ) -> Self::Located;
 
-    /// Finds out where to look for a whole word, and with `FETCH` starts fetching that. Words come in their order.
+    /// Finds out where to look for a whole word. Words come in their order.
     ///
     /// # Safety
     /// As for `locate`.
-    unsafe fn seek<const FETCH: bool>(
+    unsafe fn seek(
         r: &Self::Registers<'_>,
         memory: &mut Self::Memory,
         located: [Self::Located; GROUPS],
@@ -125,7 +133,7 @@ unsafe fn run_near<P: Probe>(
 ) -> bool {
     // SAFETY: the features are there, and the view lives.
     unsafe {
-        let mut steps = Steps::<P, false>::load(lattice_from_points, view);
+        let mut steps = Steps::<P>::load(lattice_from_points, view);
         let (mut word, mut all_have_a_voxel) = (Word::of(P::NO_WORD), true);
         for (answers, points) in occupied.iter_mut().zip(points.chunks(WORD)) {
             steps.locate(points, &mut word);
@@ -151,11 +159,11 @@ unsafe fn run_far<P: Probe>(
     const { assert!(P::AHEAD < PLACES) };
     // SAFETY: the features are there, and the view lives. What is answered for was located before.
     unsafe {
-        let mut steps = Steps::<P, true>::load(lattice_from_points, view);
+        let mut steps = Steps::<P>::load(lattice_from_points, view);
         let mut under_way = [const { Word::of(P::NO_WORD) }; PLACES];
         let mut words = points.chunks(WORD).enumerate();
         let mut all_have_a_voxel = true;
-        let mut locate_next = |steps: &mut Steps<'_, P, true>, under_way: &mut [Word<P::Word>; PLACES]| {
+        let mut locate_next = |steps: &mut Steps<'_, P>, under_way: &mut [Word<P::Word>; PLACES]| {
             if let Some((i, points)) = words.next() {
                 let word = &mut under_way[i % PLACES];
                 steps.locate(points, word);
@@ -186,13 +194,13 @@ impl<W> Word<W> {
 }
 
 /// The steps of a look-up, and what they keep in registers.
-struct Steps<'a, P: Probe, const FETCH: bool> {
+struct Steps<'a, P: Probe> {
     place: Place,
     registers: P::Registers<'a>,
     memory: P::Memory,
 }
 
-impl<'a, P: Probe, const FETCH: bool> Steps<'a, P, FETCH> {
+impl<'a, P: Probe> Steps<'a, P> {
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn load(lattice_from_points: &LatticeFromPoints, view: &'a LevelView<'_>) -> Self {
@@ -204,9 +212,13 @@ impl<'a, P: Probe, const FETCH: bool> Steps<'a, P, FETCH> {
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(&mut self, points: &[Point], word: &mut Word<P::Word>) {
-        let Some(points) = points.first_chunk::<WORD>() else {
-            // SAFETY: as for this function.
-            return unsafe { self.locate_last(points, word) };
+        let padded;
+        let (points, present) = match points.first_chunk() {
+            Some(points) => (points, u64::MAX),
+            None => {
+                padded = to_word(points);
+                (&padded, (1 << points.len()) - 1)
+            }
         };
         let groups = points.as_chunks::<LANES>().0;
         let (mut has_voxel, mut group) = (0, 0);
@@ -216,26 +228,13 @@ impl<'a, P: Probe, const FETCH: bool> Steps<'a, P, FETCH> {
                 let (index, shard, valid) = self.place.of(points);
                 has_voxel |= u64::from(valid) << (group * LANES);
                 group += 1;
-                P::locate::<FETCH>(&self.registers, index, shard, valid)
+                P::locate(&self.registers, index, shard, valid)
             }
         };
         let located = [locate(&groups[0]), locate(&groups[1]), locate(&groups[2]), locate(&groups[3])];
         // SAFETY: as for this function.
-        unsafe { P::seek::<FETCH>(&self.registers, &mut self.memory, located, &mut word.voxels) };
-        word.has_voxel = has_voxel;
-        word.all_have_a_voxel = has_voxel == u64::MAX;
-    }
-
-    /// The same for fewer points than a word has bits.
-    #[cold]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn locate_last(&mut self, points: &[Point], word: &mut Word<P::Word>) {
-        let mut padded = [Point::new(0.0, 0.0, 0.0); WORD];
-        padded[..points.len()].copy_from_slice(points);
-        // SAFETY: as for this function.
-        unsafe { self.locate(&padded, word) };
-        let present = (1 << points.len()) - 1;
-        word.has_voxel &= present;
+        unsafe { P::seek(&self.registers, &mut self.memory, located, &mut word.voxels) };
+        word.has_voxel = has_voxel & present;
         word.all_have_a_voxel = word.has_voxel == present;
     }
 
@@ -245,4 +244,12 @@ impl<'a, P: Probe, const FETCH: bool> Steps<'a, P, FETCH> {
         // SAFETY: as for this function.
         unsafe { P::answer(&self.registers, &mut self.memory, &word.voxels) & word.has_voxel }
     }
+}
+
+/// The last points, which are fewer than a word has bits, and origins.
+#[cold]
+fn to_word(points: &[Point]) -> [Point; WORD] {
+    let mut word = [Point::new(0.0, 0.0, 0.0); WORD];
+    word[..points.len()].copy_from_slice(points);
+    word
 }

@@ -8,6 +8,7 @@ pub(super) mod ahead;
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+pub(super) mod bounds;
 mod scalar;
 pub mod stages;
 #[cfg(test)]

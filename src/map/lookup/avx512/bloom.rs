@@ -7,8 +7,9 @@ use super::{GROUPS, LANES, Probe};
 use crate::bloom::{HASH_A, HASH_B, HASH_C};
 use crate::map::lookup::LevelView;
 
-/// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says.
-pub(super) struct Bloom<const HASHES: u32>;
+/// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says. With `FETCH`, words are fetched as soon
+/// as they are located.
+pub(super) struct Bloom<const HASHES: u32, const FETCH: bool>;
 
 pub(super) struct BloomRegisters {
     plane: PerShard,
@@ -19,7 +20,7 @@ pub(super) struct BloomRegisters {
 /// Addresses of words of the planes, and the bits that count there; eight voxels a register.
 type Located = ([__m512i; 2], [__m512i; 2]);
 
-impl<const HASHES: u32> Probe for Bloom<HASHES> {
+impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
     type Registers<'a> = BloomRegisters;
     type Located = Located;
     type Word = [Located; GROUPS];
@@ -40,12 +41,7 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn locate<const FETCH: bool>(
-        r: &BloomRegisters,
-        index: [__m512i; 3],
-        shard: __m512i,
-        _: u16,
-    ) -> Located {
+    unsafe fn locate(r: &BloomRegisters, index: [__m512i; 3], shard: __m512i, _: u16) -> Located {
         let (keys, shards) = (pack(index), widen(shard));
         let hashes = if HASHES == 0 { r.hashes } else { HASHES };
         let (a, b) = (r.word_of(keys[0], shards[0], hashes), r.word_of(keys[1], shards[1], hashes));
@@ -62,7 +58,7 @@ impl<const HASHES: u32> Probe for Bloom<HASHES> {
     /// Nothing is left to find out: neighbours' words lie apart.
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn seek<const FETCH: bool>(
+    unsafe fn seek(
         _: &BloomRegisters,
         (): &mut (),
         located: [Located; GROUPS],

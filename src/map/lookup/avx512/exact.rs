@@ -21,7 +21,9 @@ use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CacheLine, Cell, Slots};
 /// seek     those of 64 in a new block are sought: tags say which slots may be theirs; keys and masks are fetched
 /// answer   the keys decide; each voxel gets the address of its block's mask, and asks for its word there
 /// ```
-pub(super) struct Exact;
+///
+/// With `FETCH`, keys and masks are fetched as soon as tags say where they are.
+pub(super) struct Exact<const FETCH: bool>;
 
 pub(super) struct ExactRegisters<'a> {
     view: &'a LevelView<'a>,
@@ -105,7 +107,7 @@ impl Default for ExactMemory {
     }
 }
 
-impl Probe for Exact {
+impl<const FETCH: bool> Probe for Exact<FETCH> {
     type Registers<'a> = ExactRegisters<'a>;
     type Located = Located;
     type Word = ExactWord;
@@ -140,12 +142,7 @@ impl Probe for Exact {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn locate<const FETCH: bool>(
-        r: &ExactRegisters<'_>,
-        index: [__m512i; 3],
-        shard: __m512i,
-        valid: u16,
-    ) -> Located {
+    unsafe fn locate(r: &ExactRegisters<'_>, index: [__m512i; 3], shard: __m512i, valid: u16) -> Located {
         let up = r.view.up;
         let (left, right) = (_mm_cvtsi32_si128(up as i32), _mm_cvtsi32_si128((BLOCK_LEVELS - up) as i32));
         let [a, b] = pack(index.map(|i| _mm512_sra_epi32(i, right)));
@@ -160,7 +157,7 @@ impl Probe for Exact {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn seek<const FETCH: bool>(
+    unsafe fn seek(
         r: &ExactRegisters<'_>,
         memory: &mut ExactMemory,
         located: [Located; GROUPS],

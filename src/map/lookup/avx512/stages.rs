@@ -113,7 +113,7 @@ unsafe fn all_in_filter<const HASHES: u32>(keys: &[u64], view: &LevelView<'_>, o
     // SAFETY: the features are there; each load is masked to the keys that are, and each address is of a word of a
     // shard's plane, which the view keeps alive.
     unsafe {
-        let r = Bloom::<HASHES>::load(view);
+        let r = Bloom::<HASHES, false>::load(view);
         let region_shift = _mm_cvtsi32_si128(view.region_shift as i32);
         for (keys, word) in keys.chunks(64).zip(occupied) {
             // All addresses first, as in the whole look-up, so that many loads are on their way at once.
