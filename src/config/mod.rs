@@ -227,6 +227,16 @@ impl Config {
                 return range(key, "at least 1", "0".into());
             }
         }
+        for (key, value, most, allowed) in [
+            ("threads.query", self.threads.query, 1024, "0 to 1024"),
+            ("threads.mapping", self.threads.mapping, 1024, "0 to 1024"),
+            ("threads.localization", self.threads.localization, 1024, "0 to 1024"),
+            ("limits.jobs_waiting_max", self.limits.jobs_waiting_max, 1 << 20, "0 to 1048576"),
+        ] {
+            if value > most {
+                return range(key, allowed, value.to_string());
+            }
+        }
         for (key, seconds) in [
             ("limits.min_revision_wait_max_s", self.limits.min_revision_wait_max_s),
             ("limits.localization_time_max_s", self.limits.localization_time_max_s),
@@ -345,6 +355,11 @@ mod tests {
         assert!(error("[tls]\nkey = \"a\"").contains("tls.certificate is missing"));
         assert!(error("[tls]\ncertificate = \"a\"").contains("tls.key is missing"));
         assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
+        let threads = error("[threads]\nmapping = 1025");
+        assert!(threads.contains("threads.mapping must be 0 to 1024, got 1025"), "{threads}");
+        assert!(
+            error("[limits]\njobs_waiting_max = 1048577").contains("jobs_waiting_max must be 0 to 1048576")
+        );
         assert!(error("[log]\nformat = \"xml\"").contains("xml"));
         let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();
         assert!(missing.to_string().contains("no-such-file.toml"));

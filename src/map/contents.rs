@@ -5,6 +5,25 @@ use std::sync::atomic::Ordering;
 use super::{MapSettings, MapSettingsError, MultiResolutionMap, Requests, Trajectory};
 use crate::voxel::{MomentSet, VoxelSet};
 
+/// The largest revision: so far from the end of its numbers that no map gets there.
+pub const REVISION_MAX: u64 = u64::MAX >> 1;
+
+/// Why contents are those of no map.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ContentsError {
+    /// A revision that no map reaches.
+    #[error("revision {0}, at most {REVISION_MAX} is possible")]
+    Revision(u64),
+    /// Revisions that do not ascend, or lie beyond the map's.
+    #[error("the revisions of its {what} must ascend to at most {revision}")]
+    Order {
+        /// Whose they are.
+        what: &'static str,
+        /// The map's.
+        revision: u64,
+    },
+}
+
 /// What a map holds at one revision, besides its settings. Coarser levels and filters follow from the finest
 /// voxels.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,6 +44,30 @@ impl MapContents {
     /// Voxels alone, at a revision; their centres stand for the points.
     pub fn at(revision: u64, voxels: VoxelSet) -> Self {
         Self { revision, moments: MomentSet::of_centers(&voxels), voxels, ..Self::default() }
+    }
+
+    /// These contents, when a map can hold them: what came from elsewhere is asked.
+    ///
+    /// # Errors
+    /// When revisions are out of range or out of order.
+    pub fn checked(self) -> Result<Self, ContentsError> {
+        if self.revision > REVISION_MAX {
+            return Err(ContentsError::Revision(self.revision));
+        }
+        let (scans, withdrawn) = (self.trajectory.poses(), self.trajectory.withdrawn());
+        self.check_order("scans", scans.iter().map(|scan| scan.revision))?;
+        self.check_order("withdrawn scans", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
+        self.check_order("requests", self.requests.iter().map(|request| request.revision))?;
+        Ok(self)
+    }
+
+    fn check_order(
+        &self,
+        what: &'static str,
+        revisions: impl Iterator<Item = u64>,
+    ) -> Result<(), ContentsError> {
+        let ascend = revisions.chain([self.revision]).is_sorted();
+        ascend.then_some(()).ok_or(ContentsError::Order { what, revision: self.revision })
     }
 }
 

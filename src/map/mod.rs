@@ -27,7 +27,7 @@ pub mod view;
 
 pub use change::{Change, DeletionRecord, Request, UndoRecord};
 pub use commit::{Committed, Committer};
-pub use contents::MapContents;
+pub use contents::{ContentsError, MapContents, REVISION_MAX};
 pub use info::{LevelInfo, MapDescription};
 pub use lookup::Lookup;
 pub use moments::MomentsView;

@@ -14,11 +14,11 @@ mod tum;
 mod writer;
 
 pub use point_filter::{PointFilter, PointFilterError};
-pub use reader::{ReadError, read_points, scan_files};
+pub use reader::{ReadError, parse_points, read_points, scan_files};
 pub use scene::Scene;
 #[cfg(feature = "server")]
 pub(crate) use sensor::gaussian;
 pub use sensor::{DepthCamera, Sensor, SpinningLidar};
 pub use tour::{Tour, tours};
-pub use tum::{StampedPose, read_trajectory, write_trajectory};
+pub use tum::{StampedPose, parse_trajectory, read_trajectory, write_trajectory};
 pub use writer::{write_f32, write_ply};

@@ -36,7 +36,15 @@ impl Display for StampedPose {
 /// When the file cannot be read or a line is not eight numbers of which the last seven are a pose; the error
 /// names the file and the line.
 pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ReadError> {
-    trajectory(&read_file(path)?).map_err(|problem| problem.in_file(path))
+    parse_trajectory(path, &read_file(path)?)
+}
+
+/// The same of a file's `bytes`, wherever they came from; `path` is what errors name.
+///
+/// # Errors
+/// When a line is no pose, as there.
+pub fn parse_trajectory(path: &Path, bytes: &[u8]) -> Result<Vec<StampedPose>, ReadError> {
+    trajectory(bytes).map_err(|problem| problem.in_file(path))
 }
 
 /// Writes `poses` to `path` as a TUM file, numbers that are whole without a point.

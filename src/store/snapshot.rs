@@ -174,6 +174,7 @@ impl Snapshot {
             requests: requests.collect::<Result<_, _>>()?,
         };
         let uuid = Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?;
+        let contents = contents.checked().map_err(|e| e.to_string())?;
         Ok(Self { uuid, settings: settings.checked().map_err(|e| e.to_string())?, contents })
     }
 }
@@ -219,7 +220,8 @@ mod tests {
             new_voxels: 5000,
             digest: u64::MAX,
         };
-        let moments = Moments::from_numbers([3, -4, 5, 6, 7, -8, 9, 10, -11, 1 << 40]);
+        let mut moments = Moments::of_offset([3, -4, 5]);
+        moments += Moments::of_offset([-2048, 2048, 0]);
         let id = RequestId::new("undo-1").unwrap();
         let request = AnsweredRequest { id, digest: 9, revision: 42, voxels: 0, scans: 1 };
         Snapshot {

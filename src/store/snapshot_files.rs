@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::journal::first_revision;
 use super::{FileSystem, OpeningProgress, Snapshot, StoreError};
+use crate::map::REVISION_MAX;
 
 /// Bytes that opening the map in `folder` has to read: its newest snapshot, and the journal from there on.
 pub(super) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
@@ -21,7 +22,11 @@ pub(super) fn snapshot_name(revision: u64) -> String {
 }
 
 fn snapshot_revision(name: &str) -> Option<u64> {
-    name.strip_prefix("snapshot-")?.strip_suffix(".mrol")?.parse().ok()
+    name.strip_prefix("snapshot-")?
+        .strip_suffix(".mrol")?
+        .parse()
+        .ok()
+        .filter(|&revision| revision <= REVISION_MAX)
 }
 
 /// Revisions of the snapshots in `folder`, ascending.

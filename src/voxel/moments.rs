@@ -1,6 +1,6 @@
 //! Moments of the points in a voxel, in integers: what the refinement of an alignment knows of a surface.
 
-use std::ops::{AddAssign, SubAssign};
+use std::ops::AddAssign;
 
 use hashbrown::HashMap;
 
@@ -14,7 +14,7 @@ pub const MOMENT_LEVEL: u32 = 2;
 /// How far points lie from the centre of their voxel, summed: count, sum d and sum d d^T.
 ///
 /// Offsets d are whole numbers of 1 / [`Moments::UNITS`] of the voxel's side, so that sums neither round nor depend on
-/// their order: what a scan added can be taken away again, and every thread count gives the same map.
+/// their order: every thread count gives the same map, and a map without a scan is that of the others.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Moments([i64; Moments::NUMBERS]);
 
@@ -23,6 +23,9 @@ impl Moments {
     pub const UNITS: i64 = 4096;
     /// Count, the three of sum d, the six of sum d d^T (xx xy xz yy yz zz).
     pub const NUMBERS: usize = 10;
+    /// Points of one voxel, at most. More of them say nothing new, and no sum comes near the end of its numbers, about
+    /// whatever centre it is taken.
+    pub const COUNT_MAX: i64 = 1 << 32;
 
     /// Of one point at an offset from the centre.
     pub fn of_offset([x, y, z]: [i64; 3]) -> Self {
@@ -45,9 +48,16 @@ impl Moments {
         self.0
     }
 
-    /// The inverse of [`Moments::to_numbers`].
-    pub fn from_numbers(numbers: [i64; Self::NUMBERS]) -> Self {
-        Self(numbers)
+    /// The inverse of [`Moments::to_numbers`]; none where no points within a voxel have them, or too many.
+    pub fn from_numbers(numbers: [i64; Self::NUMBERS]) -> Option<Self> {
+        const HALF: i64 = Moments::UNITS / 2;
+        let [count, first @ .., xx, xy, xz, yy, yz, zz] = numbers;
+        let possible = |sums: &[i64], least: i64, most: i64| sums.iter().all(|s| (least..=most).contains(s));
+        let fits = (0..=Self::COUNT_MAX).contains(&count)
+            && possible(&first, -count * HALF, count * HALF)
+            && possible(&[xx, yy, zz], 0, count * HALF * HALF)
+            && possible(&[xy, xz, yz], -count * HALF * HALF, count * HALF * HALF);
+        fits.then_some(Self(numbers))
     }
 
     /// Number of points.
@@ -94,14 +104,11 @@ impl Moments {
 }
 
 impl AddAssign for Moments {
+    /// Points that would be more than [`Moments::COUNT_MAX`] with those that are there are left out.
     fn add_assign(&mut self, other: Self) {
-        self.0.iter_mut().zip(other.0).for_each(|(mine, other)| *mine += other);
-    }
-}
-
-impl SubAssign for Moments {
-    fn sub_assign(&mut self, other: Self) {
-        self.0.iter_mut().zip(other.0).for_each(|(mine, other)| *mine -= other);
+        if self.count() + other.count() <= Self::COUNT_MAX {
+            self.0.iter_mut().zip(other.0).for_each(|(mine, other)| *mine += other);
+        }
     }
 }
 
@@ -180,13 +187,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_added_can_be_taken_away(
-            a in proptest::collection::vec(offset(), 0..50),
-            b in proptest::collection::vec(offset(), 0..50),
+        fn moments_of_points_are_told_from_numbers_that_are_none(
+            offsets in proptest::collection::vec(offset(), 0..50), numbers: [i64; Moments::NUMBERS],
         ) {
-            let mut both = of(&[a.clone(), b.clone()].concat());
-            both -= of(&b);
-            prop_assert_eq!(both, of(&a));
+            let moments = of(&offsets);
+            prop_assert_eq!(Moments::from_numbers(moments.to_numbers()), Some(moments));
+            prop_assert_eq!(Moments::from_numbers(numbers), None);
         }
 
         #[test]
@@ -203,6 +209,21 @@ mod tests {
         let (mean, covariance) = of(&[[2, 0, 0], [4, 0, 0], [2, 6, 0], [4, 6, 0]]).gaussian().unwrap();
         assert_eq!((mean, covariance), ([3.0, 3.0, 0.0], [1.0, 0.0, 0.0, 9.0, 0.0, 0.0]));
         assert_eq!(Moments::default().gaussian(), None);
+    }
+
+    #[test]
+    fn a_voxel_that_is_full_takes_no_more_points() {
+        let (half, most) = (Moments::UNITS / 2, Moments::COUNT_MAX);
+        let corner = Moments::of_offset([half; 3]).to_numbers();
+        let full = Moments::from_numbers(corner.map(|number| number * most)).unwrap();
+        let mut sum = full;
+        sum += Moments::of_offset([0; 3]);
+        assert_eq!(sum, full);
+        // About the farthest centre that coarser levels need.
+        let farther = Moments::of_offset([4 * half; 3]).to_numbers();
+        assert_eq!(full.about([3 * half; 3]).to_numbers(), farther.map(|number| number * most));
+        let beyond = Moments::of_offset([half + 1, 0, 0]).to_numbers();
+        assert_eq!(Moments::from_numbers(beyond), None);
     }
 
     #[test]

@@ -54,7 +54,8 @@ impl VoxelGaussians {
         let mut nearest = None;
         for axis in 0..3 {
             let mut neighbour = index;
-            neighbour[axis] += if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
+            let side = if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
+            neighbour[axis] = index[axis].saturating_add(side);
             if let Some(i) = self.of_voxel(moments, neighbour.into(), size) {
                 let distance = self.get(i).distance_squared(point_m);
                 if nearest.is_none_or(|(_, least)| distance < least) {

@@ -7,6 +7,8 @@ use super::{EXTENSIONS, FILE_BYTES_MAX};
 
 /// Longest piece of a file that a message repeats, characters.
 const QUOTE_CHARS_MAX: usize = 80;
+/// Longest message, characters; parsers from elsewhere may repeat whole lines of a file.
+const PROBLEM_CHARS_MAX: usize = 500;
 
 /// Why a scan or trajectory file could not be read; every message starts with the file.
 #[derive(Debug, thiserror::Error)]
@@ -76,12 +78,12 @@ pub(in crate::scan) struct Problem {
 impl Problem {
     /// A problem of the whole content, or one that `text` places by byte or element.
     pub(in crate::scan) fn new(text: impl Into<String>) -> Self {
-        Self { line: None, text: text.into() }
+        Self { line: None, text: shortened(text.into(), PROBLEM_CHARS_MAX) }
     }
 
     /// A problem of `line`, counted from 1.
     pub(in crate::scan) fn at_line(line: usize, text: impl Into<String>) -> Self {
-        Self { line: Some(line), text: text.into() }
+        Self { line: Some(line), ..Self::new(text) }
     }
 
     /// The error that names the file at `path`.
@@ -100,4 +102,12 @@ pub(in crate::scan) fn quoted(text: &str) -> String {
         Some((end, _)) => format!("{:?}...", &text[..end]),
         None => format!("{text:?}"),
     }
+}
+
+fn shortened(mut text: String, chars_max: usize) -> String {
+    if let Some((end, _)) = text.char_indices().nth(chars_max) {
+        text.truncate(end);
+        text.push_str("...");
+    }
+    text
 }

@@ -37,10 +37,17 @@ const EXTENSIONS: [&str; 4] = [".ply", ".pcd", ".xyz", ".f32"];
 /// When the file cannot be read, is larger than a scan may be, is of another format, or is broken or truncated;
 /// the error names the file and the line, byte or element.
 pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
-    let format = Format::of(path)
-        .ok_or_else(|| ReadError::Extension { path: path.to_owned(), extension: extension(path) })?;
+    let format = Format::named_by(path)?;
     let bytes = read_file(path)?;
     format.points(&bytes).map_err(|problem| problem.in_file(path))
+}
+
+/// The same of a file's `bytes`, wherever they came from; `path` says the format, and is what errors name.
+///
+/// # Errors
+/// When the bytes are of another format, broken or truncated.
+pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> {
+    Format::named_by(path)?.points(bytes).map_err(|problem| problem.in_file(path))
 }
 
 /// The scan files that `paths` name: a directory gives its scan files sorted by name, a file itself.
@@ -101,6 +108,11 @@ enum Format {
 }
 
 impl Format {
+    fn named_by(path: &Path) -> Result<Self, ReadError> {
+        let unknown = || ReadError::Extension { path: path.to_owned(), extension: extension(path) };
+        Self::of(path).ok_or_else(unknown)
+    }
+
     fn of(path: &Path) -> Option<Self> {
         match extension(path).as_str() {
             "ply" => Some(Self::Ply),

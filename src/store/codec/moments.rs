@@ -35,7 +35,9 @@ impl TryFrom<pb::Moments> for MomentSet {
             bits =
                 bits.checked_add(gap).ok_or_else(|| format!("moments.key_gaps[{i}] is too large: {gap}"))?;
             let key = Self::key(bits).ok_or_else(|| format!("voxel key {bits:#x} is out of range"))?;
-            Ok((key, Moments::from_numbers(numbers)))
+            let moments = Moments::from_numbers(numbers)
+                .ok_or_else(|| format!("moments.numbers of voxel {i} are those of no points: {numbers:?}"))?;
+            Ok((key, moments))
         };
         message.key_gaps.iter().zip(moments).enumerate().map(voxel).collect()
     }
@@ -47,11 +49,20 @@ mod tests {
     use crate::voxel::VoxelKey;
     use proptest::prelude::*;
 
+    /// Of a few points, or of none.
+    fn moments() -> impl Strategy<Value = Moments> {
+        prop::collection::vec(prop::array::uniform3(-2048i64..=2048), 0..20).prop_map(|offsets| {
+            let mut sum = Moments::default();
+            offsets.into_iter().for_each(|offset| sum += Moments::of_offset(offset));
+            sum
+        })
+    }
+
     proptest! {
         #[test]
-        fn a_set_survives_its_message(keys in prop::collection::btree_set(prop::array::uniform3(-40i32..40), 0..30), numbers: [i64; 10]) {
-            let moments = |key: [i32; 3]| (VoxelKey::new(key).unwrap(), Moments::from_numbers(numbers.map(|n| n ^ i64::from(key[0]))));
-            let set: MomentSet = keys.into_iter().map(moments).collect();
+        fn a_set_survives_its_message(voxels in prop::collection::btree_map(prop::array::uniform3(-40i32..40), moments(), 0..30)) {
+            let set: MomentSet =
+                voxels.into_iter().map(|(index, moments)| (VoxelKey::new(index).unwrap(), moments)).collect();
             prop_assert_eq!(MomentSet::try_from(pb::Moments::from(&set)).unwrap(), set);
         }
 

@@ -18,6 +18,7 @@ use std::path::Path;
 use uuid::Uuid;
 
 use super::frame::{self, Frame};
+use crate::map::REVISION_MAX;
 use crate::store::StoreError;
 
 /// The version that this build writes; it reads this one and all before.
@@ -33,7 +34,11 @@ pub(super) fn file_name(first: u64) -> String {
 
 /// The first revision of the segment of that name, where it is one's.
 pub(crate) fn first_revision(name: &str) -> Option<u64> {
-    name.strip_prefix("journal-")?.strip_suffix(".log")?.parse().ok()
+    name.strip_prefix("journal-")?
+        .strip_suffix(".log")?
+        .parse()
+        .ok()
+        .filter(|&revision| revision <= REVISION_MAX)
 }
 
 /// What a segment begins with.

@@ -1,0 +1,38 @@
+//! What is fuzzed: functions of bytes that panic where a promise is broken. The fuzzers call them with what they make
+//! up, `tests/fuzz_corpus.rs` with the inputs that are kept.
+
+mod config;
+mod frames;
+mod grpc;
+mod hosted;
+mod http;
+mod journal;
+mod map_file;
+mod map_state;
+mod record;
+mod scan_files;
+#[path = "../../failing_disk/simulated.rs"]
+#[allow(dead_code, unreachable_pub, reason = "it is used in part")]
+mod simulated;
+
+/// A function that is fuzzed.
+pub type Target = fn(&[u8]);
+
+/// All of them, by name.
+pub const TARGETS: [(&str, Target); 9] = [
+    ("journal", journal::journal),
+    ("record", record::record),
+    ("map_file", map_file::map_file),
+    ("ply", scan_files::ply),
+    ("pcd", scan_files::pcd),
+    ("text", scan_files::text),
+    ("config", config::config),
+    ("grpc", grpc::grpc),
+    ("http", http::http),
+];
+
+/// Calls the target of that name.
+pub fn run(name: &str, bytes: &[u8]) {
+    let target = TARGETS.iter().find(|(target, _)| *target == name);
+    target.unwrap_or_else(|| panic!("no target {name}")).1(bytes);
+}
