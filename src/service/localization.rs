@@ -198,6 +198,7 @@ impl From<LocalizationError> for ServiceError {
     fn from(error: LocalizationError) -> Self {
         let (code, reason) = match error {
             LocalizationError::EmptyMap => (ErrorCode::FailedPrecondition, "map_empty"),
+            LocalizationError::NothingInReach { .. } => (ErrorCode::InvalidArgument, "scan_out_of_range"),
             LocalizationError::NothingThere { .. } => (ErrorCode::InvalidArgument, "nothing_there"),
             LocalizationError::TooLarge { .. } => (ErrorCode::ResourceExhausted, "search_too_large"),
         };

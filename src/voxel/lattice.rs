@@ -58,6 +58,12 @@ impl Lattice {
         (f64::from(INDEX_MIN) * self.resolution_m, (f64::from(INDEX_MAX) + 1.0) * self.resolution_m)
     }
 
+    /// How far apart two places of a map can be, metres.
+    pub fn reach_m(&self) -> f64 {
+        let (min_m, end_m) = self.range_m();
+        (end_m - min_m) * 3f64.sqrt()
+    }
+
     /// Centre of voxel `key` of `level` in the map frame, metres.
     pub fn center_m(&self, key: VoxelKey, level: u32) -> [f64; 3] {
         key.index().map(|i| (f64::from(i) + 0.5) * self.resolution_m(level))

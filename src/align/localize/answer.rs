@@ -62,6 +62,12 @@ pub struct SearchProgress {
 /// Why a scan cannot be searched for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LocalizationError {
+    /// Every point is too far away to be on any map.
+    #[error("no point of the scan is within {reach_m} m, farther than two places of the map can lie apart")]
+    NothingInReach {
+        /// How far that is, metres.
+        reach_m: f64,
+    },
     /// There is no map yet.
     #[error("the map is empty: nothing to localise in")]
     EmptyMap,

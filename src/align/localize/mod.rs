@@ -47,13 +47,14 @@ use verdict::verdict_on;
 
 /// Finds where in the map a scan was taken, with no guess.
 ///
-/// `points` are in the sensor frame, finite, and at least one. `watch` is told of the progress every few hundred cells
+/// `points` are in the sensor frame; those farther away than any two places of a map are left out. `watch` is told of the progress every few hundred cells
 /// and stops the search by breaking; the answer is then the best so far, refined. One revision of the map is searched; the
 /// refinement at the end sees the map as it is then. One thread does it all, and the same input gives the same answer
 /// unless `watch` breaks.
 ///
 /// # Errors
-/// When the map is empty, has nothing near the search box, or needs more memory than the settings allow.
+/// When the map is empty, has nothing near the search box, or needs more memory than the settings allow; when no point
+/// is left.
 pub fn localize(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -62,6 +63,13 @@ pub fn localize(
     alignment: &AlignmentSettings,
     watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
 ) -> Result<Localization, LocalizationError> {
+    let reach_m = map.lattice().reach_m();
+    let in_reach = |point: &Point| point.to_f64().coords.norm() <= reach_m;
+    let points: &[Point] = &points.iter().copied().filter(in_reach).collect::<Vec<_>>();
+    if points.is_empty() {
+        return Err(LocalizationError::NothingInReach { reach_m });
+    }
+
     // 1) Take a few hundred points, even over the surfaces that the scan shows.
     let sample = SearchSample::of(points, settings.search_points, query.seed);
 
