@@ -43,4 +43,4 @@ macro_rules! replayed {
     };
 }
 
-replayed!(journal record map_file ply pcd text config grpc http);
+replayed!(journal record map_file ply pcd text config keys grpc http);

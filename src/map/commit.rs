@@ -125,7 +125,7 @@ impl<'a> Committer<'a> {
     fn add_to_shards(&self, voxels: &VoxelSet, moments: &MomentSet) -> (Locks<'a>, usize) {
         let (by_shard, moments) = (self.group(voxels), self.map.moments.group(moments));
         let planned = self.plan(touched(&by_shard), |i, shard| Addition::plan(shard, &by_shard[i]));
-        let added_moments = planned.iter().map(|(at, _)| (at.number, &moments[at.number]));
+        let added_moments = moments.iter().enumerate().filter(|(_, moments)| !moments.is_empty());
         let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments));
         let mut added = 0;
         let shards = carry_out(planned, |shard, addition| added += addition.apply(shard));

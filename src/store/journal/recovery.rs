@@ -83,16 +83,7 @@ impl SegmentedJournal {
         }
         journal.head = known.snapshot.max(expected - 1);
         journal.durable = journal.head;
-        journal.forget_empty_segment(&recovered)?;
         Ok((journal, recovered))
-    }
-
-    /// After a cut before the first frame, there is no file.
-    fn forget_empty_segment(&mut self, recovered: &Recovered) -> Result<(), StoreError> {
-        if recovered.cut.as_ref().is_some_and(|cut| cut.offset == 0) {
-            self.segments.pop();
-        }
-        Ok(())
     }
 }
 
@@ -166,7 +157,8 @@ impl Segment<'_> {
     fn cut(&self, broken: Break, place: &Place) -> Result<Cut, StoreError> {
         let (offset, bytes) = (broken.offset as u64, self.bytes.len() as u64);
         let cut = || match offset {
-            0 => place.files.remove(self.path).and_then(|()| place.files.sync(&place.folder)),
+            // Begun anew and not removed: the segment before it would be the last then, and be read by other rules.
+            0 => place.begin_segment(self.first).map(drop),
             _ => place.files.truncate(self.path, offset).and_then(|()| place.files.sync(self.path)),
         };
         cut().map_err(StoreError::io(self.path))?;

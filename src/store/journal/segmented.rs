@@ -128,20 +128,12 @@ impl SegmentedJournal {
     fn begin_segment(&mut self) -> Result<Active, StoreError> {
         let first = self.head + 1;
         let path = self.place.path(first);
-        let make = || {
-            let header = segment::header(self.place.map, first);
-            let mut file = self.place.files.create(&path)?;
-            file.append(&header)?;
-            file.sync()?;
-            self.place.files.sync(&self.place.folder)?;
-            Ok((file, header.len() as u64))
-        };
-        let (file, bytes) = make().map_err(StoreError::io(&path))?;
+        let file = self.place.begin_segment(first).map_err(StoreError::io(&path))?;
         // One without a frame, left by a crash, has the same name.
         if self.segments.last() != Some(&first) {
             self.segments.push(first);
         }
-        Ok(Active { file, path, bytes })
+        Ok(Active { file, path, bytes: segment::HEADER_BYTES as u64 })
     }
 
     fn sync_active(&mut self) -> Result<(), StoreError> {
@@ -196,6 +188,15 @@ impl Journal for SegmentedJournal {
 impl Place {
     pub(super) fn path(&self, first: u64) -> PathBuf {
         self.folder.join(segment::file_name(first))
+    }
+
+    /// A segment without a frame, in the place of one that is there.
+    pub(super) fn begin_segment(&self, first: u64) -> std::io::Result<Box<dyn Appending>> {
+        let mut file = self.files.create(&self.path(first))?;
+        file.append(&segment::header(self.map, first))?;
+        file.sync()?;
+        self.files.sync(&self.folder)?;
+        Ok(file)
     }
 
     pub(super) fn read(&self, path: &Path) -> Result<Vec<u8>, StoreError> {

@@ -45,13 +45,14 @@ pub(super) fn seal(map: Uuid, bytes: &mut [u8]) {
     header[28..32].copy_from_slice(&checksum.to_le_bytes());
 }
 
-/// Where the frames of a good segment begin, and where the last one ends.
-pub(super) fn boundaries(segment: &[u8]) -> Vec<usize> {
-    let mut boundaries = vec![SEGMENT_HEADER_BYTES];
-    while let Some(frame) = segment.get(boundaries[boundaries.len() - 1]..).filter(|rest| !rest.is_empty()) {
-        let payload = u32::from_le_bytes(std::array::from_fn(|i| frame[i])) as usize;
-        let length = (FRAME_HEADER_BYTES + payload + 1).next_multiple_of(FRAME_ALIGNMENT);
-        boundaries.push(boundaries[boundaries.len() - 1] + length);
+/// Where the frames of a segment begin, and where the last one ends; none where it does not end with a frame.
+pub(super) fn boundaries(segment: &[u8]) -> Option<Vec<usize>> {
+    let (mut boundaries, mut at) = (Vec::new(), SEGMENT_HEADER_BYTES);
+    loop {
+        boundaries.push(at);
+        let rest = segment.get(at..)?;
+        let Some(length) = rest.first_chunk() else { return rest.is_empty().then_some(boundaries) };
+        let payload = u32::from_le_bytes(*length) as usize;
+        at += (FRAME_HEADER_BYTES + payload + 1).next_multiple_of(FRAME_ALIGNMENT);
     }
-    boundaries
 }

@@ -1,11 +1,13 @@
 //! A service with one map, as it is behind both protocols.
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Request, StatusCode};
 use http_body_util::{BodyExt, Limited};
+use mrol::access::{Access, Gate};
 use mrol::align::Guess;
 use mrol::geometry::{Point, Pose};
 use mrol::lifecycle::Lifecycle;
@@ -24,6 +26,8 @@ pub(super) const MESSAGE_BYTES_MAX: usize = 1 << 16;
 const ANSWER_BYTES_MAX: usize = 8 << 20;
 /// How long an answer may take.
 const PATIENCE: Duration = Duration::from_secs(20);
+/// What was measured of them is folded together once for so many.
+const REQUESTS_AN_UPKEEP: u64 = 1000;
 /// Changes of the map as it is at first.
 const REVISIONS: u64 = 2;
 
@@ -32,6 +36,7 @@ pub(super) struct Hosted {
     runtime: Runtime,
     service: MeteredService,
     router: Router,
+    asked: Cell<u64>,
     _data: TempDir,
 }
 
@@ -44,7 +49,7 @@ pub(super) struct Answer {
 }
 
 impl Hosted {
-    pub(super) fn new(protocol: impl FnOnce(MeteredService, Lifecycle) -> Router) -> Self {
+    pub(super) fn new(protocol: impl FnOnce(Gate, Lifecycle) -> Router) -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let data = tempfile::tempdir().expect("a folder");
         let settings = ServiceSettings {
@@ -57,14 +62,18 @@ impl Hosted {
         };
         let service = MapService::open(settings, &OpeningProgress::default()).expect("a service");
         let service = MeteredService::new(service, Metrics::new().expect("metrics"));
-        let router = protocol(service.clone(), Lifecycle::default());
-        let hosted = Self { runtime, service, router, _data: data };
+        let gate = Gate::new(Access::open(), service.clone());
+        let router = protocol(gate, Lifecycle::default());
+        let hosted = Self { runtime, service, router, asked: Cell::new(0), _data: data };
         hosted.runtime.block_on(hosted.make_map());
         hosted
     }
 
     /// The answer to one request.
     pub(super) fn ask(&self, request: Request<Body>) -> Answer {
+        if self.asked.replace(self.asked.get() + 1).is_multiple_of(REQUESTS_AN_UPKEEP) {
+            self.service.metrics().upkeep();
+        }
         self.runtime.block_on(async {
             let answered = tokio::time::timeout(PATIENCE, async {
                 let answer = self.router.clone().oneshot(request).await.expect("an answer");

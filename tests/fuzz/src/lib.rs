@@ -1,7 +1,6 @@
 //! What is fuzzed: functions of bytes that panic where a promise is broken. The fuzzers call them with what they make
 //! up, `tests/fuzz_corpus.rs` with the inputs that are kept.
 
-mod config;
 mod frames;
 mod grpc;
 mod hosted;
@@ -11,6 +10,7 @@ mod map_file;
 mod map_state;
 mod record;
 mod scan_files;
+mod settings_files;
 #[path = "../../failing_disk/simulated.rs"]
 #[allow(dead_code, unreachable_pub, reason = "it is used in part")]
 mod simulated;
@@ -19,14 +19,15 @@ mod simulated;
 pub type Target = fn(&[u8]);
 
 /// All of them, by name.
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 10] = [
     ("journal", journal::journal),
     ("record", record::record),
     ("map_file", map_file::map_file),
     ("ply", scan_files::ply),
     ("pcd", scan_files::pcd),
     ("text", scan_files::text),
-    ("config", config::config),
+    ("config", settings_files::config),
+    ("keys", settings_files::keys),
     ("grpc", grpc::grpc),
     ("http", http::http),
 ];
