@@ -156,6 +156,15 @@ mod tests {
     }
 
     #[test]
+    fn a_file_for_everybody_is_told_from_one_for_a_group() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for (mode, open) in [(0o600, false), (0o640, false), (0o644, true), (0o602, true)] {
+            fs::set_permissions(file.path(), fs::Permissions::from_mode(mode)).unwrap();
+            assert_eq!(is_open_to_others(file.path()), open, "{mode:o}");
+        }
+    }
+
+    #[test]
     fn a_file_that_is_broken_or_gone_leaves_the_value_and_is_told_once() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("number");

@@ -24,7 +24,10 @@ use serde_json::Value;
 /// A call of the program, away from the caller's settings.
 fn mrol(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
-    command.env_remove("MROL_SERVER").env_remove("MROL_CONFIG").args(arguments);
+    for name in ["MROL_SERVER", "MROL_CONFIG", "MROL_KEY", "MROL_KEY_FILE", "MROL_CA"] {
+        command.env_remove(name);
+    }
+    command.args(arguments);
     command
 }
 
