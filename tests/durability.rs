@@ -170,6 +170,27 @@ async fn a_data_folder_of_version_2_is_opened_with_its_journal() {
 }
 
 #[tokio::test]
+async fn a_damaged_snapshot_is_set_aside_and_goes_with_those_of_its_age() {
+    let daemon = Daemon::start_with(|config| config.store.undo_revisions = 1).await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &row(2)).await;
+    let mut data = daemon.stop().await;
+    let newest = data.path().join("maps/a/snapshot-00000000000000000001.mrol");
+    let mut bytes = std::fs::read(&newest).unwrap();
+    bytes[30] ^= 1;
+    std::fs::write(&newest, &bytes).unwrap();
+    let mut there = Vec::new();
+    for points in 3..6 {
+        let daemon = Daemon::start_in(data, |config| config.store.undo_revisions = 1).await;
+        daemon.put_in("a", &row(points)).await;
+        assert_eq!(daemon.contents("a").await.1.len(), points);
+        data = daemon.stop().await;
+        there.push(newest.with_extension("mrol.damaged").exists());
+    }
+    assert_eq!(there, [true, false, false]);
+}
+
+#[tokio::test]
 async fn a_scan_is_undone_and_what_others_saw_stays() {
     let daemon = Daemon::start().await;
     daemon.make_map("a").await;

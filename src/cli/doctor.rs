@@ -10,7 +10,7 @@ use super::map_report::{bytes, count};
 use super::output::Output;
 use super::parse;
 use crate::map::MapName;
-use crate::store::doctor::{Diagnosis, SetAside, diagnose, set_aside};
+use crate::store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, set_aside};
 use crate::store::{DataDir, StoreSettings};
 
 const EXAMPLES: &str = "\
@@ -23,7 +23,8 @@ replayed from the oldest snapshot, and the map compared with each snapshot on th
 something is wrong.
 
 --set-aside keeps what can be read before the damage and moves the rest to files named .damaged: nothing is deleted,
-and what is lost to the map is said.";
+and what is lost to the map is said. Those files stay, and are told, until you remove them; damaged snapshots, which a
+server sets aside by itself, go with the snapshots of their age.";
 
 /// Check a data folder, file by file, while no server uses it
 #[derive(Debug, clap::Args)]
@@ -105,14 +106,24 @@ struct Report {
     segments: usize,
     records: u64,
     torn_bytes: u64,
+    set_aside: Vec<AsideOut>,
     problems: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct AsideOut {
+    file: String,
+    bytes: u64,
 }
 
 impl Report {
     fn of(name: &MapName, diagnosis: Diagnosis) -> Self {
-        let Diagnosis { snapshots, segments, records, revision, voxels, torn_bytes, problems } = diagnosis;
+        let Diagnosis { snapshots, segments, records, revision, voxels, torn_bytes, set_aside, problems } =
+            diagnosis;
         let map = name.to_string();
-        Self { map, revision, voxels, snapshots, segments, records, torn_bytes, problems }
+        let aside = |AsideFile { name, bytes }| AsideOut { file: name, bytes };
+        let set_aside = set_aside.into_iter().map(aside).collect();
+        Self { map, revision, voxels, snapshots, segments, records, torn_bytes, set_aside, problems }
     }
 }
 
@@ -126,6 +137,9 @@ impl Display for Report {
         if self.torn_bytes > 0 {
             let torn = bytes(self.torn_bytes as usize);
             write!(f, "; {torn} at the end were never acknowledged, the next start cuts them off")?;
+        }
+        for AsideOut { file, bytes: size } in &self.set_aside {
+            write!(f, "\n  set aside, and read by nobody: {file}, {}", bytes(*size as usize))?;
         }
         self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
     }

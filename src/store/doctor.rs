@@ -24,8 +24,20 @@ pub struct Diagnosis {
     pub voxels: usize,
     /// Bytes that a crash left unfinished, which the next start cuts off: nothing acknowledged is among them.
     pub torn_bytes: u64,
+    /// Files that were set aside since they could not be read. Damaged snapshots among them go with the snapshots of
+    /// their age; parts of a journal stay until somebody removes them.
+    pub set_aside: Vec<AsideFile>,
     /// What is wrong, a sentence each.
     pub problems: Vec<String>,
+}
+
+/// A file that nobody reads any more.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AsideFile {
+    /// Its name in the map's folder.
+    pub name: String,
+    /// Its size.
+    pub bytes: u64,
 }
 
 /// What was set aside.
@@ -44,7 +56,7 @@ pub struct SetAside {
 /// When the system refuses. What is wrong with the files is in the diagnosis.
 pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreError> {
     let (files, path) = (data_dir.files(), data_dir.path(name));
-    let mut diagnosis = Diagnosis::default();
+    let mut diagnosis = Diagnosis { set_aside: aside_files(&**files, &path)?, ..Diagnosis::default() };
     let mut snapshots = read_snapshots(&**files, &path, &mut diagnosis)?;
     let Some(oldest) = snapshots.pop() else {
         diagnosis.problems.push(format!("{}: no snapshot can be read", path.display()));
@@ -61,6 +73,14 @@ pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreEr
     diagnosis.problems.append(&mut replay.problems);
     (diagnosis.revision, diagnosis.voxels) = (Some(replay.map.revision()), replay.map.voxels(0));
     Ok(diagnosis)
+}
+
+fn aside_files(files: &dyn FileSystem, path: &Path) -> Result<Vec<AsideFile>, StoreError> {
+    let file = |name: String| {
+        let bytes = files.size(&path.join(&name)).map_err(StoreError::io(path.join(&name)))?;
+        Ok(AsideFile { name, bytes })
+    };
+    snapshot_files::set_aside_in(files, path)?.into_iter().map(file).collect()
 }
 
 /// The snapshots that can be read, newest first.

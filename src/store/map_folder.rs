@@ -15,7 +15,7 @@ use parking_lot::Mutex;
 use uuid::Uuid;
 
 use super::journal::{Journal, JournalUse, Known, Record, Recovered, SegmentedJournal};
-use super::snapshot_files::{newest_good, set_aside, snapshot_name, snapshot_revisions};
+use super::snapshot_files::{forget_damaged, newest_good, set_aside, snapshot_name, snapshot_revisions};
 use super::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, retention};
 use crate::map::{MultiResolutionMap, Observations, WithdrawnScan};
 
@@ -213,6 +213,7 @@ impl MapFolder {
         // The journal first: a snapshot without the journal behind it would be a gap, one more is not.
         if let Some(base) = kept.first() {
             self.journal.lock().truncate_before(base + 1)?;
+            forget_damaged(&*self.files, &self.path, *base)?;
         }
         for &revision in snapshots.iter().filter(|revision| !kept.contains(revision)) {
             let path = self.path.join(snapshot_name(revision));

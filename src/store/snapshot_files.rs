@@ -21,6 +21,9 @@ pub(super) fn snapshot_name(revision: u64) -> String {
     format!("snapshot-{revision:020}.mrol")
 }
 
+/// What the name of a file ends with that was set aside, since it cannot be read.
+const SET_ASIDE: &str = ".damaged";
+
 fn snapshot_revision(name: &str) -> Option<u64> {
     name.strip_prefix("snapshot-")?
         .strip_suffix(".mrol")?
@@ -74,4 +77,24 @@ pub(super) fn set_aside(
         files.rename(&path, &path.with_extension("mrol.damaged")).map_err(StoreError::io(&path))?;
     }
     files.sync(folder).map_err(StoreError::io(folder))
+}
+
+/// Removes snapshots of before `revision` that were set aside. Parts of journals stay until somebody has looked at them:
+/// they may hold what is nowhere else.
+pub(super) fn forget_damaged(files: &dyn FileSystem, folder: &Path, revision: u64) -> Result<(), StoreError> {
+    for name in set_aside_in(files, folder)? {
+        let snapshot = name.strip_suffix(SET_ASIDE).and_then(snapshot_revision);
+        if snapshot.is_some_and(|snapshot| snapshot < revision) {
+            let path = folder.join(name);
+            files.remove(&path).map_err(StoreError::io(&path))?;
+        }
+    }
+    Ok(())
+}
+
+/// The names of the files in `folder` that were set aside.
+pub(super) fn set_aside_in(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
+    let mut names = files.list(folder).map_err(StoreError::io(folder))?;
+    names.retain(|name| name.ends_with(SET_ASIDE));
+    Ok(names)
 }

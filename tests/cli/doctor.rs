@@ -78,7 +78,9 @@ fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
     let opens = &objects(&["doctor", &data, "--set-aside", "office"])[0];
     assert_eq!(opens, &json!({"map": "office", "revision": 1}));
     assert_eq!(std::fs::read(journal(&sequence).with_extension("log.damaged")).unwrap(), bytes);
-    assert_eq!(objects(&["doctor", &data])[0]["problems"], json!([]));
+    let found = &objects(&["doctor", &data])[0];
+    let aside = json!([{"file": "journal-00000000000000000001.log.damaged", "bytes": bytes.len()}]);
+    assert_eq!((&found["problems"], &found["set_aside"]), (&json!([]), &aside));
     let server = Process::start(&data, &[]);
     let shown = &objects(&["maps", "show", "office", "--server", &server.grpc])[0];
     assert_eq!((&shown["revision"], &shown["scans"]), (&json!(1), &json!(1)));
