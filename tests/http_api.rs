@@ -278,3 +278,40 @@ async fn an_answer_carries_the_id_of_its_request() {
     let given = daemon.get("/v1/maps").await;
     assert!(given.headers()["x-request-id"].len() > 8);
 }
+
+#[tokio::test]
+async fn a_map_goes_out_as_a_file_and_comes_back_under_another_name() {
+    let daemon = Daemon::start_with(|config| config.limits.map_file_bytes_max = 100_000).await;
+    daemon.make_map("hall").await;
+    daemon.put_in("hall", &[[1.05, 2.05, 3.05], [-4.05, 0.05, 0.05]]).await;
+    let taken = daemon.get("/v1/maps/hall/snapshot").await;
+    let header = |name: &str| taken.headers().get(name).unwrap().to_str().unwrap().to_owned();
+    assert_eq!(header("content-disposition"), "attachment; filename=\"hall.mrol\"");
+    assert_eq!(
+        (header("content-type").as_str(), header("mrol-revision").as_str()),
+        ("application/octet-stream", "1")
+    );
+    let file = taken.bytes().await.unwrap();
+
+    let put = async |path: &str, body: Vec<u8>| {
+        let request =
+            client().put(daemon.url(path)).header("content-type", "application/octet-stream").body(body);
+        let answer = request.send().await.unwrap();
+        (answer.status(), json_of(answer).await)
+    };
+    let (status, made) = put("/v1/maps/copy/snapshot", file.to_vec()).await;
+    assert_eq!((status, &made["map"]), (StatusCode::CREATED, &json!("copy")));
+    assert_eq!(daemon.contents("copy").await, daemon.contents("hall").await);
+
+    let (status, error) = put("/v1/maps/copy/snapshot", file.to_vec()).await;
+    assert_eq!((status, reason(&error).0), (StatusCode::CONFLICT, "conflict"));
+    let (status, error) = put("/v1/maps/other/snapshot", file[..file.len() - 1].to_vec()).await;
+    assert_eq!((status, reason(&error).0), (StatusCode::BAD_REQUEST, "invalid_argument"));
+    let (status, error) = put("/v1/maps/other/snapshot", vec![0; 100_001]).await;
+    assert_eq!((status, reason(&error).1), (StatusCode::PAYLOAD_TOO_LARGE, "body_too_large"));
+    assert!(
+        error["error"]["message"].as_str().unwrap().contains("100000 bytes (map_file_bytes_max)"),
+        "{error}"
+    );
+    assert_eq!(daemon.get("/v1/maps/other").await.status(), StatusCode::NOT_FOUND);
+}

@@ -69,8 +69,8 @@ operations! {
     GetMap:            Some(Read),  grpc "/mrol.v1.Maps/GetMap",                 http GET "/v1/maps/{map}";
     ListMaps:          Some(Read),  grpc "/mrol.v1.Maps/ListMaps",               http GET "/v1/maps";
     DeleteMap:         Some(Admin), grpc "/mrol.v1.Maps/DeleteMap",              http DELETE "/v1/maps/{map}";
-    SnapshotMap:       Some(Read),  grpc "/mrol.v1.Maps/SnapshotMap";
-    RestoreMap:        Some(Admin), grpc "/mrol.v1.Maps/RestoreMap";
+    SnapshotMap:       Some(Read),  grpc "/mrol.v1.Maps/SnapshotMap",            http GET "/v1/maps/{map}/snapshot";
+    RestoreMap:        Some(Admin), grpc "/mrol.v1.Maps/RestoreMap",             http PUT "/v1/maps/{map}/snapshot";
     Reflect:           Some(Read),  grpc "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
     HealthCheck:       None,        grpc "/grpc.health.v1.Health/Check";
     HealthWatch:       None,        grpc "/grpc.health.v1.Health/Watch";

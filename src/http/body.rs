@@ -1,7 +1,7 @@
 //! Bodies: JSON, or points as bytes with the rest of the request in the query.
 
 use axum::body::Bytes;
-use axum::extract::{FromRequest, Request};
+use axum::extract::{DefaultBodyLimit, FromRequest, Request};
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 
@@ -91,10 +91,21 @@ fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
     Ok(serde_json::from_slice(body).map_err(not_json)?)
 }
 
+/// A body of bytes that are no points: at most `most` of them, which is the limit `limit`.
+pub(super) async fn octets(request: Request, most: usize, limit: &str) -> Result<Bytes, HttpError> {
+    match content_type(request.headers()).as_str() {
+        OCTET_STREAM => read_most(request, most, limit).await,
+        other => Err(unsupported(other, OCTET_STREAM)),
+    }
+}
+
 async fn read(request: Request, adapter: &Adapter) -> Result<Bytes, HttpError> {
-    let most = adapter.message_bytes_max;
+    read_most(request, adapter.message_bytes_max, "message_bytes_max").await
+}
+
+async fn read_most(mut request: Request, most: usize, limit: &str) -> Result<Bytes, HttpError> {
     let too_large = |bytes: String| {
-        let message = format!("body must be at most {most} bytes (message_bytes_max), got {bytes}");
+        let message = format!("body must be at most {most} bytes ({limit}), got {bytes}");
         HttpError::with_status(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large", message)
     };
     let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
@@ -102,7 +113,8 @@ async fn read(request: Request, adapter: &Adapter) -> Result<Bytes, HttpError> {
     {
         return Err(too_large(bytes.to_string()));
     }
-    Bytes::from_request(request, adapter).await.map_err(|rejection| {
+    DefaultBodyLimit::max(most).apply(&mut request);
+    Bytes::from_request(request, &()).await.map_err(|rejection| {
         if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
             too_large("more".into())
         } else {

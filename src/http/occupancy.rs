@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
+use super::headers;
 use super::json::{JsonLookup, JsonPoints, JsonPose, JsonState};
 use super::parameters::{self, Map};
 use crate::geometry::Pose;
@@ -101,14 +102,11 @@ fn as_json(answer: PointAnswer) -> Response {
 
 fn as_bitmap(answer: PointAnswer) -> Response {
     let mut response = answer.occupied.into_response();
-    let headers = response.headers_mut();
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream"));
-    let mut number = |name, value: usize| headers.insert(HeaderName::from_static(name), value.into());
+    let all = response.headers_mut();
+    all.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream"));
+    let mut number = |name, value: usize| all.insert(HeaderName::from_static(name), value.into());
     number("mrol-points", answer.points);
     number("mrol-points-occupied", answer.points_occupied);
-    headers.insert(HeaderName::from_static("mrol-revision"), answer.state.revision.into());
-    if let Ok(uuid) = HeaderValue::try_from(answer.state.map_uuid.to_string()) {
-        headers.insert(HeaderName::from_static("mrol-map-uuid"), uuid);
-    }
+    all.extend(headers::of_state(&answer.state));
     response
 }

@@ -4,7 +4,9 @@ use axum::Router;
 use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
-use super::{Adapter, deletions, localization, maps, occupancy, probes, scans, trajectory, undo, voxels};
+use super::{
+    Adapter, deletions, localization, map_file, maps, occupancy, probes, scans, trajectory, undo, voxels,
+};
 use crate::access::Operation;
 
 /// A route for every operation that HTTP has, and none besides.
@@ -36,13 +38,13 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::UndoScans => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),
         Operation::ListVoxels => on(method, voxels::list),
+        Operation::SnapshotMap => on(method, map_file::take),
+        Operation::RestoreMap => on(method, map_file::restore),
         Operation::Live => on(method, probes::live),
         Operation::Ready => on(method, probes::ready),
         Operation::Metrics => on(method, probes::metrics),
         Operation::QueryPointsStream
         | Operation::InsertScanStream
-        | Operation::SnapshotMap
-        | Operation::RestoreMap
         | Operation::Reflect
         | Operation::HealthCheck
         | Operation::HealthWatch => return None,

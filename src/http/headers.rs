@@ -1,0 +1,15 @@
+//! Headers that say with bytes what JSON says in fields.
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
+
+use crate::service::MapState;
+
+/// At which state of a map something was: its `mrol-revision` and `mrol-map-uuid`.
+pub(super) fn of_state(state: &MapState) -> HeaderMap {
+    let mut headers = HeaderMap::new();
+    headers.insert(HeaderName::from_static("mrol-revision"), state.revision.into());
+    if let Ok(uuid) = HeaderValue::try_from(state.map_uuid.to_string()) {
+        headers.insert(HeaderName::from_static("mrol-map-uuid"), uuid);
+    }
+    headers
+}

@@ -1,0 +1,47 @@
+//! `/v1/maps/{map}/snapshot`: a map out of the server as a map file, and a map from one.
+
+use std::convert::Infallible;
+
+use axum::body::Body;
+use axum::extract::{Request, State};
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Json, Response};
+
+use super::around::Service;
+use super::error::HttpError;
+use super::maps::MapOut;
+use super::parameters::Map;
+use super::{Adapter, body, headers};
+use crate::wire::snapshot_pieces;
+
+pub(super) async fn take(
+    State(adapter): State<Adapter>,
+    Service(service): Service,
+    Map(map): Map,
+) -> Result<Response, HttpError> {
+    let file = service.maps().snapshot_map(&map).await?;
+    let mut headers = headers::of_state(&file.state);
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream"));
+    headers.insert(header::CONTENT_LENGTH, file.bytes.len().into());
+    let attachment = format!("attachment; filename=\"{map}.mrol\"");
+    if let Ok(attachment) = HeaderValue::try_from(attachment) {
+        headers.insert(header::CONTENT_DISPOSITION, attachment);
+    }
+    let held = adapter.lifecycle.hold();
+    let pieces = snapshot_pieces(file).map(move |piece| {
+        let _until_sent = &held;
+        Ok::<_, Infallible>(piece.data)
+    });
+    Ok((headers, Body::from_stream(tokio_stream::iter(pieces))).into_response())
+}
+
+pub(super) async fn restore(
+    Service(service): Service,
+    Map(map): Map,
+    request: Request,
+) -> Result<(StatusCode, Json<MapOut>), HttpError> {
+    let service = service.maps();
+    let file = body::octets(request, service.limits().map_file_bytes_max, "map_file_bytes_max").await?;
+    let info = service.restore_map(map, file).await?;
+    Ok((StatusCode::CREATED, Json(info.into())))
+}
