@@ -17,7 +17,7 @@ mod tls;
 
 pub use error::ServerError;
 pub use files::ReloadedFiles;
-pub use signal::{reload_on_hangup, shutdown_signal};
+pub use signal::{exit_when_told, reload_on_hangup, shutdown_signal};
 pub use tls::TlsError;
 
 use std::net::SocketAddr;

@@ -3,6 +3,7 @@
 #![cfg(feature = "server")]
 
 mod common;
+mod process;
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use mrol::server::Server;
 use mrol::wire::pb;
 use reqwest::StatusCode;
 use serde_json::json;
-use tokio::io::AsyncWriteExt;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio_stream::StreamExt;
 use tonic::Code;
@@ -95,6 +96,32 @@ async fn what_is_in_flight_is_finished_and_what_is_new_is_refused() {
     // Its own bound ends it, not the server's end.
     assert_eq!(waiting.await.unwrap().unwrap().status(), StatusCode::GATEWAY_TIMEOUT);
     stopping.stopped().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn told_a_second_time_it_ends_at_once() {
+    let data = tempfile::tempdir().unwrap();
+    // Longer than the test has patience.
+    let server = process::Process::start(data.path().to_str().unwrap(), &["--drain-seconds", "3600"]);
+    let address = server.http.strip_prefix("http://").unwrap();
+    // A request in flight: its body is waited for, and never comes.
+    let mut stuck = TcpStream::connect(address).await.unwrap();
+    let head = "PUT /v1/maps/a HTTP/1.1\r\nhost: mrol\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\
+                expect: 100-continue\r\n\r\n";
+    stuck.write_all(head.as_bytes()).await.unwrap();
+    let mut answer = [0; 12];
+    stuck.read_exact(&mut answer).await.unwrap();
+    assert_eq!(&answer, b"HTTP/1.1 100");
+    server.signal("TERM");
+    let ready = format!("{}/readyz", server.http);
+    wait_until(async || match client().get(&ready).send().await {
+        Ok(answer) => answer.status() == StatusCode::SERVICE_UNAVAILABLE,
+        Err(_) => panic!("it went down with a request in flight"),
+    })
+    .await;
+    server.signal("TERM");
+    let ended = tokio::time::timeout(PATIENCE, tokio::task::spawn_blocking(|| server.ended())).await;
+    assert_eq!(ended.expect("its end").unwrap(), Some(130));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -11,7 +11,7 @@ use serde_json::json;
 use super::error::CliError;
 use super::output::Output;
 use crate::config::{Config, ConfigError};
-use crate::server::{Server, reload_on_hangup, shutdown_signal};
+use crate::server::{Server, exit_when_told, reload_on_hangup, shutdown_signal};
 use crate::telemetry::start_logging;
 
 const EXAMPLES: &str = "\
@@ -29,7 +29,8 @@ EXAMPLES:
 
 The first line on standard output says where it serves; the log goes to standard error. Settings come from
 defaults, then the file of --config (TOML), then MROL_... variables, then the options here. SIGTERM and Ctrl-C
-end it: requests in flight are finished, maps are saved. Whatever ends it, nothing acknowledged is lost.";
+end it: requests in flight are finished, maps are saved; the second time at once. Whatever ends it, nothing
+acknowledged is lost.";
 
 /// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
 #[derive(Debug, clap::Args)]
@@ -114,6 +115,10 @@ impl Serve {
             Ok(()) | Err(CliError::OutputClosed) => {}
             Err(error) => return Err(error),
         }
+        let shutdown = async {
+            shutdown.await;
+            tokio::spawn(exit_when_told());
+        };
         Ok(server.run(shutdown).await?)
     }
 }

@@ -35,6 +35,17 @@ async fn terminated() {
     std::future::pending().await
 }
 
+/// Exit code of a server that was told to end a second time: as of a program that ctrl-c ended.
+const INTERRUPTED: i32 = 130;
+
+/// Ends the process at once when it is told to end: for a server that is going down, and is told a second time that it
+/// takes too long. What was acknowledged as synced is in the journal.
+pub async fn exit_when_told() {
+    shutdown_signal().await;
+    tracing::warn!("told to end a second time: ends at once, requests in flight are lost");
+    std::process::exit(INTERRUPTED);
+}
+
 /// Reads `files` again each time that the process gets SIGHUP, for ever. Where there are none, the signal keeps its
 /// meaning and ends the process.
 pub async fn reload_on_hangup(files: ReloadedFiles) {

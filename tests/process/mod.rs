@@ -47,8 +47,13 @@ impl Process {
     }
 
     /// Tells it to end, as a service manager does; its exit code.
-    pub fn stop(mut self) -> Option<i32> {
+    pub fn stop(self) -> Option<i32> {
         self.signal("TERM");
+        self.ended()
+    }
+
+    /// Waits for its end; its exit code.
+    pub fn ended(mut self) -> Option<i32> {
         self.child.wait().expect("its end").code()
     }
 
