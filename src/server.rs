@@ -1,6 +1,7 @@
 //! The daemon: its sockets, and going down within a bound.
 
 mod accepting;
+mod answer_body;
 mod connection;
 mod endpoint;
 mod entrance;
@@ -29,6 +30,7 @@ use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
 use crate::access::{Access, Gate};
+use crate::admission::Admission;
 use crate::config::Config;
 use crate::lifecycle::Lifecycle;
 use crate::service::MapService;
@@ -133,15 +135,16 @@ impl Server {
         let Self { config, access, tls, service, lifecycle, .. } = &self;
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
-        let (routes, health) = grpc::routes(gate.clone(), lifecycle.clone(), bytes_max)?;
-        let router = http::router(gate, lifecycle.clone(), bytes_max);
+        let admission = Admission::new(&config.limits.admission(), lifecycle.clone());
+        let (routes, health) = grpc::routes(gate.clone(), admission.clone(), bytes_max)?;
+        let router = http::router(gate, admission.clone(), bytes_max);
         let grpc = Endpoint::new(Protocol::Grpc, routes.into_axum_router(), tls.clone(), &config.limits);
         let http = Endpoint::new(Protocol::Http, router, tls.clone(), &config.limits);
 
         let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
         let files = self.files();
         let mut accepting = self.accept(&grpc, &http);
-        let housekeeping = tokio::spawn(keep_house(service.clone(), files, lifecycle.clone()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), files, admission));
         health.set_serving().await;
 
         let ended = tokio::select! {

@@ -178,7 +178,8 @@ async fn a_message_beyond_the_limit_is_refused_before_it_is_read() {
     let daemon = daemon().await;
     let large = row(2000);
     let status = daemon.occupancy().await.query_points(query_pb("a", &large)).await.unwrap_err();
-    assert_eq!(status.code(), Code::OutOfRange);
+    assert_eq!(status.code(), Code::ResourceExhausted);
+    assert!(status.message().starts_with("message_bytes_max is 20000"), "{status:?}");
     assert_says(status.message(), &["20000"]);
     let answer = daemon.post_bytes("/v1/maps/a/occupancy", bytes_of(&large)).await;
     assert_eq!(answer.status(), StatusCode::PAYLOAD_TOO_LARGE);

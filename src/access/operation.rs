@@ -105,6 +105,11 @@ impl Operation {
         matches!(self, Self::HealthCheck | Self::HealthWatch | Self::Live | Self::Ready | Self::Metrics)
     }
 
+    /// True for calls that last as long as their client wishes.
+    pub fn is_stream(self) -> bool {
+        matches!(self, Self::QueryPointsStream | Self::InsertScanStream | Self::Reflect | Self::HealthWatch)
+    }
+
     /// The operation of a gRPC call.
     pub fn of_call(path: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|operation| operation.grpc() == Some(path))

@@ -8,14 +8,14 @@ use hyper::body::{Frame, SizeHint};
 
 /// A body that holds `H` until it was sent, or nobody takes it any more.
 #[derive(Debug)]
-pub struct HeldBody<H> {
+pub(super) struct HeldBody<H> {
     body: Body,
     _held: H,
 }
 
 impl<H> HeldBody<H> {
     /// `body`, with what is dropped after it.
-    pub fn new(body: Body, held: H) -> Self {
+    pub(super) fn new(body: Body, held: H) -> Self {
         Self { body, _held: held }
     }
 }

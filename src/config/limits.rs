@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::ConfigError;
+use crate::admission::AdmissionLimits;
 use crate::service::Limits;
 
 /// The service's [`Limits`], and those of messages and connections.
@@ -13,7 +15,7 @@ pub struct LimitsConfig {
     /// Bytes of one HTTP body or one gRPC message. 32 MiB.
     pub message_bytes_max: usize,
     /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle, it
-    /// gives way. 1024.
+    /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
     pub connections_max: usize,
     /// Seconds until a connection has to be secure and to begin to speak. 10.
     pub connection_opening_max_s: f64,
@@ -21,6 +23,18 @@ pub struct LimitsConfig {
     pub http_idle_max_s: f64,
     /// Seconds that a gRPC connection may stay without a call. 600.
     pub grpc_idle_max_s: f64,
+    /// See [`AdmissionLimits::requests_max`].
+    pub requests_max: usize,
+    /// See [`AdmissionLimits::streams_max`].
+    pub streams_max: usize,
+    /// See [`AdmissionLimits::body_bytes_max`].
+    pub body_bytes_max: usize,
+    /// See [`AdmissionLimits::body_silence_max`]; seconds.
+    pub body_silence_max_s: f64,
+    /// See [`AdmissionLimits::caller_requests_per_s_max`].
+    pub caller_requests_per_s_max: u32,
+    /// See [`AdmissionLimits::caller_burst_max`].
+    pub caller_burst_max: u32,
     /// See [`Limits::points_per_request_max`].
     pub points_per_request_max: usize,
     /// See [`Limits::keys_per_request_max`].
@@ -47,13 +61,19 @@ pub struct LimitsConfig {
 
 impl Default for LimitsConfig {
     fn default() -> Self {
-        let limits = Limits::default();
+        let (limits, admission) = (Limits::default(), AdmissionLimits::default());
         Self {
             message_bytes_max: crate::wire::transport::MESSAGE_BYTES_MAX,
-            connections_max: 1024,
+            connections_max: 2048,
             connection_opening_max_s: 10.0,
             http_idle_max_s: 30.0,
             grpc_idle_max_s: 600.0,
+            requests_max: admission.requests_max,
+            streams_max: admission.streams_max,
+            body_bytes_max: admission.body_bytes_max,
+            body_silence_max_s: admission.body_silence_max.as_secs_f64(),
+            caller_requests_per_s_max: admission.caller_requests_per_s_max,
+            caller_burst_max: admission.caller_burst_max,
             points_per_request_max: limits.points_per_request_max,
             keys_per_request_max: limits.keys_per_request_max,
             maps_max: limits.maps_max,
@@ -70,6 +90,57 @@ impl Default for LimitsConfig {
 }
 
 impl LimitsConfig {
+    /// Bounds on all requests together.
+    pub fn admission(&self) -> AdmissionLimits {
+        AdmissionLimits {
+            requests_max: self.requests_max,
+            streams_max: self.streams_max,
+            body_bytes_max: self.body_bytes_max,
+            body_silence_max: Duration::from_secs_f64(self.body_silence_max_s),
+            caller_requests_per_s_max: self.caller_requests_per_s_max,
+            caller_burst_max: self.caller_burst_max,
+        }
+    }
+
+    /// Refuses numbers that would stop the server from working at all.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        let range = |key, range, value: String| Err(ConfigError::Range { key, range, value });
+        if self.message_bytes_max == 0 {
+            return range("limits.message_bytes_max", "at least 1", "0".into());
+        }
+        for (key, value, least, allowed) in [
+            ("limits.requests_max", self.requests_max, 1, "1 to 1048576"),
+            ("limits.streams_max", self.streams_max, 1, "1 to 1048576"),
+            ("limits.jobs_waiting_max", self.jobs_waiting_max, 0, "0 to 1048576"),
+        ] {
+            if !(least..=1 << 20).contains(&value) {
+                return range(key, allowed, value.to_string());
+            }
+        }
+        for (key, seconds) in [
+            ("limits.min_revision_wait_max_s", self.min_revision_wait_max_s),
+            ("limits.localization_time_max_s", self.localization_time_max_s),
+            ("limits.connection_opening_max_s", self.connection_opening_max_s),
+            ("limits.http_idle_max_s", self.http_idle_max_s),
+            ("limits.grpc_idle_max_s", self.grpc_idle_max_s),
+            ("limits.body_silence_max_s", self.body_silence_max_s),
+        ] {
+            if !(0.0..=86_400.0).contains(&seconds) {
+                return range(key, "0 to 86400", seconds.to_string());
+            }
+        }
+        if self.body_bytes_max < self.message_bytes_max {
+            let least = "at least limits.message_bytes_max";
+            return range("limits.body_bytes_max", least, self.body_bytes_max.to_string());
+        }
+        // Each request may be on a connection of its own, in work or arriving, and each stream.
+        if self.connections_max <= 2 * self.requests_max + self.streams_max {
+            let least = "more than twice limits.requests_max and limits.streams_max";
+            return range("limits.connections_max", least, self.connections_max.to_string());
+        }
+        Ok(())
+    }
+
     pub(super) fn service_limits(&self) -> Limits {
         Limits {
             points_per_request_max: self.points_per_request_max,

@@ -219,35 +219,16 @@ impl Config {
                 return range(key, "1 to 1048576", value.to_string());
             }
         }
-        for (key, value) in [
-            ("limits.message_bytes_max", self.limits.message_bytes_max),
-            ("limits.connections_max", self.limits.connections_max),
+        for (key, threads) in [
+            ("threads.query", self.threads.query),
+            ("threads.mapping", self.threads.mapping),
+            ("threads.localization", self.threads.localization),
         ] {
-            if value == 0 {
-                return range(key, "at least 1", "0".into());
+            if threads > 1024 {
+                return range(key, "0 to 1024", threads.to_string());
             }
         }
-        for (key, value, most, allowed) in [
-            ("threads.query", self.threads.query, 1024, "0 to 1024"),
-            ("threads.mapping", self.threads.mapping, 1024, "0 to 1024"),
-            ("threads.localization", self.threads.localization, 1024, "0 to 1024"),
-            ("limits.jobs_waiting_max", self.limits.jobs_waiting_max, 1 << 20, "0 to 1048576"),
-        ] {
-            if value > most {
-                return range(key, allowed, value.to_string());
-            }
-        }
-        for (key, seconds) in [
-            ("limits.min_revision_wait_max_s", self.limits.min_revision_wait_max_s),
-            ("limits.localization_time_max_s", self.limits.localization_time_max_s),
-            ("limits.connection_opening_max_s", self.limits.connection_opening_max_s),
-            ("limits.http_idle_max_s", self.limits.http_idle_max_s),
-            ("limits.grpc_idle_max_s", self.limits.grpc_idle_max_s),
-        ] {
-            if !(0.0..=86_400.0).contains(&seconds) {
-                return range(key, "0 to 86400", seconds.to_string());
-            }
-        }
+        self.limits.check()?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
         }

@@ -12,7 +12,7 @@ use tracing::Instrument;
 
 use super::{deadline, status};
 use crate::access::{Authorized, Gate, Operation};
-use crate::lifecycle::Lifecycle;
+use crate::admission::Admission;
 
 /// How much of an unknown path is repeated to who sent it.
 const PATH_LENGTH_MAX: usize = 80;
@@ -21,12 +21,13 @@ const PATH_LENGTH_MAX: usize = 80;
 #[derive(Debug, Clone)]
 pub(super) struct Around {
     gate: Gate,
-    lifecycle: Lifecycle,
+    admission: Admission,
+    message_bytes_max: usize,
 }
 
 impl Around {
-    pub(super) fn new(gate: Gate, lifecycle: Lifecycle) -> Self {
-        Self { gate, lifecycle }
+    pub(super) fn new(gate: Gate, admission: Admission, message_bytes_max: usize) -> Self {
+        Self { gate, admission, message_bytes_max }
     }
 
     /// Wraps the services' routes.
@@ -48,12 +49,13 @@ impl Around {
             self.gate.metrics().key_used("grpc", key);
         }
         let deadline = deadline::of(call.headers());
-        let answer = deadline::within(deadline, next.run(call)).instrument(span);
-        let answer = match operation.is_probe() {
-            true => answer.await,
-            false => self.lifecycle.admit(answer).await.flatten(),
-        };
-        answer.unwrap_or_else(|refusal| Status::from(refusal).into_http())
+        let handle = |call| deadline::within(deadline, next.run(call));
+        let answer = self.admission.answer(operation, call, handle).instrument(span).await;
+        let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
+        match Status::from_header_map(response.headers()) {
+            Some(refused) => status::naming_the_limit(refused, self.message_bytes_max).into_http(),
+            None => response,
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::{Adapter, service_of};
 use crate::access::Authorized;
+use crate::admission::Arrival;
 use crate::map::MapName;
 use crate::service::{MapReach, ServiceError};
 use crate::wire::{self, pb, snapshot_pieces};
@@ -62,9 +63,9 @@ impl Maps for Adapter {
         let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
         let file = service.maps().snapshot_map(&name).await?;
-        let held = self.lifecycle.hold();
+        let kept = self.admission.keep(file.bytes.len())?;
         let pieces = snapshot_pieces(file).map(move |piece| {
-            let _until_sent = &held;
+            let _until_sent = &kept;
             Ok(piece)
         });
         Ok(Response::new(Box::pin(tokio_stream::iter(pieces))))
@@ -77,7 +78,8 @@ impl Maps for Adapter {
         let Authorized { caller, service } = Authorized::of(pieces.extensions())?.clone();
         let service = service.maps();
         let most = service.limits().map_file_bytes_max;
-        let (name, file) = gather(pieces.into_inner(), caller.reach(), most).await?;
+        let arrival = Arrival::of(pieces.extensions())?.clone();
+        let (name, file) = gather(pieces.into_inner(), &arrival, caller.reach(), most).await?;
         let info = service.restore_map(name, file).await?;
         Ok(Response::new(pb::RestoreMapResponse { map: Some(info.into()) }))
     }
@@ -87,6 +89,7 @@ impl Maps for Adapter {
 /// that the caller may not name, before the second piece.
 async fn gather(
     mut pieces: Streaming<pb::RestoreMapRequest>,
+    arrival: &Arrival,
     reach: &MapReach,
     most: usize,
 ) -> Result<(MapName, Bytes), Status> {
@@ -99,6 +102,8 @@ async fn gather(
             let message = format!("map_file_bytes_max is {most}: the map file is larger");
             return Err(ServiceError::invalid("map_file_too_large", message).into());
         }
+        // Compressed, it came as less.
+        arrival.at_least(file.len() + piece.data.len())?;
         file.extend_from_slice(&piece.data);
         match pieces.message().await? {
             Some(next) => piece = next,

@@ -8,6 +8,7 @@ mod occupancy;
 mod status;
 mod stream;
 
+use prost::Message;
 use tonic::Request;
 use tonic::codec::CompressionEncoding;
 use tonic::service::Routes;
@@ -15,7 +16,7 @@ use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
 use crate::access::{Authorized, Gate};
-use crate::lifecycle::Lifecycle;
+use crate::admission::{Admission, Arrival};
 use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 use crate::wire::pb;
@@ -27,11 +28,13 @@ use pb::occupancy_server::{self, OccupancyServer};
 /// What every handler has at hand, besides the service that its caller may use.
 #[derive(Debug, Clone)]
 struct Adapter {
-    lifecycle: Lifecycle,
+    admission: Admission,
+    message_bytes_max: usize,
 }
 
-/// What the caller of `request` may use.
-fn service_of<T>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
+/// What the caller of `request` may use. The message counts by its own size from now on: it may have been compressed.
+fn service_of<T: Message>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
+    Arrival::of(request.extensions())?.at_least(request.get_ref().encoded_len())?;
     Ok(Authorized::of(request.extensions())?.service.clone())
 }
 
@@ -41,10 +44,10 @@ fn service_of<T>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
 /// When the contract that was compiled in cannot be read.
 pub fn routes(
     gate: Gate,
-    lifecycle: Lifecycle,
+    admission: Admission,
     message_bytes_max: usize,
 ) -> Result<(Routes, Health), tonic_reflection::server::Error> {
-    let adapter = Adapter { lifecycle: lifecycle.clone() };
+    let adapter = Adapter { admission: admission.clone(), message_bytes_max };
     // Each generated server has the same methods, but no trait names them.
     macro_rules! configured {
         ($server:ident) => {
@@ -67,7 +70,10 @@ pub fn routes(
         .add_service(configured!(MapsServer))
         .add_service(health)
         .add_service(reflection);
-    Ok((Around::new(gate, lifecycle).wrap(services.into_axum_router()).into(), Health(reporter)))
+    Ok((
+        Around::new(gate, admission, message_bytes_max).wrap(services.into_axum_router()).into(),
+        Health(reporter),
+    ))
 }
 
 /// Says by gRPC's health protocol whether the server serves: as a whole (the empty name) and each service.

@@ -44,9 +44,9 @@ impl Occupancy for Adapter {
         let service = service_of(&request)?;
         let (map, level, region) = request.into_inner().try_into()?;
         let listing = service.maps().list_voxels(&map, level, region).await?;
-        let held = self.lifecycle.hold();
+        let kept = self.admission.keep(size_of_val(listing.keys.as_slice()))?;
         let chunks = voxel_chunks(listing).map(move |chunk| {
-            let _until_sent = &held;
+            let _until_sent = &kept;
             Ok(chunk)
         });
         Ok(Response::new(Box::pin(tokio_stream::iter(chunks))))

@@ -8,6 +8,9 @@ use crate::service::{ErrorCode, ServiceError};
 /// The metadata that holds the word for programs.
 pub(super) const REASON: &str = "mrol-reason";
 
+/// The metadata that tells gRPC's own retries how many milliseconds to wait.
+const PUSHBACK: &str = "grpc-retry-pushback-ms";
+
 /// The gRPC code of a failure.
 fn code(code: ErrorCode) -> Code {
     match code {
@@ -28,7 +31,22 @@ impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
         let mut status = Self::new(code(error.code), error.message);
         status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason));
+        if let Some(wait) = error.retry_after {
+            status.metadata_mut().insert(PUSHBACK, MetadataValue::from(wait.as_millis() as u64));
+        }
         status
+    }
+}
+
+/// tonic's own refusal of a message, which names no limit, in our words; any other status as it is.
+pub(super) fn naming_the_limit(status: Status, message_bytes_max: usize) -> Status {
+    let of_tonic = status.metadata().get(REASON).is_none();
+    match status.code() {
+        Code::OutOfRange | Code::ResourceExhausted if of_tonic => {
+            let message = format!("message_bytes_max is {message_bytes_max}: {}", status.message());
+            ServiceError::new(ErrorCode::ResourceExhausted, "message_too_large", message).into()
+        }
+        _ => status,
     }
 }
 

@@ -8,7 +8,8 @@ use tonic::{Code, Request, Status, Streaming};
 
 use super::{Adapter, status};
 use crate::access::{Authorized, Operation};
-use crate::lifecycle::{self, Lifecycle};
+use crate::admission::{Admission, Arrival, Asking, Charge};
+use crate::lifecycle;
 use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 
@@ -19,7 +20,7 @@ const MESSAGES_AHEAD_MAX: usize = 4;
 pub(super) type Answers<T> = ReceiverStream<Result<T, Status>>;
 
 /// A request of a stream.
-pub(super) trait Message: Send + 'static {
+pub(super) trait Message: prost::Message + 'static {
     /// The map's name: where it is empty, the former request's map is meant.
     fn map_mut(&mut self) -> &mut String;
 }
@@ -42,34 +43,63 @@ impl Adapter {
     {
         let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let (outbox, answers) = mpsc::channel(MESSAGES_AHEAD_MAX);
-        let lifecycle = self.lifecycle.clone();
-        let authorized = Authorized::of(requests.extensions())?.clone();
-        let worker = Worker { lifecycle, authorized, operation, handle, map: String::new() };
+        let extensions = requests.extensions();
+        let (arrival, asking) = (Arrival::of(extensions)?.clone(), Asking::of(extensions));
+        let (admission, authorized) = (self.admission.clone(), Authorized::of(extensions)?.clone());
+        let worker = Worker { admission, asking, authorized, operation, handle, map: String::new() };
+        let reader =
+            Reader { requests: requests.into_inner(), arrival, message_bytes_max: self.message_bytes_max };
         tokio::spawn(async move {
             tokio::select! {
                 // The worker's end ends the reader too.
                 () = worker.run(read, outbox) => {}
-                () = read_into(inbox, requests.into_inner()) => {}
+                () = reader.run(inbox) => {}
             }
         });
         Ok(ReceiverStream::new(answers))
     }
 }
 
-/// Moves what the client sends to `inbox`; when the client is done, the inbox is closed, and this never ends.
-async fn read_into<M>(inbox: Sender<Result<M, Status>>, mut requests: Streaming<M>) {
-    while let Some(request) = requests.message().await.transpose() {
-        let last = request.is_err();
-        if inbox.send(request).await.is_err() || last {
-            break;
+/// A request of a stream, with the memory that it takes until it is answered.
+type Read<M> = Result<(M, Charge), Status>;
+
+struct Reader<M> {
+    requests: Streaming<M>,
+    arrival: Arrival,
+    message_bytes_max: usize,
+}
+
+impl<M: Message> Reader<M> {
+    /// Moves what the client sends to `inbox`; when the client is done, the inbox is closed, and this never ends.
+    async fn run(mut self, inbox: Sender<Read<M>>) {
+        while let Some(request) = self.next().await {
+            let last = request.is_err();
+            if inbox.send(request).await.is_err() || last {
+                break;
+            }
         }
+        drop(inbox);
+        std::future::pending().await
     }
-    drop(inbox);
-    std::future::pending().await
+
+    async fn next(&mut self) -> Option<Read<M>> {
+        Some(match self.requests.message().await.transpose()? {
+            // Compressed, it came as less.
+            Ok(message) => match self.arrival.take().at_least(message.encoded_len()) {
+                Ok(charge) => Ok((message, charge)),
+                Err(refusal) => Err(refusal.into()),
+            },
+            Err(unreadable) => Err(self
+                .arrival
+                .refusal()
+                .map_or_else(|| status::naming_the_limit(unreadable, self.message_bytes_max), Status::from)),
+        })
+    }
 }
 
 struct Worker<H> {
-    lifecycle: Lifecycle,
+    admission: Admission,
+    asking: Asking,
     authorized: Authorized,
     operation: Operation,
     handle: H,
@@ -78,7 +108,7 @@ struct Worker<H> {
 }
 
 impl<H> Worker<H> {
-    async fn run<M, A, F>(mut self, mut inbox: Receiver<Result<M, Status>>, outbox: Sender<Result<A, Status>>)
+    async fn run<M, A, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Result<A, Status>>)
     where
         M: Message,
         H: Fn(MeteredService, M) -> F,
@@ -87,7 +117,7 @@ impl<H> Worker<H> {
         loop {
             let answer = tokio::select! {
                 biased;
-                () = self.lifecycle.draining() => Err(lifecycle::draining().into()),
+                () = self.admission.lifecycle().draining() => Err(lifecycle::draining().into()),
                 withdrawn = self.authorized.caller.withdrawn() => Err(withdrawn.into()),
                 request = inbox.recv() => match request {
                     Some(request) => self.answer(request).await,
@@ -102,7 +132,7 @@ impl<H> Worker<H> {
     }
 
     /// Answers one request, timed and counted as a request of its own.
-    async fn answer<M, A, F>(&mut self, request: Result<M, Status>) -> Result<A, Status>
+    async fn answer<M, A, F>(&mut self, request: Read<M>) -> Result<A, Status>
     where
         M: Message,
         H: Fn(MeteredService, M) -> F,
@@ -110,7 +140,7 @@ impl<H> Worker<H> {
     {
         let start = Instant::now();
         let answer = match request {
-            Ok(request) => self.handled(request).await.map_err(Status::from),
+            Ok((request, _until_answered)) => self.handled(request).await.map_err(Status::from),
             Err(unreadable) => Err(unreadable),
         };
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
@@ -129,7 +159,8 @@ impl<H> Worker<H> {
             map if map.is_empty() => map.clone_from(&self.map),
             map => self.map.clone_from(map),
         }
+        self.admission.check_rate(&self.asking)?;
         let handled = (self.handle)(self.authorized.service.clone(), request);
-        self.lifecycle.admit(handled).await?
+        self.admission.lifecycle().admit(handled).await?
     }
 }

@@ -12,14 +12,14 @@ use tracing::Instrument;
 
 use super::error::{self, HttpError};
 use crate::access::{Authorized, Gate, Operation};
-use crate::lifecycle::Lifecycle;
+use crate::admission::Admission;
 use crate::telemetry::MeteredService;
 
 /// What requests pass before a handler sees them.
 #[derive(Debug, Clone)]
 pub(super) struct Around {
     pub(super) gate: Gate,
-    pub(super) lifecycle: Lifecycle,
+    pub(super) admission: Admission,
 }
 
 pub(super) async fn request(State(around): State<Around>, mut request: Request, next: Next) -> Response {
@@ -52,11 +52,8 @@ impl Around {
         if let Some(key) = key {
             self.gate.metrics().key_used("http", key);
         }
-        let answer = next.run(request).instrument(span);
-        if operation.is_probe() {
-            return answer.await;
-        }
-        let answer = self.lifecycle.admit(answer).await;
+        let handle = async |request| Ok(next.run(request).await);
+        let answer = self.admission.answer(operation, request, handle).instrument(span).await;
         answer.unwrap_or_else(|refusal| HttpError::from(refusal).into_response())
     }
 }

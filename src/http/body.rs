@@ -7,11 +7,15 @@ use serde::de::DeserializeOwned;
 
 use super::error::{HttpError, excerpt};
 use super::{Adapter, parameters};
+use crate::admission::Arrival;
 use crate::service::{ErrorCode, PointCloud, ServiceError};
 use crate::wire::InField;
 
 const JSON: &str = "application/json";
 const OCTET_STREAM: &str = "application/octet-stream";
+
+/// Memory for JSON and what is made of it, as a multiple of the former: points are longer than their shortest text.
+const JSON_AND_PARSED: usize = 4;
 
 /// JSON of more bytes than this is parsed away from the threads that serve connections.
 const PARSED_INLINE_MAX: usize = 64 << 10;
@@ -77,7 +81,9 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
             format!("with {JSON} the body holds everything, got the query {:?} too", excerpt(query));
         return Err(ServiceError::invalid("unexpected_query", message).into());
     }
+    let arrival = Arrival::of(request.extensions())?.clone();
     let body = read(request, adapter).await?;
+    arrival.at_least(body.len() * JSON_AND_PARSED)?;
     if body.len() <= PARSED_INLINE_MAX {
         return parse(&body);
     }

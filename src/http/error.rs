@@ -8,6 +8,7 @@ use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
 use crate::access::Operation;
+use crate::admission;
 use crate::service::{ErrorCode, ServiceError};
 
 /// A failed request.
@@ -37,7 +38,11 @@ fn status_of(code: ErrorCode) -> (StatusCode, &'static str) {
 
 impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
-        Self { status: status_of(error.code).0, error, allow: None }
+        let status = match error.reason {
+            admission::BODY_SILENT => StatusCode::REQUEST_TIMEOUT,
+            _ => status_of(error.code).0,
+        };
+        Self { status, error, allow: None }
     }
 }
 
@@ -50,13 +55,13 @@ impl HttpError {
 
 impl IntoResponse for HttpError {
     fn into_response(self) -> Response {
-        let ServiceError { code, reason, message } = self.error;
+        let ServiceError { code, reason, message, retry_after } = self.error;
         let (_, word) = status_of(code);
         let body = json!({"error": {"code": word, "reason": reason, "message": message}});
         let mut response = (self.status, Json(body)).into_response();
         let headers = response.headers_mut();
-        if code == ErrorCode::ResourceExhausted {
-            headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        if let Some(wait) = retry_after {
+            headers.insert(header::RETRY_AFTER, (wait.as_secs_f64().ceil() as u64).into());
         }
         if code == ErrorCode::Unauthenticated {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"mrol\""));

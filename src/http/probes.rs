@@ -21,7 +21,7 @@ pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
 ) -> (StatusCode, Json<Value>) {
-    if adapter.lifecycle.is_draining() {
+    if adapter.admission.lifecycle().is_draining() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
     } else {
         let maps = service.maps().read_only_maps();

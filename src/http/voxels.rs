@@ -48,9 +48,9 @@ pub(super) async fn list(
     let (level, region) = (query.level, query.region()?);
     let listing = service.maps().list_voxels(&map, level, region).await?;
     let head = Head { level, resolution_m: listing.resolution_m, state: listing.state.into() };
-    let held = adapter.lifecycle.hold();
+    let kept = adapter.admission.keep(size_of_val(listing.keys.as_slice()))?;
     let chunks = chunks(head, listing.keys)?.map(move |chunk| {
-        let _until_sent = &held;
+        let _until_sent = &kept;
         Ok::<_, Infallible>(Bytes::from(chunk))
     });
     let body = Body::from_stream(tokio_stream::iter(chunks));

@@ -13,6 +13,7 @@ use super::ServerError;
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::stream::Stream;
+use crate::admission::Peer;
 use crate::wire::transport::KEEPALIVE_INTERVAL;
 
 /// How long to wait after an error that the next connection would meet as well: too many open files.
@@ -23,6 +24,12 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(super) enum Accepting {
     Tcp(Arc<TcpListener>),
     Unix(UnixSocket),
+}
+
+/// A connection, and where it came from.
+pub(super) struct Accepted {
+    pub(super) stream: Stream,
+    pub(super) peer: Peer,
 }
 
 /// A TCP address that is listened on; a clone is another handle on the same socket.
@@ -45,7 +52,7 @@ impl TcpSocket {
 
 impl Accepting {
     /// The next connection. What goes wrong with one, or for lack of files for a while, does not end it.
-    pub(super) async fn next(&self) -> Stream {
+    pub(super) async fn next(&self) -> Accepted {
         loop {
             match self.accept().await {
                 Ok(stream) => return stream,
@@ -58,14 +65,17 @@ impl Accepting {
         }
     }
 
-    async fn accept(&self) -> io::Result<Stream> {
+    async fn accept(&self) -> io::Result<Accepted> {
         match self {
             Self::Tcp(listener) => {
-                let (stream, _) = listener.accept().await?;
+                let (stream, from) = listener.accept().await?;
                 prepare(&stream);
-                Ok(Box::new(stream))
+                Ok(Accepted { stream: Box::new(stream), peer: Peer::Address(from.ip()) })
             }
-            Self::Unix(UnixSocket { listener, .. }) => Ok(Box::new(listener.accept().await?.0)),
+            Self::Unix(UnixSocket { listener, .. }) => {
+                let (stream, _) = listener.accept().await?;
+                Ok(Accepted { stream: Box::new(stream), peer: Peer::Local })
+            }
         }
     }
 }

@@ -11,30 +11,34 @@ use hyper::body::Incoming;
 use hyper::service::service_fn;
 use hyper_util::rt::TokioIo;
 use tokio::time::{sleep, timeout};
-use tokio_io_timeout::TimeoutStream;
 use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt;
 
+use super::CLOSING_MAX;
+use super::accepting::Accepted;
+use super::answer_body::AnswerBody;
 use super::endpoint::Endpoint;
 use super::places::Place;
-use super::stream::{Count, Counted, Stream, secure};
-use crate::admission::HeldBody;
+use super::stream::{Count, Counted, secure};
+use crate::admission::Peer;
 
 /// How long a client may leave unread what it asked for.
 const UNREAD_MAX: Duration = Duration::from_secs(30);
 
 impl Endpoint {
-    /// Serves a connection until its client closes it, it has been idle for too long, another gets its place, or the
-    /// server is going down.
-    pub(super) async fn serve(self, stream: Stream, tls: Option<TlsAcceptor>, place: Place) {
+    /// Serves a connection until its client closes it or leaves answers unread, it has been idle for too long, another
+    /// gets its place, or the server is going down.
+    pub(super) async fn serve(self, stream: Accepted, tls: Option<TlsAcceptor>, place: Place) {
         tokio::select! {
             () = self.serve_open(stream, tls, &place) => {}
             () = place.lost() => {}
+            () = place.unread_for(UNREAD_MAX) => {}
             () = self.cut.cancelled() => {}
         }
     }
 
-    async fn serve_open(&self, stream: Stream, tls: Option<TlsAcceptor>, place: &Place) {
+    async fn serve_open(&self, accepted: Accepted, tls: Option<TlsAcceptor>, place: &Place) {
+        let Accepted { stream, peer } = accepted;
         let stream = match timeout(self.bounds.opening_max, secure(stream, tls)).await {
             Ok(Ok(stream)) => stream,
             Ok(Err(error)) => {
@@ -44,10 +48,8 @@ impl Endpoint {
             Err(_) => return,
         };
         let (stream, bytes_read) = Counted::new(stream);
-        let mut stream = TimeoutStream::new(stream);
-        stream.set_write_timeout(Some(UNREAD_MAX));
-        let service = service_fn(|request| answer(self.router.clone(), place.clone(), request));
-        let mut connection = pin!(self.builder.serve_connection(TokioIo::new(Box::pin(stream)), service));
+        let service = service_fn(|request| answer(self.router.clone(), place.clone(), peer, request));
+        let mut connection = pin!(self.builder.serve_connection(TokioIo::new(stream), service));
         tokio::select! {
             _ = &mut connection => return,
             () = self.not_opened(bytes_read) => return,
@@ -55,8 +57,11 @@ impl Endpoint {
             () = self.closing.cancelled() => {}
         }
         connection.as_mut().graceful_shutdown();
-        // What goes wrong with a connection, its client sees; there is nobody else to tell.
-        let _ = connection.await;
+        tokio::select! {
+            // What goes wrong with a connection, its client sees; there is nobody else to tell.
+            _ = connection => {}
+            () = lingering(place) => {}
+        }
     }
 
     /// Waits until it is clear that the client will never begin to speak.
@@ -68,13 +73,21 @@ impl Endpoint {
     }
 }
 
+/// Waits until a connection that is to be closed has had the time for it, and has no request in flight.
+async fn lingering(place: &Place) {
+    sleep(CLOSING_MAX).await;
+    place.idle_for(CLOSING_MAX).await;
+}
+
 /// Answers a request; until the answer is sent, the connection is in use.
 async fn answer(
     router: Router,
     place: Place,
-    request: Request<Incoming>,
+    peer: Peer,
+    mut request: Request<Incoming>,
 ) -> Result<Response<Body>, Infallible> {
     let used = place.used();
+    request.extensions_mut().insert(peer);
     let response = router.oneshot(request).await?;
-    Ok(response.map(|body| Body::new(HeldBody::new(body, used))))
+    Ok(response.map(|body| Body::new(AnswerBody::new(body, used))))
 }

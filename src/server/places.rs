@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use parking_lot::Mutex;
@@ -44,11 +45,17 @@ struct Held {
     number: u64,
     places: Places,
     lost: CancellationToken,
+    /// Since when pieces of answers have been on their way, by answer.
+    unread: Mutex<BTreeMap<u64, Instant>>,
+    next_answer: AtomicU64,
 }
 
 /// A request in flight, until it is dropped.
 #[derive(Debug)]
-pub(super) struct InUse(Place);
+pub(super) struct InUse {
+    place: Place,
+    answer: u64,
+}
 
 impl Places {
     pub(super) fn new(most: usize) -> Self {
@@ -65,7 +72,13 @@ impl Places {
         taken.next += 1;
         let connection = Connection { requests: 0, idle_since: Instant::now(), lost: lost.clone() };
         taken.connections.insert(number, connection);
-        Some(Place(Arc::new(Held { number, places: self.clone(), lost })))
+        Some(Place(Arc::new(Held {
+            number,
+            places: self.clone(),
+            lost,
+            unread: Mutex::default(),
+            next_answer: AtomicU64::new(0),
+        })))
     }
 }
 
@@ -82,7 +95,7 @@ impl Place {
     /// A request begins.
     pub(super) fn used(&self) -> InUse {
         self.change(|connection| connection.requests += 1);
-        InUse(self.clone())
+        InUse { place: self.clone(), answer: self.0.next_answer.fetch_add(1, Ordering::Relaxed) }
     }
 
     /// Waits until another connection has got this place.
@@ -101,6 +114,17 @@ impl Place {
         }
     }
 
+    /// Waits until the client has not read on in an answer for `time`.
+    pub(super) async fn unread_for(&self, time: Duration) {
+        loop {
+            let oldest = self.0.unread.lock().values().min().map_or(Duration::ZERO, Instant::elapsed);
+            if oldest >= time {
+                return;
+            }
+            sleep(time - oldest).await;
+        }
+    }
+
     /// For how long there has been no request in flight; none while there is one.
     fn idle(&self) -> Option<Duration> {
         let taken = self.0.places.taken.lock();
@@ -116,9 +140,22 @@ impl Place {
     }
 }
 
+impl InUse {
+    /// A piece of the answer was handed over to be sent.
+    pub(super) fn handed_over(&self) {
+        self.place.0.unread.lock().insert(self.answer, Instant::now());
+    }
+
+    /// All that was handed over is on its way, and there is room for more.
+    pub(super) fn read(&self) {
+        self.place.0.unread.lock().remove(&self.answer);
+    }
+}
+
 impl Drop for InUse {
     fn drop(&mut self) {
-        self.0.change(|connection| {
+        self.read();
+        self.place.change(|connection| {
             connection.requests -= 1;
             connection.idle_since = Instant::now();
         });
@@ -160,6 +197,31 @@ mod tests {
         assert!(places.take().is_none());
         drop(used);
         assert!(places.take().is_some());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_answer_that_nobody_reads_is_found_out() {
+        let place = Places::new(1).take().unwrap();
+        let (slow, quick) = (place.used(), place.used());
+        let start = Instant::now();
+        slow.handed_over();
+        let unread = tokio::spawn({
+            let place = place.clone();
+            async move { place.unread_for(Duration::from_secs(30)).await }
+        });
+        for _ in 0..4 {
+            sleep(Duration::from_secs(5)).await;
+            quick.handed_over();
+            sleep(Duration::from_secs(5)).await;
+            quick.read();
+            if start.elapsed().as_secs() == 20 {
+                // The slow one reads on after 20 seconds, and then no more.
+                slow.read();
+                slow.handed_over();
+            }
+        }
+        unread.await.unwrap();
+        assert_eq!(start.elapsed().as_secs(), 50);
     }
 
     #[tokio::test(start_paused = true)]

@@ -1,5 +1,7 @@
 //! What can go wrong with a request, once for every protocol.
 
+use std::time::Duration;
+
 use crate::bloom::FilterSettingsError;
 use crate::geometry::PoseError;
 use crate::map::{MapSettingsError, NameError, RegionError};
@@ -40,12 +42,24 @@ pub struct ServiceError {
     pub reason: &'static str,
     /// A sentence for people: the field, its value and the limit, in lower case.
     pub message: String,
+    /// When the same request may be answered otherwise, where the server can tell.
+    pub retry_after: Option<Duration>,
 }
 
 impl ServiceError {
     /// A failure of kind `code`.
     pub fn new(code: ErrorCode, reason: &'static str, message: impl Into<String>) -> Self {
-        Self { code, reason, message: message.into() }
+        Self { code, reason, message: message.into(), retry_after: None }
+    }
+
+    /// The server has too much to do: a limit, named in the message, would be exceeded.
+    pub fn overloaded(message: impl Into<String>) -> Self {
+        Self::new(ErrorCode::ResourceExhausted, "overloaded", message).retry_after(Duration::from_secs(1))
+    }
+
+    /// The same, with when to come again.
+    pub fn retry_after(self, wait: Duration) -> Self {
+        Self { retry_after: Some(wait), ..self }
     }
 
     /// The request is wrong in itself.

@@ -33,7 +33,8 @@ impl Pool {
         Ok(Self { threads, places: Semaphore::new(places).into(), jobs_waiting_max })
     }
 
-    /// Runs `job` on a thread of the pool, first come first served.
+    /// Runs `job` on a thread of the pool, first come first served; not at all where the caller does not wait for its
+    /// turn.
     ///
     /// # Errors
     /// `ResourceExhausted` at once when the queue is full; `Internal` when the job panicked.
@@ -44,12 +45,16 @@ impl Pool {
         let Ok(place) = self.places.clone().try_acquire_owned() else {
             let message =
                 format!("jobs_waiting_max is {}: all places are taken, try again", self.jobs_waiting_max);
-            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "overloaded", message));
+            return Err(ServiceError::overloaded(message));
         };
         let (answer, answered) = oneshot::channel();
         let span = tracing::Span::current();
         self.threads.spawn_fifo(move || {
             let _place = place;
+            if answer.is_closed() {
+                // Who asked has gone while this waited.
+                return;
+            }
             let job = std::panic::AssertUnwindSafe(|| span.in_scope(job));
             // A panic drops `answer`, which the caller is told; the pool's thread lives on.
             if let Ok(result) = std::panic::catch_unwind(job) {
@@ -91,6 +96,27 @@ mod tests {
         running.await.unwrap().unwrap().unwrap();
         assert_eq!(waiting.await.unwrap().unwrap(), 2);
         assert_eq!(pool.run(|| 4).await.unwrap(), 4);
+    }
+
+    #[tokio::test]
+    async fn a_job_that_nobody_waits_for_is_not_run() {
+        let pool = std::sync::Arc::new(Pool::new("test", 1, 2).unwrap());
+        let (release, released) = std::sync::mpsc::channel::<()>();
+        let running = tokio::spawn({
+            let pool = pool.clone();
+            async move { pool.run(move || released.recv()).await }
+        });
+        while pool.places.available_permits() == 3 {
+            tokio::task::yield_now().await;
+        }
+        let (ran, was_run) = std::sync::mpsc::channel::<()>();
+        let gone = tokio::time::timeout(std::time::Duration::from_millis(10), pool.run(move || ran.send(())));
+        assert!(gone.await.is_err());
+        release.send(()).unwrap();
+        running.await.unwrap().unwrap().unwrap();
+        // Its turn has come and gone when the next one's has.
+        pool.run(|| ()).await.unwrap();
+        assert!(was_run.recv().is_err());
     }
 
     #[tokio::test]

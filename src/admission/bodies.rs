@@ -1,0 +1,212 @@
+//! The bodies of all requests, and who gives way where there is no room for more.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use parking_lot::Mutex;
+use tokio_util::sync::CancellationToken;
+
+use super::InUse;
+use super::arrival::{Arrival, Body};
+use super::limits::AdmissionLimits;
+use super::quota::Quota;
+use crate::service::{ErrorCode, ServiceError};
+
+/// The reason of a body that was ended for its silence.
+pub const BODY_SILENT: &str = "body_silent";
+
+/// The bodies of all requests, and what else lies in the same memory. A clone is another handle on the same ones.
+#[derive(Debug, Clone)]
+pub(super) struct Bodies(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    limits: AdmissionLimits,
+    /// Of requests whose bodies have arrived.
+    requests: Quota,
+    known: Mutex<Known>,
+}
+
+#[derive(Debug, Default)]
+struct Known {
+    /// By the order in which they began.
+    bodies: BTreeMap<u64, Body>,
+    next: u64,
+    /// Of requests, and not there yet.
+    arriving: usize,
+    /// Of bodies and of charges.
+    bytes: usize,
+}
+
+/// Memory that is in use until this is dropped.
+#[derive(Debug)]
+pub struct Charge {
+    bodies: Bodies,
+    bytes: usize,
+}
+
+impl Bodies {
+    pub(super) fn new(limits: &AdmissionLimits) -> Self {
+        let requests = Quota::new("requests_max", limits.requests_max);
+        Self(Arc::new(Inner { limits: limits.clone(), requests, known: Mutex::default() }))
+    }
+
+    /// A body begins to arrive.
+    ///
+    /// # Errors
+    /// When as many requests are arriving as may be, and none was silent.
+    pub(super) fn begin(&self, is_stream: bool) -> Result<Arrival, ServiceError> {
+        let mut known = self.0.known.lock();
+        if !is_stream {
+            let full = known.arriving >= self.0.limits.requests_max;
+            if full && !known.end_most_silent(None, &self.0.requests.refusal()) {
+                return Err(self.0.requests.refusal());
+            }
+            known.arriving += 1;
+        }
+        let (number, ended) = (known.next, CancellationToken::new());
+        known.next += 1;
+        known.bodies.insert(number, Body::new(is_stream, ended.clone()));
+        Ok(Arrival::new(self.clone(), number, ended))
+    }
+
+    /// More of a body has come.
+    ///
+    /// # Errors
+    /// When there is no room for it, or the body was ended.
+    pub(super) fn add(&self, number: u64, bytes: usize) -> Result<(), ServiceError> {
+        let mut known = self.0.known.lock();
+        let room = self.make_room(&mut known, Some(number), bytes);
+        known.change(number, |body| body.add(bytes, room)).unwrap_or(Ok(()))
+    }
+
+    /// As [`Bodies::add`], for what is missing to `bytes`.
+    pub(super) fn at_least(&self, number: u64, bytes: usize) -> Result<(), ServiceError> {
+        let known = self.0.known.lock().bodies.get(&number).map_or(0, Body::bytes);
+        self.add(number, bytes.saturating_sub(known))
+    }
+
+    /// All of a body has come: from now on it counts as a request in work.
+    ///
+    /// # Errors
+    /// When as many are in work as may be.
+    pub(super) fn complete(&self, number: u64) -> Result<(), ServiceError> {
+        self.0.known.lock().change(number, |body| body.complete(&self.0.requests)).unwrap_or(Ok(()))
+    }
+
+    /// The bytes of a body are somebody else's now, or nobody's.
+    pub(super) fn take(&self, number: u64) -> Charge {
+        let mut known = self.0.known.lock();
+        let bytes = known.change(number, Body::take_bytes).unwrap_or_default();
+        // They are in use as before, by the charge.
+        known.bytes += bytes;
+        Charge { bodies: self.clone(), bytes }
+    }
+
+    /// Why a body was ended.
+    pub(super) fn refusal(&self, number: u64) -> Option<ServiceError> {
+        self.0.known.lock().bodies.get(&number)?.refusal().cloned()
+    }
+
+    /// Memory for something else.
+    ///
+    /// # Errors
+    /// When there is no room.
+    pub(super) fn charge(&self, bytes: usize) -> Result<Charge, ServiceError> {
+        let mut known = self.0.known.lock();
+        self.make_room(&mut known, None, bytes)?;
+        known.bytes += bytes;
+        Ok(Charge { bodies: self.clone(), bytes })
+    }
+
+    /// Nobody has to do with a body any more.
+    pub(super) fn forget(&self, number: u64) {
+        let mut known = self.0.known.lock();
+        if let Some(body) = known.bodies.remove(&number) {
+            known.arriving -= usize::from(body.is_arriving());
+            known.bytes -= body.bytes();
+        }
+    }
+
+    /// Ends the bodies that have been silent for longer than they may.
+    pub(super) fn end_silent(&self) {
+        let silence_max = self.0.limits.body_silence_max;
+        let message = format!("body_silence_max is {silence_max:?}: nothing more of the body came");
+        let refusal = ServiceError::new(ErrorCode::DeadlineExceeded, BODY_SILENT, message);
+        let mut known = self.0.known.lock();
+        let silent = |body: &Body| body.silence().is_some_and(|silence| silence >= silence_max);
+        let numbers: Vec<u64> =
+            known.bodies.iter().filter(|(_, body)| silent(body)).map(|(&number, _)| number).collect();
+        for number in numbers {
+            known.change(number, |body| body.end(refusal.clone()));
+        }
+    }
+
+    pub(super) fn in_use(&self) -> InUse {
+        let known = self.0.known.lock();
+        InUse { requests: self.0.requests.taken(), arriving: known.arriving, streams: 0, bytes: known.bytes }
+    }
+
+    /// Ends silent bodies other than `own` until there is room for `bytes`.
+    fn make_room(&self, known: &mut Known, own: Option<u64>, bytes: usize) -> Result<(), ServiceError> {
+        let most = self.0.limits.body_bytes_max;
+        let refusal = || {
+            ServiceError::overloaded(format!(
+                "body_bytes_max is {most}: other requests hold that much, try again"
+            ))
+        };
+        while known.bytes.saturating_add(bytes) > most {
+            if !known.end_most_silent(own, &refusal()) {
+                return Err(refusal());
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Known {
+    /// Ends the body that has been silent for longest and is not `own`; false where there is none. What it had in memory
+    /// is free.
+    fn end_most_silent(&mut self, own: Option<u64>, refusal: &ServiceError) -> bool {
+        let others = self.bodies.iter().filter(|(number, _)| Some(**number) != own);
+        let silent = others.filter_map(|(&number, body)| Some((body.gives_way_after()?, number)));
+        let Some((_, number)) = silent.max() else {
+            return false;
+        };
+        self.change(number, |body| body.end(refusal.clone()));
+        true
+    }
+
+    /// Changes a body, and the sums with it.
+    fn change<T>(&mut self, number: u64, change: impl FnOnce(&mut Body) -> T) -> Option<T> {
+        let body = self.bodies.get_mut(&number)?;
+        self.bytes -= body.bytes();
+        self.arriving -= usize::from(body.is_arriving());
+        let changed = change(body);
+        self.bytes += body.bytes();
+        self.arriving += usize::from(body.is_arriving());
+        Some(changed)
+    }
+}
+
+impl Charge {
+    /// The same for something larger.
+    ///
+    /// # Errors
+    /// When there is no room for the rest.
+    pub fn at_least(mut self, bytes: usize) -> Result<Self, ServiceError> {
+        let rest = bytes.saturating_sub(self.bytes);
+        if rest > 0 {
+            // Both parts are given back by this one.
+            let mut more = self.bodies.charge(rest)?;
+            self.bytes += std::mem::take(&mut more.bytes);
+        }
+        Ok(self)
+    }
+}
+
+impl Drop for Charge {
+    fn drop(&mut self) {
+        self.bodies.0.known.lock().bytes -= self.bytes;
+    }
+}
