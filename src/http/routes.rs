@@ -55,6 +55,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
 mod tests {
     use super::*;
     use crate::access::{Access, Gate};
+    use crate::admission::{Admission, AdmissionLimits};
     use crate::http::around::{self, Around};
     use crate::lifecycle::Lifecycle;
     use crate::service::{MapService, ServiceSettings};
@@ -70,7 +71,8 @@ mod tests {
     async fn what_somebody_serves_without_a_rule_is_refused_as_a_defect() {
         let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
         let gate = Gate::new(Access::open(), MeteredService::new(service, Metrics::new().unwrap()));
-        let around = Around { gate, lifecycle: Lifecycle::default() };
+        let around =
+            Around { gate, admission: Admission::new(&AdmissionLimits::default(), Lifecycle::default()) };
         let stray = Router::new().route("/stray", get(async || "open to all"));
         let stray = stray.layer(from_fn_with_state(around, around::request));
         let answer = stray.oneshot(Request::get("/stray").body(Body::empty()).unwrap()).await.unwrap();
