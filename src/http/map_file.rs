@@ -27,9 +27,9 @@ pub(super) async fn take(
     if let Ok(attachment) = HeaderValue::try_from(attachment) {
         headers.insert(header::CONTENT_DISPOSITION, attachment);
     }
-    let held = adapter.lifecycle.hold();
+    let kept = adapter.admission.keep(file.bytes.len())?;
     let pieces = snapshot_pieces(file).map(move |piece| {
-        let _until_sent = &held;
+        let _until_sent = &kept;
         Ok::<_, Infallible>(piece.data)
     });
     Ok((headers, Body::from_stream(tokio_stream::iter(pieces))).into_response())

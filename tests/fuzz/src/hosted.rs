@@ -8,6 +8,7 @@ use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Request, StatusCode};
 use http_body_util::{BodyExt, Limited};
 use mrol::access::{Access, Gate};
+use mrol::admission::{Admission, AdmissionLimits};
 use mrol::align::Guess;
 use mrol::geometry::{Point, Pose};
 use mrol::lifecycle::Lifecycle;
@@ -49,7 +50,7 @@ pub(super) struct Answer {
 }
 
 impl Hosted {
-    pub(super) fn new(protocol: impl FnOnce(Gate, Lifecycle) -> Router) -> Self {
+    pub(super) fn new(protocol: impl FnOnce(Gate, Admission) -> Router) -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let data = tempfile::tempdir().expect("a folder");
         let settings = ServiceSettings {
@@ -63,7 +64,7 @@ impl Hosted {
         let service = MapService::open(settings, &OpeningProgress::default()).expect("a service");
         let service = MeteredService::new(service, Metrics::new().expect("metrics"));
         let gate = Gate::new(Access::open(), service.clone());
-        let router = protocol(gate, Lifecycle::default());
+        let router = protocol(gate, Admission::new(&AdmissionLimits::default(), Lifecycle::default()));
         let hosted = Self { runtime, service, router, asked: Cell::new(0), _data: data };
         hosted.runtime.block_on(hosted.make_map());
         hosted
