@@ -2,13 +2,12 @@
 
 use std::sync::atomic::Ordering;
 
-use parking_lot::{MutexGuard, RwLockUpgradableReadGuard, RwLockWriteGuard};
-
 use super::addition::Addition;
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::removal::Removal;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
+use super::sync::{MutexGuard, RwLockUpgradableReadGuard, RwLockWriteGuard};
 use super::{AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, UndoRecord};
 use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 

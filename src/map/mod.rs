@@ -22,6 +22,7 @@ mod room;
 mod settings;
 mod shard;
 mod sharding;
+mod sync;
 mod trajectory;
 pub mod view;
 
@@ -41,15 +42,14 @@ pub use sharding::SHARDS;
 pub use trajectory::{ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
 pub use view::MapView;
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
-use parking_lot::{Mutex, RwLock, RwLockReadGuard};
+use std::sync::atomic::Ordering;
 
 use crate::geometry::{Point, Pose};
 use crate::voxel::Lattice;
 use moments::ShardedMoments;
 use shard::Shard;
 use sharding::{Sharding, ShardsTouched};
+use sync::{AtomicU64, Mutex, RwLock, RwLockReadGuard};
 
 /// A multi-resolution occupied voxel list (MROL, paper III): level n holds the occupied voxels of
 /// r_n = r_0 * 2^n, with the trajectory of the poses from which they were seen.

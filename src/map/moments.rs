@@ -1,9 +1,9 @@
 //! The moments of a map's points: what alignments refine poses on.
 
 use hashbrown::HashMap;
-use parking_lot::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use super::sharding::{SHARDS, Sharding};
+use super::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 use crate::voxel::{MOMENT_LEVEL, MomentSet, Moments, VoxelKey};
 
 /// The moments of the points in each voxel of [`MOMENT_LEVEL`], in shards like the voxels themselves.

@@ -1,11 +1,10 @@
 //! How a map is read: all the locks it takes, at once, and so one revision.
 
-use parking_lot::RwLockReadGuard;
-
 use super::lookup::{self, LevelView, Lookup};
 use super::occupied_voxel_list::tier_of;
 use super::shard::Shard;
 use super::sharding::{SHARDS, ShardsTouched};
+use super::sync::RwLockReadGuard;
 use super::{MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::voxel::{
