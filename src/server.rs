@@ -7,6 +7,7 @@ mod endpoint;
 mod entrance;
 mod error;
 mod files;
+mod gauges;
 mod housekeeping;
 mod places;
 mod protocol;
@@ -33,13 +34,14 @@ use crate::access::{Access, Gate};
 use crate::admission::Admission;
 use crate::config::Config;
 use crate::lifecycle::Lifecycle;
-use crate::service::MapService;
+use crate::service::{Gauges, MapService};
 use crate::store::OpeningProgress;
 use crate::telemetry::{MeteredService, Metrics};
 use crate::{grpc, http};
 use accepting::{Accepting, TcpSocket};
 use endpoint::Endpoint;
-use housekeeping::keep_house;
+use gauges::SystemGauges;
+use housekeeping::{keep_house, measure};
 use protocol::Protocol;
 use socket::UnixSocket;
 use starting::Starting;
@@ -55,6 +57,7 @@ pub struct Server {
     access: Access,
     tls: Option<Tls>,
     service: MeteredService,
+    gauges: Arc<dyn Gauges>,
     lifecycle: Lifecycle,
     http: TcpSocket,
     grpc: TcpSocket,
@@ -72,6 +75,7 @@ impl Server {
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
         let (access, tls) = (entrance::access(&config)?, Tls::of(&config.tls)?);
         let settings = config.service_settings();
+        let gauges = Arc::new(SystemGauges { data_dir: settings.data_dir.clone() });
         let http = TcpSocket::bind(Protocol::Http, config.http.listen).await?;
         let progress = Arc::new(OpeningProgress::default());
         let starting = Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits);
@@ -84,6 +88,7 @@ impl Server {
             service: MeteredService::new(service, Metrics::new()?),
             access,
             tls,
+            gauges,
             lifecycle: Lifecycle::default(),
             http,
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen).await?,
@@ -91,6 +96,11 @@ impl Server {
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
             config,
         })
+    }
+
+    /// The same server with other gauges of disk and memory than the system's.
+    pub fn with_gauges(self, gauges: Arc<dyn Gauges>) -> Self {
+        Self { gauges, ..self }
     }
 
     /// Where HTTP is served.
@@ -142,9 +152,10 @@ impl Server {
         let http = Endpoint::new(Protocol::Http, router, tls.clone(), &config.limits);
 
         let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
-        let files = self.files();
+        let (files, gauges) = (self.files(), Arc::clone(&self.gauges));
+        measure(&service, Arc::clone(&gauges)).await;
         let mut accepting = self.accept(&grpc, &http);
-        let housekeeping = tokio::spawn(keep_house(service.clone(), files, admission));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), files, gauges, admission));
         health.set_serving().await;
 
         let ended = tokio::select! {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use crate::admission::AdmissionLimits;
-use crate::service::Limits;
+use crate::service::{Limits, Marks};
 
 /// The service's [`Limits`], and those of messages and connections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,6 +57,15 @@ pub struct LimitsConfig {
     pub localization_candidates_max: usize,
     /// See [`Limits::localization_grid_bytes_max`].
     pub localization_grid_bytes_max: usize,
+    /// MiB free on the disk of the data folder below which changes are refused; 0 = never. 256.
+    pub disk_free_low_mib: u64,
+    /// MiB free from which on they are taken again. 512.
+    pub disk_free_back_mib: u64,
+    /// MiB of memory in use above which what makes maps grow is refused; 0 = 85 % of what the system or the control group
+    /// allows. 0.
+    pub memory_high_mib: u64,
+    /// MiB at which it is taken again; 0 = 94 % of the high mark. 0.
+    pub memory_back_mib: u64,
 }
 
 impl Default for LimitsConfig {
@@ -85,6 +94,10 @@ impl Default for LimitsConfig {
             localization_time_max_s: limits.localization_time_max.as_secs_f64(),
             localization_candidates_max: limits.localization_candidates_max,
             localization_grid_bytes_max: limits.localization_grid_bytes_max,
+            disk_free_low_mib: limits.marks.disk_free_low_bytes >> 20,
+            disk_free_back_mib: limits.marks.disk_free_back_bytes >> 20,
+            memory_high_mib: 0,
+            memory_back_mib: 0,
         }
     }
 }
@@ -138,7 +151,7 @@ impl LimitsConfig {
             let least = "more than twice limits.requests_max and limits.streams_max";
             return range("limits.connections_max", least, self.connections_max.to_string());
         }
-        Ok(())
+        self.check_marks()
     }
 
     pub(super) fn service_limits(&self) -> Limits {
@@ -154,6 +167,46 @@ impl LimitsConfig {
             localization_time_max: Duration::from_secs_f64(self.localization_time_max_s),
             localization_candidates_max: self.localization_candidates_max,
             localization_grid_bytes_max: self.localization_grid_bytes_max,
+            marks: self.marks(),
+        }
+    }
+
+    fn marks(&self) -> Marks {
+        let given = |mib: u64| (mib > 0).then_some(mib << 20);
+        Marks {
+            disk_free_low_bytes: self.disk_free_low_mib << 20,
+            disk_free_back_bytes: self.disk_free_back_mib << 20,
+            memory_high_bytes: given(self.memory_high_mib),
+            memory_back_bytes: given(self.memory_back_mib),
+        }
+    }
+
+    /// Refuses marks with nothing between them, and those that no system has.
+    fn check_marks(&self) -> Result<(), ConfigError> {
+        let range = |key, range, value: u64| Err(ConfigError::Range { key, range, value: value.to_string() });
+        for (key, mib) in [
+            ("limits.disk_free_low_mib", self.disk_free_low_mib),
+            ("limits.disk_free_back_mib", self.disk_free_back_mib),
+            ("limits.memory_high_mib", self.memory_high_mib),
+            ("limits.memory_back_mib", self.memory_back_mib),
+        ] {
+            if mib > 1 << 40 {
+                return range(key, "0 to 1099511627776", mib);
+            }
+        }
+        if self.disk_free_back_mib <= self.disk_free_low_mib {
+            let more = "more than limits.disk_free_low_mib";
+            return range("limits.disk_free_back_mib", more, self.disk_free_back_mib);
+        }
+        match (self.memory_high_mib, self.memory_back_mib) {
+            (_, 0) => Ok(()),
+            (0, _) => {
+                Err(ConfigError::Missing { needed: "limits.memory_high_mib", by: "limits.memory_back_mib" })
+            }
+            (high, back) if back >= high => {
+                range("limits.memory_back_mib", "less than limits.memory_high_mib", back)
+            }
+            _ => Ok(()),
         }
     }
 }

@@ -347,6 +347,26 @@ mod tests {
     }
 
     #[test]
+    fn marks_need_room_between_them() {
+        let error = |limits| load(&format!("[limits]\n{limits}"), json!({})).unwrap_err().to_string();
+        let disk = error("disk_free_low_mib = 512");
+        assert!(
+            disk.contains("limits.disk_free_back_mib must be more than limits.disk_free_low_mib, got 512"),
+            "{disk}"
+        );
+        let memory = error("memory_high_mib = 100\nmemory_back_mib = 100");
+        assert!(memory.contains("memory_back_mib must be less than limits.memory_high_mib"), "{memory}");
+        assert!(error("memory_back_mib = 100").contains("limits.memory_high_mib is missing"));
+        let beyond = error("disk_free_back_mib = 1099511627777");
+        assert!(beyond.contains("disk_free_back_mib must be 0 to 1099511627776"), "{beyond}");
+
+        let limits = load("[limits]\nmemory_high_mib = 3\ndisk_free_low_mib = 0", json!({})).unwrap();
+        let marks = limits.service_settings().limits.marks;
+        assert_eq!((marks.memory_high_bytes, marks.memory_back_bytes), (Some(3 << 20), None));
+        assert_eq!((marks.disk_free_low_bytes, marks.disk_free_back_bytes), (0, 512 << 20));
+    }
+
+    #[test]
     fn an_empty_data_dir_keeps_maps_in_memory() {
         let config = load("data_dir = \"\"", json!({})).unwrap();
         assert_eq!(config.service_settings().data_dir, None);

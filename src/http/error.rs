@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::access::Operation;
 use crate::admission;
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{ErrorCode, ServiceError, Shortage};
 
 /// A failed request.
 #[derive(Debug)]
@@ -40,6 +40,8 @@ impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
         let status = match error.reason {
             admission::BODY_SILENT => StatusCode::REQUEST_TIMEOUT,
+            Shortage::DISK_FULL => StatusCode::INSUFFICIENT_STORAGE,
+            Shortage::MEMORY_FULL => StatusCode::SERVICE_UNAVAILABLE,
             _ => status_of(error.code).0,
         };
         Self { status, error, allow: None }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::Adapter;
 use super::around::Service;
 use crate::map::MapName;
+use crate::service::Shortage;
 
 /// `GET /livez`: 200 while the process lives.
 pub(super) async fn live() -> &'static str {
@@ -16,7 +17,8 @@ pub(super) async fn live() -> &'static str {
 }
 
 /// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not. Maps that take no changes since
-/// their journal failed are named to whoever may name them; they answer queries all the same.
+/// their journal failed are named to whoever may name them; they answer queries all the same. So does a server whose disk
+/// or memory is nearly full: it stays ready, and `writes_refused` holds the reasons.
 pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -30,6 +32,10 @@ pub(super) async fn ready(
         let mut body = json!({"ready": true});
         if !read_only.is_empty() {
             body["read_only"] = read_only.into();
+        }
+        let shortages = service.maps().shortages();
+        if !shortages.is_empty() {
+            body["writes_refused"] = shortages.iter().map(Shortage::reason).collect();
         }
         (StatusCode::OK, Json(body))
     }

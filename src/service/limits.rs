@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::ServiceError;
+use super::{Marks, ServiceError};
 
 /// Bounds on what callers may ask. Each is named in the error of a request beyond it.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,8 @@ pub struct Limits {
     /// Memory for the dilated levels of one search; a map that takes more is searched at a coarser resolution, or in
     /// a box. 512 MiB.
     pub localization_grid_bytes_max: usize,
+    /// Of disk and memory, where changes are refused.
+    pub marks: Marks,
 }
 
 impl Default for Limits {
@@ -46,6 +48,7 @@ impl Default for Limits {
             localization_time_max: Duration::from_secs(60),
             localization_candidates_max: 16,
             localization_grid_bytes_max: 512 << 20,
+            marks: Marks::default(),
         }
     }
 }

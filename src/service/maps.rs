@@ -17,13 +17,16 @@ impl MapService {
     ///
     /// # Errors
     /// `InvalidArgument` for settings out of range, `Conflict` where it exists with others, `ResourceExhausted`
-    /// beyond `maps_max`.
+    /// beyond `maps_max`, or while disk or memory is nearly full.
     pub async fn create_map(
         &self,
         name: MapName,
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
         let name = self.reach.check(&name)?;
+        if self.inner.catalogue.get(&name).is_err() {
+            self.inner.watermarks.check_room_to_grow()?;
+        }
         let inner = Arc::clone(&self.inner);
         let create =
             async move { inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await };
@@ -77,9 +80,11 @@ impl MapService {
     ///
     /// # Errors
     /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
-    /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`.
+    /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`, or while disk or memory is
+    /// nearly full.
     pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
         let name = self.reach.check(&name)?;
+        self.inner.watermarks.check_room_to_grow()?;
         let inner = Arc::clone(&self.inner);
         let snapshot = self.inner.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
         let inner = Arc::clone(&self.inner);

@@ -18,6 +18,7 @@ mod reach;
 mod request;
 mod settings;
 mod undo;
+mod watermarks;
 
 pub use error::{ErrorCode, ServiceError};
 pub use limits::Limits;
@@ -31,6 +32,7 @@ pub use request::{
     UndoTarget, VoxelListing,
 };
 pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
+pub use watermarks::{Gauges, Marks, MemoryReading, Readings, Shortage};
 
 use std::sync::Arc;
 
@@ -41,6 +43,7 @@ use committing::{Refusal, Step};
 use hosted_map::HostedMap;
 use localization::Caller;
 use pool::Pool;
+use watermarks::Watermarks;
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
 ///
@@ -61,6 +64,7 @@ struct Inner {
     mapping: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
+    watermarks: Watermarks,
 }
 
 impl MapService {
@@ -78,6 +82,7 @@ impl MapService {
             queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
             mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
             localization: Pool::new("mrol-localization", settings.localization_threads, waiting)?,
+            watermarks: Watermarks::new(settings.limits.marks.clone()),
             settings,
         };
         Ok(Self { inner: Arc::new(inner), reach: MapReach::Every })
@@ -96,6 +101,16 @@ impl MapService {
     /// The filter of maps whose makers do not say.
     pub fn default_filter(&self) -> crate::bloom::FilterSettings {
         self.inner.settings.filter
+    }
+
+    /// Takes note of how full disk and memory are; to be called every second or so.
+    pub fn measured(&self, readings: &Readings) {
+        self.inner.watermarks.note(readings);
+    }
+
+    /// What there is too little of, and changes are refused for.
+    pub fn shortages(&self) -> Vec<Shortage> {
+        self.inner.watermarks.shortages()
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -122,10 +137,12 @@ impl MapService {
     ///
     /// # Errors
     /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
-    /// `InvalidArgument` for a scan without a usable point or with too many.
+    /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
+    /// is nearly full.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
+        self.inner.watermarks.check_room_to_grow()?;
         let turn = Arc::new(map.turn_of(&scan.robot).await);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
         self.carry_through(move || map.propose_scan(&scan, Arc::clone(&turn), &inner.settings)).await
@@ -165,7 +182,7 @@ impl MapService {
     ///
     /// # Errors
     /// `InvalidArgument` for a point in no voxel, a key out of the level's range, a level that is none, too many
-    /// of them; `NotFound`.
+    /// of them; `NotFound`; `ResourceExhausted` while the disk is nearly full.
     pub async fn delete_voxels(
         &self,
         map: &MapName,
@@ -178,6 +195,7 @@ impl MapService {
             DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
             DeletionTarget::Region(_) => {}
         }
+        self.inner.watermarks.check_room_to_shrink()?;
         let deletion = Arc::new(deletion);
         self.carry_through(move || map.propose_deletion(&deletion)).await
     }
@@ -187,9 +205,10 @@ impl MapService {
     ///
     /// # Errors
     /// `NotFound` without such a map or scan; `FailedPrecondition` for a scan from before what undo reaches, or where
-    /// maps are kept in memory only.
+    /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full.
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let (map, undo) = (self.map(map)?, Arc::new(undo));
+        self.inner.watermarks.check_room_to_shrink()?;
         self.carry_through(move || map.propose_undo(&undo)).await
     }
 

@@ -13,7 +13,7 @@ use super::exposition;
 use super::log::TelemetryError;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName};
-use crate::service::MapInfo;
+use crate::service::{MapInfo, Readings, Shortage};
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds.
 const SECONDS_BUCKETS: [f64; 14] =
@@ -23,6 +23,9 @@ const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
 const KEY_REQUESTS: &str = "mrol_key_requests_total";
 const FILE_IN_FORCE: &str = "mrol_file_in_force";
+const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
+const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
+const WRITES_REFUSED: &str = "mrol_writes_refused";
 const POINTS_QUERIED: &str = "mrol_points_queried_total";
 const SCANS: &str = "mrol_scans_total";
 const SCANS_UNDONE: &str = "mrol_scans_undone_total";
@@ -71,6 +74,22 @@ impl Metrics {
     /// Says whether what a file holds is in force: false where it changed into something that cannot be used.
     pub fn file_in_force(&self, file: &'static str, in_force: bool) {
         self.record(|| gauge!(FILE_IN_FORCE, "file" => file).set(f64::from(u8::from(in_force))));
+    }
+
+    /// Says how full disk and memory are, and whether changes are refused for it.
+    pub fn room(&self, readings: &Readings, shortages: &[Shortage]) {
+        self.record(|| {
+            if let Some(bytes) = readings.disk_free_bytes {
+                gauge!(DISK_FREE_BYTES).set(bytes as f64);
+            }
+            if let Some(memory) = readings.memory {
+                gauge!(MEMORY_RESIDENT_BYTES).set(memory.resident_bytes as f64);
+            }
+            for reason in [Shortage::DISK_FULL, Shortage::MEMORY_FULL] {
+                let refused = shortages.iter().any(|shortage| shortage.reason() == reason);
+                gauge!(WRITES_REFUSED, "reason" => reason).set(f64::from(u8::from(refused)));
+            }
+        });
     }
 
     /// Counts points that were answered.
@@ -125,6 +144,9 @@ fn describe() {
         FILE_IN_FORCE,
         "0 where a file changed into what cannot be used, and what it held before goes on"
     );
+    describe_gauge!(DISK_FREE_BYTES, "Bytes free on the disk of the data folder");
+    describe_gauge!(MEMORY_RESIDENT_BYTES, "Bytes that the process has in memory");
+    describe_gauge!(WRITES_REFUSED, "1 while changes are refused, by reason");
     describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
     describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
     describe_counter!(SCANS_UNDONE, "Scans taken out again, by map");

@@ -4,10 +4,12 @@
 #![allow(unreachable_pub, reason = "a test has no crate to reach it from")]
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use mrol::config::Config;
 use mrol::server::{Server, ServerError};
+use mrol::service::Gauges;
 use mrol::wire::pb;
 use pb::mapping_client::MappingClient;
 use pb::maps_client::MapsClient;
@@ -44,11 +46,18 @@ impl Daemon {
 
     /// With the maps in `data`.
     pub async fn start_in(data: TempDir, change: impl FnOnce(&mut Config)) -> Self {
-        let mut config = Config { data_dir: data.path().to_owned(), ..Config::default() };
-        config.http.listen.set_port(0);
-        config.grpc.listen.set_port(0);
-        change(&mut config);
-        let server = Server::bind(config).await.expect("a server");
+        let server = bind(&data, change).await;
+        Self::serve(server, data)
+    }
+
+    /// With other gauges of disk and memory than the system's.
+    pub async fn start_with_gauges(gauges: Arc<dyn Gauges>) -> Self {
+        let data = tempfile::tempdir().expect("a folder");
+        let server = bind(&data, |_| {}).await.with_gauges(gauges);
+        Self::serve(server, data)
+    }
+
+    fn serve(server: Server, data: TempDir) -> Self {
         let (http, grpc) = (server.http_address(), server.grpc_address());
         let (stop, stopped) = oneshot::channel();
         let running = tokio::spawn(server.run(async move { drop(stopped.await) }));
@@ -131,6 +140,14 @@ impl Daemon {
         let post = client().post(self.url(path)).header("content-type", "application/octet-stream");
         post.body(body).send().await.expect("an answer")
     }
+}
+
+async fn bind(data: &TempDir, change: impl FnOnce(&mut Config)) -> Server {
+    let mut config = Config { data_dir: data.path().to_owned(), ..Config::default() };
+    config.http.listen.set_port(0);
+    config.grpc.listen.set_port(0);
+    change(&mut config);
+    Server::bind(config).await.expect("a server")
 }
 
 /// A server that was told to go down.
