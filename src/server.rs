@@ -9,6 +9,7 @@ mod error;
 mod files;
 mod gauges;
 mod housekeeping;
+mod open_files;
 mod places;
 mod protocol;
 mod signal;
@@ -73,10 +74,11 @@ impl Server {
     /// When a map, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
     /// and an address can be reached from elsewhere, unless the settings allow that.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
+        let config = Config { limits: open_files::within_allowed(config.limits), ..config };
         let (access, tls) = (entrance::access(&config)?, Tls::of(&config.tls)?);
         let settings = config.service_settings();
         let gauges = Arc::new(SystemGauges { data_dir: settings.data_dir.clone() });
-        let http = TcpSocket::bind(Protocol::Http, config.http.listen).await?;
+        let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let progress = Arc::new(OpeningProgress::default());
         let starting = Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits);
         let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
@@ -91,7 +93,7 @@ impl Server {
             gauges,
             lifecycle: Lifecycle::default(),
             http,
-            grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen).await?,
+            grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
             http_socket: UnixSocket::bind(Protocol::Http, config.http.socket.as_deref())?,
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
             config,

@@ -20,11 +20,18 @@ pub(super) struct Body {
     is_stream: bool,
     /// That are in memory.
     bytes: usize,
-    /// When the last of them came.
-    heard: Instant,
+    /// Up to when they came in time: each accounts for a part of a second, and none for time to come.
+    in_time: Instant,
+    /// Since when nobody waits for more: meanwhile it is not the client who is silent.
+    left_alone: Option<Instant>,
     state: State,
     ended: CancellationToken,
+    hang_up: Option<HangUp>,
 }
+
+/// Closes the connection that a request came by; to be found among its extensions.
+#[derive(Debug, Clone)]
+pub struct HangUp(pub CancellationToken);
 
 #[derive(Debug)]
 enum State {
@@ -32,14 +39,17 @@ enum State {
     /// It counts as a request in work.
     Complete {
         _place: Taken,
+        /// Since when its answer waits to be read.
+        unread: Option<Instant>,
     },
     /// It was ended before it was complete.
     Ended(ServiceError),
 }
 
 impl Body {
-    pub(super) fn new(is_stream: bool, ended: CancellationToken) -> Self {
-        Self { is_stream, bytes: 0, heard: Instant::now(), state: State::Arriving, ended }
+    pub(super) fn new(is_stream: bool, ended: CancellationToken, hang_up: Option<HangUp>) -> Self {
+        let (now, state) = (Instant::now(), State::Arriving);
+        Self { is_stream, bytes: 0, in_time: now, left_alone: Some(now), state, ended, hang_up }
     }
 
     /// True of a request that has not come in full.
@@ -47,15 +57,40 @@ impl Body {
         !self.is_stream && matches!(self.state, State::Arriving)
     }
 
-    /// For how long nothing has come, where more must: a stream may be silent between two messages.
+    /// For how long nothing has come, or so much too little, where more must: a stream may be silent between two
+    /// messages.
     pub(super) fn silence(&self) -> Option<Duration> {
-        let awaited = matches!(self.state, State::Arriving) && (!self.is_stream || self.bytes > 0);
-        awaited.then(|| self.heard.elapsed())
+        let arriving = matches!(self.state, State::Arriving) && (!self.is_stream || self.bytes > 0);
+        (arriving && self.left_alone.is_none()).then(|| self.in_time.elapsed())
     }
 
     /// The same where that is long enough for others to go first.
     pub(super) fn gives_way_after(&self) -> Option<Duration> {
         self.silence().filter(|silence| *silence >= GRACE)
+    }
+
+    /// For how long the answer to it has waited to be read, where that is long enough for others to go first.
+    pub(super) fn unread_for(&self) -> Option<Duration> {
+        match self.state {
+            State::Complete { unread: Some(since), .. } => {
+                Some(since.elapsed()).filter(|wait| *wait >= GRACE)
+            }
+            _ => None,
+        }
+    }
+
+    /// Its answer waits to be read, or is being read.
+    pub(super) fn set_unread(&mut self, waits: bool) {
+        if let State::Complete { unread, .. } = &mut self.state {
+            *unread = waits.then(Instant::now);
+        }
+    }
+
+    /// Closes the connection that it came by.
+    pub(super) fn hang_up(&self) {
+        if let Some(HangUp(connection)) = &self.hang_up {
+            connection.cancel();
+        }
     }
 
     pub(super) fn refusal(&self) -> Option<&ServiceError> {
@@ -65,13 +100,29 @@ impl Body {
         }
     }
 
-    /// More has come, and there is `room` for it or not.
-    pub(super) fn add(&mut self, bytes: usize, room: Result<(), ServiceError>) -> Result<(), ServiceError> {
+    /// Somebody waits for more.
+    pub(super) fn await_more(&mut self) {
+        if let Some(since) = self.left_alone.take() {
+            self.in_time += since.elapsed();
+        }
+    }
+
+    /// More has come, which accounts for `time`, and there is `room` for it or not.
+    pub(super) fn add(
+        &mut self,
+        bytes: usize,
+        time: Duration,
+        room: Result<(), ServiceError>,
+    ) -> Result<(), ServiceError> {
         if let State::Ended(refusal) = &self.state {
             return Err(refusal.clone());
         }
         room.inspect_err(|refusal| self.state = State::Ended(refusal.clone()))?;
-        self.heard = Instant::now();
+        let now = Instant::now();
+        let begins_message = self.is_stream && self.bytes == 0;
+        let in_time = self.in_time.checked_add(time).filter(|_| !begins_message);
+        self.in_time = in_time.map_or(now, |in_time| in_time.min(now));
+        self.left_alone = Some(now);
         self.bytes += bytes;
         Ok(())
     }
@@ -84,7 +135,7 @@ impl Body {
         if self.is_arriving() {
             let place = requests.take();
             let place = place.inspect_err(|refusal| self.state = State::Ended(refusal.clone()))?;
-            self.state = State::Complete { _place: place };
+            self.state = State::Complete { _place: place, unread: None };
         }
         Ok(())
     }
@@ -140,6 +191,11 @@ impl Arrival {
         self.0.bodies.add(self.0.number, bytes)
     }
 
+    /// Somebody waits for more of it.
+    pub(super) fn await_more(&self) {
+        self.0.bodies.await_more(self.0.number);
+    }
+
     /// What was made of it takes `bytes`.
     ///
     /// # Errors
@@ -154,6 +210,16 @@ impl Arrival {
     /// When as many are in work as may be.
     pub(super) fn complete(&self) -> Result<(), ServiceError> {
         self.0.bodies.complete(self.0.number)
+    }
+
+    /// Its answer waits for its client to read it, or for more of it.
+    pub(super) fn answer_waits(&self) {
+        self.0.bodies.set_unread(self.0.number, true);
+    }
+
+    /// Its client reads on in the answer.
+    pub(super) fn answer_is_read(&self) {
+        self.0.bodies.set_unread(self.0.number, false);
     }
 
     /// Its bytes in memory, which are given back when the charge is dropped: of a message that was read from it.

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use parking_lot::Mutex;
 use tokio_util::sync::CancellationToken;
 
 use super::InUse;
-use super::arrival::{Arrival, Body};
+use super::arrival::{Arrival, Body, HangUp};
 use super::limits::AdmissionLimits;
 use super::quota::Quota;
 use crate::service::{ErrorCode, ServiceError};
@@ -55,7 +56,7 @@ impl Bodies {
     ///
     /// # Errors
     /// When as many requests are arriving as may be, and none was silent.
-    pub(super) fn begin(&self, is_stream: bool) -> Result<Arrival, ServiceError> {
+    pub(super) fn begin(&self, is_stream: bool, hang_up: Option<HangUp>) -> Result<Arrival, ServiceError> {
         let mut known = self.0.known.lock();
         if !is_stream {
             let full = known.arriving >= self.0.limits.requests_max;
@@ -66,7 +67,7 @@ impl Bodies {
         }
         let (number, ended) = (known.next, CancellationToken::new());
         known.next += 1;
-        known.bodies.insert(number, Body::new(is_stream, ended.clone()));
+        known.bodies.insert(number, Body::new(is_stream, ended.clone(), hang_up));
         Ok(Arrival::new(self.clone(), number, ended))
     }
 
@@ -77,7 +78,21 @@ impl Bodies {
     pub(super) fn add(&self, number: u64, bytes: usize) -> Result<(), ServiceError> {
         let mut known = self.0.known.lock();
         let room = self.make_room(&mut known, Some(number), bytes);
-        known.change(number, |body| body.add(bytes, room)).unwrap_or(Ok(()))
+        let time = self.time_of(bytes);
+        known.change(number, |body| body.add(bytes, time, room)).unwrap_or(Ok(()))
+    }
+
+    /// How long so many bytes may take.
+    fn time_of(&self, bytes: usize) -> Duration {
+        match self.0.limits.body_bytes_per_s_min {
+            0 => Duration::MAX,
+            least => Duration::from_secs_f64(bytes as f64 / f64::from(least)),
+        }
+    }
+
+    /// Somebody waits for more of a body.
+    pub(super) fn await_more(&self, number: u64) {
+        self.0.known.lock().change(number, Body::await_more);
     }
 
     /// As [`Bodies::add`], for what is missing to `bytes`.
@@ -91,7 +106,16 @@ impl Bodies {
     /// # Errors
     /// When as many are in work as may be.
     pub(super) fn complete(&self, number: u64) -> Result<(), ServiceError> {
-        self.0.known.lock().change(number, |body| body.complete(&self.0.requests)).unwrap_or(Ok(()))
+        let mut known = self.0.known.lock();
+        if self.0.requests.is_full() {
+            known.hang_up_on_least_read(&self.0.requests.refusal());
+        }
+        known.change(number, |body| body.complete(&self.0.requests)).unwrap_or(Ok(()))
+    }
+
+    /// Whether the answer to a body's request waits to be read.
+    pub(super) fn set_unread(&self, number: u64, waits: bool) {
+        self.0.known.lock().change(number, |body| body.set_unread(waits));
     }
 
     /// The bytes of a body are somebody else's now, or nobody's.
@@ -130,8 +154,11 @@ impl Bodies {
 
     /// Ends the bodies that have been silent for longer than they may.
     pub(super) fn end_silent(&self) {
-        let silence_max = self.0.limits.body_silence_max;
-        let message = format!("body_silence_max is {silence_max:?}: nothing more of the body came");
+        let AdmissionLimits { body_silence_max: silence_max, body_bytes_per_s_min: least, .. } =
+            self.0.limits;
+        let message = format!(
+            "body_silence_max is {silence_max:?}, body_bytes_per_s_min is {least}: nothing more of the body came, or too slowly"
+        );
         let refusal = ServiceError::new(ErrorCode::DeadlineExceeded, BODY_SILENT, message);
         let mut known = self.0.known.lock();
         let silent = |body: &Body| body.silence().is_some_and(|silence| silence >= silence_max);
@@ -175,6 +202,17 @@ impl Known {
         };
         self.change(number, |body| body.end(refusal.clone()));
         true
+    }
+
+    /// Ends the request whose answer has waited to be read for longest, with its connection; if there is one.
+    fn hang_up_on_least_read(&mut self, refusal: &ServiceError) {
+        let unread = self.bodies.iter().filter_map(|(&number, body)| Some((body.unread_for()?, number)));
+        if let Some((_, number)) = unread.max() {
+            self.change(number, |body| {
+                body.end(refusal.clone());
+                body.hang_up();
+            });
+        }
     }
 
     /// Changes a body, and the sums with it.

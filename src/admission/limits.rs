@@ -13,6 +13,9 @@ pub struct AdmissionLimits {
     pub body_bytes_max: usize,
     /// How long a body may be silent before its end. 30 s.
     pub body_silence_max: Duration,
+    /// Bytes a second of a body that comes in time; what comes more slowly counts as silent for the time that its bytes
+    /// do not account for. 0 = any byte will do. 1024.
+    pub body_bytes_per_s_min: u32,
     /// Requests and messages of streams a second of one caller: of a key, or of an address where there is none;
     /// 0 = any number. 0.
     pub caller_requests_per_s_max: u32,
@@ -27,6 +30,7 @@ impl Default for AdmissionLimits {
             streams_max: 256,
             body_bytes_max: 1 << 30,
             body_silence_max: Duration::from_secs(30),
+            body_bytes_per_s_min: 1024,
             caller_requests_per_s_max: 0,
             caller_burst_max: 100,
         }

@@ -14,6 +14,8 @@ use crate::service::ServiceError;
 pub(super) struct MeteredBody {
     body: Body,
     arrival: Arrival,
+    /// Its reader has asked for a piece that has not come.
+    awaited: bool,
     ended: Pin<Box<WaitForCancellationFutureOwned>>,
 }
 
@@ -22,7 +24,7 @@ type Piece = Option<Result<Frame<Bytes>, axum::Error>>;
 impl MeteredBody {
     pub(super) fn new(body: Body, arrival: Arrival) -> Self {
         let ended = Box::pin(arrival.ended().cancelled_owned());
-        Self { body, arrival, ended }
+        Self { body, arrival, awaited: false, ended }
     }
 
     fn counted(&self, piece: Piece) -> Result<Piece, ServiceError> {
@@ -48,7 +50,12 @@ impl HttpBody for MeteredBody {
         {
             return refused(refusal);
         }
+        if !self.awaited {
+            self.arrival.await_more();
+            self.awaited = true;
+        }
         let piece = ready!(Pin::new(&mut self.body).poll_frame(context));
+        self.awaited = false;
         self.counted(piece).map_or_else(refused, Poll::Ready)
     }
 

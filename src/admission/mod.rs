@@ -17,7 +17,7 @@ mod metered_body;
 mod quota;
 mod rate;
 
-pub use arrival::Arrival;
+pub use arrival::{Arrival, HangUp};
 pub use bodies::{BODY_SILENT, Charge};
 pub use limits::AdmissionLimits;
 pub use rate::{Asking, Peer};
@@ -91,12 +91,13 @@ impl Admission {
         let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
         if operation.is_probe() {
             let response = handle(request).await?;
-            return Ok(response.map(|body| Body::new(HeldBody::new(body, place))));
+            return Ok(response.map(|body| Body::new(HeldBody::new(body, None, place))));
         }
         if let Some(rates) = &self.0.rates {
             rates.check(&Asking::of(request.extensions()))?;
         }
-        let arrival = self.0.bodies.begin(operation.is_stream())?;
+        let hang_up = request.extensions().get().cloned();
+        let arrival = self.0.bodies.begin(operation.is_stream(), hang_up)?;
         let request = Self::metered(request, &arrival)?;
         let answered = self.0.lifecycle.admit(handle(request)).await?;
         let response = arrival.refusal().map_or(answered, Err)?;
@@ -105,7 +106,7 @@ impl Admission {
         if held.is_some() {
             drop(arrival.take());
         }
-        Ok(response.map(|body| Body::new(HeldBody::new(body, (arrival, place, held)))))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, held)))))
     }
 
     /// Lets the next message of a stream in.

@@ -28,6 +28,10 @@ impl Quota {
         Arc::clone(&self.free).try_acquire_owned().map_err(|_| self.refusal())
     }
 
+    pub(super) fn is_full(&self) -> bool {
+        self.free.available_permits() == 0
+    }
+
     pub(super) fn taken(&self) -> usize {
         self.most - self.free.available_permits()
     }

@@ -31,6 +31,8 @@ pub struct LimitsConfig {
     pub body_bytes_max: usize,
     /// See [`AdmissionLimits::body_silence_max`]; seconds.
     pub body_silence_max_s: f64,
+    /// See [`AdmissionLimits::body_bytes_per_s_min`].
+    pub body_bytes_per_s_min: u32,
     /// See [`AdmissionLimits::caller_requests_per_s_max`].
     pub caller_requests_per_s_max: u32,
     /// See [`AdmissionLimits::caller_burst_max`].
@@ -81,6 +83,7 @@ impl Default for LimitsConfig {
             streams_max: admission.streams_max,
             body_bytes_max: admission.body_bytes_max,
             body_silence_max_s: admission.body_silence_max.as_secs_f64(),
+            body_bytes_per_s_min: admission.body_bytes_per_s_min,
             caller_requests_per_s_max: admission.caller_requests_per_s_max,
             caller_burst_max: admission.caller_burst_max,
             points_per_request_max: limits.points_per_request_max,
@@ -110,6 +113,7 @@ impl LimitsConfig {
             streams_max: self.streams_max,
             body_bytes_max: self.body_bytes_max,
             body_silence_max: Duration::from_secs_f64(self.body_silence_max_s),
+            body_bytes_per_s_min: self.body_bytes_per_s_min,
             caller_requests_per_s_max: self.caller_requests_per_s_max,
             caller_burst_max: self.caller_burst_max,
         }

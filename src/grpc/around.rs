@@ -10,6 +10,7 @@ use axum::response::Response;
 use tonic::{Code, Status};
 use tracing::Instrument;
 
+use super::inflation::{Compressed, Inflation};
 use super::{deadline, status};
 use crate::access::{Authorized, Gate, Operation};
 use crate::admission::Admission;
@@ -20,16 +21,13 @@ const PATH_LENGTH_MAX: usize = 80;
 /// What calls pass before a handler sees them.
 #[derive(Debug, Clone)]
 pub(super) struct Around {
-    gate: Gate,
-    admission: Admission,
-    message_bytes_max: usize,
+    pub(super) gate: Gate,
+    pub(super) admission: Admission,
+    pub(super) inflation: Inflation,
+    pub(super) message_bytes_max: usize,
 }
 
 impl Around {
-    pub(super) fn new(gate: Gate, admission: Admission, message_bytes_max: usize) -> Self {
-        Self { gate, admission, message_bytes_max }
-    }
-
     /// Wraps the services' routes.
     pub(super) fn wrap(self, routes: Router) -> Router {
         routes.layer(from_fn_with_state(self, call))
@@ -42,14 +40,15 @@ impl Around {
         Ok(operation)
     }
 
-    async fn answer(&self, operation: Operation, call: Request, next: Next) -> Response {
+    async fn answer(&self, operation: Operation, mut call: Request, next: Next) -> Response {
         let key = call.extensions().get::<Authorized>().and_then(|authorized| authorized.caller.name());
         let span = tracing::info_span!("grpc", operation = operation.name(), key);
         if let Some(key) = key {
             self.gate.metrics().key_used("grpc", key);
         }
-        let deadline = deadline::of(call.headers());
-        let handle = |call| deadline::within(deadline, next.run(call));
+        let (deadline, compressed) = (deadline::of(call.headers()), Compressed::of(call.headers()));
+        call.extensions_mut().insert(compressed);
+        let handle = |call| deadline::within(deadline, self.inflation.within(compressed, next.run(call)));
         let answer = self.admission.answer(operation, call, handle).instrument(span).await;
         let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
         match Status::from_header_map(response.headers()) {

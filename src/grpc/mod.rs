@@ -2,6 +2,7 @@
 
 mod around;
 mod deadline;
+mod inflation;
 mod mapping;
 mod maps;
 mod occupancy;
@@ -21,6 +22,7 @@ use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 use crate::wire::pb;
 use around::Around;
+use inflation::Inflation;
 use pb::mapping_server::{self, MappingServer};
 use pb::maps_server::{self, MapsServer};
 use pb::occupancy_server::{self, OccupancyServer};
@@ -29,6 +31,7 @@ use pb::occupancy_server::{self, OccupancyServer};
 #[derive(Debug, Clone)]
 struct Adapter {
     admission: Admission,
+    inflation: Inflation,
     message_bytes_max: usize,
 }
 
@@ -47,7 +50,8 @@ pub fn routes(
     admission: Admission,
     message_bytes_max: usize,
 ) -> Result<(Routes, Health), tonic_reflection::server::Error> {
-    let adapter = Adapter { admission: admission.clone(), message_bytes_max };
+    let inflation = Inflation::default();
+    let adapter = Adapter { admission: admission.clone(), inflation: inflation.clone(), message_bytes_max };
     // Each generated server has the same methods, but no trait names them.
     macro_rules! configured {
         ($server:ident) => {
@@ -71,7 +75,7 @@ pub fn routes(
         .add_service(health)
         .add_service(reflection);
     Ok((
-        Around::new(gate, admission, message_bytes_max).wrap(services.into_axum_router()).into(),
+        Around { gate, admission, inflation, message_bytes_max }.wrap(services.into_axum_router()).into(),
         Health(reporter),
     ))
 }

@@ -6,6 +6,7 @@ use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Status, Streaming};
 
+use super::inflation::{Compressed, Inflation};
 use super::{Adapter, status};
 use crate::access::{Authorized, Operation};
 use crate::admission::{Admission, Arrival, Asking, Charge};
@@ -47,8 +48,14 @@ impl Adapter {
         let (arrival, asking) = (Arrival::of(extensions)?.clone(), Asking::of(extensions));
         let (admission, authorized) = (self.admission.clone(), Authorized::of(extensions)?.clone());
         let worker = Worker { admission, asking, authorized, operation, handle, map: String::new() };
-        let reader =
-            Reader { requests: requests.into_inner(), arrival, message_bytes_max: self.message_bytes_max };
+        let compressed = extensions.get().copied().unwrap_or(Compressed(true));
+        let reader = Reader {
+            requests: requests.into_inner(),
+            arrival,
+            inflation: self.inflation.clone(),
+            compressed,
+            message_bytes_max: self.message_bytes_max,
+        };
         tokio::spawn(async move {
             tokio::select! {
                 // The worker's end ends the reader too.
@@ -66,6 +73,8 @@ type Read<M> = Result<(M, Charge), Status>;
 struct Reader<M> {
     requests: Streaming<M>,
     arrival: Arrival,
+    inflation: Inflation,
+    compressed: Compressed,
     message_bytes_max: usize,
 }
 
@@ -83,7 +92,8 @@ impl<M: Message> Reader<M> {
     }
 
     async fn next(&mut self) -> Option<Read<M>> {
-        Some(match self.requests.message().await.transpose()? {
+        let message = self.inflation.within(self.compressed, self.requests.message()).await;
+        Some(match message.transpose()? {
             // Compressed, it came as less.
             Ok(message) => match self.arrival.take().at_least(message.encoded_len()) {
                 Ok(charge) => Ok((message, charge)),

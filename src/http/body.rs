@@ -66,6 +66,17 @@ fn content_type(headers: &HeaderMap) -> String {
     value.split(';').next().unwrap_or_default().trim().to_ascii_lowercase()
 }
 
+/// Bodies come as they are: what grows when it is read would have to be bounded by what it grows to.
+fn as_it_is(headers: &HeaderMap) -> Result<(), HttpError> {
+    let encoding =
+        headers.get(header::CONTENT_ENCODING).map_or("identity", |value| value.to_str().unwrap_or("?"));
+    if encoding.eq_ignore_ascii_case("identity") {
+        return Ok(());
+    }
+    let message = format!("content-encoding must be identity, got {:?}", excerpt(encoding));
+    Err(HttpError::with_status(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_content_encoding", message))
+}
+
 fn unsupported(got: &str, supported: &str) -> HttpError {
     let message = format!("content-type must be {supported}, got {:?}", excerpt(got));
     HttpError::with_status(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_content_type", message)
@@ -110,6 +121,7 @@ async fn read(request: Request, adapter: &Adapter) -> Result<Bytes, HttpError> {
 }
 
 async fn read_most(mut request: Request, most: usize, limit: &str) -> Result<Bytes, HttpError> {
+    as_it_is(request.headers())?;
     let too_large = |bytes: String| {
         let message = format!("body must be at most {most} bytes ({limit}), got {bytes}");
         HttpError::with_status(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large", message)

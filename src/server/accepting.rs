@@ -19,6 +19,10 @@ use crate::wire::transport::KEEPALIVE_INTERVAL;
 /// How long to wait after an error that the next connection would meet as well: too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
 
+/// Connections that may wait to be accepted: one that finds no room tries again after a second. The system may set a
+/// lower bound.
+const WAITING_MAX: u32 = 4096;
+
 /// A socket that is listened on. Dropping it ends that, and removes the file of a Unix socket.
 #[derive(Debug)]
 pub(super) enum Accepting {
@@ -42,9 +46,9 @@ pub(super) struct TcpSocket {
 impl TcpSocket {
     /// # Errors
     /// When the address is taken, or is none of this machine's.
-    pub(super) async fn bind(protocol: Protocol, address: SocketAddr) -> Result<Self, ServerError> {
+    pub(super) fn bind(protocol: Protocol, address: SocketAddr) -> Result<Self, ServerError> {
         let listen = |error| ServerError::Listen { protocol: protocol.as_str(), address, error };
-        let listener = TcpListener::bind(address).await.map_err(listen)?;
+        let listener = listener(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;
         Ok(Self { listener: listener.into(), address })
     }
@@ -78,6 +82,17 @@ impl Accepting {
             }
         }
     }
+}
+
+fn listener(address: SocketAddr) -> io::Result<TcpListener> {
+    let socket = match address {
+        SocketAddr::V4(_) => tokio::net::TcpSocket::new_v4(),
+        SocketAddr::V6(_) => tokio::net::TcpSocket::new_v6(),
+    }?;
+    // A server that comes back need not wait for the last connections of the one before.
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(WAITING_MAX)
 }
 
 /// Answers go out at once; a peer that vanished without a word is found out.

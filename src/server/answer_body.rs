@@ -17,6 +17,8 @@ pub(super) struct AnswerBody {
 
 impl AnswerBody {
     pub(super) fn new(body: Body, used: InUse) -> Self {
+        // A client that leaves no room for the first piece does not read either.
+        used.handed_over();
         Self { body, used }
     }
 }

@@ -20,7 +20,7 @@ use super::answer_body::AnswerBody;
 use super::endpoint::Endpoint;
 use super::places::Place;
 use super::stream::{Count, Counted, secure};
-use crate::admission::Peer;
+use crate::admission::{HangUp, Peer};
 
 /// How long a client may leave unread what it asked for.
 const UNREAD_MAX: Duration = Duration::from_secs(30);
@@ -88,6 +88,7 @@ async fn answer(
 ) -> Result<Response<Body>, Infallible> {
     let used = place.used();
     request.extensions_mut().insert(peer);
+    request.extensions_mut().insert(HangUp(place.hang_up()));
     let response = router.oneshot(request).await?;
     Ok(response.map(|body| Body::new(AnswerBody::new(body, used))))
 }

@@ -98,7 +98,12 @@ impl Place {
         InUse { place: self.clone(), answer: self.0.next_answer.fetch_add(1, Ordering::Relaxed) }
     }
 
-    /// Waits until another connection has got this place.
+    /// Ends the connection when it is cancelled.
+    pub(super) fn hang_up(&self) -> CancellationToken {
+        self.0.lost.clone()
+    }
+
+    /// Waits until another connection has got this place, or somebody hung up.
     pub(super) async fn lost(&self) {
         self.0.lost.cancelled().await;
     }

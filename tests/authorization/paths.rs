@@ -15,7 +15,7 @@ use crate::common::Daemon;
 use crate::requests::{body, message, names_a_map};
 
 /// What a file system, or a parser on the way to it, may take for something else than a name.
-const TRICKS: [&str; 16] = [
+const TRICKS: [&str; 20] = [
     "..",
     ".",
     "../canary",
@@ -32,7 +32,17 @@ const TRICKS: [&str; 16] = [
     "~",
     "-rf",
     "own\n",
+    "%2e%2e%2fcanary",
+    "..%252fcanary",
+    "\u{ff0e}\u{ff0e}\u{2215}canary",
+    LONG,
 ];
+
+/// Longer than any file's name may be.
+const LONG: &str = match std::str::from_utf8(&[b'a'; 5000]) {
+    Ok(long) => long,
+    Err(_) => panic!(),
+};
 
 /// Every file below a folder with what it holds.
 fn files(folder: &Path, found: &mut BTreeMap<String, Vec<u8>>) {

@@ -39,6 +39,11 @@ impl Process {
         Self { child, http: address("http"), grpc: address("grpc") }
     }
 
+    /// Its number.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends it a signal, by its name.
     pub fn signal(&self, name: &str) {
         let sent =

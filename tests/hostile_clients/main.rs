@@ -1,0 +1,25 @@
+//! Clients that mean harm, one kind after another against the real program, beside honest ones: memory stays under the
+//! sum of the limits, `/livez` answers throughout, and the honest clients are served.
+//!
+//! What is bounded by the clock here is generous, since tests run on busy machines. The strict form:
+//! `MROL_LIVEZ_MS=100 cargo test --release --test hostile_clients -- --nocapture`.
+
+#![cfg(all(feature = "server", target_os = "linux"))]
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod bombs;
+#[path = "../common/mod.rs"]
+mod common;
+mod floods;
+mod frames;
+mod headers;
+mod honest;
+mod idle;
+mod memory;
+mod probe;
+#[path = "../process/mod.rs"]
+mod process;
+mod siege;
+mod silence;
+mod slowness;
+mod unread;
