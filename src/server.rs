@@ -17,6 +17,7 @@ mod socket;
 mod starting;
 mod stream;
 mod tls;
+mod watch;
 
 pub use error::ServerError;
 pub use files::ReloadedFiles;
@@ -35,18 +36,19 @@ use crate::access::{Access, Gate};
 use crate::admission::Admission;
 use crate::config::Config;
 use crate::lifecycle::Lifecycle;
-use crate::service::{Gauges, MapService};
+use crate::service::{Gauges, MapService, ServiceSettings};
 use crate::store::OpeningProgress;
 use crate::telemetry::{MeteredService, Metrics};
 use crate::{grpc, http};
 use accepting::{Accepting, TcpSocket};
 use endpoint::Endpoint;
 use gauges::SystemGauges;
-use housekeeping::{keep_house, measure};
+use housekeeping::keep_house;
 use protocol::Protocol;
 use socket::UnixSocket;
 use starting::Starting;
 use tls::Tls;
+use watch::{measure, watch};
 
 /// How long connections have to close once their requests are done: what is left then is idle or half open.
 const CLOSING_MAX: Duration = Duration::from_secs(1);
@@ -58,7 +60,6 @@ pub struct Server {
     access: Access,
     tls: Option<Tls>,
     service: MeteredService,
-    gauges: Arc<dyn Gauges>,
     lifecycle: Lifecycle,
     http: TcpSocket,
     grpc: TcpSocket,
@@ -74,10 +75,20 @@ impl Server {
     /// When a map, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
     /// and an address can be reached from elsewhere, unless the settings allow that.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
-        let config = Config { limits: open_files::within_allowed(config.limits), ..config };
+        let gauges = SystemGauges { data_dir: config.service_settings().data_dir };
+        Self::bind_with(config, Arc::new(gauges)).await
+    }
+
+    /// [`Server::bind`], with other gauges of disk and memory than the system's.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn bind_with(config: Config, gauges: Arc<dyn Gauges>) -> Result<Self, ServerError> {
+        let allowed_bytes = gauges.memory().map(|memory| memory.allowed_bytes);
+        let limits = open_files::within_allowed(config.limits).within_memory(allowed_bytes);
+        let config = Config { limits, ..config };
         let (access, tls) = (entrance::access(&config)?, Tls::of(&config.tls)?);
-        let settings = config.service_settings();
-        let gauges = Arc::new(SystemGauges { data_dir: settings.data_dir.clone() });
+        let settings = ServiceSettings { gauges: Some(gauges), ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let progress = Arc::new(OpeningProgress::default());
         let starting = Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits);
@@ -90,7 +101,6 @@ impl Server {
             service: MeteredService::new(service, Metrics::new()?),
             access,
             tls,
-            gauges,
             lifecycle: Lifecycle::default(),
             http,
             grpc: TcpSocket::bind(Protocol::Grpc, config.grpc.listen)?,
@@ -98,11 +108,6 @@ impl Server {
             grpc_socket: UnixSocket::bind(Protocol::Grpc, config.grpc.socket.as_deref())?,
             config,
         })
-    }
-
-    /// The same server with other gauges of disk and memory than the system's.
-    pub fn with_gauges(self, gauges: Arc<dyn Gauges>) -> Self {
-        Self { gauges, ..self }
     }
 
     /// Where HTTP is served.
@@ -154,10 +159,11 @@ impl Server {
         let http = Endpoint::new(Protocol::Http, router, tls.clone(), &config.limits);
 
         let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
-        let (files, gauges) = (self.files(), Arc::clone(&self.gauges));
-        measure(&service, Arc::clone(&gauges)).await;
+        let files = self.files();
+        measure(&service).await;
         let mut accepting = self.accept(&grpc, &http);
-        let housekeeping = tokio::spawn(keep_house(service.clone(), files, gauges, admission));
+        let watching = tokio::spawn(watch(service.clone(), admission));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), files, lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {
@@ -179,7 +185,7 @@ impl Server {
             http.cut();
         }
         // It ends by itself when draining begins; waiting keeps its last saving apart from the one below.
-        let _ended = housekeeping.await;
+        let _ended = tokio::join!(housekeeping, watching);
         let maps = service.maps().save().await.map_err(ServerError::Save)?;
         tracing::info!(maps, "saved, ending");
         ended

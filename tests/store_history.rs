@@ -214,7 +214,7 @@ impl Kept {
                     model.undo(&scans);
                 }
             }
-            Step::Snapshot => self.folder.save(&Snapshot::of(&self.map, self.uuid)).unwrap(),
+            Step::Snapshot => self.folder.save(&Snapshot::of(&self.map, self.uuid), u64::MAX).unwrap(),
             Step::Restart => self.restart(self.map.revision()),
         }
     }

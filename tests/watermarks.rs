@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use common::{Daemon, PATIENCE, client, identity_json, json_of, points_pb, query_pb, row, scan_pb};
+use mrol::config::Config;
 use mrol::service::{Gauges, MemoryReading, Readings};
 use mrol::wire::pb;
 use parking_lot::Mutex;
@@ -23,8 +24,12 @@ const MIB: u64 = 1 << 20;
 struct Dials(Mutex<Readings>);
 
 impl Gauges for Dials {
-    fn read(&self) -> Readings {
-        *self.0.lock()
+    fn disk_free_bytes(&self) -> Option<u64> {
+        self.0.lock().disk_free_bytes
+    }
+
+    fn memory(&self) -> Option<MemoryReading> {
+        self.0.lock().memory
     }
 }
 
@@ -40,11 +45,11 @@ impl Dials {
 }
 
 /// A server with a map of ten voxels, and its gauges.
-async fn with_dials() -> (Daemon, Arc<Dials>) {
+async fn with_dials(change: impl FnOnce(&mut Config)) -> (Daemon, Arc<Dials>) {
     let dials = Arc::new(Dials::default());
     dials.turn_disk(10_000);
     dials.turn_memory(100);
-    let daemon = Daemon::start_with_gauges(Arc::clone(&dials) as Arc<dyn Gauges>).await;
+    let daemon = Daemon::start_with_gauges(Arc::clone(&dials) as Arc<dyn Gauges>, change).await;
     daemon.make_map("a").await;
     daemon.put_in("a", &row(10)).await;
     (daemon, dials)
@@ -68,6 +73,18 @@ async fn refuses_for(daemon: &Daemon, reasons: &[&str]) {
 
 fn scan_json() -> Value {
     json!({"robot": "r", "points": [[9.0, 9.0, 9.0]], "guess": identity_json(), "align": false})
+}
+
+/// A scan under a number, which may be sent again.
+async fn insert_numbered(daemon: &Daemon, scan_id: u64) -> Response {
+    let mut scan = scan_json();
+    scan["scan_id"] = scan_id.into();
+    daemon.post("/v1/maps/a/scans", scan).await
+}
+
+/// A deletion under an id, which may be sent again.
+async fn delete_named(daemon: &Daemon, request_id: &str) -> Response {
+    daemon.post("/v1/maps/a/deletions", json!({"points": row(1), "request_id": request_id})).await
 }
 
 async fn insert(daemon: &Daemon) -> Response {
@@ -136,7 +153,7 @@ async fn is_read(daemon: &Daemon) {
 
 #[tokio::test]
 async fn a_full_disk_refuses_every_change_and_no_question_until_there_is_room() {
-    let (daemon, dials) = with_dials().await;
+    let (daemon, dials) = with_dials(|_| {}).await;
     let file = daemon.get("/v1/maps/a/snapshot").await.bytes().await.unwrap().to_vec();
     let before = daemon.contents("a").await;
     dials.turn_disk(100);
@@ -183,7 +200,7 @@ async fn a_full_disk_refuses_every_change_and_no_question_until_there_is_room() 
 
 #[tokio::test]
 async fn full_memory_refuses_what_grows_and_takes_what_shrinks() {
-    let (daemon, dials) = with_dials().await;
+    let (daemon, dials) = with_dials(|_| {}).await;
     let before = daemon.contents("a").await;
     dials.turn_memory(900);
     refuses_for(&daemon, &["memory_full"]).await;
@@ -200,6 +217,12 @@ async fn full_memory_refuses_what_grows_and_takes_what_shrinks() {
     assert_eq!(daemon.contents("a").await, before);
 
     assert_eq!(json_of(delete_first_voxel(&daemon).await).await["removed"], 1);
+    // To find out in who holds which voxels takes memory as well: there must be some left.
+    dials.turn_memory(990);
+    let message = refused(undo_first_scan(&daemon).await, full, "memory_full").await;
+    assert!(message.contains("an undo takes"), "{message}");
+    refused(daemon.get("/v1/maps/a/snapshot").await, full, "memory_full").await;
+    dials.turn_memory(900);
     assert_eq!(json_of(undo_first_scan(&daemon).await).await["removed"], 9);
     // Between the marks it stays as it is.
     dials.turn_memory(820);
@@ -227,5 +250,99 @@ async fn the_room_on_the_real_disk_counts_from_the_first_request_on_and_a_map_ca
     assert_eq!(ready(&daemon).await["writes_refused"], json!(["disk_full"]));
     assert_eq!(daemon.contents("a").await.1.len(), 0);
     assert_eq!(daemon.delete("/v1/maps/a").await.status(), StatusCode::NO_CONTENT);
+    daemon.stop().await;
+}
+
+#[tokio::test]
+async fn what_was_done_before_is_answered_again_while_the_disk_is_full() {
+    let (daemon, dials) = with_dials(|_| {}).await;
+    let first = json_of(insert_numbered(&daemon, 7).await).await;
+    assert_eq!(json_of(delete_named(&daemon, "once").await).await["removed"], 1);
+    dials.turn_disk(100);
+    refuses_for(&daemon, &["disk_full"]).await;
+
+    let again = json_of(insert_numbered(&daemon, 7).await).await;
+    assert_eq!((&again["replayed"], &again["revision"]), (&json!(true), &first["revision"]));
+    let again = json_of(delete_named(&daemon, "once").await).await;
+    assert_eq!((&again["replayed"], &again["removed"]), (&json!(true), &json!(1)));
+    let full = StatusCode::INSUFFICIENT_STORAGE;
+    refused(insert_numbered(&daemon, 8).await, full, "disk_full").await;
+    refused(delete_named(&daemon, "twice").await, full, "disk_full").await;
+    daemon.stop().await;
+}
+
+async fn snapshot_revision(daemon: &Daemon) -> Value {
+    json_of(daemon.get("/v1/maps/a").await).await["storage"]["snapshot_revision"].take()
+}
+
+#[tokio::test]
+async fn a_snapshot_without_room_is_put_off_and_scans_go_on() {
+    let (daemon, dials) = with_dials(|config| config.store.snapshot_interval_s = 1).await;
+    // Enough for changes, and nothing to spare.
+    dials.turn_disk(256);
+    let before = snapshot_revision(&daemon).await;
+    for scan_id in 0..4 {
+        assert_eq!(insert_numbered(&daemon, scan_id).await.status(), StatusCode::OK);
+        tokio::time::sleep(Duration::from_millis(500)).await;
+    }
+    let with_them = json_of(daemon.get("/v1/maps/a").await).await["revision"].take();
+    assert_eq!(ready(&daemon).await["writes_refused"], Value::Null);
+    // The first may have been taken before there was too little room.
+    assert!(snapshot_revision(&daemon).await.as_u64() <= Some(before.as_u64().unwrap() + 1));
+
+    dials.turn_disk(10_000);
+    let start = Instant::now();
+    while snapshot_revision(&daemon).await != with_them {
+        assert!(start.elapsed() < PATIENCE, "it is never tried again");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    let contents = daemon.contents("a").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("a").await, contents);
+    daemon.stop().await;
+}
+
+#[tokio::test]
+async fn a_server_goes_down_in_order_with_no_room_for_its_last_snapshot() {
+    let (daemon, dials) = with_dials(|_| {}).await;
+    let contents = daemon.contents("a").await;
+    dials.turn_disk(1);
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("a").await, contents);
+    daemon.stop().await;
+}
+
+/// Marks half a GiB and one GiB below what is free, and a file of one and a half.
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn a_file_that_fills_the_real_disk_refuses_changes_until_it_is_removed() {
+    use rustix::fs::{FallocateFlags, fallocate, statvfs};
+
+    let data = tempfile::tempdir().unwrap();
+    let disk = statvfs(data.path()).unwrap();
+    let free_mib = (disk.f_bavail * disk.f_frsize) >> 20;
+    if free_mib < 4096 {
+        eprintln!("SKIPPED: {free_mib} MiB are free, of which this test fills 1536");
+        return;
+    }
+    let filler = data.path().join("filler");
+    let daemon = Daemon::start_in(data, |config| {
+        config.limits.disk_free_low_mib = free_mib - 1024;
+        config.limits.disk_free_back_mib = free_mib - 512;
+    })
+    .await;
+    daemon.make_map("a").await;
+    assert_eq!(insert(&daemon).await.status(), StatusCode::OK);
+    let file = std::fs::File::create(&filler).unwrap();
+    if let Err(error) = fallocate(&file, FallocateFlags::empty(), 0, 1536 * MIB) {
+        eprintln!("SKIPPED: the file system cannot set room aside: {error}");
+        return;
+    }
+    refuses_for(&daemon, &["disk_full"]).await;
+    refused(insert(&daemon).await, StatusCode::INSUFFICIENT_STORAGE, "disk_full").await;
+    drop(file);
+    std::fs::remove_file(&filler).unwrap();
+    refuses_for(&daemon, &[]).await;
+    assert_eq!(insert(&daemon).await.status(), StatusCode::OK);
     daemon.stop().await;
 }

@@ -158,6 +158,19 @@ impl LimitsConfig {
         self.check_marks()
     }
 
+    /// The same limits for a process that may have so many bytes in memory, if that is known: what may lie in bodies, be
+    /// restored or be searched in at once is an eighth of that at most.
+    pub fn within_memory(self, allowed_bytes: Option<u64>) -> Self {
+        let share =
+            allowed_bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes / 8).unwrap_or(usize::MAX));
+        Self {
+            body_bytes_max: self.body_bytes_max.min(share.max(self.message_bytes_max)),
+            map_file_bytes_max: self.map_file_bytes_max.min(share),
+            localization_grid_bytes_max: self.localization_grid_bytes_max.min(share),
+            ..self
+        }
+    }
+
     pub(super) fn service_limits(&self) -> Limits {
         Limits {
             points_per_request_max: self.points_per_request_max,
@@ -212,5 +225,22 @@ impl LimitsConfig {
             }
             _ => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_in_memory_for_a_while_is_an_eighth_of_what_there_is_at_most() {
+        let limits = LimitsConfig::default();
+        assert_eq!(limits.clone().within_memory(None), limits);
+        assert_eq!(limits.clone().within_memory(Some(16 << 30)), limits);
+        let small = limits.clone().within_memory(Some(512 << 20));
+        assert_eq!((small.body_bytes_max, small.map_file_bytes_max), (64 << 20, 64 << 20));
+        assert_eq!(small.localization_grid_bytes_max, 64 << 20);
+        // One message must have room.
+        assert_eq!(limits.clone().within_memory(Some(64 << 20)).body_bytes_max, limits.message_bytes_max);
     }
 }

@@ -247,6 +247,7 @@ impl Config {
             data_dir: (!self.data_dir.as_os_str().is_empty()).then(|| self.data_dir.clone()),
             store: self.store.settings(),
             limits: self.limits.service_limits(),
+            gauges: None,
             query_threads: self.threads.query,
             mapping_threads: self.threads.mapping,
             localization_threads: self.threads.localization,

@@ -56,6 +56,12 @@ impl MultiResolutionMap {
         }
     }
 
+    /// Bytes of memory of the exact sets of all levels and of the points' moments.
+    pub fn memory_bytes(&self) -> usize {
+        let (moments, view) = (self.moments(), self.view());
+        view.shards().map(Shard::set_bytes).sum::<usize>() + moments.bytes()
+    }
+
     fn describe_level(&self, view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> LevelInfo {
         let mut info = LevelInfo {
             level,

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::statvfs;
 
-use crate::service::{Gauges, MemoryReading, Readings};
+use crate::service::{Gauges, MemoryReading};
 
-/// Where control groups (version 2) are told.
+/// Where control groups are told.
 const CONTROL_GROUPS: &str = "/sys/fs/cgroup";
 
 /// The disk of a data folder and the memory of this process. Memory is measured on Linux only.
@@ -17,23 +17,21 @@ pub(super) struct SystemGauges {
 }
 
 impl Gauges for SystemGauges {
-    fn read(&self) -> Readings {
-        Readings { disk_free_bytes: self.data_dir.as_deref().and_then(disk_free_bytes), memory: memory() }
+    /// Bytes that somebody who is not root may still write.
+    fn disk_free_bytes(&self) -> Option<u64> {
+        let disk = statvfs(self.data_dir.as_ref()?);
+        let disk =
+            disk.inspect_err(|error| tracing::debug!(%error, "the room on the disk is unknown")).ok()?;
+        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
     }
-}
 
-/// Bytes that somebody who is not root may still write.
-fn disk_free_bytes(folder: &Path) -> Option<u64> {
-    let disk = statvfs(folder);
-    let disk = disk.inspect_err(|error| tracing::debug!(%error, "the room on the disk is unknown")).ok()?;
-    Some(disk.f_bavail.saturating_mul(disk.f_frsize))
-}
-
-fn memory() -> Option<MemoryReading> {
-    let resident_bytes = kib("/proc/self/status", "VmRSS:")? << 10;
-    let system_bytes = kib("/proc/meminfo", "MemTotal:")? << 10;
-    let allowed_bytes = control_group_bytes().map_or(system_bytes, |bytes| bytes.min(system_bytes));
-    Some(MemoryReading { resident_bytes, allowed_bytes })
+    fn memory(&self) -> Option<MemoryReading> {
+        let resident_bytes = kib("/proc/self/status", "VmRSS:")? << 10;
+        let system_bytes = kib("/proc/meminfo", "MemTotal:")? << 10;
+        let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+        let group_bytes = control_group_bytes(&groups, Path::new(CONTROL_GROUPS)).unwrap_or(u64::MAX);
+        Some(MemoryReading { resident_bytes, allowed_bytes: system_bytes.min(group_bytes) })
+    }
 }
 
 /// The number after `name` in a file whose lines are `name number kB`.
@@ -43,14 +41,29 @@ fn kib(file: &str, name: &str) -> Option<u64> {
     number.trim().trim_end_matches("kB").trim_end().parse().ok()
 }
 
-/// The least that the control group of this process, or one above it, allows; nothing where none has a limit.
-fn control_group_bytes() -> Option<u64> {
-    let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
-    let group = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
-    let folder = Path::new(CONTROL_GROUPS).join(group);
-    let within = folder.ancestors().take_while(|folder| folder.starts_with(CONTROL_GROUPS));
+/// The least that the control groups of a process, or one above them, allow; nothing where none has a limit. A line of
+/// `groups` is `number:controllers:/group`, and of version 2 `0::/group`.
+fn control_group_bytes(groups: &str, root: &Path) -> Option<u64> {
+    let limit = |line: &str| {
+        let (controllers, group) = line.split_once(':')?.1.split_once(':')?;
+        let (root, file) = match controllers {
+            "" => (root.to_owned(), "memory.max"),
+            _ if controllers.split(',').any(|name| name == "memory") => {
+                (root.join("memory"), "memory.limit_in_bytes")
+            }
+            _ => return None,
+        };
+        least_within(&root, group.trim_start_matches('/'), file)
+    };
+    groups.lines().filter_map(limit).min()
+}
+
+/// The least number that `file` holds in `group` or above it. In a container the groups above its own are not there.
+fn least_within(root: &Path, group: &str, file: &str) -> Option<u64> {
+    let folder = root.join(group);
+    let within = folder.ancestors().take_while(|folder| folder.starts_with(root));
     // A group without a limit says `max`.
-    within.filter_map(|folder| fs::read_to_string(folder.join("memory.max")).ok()?.trim().parse().ok()).min()
+    within.filter_map(|folder| fs::read_to_string(folder.join(file)).ok()?.trim().parse().ok()).min()
 }
 
 #[cfg(test)]
@@ -60,24 +73,47 @@ mod tests {
     #[test]
     fn a_folder_has_a_disk_and_one_that_is_not_there_has_none() {
         let folder = tempfile::tempdir().unwrap();
-        let free = SystemGauges { data_dir: Some(folder.path().to_owned()) }.read().disk_free_bytes;
-        assert!(free.is_some());
-        assert_eq!(disk_free_bytes(&folder.path().join("none")), None);
-        assert_eq!(SystemGauges { data_dir: None }.read().disk_free_bytes, None);
+        let of = |data_dir| SystemGauges { data_dir }.disk_free_bytes();
+        assert!(of(Some(folder.path().to_owned())).is_some());
+        assert_eq!(of(Some(folder.path().join("none"))), None);
+        assert_eq!(of(None), None);
     }
 
     #[cfg(target_os = "linux")]
     #[test]
     fn memory_that_is_written_is_resident() {
         const MORE: usize = 64 << 20;
-        let before = memory().unwrap();
+        let memory = || SystemGauges { data_dir: None }.memory().unwrap();
+        let before = memory();
         let written = std::hint::black_box(vec![1_u8; MORE]);
-        let after = memory().unwrap();
+        let after = memory();
         // Other tests of this process may give some back meanwhile.
         assert!(
             after.resident_bytes > before.resident_bytes + written.len() as u64 / 2,
             "{before:?} {after:?}"
         );
         assert!(after.allowed_bytes > after.resident_bytes);
+    }
+
+    #[test]
+    fn the_least_limit_of_a_group_and_those_above_it_counts() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |file: &str, text: &str| {
+            let file = root.path().join(file);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, text).unwrap();
+        };
+        write("a/memory.max", "300\n");
+        write("a/b/memory.max", "max\n");
+        write("memory/c/memory.limit_in_bytes", "200\n");
+        write("memory/memory.limit_in_bytes", "9223372036854771712\n");
+        write("cpu/c/memory.limit_in_bytes", "1\n");
+        let bytes = |groups| control_group_bytes(groups, root.path());
+        assert_eq!(bytes("0::/a/b\n"), Some(300));
+        assert_eq!(bytes("2:cpu:/c\n1:hugetlb,memory:/c\n0::/\n"), Some(200));
+        assert_eq!(bytes("1:memory:/c/d\n0::/a\n"), Some(200));
+        assert_eq!(bytes("0::/none\n"), None);
+        // A container sees its own group as the root, and the host's name of it.
+        assert_eq!(bytes("1:memory:/host/name\n"), Some(9_223_372_036_854_771_712));
     }
 }

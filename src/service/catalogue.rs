@@ -8,7 +8,7 @@ use std::time::Instant;
 use parking_lot::RwLock;
 use uuid::Uuid;
 
-use super::hosted_map::{HostedMap, Saving};
+use super::hosted_map::HostedMap;
 use super::reach::Reachable;
 use super::{ErrorCode, MapReach, ServiceError};
 use crate::bloom::FilterSettings;
@@ -128,12 +128,16 @@ impl Catalogue {
         Ok(())
     }
 
-    /// Writes snapshots of the maps that changed, of all or of those whose turn it is; the number of them. One that
+    /// Writes a snapshot of each map by `save`, which says whether it did; the number of those that it wrote. One that
     /// cannot be written keeps none of the others from it.
-    pub(super) async fn save(&self, which: Saving) -> Result<usize, ServiceError> {
+    pub(super) async fn save(
+        &self,
+        save: impl Fn(&HostedMap) -> Result<bool, StoreError> + Clone + Send + 'static,
+    ) -> Result<usize, ServiceError> {
         let (mut saved, mut failed) = (0, None);
         for map in self.all() {
-            match self.on_disk(move |_| map.save(which)).await {
+            let save = save.clone();
+            match self.on_disk(move |_| save(&map)).await {
                 Ok(written) => saved += usize::from(written.unwrap_or(false)),
                 Err(error) => failed = Some(error),
             }

@@ -20,6 +20,7 @@ use std::sync::{Arc, OnceLock};
 
 use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 
+use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::store::{MapFolder, Record};
@@ -50,6 +51,8 @@ pub(super) struct Prepared {
     /// It was decided on an empty map, and holds for no other.
     pub(super) if_empty: bool,
     pub(super) turn: Turn,
+    /// The memory that it takes.
+    pub(super) promise: Promise,
 }
 
 /// Why a change was not made.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::committing::{Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
+use super::room::Room;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
 use crate::geometry::Point;
 use crate::map::{AnsweredRequest, Change, Committed, DeletionRecord, Region, Request};
@@ -15,6 +16,7 @@ impl HostedMap {
     pub(super) fn propose_deletion(
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
+        room: &Room,
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request { id, digest: digest(deletion) });
@@ -22,6 +24,7 @@ impl HostedMap {
             let state = self.state(answered.revision);
             return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, state, replayed: true }));
         }
+        room.check_to_shrink()?;
         let (map, deletion) = (Arc::clone(self), Arc::clone(deletion));
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |_: &_| {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -10,6 +11,7 @@ use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
 use super::committing::{Committing, Stop};
+use super::room::Room;
 use super::{
     ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, TrajectoryAnswer,
     VoxelListing,
@@ -41,6 +43,8 @@ pub(super) struct HostedMap {
     announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
+    /// A snapshot is due, and there is no room for it.
+    is_put_off: AtomicBool,
 }
 
 /// Robots whose turns are remembered before those that nobody waits for are dropped.
@@ -62,11 +66,21 @@ impl HostedMap {
         let (map, folder) = (Arc::new(map), folder.map(Arc::new));
         let (announcing, announced) = watch::channel(map.revision());
         let committing = Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing)?;
-        Ok(Self { name, uuid, map, folder, committing, announced, turns: Mutex::default() })
+        Ok(Self {
+            name,
+            uuid,
+            map,
+            folder,
+            committing,
+            announced,
+            turns: Mutex::default(),
+            is_put_off: AtomicBool::default(),
+        })
     }
 
-    /// Writes a snapshot where there is need for one; true when it did. A map whose journal failed is left as it is.
-    pub(super) fn save(&self, which: Saving) -> Result<bool, StoreError> {
+    /// Writes a snapshot where there is need and room for one; true when it did. A map whose journal failed is left as
+    /// it is.
+    pub(super) fn save(&self, which: Saving, room: &Room) -> Result<bool, StoreError> {
         let Some(folder) = self.folder.as_ref().filter(|_| self.committing.stopped().is_none()) else {
             return Ok(false);
         };
@@ -74,15 +88,37 @@ impl HostedMap {
         if !changed || which == Saving::Due && !folder.snapshot_is_due() {
             return Ok(false);
         }
+        let lent = room.check_to_shrink().and_then(|()| room.lend(self.snapshot_bytes(), "a snapshot"));
+        let Ok(_lent) = lent.inspect_err(|no_room| self.put_off(&no_room.message)) else {
+            return Ok(false);
+        };
         let (start, snapshot) = (Instant::now(), Snapshot::of(&self.map, self.uuid));
-        let saved = folder.save(&snapshot);
+        let saved = folder.save(&snapshot, room.file_bytes_max());
         // Its folder may go while it is written.
         if self.committing.stopped() == Some(&Stop::Deleted) {
             return Ok(false);
         }
+        if let Err(no_room @ StoreError::NoRoom { .. }) = &saved {
+            self.put_off(&no_room.to_string());
+            return Ok(false);
+        }
         saved?;
+        self.is_put_off.store(false, Ordering::Relaxed);
         tracing::info!(map = %self.name, revision = snapshot.contents.revision, elapsed = ?start.elapsed(), "saved");
         Ok(true)
+    }
+
+    /// There is no room for a snapshot: said once, tried again and again. Nothing is lost, since the journal is kept until
+    /// there is one.
+    fn put_off(&self, why: &str) {
+        if !self.is_put_off.swap(true, Ordering::Relaxed) {
+            tracing::warn!(map = %self.name, why, "a snapshot is put off: the journal grows instead");
+        }
+    }
+
+    /// Bytes of memory that a snapshot takes while it is made: 55 to 70 % of the map's were measured.
+    pub(super) fn snapshot_bytes(&self) -> u64 {
+        self.map.memory_bytes() as u64 / 4 * 3
     }
 
     /// Refuses changes that would be refused in the end, before any work is done for them.

@@ -3,12 +3,14 @@
 use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
+use super::room::Room;
 use super::{ErrorCode, Limits, MapFile, ServiceError};
 use crate::store::Snapshot;
 
 impl HostedMap {
     /// The map as a file, at one revision.
-    pub(super) fn to_file(&self) -> Result<MapFile, ServiceError> {
+    pub(super) fn to_file(&self, room: &Room) -> Result<MapFile, ServiceError> {
+        let _lent = room.lend(self.snapshot_bytes(), "a map file")?;
         let snapshot = Snapshot::of(&self.map, self.uuid);
         let encoded = snapshot.encode();
         let bytes =

@@ -25,7 +25,7 @@ impl MapService {
     ) -> Result<(MapInfo, bool), ServiceError> {
         let name = self.reach.check(&name)?;
         if self.inner.catalogue.get(&name).is_err() {
-            self.inner.watermarks.check_room_to_grow()?;
+            self.inner.room.check_to_grow()?;
         }
         let inner = Arc::clone(&self.inner);
         let create =
@@ -70,10 +70,10 @@ impl MapService {
     /// A map as a map file, at one revision.
     ///
     /// # Errors
-    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait.
+    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, or there is no memory for it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
-        let map = self.map(name)?;
-        self.inner.queries.run(move || map.to_file()).await?
+        let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
+        self.inner.queries.run(move || map.to_file(&inner.room)).await?
     }
 
     /// Makes a map from a map file, under a uuid of its own.
@@ -84,7 +84,7 @@ impl MapService {
     /// nearly full.
     pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
         let name = self.reach.check(&name)?;
-        self.inner.watermarks.check_room_to_grow()?;
+        self.inner.room.check_to_grow()?;
         let inner = Arc::clone(&self.inner);
         let snapshot = self.inner.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
         let inner = Arc::clone(&self.inner);
@@ -93,12 +93,13 @@ impl MapService {
         self.describe(map).await
     }
 
-    /// Writes snapshots of the maps that changed since their last one; the number of them.
+    /// Writes snapshots of the maps that changed since their last one; the number of them. Those for which there is no
+    /// room, on disk or in memory, are put off: the journal has all that they would hold.
     ///
     /// # Errors
     /// `Internal` when a file cannot be written; the others are written all the same.
     pub async fn save(&self) -> Result<usize, ServiceError> {
-        self.inner.catalogue.save(Saving::Changed).await
+        self.save_maps(Saving::Changed).await
     }
 
     /// The same for the maps with much journal or an old snapshot; to be called every now and then.
@@ -106,7 +107,12 @@ impl MapService {
     /// # Errors
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
-        self.inner.catalogue.save(Saving::Due).await
+        self.save_maps(Saving::Due).await
+    }
+
+    async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {
+        let inner = Arc::clone(&self.inner);
+        self.inner.catalogue.save(move |map| map.save(which, &inner.room)).await
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {

@@ -7,6 +7,7 @@ mod committing;
 mod deletion;
 mod digest;
 mod error;
+mod gauges;
 mod hosted_map;
 mod limits;
 mod localization;
@@ -16,11 +17,14 @@ mod maps;
 mod pool;
 mod reach;
 mod request;
+mod room;
 mod settings;
+mod shortage;
 mod undo;
 mod watermarks;
 
 pub use error::{ErrorCode, ServiceError};
+pub use gauges::{Gauges, MemoryReading, Readings};
 pub use limits::Limits;
 pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, TIME_LIMIT_DEFAULT,
@@ -32,7 +36,8 @@ pub use request::{
     UndoTarget, VoxelListing,
 };
 pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
-pub use watermarks::{Gauges, Marks, MemoryReading, Readings, Shortage};
+pub use shortage::Shortage;
+pub use watermarks::Marks;
 
 use std::sync::Arc;
 
@@ -43,7 +48,7 @@ use committing::{Refusal, Step};
 use hosted_map::HostedMap;
 use localization::Caller;
 use pool::Pool;
-use watermarks::Watermarks;
+use room::Room;
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
 ///
@@ -64,7 +69,7 @@ struct Inner {
     mapping: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
-    watermarks: Watermarks,
+    room: Room,
 }
 
 impl MapService {
@@ -82,7 +87,7 @@ impl MapService {
             queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
             mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
             localization: Pool::new("mrol-localization", settings.localization_threads, waiting)?,
-            watermarks: Watermarks::new(settings.limits.marks.clone()),
+            room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()),
             settings,
         };
         Ok(Self { inner: Arc::new(inner), reach: MapReach::Every })
@@ -103,14 +108,14 @@ impl MapService {
         self.inner.settings.filter
     }
 
-    /// Takes note of how full disk and memory are; to be called every second or so.
-    pub fn measured(&self, readings: &Readings) {
-        self.inner.watermarks.note(readings);
+    /// Looks how full disk and memory are; to be called every second or so. May block: not for an async thread.
+    pub fn measure(&self) -> Readings {
+        self.inner.room.look()
     }
 
     /// What there is too little of, and changes are refused for.
     pub fn shortages(&self) -> Vec<Shortage> {
-        self.inner.watermarks.shortages()
+        self.inner.room.shortages()
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -142,10 +147,13 @@ impl MapService {
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
-        self.inner.watermarks.check_room_to_grow()?;
+        if !map.knows(&scan) {
+            self.inner.room.check_to_grow()?;
+        }
         let turn = Arc::new(map.turn_of(&scan.robot).await);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
-        self.carry_through(move || map.propose_scan(&scan, Arc::clone(&turn), &inner.settings)).await
+        self.carry_through(move || map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room))
+            .await
     }
 
     /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
@@ -195,9 +203,8 @@ impl MapService {
             DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
             DeletionTarget::Region(_) => {}
         }
-        self.inner.watermarks.check_room_to_shrink()?;
-        let deletion = Arc::new(deletion);
-        self.carry_through(move || map.propose_deletion(&deletion)).await
+        let (inner, deletion) = (Arc::clone(&self.inner), Arc::new(deletion));
+        self.carry_through(move || map.propose_deletion(&deletion, &inner.room)).await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -205,11 +212,12 @@ impl MapService {
     ///
     /// # Errors
     /// `NotFound` without such a map or scan; `FailedPrecondition` for a scan from before what undo reaches, or where
-    /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full.
+    /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full, or where there is no memory to
+    /// find out in who holds which voxels.
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let (map, undo) = (self.map(map)?, Arc::new(undo));
-        self.inner.watermarks.check_room_to_shrink()?;
-        self.carry_through(move || map.propose_undo(&undo)).await
+        let inner = Arc::clone(&self.inner);
+        self.carry_through(move || map.propose_undo(&undo, &inner.room)).await
     }
 
     /// The poses of the accepted scans, of one robot or of all.

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use super::Limits;
+use super::{Gauges, Limits};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::map::RobotName;
@@ -19,6 +20,8 @@ pub struct ServiceSettings {
     pub store: StoreSettings,
     /// Bounds on what callers may ask.
     pub limits: Limits,
+    /// What disk and memory are measured with; without, nothing is refused for want of them.
+    pub gauges: Option<Arc<dyn Gauges>>,
     /// Threads for queries; 0 = one a core.
     pub query_threads: usize,
     /// Threads for alignments and changes; 0 = one a core.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::committing::{Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
+use super::room::Room;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget};
 use crate::map::{Change, Committed, MultiResolutionMap, Request, TrajectoryPose, UndoRecord, WithdrawnScan};
 use crate::store::{MapFolder, StoreError};
@@ -14,24 +15,32 @@ impl HostedMap {
     ///
     /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
     /// nobody else can change the map.
-    pub(super) fn propose_undo(self: &Arc<Self>, undo: &Undo) -> Result<Step<UndoAnswer>, ServiceError> {
+    pub(super) fn propose_undo(
+        self: &Arc<Self>,
+        undo: &Undo,
+        room: &Room,
+    ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
         let request = undo.request_id.clone().map(|id| Request { id, digest: digest(&undo.target) });
         if let Some(answered) = self.answered(request.as_ref())? {
             let (scans, removed, state) = (answered.scans, answered.voxels, self.state(answered.revision));
             return Ok(Step::Answered(UndoAnswer { scans, removed, state, replayed: true }));
         }
+        room.check_to_shrink()?;
         let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
         let (scans, withdrawn) = self.targets_of_undo(&undo.target)?;
         if scans.is_empty() {
             let state = self.state(self.map.revision());
             return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, state, replayed: false }));
         }
+        // The map's content as it was before the first of them.
+        let lent = room.lend(self.snapshot_bytes(), "an undo")?;
         let observed = folder.observations(&scans, &withdrawn).map_err(unreadable)?;
         let (mut observations, seen) = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
         let (map, count) = (Arc::clone(self), scans.len());
         let decide = move |core: &MultiResolutionMap| {
+            let _until_decided = lent;
             map.still_unanswered(request.as_ref())?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);

@@ -3,15 +3,9 @@
 //! Each gauge has two marks, so that a value that trembles about one of them does not open and shut the door at each
 //! look. Reads, alignments and searches go on meanwhile.
 
-use std::fmt::{self, Display};
-use std::time::Duration;
-
 use parking_lot::RwLock;
 
-use super::{ErrorCode, ServiceError};
-
-/// When to come again: whoever makes room takes longer than the next look.
-const RETRY_AFTER: Duration = Duration::from_secs(5);
+use super::{MemoryReading, Readings, ServiceError, Shortage};
 
 /// Where changes are refused, and where they are taken again.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,97 +31,6 @@ impl Default for Marks {
     }
 }
 
-/// What disk and memory are measured with.
-pub trait Gauges: fmt::Debug + Send + Sync {
-    /// What they say now. May block: not for an async thread.
-    fn read(&self) -> Readings;
-}
-
-/// What the gauges said at one look; nothing of a gauge that cannot be read.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Readings {
-    /// Bytes that are free on the disk of the data folder.
-    pub disk_free_bytes: Option<u64>,
-    /// The memory of the process.
-    pub memory: Option<MemoryReading>,
-}
-
-/// The memory of a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MemoryReading {
-    /// Bytes that it has in memory.
-    pub resident_bytes: u64,
-    /// Bytes that the system, or the control group of the process, has in all.
-    pub allowed_bytes: u64,
-}
-
-/// What there is too little of: the value that was measured last, and the marks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shortage {
-    /// Room on the disk of the data folder.
-    Disk {
-        /// Bytes that are free.
-        free: u64,
-        /// Fewer are too few.
-        low: u64,
-        /// That many are enough again.
-        back: u64,
-    },
-    /// Memory of the process.
-    Memory {
-        /// Bytes in use.
-        resident: u64,
-        /// More are too many.
-        high: u64,
-        /// At most that many are well again.
-        back: u64,
-    },
-}
-
-impl Shortage {
-    /// The reason of a refusal where the disk is nearly full.
-    pub const DISK_FULL: &'static str = "disk_full";
-    /// The reason of a refusal where memory is nearly full.
-    pub const MEMORY_FULL: &'static str = "memory_full";
-
-    /// The word for programs.
-    pub fn reason(&self) -> &'static str {
-        match self {
-            Self::Disk { .. } => Self::DISK_FULL,
-            Self::Memory { .. } => Self::MEMORY_FULL,
-        }
-    }
-
-    fn refusal(&self, what_else: &str) -> ServiceError {
-        let message = format!("{self}{what_else}");
-        ServiceError::new(ErrorCode::ResourceExhausted, self.reason(), message).retry_after(RETRY_AFTER)
-    }
-}
-
-impl Display for Shortage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mib = |bytes: &u64| bytes >> 20;
-        match self {
-            Self::Disk { free, low, back } => write!(
-                f,
-                "the disk of the data folder has {} MiB free: below limits.disk_free_low_mib, {}, changes are refused \
-                 until limits.disk_free_back_mib, {}, are free again; make room there, or delete a map",
-                mib(free),
-                mib(low),
-                mib(back)
-            ),
-            Self::Memory { resident, high, back } => write!(
-                f,
-                "the server has {} MiB in memory: above limits.memory_high_mib, {}, what makes maps grow is refused \
-                 until it has limits.memory_back_mib, {}, or less; delete a map, or give the server more memory",
-                mib(resident),
-                mib(high),
-                mib(back)
-            ),
-        }
-    }
-}
-
 /// What there is too little of, by the marks and the readings so far.
 #[derive(Debug)]
 pub(super) struct Watermarks {
@@ -146,7 +49,7 @@ impl Watermarks {
         Self { marks, now: RwLock::default() }
     }
 
-    /// Takes note of readings. A gauge that cannot be read leaves its side as it was.
+    /// Takes note of readings. Of what nothing was read, all stays as it was.
     pub(super) fn note(&self, readings: &Readings) {
         let mut now = self.now.write();
         if let Some(free) = readings.disk_free_bytes {
@@ -168,7 +71,7 @@ impl Watermarks {
 
     /// # Errors
     /// `ResourceExhausted` where there is no room for more voxels, in memory or on disk.
-    pub(super) fn check_room_to_grow(&self) -> Result<(), ServiceError> {
+    pub(super) fn check_to_grow(&self) -> Result<(), ServiceError> {
         self.shortages().first().map_or(Ok(()), |shortage| Err(shortage.refusal("")))
     }
 
@@ -176,7 +79,7 @@ impl Watermarks {
     ///
     /// # Errors
     /// `ResourceExhausted` where there is no room in the journal.
-    pub(super) fn check_room_to_shrink(&self) -> Result<(), ServiceError> {
+    pub(super) fn check_to_shrink(&self) -> Result<(), ServiceError> {
         let why = " (removals are refused as well, since the journal keeps each of them)";
         self.now.read().disk.map_or(Ok(()), |shortage| Err(shortage.refusal(why)))
     }
@@ -190,11 +93,11 @@ impl Marks {
     }
 
     fn memory(&self, memory: MemoryReading, is_short: bool) -> Option<Shortage> {
-        let resident = memory.resident_bytes;
+        let in_use = memory.resident_bytes;
         let high = self.memory_high_bytes.unwrap_or(memory.allowed_bytes / 100 * 85);
         let back = self.memory_back_bytes.unwrap_or(high / 100 * 94);
         let most = if is_short { back } else { high };
-        (resident > most).then_some(Shortage::Memory { resident, high, back })
+        (in_use > most).then_some(Shortage::Memory { in_use, high, back })
     }
 }
 
@@ -209,6 +112,7 @@ fn log_change(reason: &'static str, before: Option<Shortage>, now: Option<Shorta
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::service::ErrorCode;
 
     const MIB: u64 = 1 << 20;
 
@@ -225,7 +129,7 @@ mod tests {
     fn refused_after(watermarks: &Watermarks, readings: impl IntoIterator<Item = Readings>) -> Vec<bool> {
         let refused = |reading| {
             watermarks.note(&reading);
-            watermarks.check_room_to_grow().is_err()
+            watermarks.check_to_grow().is_err()
         };
         readings.into_iter().map(refused).collect()
     }
@@ -233,7 +137,7 @@ mod tests {
     #[test]
     fn nothing_is_refused_before_anything_was_measured() {
         let watermarks = Watermarks::new(Marks::default());
-        assert!(watermarks.check_room_to_grow().is_ok() && watermarks.check_room_to_shrink().is_ok());
+        assert!(watermarks.check_to_grow().is_ok() && watermarks.check_to_shrink().is_ok());
         assert_eq!(watermarks.shortages(), []);
     }
 
@@ -282,12 +186,12 @@ mod tests {
     fn a_refusal_says_what_was_measured_the_marks_and_what_to_do() {
         let watermarks = Watermarks::new(Marks::default());
         watermarks.note(&disk(100));
-        let error = watermarks.check_room_to_grow().unwrap_err();
+        let error = watermarks.check_to_grow().unwrap_err();
         assert_eq!((error.code, error.reason), (ErrorCode::ResourceExhausted, "disk_full"));
         for part in ["100 MiB", "disk_free_low_mib, 256", "disk_free_back_mib, 512", "make room"] {
             assert!(error.message.contains(part), "{part} is not in {}", error.message);
         }
-        let error = watermarks.check_room_to_shrink().unwrap_err();
+        let error = watermarks.check_to_shrink().unwrap_err();
         assert_eq!(error.reason, "disk_full");
         assert!(error.message.contains("journal"), "{}", error.message);
     }
@@ -296,11 +200,11 @@ mod tests {
     fn what_gives_memory_back_is_taken_while_memory_is_full() {
         let watermarks = Watermarks::new(Marks::default());
         watermarks.note(&memory(990, 1000));
-        let error = watermarks.check_room_to_grow().unwrap_err();
+        let error = watermarks.check_to_grow().unwrap_err();
         assert_eq!((error.code, error.reason), (ErrorCode::ResourceExhausted, "memory_full"));
         for part in ["990 MiB", "memory_high_mib, 850", "memory_back_mib, 79", "delete a map"] {
             assert!(error.message.contains(part), "{part} is not in {}", error.message);
         }
-        assert!(watermarks.check_room_to_shrink().is_ok());
+        assert!(watermarks.check_to_shrink().is_ok());
     }
 }

@@ -41,6 +41,16 @@ pub enum StoreError {
         /// The first revision that is lost.
         revision: u64,
     },
+    /// A snapshot would take what the journal needs.
+    #[error(
+        "a snapshot of {bytes} bytes does not fit on the disk, at most {bytes_max} leave enough for the journal"
+    )]
+    NoRoom {
+        /// Its size.
+        bytes: u64,
+        /// The most that it may have.
+        bytes_max: u64,
+    },
     /// An earlier write failed, and what the disk holds since is unknown.
     #[error("the journal stopped: {0}")]
     JournalStopped(String),

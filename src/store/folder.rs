@@ -17,7 +17,8 @@ pub(super) fn unfinished(path: &Path) -> PathBuf {
 /// any moment `path` holds the old bytes or the new.
 ///
 /// # Errors
-/// When the system refuses; `path` is then as it was, or, where the folder could not be synced, new.
+/// When the system refuses; `path` is then as it was, or, where the folder could not be synced, new. Nothing else is
+/// left that takes room.
 pub(super) fn replace(files: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let aside = unfinished(path);
     let write = || {
@@ -28,7 +29,9 @@ pub(super) fn replace(files: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Resu
         files.rename(&aside, path)?;
         files.sync(folder_of(path))
     };
-    write().map_err(StoreError::io(path))
+    // What is left of it takes the room that is missing.
+    let left = |_: &std::io::Error| drop(files.remove(&aside));
+    write().inspect_err(left).map_err(StoreError::io(path))
 }
 
 /// Removes what a crash left unfinished in `folder`.

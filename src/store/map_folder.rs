@@ -9,7 +9,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
 use uuid::Uuid;
@@ -31,6 +31,10 @@ pub struct MapFolder {
     saved: Mutex<Saved>,
 }
 
+/// How long after one that could not be written the next snapshot is due at the earliest: to make one takes a while of
+/// a thread, and a disk that is full does not empty at once.
+const AGAIN_AFTER: Duration = Duration::from_secs(5);
+
 /// How much journal there is behind the newest snapshot, and since when.
 #[derive(Debug, Clone, Copy)]
 struct Saved {
@@ -39,6 +43,8 @@ struct Saved {
     found: u64,
     /// Bytes that had been appended when it was written.
     appended: u64,
+    /// When the next one could not be written.
+    failed: Option<Instant>,
 }
 
 /// A map as it was found.
@@ -157,7 +163,7 @@ impl MapFolder {
         found: u64,
     ) -> Self {
         let (journal, snapshots) = (Mutex::new(journal), Mutex::new(snapshots));
-        let saved = Mutex::new(Saved { at: Instant::now(), found, appended: 0 });
+        let saved = Mutex::new(Saved { at: Instant::now(), found, appended: 0, failed: None });
         Self { files, path, settings, journal, snapshots, saved }
     }
 
@@ -182,27 +188,40 @@ impl MapFolder {
         &self.settings
     }
 
-    /// Writes a snapshot beside the others, and forgets snapshots and journal that nobody needs any more.
+    /// Writes a snapshot of at most `bytes_max` beside the others, and forgets snapshots and journal that nobody needs any
+    /// more. Where it cannot, a while passes before the next one is due.
     ///
     /// # Errors
-    /// When the system refuses, or the journal stopped; what was there is then there still.
-    pub fn save(&self, snapshot: &Snapshot) -> Result<(), StoreError> {
+    /// `NoRoom` for a larger one; when the system refuses, or the journal stopped. What was there is then there still.
+    pub fn save(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
+        self.write(snapshot, bytes_max).inspect_err(|_| self.saved.lock().failed = Some(Instant::now()))
+    }
+
+    fn write(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
         let mut snapshots = self.snapshots.lock();
         let revision = snapshot.contents.revision;
+        let path = self.path.join(snapshot_name(revision));
+        let file = snapshot.encode().map_err(StoreError::io(&path))?;
+        if file.len() as u64 > bytes_max {
+            return Err(StoreError::NoRoom { bytes: file.len() as u64, bytes_max });
+        }
         // What the snapshot holds is durable in the journal before; what comes next begins a segment.
         self.journal.lock().end_segment()?;
-        snapshot.write(&*self.files, &self.path.join(snapshot_name(revision)))?;
+        folder::replace(&*self.files, &path, &file)?;
         if snapshots.last() != Some(&revision) {
             snapshots.push(revision);
         }
         let appended = self.journal.lock().used().bytes;
-        *self.saved.lock() = Saved { at: Instant::now(), found: 0, appended };
+        *self.saved.lock() = Saved { at: Instant::now(), found: 0, appended, failed: None };
         self.forget(&mut snapshots, snapshot.contents.trajectory.withdrawn())
     }
 
-    /// True when there is much journal since the last snapshot, or that is old.
+    /// True when there is much journal since the last snapshot, or that is old; not just after one that failed.
     pub fn snapshot_is_due(&self) -> bool {
-        let Saved { at, found, appended } = *self.saved.lock();
+        let Saved { at, found, appended, failed } = *self.saved.lock();
+        if failed.is_some_and(|failed| failed.elapsed() < AGAIN_AFTER) {
+            return false;
+        }
         let bytes = found + self.journal.lock().used().bytes - appended;
         bytes >= self.settings.snapshot_journal_bytes || at.elapsed() >= self.settings.snapshot_interval
     }

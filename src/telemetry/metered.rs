@@ -3,8 +3,8 @@
 use super::Metrics;
 use crate::map::MapName;
 use crate::service::{
-    Deletion, DeletionAnswer, MapReach, MapService, PointAnswer, PointQuery, Readings, ScanAnswer,
-    ScanRequest, ServiceError, Undo, UndoAnswer,
+    Deletion, DeletionAnswer, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer, ScanRequest,
+    ServiceError, Undo, UndoAnswer,
 };
 
 /// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
@@ -36,10 +36,10 @@ impl MeteredService {
         &self.metrics
     }
 
-    /// [`MapService::measured`], shown.
-    pub fn measured(&self, readings: &Readings) {
-        self.service.measured(readings);
-        self.metrics.room(readings, &self.service.shortages());
+    /// [`MapService::measure`], shown. May block as well.
+    pub fn measure(&self) {
+        let readings = self.service.measure();
+        self.metrics.room(&readings, &self.service.shortages());
     }
 
     /// [`MapService::query_points`], counted.

@@ -11,6 +11,7 @@ use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder
 
 use super::exposition;
 use super::log::TelemetryError;
+use crate::admission::InUse;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName};
 use crate::service::{MapInfo, Readings, Shortage};
@@ -23,6 +24,9 @@ const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
 const KEY_REQUESTS: &str = "mrol_key_requests_total";
 const FILE_IN_FORCE: &str = "mrol_file_in_force";
+const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
+const STREAMS_OPEN: &str = "mrol_streams_open";
+const BODY_BYTES: &str = "mrol_body_bytes";
 const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
 const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
 const WRITES_REFUSED: &str = "mrol_writes_refused";
@@ -74,6 +78,17 @@ impl Metrics {
     /// Says whether what a file holds is in force: false where it changed into something that cannot be used.
     pub fn file_in_force(&self, file: &'static str, in_force: bool) {
         self.record(|| gauge!(FILE_IN_FORCE, "file" => file).set(f64::from(u8::from(in_force))));
+    }
+
+    /// Says how much of what is limited is in use.
+    pub fn in_use(&self, in_use: &InUse) {
+        let InUse { requests, arriving, streams, bytes } = *in_use;
+        self.record(|| {
+            gauge!(REQUESTS_IN_FLIGHT, "state" => "in_work").set(requests as f64);
+            gauge!(REQUESTS_IN_FLIGHT, "state" => "arriving").set(arriving as f64);
+            gauge!(STREAMS_OPEN).set(streams as f64);
+            gauge!(BODY_BYTES).set(bytes as f64);
+        });
     }
 
     /// Says how full disk and memory are, and whether changes are refused for it.
@@ -143,6 +158,12 @@ fn describe() {
     describe_gauge!(
         FILE_IN_FORCE,
         "0 where a file changed into what cannot be used, and what it held before goes on"
+    );
+    describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
+    describe_gauge!(STREAMS_OPEN, "Calls whose client streams messages");
+    describe_gauge!(
+        BODY_BYTES,
+        "Bytes of bodies that have arrived, and of listings and map files on their way out"
     );
     describe_gauge!(DISK_FREE_BYTES, "Bytes free on the disk of the data folder");
     describe_gauge!(MEMORY_RESIDENT_BYTES, "Bytes that the process has in memory");

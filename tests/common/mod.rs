@@ -46,14 +46,14 @@ impl Daemon {
 
     /// With the maps in `data`.
     pub async fn start_in(data: TempDir, change: impl FnOnce(&mut Config)) -> Self {
-        let server = bind(&data, change).await;
+        let server = Server::bind(config(&data, change)).await.expect("a server");
         Self::serve(server, data)
     }
 
     /// With other gauges of disk and memory than the system's.
-    pub async fn start_with_gauges(gauges: Arc<dyn Gauges>) -> Self {
+    pub async fn start_with_gauges(gauges: Arc<dyn Gauges>, change: impl FnOnce(&mut Config)) -> Self {
         let data = tempfile::tempdir().expect("a folder");
-        let server = bind(&data, |_| {}).await.with_gauges(gauges);
+        let server = Server::bind_with(config(&data, change), gauges).await.expect("a server");
         Self::serve(server, data)
     }
 
@@ -142,12 +142,12 @@ impl Daemon {
     }
 }
 
-async fn bind(data: &TempDir, change: impl FnOnce(&mut Config)) -> Server {
+fn config(data: &TempDir, change: impl FnOnce(&mut Config)) -> Config {
     let mut config = Config { data_dir: data.path().to_owned(), ..Config::default() };
     config.http.listen.set_port(0);
     config.grpc.listen.set_port(0);
     change(&mut config);
-    Server::bind(config).await.expect("a server")
+    config
 }
 
 /// A server that was told to go down.

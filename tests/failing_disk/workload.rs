@@ -100,7 +100,10 @@ fn grow(
             }
         }
         // A snapshot that cannot be written harms nobody, unless the journal is harmed with it.
-        if group % 4 == 3 && folder.save(&Snapshot::of(model, uuid)).is_err() && folder.sync().is_err() {
+        if group % 4 == 3
+            && folder.save(&Snapshot::of(model, uuid), u64::MAX).is_err()
+            && folder.sync().is_err()
+        {
             history.stopped = true;
             return Ok(());
         }

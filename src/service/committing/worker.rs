@@ -9,6 +9,7 @@ use tokio::sync::{oneshot, watch};
 use super::{Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Turn, Waiting, record_of};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::service::ServiceError;
+use crate::service::room::Promise;
 use crate::store::{Durability, MapFolder, Record, StoreError};
 
 /// What a map's thread works with.
@@ -28,7 +29,7 @@ struct Decided {
     record: Option<Record>,
     answer: oneshot::Sender<Outcome>,
     /// Kept until the change is visible.
-    _turn: Option<Turn>,
+    _held: Option<(Turn, Promise)>,
 }
 
 impl Worker {
@@ -72,7 +73,7 @@ impl Worker {
         for Waiting { proposal, answer } in waiting {
             match proposal {
                 Proposal::Prepared(prepared) => {
-                    let Prepared { change, record, if_empty, turn } = *prepared;
+                    let Prepared { change, record, if_empty, turn, promise } = *prepared;
                     if if_empty {
                         self.commit_group(&mut group);
                         if !self.map.is_empty() {
@@ -80,7 +81,7 @@ impl Worker {
                             continue;
                         }
                     }
-                    group.push(Decided { change, record, answer, _turn: Some(turn) });
+                    group.push(Decided { change, record, answer, _held: Some((turn, promise)) });
                 }
                 Proposal::Undecided(decide) => {
                     self.commit_group(&mut group);
@@ -102,7 +103,7 @@ impl Worker {
             None => Ok(None),
         };
         match decided() {
-            Ok(Some((change, record))) => group.push(Decided { change, record, answer, _turn: None }),
+            Ok(Some((change, record))) => group.push(Decided { change, record, answer, _held: None }),
             Ok(None) => drop(answer.send(Ok(unchanged))),
             Err(refusal) => drop(answer.send(Err(refusal))),
         }

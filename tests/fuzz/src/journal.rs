@@ -55,7 +55,7 @@ impl Kept {
             commit(&folder, &map, &change(revision));
             history.push(map.contents());
             if revision == SNAPSHOT_AT {
-                folder.save(&Snapshot::of(&map, MAP)).expect("a snapshot");
+                folder.save(&Snapshot::of(&map, MAP), u64::MAX).expect("a snapshot");
             }
         }
         Self { disk, history }

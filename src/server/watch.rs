@@ -1,0 +1,35 @@
+//! What a server looks at every second: how much is in use, and how much room there is.
+
+use std::time::Duration;
+
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::admission::Admission;
+use crate::telemetry::MeteredService;
+
+/// How often.
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of its
+/// own: a snapshot that takes long does not keep it from looking.
+pub(super) async fn watch(service: MeteredService, admission: Admission) {
+    let mut looking = interval(INTERVAL);
+    looking.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            () = admission.lifecycle().draining() => return,
+            _ = looking.tick() => {}
+        }
+        admission.sweep();
+        service.metrics().in_use(&admission.in_use());
+        measure(&service).await;
+    }
+}
+
+/// Looks how full disk and memory are, on a thread that may block.
+pub(super) async fn measure(service: &MeteredService) {
+    let service = service.clone();
+    if let Err(panic) = tokio::task::spawn_blocking(move || service.measure()).await {
+        tracing::error!(%panic, "disk and memory cannot be measured");
+    }
+}
