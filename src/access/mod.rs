@@ -19,6 +19,6 @@ pub use key::{Key, KeyName};
 pub use key_file::{KeyFileError, add_to_file, to_toml};
 pub use keys::Keys;
 pub use operation::{Operation, Route};
-pub use rules::Access;
+pub use rules::{Access, KEY_UNKNOWN};
 pub use scope::Scope;
 pub use secret::{Digest, Secret};

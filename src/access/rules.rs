@@ -59,10 +59,13 @@ impl Access {
     }
 }
 
+/// The reason of a refusal where a key came that is none of ours.
+pub const KEY_UNKNOWN: &str = "key_unknown";
+
 fn no_key(operation: Operation, given: bool) -> ServiceError {
     let (reason, problem) = match given {
         false => ("key_missing", "send one as `authorization: Bearer <secret>`"),
-        true => ("key_unknown", "the one sent is not known here"),
+        true => (KEY_UNKNOWN, "the one sent is not known here"),
     };
     let message = format!("{} needs a key: {problem}", operation.name());
     ServiceError::new(ErrorCode::Unauthenticated, reason, message)

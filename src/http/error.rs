@@ -7,7 +7,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-use crate::access::Operation;
+use crate::access::{KEY_UNKNOWN, Operation};
 use crate::admission;
 use crate::service::{ErrorCode, ServiceError, Shortage};
 
@@ -66,13 +66,21 @@ impl IntoResponse for HttpError {
             headers.insert(header::RETRY_AFTER, (wait.as_secs_f64().ceil() as u64).into());
         }
         if code == ErrorCode::Unauthenticated {
-            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"mrol\""));
+            headers.insert(header::WWW_AUTHENTICATE, challenge(reason));
         }
         if let Some(allow) = self.allow.and_then(|methods| methods.parse().ok()) {
             headers.insert(header::ALLOW, allow);
         }
         response
     }
+}
+
+/// What an unknown caller is to show (RFC 6750, section 3): there is an error only where something was shown.
+fn challenge(reason: &str) -> HeaderValue {
+    HeaderValue::from_static(match reason {
+        KEY_UNKNOWN => "Bearer realm=\"mrol\", error=\"invalid_token\"",
+        _ => "Bearer realm=\"mrol\"",
+    })
 }
 
 /// The answer where no route is.

@@ -35,8 +35,14 @@ pub(crate) async fn over_http(
 ) -> Outcome {
     let (method, path) = (route.method.parse().unwrap(), route.path.replace("{map}", map));
     let answer = server.http(method, &path, key, body(operation)).await;
-    let (status, challenge) = (answer.status(), answer.headers().contains_key(WWW_AUTHENTICATE));
-    assert_eq!(challenge, status == StatusCode::UNAUTHORIZED, "{operation:?}");
+    let status = answer.status();
+    let challenge = answer.headers().get(WWW_AUTHENTICATE).map(|challenge| challenge.to_str().unwrap());
+    let expected = if key.is_some() {
+        r#"Bearer realm="mrol", error="invalid_token""#
+    } else {
+        r#"Bearer realm="mrol""#
+    };
+    assert_eq!(challenge, (status == StatusCode::UNAUTHORIZED).then_some(expected), "{operation:?}");
     let error: Value = answer.json().await.unwrap_or_default();
     let text = |field: &str| error["error"][field].as_str().unwrap_or_default().to_owned();
     match status {
