@@ -6,7 +6,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Daemon, bits_of, corner, guess_pb, points_pb, query_pb, row, scan_pb};
+use common::{Daemon, PATIENCE, bits_of, corner, guess_pb, points_pb, query_pb, row, scan_pb};
 use mrol::wire::pb;
 use pb::delete_voxels_request::Target;
 use pb::region::Shape;
@@ -283,14 +283,17 @@ async fn a_scan_from_elsewhere_is_refused_by_an_answer_and_aligning_changes_noth
 
 #[tokio::test]
 async fn a_read_waits_for_its_revision_or_its_deadline() {
+    let later = || pb::QueryPointsRequest { min_revision: Some(1), ..query_pb("a", &row(3)) };
     let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = 0.2).await;
     daemon.make_map("a").await;
-    let later = || pb::QueryPointsRequest { min_revision: Some(1), ..query_pb("a", &row(3)) };
-    let mut planner = daemon.occupancy().await;
-    let bounded = planner.query_points(later()).await.unwrap_err();
+    let bounded = daemon.occupancy().await.query_points(later()).await.unwrap_err();
     assert_eq!(bounded.code(), Code::DeadlineExceeded);
     assert!(bounded.message().contains('1'), "{bounded}");
 
+    let patience = PATIENCE.as_secs_f64();
+    let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = patience).await;
+    daemon.make_map("a").await;
+    let mut planner = daemon.occupancy().await;
     let mut hurried = Request::new(later());
     hurried.set_timeout(Duration::from_millis(60));
     let hurried = planner.query_points(hurried).await.unwrap_err();

@@ -5,12 +5,15 @@
 mod common;
 mod process;
 
+use std::fs::{self, File};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use common::{Daemon, PATIENCE, bytes_of, client, identity_json, json_of, query_pb, row, scan_pb};
 use mrol::config::Config;
 use mrol::server::Server;
 use mrol::wire::pb;
+use process::Process;
 use reqwest::StatusCode;
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -102,7 +105,7 @@ async fn what_is_in_flight_is_finished_and_what_is_new_is_refused() {
 async fn told_a_second_time_it_ends_at_once() {
     let data = tempfile::tempdir().unwrap();
     // Longer than the test has patience.
-    let server = process::Process::start(data.path().to_str().unwrap(), &["--drain-seconds", "3600"]);
+    let server = Process::start(data.path().to_str().unwrap(), &["--drain-seconds", "3600"]);
     let address = server.http.strip_prefix("http://").unwrap();
     // A request in flight: its body is waited for, and never comes.
     let mut stuck = TcpStream::connect(address).await.unwrap();
@@ -303,4 +306,21 @@ async fn an_address_that_is_taken_is_named() {
     config.grpc.listen = daemon.grpc;
     let error = Server::bind(config).await.unwrap_err().to_string();
     assert!(error.contains(&format!("grpc cannot listen on {}", daemon.grpc)), "{error}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn with_few_open_files_it_keeps_fewer_connections_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("log");
+    let mut serve = Command::new("sh");
+    serve.args(["-c", "ulimit -n 512 && exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_mrol")]);
+    serve.args(["serve", "--json", "--data-dir", "", "--log-level", "warn"]);
+    serve.args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"]);
+    serve.stderr(File::create(&log).expect("a log"));
+    Process::of(serve).stop();
+    let said = fs::read_to_string(&log).expect("a log");
+    for part in ["fewer open files", "open_files=512", "needed=4608", "connections_max=128"] {
+        assert!(said.contains(part), "{part} is not in {said}");
+    }
 }

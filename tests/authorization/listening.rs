@@ -1,10 +1,14 @@
 //! Off loopback, a server without keys does not start.
 
+use std::fs::{self, File};
+use std::process::Command;
+
 use mrol::access::Scope;
 use mrol::config::Config;
 use mrol::server::{Server, ServerError};
 
 use crate::keyring::Keyring;
+use crate::process::Process;
 
 fn everywhere() -> Config {
     let mut config = Config { data_dir: "".into(), ..Config::default() };
@@ -61,4 +65,23 @@ async fn keys_that_cannot_be_read_keep_it_from_starting() {
         assert!(named(&error) && error.contains(problem), "{text:?}: {error}");
         assert!(!error.contains("mrol_1"), "{error}");
     }
+}
+
+#[test]
+fn keys_that_would_travel_in_the_clear_are_warned_of() {
+    let keyring = Keyring::empty();
+    keyring.add("a", Scope::Read, None);
+    let (folder, keys) = (tempfile::tempdir().unwrap(), keyring.file());
+    let log = folder.path().join("log");
+    let said = |grpc: &str| {
+        let mut serve = Command::new(env!("CARGO_BIN_EXE_mrol"));
+        serve.args(["serve", "--json", "--data-dir", "", "--log-level", "warn", "--keys-file"]).arg(&keys);
+        serve.args(["--http-listen", "127.0.0.1:0", "--grpc-listen", grpc]);
+        serve.stderr(File::create(&log).unwrap());
+        Process::of(serve).stop();
+        fs::read_to_string(&log).unwrap()
+    };
+    let warning = said("0.0.0.0:0");
+    assert!(warning.contains("keys travel in the clear") && warning.contains("grpc"), "{warning}");
+    assert_eq!(said("127.0.0.1:0"), "");
 }

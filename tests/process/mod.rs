@@ -23,14 +23,18 @@ impl Process {
 
     /// The same with its log, of `level` and above, in `log`.
     pub fn start_with_log(data_dir: &str, options: &[&str], level: &str, log: Stdio) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_mrol"))
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+        command
             .args(["serve", "--json", "--data-dir", data_dir, "--log-level", level])
             .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
             .args(options)
-            .stdout(Stdio::piped())
-            .stderr(log)
-            .spawn()
-            .expect("the program");
+            .stderr(log);
+        Self::of(command)
+    }
+
+    /// What a command becomes that serves, and says where with `--json`.
+    pub fn of(mut command: Command) -> Self {
+        let mut child = command.stdout(Stdio::piped()).spawn().expect("the program");
         let mut line = String::new();
         let output = child.stdout.take().expect("a pipe");
         BufReader::new(output).read_line(&mut line).expect("a line");
