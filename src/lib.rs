@@ -42,6 +42,7 @@ pub mod admission;
 pub mod align;
 #[cfg(feature = "server")]
 pub mod bench;
+mod bits;
 pub mod bloom;
 #[cfg(feature = "server")]
 pub mod cli;

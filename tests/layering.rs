@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules and their layers, bottom first.
 const LAYERS: [&[&str]; 7] = [
-    &["voxel", "bloom", "geometry"],
+    &["bits", "voxel", "bloom", "geometry"],
     &["map", "align", "scan"],
     &["store"],
     &["service"],

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Probe;
+use crate::bits::for_each_bit;
 
 /// A counter that reached this value no longer counts: it stays until the filter is rebuilt.
 pub(super) const COUNTER_MAX: u64 = 15;
@@ -84,12 +85,4 @@ impl Counters {
 #[inline(always)]
 fn place_of(bit: u32) -> (usize, u32) {
     ((bit / COUNTERS_PER_WORD) as usize, bit % COUNTERS_PER_WORD * COUNTER_BITS)
-}
-
-#[inline(always)]
-fn for_each_bit(mut mask: u64, mut f: impl FnMut(u32)) {
-    while mask != 0 {
-        f(mask.trailing_zeros());
-        mask &= mask - 1;
-    }
 }

@@ -1,6 +1,6 @@
 //! What adding voxels to a shard comes to.
 
-use super::bulk::{change_each, count_each, find_each, show_each};
+use super::bulk::{change_each, count_each, find_each, insert_each, show_each};
 use super::room::Room;
 use super::shard::{Block, Shard, levels_of};
 use crate::bloom::{CountingBloomFilter, Probe};
@@ -41,9 +41,6 @@ enum OfLevel {
     Grown(CountingBloomFilter),
 }
 
-/// Keys of a larger filter that are counted before they are shown: what is counted is a list.
-const REBUILT_AT_ONCE: usize = 1024;
-
 impl Addition {
     /// Finds out what adding `blocks` of finest voxels to `shard` comes to, and counts them.
     pub(super) fn plan(shard: &Shard, blocks: &[&Block]) -> Self {
@@ -63,10 +60,10 @@ impl Addition {
         let (mut gains, mut created) = (Vec::new(), Vec::new());
         let mut keys = vec![Vec::new(); levels.len()];
         find_each(table, blocks, |&(block, voxels), slot, before| {
-            let after = before.union(&voxels);
-            if after == before {
+            if voxels.difference(&before).is_empty() {
                 return;
             }
+            let after = before.union(&voxels);
             if slot.is_none() {
                 created.push(block);
             }
@@ -141,10 +138,7 @@ impl OfLevel {
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
         keys.reserve_exact(filter.len());
         shard.level(level as u32).for_each_key(|key| keys.push(key));
-        for keys in keys.chunks(REBUILT_AT_ONCE) {
-            let counted = count_each(&larger, keys, CountingBloomFilter::count_in);
-            show_each(&mut larger, &counted, CountingBloomFilter::set_bits);
-        }
+        insert_each(&mut larger, &keys);
         Self::Grown(larger)
     }
 }

@@ -16,12 +16,14 @@ pub(super) fn find_each(
 ) {
     for blocks in blocks.chunks(AT_ONCE) {
         blocks.iter().for_each(|block| fetch(table.home(block.0)));
-        let mut found = [(None, BlockMask::EMPTY); AT_ONCE];
+        let mut found = [None; AT_ONCE];
         for (found, block) in found.iter_mut().zip(blocks) {
-            let slot = table.find(block.0);
-            *found = (slot, slot.map_or(BlockMask::EMPTY, |slot| *table.at(slot)));
+            *found = table.find(block.0);
+            found.iter().for_each(|&slot| fetch(table.at(slot)));
         }
-        blocks.iter().zip(found).for_each(|(block, (slot, voxels))| f(block, slot, voxels));
+        for (block, slot) in blocks.iter().zip(found) {
+            f(block, slot, slot.map_or(BlockMask::EMPTY, |slot| *table.at(slot)));
+        }
     }
 }
 
@@ -54,6 +56,22 @@ pub(super) fn count_each(
         probes.iter_mut().for_each(|probe| *probe = count(filter, *probe));
     }
     probes
+}
+
+/// Adds keys to a filter that nobody reads yet.
+pub(super) fn insert_each(filter: &mut CountingBloomFilter, keys: &[u64]) {
+    let mut probes = [Probe::default(); AT_ONCE];
+    for keys in keys.chunks(AT_ONCE) {
+        for (probe, &key) in probes.iter_mut().zip(keys) {
+            *probe = filter.probe(key);
+            fetch(filter.counters_at(*probe));
+            fetch(filter.plane_at(*probe));
+        }
+        for &probe in &probes[..keys.len()] {
+            let counted = filter.count_in(probe);
+            filter.set_bits(counted);
+        }
+    }
 }
 
 /// Sets or clears what was counted.

@@ -43,8 +43,8 @@ impl Removal {
         let (mut losses, mut emptied) = (Vec::new(), Vec::new());
         let mut keys = vec![Vec::new(); levels.len()];
         find_each(&shard.tiers[tier], blocks, |&(block, ref voxels), slot, before| {
+            let Some(slot) = slot.filter(|_| !before.intersection(voxels).is_empty()) else { return };
             let left = before.difference(voxels);
-            let Some(slot) = slot.filter(|_| left != before) else { return };
             losses.push(Loss { block, slot, left });
             if left.is_empty() {
                 emptied.push(block);

@@ -1,6 +1,7 @@
 //! Blocks of 8 x 8 x 8 voxels: three levels of the map in one 512-bit mask.
 
 use super::{Moments, VoxelKey};
+use crate::bits::for_each_bit;
 
 /// Levels that one block's mask holds.
 pub const BLOCK_LEVELS: u32 = 3;
@@ -147,7 +148,8 @@ impl BlockMask {
     /// True when no voxel is occupied.
     #[inline]
     pub fn is_empty(&self) -> bool {
-        self.0 == [0; WORDS]
+        // A comparison of arrays would be a call.
+        self.0.iter().fold(0, |any, word| any | word) == 0
     }
 
     /// Number of occupied voxels at `level` (0, 1 or 2).
@@ -216,22 +218,39 @@ impl BlockMask {
     #[inline]
     pub(crate) fn for_each_key(&self, block: VoxelKey, level: u32, mut f: impl FnMut(u64)) {
         let first = block.first_within(BLOCK_LEVELS - level).to_bits();
-        for (w, &word) in self.0.iter().enumerate() {
-            let mut rest = word;
-            while rest != 0 {
-                let cell = w << 6 | rest.trailing_zeros() as usize;
-                // A first cell's offset has no bit below the level's own, so nothing moves to another axis.
-                f(first | OFFSETS[cell] >> level);
-                rest &= rest - 1;
+        // A first cell's offset has no bit below the level's own, so nothing moves to another axis.
+        let mut of_cell = |cell: u32| f(first | OFFSETS[cell as usize] >> level);
+        // As few loops as the level has words of bits: each that ends is a branch that was not foreseen.
+        match level {
+            0 => {
+                for_each_bit(self.words(), |w| for_each_bit(self.0[w as usize], |bit| of_cell(w << 6 | bit)))
             }
+            1 => for_each_bit(self.bytes(), |byte| of_cell(byte << 3)),
+            _ => for_each_bit(self.words(), |w| of_cell(w << 6)),
         }
     }
+
+    /// A bit for each word that is not zero.
+    #[inline(always)]
+    fn words(&self) -> u64 {
+        (0..WORDS).fold(0, |words, w| words | u64::from(self.0[w] != 0) << w)
+    }
+
+    /// The low bit of each byte.
+    #[inline(always)]
+    fn bytes(&self) -> u64 {
+        // The product brings bit 8 i to bit 56 + i, and nothing else there.
+        let low_bits = |word: u64| (word & BYTE_LOW).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        (0..WORDS).fold(0, |bytes, w| bytes | low_bits(self.0[w]) << (8 * w))
+    }
 }
+
+/// The low bit of each byte.
+const BYTE_LOW: u64 = 0x0101_0101_0101_0101;
 
 /// One bit for each voxel of `level` with an occupied descendant in `word`: the lowest bit it covers.
 #[inline(always)]
 fn first_of_each(word: u64, level: u32) -> u64 {
-    const BYTE_LOW: u64 = 0x0101_0101_0101_0101;
     match level {
         0 => word,
         1 => {
