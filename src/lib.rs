@@ -55,6 +55,7 @@ pub mod geometry;
 pub mod grpc;
 #[cfg(feature = "server")]
 pub mod http;
+pub mod interest;
 #[cfg(feature = "server")]
 pub mod lifecycle;
 pub mod map;

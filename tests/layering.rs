@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules and their layers, bottom first.
 const LAYERS: [&[&str]; 7] = [
-    &["bits", "voxel", "bloom", "geometry"],
+    &["bits", "voxel", "bloom", "geometry", "interest"],
     &["map", "align", "scan"],
     &["store"],
     &["service"],

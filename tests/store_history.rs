@@ -14,6 +14,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
+use mrol::interest::Interest;
 use mrol::map::{
     Change, DeletionRecord, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
     UndoRecord,
@@ -162,7 +163,9 @@ impl Kept {
     /// False where the journal does not reach back to the scans.
     fn undo(&self, scans: &[u64]) -> bool {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
-        let Some((observations, seen)) = self.folder.observations(scans, &withdrawn).unwrap() else {
+        let Some((observations, seen)) =
+            self.folder.observations(scans, &withdrawn, Interest::LASTING).unwrap()
+        else {
             let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
             assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());
             return false;

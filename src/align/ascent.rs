@@ -5,6 +5,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use super::AlignmentSettings;
 use super::overlap::Overlap;
 use crate::geometry::Pose;
+use crate::interest::Interest;
 use crate::voxel::Lattice;
 
 /// How far one move shifts or turns the sensor.
@@ -57,11 +58,20 @@ impl From<Pose> for Ascent {
 
 impl Ascent {
     /// Moves to the neighbour of highest overlap until none is higher than where it stands (a tie keeps the
-    /// pose), or `iterations_max` moves were made.
-    pub(super) fn climb(&mut self, overlap: &Overlap<'_>, steps: Steps, iterations_max: u32) {
+    /// pose), `iterations_max` moves were made, or nobody wants to know.
+    pub(super) fn climb(
+        &mut self,
+        overlap: &Overlap<'_>,
+        steps: Steps,
+        iterations_max: u32,
+        interest: Interest<'_>,
+    ) {
         let mut height = overlap.at(std::slice::from_ref(&self.pose))[0];
         self.lookups += overlap.lookups();
         for _ in 0..iterations_max {
+            if interest.is_lost() {
+                return;
+            }
             let candidates = neighbours(&self.pose, steps);
             let heights = overlap.at(&candidates);
             self.lookups += overlap.lookups() * candidates.len() as u64;

@@ -21,6 +21,7 @@ pub use settings::{
 pub use verdict::{Alignment, Verdict};
 
 use crate::geometry::{Point, Pose, pose_difference};
+use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
 use crate::voxel::volumetric_sample;
 use ascent::{Ascent, Steps};
@@ -53,18 +54,20 @@ struct SampledScan<'a> {
     sample: Vec<Point>,
     /// More of them, for the refinement and the verdict.
     surface_sample: Vec<Point>,
+    /// In its pose: whoever climbs asks.
+    interest: Interest<'a>,
 }
 
 impl<'a> SampledScan<'a> {
     /// 1) Take a volumetric sample of points.
-    fn new(points: &'a [Point], settings: &AlignmentSettings) -> Self {
+    fn new(points: &'a [Point], settings: &AlignmentSettings, interest: Interest<'a>) -> Self {
         let fine = volumetric_sample(
             points,
             settings.refinement.sample_points.max(settings.sample_points),
             settings.seed,
         );
         let sample = volumetric_sample(&fine.points, settings.sample_points, settings.seed).points;
-        Self { points, sample, surface_sample: fine.points }
+        Self { points, sample, surface_sample: fine.points, interest }
     }
 }
 
@@ -77,12 +80,23 @@ pub fn align(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    let scan = SampledScan::new(points, settings);
+    align_while(map, points, guess, settings, Interest::LASTING)
+}
+
+/// The same, which ends where it stands once nobody wants the pose: what it returns then means nothing.
+pub fn align_while(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    guess: &Pose,
+    settings: &AlignmentSettings,
+    interest: Interest<'_>,
+) -> Alignment {
+    let scan = SampledScan::new(points, settings, interest);
     let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
     let found = match found.is_doubtful(guess, map, settings) {
-        true => wide_start::align(map, &scan, guess, found, settings),
-        false => found,
+        true if !interest.is_lost() => wide_start::align(map, &scan, guess, found, settings),
+        _ => found,
     };
     found.within_reach_of(guess, map, settings)
 }
@@ -94,7 +108,7 @@ pub fn judge_at(
     map_from_sensor: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    let scan = SampledScan::new(points, settings);
+    let scan = SampledScan::new(points, settings, Interest::LASTING);
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
@@ -105,7 +119,7 @@ pub fn ascend(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Pose {
-    let scan = SampledScan::new(points, settings);
+    let scan = SampledScan::new(points, settings, Interest::LASTING);
     let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
     climb_sub_voxel(voxels, &scan, &mut ascent, settings);
     ascent.pose
@@ -126,7 +140,7 @@ fn climb(
             Method::Overlap | Method::Refined => Overlap::new(voxels, &scan.sample, level, settings.lookup),
         };
         let steps = Steps::of_level(level, voxels.lattice(), settings);
-        ascent.climb(&overlap, steps, settings.iterations_per_level_max);
+        ascent.climb(&overlap, steps, settings.iterations_per_level_max, scan.interest);
     }
     ascent
 }
@@ -141,7 +155,7 @@ fn climb_sub_voxel(
     let overlap = Overlap::new(voxels, scan.points, 0, settings.lookup);
     for halvings in 0..=settings.sub_voxel_halvings {
         let steps = Steps::sub_voxel(voxels.lattice(), settings).halved(halvings);
-        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max);
+        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max, scan.interest);
     }
 }
 
@@ -155,7 +169,7 @@ fn finish(
     let climbed = ascent.pose;
     match settings.method {
         Method::Refined => {
-            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement);
+            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement, scan.interest);
             ascent.pose = refined.map_from_sensor;
             ascent.iterations += refined.iterations;
         }

@@ -11,6 +11,7 @@ use tonic::{Code, Status};
 use tracing::Instrument;
 
 use super::inflation::{Compressed, Inflation};
+use super::timely_body::TimelyBody;
 use super::{deadline, status};
 use crate::access::{Authorized, Gate, Operation};
 use crate::admission::Admission;
@@ -46,6 +47,7 @@ impl Around {
         if let Some(key) = key {
             self.gate.metrics().key_used("grpc", key);
         }
+        let begin = Instant::now();
         let (deadline, compressed) = (deadline::of(call.headers()), Compressed::of(call.headers()));
         call.extensions_mut().insert(compressed);
         let handle = |call| deadline::within(deadline, self.inflation.within(compressed, next.run(call)));
@@ -53,7 +55,10 @@ impl Around {
         let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
         match Status::from_header_map(response.headers()) {
             Some(refused) => status::naming_the_limit(refused, self.message_bytes_max).into_http(),
-            None => response,
+            None => match deadline {
+                Some(deadline) => TimelyBody::wrap(response, deadline, begin),
+                None => response,
+            },
         }
     }
 }

@@ -23,10 +23,13 @@ pub(super) async fn within<T>(
 ) -> Result<T, ServiceError> {
     let Some(deadline) = deadline else { return Ok(answer.await) };
     let ahead = AHEAD_MAX.min(deadline / AHEAD_PART);
-    tokio::time::timeout(deadline - ahead, answer).await.map_err(|_| {
-        let message = format!("the call's deadline of {deadline:?} was reached");
-        ServiceError::new(ErrorCode::DeadlineExceeded, "deadline", message)
-    })
+    tokio::time::timeout(deadline - ahead, answer).await.map_err(|_| reached(deadline))
+}
+
+/// What to say of a call whose deadline has come.
+pub(super) fn reached(deadline: Duration) -> ServiceError {
+    let message = format!("the call's deadline of {deadline:?} was reached");
+    ServiceError::new(ErrorCode::DeadlineExceeded, "deadline", message)
 }
 
 /// The deadline of a call: up to eight digits and a unit; none where there is none or it cannot be read.

@@ -8,6 +8,7 @@ mod maps;
 mod occupancy;
 mod status;
 mod stream;
+mod timely_body;
 
 use prost::Message;
 use tonic::Request;

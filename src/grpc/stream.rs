@@ -56,8 +56,11 @@ impl Adapter {
             compressed,
             message_bytes_max: self.message_bytes_max,
         };
+        let caller = outbox.clone();
         tokio::spawn(async move {
             tokio::select! {
+                // Nobody waits for the request in hand.
+                () = caller.closed() => {}
                 // The worker's end ends the reader too.
                 () = worker.run(read, outbox) => {}
                 () = reader.run(inbox) => {}

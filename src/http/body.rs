@@ -98,7 +98,12 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
     if body.len() <= PARSED_INLINE_MAX {
         return parse(&body);
     }
-    tokio::task::spawn_blocking(move || parse(&body)).await.unwrap_or_else(|_| {
+    let parsed = tokio::task::spawn_blocking(move || {
+        // It takes its memory to the end, whether or not somebody waits for it still.
+        let _counted = arrival;
+        parse(&body)
+    });
+    parsed.await.unwrap_or_else(|_| {
         Err(ServiceError::new(ErrorCode::Internal, "parser_failed", "the body could not be parsed").into())
     })
 }

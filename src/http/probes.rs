@@ -48,6 +48,6 @@ pub(super) async fn metrics(Service(service): Service) -> impl IntoResponse {
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    let text = service.metrics().render(&maps);
+    let text = service.metrics().render(&service.maps().pools(), &maps);
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text)
 }

@@ -121,27 +121,31 @@ impl<'a> MapView<'a> {
         found.collect()
     }
 
-    /// The voxels of `level` whose centres lie in `region`, shard by shard.
+    /// The voxels of `level` whose centres lie in `region`.
+    pub fn voxels_in(&self, region: &Region, level: u32) -> Vec<VoxelKey> {
+        self.voxels_by_shard(region, level).flatten().collect()
+    }
+
+    /// The same shard by shard, each when it is asked for.
     ///
     /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer.
-    pub fn voxels_in(&self, region: &Region, level: u32) -> Vec<VoxelKey> {
+    pub fn voxels_by_shard(&self, region: &Region, level: u32) -> impl Iterator<Item = Vec<VoxelKey>> {
         let (_, up) = tier_of(level);
         let candidates = block_bounds(region, self.map.lattice.resolution_m(level - up));
         let volume: f64 = candidates
             .iter()
             .map(|(low, high)| (f64::from(*high) - f64::from(*low) + 1.0).max(0.0))
             .product();
-        let mut found = Vec::new();
-        for list in self.lists(level) {
-            let blocks = list.blocks();
+        self.lists(level).map(move |list| {
+            let (blocks, mut found) = (list.blocks(), Vec::new());
             if volume < blocks.len() as f64 {
                 let candidates = grid(candidates).map(|block| (block, blocks.get(block)));
                 candidates.for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
             } else {
                 blocks.iter().for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
             }
-        }
-        found
+            found
+        })
     }
 
     fn collect(

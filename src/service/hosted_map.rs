@@ -14,12 +14,13 @@ use super::committing::{Committing, Stop};
 use super::room::Room;
 use super::{
     ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, TrajectoryAnswer,
-    VoxelListing,
+    VoxelListing, wanted,
 };
 use crate::geometry::{Point, Pose};
+use crate::interest::Interest;
 use crate::map::{MapName, MultiResolutionMap, Region, RobotName, TrajectoryPose};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError};
-use crate::voxel::LatticeFromPoints;
+use crate::voxel::{LatticeFromPoints, VoxelKey};
 
 /// Which maps to write snapshots of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +50,9 @@ pub(super) struct HostedMap {
 
 /// Robots whose turns are remembered before those that nobody waits for are dropped.
 const TURNS_KEPT: usize = 1024;
+/// Points that are looked up before it is asked whether somebody waits for the answer: a millisecond or less. A multiple
+/// of the bits in a word.
+const POINTS_PER_STEP: usize = 64 << 10;
 /// Of the sample on which false positives are measured: the same map gives the same figures.
 const RATE_SEED: u64 = 1;
 
@@ -177,13 +181,21 @@ impl HostedMap {
         Err(ServiceError::new(ErrorCode::FailedPrecondition, "map_replaced", message))
     }
 
-    pub(super) fn query(&self, query: &PointQuery) -> Result<PointAnswer, ServiceError> {
+    pub(super) fn query(
+        &self,
+        query: &PointQuery,
+        interest: Interest<'_>,
+    ) -> Result<PointAnswer, ServiceError> {
         let points = query.points.as_slice();
         let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
         let quantise = self.map.lattice().from_points(&map_from_points);
         let mut occupied = vec![0; points.len().div_ceil(64)];
         let view = self.map.view_of(points, &map_from_points);
-        let all_have_a_voxel = view.query(points, &quantise, query.level, query.lookup, &mut occupied);
+        let mut all_have_a_voxel = true;
+        for (points, words) in points.chunks(POINTS_PER_STEP).zip(occupied.chunks_mut(POINTS_PER_STEP / 64)) {
+            wanted(interest)?;
+            all_have_a_voxel &= view.query(points, &quantise, query.level, query.lookup, words);
+        }
         let state = self.state(view.revision());
         drop(view);
         if !all_have_a_voxel {
@@ -214,18 +226,20 @@ impl HostedMap {
         level: u32,
         region: Option<&Region>,
         most: usize,
+        interest: Interest<'_>,
     ) -> Result<VoxelListing, ServiceError> {
         let view = self.map.view();
-        let keys: Vec<_> = match region {
-            Some(region) => view.voxels_in(region, level),
-            None => view.lists(level).flat_map(|list| list.iter()).collect(),
+        let by_shard: Box<dyn Iterator<Item = Vec<VoxelKey>>> = match region {
+            Some(region) => Box::new(view.voxels_by_shard(region, level)),
+            None => Box::new(view.lists(level).map(|list| list.iter().collect())),
         };
-        if keys.len() > most {
-            let message = format!(
-                "level {level} has {} voxels there, listed_voxels_max is {most}: ask for a region or a coarser level",
-                keys.len()
-            );
-            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "listing_too_large", message));
+        let mut keys = Vec::new();
+        for more in by_shard {
+            wanted(interest)?;
+            keys.extend(more);
+            if keys.len() > most {
+                return Err(listing_too_large(level, keys.len(), most));
+            }
         }
         let resolution_m = self.map.lattice().resolution_m(level);
         Ok(VoxelListing { resolution_m, keys, state: self.state(view.revision()) })
@@ -274,6 +288,13 @@ impl HostedMap {
             failure: self.failure().map(str::to_owned),
         })
     }
+}
+
+fn listing_too_large(level: u32, found: usize, most: usize) -> ServiceError {
+    let message = format!(
+        "level {level} has {found} voxels there or more, listed_voxels_max is {most}: ask for a region or a coarser level"
+    );
+    ServiceError::new(ErrorCode::ResourceExhausted, "listing_too_large", message)
 }
 
 /// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.

@@ -1,18 +1,17 @@
 //! Where a robot with no guess is in a map.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
-use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings};
+use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings, wanted};
 use crate::align::Verdict;
 use crate::align::localize::{
     Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
-    LocalizationSettings, localize,
+    LocalizationSettings, SearchProgress, localize_while,
 };
 use crate::geometry::{Point, Pose};
+use crate::interest::Interest;
 
 /// Candidates of a request that does not say.
 pub const CANDIDATES_DEFAULT: usize = 5;
@@ -139,31 +138,13 @@ impl LocalizationRequest {
     }
 }
 
-/// Tells work that nobody waits for it any more: the request that holds this was dropped.
-#[derive(Debug, Default)]
-pub(super) struct Caller(Arc<AtomicBool>);
-
-impl Caller {
-    /// True, from any thread, once the caller has gone.
-    pub(super) fn gone(&self) -> impl Fn() -> bool + Send + 'static {
-        let gone = Arc::clone(&self.0);
-        move || gone.load(Ordering::Relaxed)
-    }
-}
-
-impl Drop for Caller {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
 impl HostedMap {
     /// Searches the map for the scan's place, until the time is up or the caller gone.
     pub(super) fn localize(
         &self,
         request: &LocalizationRequest,
         settings: &ServiceSettings,
-        caller_gone: impl Fn() -> bool,
+        interest: Interest<'_>,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let start = Instant::now();
         let time_limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
@@ -176,13 +157,13 @@ impl HostedMap {
         }
         let grid_bytes_max = settings.limits.localization_grid_bytes_max;
         let search = LocalizationSettings { grid_bytes_max, ..LocalizationSettings::default() };
-        let found = localize(&self.map, &points, &request.query, &search, &settings.alignment, &mut |_| {
-            if caller_gone() || start.elapsed() >= time_limit {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        })?;
+        let watch = &mut |_: &SearchProgress| match start.elapsed() >= time_limit {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let (map, query) = (&self.map, &request.query);
+        let found = localize_while(map, &points, query, &search, &settings.alignment, watch, interest)?;
+        wanted(interest)?;
         let state = self.state(found.revision);
         Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
     }

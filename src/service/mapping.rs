@@ -7,10 +7,11 @@ use super::committing::{Prepared, Proposal, Step, Turn, record_of};
 use super::hosted_map::{HostedMap, bitmap};
 use super::room::Room;
 use super::{
-    ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings,
+    ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings, wanted,
 };
-use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align, judge_at};
+use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align_while, judge_at};
 use crate::geometry::{Point, Pose, extrapolate, pose_difference, rotation_xyzw, translation_m};
+use crate::interest::Interest;
 use crate::map::{Change, Committed, Lookup, ScanRecord, TrajectoryPose};
 use crate::scan::PointFilter;
 
@@ -39,6 +40,7 @@ impl HostedMap {
         turn: Turn,
         settings: &ServiceSettings,
         room: &Room,
+        interest: Interest<'_>,
     ) -> Result<Step<ScanAnswer>, ServiceError> {
         self.check_writable()?;
         let scan = UsableScan::of(request, settings)?;
@@ -47,7 +49,7 @@ impl HostedMap {
         }
         self.check_voxels(settings)?;
         room.check_to_grow()?;
-        let placement = self.place(&scan, settings)?;
+        let placement = self.place(&scan, settings, interest)?;
         let answer = self.answer(&scan, &placement);
         if !answer.accepted && !request.force {
             return Ok(Step::Answered(answer));
@@ -92,10 +94,11 @@ impl HostedMap {
         &self,
         request: &ScanRequest,
         settings: &ServiceSettings,
+        interest: Interest<'_>,
     ) -> Result<ScanAnswer, ServiceError> {
         request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
         let scan = UsableScan::of(request, settings)?;
-        let placement = self.place(&scan, settings)?;
+        let placement = self.place(&scan, settings, interest)?;
         let foreground = request
             .foreground_level
             .map(|level| self.foreground(&scan, &placement.alignment.map_from_sensor, level));
@@ -142,7 +145,12 @@ impl HostedMap {
     }
 
     /// Decides where the scan goes.
-    fn place(&self, scan: &UsableScan<'_>, settings: &ServiceSettings) -> Result<Placement, ServiceError> {
+    fn place(
+        &self,
+        scan: &UsableScan<'_>,
+        settings: &ServiceSettings,
+        interest: Interest<'_>,
+    ) -> Result<Placement, ServiceError> {
         let request = scan.request;
         let start = Instant::now();
         let method = request.method.unwrap_or(settings.alignment.method);
@@ -154,8 +162,9 @@ impl HostedMap {
         } else if request.at_guess {
             judge_at(&self.map, &scan.points, &guess, &settings).on_the_callers_word()
         } else {
-            align(&self.map, &scan.points, &guess, &settings)
+            align_while(&self.map, &scan.points, &guess, &settings, interest)
         };
+        wanted(interest)?;
         Ok(Placement { alignment, align_time: start.elapsed(), as_first: first && !request.at_guess })
     }
 

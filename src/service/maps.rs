@@ -7,6 +7,7 @@ use bytes::Bytes;
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
 use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError};
+use crate::interest::Interest;
 use crate::map::{MapName, MapSettings};
 
 /// Absent neighbours of occupied voxels on which a description measures each level's false positives.
@@ -48,7 +49,7 @@ impl MapService {
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let maps = self.inner.catalogue.within(&self.reach);
-        let describe = move || maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
+        let describe = move |_: Interest<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
         self.inner.queries.run(describe).await
     }
 
@@ -73,7 +74,7 @@ impl MapService {
     /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, or there is no memory for it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
-        self.inner.queries.run(move || map.to_file(&inner.room)).await?
+        self.inner.queries.run(move |interest| map.to_file(&inner.room, interest)).await?
     }
 
     /// Makes a map from a map file, under a uuid of its own.
@@ -86,7 +87,7 @@ impl MapService {
         let name = self.reach.check(&name)?;
         self.inner.room.check_to_grow()?;
         let inner = Arc::clone(&self.inner);
-        let snapshot = self.inner.mapping.run(move || from_file(&file, &inner.settings.limits)).await??;
+        let snapshot = self.inner.mapping.run(move |_| from_file(&file, &inner.settings.limits)).await??;
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
         let map = to_its_end(async move { inner.catalogue.restore(name, snapshot, maps_max).await }).await?;
@@ -116,7 +117,7 @@ impl MapService {
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
-        self.inner.queries.run(move || map.describe(RATE_SAMPLES)).await
+        self.inner.queries.run(move |_| map.describe(RATE_SAMPLES)).await
     }
 }
 

@@ -29,6 +29,7 @@ pub use limits::Limits;
 pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, TIME_LIMIT_DEFAULT,
 };
+pub use pool::PoolUse;
 pub use reach::MapReach;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
@@ -41,12 +42,12 @@ pub use watermarks::Marks;
 
 use std::sync::Arc;
 
+use crate::interest::Interest;
 use crate::map::{MapName, Region, RobotName};
 use crate::store::OpeningProgress;
 use catalogue::Catalogue;
 use committing::{Refusal, Step};
 use hosted_map::HostedMap;
-use localization::Caller;
 use pool::Pool;
 use room::Room;
 
@@ -84,9 +85,9 @@ impl MapService {
         let waiting = settings.limits.jobs_waiting_max;
         let inner = Inner {
             catalogue: Catalogue::open(settings.data_dir.as_deref(), &settings.store, progress)?,
-            queries: Pool::new("mrol-query", settings.query_threads, waiting)?,
-            mapping: Pool::new("mrol-mapping", settings.mapping_threads, waiting)?,
-            localization: Pool::new("mrol-localization", settings.localization_threads, waiting)?,
+            queries: Pool::new("query", settings.query_threads, waiting)?,
+            mapping: Pool::new("mapping", settings.mapping_threads, waiting)?,
+            localization: Pool::new("localization", settings.localization_threads, waiting)?,
             room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()),
             settings,
         };
@@ -118,6 +119,12 @@ impl MapService {
         self.inner.room.shortages()
     }
 
+    /// What the threads for work that uses the CPU are doing.
+    pub fn pools(&self) -> [PoolUse; 3] {
+        let Inner { queries, mapping, localization, .. } = &*self.inner;
+        [queries, mapping, localization].map(Pool::in_use)
+    }
+
     /// Says of each point whether its voxel is occupied, all at one revision.
     ///
     /// # Errors
@@ -133,9 +140,9 @@ impl MapService {
             map.reached(revision, self.limits().min_revision_wait_max).await?;
         }
         if query.points.len() <= pool::INLINE_POINTS {
-            return map.query(&query);
+            return map.query(&query, Interest::LASTING);
         }
-        self.inner.queries.run(move || map.query(&query)).await?
+        self.inner.queries.run(move |interest| map.query(&query, interest)).await?
     }
 
     /// Aligns a scan and, where it fits, adds it.
@@ -152,8 +159,10 @@ impl MapService {
         }
         let turn = Arc::new(map.turn_of(&scan.robot).await);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
-        self.carry_through(move || map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room))
-            .await
+        self.carry_through(move |interest| {
+            map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, interest)
+        })
+        .await
     }
 
     /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
@@ -164,7 +173,7 @@ impl MapService {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let inner = Arc::clone(&self.inner);
-        self.inner.mapping.run(move || map.align_scan(&scan, &inner.settings)).await?
+        self.inner.mapping.run(move |interest| map.align_scan(&scan, &inner.settings, interest)).await?
     }
 
     /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
@@ -181,9 +190,8 @@ impl MapService {
         let map = self.map(map)?;
         let request = request.within(self.limits())?;
         let inner = Arc::clone(&self.inner);
-        let caller = Caller::default();
-        let gone = caller.gone();
-        self.inner.localization.run(move || map.localize(&request, &inner.settings, gone)).await?
+        let search = move |interest: Interest<'_>| map.localize(&request, &inner.settings, interest);
+        self.inner.localization.run(search).await?
     }
 
     /// Takes voxels out, with all their descendants.
@@ -204,7 +212,7 @@ impl MapService {
             DeletionTarget::Region(_) => {}
         }
         let (inner, deletion) = (Arc::clone(&self.inner), Arc::new(deletion));
-        self.carry_through(move || map.propose_deletion(&deletion, &inner.room)).await
+        self.carry_through(move |_| map.propose_deletion(&deletion, &inner.room)).await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -217,7 +225,7 @@ impl MapService {
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let inner = Arc::clone(&self.inner);
-        self.carry_through(move || map.propose_undo(&undo, &inner.room)).await
+        self.carry_through(move |interest| map.propose_undo(&undo, &inner.room, interest)).await
     }
 
     /// The poses of the accepted scans, of one robot or of all.
@@ -246,13 +254,14 @@ impl MapService {
         let map = self.map(map)?;
         map.check_level(level)?;
         let most = self.limits().listed_voxels_max;
-        self.inner.queries.run(move || map.list(level, region.as_ref(), most)).await?
+        self.inner.queries.run(move |interest| map.list(level, region.as_ref(), most, interest)).await?
     }
 
-    /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile.
+    /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile. Whoever goes
+    /// before it is proposed takes it along; after that it is made.
     async fn carry_through<A: Send + 'static>(
         &self,
-        propose: impl Fn() -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
+        propose: impl Fn(Interest<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
             match self.inner.mapping.run(propose.clone()).await?? {
@@ -268,6 +277,19 @@ impl MapService {
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
         self.inner.catalogue.get(&self.reach.check(name)?)
+    }
+}
+
+/// Ends work that nobody waits for.
+///
+/// # Errors
+/// When the caller has gone, who is therefore not told.
+fn wanted(interest: Interest<'_>) -> Result<(), ServiceError> {
+    match interest.is_lost() {
+        true => {
+            Err(ServiceError::new(ErrorCode::DeadlineExceeded, "caller_gone", "nobody waits for the answer"))
+        }
+        false => Ok(()),
     }
 }
 

@@ -1,8 +1,16 @@
 //! Bounded threads for work that uses the CPU, away from the async runtime.
+//!
+//! Jobs wait in the futures of those who want their answers: whoever gives up takes the job along, with all that it holds
+//! in memory and its place among those that wait. A job in hand learns of it by its [`Interest`].
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use tokio::sync::{Semaphore, oneshot};
 
 use super::{ErrorCode, ServiceError};
+use crate::interest::Interest;
 
 /// Queries of up to this many points are answered where they arrive: handing them over would take longer than
 /// answering them.
@@ -11,10 +19,36 @@ pub(super) const INLINE_POINTS: usize = 2000;
 /// A fixed number of threads and a bounded queue before them.
 #[derive(Debug)]
 pub(super) struct Pool {
+    name: &'static str,
     threads: rayon::ThreadPool,
     /// One permit for each job that runs or waits.
-    places: std::sync::Arc<Semaphore>,
+    places: Arc<Semaphore>,
+    /// One permit for each thread that has no job.
+    free: Arc<Semaphore>,
     jobs_waiting_max: usize,
+    counts: Arc<Counts>,
+}
+
+/// Of jobs, since the start.
+#[derive(Debug, Default)]
+struct Counts {
+    begun: AtomicU64,
+    given_up: AtomicU64,
+}
+
+/// What became of the jobs of a pool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PoolUse {
+    /// The pool's: `query`, `mapping` or `localization`.
+    pub name: &'static str,
+    /// Jobs that wait for a thread.
+    pub waiting: usize,
+    /// Jobs in hand.
+    pub running: usize,
+    /// Jobs that a thread took in hand, since the start.
+    pub begun: u64,
+    /// Jobs whose callers went before the answer, while they waited or were in hand, since the start.
+    pub given_up: u64,
 }
 
 impl Pool {
@@ -26,11 +60,18 @@ impl Pool {
     ) -> Result<Self, ServiceError> {
         let threads = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
-            .thread_name(move |i| format!("{name}-{i}"))
+            .thread_name(move |i| format!("mrol-{name}-{i}"))
             .build()
             .map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
-        let places = threads.current_num_threads() + jobs_waiting_max;
-        Ok(Self { threads, places: Semaphore::new(places).into(), jobs_waiting_max })
+        let free = threads.current_num_threads();
+        Ok(Self {
+            name,
+            threads,
+            places: Semaphore::new(free + jobs_waiting_max).into(),
+            free: Semaphore::new(free).into(),
+            jobs_waiting_max,
+            counts: Arc::default(),
+        })
     }
 
     /// Runs `job` on a thread of the pool, first come first served; not at all where the caller does not wait for its
@@ -40,90 +81,159 @@ impl Pool {
     /// `ResourceExhausted` at once when the queue is full; `Internal` when the job panicked.
     pub(super) async fn run<T: Send + 'static>(
         &self,
-        job: impl FnOnce() -> T + Send + 'static,
+        job: impl FnOnce(Interest<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let Ok(place) = self.places.clone().try_acquire_owned() else {
+        let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             let message =
                 format!("jobs_waiting_max is {}: all places are taken, try again", self.jobs_waiting_max);
             return Err(ServiceError::overloaded(message));
         };
+        let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
+        let thread = Arc::clone(&self.free).acquire_owned().await.map_err(|_| failed())?;
         let (answer, answered) = oneshot::channel();
         let span = tracing::Span::current();
-        self.threads.spawn_fifo(move || {
-            let _place = place;
-            if answer.is_closed() {
-                // Who asked has gone while this waited.
-                return;
-            }
-            let job = std::panic::AssertUnwindSafe(|| span.in_scope(job));
+        self.threads.spawn(move || {
+            unanswered.counts.begun.fetch_add(1, Ordering::Relaxed);
+            let caller_gone = || answer.is_closed();
+            let job = AssertUnwindSafe(|| span.in_scope(|| job(Interest::until(&caller_gone))));
+            let done = catch_unwind(job);
+            // Who is answered may ask again at once.
+            drop((place, thread));
             // A panic drops `answer`, which the caller is told; the pool's thread lives on.
-            if let Ok(result) = std::panic::catch_unwind(job) {
-                drop(answer.send(result));
+            if done.map_or(true, |result| answer.send(result).is_ok()) {
+                unanswered.note_answer();
             }
         });
-        answered.await.map_err(|_| {
-            ServiceError::new(ErrorCode::Internal, "job_panicked", "the job failed by a defect of the server")
-        })
+        answered.await.map_err(|_| failed())
     }
+
+    pub(super) fn in_use(&self) -> PoolUse {
+        let running = self.threads.current_num_threads() - self.free.available_permits();
+        let all =
+            self.threads.current_num_threads() + self.jobs_waiting_max - self.places.available_permits();
+        PoolUse {
+            name: self.name,
+            waiting: all.saturating_sub(running),
+            running,
+            begun: self.counts.begun.load(Ordering::Relaxed),
+            given_up: self.counts.given_up.load(Ordering::Relaxed),
+        }
+    }
+}
+
+/// A job without an answer: given up where it is dropped as such.
+struct Unanswered {
+    counts: Arc<Counts>,
+    answered: bool,
+}
+
+impl Unanswered {
+    fn note_answer(mut self) {
+        self.answered = true;
+    }
+}
+
+impl Drop for Unanswered {
+    fn drop(&mut self) {
+        if !self.answered {
+            self.counts.given_up.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+fn failed() -> ServiceError {
+    ServiceError::new(ErrorCode::Internal, "job_panicked", "the job failed by a defect of the server")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::mpsc::{Receiver, Sender, channel};
+    use tokio::task::JoinHandle;
 
-    #[tokio::test]
-    async fn a_full_queue_refuses_at_once_and_recovers() {
-        let pool = std::sync::Arc::new(Pool::new("test", 1, 1).unwrap());
-        let (release, released) = std::sync::mpsc::channel::<()>();
-        let running = tokio::spawn({
-            let pool = pool.clone();
-            async move { pool.run(move || released.recv()).await }
-        });
-        while pool.places.available_permits() == 2 {
+    fn pool(jobs_waiting_max: usize) -> Arc<Pool> {
+        Arc::new(Pool::new("test", 1, jobs_waiting_max).unwrap())
+    }
+
+    fn spawned<T: Send + 'static>(
+        pool: &Arc<Pool>,
+        job: impl FnOnce(Interest<'_>) -> T + Send + 'static,
+    ) -> JoinHandle<Result<T, ServiceError>> {
+        let pool = Arc::clone(pool);
+        tokio::spawn(async move { pool.run(job).await })
+    }
+
+    /// Keeps the only thread until it is told to go on.
+    async fn kept_busy(pool: &Arc<Pool>) -> (Sender<()>, JoinHandle<Result<(), ServiceError>>) {
+        let (release, released): (_, Receiver<()>) = channel();
+        let running = spawned(pool, move |_| released.recv().unwrap());
+        until(|| pool.in_use().running == 1).await;
+        (release, running)
+    }
+
+    async fn until(happened: impl Fn() -> bool) {
+        while !happened() {
             tokio::task::yield_now().await;
         }
-        let waiting = tokio::spawn({
-            let pool = pool.clone();
-            async move { pool.run(|| 2).await }
-        });
-        while pool.places.available_permits() == 1 {
-            tokio::task::yield_now().await;
-        }
-        let refused = pool.run(|| 3).await.unwrap_err();
-        assert_eq!(refused.code, ErrorCode::ResourceExhausted);
-        assert!(refused.message.contains("jobs_waiting_max is 1"));
-        release.send(()).unwrap();
-        running.await.unwrap().unwrap().unwrap();
-        assert_eq!(waiting.await.unwrap().unwrap(), 2);
-        assert_eq!(pool.run(|| 4).await.unwrap(), 4);
     }
 
     #[tokio::test]
-    async fn a_job_that_nobody_waits_for_is_not_run() {
-        let pool = std::sync::Arc::new(Pool::new("test", 1, 2).unwrap());
-        let (release, released) = std::sync::mpsc::channel::<()>();
-        let running = tokio::spawn({
-            let pool = pool.clone();
-            async move { pool.run(move || released.recv()).await }
-        });
-        while pool.places.available_permits() == 3 {
-            tokio::task::yield_now().await;
-        }
-        let (ran, was_run) = std::sync::mpsc::channel::<()>();
-        let gone = tokio::time::timeout(std::time::Duration::from_millis(10), pool.run(move || ran.send(())));
-        assert!(gone.await.is_err());
+    async fn a_full_queue_refuses_at_once_and_recovers() {
+        let pool = pool(1);
+        let (release, running) = kept_busy(&pool).await;
+        let waiting = spawned(&pool, |_| 2);
+        until(|| pool.in_use().waiting == 1).await;
+        let refused = pool.run(|_| 3).await.unwrap_err();
+        assert_eq!(refused.code, ErrorCode::ResourceExhausted);
+        assert!(refused.message.contains("jobs_waiting_max is 1"));
         release.send(()).unwrap();
-        running.await.unwrap().unwrap().unwrap();
-        // Its turn has come and gone when the next one's has.
-        pool.run(|| ()).await.unwrap();
-        assert!(was_run.recv().is_err());
+        running.await.unwrap().unwrap();
+        assert_eq!(waiting.await.unwrap().unwrap(), 2);
+        assert_eq!(pool.run(|_| 4).await.unwrap(), 4);
+        let PoolUse { waiting, running, begun, given_up, .. } = pool.in_use();
+        assert_eq!((waiting, running, begun, given_up), (0, 0, 3, 0));
+    }
+
+    #[tokio::test]
+    async fn a_job_that_nobody_waits_for_goes_at_once_with_its_place_and_what_it_holds() {
+        let pool = pool(1);
+        let (release, running) = kept_busy(&pool).await;
+        let held = Arc::new(());
+        let gone = spawned(&pool, {
+            let held = Arc::clone(&held);
+            move |_| drop(held)
+        });
+        until(|| pool.in_use().waiting == 1).await;
+        gone.abort();
+        assert!(gone.await.unwrap_err().is_cancelled());
+        assert_eq!((pool.in_use().waiting, pool.in_use().given_up), (0, 1));
+        assert_eq!(Arc::strong_count(&held), 1);
+        release.send(()).unwrap();
+        running.await.unwrap().unwrap();
+        // Its turn would have come by now.
+        pool.run(|_| ()).await.unwrap();
+        assert_eq!(pool.in_use().begun, 2);
+    }
+
+    #[tokio::test]
+    async fn a_job_in_hand_learns_that_its_caller_has_gone() {
+        let pool = pool(0);
+        let gone = spawned(&pool, |interest| {
+            while !interest.is_lost() {
+                std::thread::yield_now();
+            }
+        });
+        until(|| pool.in_use().running == 1).await;
+        gone.abort();
+        until(|| pool.in_use().given_up == 1).await;
+        assert_eq!(pool.in_use().running, 0);
     }
 
     #[tokio::test]
     async fn a_job_that_panics_is_an_error_of_its_own() {
-        let pool = Pool::new("test", 1, 1).unwrap();
-        let failed = pool.run(|| panic!("a defect")).await.map(|(): ()| ()).unwrap_err();
+        let pool = pool(1);
+        let failed = pool.run(|_| panic!("a defect")).await.map(|(): ()| ()).unwrap_err();
         assert_eq!(failed.code, ErrorCode::Internal);
-        assert_eq!(pool.run(|| 1).await.unwrap(), 1);
+        assert_eq!(pool.run(|_| 1).await.unwrap(), 1);
     }
 }

@@ -17,6 +17,7 @@ use uuid::Uuid;
 use super::journal::{Journal, JournalUse, Known, Record, Recovered, SegmentedJournal};
 use super::snapshot_files::{forget_damaged, newest_good, set_aside, snapshot_name, snapshot_revisions};
 use super::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, retention};
+use crate::interest::Interest;
 use crate::map::{MultiResolutionMap, Observations, WithdrawnScan};
 
 /// What keeps a map across crashes.
@@ -251,6 +252,7 @@ impl MapFolder {
         &self,
         scans: &[u64],
         withdrawn: &[WithdrawnScan],
+        interest: Interest<'_>,
     ) -> Result<Option<(Observations, u64)>, StoreError> {
         let Some(base) = self.base_of(scans, withdrawn) else {
             return Ok(None);
@@ -258,20 +260,25 @@ impl MapFolder {
         let path = self.path.join(snapshot_name(base));
         let base_contents = Snapshot::read(&*self.files, &path)?.contents;
         let mut observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
-        let head = self.observe(&mut observations, base)?;
+        let head = self.observe(&mut observations, base, interest)?;
         Ok(Some((observations, head)))
     }
 
-    /// Shows `observations` the changes after revision `seen`; the head of the journal.
+    /// Shows `observations` the changes after revision `seen`, while somebody wants to know; the head of the journal.
     ///
     /// # Errors
     /// When the journal cannot be read.
-    pub fn observe(&self, observations: &mut Observations, seen: u64) -> Result<u64, StoreError> {
+    pub fn observe(
+        &self,
+        observations: &mut Observations,
+        seen: u64,
+        interest: Interest<'_>,
+    ) -> Result<u64, StoreError> {
         let (changes, head) = {
             let journal = self.journal.lock();
             (journal.read_from(seen + 1), journal.head())
         };
-        for change in changes {
+        for change in changes.take_while(|_| !interest.is_lost()) {
             let (revision, change) = change?;
             observations.observe(revision, &change);
         }

@@ -4,7 +4,28 @@
 use std::fmt::{Display, Write};
 
 use crate::map::LevelInfo;
-use crate::service::{MapInfo, MapStorage};
+use crate::service::{MapInfo, MapStorage, PoolUse};
+
+/// Appends the gauges of `pools`.
+pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
+    type Value = fn(&PoolUse) -> u64;
+    let families: [(&'static str, &str, Value); 4] = [
+        ("mrol_jobs_waiting", "Jobs that wait for a thread, by pool", |pool| pool.waiting as u64),
+        ("mrol_jobs_running", "Jobs in hand, by pool", |pool| pool.running as u64),
+        ("mrol_jobs_begun", "Jobs that were taken in hand since the start, by pool", |pool| pool.begun),
+        (
+            "mrol_jobs_given_up",
+            "Jobs whose callers went before the answer since the start, by pool",
+            |pool| pool.given_up,
+        ),
+    ];
+    for (name, what, value) in families {
+        let mut family = Family::begin(text, name, what);
+        for pool in pools {
+            family.gauge(&[("pool", &pool.name)], value(pool));
+        }
+    }
+}
 
 /// Appends the gauges of `maps`.
 pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {

@@ -5,8 +5,9 @@ use super::dilated::DilatedLevels;
 use super::sample::SearchSample;
 use super::sight::blocked_share;
 use super::{Candidate, LocalizationSettings};
-use crate::align::{Alignment, AlignmentSettings, align};
+use crate::align::{Alignment, AlignmentSettings, align_while};
 use crate::geometry::{Point, Pose, pose_difference};
+use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
 use crate::voxel::volumetric_sample;
 
@@ -21,6 +22,7 @@ pub(super) struct Refinement<'a> {
     pub(super) sample: &'a SearchSample,
     pub(super) settings: &'a LocalizationSettings,
     pub(super) alignment: &'a AlignmentSettings,
+    pub(super) interest: Interest<'a>,
 }
 
 impl Refinement<'_> {
@@ -30,6 +32,7 @@ impl Refinement<'_> {
         let thinned = volumetric_sample(self.points, THINNED, self.alignment.seed).points;
         let mut candidates: Vec<Candidate> = places
             .iter()
+            .take_while(|_| !self.interest.is_lost())
             .map(|place| self.at(&thinned, &place.map_from_sensor, self.share(place.score)))
             .collect();
         rank(&mut candidates);
@@ -57,7 +60,7 @@ impl Refinement<'_> {
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
         let mut alignment = *self.alignment;
         alignment.wide_start.ascents = 0;
-        align(self.map, points, guess, &alignment)
+        align_while(self.map, points, guess, &alignment, self.interest)
     }
 
     /// Without those that a better one is the same place as; that one takes over what their search found.

@@ -34,6 +34,7 @@ use std::ops::ControlFlow;
 
 use super::AlignmentSettings;
 use crate::geometry::Point;
+use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
 use basins::Basins;
 use bound::Bounds;
@@ -63,6 +64,22 @@ pub fn localize(
     alignment: &AlignmentSettings,
     watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
 ) -> Result<Localization, LocalizationError> {
+    localize_while(map, points, query, settings, alignment, watch, Interest::LASTING)
+}
+
+/// The same, which ends soon after nobody wants the answer: what it returns then means nothing.
+///
+/// # Errors
+/// As for [`localize`].
+pub fn localize_while(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    query: &LocalizationQuery,
+    settings: &LocalizationSettings,
+    alignment: &AlignmentSettings,
+    watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
+    interest: Interest<'_>,
+) -> Result<Localization, LocalizationError> {
     let reach_m = map.lattice().reach_m();
     let in_reach = |point: &Point| point.to_f64().coords.norm() <= reach_m;
     let points: &[Point] = &points.iter().copied().filter(in_reach).collect::<Vec<_>>();
@@ -86,10 +103,15 @@ pub fn localize(
     let bounds = Bounds::new(&levels, &sample, &orientations.families, rotations);
     let basins =
         Basins::new(settings.basin_voxels * side_m, settings.basin_deg.to_radians(), settings.basins_max);
+    let watch = &mut |progress: &SearchProgress| match interest.is_lost() {
+        true => ControlFlow::Break(()),
+        false => watch(progress),
+    };
     let found = Search::new(&bounds, settings, basins, watch).run();
 
     // 5) Refine the places found by alignment, and rank them.
-    let refinement = Refinement { map, points, levels: &levels, sample: &sample, settings, alignment };
+    let refinement =
+        Refinement { map, points, levels: &levels, sample: &sample, settings, alignment, interest };
     let mut candidates = refinement.candidates(&found.places, query.candidates);
 
     // 6) Say whether the best of them stands out.

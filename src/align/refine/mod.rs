@@ -12,6 +12,7 @@ mod gaussians;
 use super::PoseInformation;
 use super::settings::RefinementSettings;
 use crate::geometry::{Point, Pose};
+use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
 use equations::{NormalEquations, information};
 use gaussian::Softness;
@@ -52,6 +53,7 @@ pub(super) fn refine(
     points: &[Point],
     guess: &Pose,
     settings: &RefinementSettings,
+    interest: Interest<'_>,
 ) -> Refinement {
     let resolution_m = map.lattice().resolution_m(0);
     let mut refined = Refinement { map_from_sensor: *guess, iterations: 0 };
@@ -63,6 +65,9 @@ pub(super) fn refine(
     for stage in (0..settings.stages).rev() {
         gaussians.soften(softness(stage));
         for _ in 0..settings.iterations_per_stage_max {
+            if interest.is_lost() {
+                return refined;
+            }
             let pose = &refined.map_from_sensor;
             let equations =
                 NormalEquations::of(points, pose, &mut gaussians, &map.moments(), settings.robust_scale);
