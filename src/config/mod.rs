@@ -1,19 +1,29 @@
 //! The daemon's settings: defaults, then a TOML file, then `MROL_...` variables, then the command line.
 
 mod access;
+mod error;
+mod filter;
 mod limits;
+mod listener;
+mod log;
 mod scans;
 mod store;
+mod threads;
 mod tls;
 
 pub use access::AccessConfig;
+pub use error::ConfigError;
+pub use filter::FilterConfig;
 pub use limits::LimitsConfig;
+pub use listener::ListenerConfig;
+pub use log::LogConfig;
 pub use scans::{AlignmentConfig, MethodConfig, RobotConfig};
 pub use store::StoreConfig;
+pub use threads::ThreadsConfig;
 pub use tls::TlsConfig;
 
 use std::collections::BTreeMap;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -23,9 +33,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
-use crate::scan::PointFilterError;
 use crate::service::{ServiceSettings, StandingSettings};
-use crate::telemetry::LogFormat;
 
 /// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
 const VARIABLE_PREFIX: &str = "MROL_";
@@ -62,49 +70,6 @@ pub struct Config {
     pub limits: LimitsConfig,
 }
 
-/// Where a protocol is served.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ListenerConfig {
-    /// Address and port; port 0 takes a free one.
-    pub listen: SocketAddr,
-    /// The file of a Unix socket to serve at as well; none.
-    #[serde(default)]
-    pub socket: Option<PathBuf>,
-}
-
-/// The log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LogConfig {
-    /// `text` or `json`.
-    pub format: LogFormat,
-    /// A level, or a list of `target=level`. `info`.
-    pub level: String,
-}
-
-/// Threads for work that uses the CPU; 0 = one a core.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ThreadsConfig {
-    /// For queries, listings and descriptions.
-    pub query: usize,
-    /// For alignments and changes.
-    pub mapping: usize,
-    /// For searches with no guess, which take seconds and much memory each. 1.
-    pub localization: usize,
-}
-
-/// A counting Bloom filter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FilterConfig {
-    /// Hash functions, k of eq. (1).
-    pub hashes: u32,
-    /// Bits of the plane a voxel, m / n of eq. (1).
-    pub bits_per_voxel: f64,
-}
-
 impl Default for Config {
     fn default() -> Self {
         let listener = |port| ListenerConfig { listen: (Ipv4Addr::LOCALHOST, port).into(), socket: None };
@@ -124,62 +89,6 @@ impl Default for Config {
             limits: LimitsConfig::default(),
         }
     }
-}
-
-impl Default for LogConfig {
-    fn default() -> Self {
-        Self { format: LogFormat::Text, level: "info".into() }
-    }
-}
-
-impl Default for ThreadsConfig {
-    fn default() -> Self {
-        Self { query: 0, mapping: 0, localization: 1 }
-    }
-}
-
-impl Default for FilterConfig {
-    fn default() -> Self {
-        let FilterSettings { hashes, bits_per_key } = FilterSettings::default();
-        Self { hashes, bits_per_voxel: bits_per_key }
-    }
-}
-
-/// Why there is no configuration.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// A key that is none, or a value that does not fit; the message names both and where they stand.
-    #[error("{0}")]
-    Value(Box<figment::Error>),
-    /// The file named on the command line is not there.
-    #[error("configuration file {} cannot be read", .0.display())]
-    File(PathBuf),
-    /// A number out of its range.
-    #[error("{key} must be {range}, got {value}")]
-    Range {
-        /// The setting.
-        key: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it is.
-        value: String,
-    },
-    /// A setting that another one needs.
-    #[error("{needed} is missing: {by} is of no use without it")]
-    Missing {
-        /// The setting that is not there.
-        needed: &'static str,
-        /// The one that is.
-        by: &'static str,
-    },
-    /// Numbers of a robot's table that make no filter.
-    #[error("robots.{name}: {error}")]
-    Robot {
-        /// Of the table.
-        name: String,
-        /// What is wrong.
-        error: PointFilterError,
-    },
 }
 
 impl Config {
