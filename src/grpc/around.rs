@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use axum::Router;
+use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::Response;
@@ -12,6 +13,7 @@ use tracing::Instrument;
 
 use super::inflation::{Compressed, Inflation};
 use super::timely_body::TimelyBody;
+use super::whole_messages::WholeMessages;
 use super::{deadline, status};
 use crate::access::{Authorized, Gate, Operation};
 use crate::admission::Admission;
@@ -50,7 +52,10 @@ impl Around {
         let begin = Instant::now();
         let (deadline, compressed) = (deadline::of(call.headers()), Compressed::of(call.headers()));
         call.extensions_mut().insert(compressed);
-        let handle = |call| deadline::within(deadline, self.inflation.within(compressed, next.run(call)));
+        let handle = |call: Request| {
+            let call = call.map(|body| Body::new(WholeMessages::new(body, self.message_bytes_max)));
+            deadline::within(deadline, self.inflation.within(compressed, next.run(call)))
+        };
         let answer = self.admission.answer(operation, call, handle).instrument(span).await;
         let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
         match Status::from_header_map(response.headers()) {

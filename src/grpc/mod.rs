@@ -9,6 +9,7 @@ mod occupancy;
 mod status;
 mod stream;
 mod timely_body;
+mod whole_messages;
 
 use prost::Message;
 use tonic::Request;

@@ -8,8 +8,8 @@ pub const MESSAGE_BYTES_MAX: usize = 32 << 20;
 pub const STREAM_WINDOW_BYTES: u32 = 4 << 20;
 /// The same for all streams of a connection.
 pub const CONNECTION_WINDOW_BYTES: u32 = 16 << 20;
-/// Bytes of one frame.
-pub const FRAME_BYTES_MAX: u32 = 1 << 20;
+/// Bytes of one frame: a connection may hold as many for one that never ends.
+pub const FRAME_BYTES_MAX: u32 = 64 << 10;
 /// How often an idle peer is asked whether it is there,
 pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(20);
 /// and how long it may take to answer.

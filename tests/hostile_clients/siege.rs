@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use mrol::wire::transport::STREAM_WINDOW_BYTES;
 use tempfile::TempDir;
 use tokio::sync::{Mutex, MutexGuard};
 
@@ -27,6 +28,9 @@ const SECONDS: &str = "connection_opening_max_s = 2.0\nhttp_idle_max_s = 3.0\ngr
 /// What a connection may hold besides bodies: what was read and not yet understood, of HTTP/1 or a frame of HTTP/2, and
 /// its own state.
 const CONNECTION_BYTES_MAX: usize = 128 << 10;
+
+/// What a stream may have sent ahead of what is read from it.
+const STREAM_BYTES_MAX: usize = STREAM_WINDOW_BYTES as usize;
 
 /// Compressed messages that the daemon reads at once.
 const INFLATING_MAX: usize = 2;
@@ -103,12 +107,14 @@ fn settings() -> String {
     )
 }
 
-/// What clients may make the daemon hold, by its limits: bodies, connections of both protocols, and a message in the hands
-/// of each thread that works and of each that inflates one.
+/// What clients may make the daemon hold, by its limits: bodies, connections of both protocols, streams, and a message in
+/// the hands of each thread of both pools and four of each that inflates one, whose room doubles and is given
+/// back after a moment.
 fn under_attack() -> usize {
     BODY_BYTES_MAX
         + 2 * CONNECTIONS_MAX * CONNECTION_BYTES_MAX
-        + (INFLATING_MAX + 2 * THREADS) * MESSAGE_BYTES_MAX
+        + STREAMS_MAX * STREAM_BYTES_MAX
+        + (4 * INFLATING_MAX + 2 * THREADS) * MESSAGE_BYTES_MAX
 }
 
 fn address(url: &str) -> SocketAddr {
