@@ -9,6 +9,8 @@ use crate::telemetry::MeteredService;
 
 /// How often.
 const INTERVAL: Duration = Duration::from_secs(1);
+/// So large that the allocator has it from the system, and not from what it keeps for small ones.
+const LARGE_BLOCK: usize = 4 << 20;
 
 /// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of its
 /// own: a snapshot that takes long does not keep it from looking.
@@ -29,7 +31,18 @@ pub(super) async fn watch(service: MeteredService, admission: Admission) {
 /// Looks how full disk and memory are, on a thread that may block.
 pub(super) async fn measure(service: &MeteredService) {
     let service = service.clone();
-    if let Err(panic) = tokio::task::spawn_blocking(move || service.measure()).await {
+    let measuring = move || {
+        free_a_large_block();
+        service.measure();
+    };
+    if let Err(panic) = tokio::task::spawn_blocking(measuring).await {
         tracing::error!(%panic, "disk and memory cannot be measured");
     }
+}
+
+/// The program's allocator keeps what was freed for a second, and then gives it back when the next large block is freed.
+/// With the last map gone nobody else may free one, and a shortage of memory would last. The block is never written, so
+/// that it costs nothing.
+fn free_a_large_block() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGE_BLOCK)));
 }
