@@ -1,10 +1,15 @@
-//! Messages: what a point query costs between the socket's bytes and the map, and back.
+//! Messages: what a point query costs between the socket's bytes and the map, and back. And what is stored: the record of
+//! a scan, a map file.
 
 use bytes::Bytes;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mrol::bench::workload::{Order, Room, Workload};
-use mrol::map::{Lookup, MapName};
+use mrol::bench::workload::{Order, Room, Site, Workload};
+use mrol::map::{
+    Change, Lookup, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
+};
 use mrol::service::{MapState, PointAnswer, PointQuery};
+use mrol::store::{Record, Snapshot};
+use mrol::voxel::Lattice;
 use mrol::wire::pb;
 use prost::Message;
 
@@ -49,5 +54,37 @@ fn question() -> pb::QueryPointsRequest {
     (&MapName::new("bench").expect("a name"), query).into()
 }
 
-criterion_group!(benches, codec);
+fn stored(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("stored");
+    group.throughput(Throughput::Elements(POINTS as u64));
+    for (name, workload) in [("room", Workload::Room(Room)), ("site", Workload::Site(Site::of(1_000_000, 1)))]
+    {
+        let change = Change::Insertion(scan(workload));
+        let record = Record::of(&change).expect("a record");
+        println!("{name}: a record of {} bytes", record.len());
+        group.bench_function(format!("encode the record of a scan of the {name}"), |bencher| {
+            bencher.iter(|| Record::of(&change).expect("a record"));
+        });
+        let map = MultiResolutionMap::new(MapSettings::new(workload.resolution_m(), 4)).expect("settings");
+        map.committer().apply(&change);
+        let snapshot = Snapshot::of(&map, uuid::Uuid::from_u128(7));
+        let file = snapshot.encode().expect("memory");
+        group.bench_function(format!("encode a map of the {name}"), |bencher| {
+            bencher.iter(|| snapshot.encode().expect("memory"));
+        });
+        group.bench_function(format!("decode a map of the {name}"), |bencher| {
+            bencher.iter(|| Snapshot::decode(&file).expect("a map"));
+        });
+    }
+    group.finish();
+}
+
+fn scan(workload: Workload) -> ScanRecord {
+    let queries = workload.queries(Order::Scan, POINTS, 2);
+    let lattice = Lattice::new(workload.resolution_m(), 4).expect("settings");
+    let pose = TrajectoryPose::new(RobotName::new("bench").expect("a name"), queries.map_from_points);
+    ScanRecord::of_points(pose, &queries.points, &lattice)
+}
+
+criterion_group!(benches, codec, stored);
 criterion_main!(benches);

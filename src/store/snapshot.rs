@@ -3,8 +3,8 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 2
-//!     12  4      CRC-32C of everything from offset 16, u32 little-endian
+//!      8  4      format version, u32 little-endian: 3
+//!     12  4      CRC-32C of the version, from version 3 on, and of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
 //!     24  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto
 //! ```
@@ -14,17 +14,18 @@ use std::path::Path;
 use prost::Message;
 use uuid::Uuid;
 
-use super::codec::Unreadable;
+use super::codec::{Unreadable, moments};
 use super::{FileSystem, StoreError, folder, pb};
 use crate::bloom::FilterSettings;
 use crate::map::{AnsweredRequest, MapContents, MapSettings, MultiResolutionMap, Trajectory, TrajectoryPose};
 use crate::voxel::{BlockMask, MomentSet, VoxelSet};
 
 /// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
-/// bytes, and neither withdrawn scans nor requests.
-pub const FORMAT_VERSION: u32 = 2;
+/// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms.
+pub const FORMAT_VERSION: u32 = 3;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 const HEADER_BYTES: usize = 24;
+const VERSION: std::ops::Range<usize> = 8..12;
 const CHECKED_FROM: usize = 16;
 /// Bodies beyond this are refused before memory is taken: 4 billion voxels of a surface.
 const BODY_BYTES_MAX: u64 = 8 << 30;
@@ -85,7 +86,7 @@ impl Snapshot {
         bytes.extend_from_slice(&[0; 4]);
         bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
         bytes.extend(zstd::bulk::compress(&body, ZSTD_LEVEL)?);
-        let checksum = crc32c::crc32c(&bytes[CHECKED_FROM..]);
+        let checksum = checksum(&bytes, FORMAT_VERSION);
         bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
         Ok(bytes)
     }
@@ -116,7 +117,7 @@ impl Snapshot {
                 "format version {version}, this build reads 1 to {FORMAT_VERSION}: use a newer one"
             ));
         }
-        let (stored, computed) = (u32_at(header, 12), crc32c::crc32c(&bytes[CHECKED_FROM..]));
+        let (stored, computed) = (u32_at(header, 12), checksum(bytes, version));
         if stored != computed {
             return Err(format!(
                 "checksum {computed:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
@@ -147,7 +148,7 @@ impl Snapshot {
             voxels: Some(voxels.into()),
             withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
             requests: requests.iter().map(Into::into).collect(),
-            moments: Some(moments.into()),
+            moments: Some(moments::beside(voxels, moments)),
         }
     }
 
@@ -166,7 +167,7 @@ impl Snapshot {
         let contents = MapContents {
             revision: message.revision,
             moments: match message.moments {
-                Some(moments) => moments.try_into()?,
+                Some(moments) => moments::read(&moments, &voxels)?,
                 None => MomentSet::of_centers(&voxels),
             },
             voxels,
@@ -193,6 +194,11 @@ fn voxels_of_version_1(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, Unreadabl
         Ok((key, BlockMask::from_le_bytes(mask)))
     };
     keys.iter().zip(masks).map(block).collect()
+}
+
+fn checksum(bytes: &[u8], version: u32) -> u32 {
+    let of_version = if version < 3 { 0 } else { crc32c::crc32c(&bytes[VERSION]) };
+    crc32c::crc32c_append(of_version, &bytes[CHECKED_FROM..])
 }
 
 fn u32_at(bytes: &[u8], offset: usize) -> u32 {
@@ -246,10 +252,10 @@ mod tests {
     #[test]
     fn a_flipped_bit_anywhere_is_an_error() {
         let bytes = snapshot().encode().unwrap();
-        for at in 0..bytes.len() {
+        for bit in 0..bytes.len() * 8 {
             let mut damaged = bytes.clone();
-            damaged[at] ^= 1 << (at % 8);
-            assert!(Snapshot::decode(&damaged).is_err(), "bit {} of byte {at}", at % 8);
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert!(Snapshot::decode(&damaged).is_err(), "bit {bit}");
         }
     }
 
@@ -264,8 +270,8 @@ mod tests {
     #[test]
     fn a_newer_version_is_refused_by_name() {
         let mut bytes = snapshot().encode().unwrap();
-        bytes[8] = 3;
-        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 3"));
+        bytes[8] = 4;
+        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 4"));
     }
 
     #[test]

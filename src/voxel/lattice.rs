@@ -126,15 +126,15 @@ impl LatticeFromPoints {
         })
     }
 
-    /// The voxel of `level` that `point` falls in, and how far from its centre, in whole `units` of its side; none
-    /// when the point is not finite or out of range.
-    pub(super) fn offset(&self, point: Point, level: u32, units: i64) -> Option<(VoxelKey, [i64; 3])> {
+    /// The voxel of `level` that `point` falls in, and how far from its centre, in whole steps, an even number of which
+    /// is its side: from -`steps` / 2 to just below `steps` / 2. None when the point is not finite or out of range.
+    pub(super) fn offset(&self, point: Point, level: u32, steps: i64) -> Option<(VoxelKey, [i64; 3])> {
         let index = self.index(point)?.map(|i| i >> level);
         let side = f64::from(1u32 << level);
         let scaled = self.scaled(point);
         let offset = std::array::from_fn(|axis| {
             let from_centre = f64::from(scaled[axis]) / side - f64::from(index[axis]) - 0.5;
-            (from_centre * units as f64).round() as i64
+            ((from_centre * steps as f64).round() as i64).min(steps / 2 - 1)
         });
         Some((VoxelKey::pack(index), offset))
     }

@@ -11,16 +11,23 @@ use crate::geometry::Point;
 /// room's furniture. Coarser ones are sums of these.
 pub const MOMENT_LEVEL: u32 = 2;
 
+/// Steps of an offset along a voxel's side.
+const STEPS: i64 = Moments::UNITS / Moments::STEP;
+
 /// How far points lie from the centre of their voxel, summed: count, sum d and sum d d^T.
 ///
-/// Offsets d are whole numbers of 1 / [`Moments::UNITS`] of the voxel's side, so that sums neither round nor depend on
-/// their order: every thread count gives the same map, and a map without a scan is that of the others.
+/// Offsets d are whole numbers of 1 / [`Moments::UNITS`] of the voxel's side, of points multiples of [`Moments::STEP`], so
+/// that sums neither round nor depend on their order: every thread count gives the same map, and a map without a scan is
+/// that of the others.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Moments([i64; Moments::NUMBERS]);
 
 impl Moments {
     /// Units of an offset along a voxel's side; a unit is 0.04 mm of a voxel of 0.16 m.
     pub const UNITS: i64 = 4096;
+    /// Units to which the offsets of points are rounded: 0.6 mm of a voxel of 0.16 m, so that a byte holds one.
+    /// Finer ones would tell a sensor's noise, for two fifths more journal. Maps of former versions have them.
+    pub const STEP: i64 = 16;
     /// Count, the three of sum d, the six of sum d d^T (xx xy xz yy yz zz).
     pub const NUMBERS: usize = 10;
     /// Points of one voxel, at most. More of them say nothing new, and no sum comes near the end of its numbers, about
@@ -123,10 +130,10 @@ impl MomentSet {
         // Neighbours in a scan share voxels: one probe serves a run of points.
         let mut run: Option<(VoxelKey, Moments)> = None;
         for &point in points {
-            let Some((voxel, offset)) = lattice_from_points.offset(point, MOMENT_LEVEL, Moments::UNITS)
-            else {
+            let Some((voxel, steps)) = lattice_from_points.offset(point, MOMENT_LEVEL, STEPS) else {
                 continue;
             };
+            let offset = steps.map(|steps| steps * Moments::STEP);
             match &mut run {
                 Some((key, sum)) if *key == voxel => *sum += Moments::of_offset(offset),
                 _ => {
@@ -202,6 +209,17 @@ mod tests {
             let shifted: Vec<_> = offsets.iter().map(|d| [0, 1, 2].map(|i| d[i] + by[i])).collect();
             prop_assert_eq!(of(&offsets).about(by), of(&shifted));
         }
+
+        #[test]
+        fn the_voxels_of_points_tell_those_of_their_moments(
+            points in proptest::collection::vec(proptest::array::uniform3(-9.0f32..9.0), 0..100),
+        ) {
+            let lattice = Lattice::new(0.25, 1).unwrap().from_map();
+            let points: Vec<_> = points.into_iter().map(Point::from).collect();
+            let voxels: VoxelSet = points.iter().filter_map(|&point| lattice.key(point)).collect();
+            let set = MomentSet::of_points(&points, &lattice);
+            prop_assert!(set.as_slice().iter().map(|(key, _)| *key).eq(voxels.moment_voxels()));
+        }
     }
 
     #[test]
@@ -233,6 +251,16 @@ mod tests {
             MomentSet::of_points(&[Point::new(-0.25, 0.5, 1.5), Point::new(f32::NAN, 0.0, 0.0)], &lattice);
         let voxel = VoxelKey::new([-1, 0, 1]).unwrap();
         assert_eq!(set.as_slice(), [(voxel, Moments::of_offset([1024, 0, 0]))]);
+    }
+
+    #[test]
+    fn offsets_are_rounded_to_steps_and_stay_below_the_side() {
+        let lattice = Lattice::new(0.25, 1).unwrap().from_map();
+        let step = 1.0 / STEPS as f32;
+        let set = MomentSet::of_points(&[Point::new(0.5 + 2.4 * step, 0.5 + 2.6 * step, 0.999_99)], &lattice);
+        let last = Moments::UNITS / 2 - Moments::STEP;
+        let expected = Moments::of_offset([2 * Moments::STEP, 3 * Moments::STEP, last]);
+        assert_eq!(set.as_slice(), [(VoxelKey::new([0; 3]).unwrap(), expected)]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A set of finest voxels as sorted blocks: what a scan touches, a deletion takes, a snapshot keeps.
 
 use super::grouping::blocks_of;
-use super::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey};
+use super::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, MOMENT_LEVEL, VoxelKey};
 
 /// Distinct finest voxels, as blocks in ascending order of their keys; no block is empty.
 ///
@@ -43,6 +43,18 @@ impl VoxelSet {
     /// The finest voxels, block by block.
     pub fn iter(&self) -> impl Iterator<Item = VoxelKey> + '_ {
         self.blocks.iter().flat_map(|(block, mask)| mask.cells(0).map(|cell| cell.voxel(*block)))
+    }
+
+    /// The voxels of [`MOMENT_LEVEL`] that hold one of these, ascending: those with moments of points, where every voxel
+    /// has a point.
+    pub fn moment_voxels(&self) -> Vec<VoxelKey> {
+        let of_block = |(block, mask): &(VoxelKey, BlockMask)| {
+            let block = *block;
+            mask.cells(MOMENT_LEVEL).map(move |cell| cell.voxel(block).ancestor(MOMENT_LEVEL))
+        };
+        let mut voxels: Vec<VoxelKey> = self.blocks.iter().flat_map(of_block).collect();
+        voxels.sort_unstable();
+        voxels
     }
 }
 

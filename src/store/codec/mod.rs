@@ -3,7 +3,7 @@
 //! Numbers come back bit for bit. What cannot be read is said as a sentence; who reads adds file and offset.
 
 mod change;
-mod moments;
+pub(super) mod moments;
 mod scan;
 mod voxels;
 

@@ -1,6 +1,6 @@
 //! Scans: their poses, and with their voxels.
 
-use super::{Unreadable, count, required};
+use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
 use crate::map::{RobotName, ScanRecord, TrajectoryPose, WithdrawnScan};
 use crate::store::pb;
@@ -51,7 +51,7 @@ impl From<&ScanRecord> for pb::Insertion {
         Self {
             pose: Some((&scan.pose).into()),
             voxels: Some((&scan.voxels).into()),
-            moments: Some((&scan.moments).into()),
+            moments: Some(moments::beside(&scan.voxels, &scan.moments)),
         }
     }
 }
@@ -60,10 +60,11 @@ impl TryFrom<pb::Insertion> for ScanRecord {
     type Error = Unreadable;
 
     fn try_from(message: pb::Insertion) -> Result<Self, Unreadable> {
+        let voxels = required(message.voxels, "insertion.voxels")?.try_into()?;
         Ok(Self {
             pose: required(message.pose, "insertion.pose")?.try_into()?,
-            voxels: required(message.voxels, "insertion.voxels")?.try_into()?,
-            moments: message.moments.unwrap_or_default().try_into()?,
+            moments: moments::read(&message.moments.unwrap_or_default(), &voxels)?,
+            voxels,
         })
     }
 }

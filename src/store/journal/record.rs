@@ -61,9 +61,11 @@ pub(super) fn change_of(payload: &[u8], bytes: u32) -> Result<Change, Unreadable
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose;
+    use crate::geometry::{Point, Pose};
     use crate::map::{DeletionRecord, Request, RequestId, RobotName, ScanRecord, TrajectoryPose, UndoRecord};
-    use crate::voxel::{MomentSet, VoxelKey, VoxelSet};
+    use crate::voxel::{Lattice, MomentSet, VoxelKey, VoxelSet};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     fn voxels(n: i32) -> VoxelSet {
         (0..n).filter_map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3])).collect()
@@ -103,6 +105,21 @@ mod tests {
             Record::of(&Change::Deletion(DeletionRecord { voxels: surface.collect(), request: None }))
                 .unwrap();
         assert!(record.len() * 8 < 2 * 300 * 300, "{} bytes", record.len());
+    }
+
+    #[test]
+    fn a_scan_of_points_far_from_each_other_takes_less_than_half_of_their_coordinates() {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let mut along = || random.random_range(0.0..0.4f32);
+        let points: Vec<_> = (0..100 * 100)
+            .map(|i| Point::new((i % 100) as f32 * 0.4 + along(), (i / 100) as f32 * 0.4 + along(), along()))
+            .collect();
+        let lattice = Lattice::new(0.1, 4).unwrap();
+        let pose = TrajectoryPose::new(RobotName::new("r1").unwrap(), Pose::identity());
+        let change = Change::Insertion(ScanRecord::of_points(pose, &points, &lattice));
+        let record = Record::of(&change).unwrap();
+        assert!(record.len() < points.len() * 12 / 2, "{} bytes", record.len());
+        assert_eq!(change_of(&record.payload, record.bytes).unwrap(), change);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-JNL"
-//!      8  4      format version, u32 little-endian: 1
+//!      8  4      format version, u32 little-endian: 2
 //!     12  4      CRC-32C of bytes 16 to 64, u32 little-endian
 //!     16  16     uuid of the map
 //!     32  8      revision of the first frame, u64 little-endian
@@ -21,8 +21,8 @@ use super::frame::{self, Frame};
 use crate::map::REVISION_MAX;
 use crate::store::StoreError;
 
-/// The version that this build writes; it reads this one and all before.
-pub const JOURNAL_VERSION: u32 = 1;
+/// The version that this build writes; it reads this one and all before. In version 1 moments had no forms.
+pub const JOURNAL_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"MROL-JNL";
 const CHECKED_FROM: usize = 16;
 pub(crate) const HEADER_BYTES: usize = 64;

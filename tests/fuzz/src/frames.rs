@@ -7,18 +7,20 @@ const SEGMENT_HEADER_BYTES: usize = 64;
 const FRAME_HEADER_BYTES: usize = 32;
 const FRAME_ALIGNMENT: usize = 32;
 
-/// A map file of version 2 around a body.
+/// A map file of version 3 around a body.
 pub(super) fn map_file(body: &[u8]) -> Vec<u8> {
     let compressed = zstd::bulk::compress(body, 1).expect("memory");
-    let checked = [&(body.len() as u64).to_le_bytes()[..], &compressed].concat();
-    [b"MROL-MAP", &2u32.to_le_bytes()[..], &crc32c::crc32c(&checked).to_le_bytes(), &checked].concat()
+    let (version, checked) =
+        (3u32.to_le_bytes(), [&(body.len() as u64).to_le_bytes()[..], &compressed].concat());
+    let checksum = crc32c::crc32c_append(crc32c::crc32c(&version), &checked).to_le_bytes();
+    [b"MROL-MAP", &version[..], &checksum, &checked].concat()
 }
 
 /// A segment that begins with revision `first`, around records.
 pub(super) fn segment(map: Uuid, first: u64, records: &[&[u8]]) -> Vec<u8> {
     let checked = [&map.as_bytes()[..], &first.to_le_bytes(), &[0; 24]].concat();
     let checksum = crc32c::crc32c(&checked).to_le_bytes();
-    let mut segment = [&b"MROL-JNL"[..], &1u32.to_le_bytes(), &checksum, &checked].concat();
+    let mut segment = [&b"MROL-JNL"[..], &2u32.to_le_bytes(), &checksum, &checked].concat();
     for (revision, record) in (first..).zip(records) {
         segment.extend(frame(map, revision, record));
     }
