@@ -21,6 +21,7 @@ mod room;
 mod settings;
 mod shortage;
 mod undo;
+mod usable_scan;
 mod watermarks;
 
 pub use error::{ErrorCode, ServiceError};
