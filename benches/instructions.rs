@@ -43,8 +43,8 @@ fn room(lookup: Lookup) -> (MultiResolutionMap, Queries, Lookup) {
 }
 
 #[library_benchmark(setup = room)]
-#[bench::bloom(args = (Lookup::Bloom), config = limited(482_000))]
-#[bench::exact(args = (Lookup::Exact), config = limited(1_296_000))]
+#[bench::bloom(args = (Lookup::Bloom), config = limited(375_000))]
+#[bench::exact(args = (Lookup::Exact), config = limited(1_250_000))]
 fn wide((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; POINTS / 64] {
     let mut occupied = [0; POINTS / 64];
     let quantise = map.lattice().from_points(&queries.map_from_points);
@@ -56,8 +56,8 @@ fn wide((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; 
 }
 
 #[library_benchmark(setup = room)]
-#[bench::bloom(args = (Lookup::Bloom), config = limited(2_658_000))]
-#[bench::exact(args = (Lookup::Exact), config = limited(3_379_000))]
+#[bench::bloom(args = (Lookup::Bloom), config = limited(2_534_000))]
+#[bench::exact(args = (Lookup::Exact), config = limited(3_334_000))]
 fn scalar((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; POINTS / 64] {
     let mut occupied = [0; POINTS / 64];
     let quantise = map.lattice().from_points(&queries.map_from_points);
@@ -80,8 +80,8 @@ fn insert(map: &MultiResolutionMap, scan: &Queries) {
 }
 
 #[library_benchmark(setup = to_insert)]
-#[bench::new(args = (0), config = limited(2_818_000))]
-#[bench::known(args = (1), config = limited(1_889_000))]
+#[bench::new(args = (0), config = limited(2_719_000))]
+#[bench::known(args = (1), config = limited(1_842_000))]
 fn inserted((map, scan): (MultiResolutionMap, Queries)) {
     insert(&map, &scan);
     std::mem::forget((map, scan));
@@ -105,7 +105,7 @@ fn encoded() -> Bytes {
 }
 
 #[library_benchmark(setup = encoded)]
-#[bench::question(config = limited(3_070))]
+#[bench::question(config = limited(2_756))]
 fn decoded(message: Bytes) -> usize {
     let request = pb::QueryPointsRequest::decode(message).expect("a message");
     let (_, query) = <(MapName, PointQuery)>::try_from(request).expect("a question");
@@ -122,7 +122,7 @@ fn answer() -> PointAnswer {
 }
 
 #[library_benchmark(setup = answer)]
-#[bench::answer(config = limited(1_835))]
+#[bench::answer(config = limited(1_681))]
 fn written(answer: PointAnswer) -> Vec<u8> {
     pb::QueryPointsResponse::from(answer).encode_to_vec()
 }

@@ -1,6 +1,6 @@
 //! Which shard a voxel belongs to.
 
-use super::lookup::bounds::bounds;
+use super::lookup::bounds::{Bounds, bounds};
 use crate::geometry::{Point, Pose};
 use crate::voxel::Lattice;
 
@@ -45,6 +45,9 @@ impl ShardsTouched {
 /// How far f32 arithmetic may move a point, as a fraction of the coordinates that entered it.
 const ROUNDING: f64 = 1e-5;
 
+/// Points that are looked at before all are.
+const FEW_POINTS: usize = 64;
+
 impl Sharding {
     pub(super) fn new(levels: u32) -> Self {
         Self { region_shift: REGION_SHIFT_MIN.max(levels - 1) }
@@ -68,12 +71,19 @@ impl Sharding {
         map_from_points: &Pose,
         lattice: &Lattice,
     ) -> ShardsTouched {
-        let Some((min, max)) = bounds(points) else {
-            return ShardsTouched::none();
-        };
+        // A scan needs all shards more often than not, and a few of its points tell.
+        let few: Vec<Point> = points.iter().step_by(points.len() / FEW_POINTS + 1).copied().collect();
+        let touched_in = |bounds: Bounds| touched_in(self.regions(bounds, map_from_points, lattice));
+        match bounds(&few).map(touched_in) {
+            Some(touched) if touched == ShardsTouched::all() => touched,
+            _ => bounds(points).map_or(ShardsTouched::none(), touched_in),
+        }
+    }
+
+    /// The inclusive ranges of regions that a box of points placed at `map_from_points` meets.
+    fn regions(self, (min, max): Bounds, map_from_points: &Pose, lattice: &Lattice) -> [(i64, i64); 3] {
         let rotation = map_from_points.rotation.to_rotation_matrix();
-        let mut regions = [(0i64, 0i64); 3];
-        for (row, range) in regions.iter_mut().enumerate() {
+        std::array::from_fn(|row| {
             let translation = map_from_points.translation.vector[row];
             let (mut low, mut high, mut size) = (translation, translation, translation.abs());
             for column in 0..3 {
@@ -85,10 +95,8 @@ impl Sharding {
             }
             let margin = lattice.resolution_m(0) + size * ROUNDING;
             let region_m = lattice.resolution_m(0) * (1u64 << self.region_shift) as f64;
-            *range =
-                (((low - margin) / region_m).floor() as i64, ((high + margin) / region_m).floor() as i64);
-        }
-        touched_in(regions)
+            (((low - margin) / region_m).floor() as i64, ((high + margin) / region_m).floor() as i64)
+        })
     }
 }
 

@@ -72,12 +72,9 @@ impl Lattice {
     /// The transform from points of a frame placed at `map_from_points` to voxel indices.
     pub fn from_points(&self, map_from_points: &Pose) -> LatticeFromPoints {
         let rotation = map_from_points.rotation.to_rotation_matrix();
-        let row = |r: usize| std::array::from_fn(|c| rotation[(r, c)] as f32);
-        LatticeFromPoints {
-            rotation: std::array::from_fn(row),
-            translation: std::array::from_fn(|r| map_from_points.translation.vector[r] as f32),
-            per_resolution: (1.0 / self.resolution_m) as f32,
-        }
+        let row = |r: usize| std::array::from_fn(|c| (rotation[(r, c)] / self.resolution_m) as f32);
+        let shift = |r: usize| (map_from_points.translation.vector[r] / self.resolution_m) as f32;
+        LatticeFromPoints { rotation: std::array::from_fn(row), translation: std::array::from_fn(shift) }
     }
 
     /// The transform from points of the map frame to voxel indices.
@@ -89,17 +86,15 @@ impl Lattice {
 /// Rotate, translate, quantise (paper II): the one definition of which voxel a point falls in.
 ///
 /// Every path, scalar or wide, computes exactly this in f32, in this order, without fused multiply-add:
-/// `q = floor((((r0 * x + r1 * y) + r2 * z) + t) * (1 / r_0))`, so that all agree bit for bit. The voxel of
-/// level n is `q >> n`: a coarse voxel is exactly the parent of its eight children. (Quantising each level by
-/// itself, as the original code does, lets the levels disagree.)
+/// `q = floor(((r0 * x + r1 * y) + r2 * z) + t)`, with rotation and translation in finest voxels, so that all agree
+/// bit for bit. The voxel of level n is `q >> n`: a coarse voxel is exactly the parent of its eight children.
+/// (Quantising each level by itself, as the original code does, lets the levels disagree.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatticeFromPoints {
-    /// Rows of the rotation matrix.
+    /// Rows of the rotation matrix over r_0: voxels a metre.
     pub(crate) rotation: [[f32; 3]; 3],
-    /// Metres.
+    /// Voxels.
     pub(crate) translation: [f32; 3],
-    /// 1 / r_0, voxels a metre.
-    pub(crate) per_resolution: f32,
 }
 
 impl LatticeFromPoints {
@@ -122,7 +117,7 @@ impl LatticeFromPoints {
         let [x, y, z] = point.xyz();
         std::array::from_fn(|axis| {
             let [r0, r1, r2] = self.rotation[axis];
-            (((r0 * x + r1 * y) + r2 * z) + self.translation[axis]) * self.per_resolution
+            ((r0 * x + r1 * y) + r2 * z) + self.translation[axis]
         })
     }
 

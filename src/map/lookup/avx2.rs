@@ -115,7 +115,7 @@ fn multiply(a: __m256i, b: u64) -> __m256i {
     _mm256_add_epi64(_mm256_mul_epu32(a, low), _mm256_slli_epi64::<32>(cross))
 }
 
-/// The mix of both the filter and the table.
+/// The mix of the table (`Slots::home`).
 #[inline]
 #[target_feature(enable = "avx2")]
 fn mix(key: __m256i, a: u64, b: u64) -> __m256i {

@@ -212,6 +212,7 @@ impl<'a, P: Probe> Steps<'a, P> {
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(&mut self, points: &[Point], word: &mut Word<P::Word>) {
+        prefetch_points(points);
         let padded;
         let (points, present) = match points.first_chunk() {
             Some(points) => (points, u64::MAX),
@@ -243,6 +244,19 @@ impl<'a, P: Probe> Steps<'a, P> {
     unsafe fn answer(&mut self, word: &Word<P::Word>) -> u64 {
         // SAFETY: as for this function.
         unsafe { P::answer(&self.registers, &mut self.memory, &word.voxels) & word.has_voxel }
+    }
+}
+
+/// Bytes ahead of the points under way that points are fetched.
+const POINTS_AHEAD: usize = 2048;
+
+/// Points come one after another, which the machine foresees, but not from afar enough.
+#[inline(always)]
+fn prefetch_points(points: &[Point]) {
+    let ahead = points.as_ptr().cast::<i8>().wrapping_add(POINTS_AHEAD);
+    for line in 0..size_of::<[Point; WORD]>() / 64 {
+        // SAFETY: a prefetch never faults.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(ahead.wrapping_add(64 * line)) };
     }
 }
 

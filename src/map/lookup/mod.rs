@@ -108,8 +108,9 @@ pub fn occupied(
     }
 }
 
-/// Points that an exact look-up takes one way or the other.
-const EXACT_CHUNK: usize = 4096;
+/// Points that tell an exact look-up which way to take, and points for which it then keeps to it.
+const EXACT_CHUNKS: (usize, usize) = (512, 16_384);
+const _: () = assert!(EXACT_CHUNKS.0.is_multiple_of(64) && EXACT_CHUNKS.1.is_multiple_of(64));
 /// One point in so many is occupied, at most, where asking the filter first pays.
 const SPARSE: usize = 8;
 
@@ -122,7 +123,10 @@ fn exactly(
     occupied: &mut [u64],
 ) -> bool {
     let (mut all_have_a_voxel, mut sparse) = (true, false);
-    for (points, words) in points.chunks(EXACT_CHUNK).zip(occupied.chunks_mut(EXACT_CHUNK / 64)) {
+    let (first, later) = points.split_at(EXACT_CHUNKS.0.min(points.len()));
+    let (first_words, later_words) = occupied.split_at_mut(first.len().div_ceil(64));
+    let chunks = later.chunks(EXACT_CHUNKS.1).zip(later_words.chunks_mut(EXACT_CHUNKS.1 / 64));
+    for (points, words) in std::iter::once((first, first_words)).chain(chunks) {
         if sparse {
             all_have_a_voxel &= look_up(points, lattice_from_points, view, Lookup::Bloom, words);
             scalar::confirm(points, lattice_from_points, view, words);

@@ -12,7 +12,6 @@ use crate::voxel::LatticeFromPoints;
 pub(super) struct Place {
     rotation: [[__m256; 3]; 3],
     translation: [__m256; 3],
-    per_resolution: __m256,
     level: __m128i,
     region_shift: __m128i,
 }
@@ -29,7 +28,6 @@ impl Place {
         Self {
             rotation: t.rotation.map(|row| row.map(|r| _mm256_set1_ps(r))),
             translation: t.translation.map(|c| _mm256_set1_ps(c)),
-            per_resolution: _mm256_set1_ps(t.per_resolution),
             level: _mm_cvtsi32_si128(level as i32),
             region_shift: _mm_cvtsi32_si128(region_shift as i32),
         }
@@ -52,8 +50,7 @@ impl Place {
             let [r0, r1, r2] = self.rotation[axis];
             let sum = _mm256_add_ps(_mm256_mul_ps(r0, x), _mm256_mul_ps(r1, y));
             let sum = _mm256_add_ps(sum, _mm256_mul_ps(r2, z));
-            let q = _mm256_mul_ps(_mm256_add_ps(sum, self.translation[axis]), self.per_resolution);
-            let q = _mm256_floor_ps(q);
+            let q = _mm256_floor_ps(_mm256_add_ps(sum, self.translation[axis]));
             let in_range =
                 _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(q, min), _mm256_cmp_ps::<_CMP_LT_OQ>(q, end));
             valid &= _mm256_movemask_ps(in_range) as u8;

@@ -2,9 +2,11 @@
 
 use std::arch::x86_64::*;
 
-use super::registers::{PerShard, addresses, eight_of, gather, lengths, mix, pack, prefetch, scale, widen};
+use super::registers::{
+    Addresses, PerShard, addresses, eight_of, gather, halves, lanes, lengths, odd, prefetch, sum_of,
+};
 use super::{GROUPS, LANES, Probe};
-use crate::bloom::{HASH_A, HASH_B, HASH_C};
+use crate::bloom::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
 use crate::map::lookup::LevelView;
 
 /// The counting Bloom filter with `HASHES` hashes; 0 = as many as the view says. With `FETCH`, words are fetched as soon
@@ -13,12 +15,22 @@ pub(super) struct Bloom<const HASHES: u32, const FETCH: bool>;
 
 pub(super) struct BloomRegisters {
     plane: PerShard,
-    words: PerShard,
-    pub(super) hashes: u32,
+    words: __m512i,
+    hashes: u32,
 }
 
-/// Addresses of words of the planes, and the bits that count there; eight voxels a register.
-type Located = ([__m512i; 2], [__m512i; 2]);
+/// Sixteen keys on their way: those of even lanes first, where it is eight.
+#[derive(Clone, Copy)]
+pub(super) struct Located {
+    /// Of words of the planes.
+    addresses: [Addresses; 2],
+    /// Hashes from which the bits follow that count there.
+    bits: __m512i,
+}
+
+impl Located {
+    pub(super) const NONE: Self = Self { addresses: [Addresses::NONE; 2], bits: eight_of(0) };
+}
 
 impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
     type Registers<'a> = BloomRegisters;
@@ -27,32 +39,22 @@ impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
     type Memory = ();
 
     const AHEAD: usize = 2;
-    const NO_WORD: Self::Word = [([eight_of(0); 2], [eight_of(0); 2]); GROUPS];
+    const NO_WORD: Self::Word = [Located::NONE; GROUPS];
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
-        BloomRegisters {
-            plane: PerShard::load(addresses(view.planes)),
-            words: PerShard::load(lengths(view.planes)),
-            hashes: view.hashes,
-        }
+        BloomRegisters::load(view)
     }
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(r: &BloomRegisters, index: [__m512i; 3], shard: __m512i, _: u16) -> Located {
-        let (keys, shards) = (pack(index), widen(shard));
-        let hashes = if HASHES == 0 { r.hashes } else { HASHES };
-        let (a, b) = (r.word_of(keys[0], shards[0], hashes), r.word_of(keys[1], shards[1], hashes));
+        let located = r.locate(halves(index), shard);
         if FETCH {
-            // SAFETY: a prefetch never faults.
-            unsafe {
-                prefetch(a.0);
-                prefetch(b.0);
-            }
+            located.addresses.iter().for_each(prefetch);
         }
-        ([a.0, b.0], [a.1, b.1])
+        located
     }
 
     /// Nothing is left to find out: neighbours' words lie apart.
@@ -69,39 +71,74 @@ impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn answer(_: &BloomRegisters, (): &mut (), word: &[Located; GROUPS]) -> u64 {
+    unsafe fn answer(r: &BloomRegisters, (): &mut (), word: &[Located; GROUPS]) -> u64 {
         // SAFETY: as for this function.
-        let answer = |group: usize| unsafe { u64::from(sixteen(&word[group])) << (group * LANES) };
+        let answer =
+            |group: usize| unsafe { u64::from(r.sixteen::<HASHES>(&word[group])) << (group * LANES) };
         answer(0) | answer(1) | answer(2) | answer(3)
     }
 }
 
-/// # Safety
-/// Needs AVX-512 F; the view must still live.
-#[inline]
-#[target_feature(enable = "avx512f")]
-unsafe fn sixteen((addresses, masks): &Located) -> u16 {
-    // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
-    let words = addresses.map(|a| unsafe { gather(a) });
-    let hit = |half: usize| _mm512_cmpeq_epi64_mask(_mm512_and_si512(words[half], masks[half]), masks[half]);
-    u16::from(hit(0)) | u16::from(hit(1)) << 8
+impl BloomRegisters {
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn load(view: &LevelView<'_>) -> Self {
+        Self {
+            plane: PerShard::load(addresses(view.planes)),
+            words: lanes(&lengths(view.planes).map(|words| words as u32 as i32)),
+            hashes: view.hashes,
+        }
+    }
+
+    /// The twin of `bloom::Probe::of` for sixteen keys, given by halves.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn locate(&self, halves: [__m512i; 2], shard: __m512i) -> Located {
+        let u = sum_of(halves, HASH_WORD);
+        let h = _mm512_xor_si512(u, _mm512_srli_epi32::<16>(u));
+        let h = _mm512_mullo_epi32(h, _mm512_set1_epi32(HASH_MIX as i32));
+        let words = _mm512_permutexvar_epi32(shard, self.words);
+        let address = |h: __m512i, words: __m512i, shard: __m512i| {
+            let word = _mm512_srli_epi64::<32>(_mm512_mul_epu32(h, words));
+            _mm512_add_epi64(self.plane.of(shard), _mm512_slli_epi64::<3>(word))
+        };
+        let addresses = [address(h, words, shard), address(odd(h), odd(words), odd(shard))];
+        Located { addresses: addresses.map(|a| Addresses::of(a)), bits: sum_of(halves, HASH_BITS) }
+    }
+
+    /// A bit for each of sixteen keys: are all its bits set?
+    ///
+    /// # Safety
+    /// Needs AVX-512 F; the view must still live.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    pub(super) unsafe fn sixteen<const HASHES: u32>(&self, located: &Located) -> u16 {
+        let hashes = if HASHES == 0 { self.hashes } else { HASHES };
+        // SAFETY: each address is of a word of a shard's plane, which the view keeps alive.
+        let [even, second] = located.addresses.each_ref().map(|a| unsafe { gather(a) });
+        let (even, second) =
+            (all_set(even, located.bits, hashes), all_set(second, odd(located.bits), hashes));
+        const ODD: u16 = 0b1010_1010_1010_1010;
+        let all = _mm512_mask_mov_epi32(even, ODD, _mm512_slli_epi64::<32>(second));
+        _mm512_test_epi32_mask(all, _mm512_set1_epi32(1))
+    }
 }
 
-impl BloomRegisters {
-    /// The twin of `bloom::Probe::of` for eight keys: addresses of words, and masks.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    pub(super) fn word_of(&self, key: __m512i, shard: __m512i, hashes: u32) -> (__m512i, __m512i) {
-        let h = mix(key, HASH_A, HASH_B);
-        let word = scale(h, self.words.of(shard));
-        let address = _mm512_add_epi64(self.plane.of(shard), _mm512_slli_epi64::<3>(word));
-        let one = _mm512_set1_epi64(1);
-        let mut g = _mm512_mul_epu32(h, _mm512_set1_epi64(HASH_C as i64));
-        let mut mask = _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g));
-        for _ in 1..hashes {
-            g = _mm512_slli_epi64::<6>(g);
-            mask = _mm512_or_si512(mask, _mm512_sllv_epi64(one, _mm512_srli_epi64::<58>(g)));
-        }
-        (address, mask)
+/// Bit 0 of each of eight lanes: are the bits set in the word that the low half of `g` says?
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn all_set(word: __m512i, g: __m512i, hashes: u32) -> __m512i {
+    // A rotation looks at six bits of its count: what lies above them may be anything.
+    let rotated = |g: __m512i, i: u32| {
+        _mm512_rorv_epi64(word, _mm512_srl_epi64(g, _mm_cvtsi32_si128((26 - 6 * i) as i32)))
+    };
+    let mut all = rotated(g, 0);
+    for i in 1..hashes.min(BITS_OF_HASH) {
+        all = _mm512_and_si512(all, rotated(g, i));
     }
+    let next = _mm512_mul_epu32(g, _mm512_set1_epi64(i64::from(HASH_NEXT)));
+    for i in BITS_OF_HASH..hashes {
+        all = _mm512_and_si512(all, rotated(next, i - BITS_OF_HASH));
+    }
+    all
 }

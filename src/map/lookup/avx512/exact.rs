@@ -3,8 +3,8 @@
 use std::arch::x86_64::*;
 
 use super::registers::{
-    PerShard, addresses, eight_of, gather, lanes, lengths, load, mix, pack, prefetch, scale, store, to_array,
-    widen,
+    PerShard, addresses, eight_of, gather_now, lanes, lengths, load, mix, pack, prefetch_now, scale, store,
+    to_array, widen,
 };
 use super::{GROUPS, LANES, Probe, WORD};
 use crate::map::lookup::LevelView;
@@ -51,10 +51,10 @@ pub(super) struct Located {
 /// A word of voxels.
 pub(super) struct ExactWord {
     cells: [__m512i; EIGHTS],
-    /// Lanes in another block than the lane before them.
-    heads: [u8; EIGHTS],
+    /// A bit for each in another block than the lane before it.
+    heads: u64,
     /// Those of them that are sought, since they lie in another block than the same lane of the word before.
-    sought: [u8; EIGHTS],
+    sought: u64,
     searches: [Search; EIGHTS],
     /// How many of the searches are this word's.
     searches_used: usize,
@@ -118,13 +118,7 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
     const NO_WORD: ExactWord = {
         let none = eight_of(0);
         let search = Search { blocks: none, shards: none, keys: none, masks: none, tagged: 0, full: 0 };
-        ExactWord {
-            cells: [none; EIGHTS],
-            heads: [0; EIGHTS],
-            sought: [0; EIGHTS],
-            searches: [search; EIGHTS],
-            searches_used: 0,
-        }
+        ExactWord { cells: [none; EIGHTS], heads: 0, sought: 0, searches: [search; EIGHTS], searches_used: 0 }
     };
 
     #[inline]
@@ -146,12 +140,13 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
         let up = r.view.up;
         let (left, right) = (_mm_cvtsi32_si128(up as i32), _mm_cvtsi32_si128((BLOCK_LEVELS - up) as i32));
         let [a, b] = pack(index.map(|i| _mm512_sra_epi32(i, right)));
+        let finest = if up == 0 { index } else { index.map(|i| _mm512_sll_epi32(i, left)) };
         // What is out of range may have the key of a block in another shard.
         let blocks = [
             _mm512_mask_mov_epi64(NO_BLOCK, valid as u8, a),
             _mm512_mask_mov_epi64(NO_BLOCK, (valid >> 8) as u8, b),
         ];
-        let cells = widen(cell(index.map(|i| _mm512_sll_epi32(i, left))));
+        let cells = widen(cell(finest));
         Located { blocks, cells, shards: widen(shard) }
     }
 
@@ -181,15 +176,16 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
         }
         let (mut hits, mut taken, mut before) = (0, 0, memory.masks[EIGHTS - 1]);
         for i in 0..EIGHTS {
+            let (heads, sought) = ((word.heads >> (8 * i)) as u8, (word.sought >> (8 * i)) as u8);
             let found = load(&memory.found, taken);
-            let heads = _mm512_mask_expand_epi64(memory.masks[i], word.sought[i], found);
-            taken += word.sought[i].count_ones() as usize;
-            before = _mm512_permutex2var_epi64(heads, latest_of(word.heads[i]), before);
+            let masks = _mm512_mask_expand_epi64(memory.masks[i], sought, found);
+            taken += sought.count_ones() as usize;
+            before = _mm512_permutex2var_epi64(masks, latest_of(heads), before);
             memory.masks[i] = before;
             let addresses =
                 _mm512_add_epi64(before, _mm512_slli_epi64::<3>(_mm512_srli_epi64::<6>(word.cells[i])));
             // SAFETY: each address is of a word of a mask that the view keeps alive, or of `ABSENT`.
-            let words = unsafe { gather(addresses) };
+            let words = unsafe { gather_now(addresses) };
             let hit = _mm512_test_epi64_mask(words, within(word.cells[i], r.view.up));
             hits |= u64::from(hit) << (8 * i);
         }
@@ -208,13 +204,15 @@ impl ExactWord {
         always: u8,
     ) -> usize {
         let (mut queued, mut before) = (0, memory.blocks[EIGHTS - 1]);
+        (self.heads, self.sought) = (0, 0);
         for i in 0..EIGHTS {
             let Located { blocks, cells, shards } = &located[i / 2];
             let blocks = blocks[i % 2];
             self.cells[i] = cells[i % 2];
             let heads = _mm512_cmpneq_epi64_mask(blocks, _mm512_alignr_epi64::<7>(blocks, before)) | always;
             let sought = heads & (_mm512_cmpneq_epi64_mask(blocks, memory.blocks[i]) | always);
-            (self.heads[i], self.sought[i]) = (heads, sought);
+            self.heads |= u64::from(heads) << (8 * i);
+            self.sought |= u64::from(sought) << (8 * i);
             store(&mut memory.queue.0, queued, _mm512_maskz_compress_epi64(sought, blocks));
             store(&mut memory.queue.1, queued, _mm512_maskz_compress_epi64(sought, shards[i % 2]));
             queued += sought.count_ones() as usize;
@@ -235,7 +233,7 @@ impl ExactRegisters<'_> {
         let bucket = scale(h, self.buckets.of(shards));
         let tags_address = _mm512_add_epi64(self.tags.of(shards), _mm512_slli_epi64::<3>(bucket));
         // SAFETY: the address is of a bucket's tags of a shard's table, which the view keeps alive.
-        let tags = unsafe { gather(tags_address) };
+        let tags = unsafe { gather_now(tags_address) };
         // The place of the first tag that fits, times eight: each takes a byte, as a key does a u64.
         let fits = fitting(tags, h);
         let first = _mm512_sub_epi64(_mm512_set1_epi64(63), _mm512_lzcnt_epi64(fits));
@@ -248,11 +246,8 @@ impl ExactRegisters<'_> {
         let (keys, masks) =
             (_mm512_mask_mov_epi64(absent(), tagged, keys), _mm512_mask_mov_epi64(absent(), tagged, masks));
         if FETCH {
-            // SAFETY: a prefetch never faults.
-            unsafe {
-                prefetch(keys);
-                prefetch(masks);
-            }
+            prefetch_now(keys);
+            prefetch_now(masks);
         }
         let full = _mm512_test_epi64_mask(tags, _mm512_set1_epi64(0xff << 56));
         Search { blocks, shards, keys, masks, tagged, full }
@@ -266,7 +261,7 @@ impl ExactRegisters<'_> {
     #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
     unsafe fn masks_of(&self, search: &Search) -> __m512i {
         // SAFETY: each address is of a key that the view keeps alive, or of `ABSENT`.
-        let keys = unsafe { gather(search.keys) };
+        let keys = unsafe { gather_now(search.keys) };
         let is_block = _mm512_cmpeq_epi64_mask(keys, search.blocks) & search.tagged;
         let masks = _mm512_mask_mov_epi64(absent(), is_block, search.masks);
         let elsewhere = !is_block & (search.tagged | search.full);
@@ -343,17 +338,17 @@ fn fitting(tags: __m512i, h: __m512i) -> __m512i {
 #[target_feature(enable = "avx512f")]
 fn cell(index: [__m512i; 3]) -> __m512i {
     // The permutation looks at four bits of an index; the fourth selects the same values again.
-    const SPREAD: [i32; LANES] = {
-        let mut spread = [0; LANES];
+    const SPREAD: [[i32; LANES]; 3] = {
+        let mut spread = [[0; LANES]; 3];
         let mut i = 0;
-        while i < LANES {
-            spread[i] = (Cell::SPREAD >> ((i & 7) * 8)) as i32 & 0xff;
+        while i < 3 * LANES {
+            spread[i / LANES][i % LANES] = ((Cell::SPREAD >> ((i & 7) * 8)) as i32 & 0xff) << (i / LANES);
             i += 1;
         }
         spread
     };
-    let [x, y, z] = index.map(|i| _mm512_permutexvar_epi32(i, lanes(&SPREAD)));
-    _mm512_or_si512(x, _mm512_or_si512(_mm512_slli_epi32::<1>(y), _mm512_slli_epi32::<2>(z)))
+    let [x, y, z] = [0, 1, 2].map(|axis| _mm512_permutexvar_epi32(index[axis], lanes(&SPREAD[axis])));
+    _mm512_or_si512(_mm512_or_si512(x, y), z)
 }
 
 /// The twin of `BlockMask::within`.

@@ -12,8 +12,8 @@ use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints};
 /// From points to indices of a level and shards.
 pub(super) struct Place {
     quantise: Quantise,
-    level: __m128i,
-    region_shift: __m128i,
+    level: u32,
+    shards: Shards,
 }
 
 impl Place {
@@ -22,8 +22,8 @@ impl Place {
     pub(super) fn load(lattice_from_points: &LatticeFromPoints, view: &LevelView<'_>) -> Self {
         Self {
             quantise: Quantise::load(lattice_from_points),
-            level: _mm_cvtsi32_si128(view.level as i32),
-            region_shift: _mm_cvtsi32_si128(view.region_shift as i32),
+            level: view.level,
+            shards: Shards::load(view.region_shift),
         }
     }
 
@@ -37,8 +37,11 @@ impl Place {
         // SAFETY: the feature is there.
         let coordinates = unsafe { load(points) };
         let (index, valid) = self.quantise.index(deinterleave(coordinates));
-        let index = index.map(|i| _mm512_sra_epi32(i, self.level));
-        (index, shard(index.map(|i| _mm512_sra_epi32(i, self.region_shift))), valid)
+        let index = match self.level {
+            0 => index,
+            level => index.map(|i| _mm512_sra_epi32(i, _mm_cvtsi32_si128(level as i32))),
+        };
+        (index, self.shards.of(index), valid)
     }
 }
 
@@ -108,7 +111,6 @@ pub(super) fn deinterleave([a, b, c]: [__m512; 3]) -> [__m512; 3] {
 pub(super) struct Quantise {
     rotation: [[__m512; 3]; 3],
     translation: [__m512; 3],
-    per_resolution: __m512,
 }
 
 impl Quantise {
@@ -118,7 +120,6 @@ impl Quantise {
         Self {
             rotation: t.rotation.map(|row| row.map(|r| _mm512_set1_ps(r))),
             translation: t.translation.map(|c| _mm512_set1_ps(c)),
-            per_resolution: _mm512_set1_ps(t.per_resolution),
         }
     }
 
@@ -130,7 +131,7 @@ impl Quantise {
             let [r0, r1, r2] = self.rotation[axis];
             let sum = _mm512_add_ps(_mm512_mul_ps(r0, x), _mm512_mul_ps(r1, y));
             let sum = _mm512_add_ps(sum, _mm512_mul_ps(r2, z));
-            let scaled = _mm512_mul_ps(_mm512_add_ps(sum, self.translation[axis]), self.per_resolution);
+            let scaled = _mm512_add_ps(sum, self.translation[axis]);
             _mm512_cvt_roundps_epi32::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(scaled)
         });
         // What is no number, or no i32, became i32::MIN: out of range as well.
@@ -141,11 +142,27 @@ impl Quantise {
     }
 }
 
-/// The twin of `sharding::shard_of_region`.
-#[inline]
-#[target_feature(enable = "avx512f")]
-pub(super) fn shard([x, y, z]: [__m512i; 3]) -> __m512i {
-    let colour = _mm512_slli_epi32::<2>(_mm512_add_epi32(y, z));
-    let colour = _mm512_add_epi32(colour, _mm512_add_epi32(x, z));
-    _mm512_and_si512(colour, _mm512_set1_epi32(SHARDS as i32 - 1))
+/// The twin of `sharding::shard_of_region`, for indices of a level.
+struct Shards {
+    shift: __m128i,
+    /// The bits of an index that say which region it is in.
+    region: __m512i,
+}
+
+impl Shards {
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn load(region_shift: u32) -> Self {
+        Self { shift: _mm_cvtsi32_si128(region_shift as i32), region: _mm512_set1_epi32(-1 << region_shift) }
+    }
+
+    /// Shifts once, for shifts are what the look-up has most of.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn of(&self, index: [__m512i; 3]) -> __m512i {
+        let [x, y, z] = index.map(|i| _mm512_and_si512(i, self.region));
+        let colour = _mm512_slli_epi32::<2>(_mm512_add_epi32(y, z));
+        let colour = _mm512_add_epi32(colour, _mm512_add_epi32(x, z));
+        _mm512_and_si512(_mm512_srl_epi32(colour, self.shift), _mm512_set1_epi32(SHARDS as i32 - 1))
+    }
 }

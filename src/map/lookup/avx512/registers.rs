@@ -20,17 +20,48 @@ pub(super) fn lanes(values: &[i32; LANES]) -> __m512i {
     unsafe { _mm512_loadu_si512(values.as_ptr().cast()) }
 }
 
-/// Sixteen packed keys (`VoxelKey::pack`), eight a register.
+/// Low and high halves of sixteen packed keys (`VoxelKey::pack`).
 #[inline]
 #[target_feature(enable = "avx512f")]
-pub(super) fn pack(index: [__m512i; 3]) -> [__m512i; 2] {
+pub(super) fn halves(index: [__m512i; 3]) -> [__m512i; 2] {
     let field = _mm512_set1_epi32(0x1f_ffff);
     let [x, y, z] = index.map(|i| _mm512_and_si512(i, field));
     let low = _mm512_or_si512(x, _mm512_slli_epi32::<21>(y));
-    let high = _mm512_or_si512(_mm512_srli_epi32::<11>(y), _mm512_slli_epi32::<10>(z));
+    [low, _mm512_or_si512(_mm512_srli_epi32::<11>(y), _mm512_slli_epi32::<10>(z))]
+}
+
+/// Sixteen packed keys, eight a register.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn pack(index: [__m512i; 3]) -> [__m512i; 2] {
+    let [low, high] = halves(index);
     const FIRST: [i32; LANES] = [0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23];
     const SECOND: [i32; LANES] = [8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31];
     [FIRST, SECOND].map(|index| _mm512_permutex2var_epi32(low, lanes(&index), high))
+}
+
+/// The inverse of [`halves`] and [`pack`]: halves of sixteen keys.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn halves_of([a, b]: [__m512i; 2]) -> [__m512i; 2] {
+    const LOW: [i32; LANES] = [0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30];
+    const HIGH: [i32; LANES] = [1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31];
+    [LOW, HIGH].map(|index| _mm512_permutex2var_epi32(a, lanes(&index), b))
+}
+
+/// low * by[0] + high * by[1], in 32 bits.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn sum_of([low, high]: [__m512i; 2], by: [u32; 2]) -> __m512i {
+    let times = |half: __m512i, by: u32| _mm512_mullo_epi32(half, _mm512_set1_epi32(by as i32));
+    _mm512_add_epi32(times(low, by[0]), times(high, by[1]))
+}
+
+/// The odd ones of sixteen lanes, where the even ones were.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) fn odd(lanes: __m512i) -> __m512i {
+    _mm512_srli_epi64::<32>(lanes)
 }
 
 /// Sixteen u32 as u64, eight a register.
@@ -43,7 +74,7 @@ pub(super) fn widen(values: __m512i) -> [__m512i; 2] {
     ]
 }
 
-/// high32(mix(key)) and mix(key), for the mix of both the filter and the table.
+/// The mix of the table of blocks (`Slots::home`).
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq")]
 pub(super) fn mix(key: __m512i, a: u64, b: u64) -> __m512i {
@@ -86,21 +117,53 @@ pub(super) fn lengths<T>(slices: [&[T]; SHARDS]) -> [u64; SHARDS] {
     slices.map(|slice| slice.len() as u64)
 }
 
-/// Starts fetching the lines at eight addresses.
-///
-/// # Safety
-/// Needs AVX-512 F. Any address will do: a prefetch never faults.
+/// Eight addresses in memory, from where they are fetched one by one.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct Addresses([u64; 8]);
+
+impl Addresses {
+    pub(super) const NONE: Self = Self([0; 8]);
+
+    /// One of them, loaded. The compiler would rather take it out of the register that it was stored from, which is
+    /// sooner known (so where one look-up waits for the other, [`Addresses::taken`]) and is more work for the vectors.
+    #[inline(always)]
+    fn loaded<T>(&self, i: usize) -> *const T {
+        // SAFETY: what is referred to may be read.
+        let address = unsafe { std::ptr::read_volatile(&raw const self.0[i]) };
+        std::ptr::with_exposed_provenance(address as usize)
+    }
+
+    #[inline(always)]
+    fn taken<T>(&self, i: usize) -> *const T {
+        std::ptr::with_exposed_provenance(self.0[i] as usize)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn of(addresses: __m512i) -> Self {
+        Self(to_array(addresses))
+    }
+}
+
+/// Starts fetching the lines at eight addresses. Any address will do: a prefetch never faults.
+#[inline(always)]
+pub(super) fn prefetch(addresses: &Addresses) {
+    (0..8).for_each(|i| fetch(addresses.loaded(i)));
+}
+
+/// The same, at once.
 #[inline]
 #[target_feature(enable = "avx512f")]
-pub(super) unsafe fn prefetch(addresses: __m512i) {
-    let mut each = [0u64; 8];
-    // SAFETY: a register is eight u64.
-    unsafe {
-        _mm512_storeu_si512(each.as_mut_ptr().cast(), addresses);
-        for address in each {
-            _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(address as usize));
-        }
-    }
+pub(super) fn prefetch_now(addresses: __m512i) {
+    let addresses = Addresses::of(addresses);
+    (0..8).for_each(|i| fetch(addresses.taken(i)));
+}
+
+#[inline(always)]
+fn fetch(address: *const i8) {
+    // SAFETY: a prefetch never faults.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
 }
 
 /// The u64 at each of eight addresses, by eight loads: on Zen 4 the instruction that gathers takes twice as long
@@ -110,12 +173,31 @@ pub(super) unsafe fn prefetch(addresses: __m512i) {
 /// Needs AVX-512 F; each address must be of a u64 that may be read.
 #[inline]
 #[target_feature(enable = "avx512f")]
-pub(super) unsafe fn gather(addresses: __m512i) -> __m512i {
-    let mut each = [std::ptr::null::<f64>(); 8];
-    // SAFETY: a register is eight addresses, and they are of words that may be read.
+pub(super) unsafe fn gather(addresses: &Addresses) -> __m512i {
+    // SAFETY: as for this function.
+    unsafe { gather_from(|i| addresses.loaded(i)) }
+}
+
+/// The same, at once.
+///
+/// # Safety
+/// As for that.
+#[inline]
+#[target_feature(enable = "avx512f")]
+pub(super) unsafe fn gather_now(addresses: __m512i) -> __m512i {
+    let addresses = Addresses::of(addresses);
+    // SAFETY: as for this function.
+    unsafe { gather_from(|i| addresses.taken(i)) }
+}
+
+/// # Safety
+/// Needs AVX-512 F; each address must be of a u64 that may be read.
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn gather_from(at: impl Fn(usize) -> *const f64) -> __m512i {
+    // SAFETY: the addresses are of words that may be read.
     unsafe {
-        _mm512_storeu_si512(each.as_mut_ptr().cast(), addresses);
-        let pair = |i: usize| _mm_loadh_pd(_mm_load_sd(each[i]), each[i + 1]);
+        let pair = |i: usize| _mm_loadh_pd(_mm_load_sd(at(i)), at(i + 1));
         let four = |i: usize| _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(pair(i)), pair(i + 2));
         _mm512_castpd_si512(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(four(0)), four(4)))
     }

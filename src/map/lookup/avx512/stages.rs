@@ -3,10 +3,10 @@
 
 use std::arch::x86_64::*;
 
-use super::bloom::{Bloom, BloomRegisters};
+use super::bloom::{BloomRegisters, Located};
 use super::place::{Quantise, deinterleave, load};
-use super::registers::{gather, pack};
-use super::{LANES, Probe};
+use super::registers::{halves_of, pack};
+use super::{GROUPS, LANES, WORD};
 use crate::geometry::Point;
 use crate::map::lookup::LevelView;
 use crate::map::lookup::stages::{Grid, NO_KEY};
@@ -110,23 +110,24 @@ unsafe fn index(quantise: &Quantise, level: __m128i, points: &[Point]) -> ([__m5
 /// Needs AVX-512 F and DQ, and a word of `occupied` for each 64 keys.
 #[target_feature(enable = "avx512f,avx512dq")]
 unsafe fn all_in_filter<const HASHES: u32>(keys: &[u64], view: &LevelView<'_>, occupied: &mut [u64]) {
-    // SAFETY: the features are there; each load is masked to the keys that are, and each address is of a word of a
-    // shard's plane, which the view keeps alive.
+    // SAFETY: the features are there, and the view lives.
     unsafe {
-        let r = Bloom::<HASHES, false>::load(view);
+        let r = BloomRegisters::load(view);
         let region_shift = _mm_cvtsi32_si128(view.region_shift as i32);
-        for (keys, word) in keys.chunks(64).zip(occupied) {
+        for (keys, word) in keys.chunks(WORD).zip(occupied) {
             // All addresses first, as in the whole look-up, so that many loads are on their way at once.
-            let mut located = [(_mm512_setzero_si512(), _mm512_setzero_si512(), 0); 64 / EIGHT];
+            let mut located = [(Located::NONE, 0); GROUPS];
             for (group, located) in located.iter_mut().enumerate() {
-                let keys = load_keys(keys.get(group * EIGHT..).unwrap_or_default());
-                *located = locate::<HASHES>(&r, keys, region_shift);
+                let eight = |at: usize| load_keys(keys.get(group * LANES + at..).unwrap_or_default());
+                let keys = [eight(0), eight(EIGHT)];
+                let shards = keys.map(|keys| shard(unpack(keys).map(|i| _mm512_sra_epi64(i, region_shift))));
+                let is_key = !(u16::from(_mm512_movepi64_mask(keys[0]))
+                    | u16::from(_mm512_movepi64_mask(keys[1])) << EIGHT);
+                *located = (r.locate(halves_of(keys), halves_of(shards)[0]), is_key);
             }
             *word = 0;
-            for (group, (addresses, masks, is_key)) in located.into_iter().enumerate() {
-                let words = gather(addresses);
-                let hits = is_key & _mm512_cmpeq_epi64_mask(_mm512_and_si512(words, masks), masks);
-                *word |= u64::from(hits) << (group * EIGHT);
+            for (group, (located, is_key)) in located.iter().enumerate() {
+                *word |= u64::from(is_key & r.sixteen::<HASHES>(located)) << (group * LANES);
             }
         }
     }
@@ -149,20 +150,6 @@ unsafe fn load_keys(keys: &[u64]) -> __m512i {
     let present = ((1u32 << keys.len()) - 1) as u8;
     // SAFETY: the load is masked to the keys that are.
     unsafe { _mm512_mask_loadu_epi64(_mm512_set1_epi64(NO_KEY as i64), present, keys.as_ptr().cast()) }
-}
-
-/// Where to look for eight keys, for which bits, and a bit for each that is a key.
-#[inline]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn locate<const HASHES: u32>(
-    r: &BloomRegisters,
-    keys: __m512i,
-    region_shift: __m128i,
-) -> (__m512i, __m512i, u8) {
-    let shard = shard(unpack(keys).map(|i| _mm512_sra_epi64(i, region_shift)));
-    let hashes = if HASHES == 0 { r.hashes } else { HASHES };
-    let (addresses, masks) = r.word_of(keys, shard, hashes);
-    (addresses, masks, !_mm512_movepi64_mask(keys))
 }
 
 /// The indices of eight keys: the inverse of [`pack`].
