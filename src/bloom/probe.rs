@@ -1,14 +1,17 @@
 //! Where a key's bits lie: one word of the plane, k bits of it.
 
-/// What the halves of a key are multiplied by, for the word and for the bits there. The determinant
-/// `WORD[0] * BITS[1] - WORD[1] * BITS[0]` is odd: no two keys agree in both.
+/// What the halves of a key are multiplied by, for the word and for the bits there.
 pub(crate) const HASH_WORD: [u32; 2] = [0x9e37_79b1, 0xc2b2_ae3e];
 pub(crate) const HASH_BITS: [u32; 2] = [0x27d4_eb2f, 0x1656_67b1];
+const _: () = assert!(
+    (HASH_WORD[0] & HASH_BITS[1] ^ HASH_WORD[1] & HASH_BITS[0]) & 1 == 1,
+    "an odd determinant: no two keys agree in both sums"
+);
 /// Odd: what mixes the sum that the word is taken from.
 pub(crate) const HASH_MIX: u32 = 0x85eb_ca77;
 /// Odd: from the first bits of a key to further ones.
 pub(crate) const HASH_NEXT: u32 = 0xf135_7aeb;
-/// Bits that one u32 of hash gives, of six bits each.
+/// How many bits of a word one hash of 32 bits selects, six of it each.
 pub(crate) const BITS_OF_HASH: u32 = 5;
 
 /// A key's word of the bit plane and its bits there.

@@ -1,7 +1,9 @@
 //! How many false positives to expect, and the settings that decide it.
 
-/// Most hash functions a filter may have: each takes 6 of the 64 bits of one product.
-pub const HASHES_MAX: u32 = 10;
+use super::BITS_OF_HASH;
+
+/// Most hash functions a filter may have: each takes 6 bits of one of two hashes of 32.
+pub const HASHES_MAX: u32 = 2 * BITS_OF_HASH;
 const BITS_PER_KEY_MIN: f64 = 1.0;
 const BITS_PER_KEY_MAX: f64 = 4096.0;
 const WORD_BITS: f64 = 64.0;
