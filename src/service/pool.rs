@@ -13,8 +13,8 @@ use super::{ErrorCode, ServiceError};
 use crate::interest::Interest;
 
 /// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing them
-/// over takes longer (two wake-ups, some 70 us) than answering them (15 to 100 us). A probe of the server's health that
-/// comes behind as many of them as may be under way still waits for milliseconds only.
+/// over, with two wake-ups, takes some 70 us, and answering them 15 to 100 where the look-up is as wide as a machine of
+/// now allows.
 pub(super) const INLINE_POINTS: usize = 10_240;
 
 /// A fixed number of threads and a bounded queue before them.

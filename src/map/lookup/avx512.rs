@@ -255,8 +255,7 @@ const POINTS_AHEAD: usize = 2048;
 fn prefetch_points(points: &[Point]) {
     let ahead = points.as_ptr().cast::<i8>().wrapping_add(POINTS_AHEAD);
     for line in 0..size_of::<[Point; WORD]>() / 64 {
-        // SAFETY: a prefetch never faults.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(ahead.wrapping_add(64 * line)) };
+        registers::fetch(ahead.wrapping_add(64 * line));
     }
 }
 

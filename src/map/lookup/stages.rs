@@ -157,6 +157,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::bloom::{FilterSettings, HASHES_MAX};
     use crate::geometry::Pose;
     use crate::map::{MapContents, MapSettings, MultiResolutionMap};
     use crate::voxel::VoxelSet;
@@ -170,8 +171,10 @@ mod tests {
         prop::collection::vec(prop::array::uniform3(coordinate).prop_map(Point::from), 0..150)
     }
 
-    fn map_of(points: &[Point], levels: u32) -> MultiResolutionMap {
-        let map = MultiResolutionMap::new(MapSettings::new(0.5, levels)).unwrap();
+    fn map_of(points: &[Point], levels: u32, hashes: u32) -> MultiResolutionMap {
+        let filter = FilterSettings { hashes, ..FilterSettings::default() };
+        let settings = MapSettings { filter, ..MapSettings::new(0.5, levels) };
+        let map = MultiResolutionMap::new(settings).unwrap();
         let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_map());
         MultiResolutionMap::restore(*map.settings(), MapContents::at(1, voxels)).unwrap()
     }
@@ -197,9 +200,10 @@ mod tests {
             occupied in points(),
             asked in points(),
             levels in 1u32..=5,
+            hashes in 1u32..=HASHES_MAX,
             turned in any::<bool>(),
         ) {
-            let map = map_of(&occupied, levels);
+            let map = map_of(&occupied, levels, hashes);
             let pose = match turned {
                 true => Pose::new([0.3, -7.0, 1.0].into(), [0.4, -0.2, 2.0].into()),
                 false => Pose::identity(),

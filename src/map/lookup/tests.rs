@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::{LevelView, Lookup, scalar};
-use crate::bloom::FilterSettings;
+use crate::bloom::{FilterSettings, HASHES_MAX};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
@@ -75,7 +75,7 @@ proptest! {
         keys in prop::collection::vec(index(), 0..600),
         points in prop::collection::vec(point(), 0..150),
         levels in 1u32..=12,
-        hashes in 1u32..=5,
+        hashes in 1u32..=HASHES_MAX,
         bits_per_key in 2.0f64..20.0,
         turned in any::<bool>(),
     ) {
@@ -97,8 +97,11 @@ fn exact_answers_are_exact_whichever_way_they_are_found() {
     let map = map_of(floor, MapSettings { resolution_m: 1.0, levels: 2, filter });
     let at = |i: usize, height: f32| Point::new((i % 40) as f32 + 0.5, (i / 40 % 40) as f32 + 0.5, height);
     let sparse = |i: usize| at(i, if i.is_multiple_of(50) { 0.5 } else { 3.5 });
-    let points: Vec<_> =
-        (0..3000).map(sparse).chain((0..2500).map(|i| at(i, 0.5))).chain((0..2999).map(sparse)).collect();
+    let points: Vec<_> = (0..20_000)
+        .map(sparse)
+        .chain((0..20_000).map(|i| at(i, 0.5)))
+        .chain((0..19_999).map(sparse))
+        .collect();
     assert_twins(&map, &points, &Pose::identity());
 }
 

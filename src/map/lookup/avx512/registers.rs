@@ -126,17 +126,12 @@ impl Addresses {
     pub(super) const NONE: Self = Self([0; 8]);
 
     /// One of them, loaded. The compiler would rather take it out of the register that it was stored from, which is
-    /// sooner known (so where one look-up waits for the other, [`Addresses::taken`]) and is more work for the vectors.
+    /// sooner known (so where one look-up waits for the other, [`gather_now`]) and is more work for the vectors.
     #[inline(always)]
     fn loaded<T>(&self, i: usize) -> *const T {
         // SAFETY: what is referred to may be read.
         let address = unsafe { std::ptr::read_volatile(&raw const self.0[i]) };
         std::ptr::with_exposed_provenance(address as usize)
-    }
-
-    #[inline(always)]
-    fn taken<T>(&self, i: usize) -> *const T {
-        std::ptr::with_exposed_provenance(self.0[i] as usize)
     }
 
     #[inline]
@@ -156,12 +151,14 @@ pub(super) fn prefetch(addresses: &Addresses) {
 #[inline]
 #[target_feature(enable = "avx512f")]
 pub(super) fn prefetch_now(addresses: __m512i) {
-    let addresses = Addresses::of(addresses);
-    (0..8).for_each(|i| fetch(addresses.taken(i)));
+    for address in to_array(addresses) {
+        fetch(std::ptr::with_exposed_provenance(address as usize));
+    }
 }
 
+/// Starts fetching one line.
 #[inline(always)]
-fn fetch(address: *const i8) {
+pub(super) fn fetch(address: *const i8) {
     // SAFETY: a prefetch never faults.
     unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
 }
@@ -185,9 +182,9 @@ pub(super) unsafe fn gather(addresses: &Addresses) -> __m512i {
 #[inline]
 #[target_feature(enable = "avx512f")]
 pub(super) unsafe fn gather_now(addresses: __m512i) -> __m512i {
-    let addresses = Addresses::of(addresses);
+    let addresses = to_array(addresses);
     // SAFETY: as for this function.
-    unsafe { gather_from(|i| addresses.taken(i)) }
+    unsafe { gather_from(|i| std::ptr::with_exposed_provenance(addresses[i] as usize)) }
 }
 
 /// # Safety
