@@ -1,7 +1,6 @@
 //! Work whose caller is gone stops: while it waits, while it is in hand, and in streams; a deadline is a caller that goes.
 
 #![cfg(feature = "server")]
-#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod common;
 
@@ -47,9 +46,7 @@ async fn align(daemon: &Daemon) -> JoinHandle<Result<tonic::Response<pb::AlignSc
 
 /// What `/metrics` says of the jobs of the mapping pool.
 async fn jobs(daemon: &Daemon, what: &str) -> u64 {
-    let metrics = daemon.get("/metrics").await.text().await.unwrap();
-    let name = format!("mrol_jobs_{what}{{pool=\"mapping\"}} ");
-    metrics.lines().find_map(|line| line.strip_prefix(&name)).unwrap().parse().unwrap()
+    daemon.metric(&format!("mrol_jobs_{what}{{pool=\"mapping\"}}")).await as u64
 }
 
 async fn until(daemon: &Daemon, what: &str, count: u64) {

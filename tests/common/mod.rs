@@ -124,6 +124,13 @@ impl Daemon {
         client().get(self.url(path)).send().await.expect("an answer")
     }
 
+    /// What `/metrics` says of `series`: a name with its labels. Zero before it is first recorded.
+    pub async fn metric(&self, series: &str) -> f64 {
+        let metrics = self.get("/metrics").await.text().await.expect("text");
+        let value = metrics.lines().find_map(|line| line.strip_prefix(series)?.strip_prefix(' '));
+        value.map_or(0.0, |value| value.parse().expect("a number"))
+    }
+
     pub async fn delete(&self, path: &str) -> Response {
         client().delete(self.url(path)).send().await.expect("an answer")
     }
