@@ -11,6 +11,7 @@ pub(super) mod stages;
 
 use std::arch::x86_64::*;
 
+use super::ahead::fetch;
 use super::{LevelView, Lookup};
 use crate::geometry::Point;
 use crate::voxel::LatticeFromPoints;
@@ -153,6 +154,5 @@ fn store(to: &mut [u64], lanes: __m256i) {
 /// Starts fetching the line at an address.
 #[inline(always)]
 fn prefetch(address: u64) {
-    // SAFETY: a prefetch never faults.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::with_exposed_provenance(address as usize)) };
+    fetch::<u64>(std::ptr::with_exposed_provenance(address as usize));
 }

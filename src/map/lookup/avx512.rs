@@ -13,6 +13,7 @@ pub(super) mod stages;
 
 use std::arch::x86_64::*;
 
+use super::ahead::fetch;
 use super::{LevelView, Lookup};
 use crate::geometry::Point;
 use crate::voxel::LatticeFromPoints;
@@ -255,7 +256,7 @@ const POINTS_AHEAD: usize = 2048;
 fn prefetch_points(points: &[Point]) {
     let ahead = points.as_ptr().cast::<i8>().wrapping_add(POINTS_AHEAD);
     for line in 0..size_of::<[Point; WORD]>() / 64 {
-        registers::fetch(ahead.wrapping_add(64 * line));
+        fetch(ahead.wrapping_add(64 * line));
     }
 }
 

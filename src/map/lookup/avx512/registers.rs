@@ -3,6 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::LANES;
+use crate::map::lookup::ahead::fetch;
 use crate::map::sharding::SHARDS;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
@@ -144,7 +145,7 @@ impl Addresses {
 /// Starts fetching the lines at eight addresses. Any address will do: a prefetch never faults.
 #[inline(always)]
 pub(super) fn prefetch(addresses: &Addresses) {
-    (0..8).for_each(|i| fetch(addresses.loaded(i)));
+    (0..8).for_each(|i| fetch(addresses.loaded::<u64>(i)));
 }
 
 /// The same, at once.
@@ -152,15 +153,8 @@ pub(super) fn prefetch(addresses: &Addresses) {
 #[target_feature(enable = "avx512f")]
 pub(super) fn prefetch_now(addresses: __m512i) {
     for address in to_array(addresses) {
-        fetch(std::ptr::with_exposed_provenance(address as usize));
+        fetch(std::ptr::with_exposed_provenance::<u64>(address as usize));
     }
-}
-
-/// Starts fetching one line.
-#[inline(always)]
-pub(super) fn fetch(address: *const i8) {
-    // SAFETY: a prefetch never faults.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
 }
 
 /// The u64 at each of eight addresses, by eight loads: on Zen 4 the instruction that gathers takes twice as long
