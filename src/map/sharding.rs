@@ -48,6 +48,10 @@ const ROUNDING: f64 = 1e-5;
 /// Points that are looked at before all are.
 const FEW_POINTS: usize = 64;
 
+/// Shards from which on a view covers all of them: to spare the others their locks, all points would have to be looked
+/// at, which takes a tenth of what a look-up by the filter does.
+const MANY_SHARDS: u32 = SHARDS as u32 / 2;
+
 impl Sharding {
     pub(super) fn new(levels: u32) -> Self {
         Self { region_shift: REGION_SHIFT_MIN.max(levels - 1) }
@@ -63,19 +67,19 @@ impl Sharding {
         shard_of_region(index.map(|i| i >> self.shift_at(level)))
     }
 
-    /// The shards that `points` placed at `map_from_points` can fall in: those of the regions that their
-    /// bounding box meets, with room for rounding.
+    /// Shards enough for `points` placed at `map_from_points`: those of the regions that their bounding box meets, with
+    /// room for rounding; all of them where that is many.
     pub(super) fn touched_by(
         self,
         points: &[Point],
         map_from_points: &Pose,
         lattice: &Lattice,
     ) -> ShardsTouched {
-        // A scan needs all shards more often than not, and a few of its points tell.
+        // A scan needs many shards more often than not, and a few of its points tell.
         let few: Vec<Point> = points.iter().step_by(points.len() / FEW_POINTS + 1).copied().collect();
         let touched_in = |bounds: Bounds| touched_in(self.regions(bounds, map_from_points, lattice));
         match bounds(&few).map(touched_in) {
-            Some(touched) if touched == ShardsTouched::all() => touched,
+            Some(touched) if touched.0.count_ones() >= MANY_SHARDS => ShardsTouched::all(),
             _ => bounds(points).map_or(ShardsTouched::none(), touched_in),
         }
     }
