@@ -128,7 +128,7 @@ impl OfTier {
 
 impl OfLevel {
     /// A larger filter also forgets saturated counters.
-    fn plan(shard: &Shard, level: usize, mut keys: Vec<u64>) -> Self {
+    fn plan(shard: &Shard, level: usize, keys: Vec<u64>) -> Self {
         let filter = &shard.filters[level];
         let need = filter.len() + keys.len();
         if need <= filter.capacity() {
@@ -136,9 +136,8 @@ impl OfLevel {
         }
         let capacity = Room::of(shard.number, level).for_items(need);
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
-        keys.reserve_exact(filter.len());
-        shard.level(level as u32).for_each_key(|key| keys.push(key));
         insert_each(&mut larger, &keys);
+        shard.level(level as u32).for_some_keys(|keys| insert_each(&mut larger, keys));
         Self::Grown(larger)
     }
 }

@@ -57,12 +57,18 @@ impl<'a> OccupiedVoxelList<'a> {
         self.blocks.iter().flat_map(voxels)
     }
 
-    /// Calls `f` with the key of each occupied voxel, in no order.
-    pub(super) fn for_each_key(&self, mut f: impl FnMut(u64)) {
-        let up = tier_of(self.level).1;
+    /// Calls `f` with the keys of all occupied voxels, in no order: some at a time, so that they are still near.
+    pub(super) fn for_some_keys(&self, mut f: impl FnMut(&[u64])) {
+        const SOME: usize = 256;
+        let (up, mut keys) = (tier_of(self.level).1, Vec::with_capacity(2 * SOME));
         for (block, mask) in self.blocks.iter() {
-            mask.firsts(up).for_each_key(block, up, &mut f);
+            mask.firsts(up).for_each_key(block, up, |key| keys.push(key));
+            if keys.len() >= SOME {
+                f(&keys);
+                keys.clear();
+            }
         }
+        f(&keys);
     }
 
     /// About `wish` occupied voxels, spread over the blocks: some of every n-th block, from a random start.
