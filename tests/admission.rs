@@ -86,7 +86,8 @@ async fn more_requests_than_requests_max_are_shed_and_probes_are_not() {
     let post = client().post(daemon.url("/v1/maps/a/occupancy")).json(&waiting());
     let busy: Vec<_> = (0..2).map(|_| tokio::spawn(post.try_clone().expect("a request").send())).collect();
     // Only a probe takes nobody's place meanwhile.
-    wait_until(async || daemon.metric(r#"mrol_requests_in_flight{state="in_work"}"#).await == 2.0).await;
+    wait_until(async || daemon.metric(r#"mrol_requests_in_flight{state="in_work"}"#).await == Some(2.0))
+        .await;
 
     assert_shed(daemon.get("/v1/maps/a").await, "requests_max is 2").await;
     assert_shed(daemon.post("/v1/maps/a/occupancy", json!({"points": row(1)})).await, "requests_max is 2")
@@ -150,7 +151,7 @@ async fn bodies_share_a_budget_that_declared_lengths_do_not_count_in() {
 
     // One that is being sent keeps its memory.
     let mut sending = begun(&daemon, MIB, 900_000).await;
-    wait_until(async || daemon.metric("mrol_body_bytes").await >= 900_000.0).await;
+    wait_until(async || daemon.metric("mrol_body_bytes").await >= Some(900_000.0)).await;
     sending.write_all(&[0; 100]).await.expect("more");
     assert_shed(ask().await, "body_bytes_max is 1572864").await;
     // One that is silent gives way.
@@ -174,7 +175,7 @@ async fn what_a_compressed_message_grows_to_counts() {
     let held = pb::QueryPointsRequest { min_revision: Some(9), ..large() };
     let mut planner = compressed().await;
     let held = tokio::spawn(async move { planner.query_points(held).await });
-    wait_until(async || daemon.metric("mrol_body_bytes").await >= 960_000.0).await;
+    wait_until(async || daemon.metric("mrol_body_bytes").await >= Some(960_000.0)).await;
     for refused in [
         compressed().await.query_points(large()).await.expect_err("a refusal"),
         first_of_stream(compressed().await, large()).await.expect_err("a refusal"),

@@ -46,7 +46,7 @@ async fn align(daemon: &Daemon) -> JoinHandle<Result<tonic::Response<pb::AlignSc
 
 /// What `/metrics` says of the jobs of the mapping pool.
 async fn jobs(daemon: &Daemon, what: &str) -> u64 {
-    daemon.metric(&format!("mrol_jobs_{what}{{pool=\"mapping\"}}")).await as u64
+    daemon.metric(&format!("mrol_jobs_{what}{{pool=\"mapping\"}}")).await.expect("a gauge") as u64
 }
 
 async fn until(daemon: &Daemon, what: &str, count: u64) {

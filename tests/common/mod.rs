@@ -124,11 +124,11 @@ impl Daemon {
         client().get(self.url(path)).send().await.expect("an answer")
     }
 
-    /// What `/metrics` says of `series`: a name with its labels. Zero before it is first recorded.
-    pub async fn metric(&self, series: &str) -> f64 {
+    /// What `/metrics` says of `series`, a name with its labels; none before it is first recorded.
+    pub async fn metric(&self, series: &str) -> Option<f64> {
         let metrics = self.get("/metrics").await.text().await.expect("text");
-        let value = metrics.lines().find_map(|line| line.strip_prefix(series)?.strip_prefix(' '));
-        value.map_or(0.0, |value| value.parse().expect("a number"))
+        let value = metrics.lines().find_map(|line| line.strip_prefix(series)?.strip_prefix(' '))?;
+        Some(value.parse().expect("a number"))
     }
 
     pub async fn delete(&self, path: &str) -> Response {
