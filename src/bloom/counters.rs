@@ -75,6 +75,12 @@ impl Counters {
         &self.0[word]
     }
 
+    /// The same, of counters that nobody else reads.
+    #[inline]
+    pub(super) fn of_word_mut(&mut self, word: usize) -> &mut CountersOfWord {
+        &mut self.0[word]
+    }
+
     /// Bytes of memory held.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&self.0[..])

@@ -1,6 +1,7 @@
 //! The counting Bloom filter (paper II-A).
 
 use super::counters::{COUNTER_MAX, Counters, CountersOfWord};
+use super::fill::fill;
 use super::{FilterSettings, Probe, expected_rate, unblocked_rate};
 
 /// A set of u64 keys that may answer "present" of an absent key, and never "absent" of a present one.
@@ -47,6 +48,12 @@ impl CountingBloomFilter {
         let probe = self.probe(key);
         let counted = self.count_in(probe);
         self.set_bits(counted);
+    }
+
+    /// Adds keys that are absent.
+    pub fn insert_each(&mut self, keys: &[u64]) {
+        self.keys += keys.len();
+        fill(&mut self.plane, &mut self.counters, self.settings.hashes, keys);
     }
 
     /// Takes out a key that is present: confirm that in the exact set first (paper II-A). Removing a key that

@@ -1,6 +1,7 @@
 //! Counting Bloom filters (paper II-A) over u64 keys.
 
 mod counters;
+mod fill;
 mod filter;
 mod probe;
 mod rates;

@@ -1,6 +1,6 @@
 //! What adding voxels to a shard comes to.
 
-use super::bulk::{change_each, count_each, find_each, insert_each, show_each};
+use super::bulk::{change_each, count_each, find_each, show_each};
 use super::room::Room;
 use super::shard::{Block, Shard, levels_of};
 use crate::bloom::{CountingBloomFilter, Probe};
@@ -57,21 +57,17 @@ impl Addition {
     fn tier(&mut self, shard: &Shard, tier: usize, blocks: &[&Block]) -> Vec<VoxelKey> {
         let table = &shard.tiers[tier];
         let levels = levels_of(tier, shard.filters.len());
-        let (mut gains, mut created) = (Vec::new(), Vec::new());
+        let (mut gains, mut created) = (Vec::with_capacity(blocks.len()), Vec::new());
         let mut keys = vec![Vec::new(); levels.len()];
-        find_each(table, blocks, |&(block, voxels), slot, before| {
-            if voxels.difference(&before).is_empty() {
+        find_each(table, blocks, |&(block, ref voxels), slot, before| {
+            if voxels.difference(before).is_empty() {
                 return;
             }
-            let after = before.union(&voxels);
             if slot.is_none() {
                 created.push(block);
             }
-            gains.push(Gain { block, slot, voxels });
-            for (up, keys) in (0..).zip(&mut keys) {
-                let gained = after.firsts(up).difference(&before.firsts(up));
-                gained.for_each_key(block, up, |key| keys.push(key));
-            }
+            gains.push(Gain { block, slot, voxels: *voxels });
+            (0..).zip(&mut keys).for_each(|(up, keys)| before.keys_gained(voxels, block, up, keys));
         });
         self.tiers.push(OfTier::plan(shard, tier, gains, created.len()));
         self.levels.extend(levels.zip(keys).map(|(level, keys)| OfLevel::plan(shard, level, keys)));
@@ -136,8 +132,8 @@ impl OfLevel {
         }
         let capacity = Room::of(shard.number, level).for_items(need);
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
-        insert_each(&mut larger, &keys);
-        shard.level(level as u32).for_some_keys(|keys| insert_each(&mut larger, keys));
+        larger.insert_each(&keys);
+        shard.level(level as u32).for_some_keys(|keys| larger.insert_each(keys));
         Self::Grown(larger)
     }
 }

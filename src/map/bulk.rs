@@ -12,7 +12,7 @@ const AT_ONCE: usize = 32;
 pub(super) fn find_each(
     table: &BlockTable,
     blocks: &[&Block],
-    mut f: impl FnMut(&Block, Option<usize>, BlockMask),
+    mut f: impl FnMut(&Block, Option<usize>, &BlockMask),
 ) {
     for blocks in blocks.chunks(AT_ONCE) {
         blocks.iter().for_each(|block| fetch(table.home(block.0)));
@@ -22,7 +22,7 @@ pub(super) fn find_each(
             found.iter().for_each(|&slot| fetch(table.at(slot)));
         }
         for (block, slot) in blocks.iter().zip(found) {
-            f(block, slot, slot.map_or(BlockMask::EMPTY, |slot| *table.at(slot)));
+            f(block, slot, slot.map_or(&BlockMask::EMPTY, |slot| table.at(slot)));
         }
     }
 }
@@ -56,22 +56,6 @@ pub(super) fn count_each(
         probes.iter_mut().for_each(|probe| *probe = count(filter, *probe));
     }
     probes
-}
-
-/// Adds keys to a filter that nobody reads yet.
-pub(super) fn insert_each(filter: &mut CountingBloomFilter, keys: &[u64]) {
-    let mut probes = [Probe::default(); AT_ONCE];
-    for keys in keys.chunks(AT_ONCE) {
-        for (probe, &key) in probes.iter_mut().zip(keys) {
-            *probe = filter.probe(key);
-            fetch(filter.counters_at(*probe));
-            fetch(filter.plane_at(*probe));
-        }
-        for &probe in &probes[..keys.len()] {
-            let counted = filter.count_in(probe);
-            filter.set_bits(counted);
-        }
-    }
 }
 
 /// Sets or clears what was counted.

@@ -4,7 +4,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 
 use crate::bloom::CountingBloomFilter;
-use crate::voxel::{BLOCK_LEVELS, BlockTable, VoxelKey};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, VoxelKey};
 
 /// The occupied voxels of one level, of one shard: an exact set and the counting Bloom filter in front of it,
 /// which always hold the same keys.
@@ -51,7 +51,7 @@ impl<'a> OccupiedVoxelList<'a> {
     /// The occupied voxels, in no order.
     pub fn iter(&self) -> impl Iterator<Item = VoxelKey> + use<'a> {
         let up = tier_of(self.level).1;
-        let voxels = move |(block, mask): (VoxelKey, crate::voxel::BlockMask)| {
+        let voxels = move |(block, mask): (VoxelKey, &BlockMask)| {
             mask.cells(up).map(move |cell| cell.voxel(block).ancestor(up))
         };
         self.blocks.iter().flat_map(voxels)
@@ -61,13 +61,13 @@ impl<'a> OccupiedVoxelList<'a> {
     pub(super) fn for_some_keys(&self, mut f: impl FnMut(&[u64])) {
         const SOME: usize = 256;
         let (up, mut keys) = (tier_of(self.level).1, Vec::with_capacity(2 * SOME));
-        for (block, mask) in self.blocks.iter() {
-            mask.firsts(up).for_each_key(block, up, |key| keys.push(key));
+        self.blocks.iter().for_each(|(block, mask)| {
+            BlockMask::EMPTY.keys_gained(mask, block, up, &mut keys);
             if keys.len() >= SOME {
                 f(&keys);
                 keys.clear();
             }
-        }
+        });
         f(&keys);
     }
 

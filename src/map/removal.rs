@@ -49,12 +49,10 @@ impl Removal {
             if left.is_empty() {
                 emptied.push(block);
             }
-            for (up, keys) in (0..).zip(&mut keys) {
-                let gone = before.firsts(up).difference(&left.firsts(up));
-                gone.for_each_key(block, up, |key| keys.push(key));
-            }
+            // What is gone is what would be gained if all came back.
+            (0..).zip(&mut keys).for_each(|(up, keys)| left.keys_gained(before, block, up, keys));
             if tier == 0 {
-                self.moments.extend(left.rebuilt_moments(&before, block));
+                self.moments.extend(left.rebuilt_moments(before, block));
             }
         });
         self.tiers.push(losses);

@@ -56,7 +56,7 @@ impl Shard {
 
     /// The blocks of finest voxels.
     pub(super) fn blocks(&self) -> impl Iterator<Item = (VoxelKey, BlockMask)> + '_ {
-        self.tiers[0].iter()
+        self.tiers[0].iter().map(|(block, mask)| (block, *mask))
     }
 
     /// The finest voxels below `blocks` of `tier`, of those that are there.

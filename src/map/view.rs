@@ -142,7 +142,7 @@ impl<'a> MapView<'a> {
                 let candidates = grid(candidates).map(|block| (block, blocks.get(block)));
                 candidates.for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
             } else {
-                blocks.iter().for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
+                blocks.iter().for_each(|(block, mask)| self.collect(block, mask, region, level, &mut found));
             }
             found
         })

@@ -1,7 +1,6 @@
 //! Blocks of 8 x 8 x 8 voxels: three levels of the map in one 512-bit mask.
 
 use super::{Moments, VoxelKey};
-use crate::bits::for_each_bit;
 
 /// Levels that one block's mask holds.
 pub const BLOCK_LEVELS: u32 = 3;
@@ -72,10 +71,10 @@ impl Cell {
 }
 
 /// Cells of a block.
-const CELLS: usize = 64 * WORDS;
+pub(super) const CELLS: usize = 64 * WORDS;
 
-/// What a cell's number adds to the key of its block's first voxel.
-const OFFSETS: [u64; CELLS] = {
+/// What a cell's number adds to the key of its block's first voxel; of a coarsened block's cells as well.
+pub(super) static OFFSETS: [u64; CELLS] = {
     let mut offsets = [0; CELLS];
     let mut cell = 0;
     while cell < CELLS {
@@ -154,21 +153,38 @@ impl BlockMask {
 
     /// Number of occupied voxels at `level` (0, 1 or 2).
     pub fn count(&self, level: u32) -> usize {
-        self.0.iter().map(|&word| first_of_each(word, level).count_ones() as usize).sum()
+        self.coarsened(level).0.iter().map(|word| word.count_ones() as usize).sum()
     }
 
     /// The occupied voxels at `level` (0, 1 or 2), each as the first cell it covers, ascending.
     #[inline]
     pub fn cells(&self, level: u32) -> impl Iterator<Item = Cell> + use<> {
-        let words = self.0;
+        let words = self.coarsened(level).0;
         (0..WORDS).flat_map(move |w| {
-            let mut rest = first_of_each(words[w], level);
+            let mut rest = words[w];
             std::iter::from_fn(move || {
                 let bit = (rest != 0).then(|| rest.trailing_zeros())?;
                 rest &= rest - 1;
-                Some(Cell((w as u16) << 6 | bit as u16))
+                Some(Cell(((w as u16) << 6 | bit as u16) << (3 * level)))
             })
         })
+    }
+
+    /// The occupied voxels at `level` (0, 1 or 2) as the cells of a block of as many fewer levels: the first 512, 64 or 8.
+    #[inline]
+    pub(super) fn coarsened(&self, level: u32) -> Self {
+        match level {
+            0 => *self,
+            1 => self.word_by_word(WORDS, occupied_bytes),
+            _ => self.word_by_word(1, |word| u64::from(word != 0)),
+        }
+    }
+
+    /// What `bits` makes of each word, `each` bits of it, in the first word.
+    #[inline(always)]
+    fn word_by_word(&self, each: usize, bits: impl Fn(u64) -> u64) -> Self {
+        let first = (0..WORDS).fold(0, |first, w| first | bits(self.0[w]) << (each * w));
+        Self([first, 0, 0, 0, 0, 0, 0, 0])
     }
 
     /// The moments of the voxels of `block` two levels up that had other descendants `before`: which of their points
@@ -207,59 +223,16 @@ impl BlockMask {
     pub fn difference(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|w| self.0[w] & !other.0[w]))
     }
-
-    /// The voxels of `level`, each as the first cell it covers.
-    #[inline]
-    pub(crate) fn firsts(&self, level: u32) -> Self {
-        Self(self.0.map(|word| first_of_each(word, level)))
-    }
-
-    /// Calls `f` with the key of each voxel of `level` of `block`, where this mask holds the first cell of each.
-    #[inline]
-    pub(crate) fn for_each_key(&self, block: VoxelKey, level: u32, mut f: impl FnMut(u64)) {
-        let first = block.first_within(BLOCK_LEVELS - level).to_bits();
-        // A first cell's offset has no bit below the level's own, so nothing moves to another axis.
-        let mut of_cell = |cell: u32| f(first | OFFSETS[cell as usize] >> level);
-        // As few loops as the level has words of bits: each that ends is a branch that was not foreseen.
-        match level {
-            0 => {
-                for_each_bit(self.words(), |w| for_each_bit(self.0[w as usize], |bit| of_cell(w << 6 | bit)))
-            }
-            1 => for_each_bit(self.bytes(), |byte| of_cell(byte << 3)),
-            _ => for_each_bit(self.words(), |w| of_cell(w << 6)),
-        }
-    }
-
-    /// A bit for each word that is not zero.
-    #[inline(always)]
-    fn words(&self) -> u64 {
-        (0..WORDS).fold(0, |words, w| words | u64::from(self.0[w] != 0) << w)
-    }
-
-    /// The low bit of each byte.
-    #[inline(always)]
-    fn bytes(&self) -> u64 {
-        // The product brings bit 8 i to bit 56 + i, and nothing else there.
-        let low_bits = |word: u64| (word & BYTE_LOW).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        (0..WORDS).fold(0, |bytes, w| bytes | low_bits(self.0[w]) << (8 * w))
-    }
 }
 
-/// The low bit of each byte.
-const BYTE_LOW: u64 = 0x0101_0101_0101_0101;
-
-/// One bit for each voxel of `level` with an occupied descendant in `word`: the lowest bit it covers.
+/// A bit for each byte of `word` that is not zero.
 #[inline(always)]
-fn first_of_each(word: u64, level: u32) -> u64 {
-    match level {
-        0 => word,
-        1 => {
-            let word = word | word >> 4;
-            let word = word | word >> 2;
-            (word | word >> 1) & BYTE_LOW
-        }
-        _ => u64::from(word != 0),
-    }
+fn occupied_bytes(word: u64) -> u64 {
+    let word = word | word >> 4;
+    let word = word | word >> 2;
+    let low_bits = (word | word >> 1) & 0x0101_0101_0101_0101;
+    // The product brings bit 8 i to bit 56 + i, and nothing else there.
+    low_bits.wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
 #[cfg(test)]
@@ -289,27 +262,10 @@ mod tests {
                 let found: Vec<u16> = mask.cells(level).map(|c| c.0 >> (3 * level)).collect();
                 prop_assert_eq!(&found, &parents.iter().copied().collect::<Vec<_>>());
                 prop_assert_eq!(mask.count(level), parents.len());
-                let block = VoxelKey::pack([-3, 7, 0]);
-                let mut keys = Vec::new();
-                mask.firsts(level).for_each_key(block, level, |key| keys.push(key));
-                let expected = mask.cells(level).map(|cell| cell.voxel(block).ancestor(level).to_bits());
-                prop_assert_eq!(keys, expected.collect::<Vec<_>>());
                 for c in 0..512 {
                     prop_assert_eq!(mask.contains(Cell(c), level), parents.contains(&(c >> (3 * level))));
                 }
             }
         }
-    }
-
-    #[test]
-    fn what_is_gained_at_a_level_is_what_had_no_voxel_before() {
-        let before = BlockMask([0b1, 0, 0, 0, 0, 0, 0, 0]);
-        let after = BlockMask([0b11 | 1 << 8, 1 << 63, 0, 0, 0, 0, 0, 0]);
-        let gained = |level| {
-            after.firsts(level).difference(&before.firsts(level)).cells(0).map(|c| c.0).collect::<Vec<_>>()
-        };
-        assert_eq!(gained(0), [1, 8, 127]);
-        assert_eq!(gained(1), [8, 64 + 56]);
-        assert_eq!(gained(2), [64]);
     }
 }

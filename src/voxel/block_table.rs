@@ -217,15 +217,18 @@ impl BlockTable {
     pub(crate) fn with_room_for(&self, blocks: usize) -> Self {
         let mut table = Self::with_capacity(blocks.max(self.len));
         for (block, mask) in self.iter() {
-            *table.entry(block) = mask;
+            *table.entry(block) = *mask;
         }
         table
     }
 
     /// All blocks, in no order.
-    pub fn iter(&self) -> impl Iterator<Item = (VoxelKey, BlockMask)> + '_ {
-        let occupied = |(key, mask): (u64, &CacheLine<BlockMask>)| Some((VoxelKey::from_bits(key)?, mask.0));
-        self.keys.iter().flat_map(|bucket| bucket.0).zip(&self.masks).filter_map(occupied)
+    pub fn iter(&self) -> impl Iterator<Item = (VoxelKey, &BlockMask)> {
+        let buckets = self.keys.iter().zip(self.masks.chunks_exact(BUCKET));
+        // A bucket's vacant slots come last.
+        buckets.flat_map(|(bucket, masks)| {
+            bucket.0.iter().zip(masks).map_while(|(&key, mask)| Some((VoxelKey::from_bits(key)?, &mask.0)))
+        })
     }
 }
 
@@ -326,7 +329,7 @@ mod tests {
             }
             let mut found: Vec<_> = table.iter().collect();
             found.sort_by_key(|(block, _)| *block);
-            prop_assert!(found.into_iter().eq(model.iter().map(|(k, m)| (*k, *m))));
+            prop_assert!(found.into_iter().eq(model.iter().map(|(k, m)| (*k, m))));
             for x in 0..60 {
                 let block = VoxelKey::pack([x, -x, 7]);
                 prop_assert!(table.get(block) == model.get(&block).copied().unwrap_or_default());

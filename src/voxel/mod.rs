@@ -3,6 +3,7 @@
 
 mod block;
 mod block_table;
+mod gained;
 mod grouping;
 mod key;
 mod lattice;

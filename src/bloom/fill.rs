@@ -1,0 +1,59 @@
+//! Many keys at once into a filter that nobody reads yet: most of what a map does that grows.
+
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+
+use super::Probe;
+use super::counters::Counters;
+
+/// Counts `keys`, which are absent, with `hashes` hashes each and sets their bits of the plane.
+pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
+    #[cfg(target_arch = "x86_64")]
+    if avx512::is_available() {
+        return avx512::fill(plane, counters, hashes, keys);
+    }
+    fill_scalar(plane, counters, hashes, keys);
+}
+
+/// The scalar twin of what the wide ones do.
+fn fill_scalar(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
+    for &key in keys {
+        let probe = Probe::of(key, hashes, plane.len());
+        counters.count_in(probe);
+        plane[probe.word] |= probe.mask;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::HASHES_MAX;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Into so few words, some of them at a time, that counters saturate.
+        #[test]
+        fn the_wide_twin_is_the_scalar_one(
+            keys in prop::collection::vec(any::<u64>(), 0..700),
+            at_once in 1usize..70,
+            hashes in 1u32..=HASHES_MAX,
+            words in 1usize..40,
+        ) {
+            let empty = || (vec![0; words], Counters::zero(words));
+            let ((mut plane, mut counters), (mut plane_scalar, mut counters_scalar)) = (empty(), empty());
+            keys.chunks(at_once).for_each(|keys| fill(&mut plane, &mut counters, hashes, keys));
+            fill_scalar(&mut plane_scalar, &mut counters_scalar, hashes, &keys);
+            prop_assert_eq!(plane, plane_scalar);
+            prop_assert!(counters.iter().eq(counters_scalar.iter()));
+        }
+    }
+
+    #[test]
+    fn counters_saturate_and_stay() {
+        let (mut plane, mut counters) = (vec![0], Counters::zero(1));
+        fill(&mut plane, &mut counters, 1, &[7; 14]);
+        assert_eq!(counters.iter().sum::<u64>(), 14);
+        fill(&mut plane, &mut counters, 1, &[7; 14]);
+        assert_eq!((counters.iter().sum::<u64>(), plane[0].count_ones()), (15, 1));
+    }
+}
