@@ -39,6 +39,7 @@
 pub mod access;
 #[cfg(feature = "server")]
 pub mod admission;
+mod ahead;
 pub mod align;
 #[cfg(feature = "server")]
 pub mod bench;

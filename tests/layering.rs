@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules and their layers, bottom first.
 const LAYERS: [&[&str]; 7] = [
-    &["bits", "voxel", "bloom", "geometry", "interest"],
+    &["ahead", "bits", "voxel", "bloom", "geometry", "interest"],
     &["map", "align", "scan"],
     &["store"],
     &["service"],
@@ -109,8 +109,8 @@ fn generated_types_are_named_in_the_wire_layer_alone() {
     }
 }
 
-/// What is written for wide instructions: look-ups, filling a filter, taking a block apart.
-const KERNELS: [&str; 3] = ["map/lookup", "bloom/fill", "voxel/gained"];
+/// What is written for wide instructions: look-ups, filling a filter, taking a block apart; and the prefetch.
+const KERNELS: [&str; 4] = ["map/lookup", "bloom/fill", "voxel/gained", "ahead.rs"];
 
 #[test]
 fn unsafe_code_stays_in_the_kernels() {

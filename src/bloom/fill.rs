@@ -5,6 +5,7 @@ mod avx512;
 
 use super::Probe;
 use super::counters::Counters;
+use crate::ahead::fetch;
 
 /// Counts `keys`, which are absent, with `hashes` hashes each and sets their bits of the plane.
 pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
@@ -15,12 +16,22 @@ pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys
     fill_scalar(plane, counters, hashes, keys);
 }
 
+/// Keys whose words and counters are fetched at once: their cache misses are under way together.
+const AT_ONCE: usize = 16;
+
 /// The scalar twin of what the wide ones do.
 fn fill_scalar(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
-    for &key in keys {
-        let probe = Probe::of(key, hashes, plane.len());
-        counters.count_in(probe);
-        plane[probe.word] |= probe.mask;
+    for keys in keys.chunks(AT_ONCE) {
+        let mut probes = [Probe::default(); AT_ONCE];
+        for (probe, &key) in probes.iter_mut().zip(keys) {
+            *probe = Probe::of(key, hashes, plane.len());
+            fetch(counters.of_word(probe.word));
+            fetch(&plane[probe.word]);
+        }
+        for &probe in &probes[..keys.len()] {
+            counters.count_in(probe);
+            plane[probe.word] |= probe.mask;
+        }
     }
 }
 

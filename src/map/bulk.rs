@@ -1,7 +1,7 @@
 //! Many blocks, or keys, at once: their cache misses are under way together.
 
-use super::lookup::ahead::fetch;
 use super::shard::Block;
+use crate::ahead::fetch;
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::voxel::{BlockMask, BlockTable};
 

@@ -3,18 +3,18 @@
 
 use std::arch::x86_64::*;
 
+use super::AT_ONCE;
+use crate::ahead::fetch;
 use crate::bloom::Probe;
 use crate::bloom::counters::{COUNTER_MAX, Counters};
 
-/// Keys whose probes are computed side by side.
-const LANES: usize = 16;
 /// The bits of a mask whose counters are the low halves of bytes, and the high ones.
 const EVEN: u64 = 0x5555_5555_5555_5555;
 const ODD: u64 = !EVEN;
 
 /// True when the machine can run this module.
 pub(super) fn is_available() -> bool {
-        is_x86_feature_detected!("avx512f")
+    is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512vl")
@@ -38,13 +38,17 @@ pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,bmi2")]
 fn fill_with<const HASHES: u32>(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
     let (hashes, words) = (if HASHES == 0 { hashes } else { HASHES }, plane.len());
-    let (sixteens, rest) = keys.as_chunks::<LANES>();
+    let (sixteens, rest) = keys.as_chunks::<AT_ONCE>();
     for keys in sixteens {
-        let (mut places, mut masks) = ([0; LANES], [0; LANES]);
+        let (mut places, mut masks) = ([0; AT_ONCE], [0; AT_ONCE]);
         // Nothing but arithmetic, and each result in an array of its own: the compiler makes it wide.
-        for i in 0..LANES {
+        for i in 0..AT_ONCE {
             let probe = Probe::of(keys[i], hashes, words);
             (places[i], masks[i]) = (probe.word, probe.mask);
+        }
+        for &word in &places {
+            fetch(counters.of_word(word));
+            fetch(&plane[word]);
         }
         places.into_iter().zip(masks).for_each(|(word, mask)| add(plane, counters, Probe { word, mask }));
     }

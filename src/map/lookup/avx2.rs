@@ -11,8 +11,8 @@ pub(super) mod stages;
 
 use std::arch::x86_64::*;
 
-use super::ahead::fetch;
 use super::{LevelView, Lookup};
+use crate::ahead::fetch;
 use crate::geometry::Point;
 use crate::voxel::LatticeFromPoints;
 use place::Place;

@@ -3,7 +3,6 @@
 //! One operation: points and a pose in, a bit a point out. `scalar` defines it; the wide twins agree with it
 //! bit for bit and are chosen at run time.
 
-pub(super) mod ahead;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]

@@ -13,7 +13,7 @@ const LANES: usize = 8;
 /// True when the machine can run this module.
 #[inline]
 pub(super) fn is_available() -> bool {
-        is_x86_feature_detected!("avx512f")
+    is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("popcnt")
 }

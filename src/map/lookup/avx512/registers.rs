@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::LANES;
-use crate::map::lookup::ahead::fetch;
+use crate::ahead::fetch;
 use crate::map::sharding::SHARDS;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
