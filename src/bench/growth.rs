@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::insert::bytes;
+use super::insert::{bytes, filter_bytes};
 use super::structures::{Structure, ThroughMap};
 use super::workload::{Order, Queries, Workload, add};
 use crate::map::{Lookup, MapSettings, MapSettingsError, MultiResolutionMap};
@@ -15,7 +15,7 @@ pub struct Growth {
     pub voxels: usize,
     /// Bytes a finest voxel, all levels, filters and counters: least and most after any commit but the first ones.
     pub bytes_per_voxel: (f64, f64),
-    /// How long the commits took that made nothing larger, milliseconds, ascending.
+    /// How long the commits took that made no filter larger, milliseconds, ascending.
     pub commits_ms: Vec<f64>,
     /// How long those took that did.
     pub growing_commits_ms: Vec<f64>,
@@ -53,16 +53,15 @@ pub fn watch(workload: Workload, settings: MapSettings, seed: u64) -> Result<Gro
 
 fn grow(map: &MultiResolutionMap, workload: Workload) -> Growth {
     let (mut commits_ms, mut growing_commits_ms) = (Vec::new(), Vec::new());
-    let (mut before, mut least, mut most) = (bytes(map), f64::INFINITY, 0.0f64);
+    let (mut filters, mut least, mut most) = (filter_bytes(map), f64::INFINITY, 0.0f64);
     for voxels in workload.pieces() {
         let start = Instant::now();
         add(map, voxels);
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        let after = bytes(map);
-        if after == before { &mut commits_ms } else { &mut growing_commits_ms }.push(ms);
-        before = after;
+        let before = std::mem::replace(&mut filters, filter_bytes(map));
+        if filters == before { &mut commits_ms } else { &mut growing_commits_ms }.push(ms);
         let voxels = map.voxels(0);
-        let each = after as f64 / voxels as f64;
+        let each = bytes(map) as f64 / voxels as f64;
         if voxels >= VOXELS_MIN {
             (least, most) = (least.min(each), most.max(each));
         }

@@ -51,8 +51,13 @@ fn insert(map: &MultiResolutionMap, points: &Queries, scan_points: usize) {
 
 /// Bytes of a map's sets and filters, all levels.
 pub fn bytes(map: &MultiResolutionMap) -> usize {
-    let MapDescription { levels, set_bytes, .. } = map.describe(0, 0);
-    set_bytes + levels.iter().map(|level| level.plane_bytes + level.counter_bytes).sum::<usize>()
+    map.describe(0, 0).set_bytes + filter_bytes(map)
+}
+
+/// Bytes of a map's filters, all levels.
+pub(super) fn filter_bytes(map: &MultiResolutionMap) -> usize {
+    let MapDescription { levels, .. } = map.describe(0, 0);
+    levels.iter().map(|level| level.plane_bytes + level.counter_bytes).sum()
 }
 
 /// The same into a hash set of packed keys, which has one level and no filter.

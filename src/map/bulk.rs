@@ -3,40 +3,28 @@
 use super::shard::Block;
 use crate::ahead::fetch;
 use crate::bloom::{CountingBloomFilter, Probe};
-use crate::voxel::{BlockMask, BlockTable};
+use crate::voxel::{BlockMask, BlockTable, Place};
 
 /// How many misses are under way at once.
 const AT_ONCE: usize = 32;
 
-/// Calls `f(block, slot, voxels there)` for each block; none and none where it is absent.
-pub(super) fn find_each(
-    table: &BlockTable,
-    blocks: &[&Block],
-    mut f: impl FnMut(&Block, Option<usize>, &BlockMask),
-) {
+/// Calls `f(block, voxels there)` for each block.
+pub(super) fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut(&Block, &BlockMask)) {
+    let mut last = (None, None);
     for blocks in blocks.chunks(AT_ONCE) {
-        blocks.iter().for_each(|block| fetch(table.home(block.0)));
-        let mut found = [None; AT_ONCE];
+        let mut found = [&BlockMask::EMPTY; AT_ONCE];
         for (found, block) in found.iter_mut().zip(blocks) {
-            *found = table.find(block.0);
-            found.iter().for_each(|&slot| fetch(table.at(slot)));
+            let (key, place) = Place::of(block.0);
+            // Blocks come row by row: the last cluster is met again more often than not.
+            if last.0 != Some(key) {
+                last = (Some(key), table.cluster(key));
+            }
+            if let Some(cluster) = last.1 {
+                *found = cluster.get(place);
+                fetch(*found);
+            }
         }
-        for (block, slot) in blocks.iter().zip(found) {
-            f(block, slot, slot.map_or(&BlockMask::EMPTY, |slot| table.at(slot)));
-        }
-    }
-}
-
-/// Calls `change(table, item)` for each item, which is about to touch the block at `slot(item)`.
-pub(super) fn change_each<T>(
-    table: &mut BlockTable,
-    items: &[T],
-    slot: impl Fn(&T) -> Option<usize>,
-    mut change: impl FnMut(&mut BlockTable, &T),
-) {
-    for items in items.chunks(AT_ONCE) {
-        items.iter().filter_map(&slot).for_each(|slot| fetch(table.at(slot)));
-        items.iter().for_each(|item| change(table, item));
+        blocks.iter().zip(found).for_each(|(block, before)| f(block, before));
     }
 }
 

@@ -1,27 +1,19 @@
 //! What taking voxels out of a shard comes to.
 
-use super::bulk::{change_each, count_each, find_each, show_each};
+use super::bulk::{count_each, find_each, show_each};
 use super::shard::{Block, Shard, levels_of};
 use crate::bloom::{CountingBloomFilter, Probe};
-use crate::voxel::{BlockMask, BlockTable, Moments, VoxelKey, VoxelSet};
+use crate::voxel::{Moments, Renewal, VoxelKey, VoxelSet};
 
 /// What is to be done to a shard to take voxels out at every level, found out while readers go on. It holds for the
 /// shard as it was planned for.
 #[derive(Debug)]
 #[must_use = "what is planned is counted already"]
 pub(super) struct Removal {
-    tiers: Vec<Vec<Loss>>,
+    tiers: Vec<Renewal>,
     /// What each level's plane loses.
     levels: Vec<Vec<Probe>>,
     moments: Vec<(VoxelKey, Moments)>,
-}
-
-/// A block that loses voxels.
-#[derive(Debug)]
-struct Loss {
-    block: VoxelKey,
-    slot: usize,
-    left: BlockMask,
 }
 
 impl Removal {
@@ -39,13 +31,16 @@ impl Removal {
 
     /// Plans for one tier; the blocks that lose their last voxel.
     fn tier(&mut self, shard: &Shard, tier: usize, blocks: &[&Block]) -> Vec<VoxelKey> {
+        let table = &shard.tiers[tier];
         let levels = levels_of(tier, shard.filters.len());
         let (mut losses, mut emptied) = (Vec::new(), Vec::new());
         let mut keys = vec![Vec::new(); levels.len()];
-        find_each(&shard.tiers[tier], blocks, |&(block, ref voxels), slot, before| {
-            let Some(slot) = slot.filter(|_| !before.intersection(voxels).is_empty()) else { return };
+        find_each(table, blocks, |&(block, ref voxels), before| {
+            if before.intersection(voxels).is_empty() {
+                return;
+            }
             let left = before.difference(voxels);
-            losses.push(Loss { block, slot, left });
+            losses.push((block, left));
             if left.is_empty() {
                 emptied.push(block);
             }
@@ -55,7 +50,7 @@ impl Removal {
                 self.moments.extend(left.rebuilt_moments(before, block));
             }
         });
-        self.tiers.push(losses);
+        self.tiers.push(Renewal::plan(table, &losses));
         let count_out = |(level, keys): (usize, Vec<u64>)| {
             count_each(&shard.filters[level], &keys, CountingBloomFilter::count_out)
         };
@@ -74,20 +69,12 @@ impl Removal {
     }
 
     /// Does it, but for the moments.
-    pub(super) fn apply(&self, shard: &mut Shard) {
-        for (table, losses) in shard.tiers.iter_mut().zip(&self.tiers) {
-            take_out(table, losses);
+    pub(super) fn apply(self, shard: &mut Shard) {
+        for (table, renewal) in shard.tiers.iter_mut().zip(self.tiers) {
+            renewal.apply(table);
         }
         for (filter, cleared) in shard.filters.iter_mut().zip(&self.levels) {
             show_each(filter, cleared, CountingBloomFilter::clear_bits);
         }
     }
-}
-
-/// Blocks that go move others to their slots: those that stay are changed first.
-fn take_out(table: &mut BlockTable, losses: &[Loss]) {
-    let slot = |loss: &Loss| Some(loss.slot);
-    change_each(table, losses, slot, |table, loss| *table.at_mut(loss.slot) = loss.left);
-    let emptied = losses.iter().filter(|loss| loss.left.is_empty());
-    emptied.for_each(|loss| table.set(loss.block, BlockMask::EMPTY));
 }

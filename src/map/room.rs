@@ -8,7 +8,7 @@ const FIRST: f64 = 64.0;
 /// Shards grow in so many different places.
 const PHASES: usize = 16;
 
-/// The sizes that one table or filter goes through: FIRST * FACTOR^(n + phase).
+/// The sizes that one filter goes through: FIRST * FACTOR^(n + phase).
 ///
 /// Each shard, and each of its levels, has a phase of its own. Shards of a map fill alike; with one phase they
 /// would all grow within a few scans, and so would the map's memory. With many it stays near its mean, and a
@@ -19,7 +19,7 @@ pub(super) struct Room {
 }
 
 impl Room {
-    /// Of one level, or tier, of a shard.
+    /// Of one level of a shard.
     pub(super) fn of(shard: usize, level: usize) -> Self {
         // Five has no divisor in common with sixteen: levels of one shard are far apart.
         Self { phase: ((shard + 5 * level) % PHASES) as f64 / PHASES as f64 }

@@ -36,7 +36,7 @@ impl Shard {
         let tiers = tier_of(settings.levels - 1).0 + 1;
         Self {
             number,
-            tiers: vec![BlockTable::with_capacity(0); tiers],
+            tiers: std::iter::repeat_with(BlockTable::default).take(tiers).collect(),
             filters: (0..settings.levels as usize).map(filter).collect(),
         }
     }
@@ -65,7 +65,7 @@ impl Shard {
             |&(block, mask): &(VoxelKey, BlockMask)| (block, self.tiers[tier].get(block).intersection(&mask));
         let mut found: VoxelSet = blocks.iter().map(present).collect();
         for below in (0..tier).rev() {
-            found = found.iter().map(|voxel| (voxel, self.tiers[below].get(voxel))).collect();
+            found = found.iter().map(|voxel| (voxel, *self.tiers[below].get(voxel))).collect();
         }
         found
     }

@@ -92,8 +92,8 @@ impl<'a> MapView<'a> {
         let absent = |&(block, mask): &(VoxelKey, BlockMask)| {
             let finest = block.index().map(|i| i << BLOCK_LEVELS);
             let shard = self.shards[self.map.sharding.shard_of(finest, 0)].as_deref();
-            let present = shard.map_or(BlockMask::EMPTY, |shard| shard.level(0).blocks().get(block));
-            mask.difference(&present).count(0)
+            let present = shard.map_or(&BlockMask::EMPTY, |shard| shard.level(0).blocks().get(block));
+            mask.difference(present).count(0)
         };
         voxels.blocks().iter().map(absent).sum()
     }
@@ -140,7 +140,7 @@ impl<'a> MapView<'a> {
             let (blocks, mut found) = (list.blocks(), Vec::new());
             if volume < blocks.len() as f64 {
                 let candidates = grid(candidates).map(|block| (block, blocks.get(block)));
-                candidates.for_each(|(block, mask)| self.collect(block, &mask, region, level, &mut found));
+                candidates.for_each(|(block, mask)| self.collect(block, mask, region, level, &mut found));
             } else {
                 blocks.iter().for_each(|(block, mask)| self.collect(block, mask, region, level, &mut found));
             }

@@ -1,5 +1,6 @@
-//! An exact set of voxels as an open-addressed table of blocks.
+//! An exact set of voxels as an open-addressed table of clusters of blocks.
 
+use super::cluster::{Cluster, Place};
 use super::{BlockMask, Cell, VoxelKey};
 
 /// Marks a vacant slot; no key sets bit 63.
@@ -9,10 +10,9 @@ pub(crate) const BUCKET: usize = 8;
 /// The keys of one bucket: those in use first.
 pub(crate) type Bucket = CacheLine<[u64; BUCKET]>;
 const VACANT_BUCKET: Bucket = CacheLine([VACANT; BUCKET]);
-const EMPTY_MASK: CacheLine<BlockMask> = CacheLine(BlockMask::EMPTY);
-/// Slots for each block, at least. At 2 one bucket in twenty is full (a Poisson tail), just after growth one in fifty:
+/// Slots for each cluster, at least. At 2 one bucket in twenty is full (a Poisson tail), just after growth one in fifty:
 /// nearly every search ends in the bucket where it began, and a wide look-up seldom has to leave its way.
-const SLOTS_A_BLOCK: usize = 2;
+const SLOTS_A_CLUSTER: usize = 2;
 
 /// What a look-up fetches in one piece: a bucket, or a block's mask. Vectors of them begin where a cache line does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,124 +22,124 @@ pub(crate) struct CacheLine<T>(pub(crate) T);
 /// A byte of a key for each slot of a bucket, none of them zero; zero where the slot is vacant.
 pub(crate) type Tags = u64;
 
-/// Blocks by key, in buckets of eight.
+/// Blocks by key, by way of their clusters, which are in buckets of eight.
 ///
 /// ```text
-/// tags    [ 8 x 8 bits | ... ]           which slots of a bucket may hold a key: all buckets' fit in a cache
-/// keys    [ 8 keys | 8 keys | ... ]      a cache line a bucket; a search reads one, seldom two
-/// masks   [ 8 x 64 bytes | ... ]         the block of keys[b][i] is masks[8 b + i]
+/// tags      [ 8 x 8 bits | ... ]           which slots of a bucket may hold a key
+/// keys      [ 8 keys | 8 keys | ... ]      a cache line a bucket; a search reads one, seldom two
+/// clusters  [ 8 x 32 bytes | ... ]         the cluster of keys[b][i] is clusters[8 b + i]; its masks are elsewhere
 /// ```
+///
+/// There is a cluster for some fifteen blocks, or a thousand voxels, of a surface: so all of this but the masks fits in the
+/// caches, and a block costs a look-up one miss.
 ///
 /// A key lives in its home bucket or, where that is full, in the next one that is not. A bucket's vacant slots
 /// come last, so that its last key tells whether a search has to go on; removal pulls keys back instead of
 /// leaving tombstones. Any number of buckets is allowed (the home is a multiply-shift of the hash, not a
-/// remainder), so that a table grows in small steps and stays near its memory budget.
-#[derive(Debug, Clone)]
+/// remainder), so that a table grows in small steps.
+#[derive(Debug)]
 pub struct BlockTable {
     tags: Vec<Tags>,
     keys: Vec<Bucket>,
-    masks: Vec<CacheLine<BlockMask>>,
-    len: usize,
+    clusters: Vec<Cluster>,
+    /// Clusters in use, blocks in them, and bytes of their masks.
+    used: usize,
+    blocks: usize,
+    mask_bytes: usize,
+}
+
+impl Default for BlockTable {
+    /// Without a block.
+    fn default() -> Self {
+        Self::with_room_for(0)
+    }
 }
 
 impl BlockTable {
-    /// An empty table with room for `blocks` blocks.
-    pub fn with_capacity(blocks: usize) -> Self {
+    fn with_room_for(clusters: usize) -> Self {
         // One slot more than the load allows for, so that a search always meets a bucket that is not full.
-        let buckets = (blocks * SLOTS_A_BLOCK + 1).div_ceil(BUCKET);
+        let buckets = (clusters * SLOTS_A_CLUSTER + 1).div_ceil(BUCKET);
         Self {
             tags: vec![0; buckets],
             keys: vec![VACANT_BUCKET; buckets],
-            masks: vec![EMPTY_MASK; buckets * BUCKET],
-            len: 0,
+            clusters: vacant(buckets),
+            used: 0,
+            blocks: 0,
+            mask_bytes: 0,
         }
     }
 
     /// Number of blocks.
     pub fn len(&self) -> usize {
-        self.len
+        self.blocks
     }
 
     /// True without a block.
     pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// Blocks that fit before the table has to grow.
-    pub fn capacity(&self) -> usize {
-        (self.masks.len() - 1) / SLOTS_A_BLOCK
+        self.blocks == 0
     }
 
     /// Bytes of memory held.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.tags[..]) + size_of_val(&self.keys[..]) + size_of_val(&self.masks[..])
+        let slots =
+            size_of_val(&self.tags[..]) + size_of_val(&self.keys[..]) + size_of_val(&self.clusters[..]);
+        slots + self.mask_bytes
     }
 
     /// What the look-up kernels read.
     pub(crate) fn slots(&self) -> Slots<'_> {
-        Slots { tags: &self.tags, keys: &self.keys, masks: &self.masks }
+        let Self { tags, keys, clusters, mask_bytes, .. } = self;
+        Slots { tags, keys, clusters, mask_bytes: *mask_bytes }
     }
 
     /// The voxels of `block`; none of them when the block is absent.
     #[inline]
-    pub fn get(&self, block: VoxelKey) -> BlockMask {
-        self.slots().find(block.to_bits()).map_or(BlockMask::EMPTY, |slot| self.masks[slot].0)
+    pub fn get(&self, block: VoxelKey) -> &BlockMask {
+        self.slots().get(block)
     }
 
     /// True when the voxel at `index`, or at `level` (0, 1 or 2) its ancestor, is occupied.
     #[inline]
     pub fn contains(&self, index: [i32; 3], level: u32) -> bool {
         let (block, cell) = Cell::of(index.map(|i| i << level));
-        self.slots().contains(block, cell, level)
+        self.get(block).contains(cell, level)
     }
 
-    /// The keys among which the search for `block` begins.
+    /// The cluster with this key.
     #[inline]
-    pub(crate) fn home(&self, block: VoxelKey) -> &Bucket {
-        &self.keys[Slots::home(block.to_bits(), self.keys.len())]
+    pub(crate) fn cluster(&self, key: VoxelKey) -> Option<&Cluster> {
+        self.slots().find(key.to_bits()).map(|slot| &self.clusters[slot])
     }
 
-    /// Where `block` is, until the table changes.
-    #[inline]
-    pub(crate) fn find(&self, block: VoxelKey) -> Option<usize> {
-        self.slots().find(block.to_bits())
-    }
-
-    /// The voxels of the block at `slot`.
-    #[inline]
-    pub(crate) fn at(&self, slot: usize) -> &BlockMask {
-        &self.masks[slot].0
-    }
-
-    /// The same, to be added to.
-    #[inline]
-    pub(crate) fn at_mut(&mut self, slot: usize) -> &mut BlockMask {
-        &mut self.masks[slot].0
-    }
-
-    /// The mask of `block` to be added to, which is empty where the block was absent. The caller leaves at
-    /// least one voxel in it.
-    #[inline]
-    pub(crate) fn entry(&mut self, block: VoxelKey) -> &mut BlockMask {
-        let key = block.to_bits();
-        let slot = match self.slots().find(key) {
-            Some(slot) => slot,
-            None => self.add(key),
+    /// Replaces a cluster; one without a block goes.
+    pub(crate) fn set_cluster(&mut self, key: VoxelKey, cluster: Cluster) {
+        let key = key.to_bits();
+        let (blocks, bytes) = (cluster.len(), cluster.bytes());
+        let before = match (self.slots().find(key), blocks) {
+            (Some(slot), 0) => self.remove(slot),
+            (Some(slot), _) => std::mem::replace(&mut self.clusters[slot], cluster),
+            (None, 0) => cluster,
+            (None, _) => {
+                let slot = self.add(key);
+                std::mem::replace(&mut self.clusters[slot], cluster)
+            }
         };
-        &mut self.masks[slot].0
+        self.blocks = self.blocks - before.len() + blocks;
+        self.mask_bytes = self.mask_bytes - before.bytes() + bytes;
     }
 
     /// The slot of a key that was absent.
     fn add(&mut self, key: u64) -> usize {
-        if self.len >= self.capacity() {
-            *self = self.with_room_for(self.len * 5 / 4 + 4);
+        // One slot stays vacant.
+        if self.used * SLOTS_A_CLUSTER + SLOTS_A_CLUSTER >= self.clusters.len() {
+            self.grow();
         }
         self.add_in_room(key)
     }
 
     /// The same, where there is a vacant slot.
     fn add_in_room(&mut self, key: u64) -> usize {
-        self.len += 1;
+        self.used += 1;
         let mut bucket = Slots::home(key, self.keys.len());
         loop {
             if let Some(place) = self.keys[bucket].0.iter().position(|&k| k == VACANT) {
@@ -151,18 +151,28 @@ impl BlockTable {
         }
     }
 
+    /// Moves to a larger table. Masks stay where they are, and there are few clusters: this is done while readers wait.
+    fn grow(&mut self) {
+        let larger = Self::with_room_for(self.used * 5 / 4 + 4);
+        let Self { keys, clusters, blocks, mask_bytes, .. } = std::mem::replace(self, larger);
+        let keys = keys.iter().flat_map(|bucket| bucket.0);
+        for (key, cluster) in keys.zip(clusters).filter(|(key, _)| *key != VACANT) {
+            let slot = self.add_in_room(key);
+            self.clusters[slot] = cluster;
+        }
+        (self.blocks, self.mask_bytes) = (blocks, mask_bytes);
+    }
+
     fn after(&self, bucket: usize) -> usize {
         if bucket + 1 == self.keys.len() { 0 } else { bucket + 1 }
     }
 
-    /// Replaces the voxels of `block`; an empty mask takes the block out.
-    pub(crate) fn set(&mut self, block: VoxelKey, mask: BlockMask) {
-        if !mask.is_empty() {
-            *self.entry(block) = mask;
-        } else if let Some(slot) = self.slots().find(block.to_bits()) {
-            self.len -= 1;
-            self.vacate(slot);
-        }
+    /// Takes out the cluster at `slot`.
+    fn remove(&mut self, slot: usize) -> Cluster {
+        self.used -= 1;
+        let removed = std::mem::take(&mut self.clusters[slot]);
+        self.vacate(slot);
+        removed
     }
 
     /// Empties `slot`, and where that makes room in a full bucket, pulls back a key that had to go past it.
@@ -171,19 +181,19 @@ impl BlockTable {
         let last = (0..BUCKET).rev().find(|&i| self.keys[bucket].0[i] != VACANT).unwrap_or_default();
         self.relocate(bucket * BUCKET + last, slot);
         if was_full && let Some(displaced) = self.displaced_past(bucket) {
-            let (key, mask) = (self.keys[displaced / BUCKET].0[displaced % BUCKET], self.masks[displaced]);
-            self.set_key(bucket * BUCKET + BUCKET - 1, key);
-            self.masks[bucket * BUCKET + BUCKET - 1] = mask;
+            let place = bucket * BUCKET + BUCKET - 1;
+            self.set_key(place, self.keys[displaced / BUCKET].0[displaced % BUCKET]);
+            self.clusters[place] = std::mem::take(&mut self.clusters[displaced]);
             self.vacate(displaced);
         }
     }
 
-    /// Moves a key and its mask; `from` is vacant afterwards.
+    /// Moves a key and its cluster; `from` is vacant afterwards.
     fn relocate(&mut self, from: usize, to: usize) {
         self.set_key(to, self.keys[from / BUCKET].0[from % BUCKET]);
-        self.masks[to] = self.masks[from];
+        self.clusters.swap(from, to);
         self.set_key(from, VACANT);
-        self.masks[from] = EMPTY_MASK;
+        self.clusters[from] = Cluster::default();
     }
 
     fn set_key(&mut self, slot: usize, key: u64) {
@@ -213,23 +223,17 @@ impl BlockTable {
         None
     }
 
-    /// A copy with room for `blocks` blocks.
-    pub(crate) fn with_room_for(&self, blocks: usize) -> Self {
-        let mut table = Self::with_capacity(blocks.max(self.len));
-        for (block, mask) in self.iter() {
-            *table.entry(block) = *mask;
-        }
-        table
-    }
-
     /// All blocks, in no order.
     pub fn iter(&self) -> impl Iterator<Item = (VoxelKey, &BlockMask)> {
-        let buckets = self.keys.iter().zip(self.masks.chunks_exact(BUCKET));
-        // A bucket's vacant slots come last.
-        buckets.flat_map(|(bucket, masks)| {
-            bucket.0.iter().zip(masks).map_while(|(&key, mask)| Some((VoxelKey::from_bits(key)?, &mask.0)))
-        })
+        let keys = self.keys.iter().flat_map(|bucket| bucket.0);
+        keys.zip(&self.clusters)
+            .filter_map(|(key, cluster)| Some((VoxelKey::from_bits(key)?, cluster)))
+            .flat_map(|(key, cluster)| cluster.blocks(key))
     }
+}
+
+fn vacant(buckets: usize) -> Vec<Cluster> {
+    std::iter::repeat_with(Cluster::default).take(buckets * BUCKET).collect()
 }
 
 /// A table's slots as plain slices.
@@ -237,15 +241,17 @@ impl BlockTable {
 pub(crate) struct Slots<'a> {
     pub(crate) tags: &'a [Tags],
     pub(crate) keys: &'a [Bucket],
-    pub(crate) masks: &'a [CacheLine<BlockMask>],
+    pub(crate) clusters: &'a [Cluster],
+    /// Bytes of all masks.
+    pub(crate) mask_bytes: usize,
 }
 
 impl Slots<'static> {
-    /// Those of a table without a block.
-    pub(crate) const NONE: Self = Self { tags: &[0], keys: &[VACANT_BUCKET], masks: &[EMPTY_MASK; BUCKET] };
+    /// Those of a table without a block: there is no cluster where no key is.
+    pub(crate) const NONE: Self = Self { tags: &[0], keys: &[VACANT_BUCKET], clusters: &[], mask_bytes: 0 };
 }
 
-impl Slots<'_> {
+impl<'a> Slots<'a> {
     pub(crate) const HASH_A: u64 = 0x9e37_79b9_7f4a_7c15;
     pub(crate) const HASH_B: u64 = 0xd6e8_feb8_6659_fd93;
     /// Where a tag's bits lie in the hash.
@@ -297,72 +303,101 @@ impl Slots<'_> {
         }
     }
 
-    /// True when a voxel within the ancestor of `cell` of `block`, `level` levels up, is occupied.
+    /// The voxels of `block`; none of them when the block is absent.
     #[inline(always)]
-    pub(crate) fn contains(self, block: VoxelKey, cell: Cell, level: u32) -> bool {
-        self.find(block.to_bits()).is_some_and(|slot| self.masks[slot].0.contains(cell, level))
+    pub(crate) fn get(self, block: VoxelKey) -> &'a BlockMask {
+        let (cluster, place) = Place::of(block);
+        match self.find(cluster.to_bits()) {
+            Some(slot) => self.clusters[slot].get(place),
+            None => &BlockMask::EMPTY,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::voxel::Renewal;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
+    /// A cluster of one block, which has one voxel.
+    fn cluster(key: VoxelKey, cell: u16) -> Cluster {
+        let mut mask = BlockMask::EMPTY;
+        mask.insert(Cell::from_bits(cell));
+        let (_, place) = Place::of(key.first_within(2));
+        let mut cluster = Cluster::default().with_blocks(place.bit());
+        cluster.set(place, mask);
+        cluster
+    }
+
     proptest! {
         #[test]
-        fn a_table_holds_what_was_set_last(changes in prop::collection::vec((0i32..60, 0u16..3), 0..800)) {
-            let mut table = BlockTable::with_capacity(0);
+        fn a_table_holds_what_was_set_last(
+            changes in prop::collection::vec(prop::collection::btree_map((0i32..60, -2i32..2), 0u16..3, 1..20), 0..40),
+        ) {
+            let mut table = BlockTable::default();
             let mut model = BTreeMap::new();
-            for (x, cell) in changes {
-                let block = VoxelKey::pack([x, -x, 7]);
-                let mut mask = BlockMask::EMPTY;
-                if cell > 0 {
-                    mask.insert(Cell::from_bits(cell));
-                    model.insert(block, mask);
-                } else {
-                    model.remove(&block);
+            for change in changes {
+                let mut blocks = Vec::new();
+                for ((x, y), cell) in change {
+                    let block = VoxelKey::pack([x, y, 7 - x]);
+                    let mut mask = BlockMask::EMPTY;
+                    if cell > 0 {
+                        mask.insert(Cell::from_bits(cell));
+                        model.insert(block, mask);
+                    } else {
+                        model.remove(&block);
+                    }
+                    blocks.push((block, mask));
                 }
-                table.set(block, mask);
+                Renewal::plan(&table, &blocks).apply(&mut table);
                 prop_assert_eq!(table.len(), model.len());
             }
             let mut found: Vec<_> = table.iter().collect();
             found.sort_by_key(|(block, _)| *block);
             prop_assert!(found.into_iter().eq(model.iter().map(|(k, m)| (*k, m))));
             for x in 0..60 {
-                let block = VoxelKey::pack([x, -x, 7]);
-                prop_assert!(table.get(block) == model.get(&block).copied().unwrap_or_default());
+                for y in -2..2 {
+                    let block = VoxelKey::pack([x, y, 7 - x]);
+                    prop_assert_eq!(table.get(block), &model.get(&block).copied().unwrap_or_default());
+                }
             }
+            let slots = table.keys.len() * (size_of::<Tags>() + BUCKET * (8 + size_of::<Cluster>()));
+            prop_assert_eq!(table.bytes(), slots + model.len() * BlockMask::BYTES);
         }
 
         /// At a load that the table itself never allows, so that buckets overflow into one another.
         #[test]
         fn keys_that_overflow_are_found_and_removed(order in Just((0..37).collect::<Vec<i32>>()).prop_shuffle()) {
-            let mut table = BlockTable::with_capacity(0);
-            (table.keys, table.masks) = (vec![VACANT_BUCKET; 5], vec![EMPTY_MASK; 40]);
-            table.tags = vec![0; 5];
-            let block = |x: i32| VoxelKey::pack([x, 3, -9]);
+            let mut table =
+                BlockTable { tags: vec![0; 5], keys: vec![VACANT_BUCKET; 5], clusters: vacant(5), ..BlockTable::default() };
+            let key = |x: i32| VoxelKey::pack([x, 3, -9]);
+            let first_mask = |table: &BlockTable, x: i32| *table.get(key(x).first_within(2));
             for &x in &order {
-                let slot = table.add_in_room(block(x).to_bits());
-                table.masks[slot].0.insert(Cell::from_bits(x as u16));
+                let slot = table.add_in_room(key(x).to_bits());
+                table.clusters[slot] = cluster(key(x), x as u16);
+                table.blocks += 1;
+                table.mask_bytes += BlockMask::BYTES;
             }
             for (gone, &x) in order.iter().enumerate() {
-                prop_assert!(order[gone..].iter().all(|&y| table.get(block(y)).contains(Cell::from_bits(y as u16), 0)));
-                table.set(block(x), BlockMask::EMPTY);
-                prop_assert!(table.get(block(x)).is_empty());
+                prop_assert!(order[gone..].iter().all(|&y| first_mask(&table, y).contains(Cell::from_bits(y as u16), 0)));
+                table.set_cluster(key(x), Cluster::default());
+                prop_assert!(first_mask(&table, x).is_empty());
             }
             prop_assert!(table.keys.iter().all(|bucket| *bucket == VACANT_BUCKET));
             prop_assert!(table.tags.iter().all(|&tags| tags == 0));
+            prop_assert_eq!((table.len(), table.mask_bytes), (0, 0));
         }
     }
 
     #[test]
-    fn blocks_of_a_plane_seldom_leave_their_home_bucket() {
-        let mut table = BlockTable::with_capacity(10_000);
+    fn clusters_of_a_plane_seldom_leave_their_home_bucket() {
+        let mut table = BlockTable::default();
         for x in 0..100 {
             for y in 0..100 {
-                table.entry(VoxelKey::pack([x, y, x / 8])).insert(Cell::from_bits(0));
+                let key = VoxelKey::pack([x, y, x / 8]);
+                table.set_cluster(key, cluster(key, 0));
             }
         }
         let full = table.keys.iter().filter(|bucket| bucket.0[BUCKET - 1] != VACANT).count();

@@ -3,19 +3,23 @@
 
 mod block;
 mod block_table;
+mod cluster;
 mod gained;
 mod grouping;
 mod key;
 mod lattice;
 mod moments;
+mod renewal;
 mod sample;
 mod set;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
 pub use block_table::BlockTable;
 pub(crate) use block_table::{BUCKET, Bucket, CacheLine, Slots};
+pub(crate) use cluster::{CLUSTER_LEVELS, Cluster, Place};
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
 pub use moments::{MOMENT_LEVEL, MomentSet, Moments};
+pub(crate) use renewal::Renewal;
 pub use sample::{VolumetricSample, volumetric_sample};
 pub use set::VoxelSet;

@@ -16,8 +16,8 @@ EXAMPLES:
   mrol bench growth --workload site --site-voxels 50000000 --json
 
 The workload goes in piece by piece (up to 131 thousand voxels each), and is never held as a whole; one thread asks for
-640 points every 50 us meanwhile. Commits are told apart by whether anything had to be made larger. Memory is
-the most that the whole process held.";
+640 points every 50 us meanwhile. Commits are told apart by whether a filter had to be made larger. Memory is the
+most that the whole process held.";
 
 /// Let a map grow: bytes a voxel, peak memory, how long writers and readers wait
 #[derive(Debug, clap::Args)]

@@ -1,8 +1,8 @@
-//! The look-up sixteen points at a time, for machines with AVX-512 F, DQ and CD.
+//! The look-up sixteen points at a time, for machines with AVX-512 F, BW, DQ and CD.
 //!
 //! Every step is the twin of one of [`super::scalar`]: the same f32 operations in the same order, the same
-//! hashes. Shard descriptors stay in registers; the only memory touched a point is its word of the plane (or
-//! its key and mask of the table).
+//! hashes. Shard descriptors stay in registers; the only memory touched a point is its word of the plane, or of
+//! its block's mask.
 #![expect(unsafe_code, reason = "vector intrinsics and gathers from raw addresses")]
 
 mod bloom;
@@ -27,6 +27,7 @@ const LANES: usize = 16;
 /// True when the machine can run this module.
 pub(super) fn is_available() -> bool {
     is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512cd")
         && is_x86_feature_detected!("popcnt")
@@ -88,14 +89,14 @@ trait Probe {
     const AHEAD: usize;
 
     /// # Safety
-    /// Needs AVX-512 F, DQ and CD.
+    /// Needs AVX-512 F, BW, DQ and CD.
     unsafe fn load<'a>(view: &'a LevelView<'_>) -> Self::Registers<'a>;
 
     /// Takes up sixteen voxels of the view's level. Those that are none are not `valid`, and what is answered of them
     /// does not count.
     ///
     /// # Safety
-    /// Needs AVX-512 F, DQ and CD; the view must still live.
+    /// Needs AVX-512 F, BW, DQ and CD; the view must still live.
     unsafe fn locate(
         r: &Self::Registers<'_>,
         index: [__m512i; 3],
@@ -124,8 +125,8 @@ trait Probe {
 /// Answers for the points of each word as soon as they are located.
 ///
 /// # Safety
-/// Needs AVX-512 F, DQ and CD, and a word of `occupied` for each 64 points.
-#[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+/// Needs AVX-512 F, BW, DQ and CD, and a word of `occupied` for each 64 points.
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
 unsafe fn run_near<P: Probe>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
@@ -148,8 +149,8 @@ unsafe fn run_near<P: Probe>(
 /// Seeks the points of each word [`Probe::AHEAD`] words before it answers for them.
 ///
 /// # Safety
-/// Needs AVX-512 F, DQ and CD, and a word of `occupied` for each 64 points.
-#[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+/// Needs AVX-512 F, BW, DQ and CD, and a word of `occupied` for each 64 points.
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
 unsafe fn run_far<P: Probe>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
@@ -203,7 +204,7 @@ struct Steps<'a, P: Probe> {
 
 impl<'a, P: Probe> Steps<'a, P> {
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn load(lattice_from_points: &LatticeFromPoints, view: &'a LevelView<'_>) -> Self {
         let memory = P::Memory::default();
         // SAFETY: the features are there.
@@ -211,7 +212,7 @@ impl<'a, P: Probe> Steps<'a, P> {
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(&mut self, points: &[Point], word: &mut Word<P::Word>) {
         prefetch_points(points);
         let padded;
@@ -241,7 +242,7 @@ impl<'a, P: Probe> Steps<'a, P> {
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn answer(&mut self, word: &Word<P::Word>) -> u64 {
         // SAFETY: as for this function.
         unsafe { P::answer(&self.registers, &mut self.memory, &word.voxels) & word.has_voxel }

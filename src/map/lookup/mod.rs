@@ -80,7 +80,7 @@ impl LevelView<'_> {
     fn bytes(&self, lookup: Lookup) -> usize {
         match lookup {
             Lookup::Bloom => self.planes.iter().map(|plane| size_of_val(*plane)).sum(),
-            Lookup::Exact => self.blocks.iter().map(|slots| size_of_val(slots.masks)).sum(),
+            Lookup::Exact => self.blocks.iter().map(|slots| slots.mask_bytes).sum(),
         }
     }
 }

@@ -66,5 +66,5 @@ pub(super) fn bloom(view: &LevelView<'_>, index: [i32; 3]) -> bool {
 #[inline(always)]
 pub(super) fn exact(view: &LevelView<'_>, index: [i32; 3]) -> bool {
     let (block, cell) = Cell::of(index.map(|i| i << view.up));
-    view.blocks[shard(view, index)].contains(block, cell, view.up)
+    view.blocks[shard(view, index)].get(block).contains(cell, view.up)
 }

@@ -6,7 +6,9 @@ use super::{LevelView, Lookup, scalar};
 use crate::bloom::{FilterSettings, HASHES_MAX};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
-use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
+use crate::voxel::{
+    BLOCK_LEVELS, CLUSTER_LEVELS, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
+};
 
 type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64]) -> bool;
 
@@ -102,6 +104,18 @@ fn exact_answers_are_exact_whichever_way_they_are_found() {
         .chain((0..20_000).map(|i| at(i, 0.5)))
         .chain((0..19_999).map(sparse))
         .collect();
+    assert_twins(&map, &points, &Pose::identity());
+}
+
+/// So many that tags agree by chance, and buckets overflow.
+#[test]
+fn clusters_that_are_not_where_their_tags_say_are_found() {
+    const SIDE: i32 = 1 << (BLOCK_LEVELS + CLUSTER_LEVELS);
+    let first_voxels = |z: i32| (0..40_000).map(move |i| [i % 200 - 100, i / 200 - 100, z].map(|c| c * SIDE));
+    let map = map_of(first_voxels(0), MapSettings::new(1.0, 5));
+    // In clusters that are there, and in those below, which are not.
+    let asked = first_voxels(0).zip(first_voxels(-1)).flat_map(|(above, below)| [above, below]);
+    let points: Vec<_> = asked.map(|index| Point::from(index.map(|i| i as f32 + 0.5))).collect();
     assert_twins(&map, &points, &Pose::identity());
 }
 

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::{BATCH, Batch, LANES, Probe, mix, of_shards, pack, prefetch, scale, store};
 use crate::map::lookup::LevelView;
 use crate::map::sharding::SHARDS;
-use crate::voxel::{BLOCK_LEVELS, BUCKET, BlockMask, Bucket, Cell, Slots};
+use crate::voxel::{BLOCK_LEVELS, BUCKET, BlockMask, Bucket, CLUSTER_LEVELS, Cell, Place, Slots};
 
 /// The tables: addresses of keys, and buckets, of each shard's.
 pub(super) struct Tables<'a> {
@@ -27,10 +27,10 @@ impl<'a> Tables<'a> {
 impl Probe for Tables<'_> {
     #[target_feature(enable = "avx2")]
     unsafe fn look_up(&self, batch: &Batch, points: usize) -> [u64; BATCH / 64] {
-        let (blocks, cells) = split(&batch.index, self.view.up);
+        let (clusters, cells) = split(&batch.index, self.view.up);
         let (mut keys, mut buckets) = ([0u64; BATCH], [0u64; BATCH]);
         for at in (0..points.next_multiple_of(4)).step_by(4) {
-            let key = pack(&blocks, at);
+            let key = pack(&clusters, at);
             let bucket =
                 scale(mix(key, Slots::HASH_A, Slots::HASH_B), of_shards(&self.buckets, &batch.shard, at));
             let table = of_shards(&self.keys, &batch.shard, at);
@@ -41,16 +41,22 @@ impl Probe for Tables<'_> {
             addresses.into_iter().for_each(prefetch);
         }
         let mut masks = [&BlockMask::EMPTY; BATCH];
+        let (mut last, mut cluster) = (None, None);
         for i in 0..points {
-            let slots = self.view.blocks[batch.shard[i] as usize];
-            if let Some(slot) = find(slots, keys[i], buckets[i] as usize) {
-                masks[i] = &slots.masks[slot].0;
-                prefetch((&raw const masks[i].0[cells[i] as usize >> 6]).expose_provenance() as u64);
+            // Neighbours lie in one cluster more often than not.
+            if last != Some((keys[i], batch.shard[i])) {
+                last = Some((keys[i], batch.shard[i]));
+                let slots = self.view.blocks[batch.shard[i] as usize];
+                cluster = find(slots, keys[i], buckets[i] as usize).map(|slot| &slots.clusters[slot]);
+            }
+            if let Some(cluster) = cluster {
+                masks[i] = cluster.get(Place::from_bits(cells[i] as u32 >> CELL_BITS));
+                prefetch((&raw const masks[i].0[word(cells[i])]).expose_provenance() as u64);
             }
         }
         let mut hits = [0; BATCH / 64];
         for i in 0..points {
-            let hit = masks[i].0[cells[i] as usize >> 6] & within(cells[i], self.view.up) != 0;
+            let hit = masks[i].0[word(cells[i])] & within(cells[i], self.view.up) != 0;
             hits[i / 64] |= u64::from(hit) << (i % 64);
         }
         hits
@@ -77,31 +83,49 @@ fn find(slots: Slots<'_>, key: u64, bucket: usize) -> Option<usize> {
     }
 }
 
-/// The twin of [`Cell::of`]: block indices and cells of the voxels of a level `up` levels up in its blocks.
+/// Bits of a cell's number in its block, behind which that of the block in its cluster begins.
+const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
+
+/// The twin of [`Cell::of`] and [`Place::of`]: cluster indices, and numbers of cells within clusters, of the voxels of a
+/// level `up` levels up in its blocks.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn split(index: &[[i32; BATCH]; 3], up: u32) -> ([[i32; BATCH]; 3], [i32; BATCH]) {
     let spread = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| (Cell::SPREAD >> (i * 8)) as i32 & 0xff);
-    let (left, right) = (_mm_cvtsi32_si128(up as i32), _mm_cvtsi32_si128((BLOCK_LEVELS - up) as i32));
-    let (mut blocks, mut cells) = ([[0; BATCH]; 3], [0; BATCH]);
+    let to_finest = _mm_cvtsi32_si128(up as i32);
+    let to_cluster = _mm_cvtsi32_si128((BLOCK_LEVELS + CLUSTER_LEVELS - up) as i32);
+    let of_place = _mm256_set1_epi32(((1 << CLUSTER_LEVELS) - 1) << BLOCK_LEVELS);
+    let (mut clusters, mut cells) = ([[0; BATCH]; 3], [0; BATCH]);
     for at in (0..BATCH).step_by(LANES) {
         let mut cell = _mm256_setzero_si256();
         for axis in 0..3 {
             // SAFETY: eight i32 are one register, each time.
             unsafe {
                 let i = _mm256_loadu_si256(index[axis][at..at + LANES].as_ptr().cast());
-                let block = blocks[axis][at..at + LANES].as_mut_ptr().cast();
-                _mm256_storeu_si256(block, _mm256_sra_epi32(i, right));
+                let cluster = clusters[axis][at..at + LANES].as_mut_ptr().cast();
+                _mm256_storeu_si256(cluster, _mm256_sra_epi32(i, to_cluster));
                 let table = _mm256_loadu_si256(spread.as_ptr().cast());
+                let finest = _mm256_sll_epi32(i, to_finest);
                 // The permutation looks at three bits of an index.
-                let bits = _mm256_permutevar8x32_epi32(table, _mm256_sll_epi32(i, left));
-                cell = _mm256_or_si256(cell, _mm256_sll_epi32(bits, _mm_cvtsi32_si128(axis as i32)));
+                let bits = _mm256_permutevar8x32_epi32(table, finest);
+                let place = _mm256_sll_epi32(
+                    _mm256_and_si256(finest, of_place),
+                    _mm_cvtsi32_si128((CELL_BITS - BLOCK_LEVELS + CLUSTER_LEVELS * axis as u32) as i32),
+                );
+                let bits = _mm256_sll_epi32(bits, _mm_cvtsi32_si128(axis as i32));
+                cell = _mm256_or_si256(cell, _mm256_or_si256(bits, place));
             }
         }
         // SAFETY: eight i32 are one register.
         unsafe { _mm256_storeu_si256(cells[at..at + LANES].as_mut_ptr().cast(), cell) };
     }
-    (blocks, cells)
+    (clusters, cells)
+}
+
+/// The word of its block's mask that holds a cell.
+#[inline(always)]
+fn word(cell: i32) -> usize {
+    cell as usize >> 6 & 7
 }
 
 /// The twin of `BlockMask::within`.

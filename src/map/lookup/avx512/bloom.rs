@@ -42,13 +42,13 @@ impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
     const NO_WORD: Self::Word = [Located::NONE; GROUPS];
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn load(view: &LevelView<'_>) -> BloomRegisters {
         BloomRegisters::load(view)
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(r: &BloomRegisters, index: [__m512i; 3], shard: __m512i, _: u16) -> Located {
         let located = r.locate(halves(index), shard);
         if FETCH {
@@ -59,7 +59,7 @@ impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
 
     /// Nothing is left to find out: neighbours' words lie apart.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn seek(
         _: &BloomRegisters,
         (): &mut (),
@@ -70,7 +70,7 @@ impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn answer(r: &BloomRegisters, (): &mut (), word: &[Located; GROUPS]) -> u64 {
         // SAFETY: as for this function.
         let answer =

@@ -3,37 +3,35 @@
 use std::arch::x86_64::*;
 
 use super::registers::{
-    PerShard, addresses, eight_of, gather_now, lanes, lengths, load, mix, pack, prefetch_now, scale, store,
-    to_array, widen,
+    PerShard, addresses, eight_of, gather_now, gather_pairs, lanes, lengths, load, mix, pack, prefetch_now,
+    scale, store, to_array, widen,
 };
 use super::{GROUPS, LANES, Probe, WORD};
 use crate::map::lookup::LevelView;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CacheLine, Cell, Slots};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CLUSTER_LEVELS, CacheLine, Cell, Cluster, Slots};
 
 /// The table of blocks.
 ///
-/// Neighbours in a scan lie in one block more often than not: a point beside the one before it, or beside what the
-/// sensor saw one turn of its lasers ago, which for 16, 32 or 64 of them is the same lane of the word before. A block
-/// that is known from either is not searched for.
+/// Neighbours in a scan lie in one cluster more often than not: a point beside the one before it, or beside what the
+/// sensor saw one turn of its lasers ago, which for 16, 32 or 64 of them is the same lane of the word before. A cluster
+/// that is known from either is not searched for, and where in it a block's mask is takes no memory to find out.
 ///
 /// ```text
-/// locate   blocks and cells of sixteen voxels
-/// seek     those of 64 in a new block are sought: tags say which slots may be theirs; keys and masks are fetched
-/// answer   the keys decide; each voxel gets the address of its block's mask, and asks for its word there
+/// locate   clusters of sixteen voxels, and their cells in them
+/// seek     those of 64 in a new cluster are sought; each voxel gets the address of its word in its block's mask,
+///          which is fetched
+/// answer   the words decide
 /// ```
 ///
-/// With `FETCH`, keys and masks are fetched as soon as tags say where they are.
+/// With `FETCH`, masks are fetched as soon as it is known where they are.
 pub(super) struct Exact<const FETCH: bool>;
 
 pub(super) struct ExactRegisters<'a> {
     view: &'a LevelView<'a>,
     tags: PerShard,
     keys: PerShard,
-    masks: PerShard,
+    clusters: PerShard,
     buckets: PerShard,
-    /// All lanes where a block is larger than a region and has a part in each of several shards: a block that is known
-    /// from one is sought in the other all the same.
-    always: u8,
 }
 
 /// Eights of voxels in a word: what a register holds.
@@ -43,53 +41,41 @@ const QUEUE: usize = WORD + 8;
 
 /// Sixteen voxels.
 pub(super) struct Located {
-    blocks: [__m512i; 2],
+    /// Their clusters: see [`within_shard`].
+    clusters: [__m512i; 2],
+    /// Numbers of their cells within their clusters.
     cells: [__m512i; 2],
-    shards: [__m512i; 2],
 }
 
 /// A word of voxels.
 pub(super) struct ExactWord {
     cells: [__m512i; EIGHTS],
-    /// A bit for each in another block than the lane before it.
-    heads: u64,
-    /// Those of them that are sought, since they lie in another block than the same lane of the word before.
-    sought: u64,
-    searches: [Search; EIGHTS],
-    /// How many of the searches are this word's.
-    searches_used: usize,
+    /// Addresses of their words of their blocks' masks.
+    words: [__m512i; EIGHTS],
 }
 
-/// What is known from the word before.
+/// What is known from the word before, and room to search.
 pub(super) struct ExactMemory {
-    blocks: [__m512i; EIGHTS],
-    /// Addresses of the blocks' masks.
-    masks: [__m512i; EIGHTS],
-    /// Blocks that are sought, and their shards.
-    queue: ([u64; QUEUE], [u64; QUEUE]),
-    /// Addresses of the masks that were found.
-    found: [u64; QUEUE],
+    clusters: [__m512i; EIGHTS],
+    found: [Found; EIGHTS],
+    /// Clusters that are sought.
+    queue: [u64; QUEUE],
+    /// What was found of them, as [`Found`] has it.
+    results: ([u64; QUEUE], [u64; QUEUE]),
 }
 
-/// Eight blocks on their way through the table.
-///
-/// A bucket's tags say which slot may hold a block, and so where its key and its mask are: both are fetched at once.
-/// That the key is the block's is checked when it is there.
+/// Eight clusters.
 #[derive(Clone, Copy)]
-struct Search {
-    blocks: __m512i,
-    shards: __m512i,
-    /// Addresses of the keys of the first slots whose tags fit, and of the masks.
-    keys: __m512i,
+struct Found {
+    /// The blocks that are there.
+    present: __m512i,
+    /// Addresses of the first of their masks.
     masks: __m512i,
-    /// Those with such a slot.
-    tagged: u8,
-    /// Those whose home bucket is full: the block may be in another.
-    full: u8,
 }
 
-/// Stands for the blocks of points without a voxel; no key sets bit 63.
-const NO_BLOCK: __m512i = eight_of(u64::MAX);
+/// Stands for the clusters of points without a voxel; no key sets bit 63. Where it is sought it may be found, in a vacant
+/// slot, without a block.
+const NO_CLUSTER: __m512i = eight_of(u64::MAX);
 /// The mask of a block that is not there.
 static ABSENT: CacheLine<BlockMask> = CacheLine(BlockMask::EMPTY);
 
@@ -97,12 +83,12 @@ impl Default for ExactMemory {
     /// Known is what is not there.
     #[inline(always)]
     fn default() -> Self {
-        let absent = eight_of((&raw const ABSENT).expose_provenance() as u64);
+        let none = Found { present: eight_of(0), masks: eight_of(0) };
         Self {
-            blocks: [NO_BLOCK; EIGHTS],
-            masks: [absent; EIGHTS],
-            queue: ([0; QUEUE], [0; QUEUE]),
-            found: [0; QUEUE],
+            clusters: [NO_CLUSTER; EIGHTS],
+            found: [none; EIGHTS],
+            queue: [0; QUEUE],
+            results: ([0; QUEUE], [0; QUEUE]),
         }
     }
 }
@@ -115,121 +101,131 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
 
     /// One more than for filters: a word of neighbours needs few lines.
     const AHEAD: usize = 3;
-    const NO_WORD: ExactWord = {
-        let none = eight_of(0);
-        let search = Search { blocks: none, shards: none, keys: none, masks: none, tagged: 0, full: 0 };
-        ExactWord { cells: [none; EIGHTS], heads: 0, sought: 0, searches: [search; EIGHTS], searches_used: 0 }
-    };
+    const NO_WORD: ExactWord = ExactWord { cells: [eight_of(0); EIGHTS], words: [eight_of(0); EIGHTS] };
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn load<'a>(view: &'a LevelView<'_>) -> ExactRegisters<'a> {
         ExactRegisters {
             view,
             tags: PerShard::load(addresses(view.blocks.map(|slots| slots.tags))),
             keys: PerShard::load(addresses(view.blocks.map(|slots| slots.keys))),
-            masks: PerShard::load(addresses(view.blocks.map(|slots| slots.masks))),
+            clusters: PerShard::load(addresses(view.blocks.map(|slots| slots.clusters))),
             buckets: PerShard::load(lengths(view.blocks.map(|slots| slots.keys))),
-            always: if BLOCK_LEVELS - view.up > view.region_shift { u8::MAX } else { 0 },
         }
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(r: &ExactRegisters<'_>, index: [__m512i; 3], shard: __m512i, valid: u16) -> Located {
         let up = r.view.up;
-        let (left, right) = (_mm_cvtsi32_si128(up as i32), _mm_cvtsi32_si128((BLOCK_LEVELS - up) as i32));
-        let [a, b] = pack(index.map(|i| _mm512_sra_epi32(i, right)));
-        let finest = if up == 0 { index } else { index.map(|i| _mm512_sll_epi32(i, left)) };
-        // What is out of range may have the key of a block in another shard.
-        let blocks = [
-            _mm512_mask_mov_epi64(NO_BLOCK, valid as u8, a),
-            _mm512_mask_mov_epi64(NO_BLOCK, (valid >> 8) as u8, b),
+        let to_cluster = _mm_cvtsi32_si128((BLOCK_LEVELS + CLUSTER_LEVELS - up) as i32);
+        let keys = pack(index.map(|i| _mm512_sra_epi32(i, to_cluster)));
+        let to_finest = _mm_cvtsi32_si128(up as i32);
+        let finest = if up == 0 { index } else { index.map(|i| _mm512_sll_epi32(i, to_finest)) };
+        let shards = widen(shard);
+        // What is out of range may have the key of a cluster in another shard.
+        let clusters = [
+            _mm512_mask_mov_epi64(NO_CLUSTER, valid as u8, within_shard(keys[0], shards[0])),
+            _mm512_mask_mov_epi64(NO_CLUSTER, (valid >> 8) as u8, within_shard(keys[1], shards[1])),
         ];
-        let cells = widen(cell(finest));
-        Located { blocks, cells, shards: widen(shard) }
+        Located { clusters, cells: widen(cell(finest)) }
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn seek(
         r: &ExactRegisters<'_>,
         memory: &mut ExactMemory,
         located: [Located; GROUPS],
         word: &mut ExactWord,
     ) {
-        let sought = word.queue_new_blocks(&located, memory, r.always);
-        word.searches_used = sought.div_ceil(8);
-        for (i, search) in word.searches[..word.searches_used].iter_mut().enumerate() {
-            let (blocks, shards) = (load(&memory.queue.0, 8 * i), load(&memory.queue.1, 8 * i));
+        let new = memory.queue_new_clusters(&located);
+        for first in (0..new.count).step_by(8) {
             // SAFETY: as for this function.
-            *search = unsafe { r.search::<FETCH>(blocks, shards) };
+            let found = unsafe { r.search(load(&memory.queue, first)) };
+            store(&mut memory.results.0, first, found.present);
+            store(&mut memory.results.1, first, found.masks);
+        }
+        let (mut taken, mut before) = (0, memory.found[EIGHTS - 1]);
+        for i in 0..EIGHTS {
+            let (heads, sought) = ((new.heads >> (8 * i)) as u8, (new.sought >> (8 * i)) as u8);
+            let known = memory.found[i];
+            let of_head = Found {
+                present: _mm512_mask_expand_epi64(known.present, sought, load(&memory.results.0, taken)),
+                masks: _mm512_mask_expand_epi64(known.masks, sought, load(&memory.results.1, taken)),
+            };
+            taken += sought.count_ones() as usize;
+            let latest = latest_of(heads);
+            before = Found {
+                present: _mm512_permutex2var_epi64(of_head.present, latest, before.present),
+                masks: _mm512_permutex2var_epi64(of_head.masks, latest, before.masks),
+            };
+            memory.found[i] = before;
+            word.cells[i] = located[i / 2].cells[i % 2];
+            word.words[i] = before.words(word.cells[i]);
+            if FETCH {
+                prefetch_now(word.words[i]);
+            }
         }
     }
 
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn answer(r: &ExactRegisters<'_>, memory: &mut ExactMemory, word: &ExactWord) -> u64 {
-        for (i, search) in word.searches[..word.searches_used].iter().enumerate() {
-            // SAFETY: as for this function.
-            store(&mut memory.found, 8 * i, unsafe { r.masks_of(search) });
-        }
-        let (mut hits, mut taken, mut before) = (0, 0, memory.masks[EIGHTS - 1]);
-        for i in 0..EIGHTS {
-            let (heads, sought) = ((word.heads >> (8 * i)) as u8, (word.sought >> (8 * i)) as u8);
-            let found = load(&memory.found, taken);
-            let masks = _mm512_mask_expand_epi64(memory.masks[i], sought, found);
-            taken += sought.count_ones() as usize;
-            before = _mm512_permutex2var_epi64(masks, latest_of(heads), before);
-            memory.masks[i] = before;
-            let addresses =
-                _mm512_add_epi64(before, _mm512_slli_epi64::<3>(_mm512_srli_epi64::<6>(word.cells[i])));
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
+    unsafe fn answer(r: &ExactRegisters<'_>, _: &mut ExactMemory, word: &ExactWord) -> u64 {
+        let mut hits = 0;
+        for (i, (&words, &cells)) in word.words.iter().zip(&word.cells).enumerate() {
             // SAFETY: each address is of a word of a mask that the view keeps alive, or of `ABSENT`.
-            let words = unsafe { gather_now(addresses) };
-            let hit = _mm512_test_epi64_mask(words, within(word.cells[i], r.view.up));
-            hits |= u64::from(hit) << (8 * i);
+            let words = unsafe { gather_now(words) };
+            hits |= u64::from(_mm512_test_epi64_mask(words, within(cells, r.view.up))) << (8 * i);
         }
         hits
     }
 }
 
-impl ExactWord {
-    /// Finds the blocks that are not known yet; the number of them.
+/// The voxels of a word whose clusters are not known yet.
+struct New {
+    /// A bit for each in another cluster than the lane before it.
+    heads: u64,
+    /// Those of them that are sought, since they lie in another cluster than the same lane of the word before.
+    sought: u64,
+    /// The number of these.
+    count: usize,
+}
+
+impl ExactMemory {
+    /// Finds and queues the clusters that are not known yet.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn queue_new_blocks(
-        &mut self,
-        located: &[Located; GROUPS],
-        memory: &mut ExactMemory,
-        always: u8,
-    ) -> usize {
-        let (mut queued, mut before) = (0, memory.blocks[EIGHTS - 1]);
-        (self.heads, self.sought) = (0, 0);
+    fn queue_new_clusters(&mut self, located: &[Located; GROUPS]) -> New {
+        let (mut new, mut before) = (New { heads: 0, sought: 0, count: 0 }, self.clusters[EIGHTS - 1]);
         for i in 0..EIGHTS {
-            let Located { blocks, cells, shards } = &located[i / 2];
-            let blocks = blocks[i % 2];
-            self.cells[i] = cells[i % 2];
-            let heads = _mm512_cmpneq_epi64_mask(blocks, _mm512_alignr_epi64::<7>(blocks, before)) | always;
-            let sought = heads & (_mm512_cmpneq_epi64_mask(blocks, memory.blocks[i]) | always);
-            self.heads |= u64::from(heads) << (8 * i);
-            self.sought |= u64::from(sought) << (8 * i);
-            store(&mut memory.queue.0, queued, _mm512_maskz_compress_epi64(sought, blocks));
-            store(&mut memory.queue.1, queued, _mm512_maskz_compress_epi64(sought, shards[i % 2]));
-            queued += sought.count_ones() as usize;
-            memory.blocks[i] = blocks;
-            before = blocks;
+            let clusters = located[i / 2].clusters[i % 2];
+            let heads = _mm512_cmpneq_epi64_mask(clusters, _mm512_alignr_epi64::<7>(clusters, before));
+            let sought = heads & _mm512_cmpneq_epi64_mask(clusters, self.clusters[i]);
+            new.heads |= u64::from(heads) << (8 * i);
+            new.sought |= u64::from(sought) << (8 * i);
+            store(&mut self.queue, new.count, _mm512_maskz_compress_epi64(sought, clusters));
+            new.count += sought.count_ones() as usize;
+            self.clusters[i] = clusters;
+            before = clusters;
         }
-        queued
+        new
     }
 }
 
 impl ExactRegisters<'_> {
+    /// Finds clusters in their shards' tables.
+    ///
+    /// A bucket's tags say which slot may hold a cluster, and so where its key is, which decides.
+    ///
     /// # Safety
-    /// Needs AVX-512 F, DQ and CD; the view must still live.
+    /// Needs AVX-512 F, BW, DQ and CD; the view must still live.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn search<const FETCH: bool>(&self, blocks: __m512i, shards: __m512i) -> Search {
-        let h = mix(blocks, Slots::HASH_A, Slots::HASH_B);
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
+    unsafe fn search(&self, clusters: __m512i) -> Found {
+        let (keys, shards) = of_shard(clusters);
+        let h = mix(keys, Slots::HASH_A, Slots::HASH_B);
         let bucket = scale(h, self.buckets.of(shards));
         let tags_address = _mm512_add_epi64(self.tags.of(shards), _mm512_slli_epi64::<3>(bucket));
         // SAFETY: the address is of a bucket's tags of a shard's table, which the view keeps alive.
@@ -239,54 +235,105 @@ impl ExactRegisters<'_> {
         let first = _mm512_sub_epi64(_mm512_set1_epi64(63), _mm512_lzcnt_epi64(fits));
         let place = _mm512_and_si512(first, _mm512_set1_epi64(!7));
         let tagged = _mm512_test_epi64_mask(fits, fits);
-        let keys =
-            _mm512_add_epi64(self.keys.of(shards), _mm512_add_epi64(_mm512_slli_epi64::<6>(bucket), place));
-        let slot = _mm512_add_epi64(_mm512_slli_epi64::<9>(bucket), _mm512_slli_epi64::<3>(place));
-        let masks = _mm512_add_epi64(self.masks.of(shards), slot);
-        let (keys, masks) =
-            (_mm512_mask_mov_epi64(absent(), tagged, keys), _mm512_mask_mov_epi64(absent(), tagged, masks));
-        if FETCH {
-            prefetch_now(keys);
-            prefetch_now(masks);
-        }
+        let slot = _mm512_add_epi64(_mm512_slli_epi64::<6>(bucket), place);
+        let key = _mm512_add_epi64(self.keys.of(shards), slot);
+        let cluster = _mm512_add_epi64(self.clusters.of(shards), _mm512_slli_epi64::<2>(slot));
+        let [key, cluster] = [key, cluster].map(|address| _mm512_mask_mov_epi64(absent(), tagged, address));
+        // SAFETY: each address is of a key that the view keeps alive and of its cluster, or of `ABSENT`.
+        let (is_key, [present, masks]) = unsafe { (gather_now(key), gather_pairs(cluster)) };
+        let found = tagged & _mm512_cmpeq_epi64_mask(is_key, keys);
+        let result = Found { present: _mm512_maskz_mov_epi64(found, present), masks };
         let full = _mm512_test_epi64_mask(tags, _mm512_set1_epi64(0xff << 56));
-        Search { blocks, shards, keys, masks, tagged, full }
+        let elsewhere = !found & (tagged | full);
+        if elsewhere == 0 { result } else { self.elsewhere(keys, shards, result, elsewhere) }
     }
 
-    /// The addresses of the blocks' masks.
-    ///
-    /// # Safety
-    /// As for `search`.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512dq,avx512cd,popcnt")]
-    unsafe fn masks_of(&self, search: &Search) -> __m512i {
-        // SAFETY: each address is of a key that the view keeps alive, or of `ABSENT`.
-        let keys = unsafe { gather_now(search.keys) };
-        let is_block = _mm512_cmpeq_epi64_mask(keys, search.blocks) & search.tagged;
-        let masks = _mm512_mask_mov_epi64(absent(), is_block, search.masks);
-        let elsewhere = !is_block & (search.tagged | search.full);
-        if elsewhere == 0 { masks } else { self.masks_elsewhere(search, masks, elsewhere) }
-    }
-
-    /// Those of blocks that are not in the first slots whose tags fit as well.
+    /// Finds those that are not in the first slots whose tags fit as well.
     #[cold]
     #[target_feature(enable = "avx512f")]
-    fn masks_elsewhere(&self, search: &Search, masks: __m512i, elsewhere: u8) -> __m512i {
-        let [blocks, shards, mut masks] = [search.blocks, search.shards, masks].map(|lanes| to_array(lanes));
+    fn elsewhere(&self, keys: __m512i, shards: __m512i, found: Found, elsewhere: u8) -> Found {
+        let [keys, shards, mut present, mut masks] =
+            [keys, shards, found.present, found.masks].map(|lanes| to_array(lanes));
         for lane in (0..8).filter(|lane| elsewhere >> lane & 1 == 1) {
             let slots = self.view.blocks[shards[lane] as usize];
-            if let Some(slot) = slots.find(blocks[lane]) {
-                masks[lane] = (&raw const slots.masks[slot]).expose_provenance() as u64;
+            if let Some(slot) = slots.find(keys[lane]) {
+                let cluster = &slots.clusters[slot];
+                (present[lane], masks[lane]) = (cluster.present, cluster.first_mask as u64);
             }
         }
-        load(&masks, 0)
+        Found { present: load(&present, 0), masks: load(&masks, 0) }
     }
 }
+
+impl Found {
+    /// Addresses of the words of masks that hold `cells` of these clusters: the twin of `Cluster::get`.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw")]
+    fn words(&self, cells: __m512i) -> __m512i {
+        let place = _mm512_srli_epi64::<{ CELL_BITS }>(cells);
+        let bit = _mm512_sllv_epi64(_mm512_set1_epi64(1), place);
+        let there = _mm512_test_epi64_mask(self.present, bit);
+        let before = _mm512_and_si512(self.present, _mm512_sub_epi64(bit, _mm512_set1_epi64(1)));
+        let mask = _mm512_add_epi64(self.masks, _mm512_slli_epi64::<6>(ones(before)));
+        let word = _mm512_and_si512(_mm512_srli_epi64::<3>(cells), _mm512_set1_epi64(0b111 << 3));
+        _mm512_mask_mov_epi64(absent(), there, _mm512_add_epi64(mask, word))
+    }
+}
+
+/// Bits of a cell's number in its block, behind which that of the block in its cluster begins.
+const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
+
+const _: () = assert!(
+    size_of::<Bucket>() == 64
+        && size_of::<CacheLine<BlockMask>>() == 64
+        && size_of::<Cluster>() == 32
+        && std::mem::offset_of!(Cluster, present) == 0
+        && std::mem::offset_of!(Cluster, first_mask) == 8,
+    "as what is above takes them"
+);
 
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn absent() -> __m512i {
     _mm512_set1_epi64((&raw const ABSENT).expose_provenance() as i64)
+}
+
+/// Keys of clusters and their shards in one: a cluster of coarse voxels is larger than a region, and each of several
+/// shards has a part of it.
+///
+/// The shard goes where a cluster's key only repeats the sign of z, since its indices have five bits fewer than a voxel's.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn within_shard(keys: __m512i, shards: __m512i) -> __m512i {
+    _mm512_xor_si512(keys, _mm512_slli_epi64::<SHARD_SHIFT>(shards))
+}
+
+/// The inverse of [`within_shard`].
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn of_shard(clusters: __m512i) -> (__m512i, __m512i) {
+    // The highest bit that tells z apart, which is its sign, everywhere.
+    let sign = _mm512_srai_epi64::<63>(_mm512_slli_epi64::<{ 64 - SHARD_SHIFT }>(clusters));
+    let marks = _mm512_xor_si512(_mm512_srli_epi64::<SHARD_SHIFT>(clusters), sign);
+    let shards = _mm512_and_si512(marks, _mm512_set1_epi64(LANES as i64 - 1));
+    (within_shard(clusters, shards), shards)
+}
+
+const SHARD_SHIFT: u32 = 58;
+const _: () = assert!(
+    LANES << SHARD_SHIFT <= 1 << 62 && BLOCK_LEVELS + CLUSTER_LEVELS >= 5,
+    "below the sign of z, which is bit 62, and above the rest of it"
+);
+
+/// The number of ones in each lane.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw")]
+fn ones(words: __m512i) -> __m512i {
+    let low = _mm512_set1_epi8(0xf);
+    let of_nibble = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
+    let of_low = _mm512_shuffle_epi8(of_nibble, _mm512_and_si512(words, low));
+    let of_high = _mm512_shuffle_epi8(of_nibble, _mm512_and_si512(_mm512_srli_epi64::<4>(words), low));
+    _mm512_sad_epu8(_mm512_add_epi8(of_low, of_high), _mm512_setzero_si512())
 }
 
 /// For each of eight lanes the latest head, itself or before it; the last lane of the eight before where there is none.
@@ -313,11 +360,6 @@ fn latest_of(heads: u8) -> __m512i {
     _mm512_cvtepu8_epi64(_mm_cvtsi64_si128(i64::from_le_bytes(LATEST[usize::from(heads)])))
 }
 
-const _: () = assert!(
-    size_of::<Bucket>() == 64 && size_of::<CacheLine<BlockMask>>() == 64,
-    "as the shifts above take them"
-);
-
 /// The top bit of each byte of `tags` that is the tag of a key with hash `h`; of bytes beyond the first such, it may be
 /// set without reason. The twin of `Slots::tag`.
 #[inline]
@@ -333,21 +375,32 @@ fn fitting(tags: __m512i, h: __m512i) -> __m512i {
     _mm512_and_si512(zeros, _mm512_sub_epi64(_mm512_setzero_si512(), zeros))
 }
 
-/// The twin of [`Cell::of`], for sixteen indices.
+/// The twin of [`Cell::of`] and `Place::of`, for sixteen indices: numbers of cells within clusters.
+///
+/// ```text
+/// | place of the block (6 bits) | cell (9 bits) |
+/// ```
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn cell(index: [__m512i; 3]) -> __m512i {
-    // The permutation looks at four bits of an index; the fourth selects the same values again.
-    const SPREAD: [[i32; LANES]; 3] = {
-        let mut spread = [[0; LANES]; 3];
+    // The permutation looks at five bits of an index: three of the cell, two of the place.
+    const SPREAD: [[[i32; LANES]; 2]; 3] = {
+        let mut spread = [[[0; LANES]; 2]; 3];
         let mut i = 0;
-        while i < 3 * LANES {
-            spread[i / LANES][i % LANES] = ((Cell::SPREAD >> ((i & 7) * 8)) as i32 & 0xff) << (i / LANES);
+        while i < 3 * 2 * LANES {
+            let (axis, index) = (i / (2 * LANES), i % (2 * LANES));
+            let cell = (Cell::SPREAD >> ((index & 7) * 8)) as i32 & 0xff;
+            let place = (index >> BLOCK_LEVELS) as i32;
+            spread[axis][index / LANES][index % LANES] =
+                cell << axis | place << (CELL_BITS + CLUSTER_LEVELS * axis as u32);
             i += 1;
         }
         spread
     };
-    let [x, y, z] = [0, 1, 2].map(|axis| _mm512_permutexvar_epi32(index[axis], lanes(&SPREAD[axis])));
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let [low, high] = &SPREAD[axis];
+        _mm512_permutex2var_epi32(lanes(low), index[axis], lanes(high))
+    });
     _mm512_or_si512(_mm512_or_si512(x, y), z)
 }
 

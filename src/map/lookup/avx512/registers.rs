@@ -194,6 +194,27 @@ unsafe fn gather_from(at: impl Fn(usize) -> *const f64) -> __m512i {
     }
 }
 
+/// The two u64 at each of eight addresses: the first ones and the second ones.
+///
+/// # Safety
+/// Needs AVX-512 F and DQ; each address must be of two u64 that may be read.
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq")]
+pub(super) unsafe fn gather_pairs(addresses: __m512i) -> [__m512i; 2] {
+    let addresses = to_array(addresses);
+    // SAFETY: the addresses are of pairs that may be read.
+    let four = |i: usize| unsafe {
+        let pair =
+            |i: usize| _mm_loadu_si128(std::ptr::with_exposed_provenance::<__m128i>(addresses[i] as usize));
+        let four = _mm512_inserti64x2::<1>(_mm512_castsi128_si512(pair(i)), pair(i + 1));
+        _mm512_inserti64x2::<3>(_mm512_inserti64x2::<2>(four, pair(i + 2)), pair(i + 3))
+    };
+    let (low, high) = (four(0), four(4));
+    const FIRST: [u64; 8] = [0, 2, 4, 6, 8, 10, 12, 14];
+    const SECOND: [u64; 8] = [1, 3, 5, 7, 9, 11, 13, 15];
+    [FIRST, SECOND].map(|order| _mm512_permutex2var_epi64(low, load(&order, 0), high))
+}
+
 /// Eight of `values` from the `first` on.
 ///
 /// # Panics
