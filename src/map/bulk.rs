@@ -3,26 +3,34 @@
 use super::shard::Block;
 use crate::ahead::fetch;
 use crate::bloom::{CountingBloomFilter, Probe};
-use crate::voxel::{BlockMask, BlockTable, Place};
+use crate::voxel::{BlockMask, BlockTable, Place, VoxelKey};
 
 /// How many misses are under way at once.
 const AT_ONCE: usize = 32;
 
-/// Calls `f(block, voxels there)` for each block.
+/// Calls `f(block, voxels there)` for each block: what leads to the next of them is fetched in three steps.
 pub(super) fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut(&Block, &BlockMask)) {
-    let mut last = (None, None);
     for blocks in blocks.chunks(AT_ONCE) {
-        let mut found = [&BlockMask::EMPTY; AT_ONCE];
-        for (found, block) in found.iter_mut().zip(blocks) {
-            let (key, place) = Place::of(block.0);
+        let mut places = [(VoxelKey::default(), Place::default()); AT_ONCE];
+        for (place, block) in places.iter_mut().zip(blocks) {
+            *place = Place::of(block.0);
+            fetch(table.home(place.0));
+        }
+        let (mut clusters, mut last) = ([None; AT_ONCE], None);
+        for (i, &(key, _)) in places[..blocks.len()].iter().enumerate() {
             // Blocks come row by row: the last cluster is met again more often than not.
-            if last.0 != Some(key) {
-                last = (Some(key), table.cluster(key));
+            if last != Some(key) {
+                last = Some(key);
+                clusters[i] = table.cluster(key);
+                clusters[i].into_iter().for_each(|cluster| fetch(cluster));
+            } else {
+                clusters[i] = clusters[i - 1];
             }
-            if let Some(cluster) = last.1 {
-                *found = cluster.get(place);
-                fetch(*found);
-            }
+        }
+        let mut found = [&BlockMask::EMPTY; AT_ONCE];
+        for ((found, cluster), (_, place)) in found.iter_mut().zip(clusters).zip(places) {
+            *found = cluster.map_or(&BlockMask::EMPTY, |cluster| cluster.get(place));
+            fetch(*found);
         }
         blocks.iter().zip(found).for_each(|(block, before)| f(block, before));
     }

@@ -105,6 +105,12 @@ impl BlockTable {
         self.get(block).contains(cell, level)
     }
 
+    /// The keys among which the search for a cluster begins.
+    #[inline]
+    pub(crate) fn home(&self, cluster: VoxelKey) -> &Bucket {
+        &self.keys[Slots::home(cluster.to_bits(), self.keys.len())]
+    }
+
     /// The cluster with this key.
     #[inline]
     pub(crate) fn cluster(&self, key: VoxelKey) -> Option<&Cluster> {

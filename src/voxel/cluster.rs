@@ -18,7 +18,7 @@ const PLACE_MASK: u64 = (1 << CLUSTER_LEVELS) - 1;
 /// ```
 ///
 /// So the blocks of a cluster ascend as their keys do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Place(u32);
 
 impl Place {

@@ -5,9 +5,8 @@ use super::{BLOCK_LEVELS, BlockMask, Cell, VoxelKey};
 
 /// Bits of a cell's number.
 const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
-/// Bits of a code that one pass of the sort looks at: their counts fit in the innermost cache.
-const DIGIT_BITS: u32 = 11;
-const DIGITS: usize = 1 << DIGIT_BITS;
+/// Bits of a code that one pass of the sort looks at, at most: their counts fit in the innermost cache.
+const DIGIT_BITS: u32 = 12;
 
 /// The blocks of finest voxels, in any order and repeated or not: ascending by key, each once.
 ///
@@ -24,7 +23,8 @@ pub(super) fn blocks_of(voxels: &[VoxelKey]) -> Vec<(VoxelKey, BlockMask)> {
     let mut codes: Vec<u64> = voxels.iter().map(|&voxel| layout.encode(voxel)).collect();
     codes.dedup();
     sort_by_digits(&mut codes, CELL_BITS..layout.bits());
-    let mut blocks: Vec<(VoxelKey, BlockMask)> = Vec::new();
+    let borders = codes.iter().zip(codes.iter().skip(1)).filter(|(a, b)| (*a ^ *b) >> CELL_BITS != 0).count();
+    let mut blocks: Vec<(VoxelKey, BlockMask)> = Vec::with_capacity(borders + 1);
     let mut last = None;
     for code in codes {
         let (block, cell) = (code >> CELL_BITS, Cell::from_bits(code as u16));
@@ -82,12 +82,15 @@ impl Layout {
     }
 }
 
-/// Sorts by the bits of `range`, in place.
+/// Sorts by the bits of `range`, in place, in as few passes as may be, with digits alike.
 fn sort_by_digits(codes: &mut Vec<u64>, range: std::ops::Range<u32>) {
+    let bits = range.end - range.start;
+    let width = bits.div_ceil(bits.div_ceil(DIGIT_BITS));
     let mut sorted = vec![0; codes.len()];
-    for shift in range.clone().step_by(DIGIT_BITS as usize) {
-        let digit = |code: u64| ((code & ((1 << range.end) - 1)) >> shift) as usize % DIGITS;
-        let mut places = [0u32; DIGITS];
+    let mut places = vec![0u32; 1 << width];
+    for shift in range.clone().step_by(width as usize) {
+        let digit = |code: u64| ((code & ((1 << range.end) - 1)) >> shift) as usize & ((1 << width) - 1);
+        places.fill(0);
         codes.iter().for_each(|&code| places[digit(code)] += 1);
         let mut before = 0;
         for place in &mut places {

@@ -22,7 +22,7 @@ pub const INDEX_MAX: i32 = (1 << (AXIS_BITS - 1)) - 1;
 /// The paper packs 4 x 16 bits and says that larger integers lift its limit of +-32,768; 3 x 21 bits reach
 /// +-1,048,576 voxels an axis, +-52 km at 5 cm. Two's complement needs no level to be decoded, and the parent
 /// of a voxel is an arithmetic shift of each field.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct VoxelKey(u64);
 
 impl VoxelKey {
@@ -63,7 +63,10 @@ impl VoxelKey {
     /// The voxel `levels` levels coarser that contains this one (r_n = r_0 * 2^n, paper III).
     #[inline(always)]
     pub fn ancestor(self, levels: u32) -> Self {
-        Self::pack(self.index().map(|i| i >> levels))
+        // All three shifted at once: each drops its lowest bits, and its sign fills the highest.
+        let beyond_signs = (self.0 & (AXIS_UNITS << (AXIS_BITS - 1))) << 1;
+        let kept = self.0 & (AXIS_UNITS * (AXIS_MASK >> levels << levels));
+        Self(kept >> levels | (beyond_signs - (beyond_signs >> levels)))
     }
 
     /// The first of the voxels `levels` levels finer within this one.
