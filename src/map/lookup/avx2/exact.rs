@@ -25,7 +25,7 @@ impl<'a> Tables<'a> {
 }
 
 impl Probe for Tables<'_> {
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,popcnt")]
     unsafe fn look_up(&self, batch: &Batch, points: usize) -> [u64; BATCH / 64] {
         let (clusters, cells) = split(&batch.index, self.view.up);
         let (mut keys, mut buckets) = ([0u64; BATCH], [0u64; BATCH]);
@@ -40,16 +40,18 @@ impl Probe for Tables<'_> {
             store(&mut addresses, _mm256_add_epi64(table, _mm256_slli_epi64::<6>(bucket)));
             addresses.into_iter().for_each(prefetch);
         }
-        let mut masks = [&BlockMask::EMPTY; BATCH];
-        let (mut last, mut cluster) = (None, None);
+        let mut found = [None; BATCH];
         for i in 0..points {
-            // Neighbours lie in one cluster more often than not.
-            if last != Some((keys[i], batch.shard[i])) {
-                last = Some((keys[i], batch.shard[i]));
-                let slots = self.view.blocks[batch.shard[i] as usize];
-                cluster = find(slots, keys[i], buckets[i] as usize).map(|slot| &slots.clusters[slot]);
+            let slots = self.view.blocks[batch.shard[i] as usize];
+            if let Some(slot) = find(slots, keys[i], buckets[i] as usize) {
+                let cluster = &slots.clusters[slot];
+                prefetch((&raw const *cluster).expose_provenance() as u64);
+                found[i] = Some(cluster);
             }
-            if let Some(cluster) = cluster {
+        }
+        let mut masks = [&BlockMask::EMPTY; BATCH];
+        for i in 0..points {
+            if let Some(cluster) = found[i] {
                 masks[i] = cluster.get(Place::from_bits(cells[i] as u32 >> CELL_BITS));
                 prefetch((&raw const masks[i].0[word(cells[i])]).expose_provenance() as u64);
             }
