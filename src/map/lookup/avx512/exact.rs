@@ -140,10 +140,10 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
         located: [Located; GROUPS],
         word: &mut ExactWord,
     ) {
-        let new = memory.queue_new_clusters(&located);
+        let new = memory.queue_new_clusters::<FETCH>(&located);
         for first in (0..new.count).step_by(8) {
             // SAFETY: as for this function.
-            let found = unsafe { r.search(load(&memory.queue, first)) };
+            let found = unsafe { r.search::<FETCH>(load(&memory.queue, first)) };
             store(&mut memory.results.0, first, found.present);
             store(&mut memory.results.1, first, found.masks);
         }
@@ -194,10 +194,10 @@ struct New {
 }
 
 impl ExactMemory {
-    /// Finds and queues the clusters that are not known yet.
+    /// Finds and queues the clusters that are not known yet. Each probe has one of its own: it has one caller.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn queue_new_clusters(&mut self, located: &[Located; GROUPS]) -> New {
+    fn queue_new_clusters<const FETCH: bool>(&mut self, located: &[Located; GROUPS]) -> New {
         let (mut new, mut before) = (New { heads: 0, sought: 0, count: 0 }, self.clusters[EIGHTS - 1]);
         for i in 0..EIGHTS {
             let clusters = located[i / 2].clusters[i % 2];
@@ -215,7 +215,7 @@ impl ExactMemory {
 }
 
 impl ExactRegisters<'_> {
-    /// Finds clusters in their shards' tables.
+    /// Finds clusters in their shards' tables. Each probe has one of its own: it has one caller.
     ///
     /// A bucket's tags say which slot may hold a cluster, and so where its key is, which decides.
     ///
@@ -223,7 +223,7 @@ impl ExactRegisters<'_> {
     /// Needs AVX-512 F, BW, DQ and CD; the view must still live.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
-    unsafe fn search(&self, clusters: __m512i) -> Found {
+    unsafe fn search<const FETCH: bool>(&self, clusters: __m512i) -> Found {
         let (keys, shards) = of_shard(clusters);
         let h = mix(keys, Slots::HASH_A, Slots::HASH_B);
         let bucket = scale(h, self.buckets.of(shards));
