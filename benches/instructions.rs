@@ -44,7 +44,7 @@ fn room(lookup: Lookup) -> (MultiResolutionMap, Queries, Lookup) {
 
 #[library_benchmark(setup = room)]
 #[bench::bloom(args = (Lookup::Bloom), config = limited(375_000))]
-#[bench::exact(args = (Lookup::Exact), config = limited(1_250_000))]
+#[bench::exact(args = (Lookup::Exact), config = limited(1_101_000))]
 fn wide((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; POINTS / 64] {
     let mut occupied = [0; POINTS / 64];
     let quantise = map.lattice().from_points(&queries.map_from_points);
@@ -57,7 +57,7 @@ fn wide((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; 
 
 #[library_benchmark(setup = room)]
 #[bench::bloom(args = (Lookup::Bloom), config = limited(2_534_000))]
-#[bench::exact(args = (Lookup::Exact), config = limited(3_334_000))]
+#[bench::exact(args = (Lookup::Exact), config = limited(3_942_000))]
 fn scalar((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; POINTS / 64] {
     let mut occupied = [0; POINTS / 64];
     let quantise = map.lattice().from_points(&queries.map_from_points);
@@ -80,8 +80,8 @@ fn insert(map: &MultiResolutionMap, scan: &Queries) {
 }
 
 #[library_benchmark(setup = to_insert)]
-#[bench::new(args = (0), config = limited(2_719_000))]
-#[bench::known(args = (1), config = limited(1_842_000))]
+#[bench::new(args = (0), config = limited(2_752_000))]
+#[bench::known(args = (1), config = limited(1_802_000))]
 fn inserted((map, scan): (MultiResolutionMap, Queries)) {
     insert(&map, &scan);
     std::mem::forget((map, scan));

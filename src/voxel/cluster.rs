@@ -36,12 +36,6 @@ impl Place {
         cluster.first_within(CLUSTER_LEVELS).offset_by(axis(0) | axis(1) | axis(2))
     }
 
-    /// The place of the number in the low six bits of `n`.
-    #[inline(always)]
-    pub(crate) fn from_bits(n: u32) -> Self {
-        Self(n % u64::BITS)
-    }
-
     /// Its bit among those of a cluster.
     #[inline(always)]
     pub(crate) fn bit(self) -> u64 {

@@ -15,19 +15,16 @@ impl Renewal {
     /// Of the clusters of `table`, once each of `blocks`, none of which comes twice, has got these voxels: none takes
     /// the block out.
     pub(crate) fn plan(table: &BlockTable, blocks: &[(VoxelKey, BlockMask)]) -> Self {
-        let mut renewed = Numbered::default();
+        let mut touched = Touched::default();
         let mut numbers = Vec::with_capacity(blocks.len());
         for (block, mask) in blocks {
-            let (cluster, place) = Place::of(*block);
-            let number = renewed.number(table, cluster);
-            let present = &mut renewed.present[number].1;
+            let (key, place) = Place::of(*block);
+            let number = touched.number(table, key);
+            let present = &mut touched.clusters[number].present;
             *present = if mask.is_empty() { *present & !place.bit() } else { *present | place.bit() };
             numbers.push(number);
         }
-        let nothing = Cluster::default();
-        let with_blocks =
-            |&(key, present): &_| (key, table.cluster(key).unwrap_or(&nothing).with_blocks(present));
-        let mut clusters: Vec<_> = renewed.present.iter().map(with_blocks).collect();
+        let mut clusters: Vec<_> = touched.clusters.iter().map(TouchedCluster::renewed).collect();
         for ((block, mask), number) in blocks.iter().zip(numbers).filter(|((_, mask), _)| !mask.is_empty()) {
             clusters[number].1.set(Place::of(*block).1, *mask);
         }
@@ -40,23 +37,41 @@ impl Renewal {
     }
 }
 
-/// The clusters that are renewed and the blocks that will be in them, in the order in which they were met.
+/// The clusters in which blocks change, in the order in which they were met.
 #[derive(Default)]
-struct Numbered {
-    present: Vec<(VoxelKey, u64)>,
+struct Touched<'a> {
+    clusters: Vec<TouchedCluster<'a>>,
     numbers: HashMap<VoxelKey, usize>,
+    last: Option<(VoxelKey, usize)>,
 }
 
-impl Numbered {
-    fn number(&mut self, table: &BlockTable, cluster: VoxelKey) -> usize {
-        let Self { present, numbers } = self;
+struct TouchedCluster<'a> {
+    key: VoxelKey,
+    before: Option<&'a Cluster>,
+    /// The blocks that are there afterwards.
+    present: u64,
+}
+
+impl<'a> Touched<'a> {
+    /// The number of a cluster of `table`, whether it is there or not.
+    fn number(&mut self, table: &'a BlockTable, key: VoxelKey) -> usize {
         // Blocks come row by row: the last cluster is met again more often than not.
-        match present.last() {
-            Some(&(last, _)) if last == cluster => present.len() - 1,
-            _ => *numbers.entry(cluster).or_insert_with(|| {
-                present.push((cluster, table.cluster(cluster).map_or(0, |cluster| cluster.present)));
-                present.len() - 1
-            }),
+        if let Some((_, number)) = self.last.filter(|(last, _)| *last == key) {
+            return number;
         }
+        let number = *self.numbers.entry(key).or_insert_with(|| {
+            let before = table.cluster(key);
+            self.clusters.push(TouchedCluster { key, before, present: before.map_or(0, |c| c.present) });
+            self.clusters.len() - 1
+        });
+        self.last = Some((key, number));
+        number
+    }
+}
+
+impl TouchedCluster<'_> {
+    fn renewed(&self) -> (VoxelKey, Cluster) {
+        let nothing = Cluster::default();
+        (self.key, self.before.unwrap_or(&nothing).with_blocks(self.present))
     }
 }

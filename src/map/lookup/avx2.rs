@@ -24,7 +24,7 @@ const BATCH: usize = 128;
 
 /// True when the machine can run this module.
 pub(super) fn is_available() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt")
+    is_x86_feature_detected!("avx2")
 }
 
 /// See [`super::occupied`]. Must only be called where [`is_available`].
@@ -36,7 +36,7 @@ pub(super) fn occupied(
     occupied: &mut [u64],
 ) -> bool {
     debug_assert!(is_available());
-    // SAFETY: the caller checked for the features; `occupied` holds a bit a point (asserted by our caller).
+    // SAFETY: the caller checked for the feature; `occupied` holds a bit a point (asserted by our caller).
     unsafe {
         match lookup {
             Lookup::Bloom => {
@@ -64,12 +64,12 @@ trait Probe {
     /// A bit for each voxel of the batch: is it occupied?
     ///
     /// # Safety
-    /// Needs AVX2 and popcnt; the view must still live.
+    /// Needs AVX2; the view must still live.
     unsafe fn look_up(&self, batch: &Batch, points: usize) -> [u64; BATCH / 64];
 }
 
 /// # Safety
-/// Needs AVX2 and popcnt, and a word of `occupied` for each 64 points.
+/// Needs AVX2, and a word of `occupied` for each 64 points.
 #[target_feature(enable = "avx2")]
 unsafe fn run(points: &[Point], place: &Place, probe: &impl Probe, occupied: &mut [u64]) -> bool {
     let mut batch = Batch::EMPTY;
