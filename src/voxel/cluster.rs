@@ -1,6 +1,5 @@
 //! Clusters of 4 x 4 x 4 blocks: which of them are there in one word, their masks packed behind it.
 
-use super::block_table::CacheLine;
 use super::key::AXIS_BITS;
 use super::{BlockMask, VoxelKey};
 use crate::bits::for_each_bit;
@@ -9,6 +8,11 @@ use crate::bits::for_each_bit;
 pub(crate) const CLUSTER_LEVELS: u32 = 2;
 /// The bits of a block's index that say where in its cluster it is.
 const PLACE_MASK: u64 = (1 << CLUSTER_LEVELS) - 1;
+
+/// What a look-up fetches in one piece: a bucket, or a block's mask. Vectors of them begin where a cache line does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub(crate) struct CacheLine<T>(pub(crate) T);
 
 /// Position of a block in its cluster, 0..64.
 ///

@@ -12,14 +12,15 @@ mod moments;
 mod renewal;
 mod sample;
 mod set;
+mod slots;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
 pub use block_table::BlockTable;
-pub(crate) use block_table::{BUCKET, Bucket, CacheLine, Slots};
-pub(crate) use cluster::{CLUSTER_LEVELS, Cluster, Place};
+pub(crate) use cluster::{CLUSTER_LEVELS, CacheLine, Cluster, Place};
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
 pub use moments::{MOMENT_LEVEL, MomentSet, Moments};
 pub(crate) use renewal::Renewal;
 pub use sample::{VolumetricSample, volumetric_sample};
 pub use set::VoxelSet;
+pub(crate) use slots::{BUCKET, Bucket, Slots};

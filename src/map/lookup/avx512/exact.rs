@@ -1,14 +1,14 @@
 //! The probe of the table of blocks.
 
+mod tables;
+
 use std::arch::x86_64::*;
 
-use super::registers::{
-    PerShard, addresses, eight_of, gather_now, gather_pairs, lanes, lengths, load, mix, pack, prefetch_now,
-    scale, store, to_array, widen,
-};
+use super::registers::{eight_of, gather_now, lanes, load, pack, prefetch_now, store, widen};
 use super::{GROUPS, LANES, Probe, WORD};
 use crate::map::lookup::LevelView;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CLUSTER_LEVELS, CacheLine, Cell, Cluster, Slots};
+use crate::voxel::{BLOCK_LEVELS, CLUSTER_LEVELS, Cell};
+use tables::{CELL_BITS, Found, Tables, within_shard};
 
 /// The table of blocks.
 ///
@@ -27,11 +27,8 @@ use crate::voxel::{BLOCK_LEVELS, BlockMask, Bucket, CLUSTER_LEVELS, CacheLine, C
 pub(super) struct Exact<const FETCH: bool>;
 
 pub(super) struct ExactRegisters<'a> {
-    view: &'a LevelView<'a>,
-    tags: PerShard,
-    keys: PerShard,
-    clusters: PerShard,
-    buckets: PerShard,
+    tables: Tables<'a>,
+    up: u32,
 }
 
 /// Eights of voxels in a word: what a register holds.
@@ -64,21 +61,9 @@ pub(super) struct ExactMemory {
     results: ([u64; QUEUE], [u64; QUEUE]),
 }
 
-/// Eight clusters.
-#[derive(Clone, Copy)]
-struct Found {
-    /// The blocks that are there.
-    present: __m512i,
-    /// Addresses of the first of their masks.
-    masks: __m512i,
-}
-
 /// Stands for the clusters of points without a voxel; no key sets bit 63. Where it is sought it may be found, in a vacant
 /// slot, without a block.
 const NO_CLUSTER: __m512i = eight_of(u64::MAX);
-/// The mask of a block that is not there.
-static ABSENT: CacheLine<BlockMask> = CacheLine(BlockMask::EMPTY);
-
 impl Default for ExactMemory {
     /// Known is what is not there.
     #[inline(always)]
@@ -106,19 +91,13 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn load<'a>(view: &'a LevelView<'_>) -> ExactRegisters<'a> {
-        ExactRegisters {
-            view,
-            tags: PerShard::load(addresses(view.blocks.map(|slots| slots.tags))),
-            keys: PerShard::load(addresses(view.blocks.map(|slots| slots.keys))),
-            clusters: PerShard::load(addresses(view.blocks.map(|slots| slots.clusters))),
-            buckets: PerShard::load(lengths(view.blocks.map(|slots| slots.keys))),
-        }
+        ExactRegisters { tables: Tables::load(view), up: view.up }
     }
 
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn locate(r: &ExactRegisters<'_>, index: [__m512i; 3], shard: __m512i, valid: u16) -> Located {
-        let up = r.view.up;
+        let up = r.up;
         let to_cluster = _mm_cvtsi32_si128((BLOCK_LEVELS + CLUSTER_LEVELS - up) as i32);
         let keys = pack(index.map(|i| _mm512_sra_epi32(i, to_cluster)));
         let to_finest = _mm_cvtsi32_si128(up as i32);
@@ -143,7 +122,7 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
         let new = memory.queue_new_clusters::<FETCH>(&located);
         for first in (0..new.count).step_by(8) {
             // SAFETY: as for this function.
-            let found = unsafe { r.search::<FETCH>(load(&memory.queue, first)) };
+            let found = unsafe { r.tables.search::<FETCH>(load(&memory.queue, first)) };
             store(&mut memory.results.0, first, found.present);
             store(&mut memory.results.1, first, found.masks);
         }
@@ -177,7 +156,7 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
         for (i, (&words, &cells)) in word.words.iter().zip(&word.cells).enumerate() {
             // SAFETY: each address is of a word of a mask that the view keeps alive, or of `ABSENT`.
             let words = unsafe { gather_now(words) };
-            hits |= u64::from(_mm512_test_epi64_mask(words, within(cells, r.view.up))) << (8 * i);
+            hits |= u64::from(_mm512_test_epi64_mask(words, within(cells, r.up))) << (8 * i);
         }
         hits
     }
@@ -214,128 +193,6 @@ impl ExactMemory {
     }
 }
 
-impl ExactRegisters<'_> {
-    /// Finds clusters in their shards' tables. Each probe has one of its own: it has one caller.
-    ///
-    /// A bucket's tags say which slot may hold a cluster, and so where its key is, which decides.
-    ///
-    /// # Safety
-    /// Needs AVX-512 F, BW, DQ and CD; the view must still live.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
-    unsafe fn search<const FETCH: bool>(&self, clusters: __m512i) -> Found {
-        let (keys, shards) = of_shard(clusters);
-        let h = mix(keys, Slots::HASH_A, Slots::HASH_B);
-        let bucket = scale(h, self.buckets.of(shards));
-        let tags_address = _mm512_add_epi64(self.tags.of(shards), _mm512_slli_epi64::<3>(bucket));
-        // SAFETY: the address is of a bucket's tags of a shard's table, which the view keeps alive.
-        let tags = unsafe { gather_now(tags_address) };
-        // The place of the first tag that fits, times eight: each takes a byte, as a key does a u64.
-        let fits = fitting(tags, h);
-        let first = _mm512_sub_epi64(_mm512_set1_epi64(63), _mm512_lzcnt_epi64(fits));
-        let place = _mm512_and_si512(first, _mm512_set1_epi64(!7));
-        let tagged = _mm512_test_epi64_mask(fits, fits);
-        let slot = _mm512_add_epi64(_mm512_slli_epi64::<6>(bucket), place);
-        let key = _mm512_add_epi64(self.keys.of(shards), slot);
-        let cluster = _mm512_add_epi64(self.clusters.of(shards), _mm512_slli_epi64::<2>(slot));
-        let [key, cluster] = [key, cluster].map(|address| _mm512_mask_mov_epi64(absent(), tagged, address));
-        // SAFETY: each address is of a key that the view keeps alive and of its cluster, or of `ABSENT`.
-        let (is_key, [present, masks]) = unsafe { (gather_now(key), gather_pairs(cluster)) };
-        let found = tagged & _mm512_cmpeq_epi64_mask(is_key, keys);
-        let result = Found { present: _mm512_maskz_mov_epi64(found, present), masks };
-        let full = _mm512_test_epi64_mask(tags, _mm512_set1_epi64(0xff << 56));
-        let elsewhere = !found & (tagged | full);
-        if elsewhere == 0 { result } else { self.elsewhere(keys, shards, result, elsewhere) }
-    }
-
-    /// Finds those that are not in the first slots whose tags fit as well.
-    #[cold]
-    #[target_feature(enable = "avx512f")]
-    fn elsewhere(&self, keys: __m512i, shards: __m512i, found: Found, elsewhere: u8) -> Found {
-        let [keys, shards, mut present, mut masks] =
-            [keys, shards, found.present, found.masks].map(|lanes| to_array(lanes));
-        for lane in (0..8).filter(|lane| elsewhere >> lane & 1 == 1) {
-            let slots = self.view.blocks[shards[lane] as usize];
-            if let Some(slot) = slots.find(keys[lane]) {
-                let cluster = &slots.clusters[slot];
-                (present[lane], masks[lane]) = (cluster.present, cluster.first_mask as u64);
-            }
-        }
-        Found { present: load(&present, 0), masks: load(&masks, 0) }
-    }
-}
-
-impl Found {
-    /// Addresses of the words of masks that hold `cells` of these clusters: the twin of `Cluster::get`.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512bw")]
-    fn words(&self, cells: __m512i) -> __m512i {
-        let place = _mm512_srli_epi64::<{ CELL_BITS }>(cells);
-        let bit = _mm512_sllv_epi64(_mm512_set1_epi64(1), place);
-        let there = _mm512_test_epi64_mask(self.present, bit);
-        let before = _mm512_and_si512(self.present, _mm512_sub_epi64(bit, _mm512_set1_epi64(1)));
-        let mask = _mm512_add_epi64(self.masks, _mm512_slli_epi64::<6>(ones(before)));
-        let word = _mm512_and_si512(_mm512_srli_epi64::<3>(cells), _mm512_set1_epi64(0b111 << 3));
-        _mm512_mask_mov_epi64(absent(), there, _mm512_add_epi64(mask, word))
-    }
-}
-
-/// Bits of a cell's number in its block, behind which that of the block in its cluster begins.
-const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
-
-const _: () = assert!(
-    size_of::<Bucket>() == 64
-        && size_of::<CacheLine<BlockMask>>() == 64
-        && size_of::<Cluster>() == 32
-        && std::mem::offset_of!(Cluster, present) == 0
-        && std::mem::offset_of!(Cluster, first_mask) == 8,
-    "as what is above takes them"
-);
-
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn absent() -> __m512i {
-    _mm512_set1_epi64((&raw const ABSENT).expose_provenance() as i64)
-}
-
-/// Keys of clusters and their shards in one: a cluster of coarse voxels is larger than a region, and each of several
-/// shards has a part of it.
-///
-/// The shard goes where a cluster's key only repeats the sign of z, since its indices have five bits fewer than a voxel's.
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn within_shard(keys: __m512i, shards: __m512i) -> __m512i {
-    _mm512_xor_si512(keys, _mm512_slli_epi64::<SHARD_SHIFT>(shards))
-}
-
-/// The inverse of [`within_shard`].
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn of_shard(clusters: __m512i) -> (__m512i, __m512i) {
-    // The highest bit that tells z apart, which is its sign, everywhere.
-    let sign = _mm512_srai_epi64::<63>(_mm512_slli_epi64::<{ 64 - SHARD_SHIFT }>(clusters));
-    let marks = _mm512_xor_si512(_mm512_srli_epi64::<SHARD_SHIFT>(clusters), sign);
-    let shards = _mm512_and_si512(marks, _mm512_set1_epi64(LANES as i64 - 1));
-    (within_shard(clusters, shards), shards)
-}
-
-const SHARD_SHIFT: u32 = 58;
-const _: () = assert!(
-    LANES << SHARD_SHIFT <= 1 << 62 && BLOCK_LEVELS + CLUSTER_LEVELS >= 5,
-    "below the sign of z, which is bit 62, and above the rest of it"
-);
-
-/// The number of ones in each lane.
-#[inline]
-#[target_feature(enable = "avx512f,avx512bw")]
-fn ones(words: __m512i) -> __m512i {
-    let low = _mm512_set1_epi8(0xf);
-    let of_nibble = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
-    let of_low = _mm512_shuffle_epi8(of_nibble, _mm512_and_si512(words, low));
-    let of_high = _mm512_shuffle_epi8(of_nibble, _mm512_and_si512(_mm512_srli_epi64::<4>(words), low));
-    _mm512_sad_epu8(_mm512_add_epi8(of_low, of_high), _mm512_setzero_si512())
-}
-
 /// For each of eight lanes the latest head, itself or before it; the last lane of the eight before where there is none.
 #[inline]
 #[target_feature(enable = "avx512f")]
@@ -358,21 +215,6 @@ fn latest_of(heads: u8) -> __m512i {
         latest
     };
     _mm512_cvtepu8_epi64(_mm_cvtsi64_si128(i64::from_le_bytes(LATEST[usize::from(heads)])))
-}
-
-/// The top bit of each byte of `tags` that is the tag of a key with hash `h`; of bytes beyond the first such, it may be
-/// set without reason. The twin of `Slots::tag`.
-#[inline]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn fitting(tags: __m512i, h: __m512i) -> __m512i {
-    let each = _mm512_set1_epi64(0x0101_0101_0101_0101);
-    let tag = _mm512_and_si512(_mm512_srli_epi64::<{ Slots::TAG_SHIFT }>(h), _mm512_set1_epi64(0xff));
-    let tag = _mm512_max_epu64(tag, _mm512_set1_epi64(1));
-    let difference = _mm512_xor_si512(tags, _mm512_mullo_epi64(tag, each));
-    let borrows = _mm512_andnot_si512(difference, _mm512_sub_epi64(difference, each));
-    let zeros = _mm512_and_si512(borrows, _mm512_slli_epi64::<7>(each));
-    // Only the lowest.
-    _mm512_and_si512(zeros, _mm512_sub_epi64(_mm512_setzero_si512(), zeros))
 }
 
 /// The twin of [`Cell::of`] and `Place::of`, for sixteen indices: numbers of cells within clusters.
