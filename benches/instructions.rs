@@ -80,7 +80,7 @@ fn insert(map: &MultiResolutionMap, scan: &Queries) {
 }
 
 #[library_benchmark(setup = to_insert)]
-#[bench::new(args = (0), config = limited(2_752_000))]
+#[bench::new(args = (0), config = limited(2_459_000))]
 #[bench::known(args = (1), config = limited(1_802_000))]
 fn inserted((map, scan): (MultiResolutionMap, Queries)) {
     insert(&map, &scan);

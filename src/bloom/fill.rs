@@ -1,6 +1,8 @@
 //! Many keys at once into a filter that nobody reads yet: most of what a map does that grows.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 
 use super::Probe;
@@ -12,6 +14,8 @@ pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys
     #[cfg(target_arch = "x86_64")]
     if avx512::is_available() {
         return avx512::fill(plane, counters, hashes, keys);
+    } else if avx2::is_available() {
+        return avx2::fill(plane, counters, hashes, keys);
     }
     fill_scalar(plane, counters, hashes, keys);
 }
@@ -41,21 +45,35 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    type Kernel = fn(&mut [u64], &mut Counters, u32, &[u64]);
+
+    fn wide_kernels() -> Vec<Kernel> {
+        let mut kernels: Vec<Kernel> = vec![fill];
+        #[cfg(target_arch = "x86_64")]
+        if avx2::is_available() {
+            kernels.push(avx2::fill);
+        }
+        kernels
+    }
+
     proptest! {
         /// Into so few words, some of them at a time, that counters saturate.
         #[test]
-        fn the_wide_twin_is_the_scalar_one(
+        fn the_wide_twins_are_the_scalar_one(
             keys in prop::collection::vec(any::<u64>(), 0..700),
             at_once in 1usize..70,
             hashes in 1u32..=HASHES_MAX,
             words in 1usize..40,
         ) {
             let empty = || (vec![0; words], Counters::zero(words));
-            let ((mut plane, mut counters), (mut plane_scalar, mut counters_scalar)) = (empty(), empty());
-            keys.chunks(at_once).for_each(|keys| fill(&mut plane, &mut counters, hashes, keys));
+            let (mut plane_scalar, mut counters_scalar) = empty();
             fill_scalar(&mut plane_scalar, &mut counters_scalar, hashes, &keys);
-            prop_assert_eq!(plane, plane_scalar);
-            prop_assert!(counters.iter().eq(counters_scalar.iter()));
+            for fill in wide_kernels() {
+                let (mut plane, mut counters) = empty();
+                keys.chunks(at_once).for_each(|keys| fill(&mut plane, &mut counters, hashes, keys));
+                prop_assert_eq!(&plane, &plane_scalar);
+                prop_assert!(counters.iter().eq(counters_scalar.iter()));
+            }
         }
     }
 

@@ -1,6 +1,8 @@
 //! The voxels that a block gains, as keys, level by level.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 
 use super::block::OFFSETS;
@@ -16,6 +18,8 @@ impl BlockMask {
         #[cfg(target_arch = "x86_64")]
         if avx512::is_available() {
             return avx512::keys_gained(self, added, first, up, keys);
+        } else if avx2::is_available() {
+            return avx2::keys_gained(self, added, first, up, keys);
         }
         keys_gained_scalar(self, added, first, up, keys);
     }
@@ -72,7 +76,13 @@ mod tests {
                 let mut scalar = vec![7];
                 let first = block.first_within(BLOCK_LEVELS - up).to_bits();
                 keys_gained_scalar(&mask, &added_mask, first, up, &mut scalar);
-                prop_assert_eq!(keys, scalar);
+                prop_assert_eq!(&keys, &scalar);
+                #[cfg(target_arch = "x86_64")]
+                if avx2::is_available() {
+                    let mut keys = vec![7];
+                    avx2::keys_gained(&mask, &added_mask, first, up, &mut keys);
+                    prop_assert_eq!(keys, scalar);
+                }
             }
         }
     }

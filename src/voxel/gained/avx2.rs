@@ -1,0 +1,83 @@
+//! Four cells at a time: half a byte of the mask picks its keys from a register of four.
+#![expect(unsafe_code, reason = "vector intrinsics and writes to a vector's spare room")]
+
+use std::arch::x86_64::*;
+
+use super::super::BlockMask;
+use super::super::block::{CELLS, OFFSETS};
+use crate::bits::for_each_bit;
+
+/// Cells a step: one register of keys.
+const LANES: usize = 4;
+
+/// True when the machine can run this module.
+#[inline]
+pub(super) fn is_available() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt")
+}
+
+/// See [`super::keys_gained_scalar`]. Must only be called where [`is_available`].
+#[inline]
+pub(super) fn keys_gained(before: &BlockMask, added: &BlockMask, first: u64, up: u32, keys: &mut Vec<u64>) {
+    debug_assert!(is_available());
+    // Each step writes a whole register, however few keys it keeps.
+    keys.reserve(CELLS + LANES);
+    // SAFETY: the caller checked for the features, and there is room for a key a cell and a register.
+    unsafe {
+        let gained = write_keys_gained(before, added, first, up, keys.as_mut_ptr().add(keys.len()));
+        keys.set_len(keys.len() + gained);
+    }
+}
+
+/// Writes the keys to `keys`; how many.
+///
+/// # Safety
+/// `keys` must have room for [`CELLS`] + [`LANES`] keys.
+#[target_feature(enable = "avx2,popcnt")]
+unsafe fn write_keys_gained(
+    before: &BlockMask,
+    added: &BlockMask,
+    first: u64,
+    up: u32,
+    keys: *mut u64,
+) -> usize {
+    let gained = before.union(added).coarsened(up).difference(&before.coarsened(up));
+    // SAFETY: four u64 are one register.
+    let offsets = unsafe { _mm256_loadu_si256(OFFSETS[..LANES].as_ptr().cast()) };
+    let mut written = 0;
+    for (word, of_word) in gained.0.into_iter().zip(OFFSETS.chunks_exact(u64::BITS as usize)) {
+        // A bit for each half byte that is not zero: its lowest.
+        let halves = (word | word >> 1 | word >> 2 | word >> 3) & 0x1111_1111_1111_1111;
+        for_each_bit(halves, |cell| {
+            let cells = (word >> cell & 0xf) as usize;
+            let first = first + of_word[cell as usize];
+            let keys_of_cells = _mm256_add_epi64(_mm256_set1_epi64x(first as i64), offsets);
+            // SAFETY: eight i32 are one register.
+            let picked = unsafe { _mm256_loadu_si256(PICKED[cells].as_ptr().cast()) };
+            let keys_gained = _mm256_permutevar8x32_epi32(keys_of_cells, picked);
+            // SAFETY: fewer than CELLS keys are written so far, and the caller left room for a register more.
+            unsafe { _mm256_storeu_si256(keys.add(written).cast(), keys_gained) };
+            written += cells.count_ones() as usize;
+        });
+    }
+    written
+}
+
+/// For each half byte the lanes of its bits, first: halves of lanes, as the permutation counts them.
+static PICKED: [[i32; 2 * LANES]; 1 << LANES] = {
+    let mut picked = [[0; 2 * LANES]; 1 << LANES];
+    let mut cells = 0;
+    while cells < 1 << LANES {
+        let (mut lane, mut place) = (0, 0);
+        while lane < LANES {
+            if cells >> lane & 1 == 1 {
+                picked[cells][place] = 2 * lane as i32;
+                picked[cells][place + 1] = 2 * lane as i32 + 1;
+                place += 2;
+            }
+            lane += 1;
+        }
+        cells += 1;
+    }
+    picked
+};
