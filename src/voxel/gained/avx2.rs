@@ -1,10 +1,11 @@
 //! Four cells at a time: half a byte of the mask picks its keys from a register of four.
-#![expect(unsafe_code, reason = "vector intrinsics and writes to a vector's spare room")]
+#![expect(unsafe_code, reason = "vector intrinsics")]
 
 use std::arch::x86_64::*;
 
 use super::super::BlockMask;
-use super::super::block::{CELLS, OFFSETS};
+use super::super::block::OFFSETS;
+use super::append::append;
 use crate::bits::for_each_bit;
 
 /// Cells a step: one register of keys.
@@ -21,18 +22,14 @@ pub(super) fn is_available() -> bool {
 pub(super) fn keys_gained(before: &BlockMask, added: &BlockMask, first: u64, up: u32, keys: &mut Vec<u64>) {
     debug_assert!(is_available());
     // Each step writes a whole register, however few keys it keeps.
-    keys.reserve(CELLS + LANES);
-    // SAFETY: the caller checked for the features, and there is room for a key a cell and a register.
-    unsafe {
-        let gained = write_keys_gained(before, added, first, up, keys.as_mut_ptr().add(keys.len()));
-        keys.set_len(keys.len() + gained);
-    }
+    // SAFETY: the caller checked for the features; a key a cell is written at most, and a register behind them.
+    unsafe { append(keys, LANES, |keys| write_keys_gained(before, added, first, up, keys)) }
 }
 
 /// Writes the keys to `keys`; how many.
 ///
 /// # Safety
-/// `keys` must have room for [`CELLS`] + [`LANES`] keys.
+/// `keys` must have room for a key a cell and a register more.
 #[target_feature(enable = "avx2,popcnt")]
 unsafe fn write_keys_gained(
     before: &BlockMask,
@@ -55,7 +52,7 @@ unsafe fn write_keys_gained(
             // SAFETY: eight i32 are one register.
             let picked = unsafe { _mm256_loadu_si256(PICKED[cells].as_ptr().cast()) };
             let keys_gained = _mm256_permutevar8x32_epi32(keys_of_cells, picked);
-            // SAFETY: fewer than CELLS keys are written so far, and the caller left room for a register more.
+            // SAFETY: fewer keys than cells are written so far, and the caller left room for a register more.
             unsafe { _mm256_storeu_si256(keys.add(written).cast(), keys_gained) };
             written += cells.count_ones() as usize;
         });

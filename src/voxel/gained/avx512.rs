@@ -1,10 +1,11 @@
 //! Eight cells at a time: a byte of the mask picks its keys from a register of eight.
-#![expect(unsafe_code, reason = "vector intrinsics and writes to a vector's spare room")]
+#![expect(unsafe_code, reason = "vector intrinsics")]
 
 use std::arch::x86_64::*;
 
 use super::super::BlockMask;
 use super::super::block::{CELLS, OFFSETS};
+use super::append::append;
 use crate::bits::for_each_bit;
 
 /// Cells a step: one register of keys.
@@ -23,18 +24,14 @@ pub(super) fn is_available() -> bool {
 pub(super) fn keys_gained(before: &BlockMask, added: &BlockMask, first: u64, up: u32, keys: &mut Vec<u64>) {
     debug_assert!(is_available());
     // Each step writes a whole register, however few keys it keeps.
-    keys.reserve(CELLS + LANES);
-    // SAFETY: the caller checked for the features, and there is room for a key a cell and a register.
-    unsafe {
-        let gained = write_keys_gained(before, added, first, up, keys.as_mut_ptr().add(keys.len()));
-        keys.set_len(keys.len() + gained);
-    }
+    // SAFETY: the caller checked for the features; a key a cell is written at most, and a register behind them.
+    unsafe { append(keys, LANES, |keys| write_keys_gained(before, added, first, up, keys)) }
 }
 
 /// Writes the keys to `keys`; how many.
 ///
 /// # Safety
-/// `keys` must have room for [`CELLS`] + [`LANES`] keys.
+/// `keys` must have room for a key a cell and a register more.
 #[target_feature(enable = "avx512f,avx512bw,popcnt")]
 unsafe fn write_keys_gained(
     before: &BlockMask,
@@ -55,7 +52,7 @@ unsafe fn write_keys_gained(
         let first = first + OFFSETS[LANES * byte as usize];
         let keys_of_cells = _mm512_add_epi64(_mm512_set1_epi64(first as i64), offsets);
         let keys_gained = _mm512_maskz_compress_epi64(cells, keys_of_cells);
-        // SAFETY: fewer than CELLS keys are written so far, and the caller left room for a register more.
+        // SAFETY: fewer keys than cells are written so far, and the caller left room for a register more.
         unsafe { _mm512_storeu_si512(keys.add(written).cast(), keys_gained) };
         written += cells.count_ones() as usize;
     });
