@@ -6,7 +6,7 @@ use super::{BlockMask, Cell, VoxelKey};
 
 /// Slots for each cluster, at least. At 3 one bucket in 150 is full (a Poisson tail), so that nearly every search ends in
 /// the bucket where it began; a wide look-up leaves its way if one of eight does not. At 2 it was one in twenty, and small
-/// maps took a fifth to a third longer at random.
+/// maps took an eighth to a third longer at random.
 const SLOTS_A_CLUSTER: usize = 3;
 
 /// Blocks by key, by way of their clusters, which are in buckets of eight.
