@@ -39,11 +39,9 @@
 pub mod access;
 #[cfg(feature = "server")]
 pub mod admission;
-mod ahead;
 pub mod align;
 #[cfg(feature = "server")]
 pub mod bench;
-mod bits;
 pub mod bloom;
 #[cfg(feature = "server")]
 pub mod cli;
@@ -56,7 +54,6 @@ pub mod geometry;
 pub mod grpc;
 #[cfg(feature = "server")]
 pub mod http;
-pub mod interest;
 #[cfg(feature = "server")]
 pub mod lifecycle;
 pub mod map;
@@ -69,8 +66,10 @@ pub mod server;
 pub mod service;
 #[cfg(feature = "client")]
 pub mod store;
+mod sync;
 #[cfg(feature = "server")]
 pub mod telemetry;
+pub mod util;
 pub mod voxel;
 #[cfg(feature = "client")]
 pub mod wire;

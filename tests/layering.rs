@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules and their layers, bottom first.
 const LAYERS: [&[&str]; 7] = [
-    &["ahead", "bits", "voxel", "bloom", "geometry", "interest"],
+    &["util", "sync", "voxel", "bloom", "geometry"],
     &["map", "align", "scan"],
     &["store"],
     &["service"],
@@ -110,7 +110,7 @@ fn generated_types_are_named_in_the_wire_layer_alone() {
 }
 
 /// What is written for wide instructions: look-ups, filling a filter, taking a block apart; and the prefetch.
-const KERNELS: [&str; 4] = ["map/lookup", "bloom/fill", "voxel/gained", "ahead.rs"];
+const KERNELS: [&str; 4] = ["map/lookup", "bloom/fill", "voxel/gained", "util/prefetch.rs"];
 
 #[test]
 fn unsafe_code_stays_in_the_kernels() {

@@ -14,12 +14,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
-use mrol::interest::Interest;
 use mrol::map::{
     Change, DeletionRecord, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
     UndoRecord,
 };
 use mrol::store::{DataDir, MapFolder, OpeningProgress, Record, Snapshot, StoreSettings};
+use mrol::util::StopSignal;
 use mrol::voxel::{Moments, VoxelKey, VoxelSet};
 use plain_set::{PlainSet, assert_equal, up};
 use proptest::prelude::*;
@@ -164,7 +164,7 @@ impl Kept {
     fn undo(&self, scans: &[u64]) -> bool {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
         let Some((observations, seen)) =
-            self.folder.observations(scans, &withdrawn, Interest::LASTING).unwrap()
+            self.folder.observations(scans, &withdrawn, StopSignal::NEVER).unwrap()
         else {
             let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
             assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());

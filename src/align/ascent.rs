@@ -5,7 +5,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use super::AlignmentSettings;
 use super::overlap::Overlap;
 use crate::geometry::Pose;
-use crate::interest::Interest;
+use crate::util::StopSignal;
 use crate::voxel::Lattice;
 
 /// How far one move shifts or turns the sensor.
@@ -64,12 +64,12 @@ impl Ascent {
         overlap: &Overlap<'_>,
         steps: Steps,
         iterations_max: u32,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) {
         let mut height = overlap.at(std::slice::from_ref(&self.pose))[0];
         self.lookups += overlap.lookups();
         for _ in 0..iterations_max {
-            if interest.is_lost() {
+            if stop.is_stopped() {
                 return;
             }
             let candidates = neighbours(&self.pose, steps);

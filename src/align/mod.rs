@@ -21,8 +21,8 @@ pub use settings::{
 pub use verdict::{Alignment, Verdict};
 
 use crate::geometry::{Point, Pose, pose_difference};
-use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
 use crate::voxel::volumetric_sample;
 use ascent::{Ascent, Steps};
 use information::root_mean_square_range_m;
@@ -55,19 +55,19 @@ struct SampledScan<'a> {
     /// More of them, for the refinement and the verdict.
     surface_sample: Vec<Point>,
     /// In its pose: whoever climbs asks.
-    interest: Interest<'a>,
+    stop: StopSignal<'a>,
 }
 
 impl<'a> SampledScan<'a> {
     /// 1) Take a volumetric sample of points.
-    fn new(points: &'a [Point], settings: &AlignmentSettings, interest: Interest<'a>) -> Self {
+    fn new(points: &'a [Point], settings: &AlignmentSettings, stop: StopSignal<'a>) -> Self {
         let fine = volumetric_sample(
             points,
             settings.refinement.sample_points.max(settings.sample_points),
             settings.seed,
         );
         let sample = volumetric_sample(&fine.points, settings.sample_points, settings.seed).points;
-        Self { points, sample, surface_sample: fine.points, interest }
+        Self { points, sample, surface_sample: fine.points, stop }
     }
 }
 
@@ -80,22 +80,22 @@ pub fn align(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    align_while(map, points, guess, settings, Interest::LASTING)
+    align_until(map, points, guess, settings, StopSignal::NEVER)
 }
 
 /// The same, which ends where it stands once nobody wants the pose: what it returns then means nothing.
-pub fn align_while(
+pub fn align_until(
     map: &MultiResolutionMap,
     points: &[Point],
     guess: &Pose,
     settings: &AlignmentSettings,
-    interest: Interest<'_>,
+    stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = SampledScan::new(points, settings, interest);
+    let scan = SampledScan::new(points, settings, stop);
     let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
     let found = match found.is_doubtful(guess, map, settings) {
-        true if !interest.is_lost() => wide_start::align(map, &scan, guess, found, settings),
+        true if !stop.is_stopped() => wide_start::align(map, &scan, guess, found, settings),
         _ => found,
     };
     found.within_reach_of(guess, map, settings)
@@ -108,7 +108,7 @@ pub fn judge_at(
     map_from_sensor: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    let scan = SampledScan::new(points, settings, Interest::LASTING);
+    let scan = SampledScan::new(points, settings, StopSignal::NEVER);
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
@@ -119,7 +119,7 @@ pub fn ascend(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Pose {
-    let scan = SampledScan::new(points, settings, Interest::LASTING);
+    let scan = SampledScan::new(points, settings, StopSignal::NEVER);
     let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
     climb_sub_voxel(voxels, &scan, &mut ascent, settings);
     ascent.pose
@@ -140,7 +140,7 @@ fn climb(
             Method::Overlap | Method::Refined => Overlap::new(voxels, &scan.sample, level, settings.lookup),
         };
         let steps = Steps::of_level(level, voxels.lattice(), settings);
-        ascent.climb(&overlap, steps, settings.iterations_per_level_max, scan.interest);
+        ascent.climb(&overlap, steps, settings.iterations_per_level_max, scan.stop);
     }
     ascent
 }
@@ -155,7 +155,7 @@ fn climb_sub_voxel(
     let overlap = Overlap::new(voxels, scan.points, 0, settings.lookup);
     for halvings in 0..=settings.sub_voxel_halvings {
         let steps = Steps::sub_voxel(voxels.lattice(), settings).halved(halvings);
-        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max, scan.interest);
+        ascent.climb(&overlap, steps, settings.sub_voxel_iterations_max, scan.stop);
     }
 }
 
@@ -169,7 +169,7 @@ fn finish(
     let climbed = ascent.pose;
     match settings.method {
         Method::Refined => {
-            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement, scan.interest);
+            let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement, scan.stop);
             ascent.pose = refined.map_from_sensor;
             ascent.iterations += refined.iterations;
         }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Probe;
-use crate::bits::for_each_bit;
+use crate::util::bits::for_each_bit;
 
 /// A counter that reached this value no longer counts: it stays until the filter is rebuilt.
 pub(super) const COUNTER_MAX: u64 = 15;

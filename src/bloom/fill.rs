@@ -7,7 +7,7 @@ mod avx512;
 
 use super::Probe;
 use super::counters::Counters;
-use crate::ahead::fetch;
+use crate::util::prefetch;
 
 /// Counts `keys`, which are absent, with `hashes` hashes each and sets their bits of the plane.
 pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
@@ -29,8 +29,8 @@ fn fill_scalar(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[
         let mut probes = [Probe::default(); AT_ONCE];
         for (probe, &key) in probes.iter_mut().zip(keys) {
             *probe = Probe::of(key, hashes, plane.len());
-            fetch(counters.of_word(probe.word));
-            fetch(&plane[probe.word]);
+            prefetch(counters.of_word(probe.word));
+            prefetch(&plane[probe.word]);
         }
         for &probe in &probes[..keys.len()] {
             counters.count_in(probe);

@@ -1,8 +1,8 @@
 //! Many blocks, or keys, at once: their cache misses are under way together.
 
 use super::shard::Block;
-use crate::ahead::fetch;
 use crate::bloom::{CountingBloomFilter, Probe};
+use crate::util::prefetch;
 use crate::voxel::{BlockMask, BlockTable, Place, VoxelKey};
 
 /// How many misses are under way at once.
@@ -14,7 +14,7 @@ pub(super) fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut
         let mut places = [(VoxelKey::default(), Place::default()); AT_ONCE];
         for (place, block) in places.iter_mut().zip(blocks) {
             *place = Place::of(block.0);
-            fetch(table.home(place.0));
+            prefetch(table.home(place.0));
         }
         let (mut clusters, mut last) = ([None; AT_ONCE], None);
         for (i, &(key, _)) in places[..blocks.len()].iter().enumerate() {
@@ -22,7 +22,7 @@ pub(super) fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut
             if last != Some(key) {
                 last = Some(key);
                 clusters[i] = table.cluster(key);
-                clusters[i].into_iter().for_each(|cluster| fetch(cluster));
+                clusters[i].into_iter().for_each(|cluster| prefetch(cluster));
             } else {
                 clusters[i] = clusters[i - 1];
             }
@@ -30,7 +30,7 @@ pub(super) fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut
         let mut found = [&BlockMask::EMPTY; AT_ONCE];
         for ((found, cluster), (_, place)) in found.iter_mut().zip(clusters).zip(places) {
             *found = cluster.map_or(&BlockMask::EMPTY, |cluster| cluster.get(place));
-            fetch(*found);
+            prefetch(*found);
         }
         blocks.iter().zip(found).for_each(|(block, before)| f(block, before));
     }
@@ -46,8 +46,8 @@ pub(super) fn count_each(
     let mut probes: Vec<_> = keys.iter().map(|&key| filter.probe(key)).collect();
     for probes in probes.chunks_mut(AT_ONCE) {
         for &probe in &*probes {
-            fetch(filter.counters_at(probe));
-            fetch(filter.plane_at(probe));
+            prefetch(filter.counters_at(probe));
+            prefetch(filter.plane_at(probe));
         }
         probes.iter_mut().for_each(|probe| *probe = count(filter, *probe));
     }
@@ -61,7 +61,7 @@ pub(super) fn show_each(
     show: impl Fn(&mut CountingBloomFilter, Probe),
 ) {
     for probes in probes.chunks(AT_ONCE) {
-        probes.iter().for_each(|&probe| fetch(filter.plane_at(probe)));
+        probes.iter().for_each(|&probe| prefetch(filter.plane_at(probe)));
         probes.iter().for_each(|&probe| show(filter, probe));
     }
 }

@@ -1,4 +1,9 @@
 //! How a map is changed: one change at a time, in the order of revisions.
+//!
+//! A change is planned first, which takes long and holds up nobody, since a plan only reads and no one else changes
+//! the map meanwhile. Then it waits until nobody reads for long ([`MultiResolutionMap::long_read`]), and last it takes
+//! the write locks of what it touches, for which it waits behind short readers only. Short readers therefore never
+//! queue behind a change that itself waits for a long one.
 
 use std::sync::atomic::Ordering;
 
@@ -7,8 +12,8 @@ use super::moments::{MomentLocks, MomentsOfShard};
 use super::removal::Removal;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
-use super::sync::{MutexGuard, RwLockUpgradableReadGuard, RwLockWriteGuard};
 use super::{AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, UndoRecord};
+use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
@@ -124,26 +129,27 @@ impl<'a> Committer<'a> {
     fn add_to_shards(&self, voxels: &VoxelSet, moments: &MomentSet) -> (Locks<'a>, usize) {
         let (by_shard, moments) = (self.group(voxels), self.map.moments.group(moments));
         let planned = self.plan(touched(&by_shard), |i, shard| Addition::plan(shard, &by_shard[i]));
+        let no_long_read = self.map.long_reads.write();
         let added_moments = moments.iter().enumerate().filter(|(_, moments)| !moments.is_empty());
         let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments));
         let mut added = 0;
-        let shards = carry_out(planned, |shard, addition| added += addition.apply(shard));
-        (Locks { _moments: moments, _shards: shards }, added)
+        let shards = self.carry_out(planned, |shard, addition| added += addition.apply(shard));
+        (Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read }, added)
     }
 
     /// Takes voxels out. Their moments are rebuilt from what remains, or become `moments` where those are known.
-    fn take_out(&self, planned: Plans<'a, Removal>, moments: &[MomentsOfShard; SHARDS]) -> Locks<'a> {
-        let changed =
-            planned.iter().map(|(at, removal)| (at.number, [removal.moments(), &moments[at.number]]));
+    fn take_out(&self, planned: Plans<Removal>, moments: &[MomentsOfShard; SHARDS]) -> Locks<'a> {
+        let no_long_read = self.map.long_reads.write();
+        let changed = planned.iter().map(|(i, removal)| (*i, [removal.moments(), &moments[*i]]));
         let moments = self.map.moments.change(changed, |shard, moments| {
             moments.into_iter().for_each(|moments| shard.set(moments));
             shard.reset_if_empty();
         });
-        let shards = carry_out(planned, |shard, removal| {
+        let shards = self.carry_out(planned, |shard, removal| {
             removal.apply(shard);
             shard.reset_if_empty(&self.map.settings);
         });
-        Locks { _moments: moments, _shards: shards }
+        Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read }
     }
 
     /// Finds out what a change of some shards comes to, and builds what it needs, while readers go on.
@@ -151,29 +157,34 @@ impl<'a> Committer<'a> {
         &self,
         shards: impl IntoIterator<Item = usize>,
         mut plan: impl FnMut(usize, &Shard) -> P,
-    ) -> Plans<'a, P> {
-        let planned = |number: usize| {
-            let shard = self.map.shards[number].upgradable_read();
-            let plan = plan(number, &shard);
-            (Planned { number, shard }, plan)
+    ) -> Plans<P> {
+        shards.into_iter().map(|i| (i, plan(i, &self.map.shards[i].read()))).collect()
+    }
+
+    /// Does what is planned under the write locks, which are taken in ascending order.
+    fn carry_out<P>(
+        &self,
+        planned: Plans<P>,
+        mut apply: impl FnMut(&mut Shard, P),
+    ) -> Vec<RwLockWriteGuard<'a, Shard>> {
+        let lock = |(i, plan): (usize, P)| {
+            let mut shard = self.map.shards[i].write();
+            apply(&mut shard, plan);
+            shard
         };
-        shards.into_iter().map(planned).collect()
+        planned.into_iter().map(lock).collect()
     }
 }
 
-/// Parts of a change, one a shard, ascending.
-type Plans<'a, P> = Vec<(Planned<'a>, P)>;
-
-/// A shard that nobody else changes; readers go on.
-struct Planned<'a> {
-    number: usize,
-    shard: RwLockUpgradableReadGuard<'a, Shard>,
-}
+/// Parts of a change, each with the number of its shard, ascending. A shard is as it was planned for until the change
+/// is carried out, since the turn to change the map is held meanwhile.
+type Plans<P> = Vec<(usize, P)>;
 
 /// Keeps readers of what changed waiting until the change is published.
 struct Locks<'a> {
-    _moments: MomentLocks<'a>,
     _shards: Vec<RwLockWriteGuard<'a, Shard>>,
+    _moments: MomentLocks<'a>,
+    _no_long_read: RwLockWriteGuard<'a, ()>,
 }
 
 /// The shards that have a part of a change, ascending.
@@ -181,19 +192,6 @@ fn touched(by_shard: &[Vec<&Block>; SHARDS]) -> impl Iterator<Item = usize> {
     (0..SHARDS).filter(|&i| !by_shard[i].is_empty())
 }
 
-fn removed_by(planned: &Plans<'_, Removal>) -> usize {
+fn removed_by(planned: &Plans<Removal>) -> usize {
     planned.iter().map(|(_, removal)| removal.voxels()).sum()
-}
-
-/// Does what is planned under the write locks, which are taken in ascending order.
-fn carry_out<'a, P>(
-    planned: Plans<'a, P>,
-    mut apply: impl FnMut(&mut Shard, P),
-) -> Vec<RwLockWriteGuard<'a, Shard>> {
-    let lock = |(Planned { shard, .. }, plan)| {
-        let mut shard = RwLockUpgradableReadGuard::upgrade(shard);
-        apply(&mut shard, plan);
-        shard
-    };
-    planned.into_iter().map(lock).collect()
 }

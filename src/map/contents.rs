@@ -74,9 +74,10 @@ impl MapContents {
 impl MultiResolutionMap {
     /// Takes the picture of this map. Changes wait while it is taken, readers do not.
     pub fn contents(&self) -> MapContents {
-        // Locks in the order in which committers take them; every change of the trajectory or the requests holds
-        // a shard meanwhile, so that the view keeps both as they are.
-        let (moments, view) = (self.moments(), self.view());
+        // Every change of the trajectory or the requests holds a shard meanwhile, so that the view keeps both as they
+        // are.
+        let long = self.long_read();
+        let (moments, view) = (long.moments(), long.view());
         let (trajectory, requests) = (self.trajectory().clone(), self.requests().clone());
         let (voxels, moments) = (view.voxels(), moments.to_set());
         MapContents { revision: view.revision(), voxels, moments, trajectory, requests }

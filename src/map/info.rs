@@ -46,7 +46,8 @@ impl MultiResolutionMap {
     ///
     /// False positives are measured on `samples` absent neighbours of occupied voxels a level, drawn from `seed`.
     pub fn describe(&self, samples: usize, seed: u64) -> MapDescription {
-        let (moments, view) = (self.moments(), self.view());
+        let long = self.long_read();
+        let (moments, view) = (long.moments(), long.view());
         let levels = (0..self.settings.levels).map(|level| self.describe_level(&view, level, samples, seed));
         MapDescription {
             revision: view.revision(),
@@ -58,7 +59,8 @@ impl MultiResolutionMap {
 
     /// Bytes of memory of the exact sets of all levels and of the points' moments.
     pub fn memory_bytes(&self) -> usize {
-        let (moments, view) = (self.moments(), self.view());
+        let long = self.long_read();
+        let (moments, view) = (long.moments(), long.view());
         view.shards().map(Shard::set_bytes).sum::<usize>() + moments.bytes()
     }
 

@@ -22,7 +22,6 @@ mod room;
 mod settings;
 mod shard;
 mod sharding;
-mod sync;
 mod trajectory;
 pub mod view;
 
@@ -40,16 +39,16 @@ pub use requests::{AnsweredRequest, REQUESTS_KEPT, Requests};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
-pub use view::MapView;
+pub use view::{LongRead, MapView};
 
 use std::sync::atomic::Ordering;
 
 use crate::geometry::{Point, Pose};
+use crate::sync::{AtomicU64, Mutex, Rank, RwLock, RwLockReadGuard};
 use crate::voxel::Lattice;
 use moments::ShardedMoments;
 use shard::Shard;
 use sharding::{Sharding, ShardsTouched};
-use sync::{AtomicU64, Mutex, RwLock, RwLockReadGuard};
 
 /// A multi-resolution occupied voxel list (MROL, paper III): level n holds the occupied voxels of
 /// r_n = r_0 * 2^n, with the trajectory of the poses from which they were seen.
@@ -69,6 +68,8 @@ pub struct MultiResolutionMap {
     requests: RwLock<Requests>,
     revision: AtomicU64,
     committing: Mutex<()>,
+    /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
+    long_reads: RwLock<()>,
 }
 
 impl MultiResolutionMap {
@@ -83,11 +84,12 @@ impl MultiResolutionMap {
             lattice,
             sharding,
             moments: ShardedMoments::new(sharding),
-            shards: std::array::from_fn(|i| RwLock::new(Shard::new(i, &settings))),
-            trajectory: RwLock::default(),
-            requests: RwLock::default(),
+            shards: std::array::from_fn(|i| RwLock::new(Rank::Shard(i as u8), Shard::new(i, &settings))),
+            trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
+            requests: RwLock::new(Rank::Requests, Requests::default()),
             revision: AtomicU64::new(0),
-            committing: Mutex::new(()),
+            committing: Mutex::new(Rank::Commit, ()),
+            long_reads: RwLock::new(Rank::LongRead, ()),
         })
     }
 
@@ -126,14 +128,27 @@ impl MultiResolutionMap {
         self.requests.read()
     }
 
-    /// Locks the whole map for reading, at one revision.
+    /// Locks the whole map for reading, at one revision. For a few milliseconds at most: whoever reads for longer
+    /// begins with [`MultiResolutionMap::long_read`].
     pub fn view(&self) -> MapView<'_> {
         MapView::lock(self, ShardsTouched::all())
+    }
+
+    /// Keeps changes from beginning to take their locks, for a read that takes longer than a few milliseconds. Changes
+    /// wait for it, and for no other: a long read that comes while one waits goes behind it. Readers of
+    /// [`MultiResolutionMap::view`] and [`MultiResolutionMap::view_of`] wait for neither.
+    pub fn long_read(&self) -> LongRead<'_> {
+        LongRead { _changes_wait: self.long_reads.read(), map: self }
     }
 
     /// Locks what `points`, placed at `map_from_points`, can fall in.
     pub fn view_of(&self, points: &[Point], map_from_points: &Pose) -> MapView<'_> {
         MapView::lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
+    }
+
+    /// The same where all its locks are to be had at once, for threads that may not wait.
+    pub fn try_view_of(&self, points: &[Point], map_from_points: &Pose) -> Option<MapView<'_>> {
+        MapView::try_lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
     }
 
     /// Locks the moments of the map's points for reading, at one revision; before a view of the voxels, where both

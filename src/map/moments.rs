@@ -3,7 +3,7 @@
 use hashbrown::HashMap;
 
 use super::sharding::{SHARDS, Sharding};
-use super::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
+use crate::sync::{Rank, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use crate::voxel::{MOMENT_LEVEL, MomentSet, Moments, VoxelKey};
 
 /// The moments of the points in each voxel of [`MOMENT_LEVEL`], in shards like the voxels themselves.
@@ -35,7 +35,8 @@ pub(super) type MomentsOfShard = Vec<(VoxelKey, Moments)>;
 
 impl ShardedMoments {
     pub(super) fn new(sharding: Sharding) -> Self {
-        Self { sharding, shards: Default::default() }
+        let shard = |i| RwLock::new(Rank::Moments(i as u8), MomentShard::default());
+        Self { sharding, shards: std::array::from_fn(shard) }
     }
 
     /// Locks them for reading, in ascending order.

@@ -4,9 +4,9 @@ use super::lookup::{self, LevelView, Lookup};
 use super::occupied_voxel_list::tier_of;
 use super::shard::Shard;
 use super::sharding::{SHARDS, ShardsTouched};
-use super::sync::RwLockReadGuard;
-use super::{MultiResolutionMap, OccupiedVoxelList, Region};
+use super::{MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
+use crate::sync::RwLockReadGuard;
 use crate::voxel::{
     BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
 };
@@ -19,12 +19,40 @@ pub struct MapView<'a> {
     revision: u64,
 }
 
+/// A read that takes long, see [`MultiResolutionMap::long_read`].
+#[derive(Debug)]
+pub struct LongRead<'a> {
+    pub(super) map: &'a MultiResolutionMap,
+    pub(super) _changes_wait: RwLockReadGuard<'a, ()>,
+}
+
+impl<'a> LongRead<'a> {
+    /// Locks the whole map for reading.
+    pub fn view(&self) -> MapView<'a> {
+        self.map.view()
+    }
+
+    /// Locks the moments of the map's points for reading; before a view, where both are needed.
+    pub fn moments(&self) -> MomentsView<'a> {
+        self.map.moments()
+    }
+}
+
 impl<'a> MapView<'a> {
     /// Takes the locks in ascending order, as committers do, so that nobody waits in a circle. The revision is
     /// read once they are held: a change that is published later touches none of these shards.
     pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
         let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
         Self { map, shards, revision: map.revision() }
+    }
+
+    /// The same where no lock has to be waited for.
+    pub(super) fn try_lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Option<Self> {
+        let mut shards = [const { None }; SHARDS];
+        for i in (0..SHARDS).filter(|&i| touched.contains(i)) {
+            shards[i] = Some(map.shards[i].try_read()?);
+        }
+        Some(Self { map, shards, revision: map.revision() })
     }
 
     /// The revision that everything read through this view belongs to.

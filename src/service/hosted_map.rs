@@ -14,12 +14,12 @@ use super::committing::{Committing, Stop};
 use super::room::Room;
 use super::{
     ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, TrajectoryAnswer,
-    VoxelListing, wanted,
+    VoxelListing, check_not_stopped,
 };
 use crate::geometry::{Point, Pose};
-use crate::interest::Interest;
 use crate::map::{MapName, MultiResolutionMap, Region, RobotName, TrajectoryPose};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError};
+use crate::util::StopSignal;
 use crate::voxel::{LatticeFromPoints, VoxelKey};
 
 /// Which maps to write snapshots of.
@@ -184,7 +184,7 @@ impl HostedMap {
     pub(super) fn query(
         &self,
         query: &PointQuery,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<PointAnswer, ServiceError> {
         let points = query.points.as_slice();
         let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
@@ -193,7 +193,7 @@ impl HostedMap {
         let view = self.map.view_of(points, &map_from_points);
         let mut all_have_a_voxel = true;
         for (points, words) in points.chunks(POINTS_PER_STEP).zip(occupied.chunks_mut(POINTS_PER_STEP / 64)) {
-            wanted(interest)?;
+            check_not_stopped(stop)?;
             all_have_a_voxel &= view.query(points, &quantise, query.level, query.lookup, words);
         }
         let state = self.state(view.revision());
@@ -226,7 +226,7 @@ impl HostedMap {
         level: u32,
         region: Option<&Region>,
         most: usize,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<VoxelListing, ServiceError> {
         let view = self.map.view();
         let by_shard: Box<dyn Iterator<Item = Vec<VoxelKey>>> = match region {
@@ -235,7 +235,7 @@ impl HostedMap {
         };
         let mut keys = Vec::new();
         for more in by_shard {
-            wanted(interest)?;
+            check_not_stopped(stop)?;
             keys.extend(more);
             if keys.len() > most {
                 return Err(listing_too_large(level, keys.len(), most));

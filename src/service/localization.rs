@@ -4,14 +4,14 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
-use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings, wanted};
+use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::Verdict;
 use crate::align::localize::{
     Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
-    LocalizationSettings, SearchProgress, localize_while,
+    LocalizationSettings, SearchProgress, localize_until,
 };
 use crate::geometry::{Point, Pose};
-use crate::interest::Interest;
+use crate::util::StopSignal;
 
 /// Candidates of a request that does not say.
 pub const CANDIDATES_DEFAULT: usize = 5;
@@ -144,7 +144,7 @@ impl HostedMap {
         &self,
         request: &LocalizationRequest,
         settings: &ServiceSettings,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let start = Instant::now();
         let time_limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
@@ -162,8 +162,8 @@ impl HostedMap {
             false => ControlFlow::Continue(()),
         };
         let (map, query) = (&self.map, &request.query);
-        let found = localize_while(map, &points, query, &search, &settings.alignment, watch, interest)?;
-        wanted(interest)?;
+        let found = localize_until(map, &points, query, &search, &settings.alignment, watch, stop)?;
+        check_not_stopped(stop)?;
         let state = self.state(found.revision);
         Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
     }

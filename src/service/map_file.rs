@@ -4,16 +4,16 @@ use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
 use super::room::Room;
-use super::{ErrorCode, Limits, MapFile, ServiceError, wanted};
-use crate::interest::Interest;
+use super::{ErrorCode, Limits, MapFile, ServiceError, check_not_stopped};
 use crate::store::Snapshot;
+use crate::util::StopSignal;
 
 impl HostedMap {
     /// The map as a file, at one revision.
-    pub(super) fn to_file(&self, room: &Room, interest: Interest<'_>) -> Result<MapFile, ServiceError> {
+    pub(super) fn to_file(&self, room: &Room, stop: StopSignal<'_>) -> Result<MapFile, ServiceError> {
         let _lent = room.lend(self.snapshot_bytes(), "a map file")?;
         let snapshot = Snapshot::of(&self.map, self.uuid);
-        wanted(interest)?;
+        check_not_stopped(stop)?;
         let encoded = snapshot.encode();
         let bytes =
             encoded.map_err(|e| ServiceError::new(ErrorCode::Internal, "not_encoded", e.to_string()))?;

@@ -8,12 +8,13 @@ use super::hosted_map::{HostedMap, bitmap};
 use super::room::Room;
 use super::usable_scan::UsableScan;
 use super::{
-    ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings, wanted,
+    ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings,
+    check_not_stopped,
 };
-use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align_while, judge_at};
+use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align_until, judge_at};
 use crate::geometry::{Point, Pose, extrapolate, pose_difference};
-use crate::interest::Interest;
 use crate::map::{Change, Committed, Lookup, ScanRecord, TrajectoryPose};
+use crate::util::StopSignal;
 
 /// Where a scan goes, and what that was decided on.
 struct Placement {
@@ -31,7 +32,7 @@ impl HostedMap {
         turn: Turn,
         settings: &ServiceSettings,
         room: &Room,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<Step<ScanAnswer>, ServiceError> {
         self.check_writable()?;
         let scan = UsableScan::of(request, settings)?;
@@ -40,7 +41,7 @@ impl HostedMap {
         }
         self.check_voxels(settings)?;
         room.check_to_grow()?;
-        let placement = self.place(&scan, settings, interest)?;
+        let placement = self.place(&scan, settings, stop)?;
         let answer = self.answer(&scan, &placement);
         if !answer.accepted && !request.force {
             return Ok(Step::Answered(answer));
@@ -85,11 +86,11 @@ impl HostedMap {
         &self,
         request: &ScanRequest,
         settings: &ServiceSettings,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<ScanAnswer, ServiceError> {
         request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
         let scan = UsableScan::of(request, settings)?;
-        let placement = self.place(&scan, settings, interest)?;
+        let placement = self.place(&scan, settings, stop)?;
         let foreground = request
             .foreground_level
             .map(|level| self.foreground(&scan, &placement.alignment.map_from_sensor, level));
@@ -140,7 +141,7 @@ impl HostedMap {
         &self,
         scan: &UsableScan<'_>,
         settings: &ServiceSettings,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<Placement, ServiceError> {
         let request = scan.request;
         let start = Instant::now();
@@ -153,9 +154,9 @@ impl HostedMap {
         } else if request.at_guess {
             judge_at(&self.map, &scan.points, &guess, &settings).on_the_callers_word()
         } else {
-            align_while(&self.map, &scan.points, &guess, &settings, interest)
+            align_until(&self.map, &scan.points, &guess, &settings, stop)
         };
-        wanted(interest)?;
+        check_not_stopped(stop)?;
         Ok(Placement { alignment, align_time: start.elapsed(), as_first: first && !request.at_guess })
     }
 

@@ -7,8 +7,8 @@ use bytes::Bytes;
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
 use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError};
-use crate::interest::Interest;
 use crate::map::{MapName, MapSettings};
+use crate::util::StopSignal;
 
 /// Absent neighbours of occupied voxels on which a description measures each level's false positives.
 const RATE_SAMPLES: usize = 4096;
@@ -49,7 +49,7 @@ impl MapService {
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let maps = self.inner.catalogue.within(&self.reach);
-        let describe = move |_: Interest<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
+        let describe = move |_: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
         self.inner.queries.run(describe).await
     }
 
@@ -74,7 +74,7 @@ impl MapService {
     /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, or there is no memory for it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
-        self.inner.queries.run(move |interest| map.to_file(&inner.room, interest)).await?
+        self.inner.queries.run(move |stop| map.to_file(&inner.room, stop)).await?
     }
 
     /// Makes a map from a map file, under a uuid of its own.

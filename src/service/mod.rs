@@ -43,9 +43,9 @@ pub use watermarks::Marks;
 
 use std::sync::Arc;
 
-use crate::interest::Interest;
 use crate::map::{MapName, Region, RobotName};
 use crate::store::OpeningProgress;
+use crate::util::StopSignal;
 use catalogue::Catalogue;
 use committing::{Refusal, Step};
 use hosted_map::HostedMap;
@@ -141,9 +141,9 @@ impl MapService {
             map.reached(revision, self.limits().min_revision_wait_max).await?;
         }
         if query.points.len() <= pool::INLINE_POINTS {
-            return map.query(&query, Interest::LASTING);
+            return map.query(&query, StopSignal::NEVER);
         }
-        self.inner.queries.run(move |interest| map.query(&query, interest)).await?
+        self.inner.queries.run(move |stop| map.query(&query, stop)).await?
     }
 
     /// Aligns a scan and, where it fits, adds it.
@@ -160,8 +160,8 @@ impl MapService {
         }
         let turn = Arc::new(map.turn_of(&scan.robot).await);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
-        self.carry_through(move |interest| {
-            map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, interest)
+        self.carry_through(move |stop| {
+            map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
         })
         .await
     }
@@ -174,7 +174,7 @@ impl MapService {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let inner = Arc::clone(&self.inner);
-        self.inner.mapping.run(move |interest| map.align_scan(&scan, &inner.settings, interest)).await?
+        self.inner.mapping.run(move |stop| map.align_scan(&scan, &inner.settings, stop)).await?
     }
 
     /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
@@ -191,7 +191,7 @@ impl MapService {
         let map = self.map(map)?;
         let request = request.within(self.limits())?;
         let inner = Arc::clone(&self.inner);
-        let search = move |interest: Interest<'_>| map.localize(&request, &inner.settings, interest);
+        let search = move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, stop);
         self.inner.localization.run(search).await?
     }
 
@@ -226,7 +226,7 @@ impl MapService {
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let inner = Arc::clone(&self.inner);
-        self.carry_through(move |interest| map.propose_undo(&undo, &inner.room, interest)).await
+        self.carry_through(move |stop| map.propose_undo(&undo, &inner.room, stop)).await
     }
 
     /// The poses of the accepted scans, of one robot or of all.
@@ -255,14 +255,14 @@ impl MapService {
         let map = self.map(map)?;
         map.check_level(level)?;
         let most = self.limits().listed_voxels_max;
-        self.inner.queries.run(move |interest| map.list(level, region.as_ref(), most, interest)).await?
+        self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
     }
 
     /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile. Whoever goes
     /// before it is proposed takes it along; after that it is made.
     async fn carry_through<A: Send + 'static>(
         &self,
-        propose: impl Fn(Interest<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
+        propose: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
             match self.inner.mapping.run(propose.clone()).await?? {
@@ -285,8 +285,8 @@ impl MapService {
 ///
 /// # Errors
 /// When the caller has gone, who is therefore not told.
-fn wanted(interest: Interest<'_>) -> Result<(), ServiceError> {
-    match interest.is_lost() {
+fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError> {
+    match stop.is_stopped() {
         true => {
             Err(ServiceError::new(ErrorCode::DeadlineExceeded, "caller_gone", "nobody waits for the answer"))
         }

@@ -1,7 +1,7 @@
 //! Bounded threads for work that uses the CPU, away from the async runtime.
 //!
 //! Jobs wait in the futures of those who want their answers: whoever gives up takes the job along, with all that it holds
-//! in memory and its place among those that wait. A job in hand learns of it by its [`Interest`].
+//! in memory and its place among those that wait. A job in hand learns of it by its [`StopSignal`].
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tokio::sync::{Semaphore, oneshot};
 
 use super::{ErrorCode, ServiceError};
-use crate::interest::Interest;
+use crate::util::StopSignal;
 
 /// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing them
 /// over, with two wake-ups, takes some 70 us, and answering them 15 to 100 where the look-up is as wide as a machine of
@@ -82,7 +82,7 @@ impl Pool {
     /// `ResourceExhausted` at once when the queue is full; `Internal` when the job panicked.
     pub(super) async fn run<T: Send + 'static>(
         &self,
-        job: impl FnOnce(Interest<'_>) -> T + Send + 'static,
+        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             let message =
@@ -96,7 +96,7 @@ impl Pool {
         self.threads.spawn(move || {
             unanswered.counts.begun.fetch_add(1, Ordering::Relaxed);
             let caller_gone = || answer.is_closed();
-            let job = AssertUnwindSafe(|| span.in_scope(|| job(Interest::until(&caller_gone))));
+            let job = AssertUnwindSafe(|| span.in_scope(|| job(StopSignal::when(&caller_gone))));
             let done = catch_unwind(job);
             // Who is answered may ask again at once.
             drop((place, thread));
@@ -158,7 +158,7 @@ mod tests {
 
     fn spawned<T: Send + 'static>(
         pool: &Arc<Pool>,
-        job: impl FnOnce(Interest<'_>) -> T + Send + 'static,
+        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
     ) -> JoinHandle<Result<T, ServiceError>> {
         let pool = Arc::clone(pool);
         tokio::spawn(async move { pool.run(job).await })
@@ -219,8 +219,8 @@ mod tests {
     #[tokio::test]
     async fn a_job_in_hand_learns_that_its_caller_has_gone() {
         let pool = pool(0);
-        let gone = spawned(&pool, |interest| {
-            while !interest.is_lost() {
+        let gone = spawned(&pool, |stop| {
+            while !stop.is_stopped() {
                 std::thread::yield_now();
             }
         });

@@ -6,10 +6,10 @@ use super::committing::{Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
-use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, wanted};
-use crate::interest::Interest;
+use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
 use crate::map::{Change, Committed, MultiResolutionMap, Request, TrajectoryPose, UndoRecord, WithdrawnScan};
 use crate::store::{MapFolder, StoreError};
+use crate::util::StopSignal;
 
 impl HostedMap {
     /// Sets an undo on its way, unless it was done before.
@@ -20,7 +20,7 @@ impl HostedMap {
         self: &Arc<Self>,
         undo: &Undo,
         room: &Room,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
         let request = undo.request_id.clone().map(|id| Request { id, digest: digest(&undo.target) });
@@ -37,8 +37,8 @@ impl HostedMap {
         }
         // The map's content as it was before the first of them.
         let lent = room.lend(self.snapshot_bytes(), "an undo")?;
-        let observed = folder.observations(&scans, &withdrawn, interest).map_err(unreadable)?;
-        wanted(interest)?;
+        let observed = folder.observations(&scans, &withdrawn, stop).map_err(unreadable)?;
+        check_not_stopped(stop)?;
         let (mut observations, seen) = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
         let (map, count) = (Arc::clone(self), scans.len());
@@ -48,7 +48,7 @@ impl HostedMap {
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
-            folder.observe(&mut observations, seen, Interest::LASTING).map_err(unreadable)?;
+            folder.observe(&mut observations, seen, StopSignal::NEVER).map_err(unreadable)?;
             let voxels = observations.held_by_targets_alone();
             let moments = observations.moments_without_targets();
             Ok(Some(Change::Undo(UndoRecord { scans, voxels, moments, request })))

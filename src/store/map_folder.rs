@@ -17,8 +17,8 @@ use uuid::Uuid;
 use super::journal::{Journal, JournalUse, Known, Record, Recovered, SegmentedJournal};
 use super::snapshot_files::{forget_damaged, newest_good, set_aside, snapshot_name, snapshot_revisions};
 use super::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, retention};
-use crate::interest::Interest;
 use crate::map::{MultiResolutionMap, Observations, WithdrawnScan};
+use crate::util::StopSignal;
 
 /// What keeps a map across crashes.
 #[derive(Debug)]
@@ -252,7 +252,7 @@ impl MapFolder {
         &self,
         scans: &[u64],
         withdrawn: &[WithdrawnScan],
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<Option<(Observations, u64)>, StoreError> {
         let Some(base) = self.base_of(scans, withdrawn) else {
             return Ok(None);
@@ -260,7 +260,7 @@ impl MapFolder {
         let path = self.path.join(snapshot_name(base));
         let base_contents = Snapshot::read(&*self.files, &path)?.contents;
         let mut observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
-        let head = self.observe(&mut observations, base, interest)?;
+        let head = self.observe(&mut observations, base, stop)?;
         Ok(Some((observations, head)))
     }
 
@@ -272,13 +272,13 @@ impl MapFolder {
         &self,
         observations: &mut Observations,
         seen: u64,
-        interest: Interest<'_>,
+        stop: StopSignal<'_>,
     ) -> Result<u64, StoreError> {
         let (changes, head) = {
             let journal = self.journal.lock();
             (journal.read_from(seen + 1), journal.head())
         };
-        for change in changes.take_while(|_| !interest.is_lost()) {
+        for change in changes.take_while(|_| !stop.is_stopped()) {
             let (revision, change) = change?;
             observations.observe(revision, &change);
         }

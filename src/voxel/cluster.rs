@@ -2,7 +2,7 @@
 
 use super::key::AXIS_BITS;
 use super::{BlockMask, VoxelKey};
-use crate::bits::for_each_bit;
+use crate::util::bits::for_each_bit;
 
 /// Levels from a block up to its cluster.
 pub(crate) const CLUSTER_LEVELS: u32 = 2;

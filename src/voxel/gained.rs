@@ -9,7 +9,7 @@ mod avx512;
 
 use super::block::OFFSETS;
 use super::{BLOCK_LEVELS, BlockMask, VoxelKey};
-use crate::bits::for_each_bit;
+use crate::util::bits::for_each_bit;
 
 impl BlockMask {
     /// Appends to `keys` those of the voxels of `block`, `up` (0, 1 or 2) levels up in it, that are occupied with the

@@ -5,10 +5,10 @@ use super::dilated::DilatedLevels;
 use super::sample::SearchSample;
 use super::sight::blocked_share;
 use super::{Candidate, LocalizationSettings};
-use crate::align::{Alignment, AlignmentSettings, align_while};
+use crate::align::{Alignment, AlignmentSettings, align_until};
 use crate::geometry::{Point, Pose, pose_difference};
-use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
 use crate::voxel::volumetric_sample;
 
 /// Points that a place is refined with before it is known to be among the best.
@@ -22,7 +22,7 @@ pub(super) struct Refinement<'a> {
     pub(super) sample: &'a SearchSample,
     pub(super) settings: &'a LocalizationSettings,
     pub(super) alignment: &'a AlignmentSettings,
-    pub(super) interest: Interest<'a>,
+    pub(super) stop: StopSignal<'a>,
 }
 
 impl Refinement<'_> {
@@ -32,7 +32,7 @@ impl Refinement<'_> {
         let thinned = volumetric_sample(self.points, THINNED, self.alignment.seed).points;
         let mut candidates: Vec<Candidate> = places
             .iter()
-            .take_while(|_| !self.interest.is_lost())
+            .take_while(|_| !self.stop.is_stopped())
             .map(|place| self.at(&thinned, &place.map_from_sensor, self.share(place.score)))
             .collect();
         rank(&mut candidates);
@@ -60,7 +60,7 @@ impl Refinement<'_> {
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
         let mut alignment = *self.alignment;
         alignment.wide_start.ascents = 0;
-        align_while(self.map, points, guess, &alignment, self.interest)
+        align_until(self.map, points, guess, &alignment, self.stop)
     }
 
     /// Without those that a better one is the same place as; that one takes over what their search found.

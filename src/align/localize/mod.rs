@@ -34,8 +34,8 @@ use std::ops::ControlFlow;
 
 use super::AlignmentSettings;
 use crate::geometry::Point;
-use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
 use basins::Basins;
 use bound::Bounds;
 use candidates::Refinement;
@@ -64,21 +64,21 @@ pub fn localize(
     alignment: &AlignmentSettings,
     watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
 ) -> Result<Localization, LocalizationError> {
-    localize_while(map, points, query, settings, alignment, watch, Interest::LASTING)
+    localize_until(map, points, query, settings, alignment, watch, StopSignal::NEVER)
 }
 
 /// The same, which ends soon after nobody wants the answer: what it returns then means nothing.
 ///
 /// # Errors
 /// As for [`localize`].
-pub fn localize_while(
+pub fn localize_until(
     map: &MultiResolutionMap,
     points: &[Point],
     query: &LocalizationQuery,
     settings: &LocalizationSettings,
     alignment: &AlignmentSettings,
     watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
-    interest: Interest<'_>,
+    stop: StopSignal<'_>,
 ) -> Result<Localization, LocalizationError> {
     let reach_m = map.lattice().reach_m();
     let in_reach = |point: &Point| point.to_f64().coords.norm() <= reach_m;
@@ -103,15 +103,14 @@ pub fn localize_while(
     let bounds = Bounds::new(&levels, &sample, &orientations.families, rotations);
     let basins =
         Basins::new(settings.basin_voxels * side_m, settings.basin_deg.to_radians(), settings.basins_max);
-    let watch = &mut |progress: &SearchProgress| match interest.is_lost() {
+    let watch = &mut |progress: &SearchProgress| match stop.is_stopped() {
         true => ControlFlow::Break(()),
         false => watch(progress),
     };
     let found = Search::new(&bounds, settings, basins, watch).run();
 
     // 5) Refine the places found by alignment, and rank them.
-    let refinement =
-        Refinement { map, points, levels: &levels, sample: &sample, settings, alignment, interest };
+    let refinement = Refinement { map, points, levels: &levels, sample: &sample, settings, alignment, stop };
     let mut candidates = refinement.candidates(&found.places, query.candidates);
 
     // 6) Say whether the best of them stands out.

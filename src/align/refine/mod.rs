@@ -12,8 +12,8 @@ mod gaussians;
 use super::PoseInformation;
 use super::settings::RefinementSettings;
 use crate::geometry::{Point, Pose};
-use crate::interest::Interest;
 use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
 use equations::{NormalEquations, information};
 use gaussian::Softness;
 use gaussians::VoxelGaussians;
@@ -53,7 +53,7 @@ pub(super) fn refine(
     points: &[Point],
     guess: &Pose,
     settings: &RefinementSettings,
-    interest: Interest<'_>,
+    stop: StopSignal<'_>,
 ) -> Refinement {
     let resolution_m = map.lattice().resolution_m(0);
     let mut refined = Refinement { map_from_sensor: *guess, iterations: 0 };
@@ -65,7 +65,7 @@ pub(super) fn refine(
     for stage in (0..settings.stages).rev() {
         gaussians.soften(softness(stage));
         for _ in 0..settings.iterations_per_stage_max {
-            if interest.is_lost() {
+            if stop.is_stopped() {
                 return refined;
             }
             let pose = &refined.map_from_sensor;

@@ -4,9 +4,9 @@
 use std::arch::x86_64::*;
 
 use super::AT_ONCE;
-use crate::ahead::fetch;
 use crate::bloom::Probe;
 use crate::bloom::counters::{COUNTER_MAX, Counters};
+use crate::util::prefetch;
 
 /// True when the machine can run this module.
 pub(super) fn is_available() -> bool {
@@ -62,8 +62,8 @@ unsafe fn fill_with<const HASHES: u32>(
             (places[i], masks[i]) = (probe.word, probe.mask);
         }
         for &word in &places {
-            fetch(counters.of_word(word));
-            fetch(&plane[word]);
+            prefetch(counters.of_word(word));
+            prefetch(&plane[word]);
         }
         for (word, mask) in places.into_iter().zip(masks) {
             // SAFETY: as for this function.

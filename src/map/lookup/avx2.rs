@@ -12,8 +12,8 @@ pub(super) mod stages;
 use std::arch::x86_64::*;
 
 use super::{LevelView, Lookup};
-use crate::ahead::fetch;
 use crate::geometry::Point;
+use crate::util;
 use crate::voxel::LatticeFromPoints;
 use place::Place;
 
@@ -154,5 +154,5 @@ fn store(to: &mut [u64], lanes: __m256i) {
 /// Starts fetching the line at an address.
 #[inline(always)]
 fn prefetch(address: u64) {
-    fetch::<u64>(std::ptr::with_exposed_provenance(address as usize));
+    util::prefetch::<u64>(std::ptr::with_exposed_provenance(address as usize));
 }

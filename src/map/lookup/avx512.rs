@@ -14,8 +14,8 @@ pub(super) mod stages;
 use std::arch::x86_64::*;
 
 use super::{LevelView, Lookup};
-use crate::ahead::fetch;
 use crate::geometry::Point;
+use crate::util::prefetch;
 use crate::voxel::LatticeFromPoints;
 use bloom::Bloom;
 use exact::Exact;
@@ -257,7 +257,7 @@ const POINTS_AHEAD: usize = 2048;
 fn prefetch_points(points: &[Point]) {
     let ahead = points.as_ptr().cast::<i8>().wrapping_add(POINTS_AHEAD);
     for line in 0..size_of::<[Point; WORD]>() / 64 {
-        fetch(ahead.wrapping_add(64 * line));
+        prefetch(ahead.wrapping_add(64 * line));
     }
 }
 

@@ -6,7 +6,7 @@ use std::arch::x86_64::*;
 use super::super::BlockMask;
 use super::super::block::{CELLS, OFFSETS};
 use super::append::append;
-use crate::bits::for_each_bit;
+use crate::util::bits::for_each_bit;
 
 /// Cells a step: one register of keys.
 const LANES: usize = 8;

@@ -3,8 +3,8 @@
 use std::arch::x86_64::*;
 
 use super::LANES;
-use crate::ahead::fetch;
 use crate::map::sharding::SHARDS;
+use crate::util;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
 
@@ -145,7 +145,7 @@ impl Addresses {
 /// Starts fetching the lines at eight addresses. Any address will do: a prefetch never faults.
 #[inline(always)]
 pub(super) fn prefetch(addresses: &Addresses) {
-    (0..8).for_each(|i| fetch(addresses.loaded::<u64>(i)));
+    (0..8).for_each(|i| util::prefetch(addresses.loaded::<u64>(i)));
 }
 
 /// The same, at once.
@@ -153,7 +153,7 @@ pub(super) fn prefetch(addresses: &Addresses) {
 #[target_feature(enable = "avx512f")]
 pub(super) fn prefetch_now(addresses: __m512i) {
     for address in to_array(addresses) {
-        fetch(std::ptr::with_exposed_provenance::<u64>(address as usize));
+        util::prefetch(std::ptr::with_exposed_provenance::<u64>(address as usize));
     }
 }
 

@@ -8,7 +8,7 @@
 /// is fetched beyond those waits, the look-ups behind it as well (by the filter of a large map, at random, 8.2 ns a point
 /// instead of 4.1).
 #[inline(always)]
-pub(crate) fn fetch<T>(at: *const T) {
+pub(crate) fn prefetch<T>(at: *const T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a prefetch reads nothing that the program sees.
     unsafe {
