@@ -26,6 +26,7 @@ impl OccupiedVoxels for MultiResolutionMap {
     fn hits(&self, points: &[Point], poses: &[Pose], level: u32, lookup: Lookup) -> Vec<usize> {
         let poses_per_lock = (LOOKUPS_PER_LOCK / points.len().max(1)).max(1);
         let hits = poses.chunks(poses_per_lock).flat_map(|poses| {
+            let _long_read = (points.len() > LOOKUPS_PER_LOCK).then(|| self.long_read());
             let view = self.view();
             let count = |pose| view.count(points, &self.lattice().from_points(pose), level, lookup);
             poses.iter().map(count).collect::<Vec<_>>()

@@ -95,6 +95,14 @@ impl CountingBloomFilter {
         self.plane[cleared.word] &= !cleared.mask;
     }
 
+    /// The second step for many keys at once: a plane without the bits that none but `keys_lost` keys set, all of them
+    /// counted out, takes the place of the present one.
+    pub(crate) fn set_plane(&mut self, plane: Vec<u64>, keys_lost: usize) {
+        debug_assert_eq!(plane.len(), self.plane.len(), "the plane of another filter");
+        self.keys -= keys_lost;
+        self.plane = plane;
+    }
+
     /// The word of the plane that a change at `probe` touches.
     #[inline]
     pub(crate) fn plane_at(&self, probe: Probe) -> &u64 {

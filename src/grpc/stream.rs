@@ -12,6 +12,7 @@ use crate::access::{Authorized, Operation};
 use crate::admission::{Admission, Arrival, Asking, Charge};
 use crate::lifecycle;
 use crate::service::ServiceError;
+use crate::sync::polled_by_runtime;
 use crate::telemetry::MeteredService;
 
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
@@ -57,7 +58,7 @@ impl Adapter {
             message_bytes_max: self.message_bytes_max,
         };
         let caller = outbox.clone();
-        tokio::spawn(async move {
+        tokio::spawn(polled_by_runtime(async move {
             tokio::select! {
                 // Nobody waits for the request in hand.
                 () = caller.closed() => {}
@@ -65,7 +66,7 @@ impl Adapter {
                 () = worker.run(read, outbox) => {}
                 () = reader.run(inbox) => {}
             }
-        });
+        }));
         Ok(ReceiverStream::new(answers))
     }
 }

@@ -134,22 +134,26 @@ impl<'a> Committer<'a> {
         let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments));
         let mut added = 0;
         let shards = self.carry_out(planned, |shard, addition| added += addition.apply(shard));
-        (Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read }, added)
+        (
+            Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: Vec::new() },
+            added,
+        )
     }
 
     /// Takes voxels out. Their moments are rebuilt from what remains, or become `moments` where those are known.
     fn take_out(&self, planned: Plans<Removal>, moments: &[MomentsOfShard; SHARDS]) -> Locks<'a> {
         let no_long_read = self.map.long_reads.write();
-        let changed = planned.iter().map(|(i, removal)| (*i, [removal.moments(), &moments[*i]]));
-        let moments = self.map.moments.change(changed, |shard, moments| {
-            moments.into_iter().for_each(|moments| shard.set(moments));
+        let changed = planned.iter().map(|(i, removal)| (*i, (removal.moments(), &moments[*i])));
+        let moments = self.map.moments.change(changed, |shard, (lost, known)| {
+            shard.lose(lost);
+            shard.set(known);
             shard.reset_if_empty();
         });
+        let mut emptied = Vec::new();
         let shards = self.carry_out(planned, |shard, removal| {
-            removal.apply(shard);
-            shard.reset_if_empty(&self.map.settings);
+            emptied.extend(removal.apply(shard, &self.map.settings));
         });
-        Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read }
+        Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: emptied }
     }
 
     /// Finds out what a change of some shards comes to, and builds what it needs, while readers go on.
@@ -185,6 +189,8 @@ struct Locks<'a> {
     _shards: Vec<RwLockWriteGuard<'a, Shard>>,
     _moments: MomentLocks<'a>,
     _no_long_read: RwLockWriteGuard<'a, ()>,
+    /// What was in shards that lost everything: to give back its memory takes a while, so it comes last.
+    _emptied: Vec<Shard>,
 }
 
 /// The shards that have a part of a change, ascending.

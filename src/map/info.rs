@@ -64,6 +64,18 @@ impl MultiResolutionMap {
         view.shards().map(Shard::set_bytes).sum::<usize>() + moments.bytes()
     }
 
+    /// Bytes of memory of the exact sets of all levels.
+    pub fn set_bytes(&self) -> usize {
+        self.view().shards().map(Shard::set_bytes).sum()
+    }
+
+    /// Bytes of memory of the bit planes of all levels' filters.
+    pub fn plane_bytes(&self) -> usize {
+        let view = self.view();
+        let of_level = |level| view.lists(level).map(|list| list.filter().bytes().0).sum::<usize>();
+        (0..self.settings.levels).map(of_level).sum()
+    }
+
     fn describe_level(&self, view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> LevelInfo {
         let mut info = LevelInfo {
             level,

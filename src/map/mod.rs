@@ -123,6 +123,11 @@ impl MultiResolutionMap {
         self.trajectory.read()
     }
 
+    /// The poses of the accepted scans, where they do not change just now: for threads that may not wait.
+    pub fn try_trajectory(&self) -> Option<RwLockReadGuard<'_, Trajectory>> {
+        self.trajectory.try_read()
+    }
+
     /// Answers to changes that were asked for under an id.
     pub fn requests(&self) -> RwLockReadGuard<'_, Requests> {
         self.requests.read()

@@ -33,6 +33,35 @@ pub(super) type MomentLocks<'a> = Vec<RwLockWriteGuard<'a, MomentShard>>;
 /// Moments of voxels of one shard.
 pub(super) type MomentsOfShard = Vec<(VoxelKey, Moments)>;
 
+/// What becomes of the moments of one shard's voxels that lose descendants.
+#[derive(Debug)]
+pub(super) enum MomentsLost {
+    /// All of them go.
+    Everything,
+    /// Some go, others are rebuilt from the voxels that stay.
+    Some { gone: Vec<VoxelKey>, rebuilt: MomentsOfShard },
+}
+
+impl Default for MomentsLost {
+    fn default() -> Self {
+        Self::Some { gone: Vec::new(), rebuilt: Vec::new() }
+    }
+}
+
+impl Extend<(VoxelKey, Moments)> for MomentsLost {
+    /// Adds voxels with what their moments become; none of no points are kept.
+    fn extend<I: IntoIterator<Item = (VoxelKey, Moments)>>(&mut self, changed: I) {
+        if let Self::Some { gone, rebuilt } = self {
+            for (voxel, moments) in changed {
+                match moments.is_empty() {
+                    true => gone.push(voxel),
+                    false => rebuilt.push((voxel, moments)),
+                }
+            }
+        }
+    }
+}
+
 impl ShardedMoments {
     pub(super) fn new(sharding: Sharding) -> Self {
         let shard = |i| RwLock::new(Rank::Moments(i as u8), MomentShard::default());
@@ -74,6 +103,17 @@ impl MomentShard {
     pub(super) fn add(&mut self, moments: &[(VoxelKey, Moments)]) {
         for &(voxel, added) in moments {
             *self.0.entry(voxel).or_default() += added;
+        }
+    }
+
+    /// Takes out what voxels that lose descendants lose.
+    pub(super) fn lose(&mut self, lost: &MomentsLost) {
+        match lost {
+            MomentsLost::Everything => *self = Self::default(),
+            MomentsLost::Some { gone, rebuilt } => {
+                gone.iter().for_each(|voxel| drop(self.0.remove(voxel)));
+                self.set(rebuilt);
+            }
         }
     }
 

@@ -28,6 +28,11 @@ impl<'a> OccupiedVoxelList<'a> {
         Self { level, blocks, filter }
     }
 
+    /// Its level, 0 the finest.
+    pub fn level(&self) -> u32 {
+        self.level
+    }
+
     /// True when `voxel` of this level is occupied: the filter, then the set for what it lets through.
     pub fn contains(&self, voxel: VoxelKey) -> bool {
         self.may_contain(voxel) && self.blocks.contains(voxel.index(), tier_of(self.level).1)

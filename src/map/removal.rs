@@ -2,40 +2,118 @@
 
 use super::bulk::{count_each, find_each, show_each};
 use super::shard::{Block, Shard, levels_of};
+use super::{MapSettings, moments::MomentsLost};
 use crate::bloom::{CountingBloomFilter, Probe};
-use crate::voxel::{Moments, Renewal, VoxelKey, VoxelSet};
+use crate::voxel::{Renewal, VoxelKey, VoxelSet};
 
-/// What is to be done to a shard to take voxels out at every level, found out while readers go on. It holds for the
+/// What is to be done to a shard to take voxels out at every level, found out while readers go on. Under the write lock
+/// pointers are exchanged, and at most [`CLEARED_IN_PLACE`] bits a level cleared, however much goes. It holds for the
 /// shard as it was planned for.
 #[derive(Debug)]
 #[must_use = "what is planned is counted already"]
 pub(super) struct Removal {
-    tiers: Vec<Renewal>,
-    /// What each level's plane loses.
-    levels: Vec<Vec<Probe>>,
-    moments: Vec<(VoxelKey, Moments)>,
+    /// Finest voxels that go.
+    voxels: usize,
+    /// Finest voxels that stay.
+    left: Left,
+    /// What becomes of the moments of voxels that lose descendants.
+    moments: MomentsLost,
 }
+
+/// What a shard is left with.
+#[derive(Debug)]
+enum Left {
+    /// No voxel.
+    Nothing,
+    /// Some, or all.
+    Voxels { tiers: Vec<Renewal>, levels: Vec<OfLevel> },
+}
+
+/// What becomes of the bit plane of a level's filter.
+#[derive(Debug)]
+enum OfLevel {
+    /// It loses these bits.
+    Loses(Vec<Probe>),
+    /// It gives way to one without the bits of so many keys.
+    Plane { plane: Vec<u64>, keys_lost: usize },
+}
+
+/// Keys a level whose bits are cleared in place, while readers wait. Beyond that a copy of the plane is cleared
+/// beforehand, which takes longer in all and keeps nobody waiting.
+const CLEARED_IN_PLACE: usize = 2048;
 
 impl Removal {
     /// Finds out what taking `blocks` of finest voxels out of `shard` comes to, and counts them out: those that are
     /// not there are passed over, and so the set says which ones the filter is told to forget (paper II-A).
     pub(super) fn plan(shard: &Shard, blocks: &[&Block]) -> Self {
-        let mut plan = Self { tiers: Vec::new(), levels: Vec::new(), moments: Vec::new() };
-        let mut emptied = plan.tier(shard, 0, blocks);
+        let voxels = voxels_there(shard, blocks);
+        if voxels > 0 && voxels == shard.level(0).len() {
+            return Self { voxels, left: Left::Nothing, moments: MomentsLost::Everything };
+        }
+        let (mut tiers, mut levels, mut moments) = (Vec::new(), Vec::new(), MomentsLost::default());
+        let mut emptied = Tier::of(shard, 0, blocks, &mut moments).plan(&mut tiers, &mut levels);
         for tier in 1..shard.tiers.len() {
             let blocks: VoxelSet = emptied.into_iter().collect();
-            emptied = plan.tier(shard, tier, &blocks.blocks().iter().collect::<Vec<_>>());
+            let blocks: Vec<_> = blocks.blocks().iter().collect();
+            emptied = Tier::of(shard, tier, &blocks, &mut moments).plan(&mut tiers, &mut levels);
         }
-        plan
+        Self { voxels, left: Left::Voxels { tiers, levels }, moments }
     }
 
-    /// Plans for one tier; the blocks that lose their last voxel.
-    fn tier(&mut self, shard: &Shard, tier: usize, blocks: &[&Block]) -> Vec<VoxelKey> {
-        let table = &shard.tiers[tier];
-        let levels = levels_of(tier, shard.filters.len());
-        let (mut losses, mut emptied) = (Vec::new(), Vec::new());
-        let mut keys = vec![Vec::new(); levels.len()];
-        find_each(table, blocks, |&(block, ref voxels), before| {
+    /// Number of finest voxels that go.
+    pub(super) fn voxels(&self) -> usize {
+        self.voxels
+    }
+
+    /// What becomes of the moments of voxels that lose descendants.
+    pub(super) fn moments(&self) -> &MomentsLost {
+        &self.moments
+    }
+
+    /// Does it, but for the moments. What the shard held and holds no more is for the caller to drop, once nobody
+    /// waits.
+    pub(super) fn apply(self, shard: &mut Shard, settings: &MapSettings) -> Option<Shard> {
+        let Left::Voxels { tiers, levels } = self.left else {
+            let empty = Shard::new(shard.number, settings);
+            return Some(std::mem::replace(shard, empty));
+        };
+        for (table, renewal) in shard.tiers.iter_mut().zip(tiers) {
+            renewal.apply(table);
+        }
+        for (filter, level) in shard.filters.iter_mut().zip(levels) {
+            match level {
+                OfLevel::Loses(cleared) => show_each(filter, &cleared, CountingBloomFilter::clear_bits),
+                OfLevel::Plane { plane, keys_lost } => filter.set_plane(plane, keys_lost),
+            }
+        }
+        None
+    }
+}
+
+/// How many of the voxels of `blocks` are in the shard.
+fn voxels_there(shard: &Shard, blocks: &[&Block]) -> usize {
+    let mut voxels = 0;
+    find_each(&shard.tiers[0], blocks, |(_, mask), there| voxels += there.intersection(mask).count(0));
+    voxels
+}
+
+/// The part of a removal in one tier of blocks.
+struct Tier<'a> {
+    shard: &'a Shard,
+    tier: usize,
+    /// The blocks that lose a voxel, as they are afterwards.
+    losses: Vec<Block>,
+    /// Those of them that lose their last one.
+    emptied: Vec<VoxelKey>,
+    /// What goes, level by level.
+    keys: Vec<Vec<u64>>,
+}
+
+impl<'a> Tier<'a> {
+    fn of(shard: &'a Shard, tier: usize, blocks: &[&Block], moments: &mut MomentsLost) -> Self {
+        let levels = levels_of(tier, shard.filters.len()).len();
+        let (mut losses, mut emptied, mut keys) = (Vec::new(), Vec::new(), vec![Vec::new(); levels]);
+        find_each(&shard.tiers[tier], blocks, |&(block, ref voxels), before| {
             if before.intersection(voxels).is_empty() {
                 return;
             }
@@ -47,34 +125,34 @@ impl Removal {
             // What is gone is what would be gained if all came back.
             (0..).zip(&mut keys).for_each(|(up, keys)| left.keys_gained(before, block, up, keys));
             if tier == 0 {
-                self.moments.extend(left.rebuilt_moments(before, block));
+                moments.extend(left.rebuilt_moments(before, block));
             }
         });
-        self.tiers.push(Renewal::plan(table, &losses));
-        let count_out = |(level, keys): (usize, Vec<u64>)| {
-            count_each(&shard.filters[level], &keys, CountingBloomFilter::count_out)
-        };
-        self.levels.extend(levels.zip(keys).map(count_out));
+        Self { shard, tier, losses, emptied, keys }
+    }
+
+    /// Plans for the tier; the blocks that lose their last voxel.
+    fn plan(self, tiers: &mut Vec<Renewal>, levels: &mut Vec<OfLevel>) -> Vec<VoxelKey> {
+        let Self { shard, tier, losses, emptied, keys } = self;
+        tiers.push(Renewal::plan(&shard.tiers[tier], &losses));
+        drop(losses);
+        let of_level = |(level, keys): (usize, Vec<u64>)| OfLevel::plan(&shard.filters[level], keys);
+        levels.extend(levels_of(tier, shard.filters.len()).zip(keys).map(of_level));
         emptied
     }
+}
 
-    /// Number of finest voxels that go.
-    pub(super) fn voxels(&self) -> usize {
-        self.levels[0].len()
-    }
-
-    /// What becomes of the moments of voxels that lose descendants.
-    pub(super) fn moments(&self) -> &[(VoxelKey, Moments)] {
-        &self.moments
-    }
-
-    /// Does it, but for the moments.
-    pub(super) fn apply(self, shard: &mut Shard) {
-        for (table, renewal) in shard.tiers.iter_mut().zip(self.tiers) {
-            renewal.apply(table);
+impl OfLevel {
+    fn plan(filter: &CountingBloomFilter, keys: Vec<u64>) -> Self {
+        if keys.len() <= CLEARED_IN_PLACE {
+            return Self::Loses(count_each(filter, &keys, CountingBloomFilter::count_out));
         }
-        for (filter, cleared) in shard.filters.iter_mut().zip(&self.levels) {
-            show_each(filter, cleared, CountingBloomFilter::clear_bits);
+        let mut plane = filter.plane().to_vec();
+        for keys in keys.chunks(CLEARED_IN_PLACE) {
+            for cleared in count_each(filter, keys, CountingBloomFilter::count_out) {
+                plane[cleared.word] &= !cleared.mask;
+            }
         }
+        Self::Plane { plane, keys_lost: keys.len() }
     }
 }

@@ -69,13 +69,6 @@ impl Shard {
         }
         found
     }
-
-    /// Gives back the memory of a shard that lost its last voxel, and its saturated counters with it.
-    pub(super) fn reset_if_empty(&mut self, settings: &MapSettings) {
-        if self.is_empty() {
-            *self = Self::new(self.number, settings);
-        }
-    }
 }
 
 /// The levels that `tier` serves, of a map that has `levels` of them.

@@ -26,14 +26,14 @@ pub struct LongRead<'a> {
     pub(super) _changes_wait: RwLockReadGuard<'a, ()>,
 }
 
-impl<'a> LongRead<'a> {
+impl LongRead<'_> {
     /// Locks the whole map for reading.
-    pub fn view(&self) -> MapView<'a> {
+    pub fn view(&self) -> MapView<'_> {
         self.map.view()
     }
 
     /// Locks the moments of the map's points for reading; before a view, where both are needed.
-    pub fn moments(&self) -> MomentsView<'a> {
+    pub fn moments(&self) -> MomentsView<'_> {
         self.map.moments()
     }
 }
@@ -137,16 +137,49 @@ impl<'a> MapView<'a> {
         let mut by_shard: [Vec<(VoxelKey, BlockMask)>; SHARDS] = Default::default();
         for key in keys {
             let (block, cell) = Cell::of(key.index().map(|i| i << up));
-            let mut mask = BlockMask::EMPTY;
-            mask.fill(cell, up);
-            by_shard[self.map.sharding.shard_of(key.index(), level)].push((block, mask));
+            let blocks = &mut by_shard[self.map.sharding.shard_of(key.index(), level)];
+            // Keys come row by row: the last block is met again more often than not.
+            match blocks.last_mut() {
+                Some((last, mask)) if *last == block => mask.fill(cell, up),
+                _ => {
+                    let mut mask = BlockMask::EMPTY;
+                    mask.fill(cell, up);
+                    blocks.push((block, mask));
+                }
+            }
         }
-        let found = self.shards.iter().zip(by_shard).flat_map(|(shard, blocks)| {
-            let wanted: VoxelSet = blocks.into_iter().collect();
-            let found = shard.as_deref().map(|shard| shard.descendants(tier, wanted.blocks()));
-            found.unwrap_or_default().blocks().to_vec()
-        });
-        found.collect()
+        let mut found = Vec::new();
+        for (shard, blocks) in self.shards.iter().zip(by_shard) {
+            if let Some(shard) = shard {
+                let wanted: VoxelSet = blocks.into_iter().collect();
+                found.extend_from_slice(shard.descendants(tier, wanted.blocks()).blocks());
+            }
+        }
+        found.into_iter().collect()
+    }
+
+    /// The finest voxels at and below the voxels of `level` whose centers lie in `region`.
+    ///
+    /// Takes some 72 bytes a block of finest voxels, and no more for a voxel.
+    pub fn finest_in(&self, region: &Region, level: u32) -> VoxelSet {
+        let (tier, up) = tier_of(level);
+        let mut found = Vec::new();
+        for shard in self.shards() {
+            let mut blocks = Vec::new();
+            self.for_each_block(&shard.level(level), region, |block, mask| {
+                let inside = |cell: &Cell| {
+                    let center_m = self.map.lattice.center_m(cell.voxel(block).ancestor(up), level);
+                    region.contains(center_m)
+                };
+                let mut wanted = BlockMask::EMPTY;
+                mask.cells(up).filter(inside).for_each(|cell| wanted.fill(cell, up));
+                if !wanted.is_empty() {
+                    blocks.push((block, wanted));
+                }
+            });
+            found.extend_from_slice(shard.descendants(tier, &blocks).blocks());
+        }
+        found.into_iter().collect()
     }
 
     /// The voxels of `level` whose centres lie in `region`.
@@ -154,39 +187,41 @@ impl<'a> MapView<'a> {
         self.voxels_by_shard(region, level).flatten().collect()
     }
 
-    /// The same shard by shard, each when it is asked for.
+    /// The voxels of `level` whose centers lie in `region`, shard by shard, each when it is asked for.
+    pub fn voxels_by_shard(&self, region: &Region, level: u32) -> impl Iterator<Item = Vec<VoxelKey>> {
+        let (_, up) = tier_of(level);
+        self.lists(level).map(move |list| {
+            let mut found = Vec::new();
+            self.for_each_block(&list, region, |block, mask| {
+                let voxels = mask.cells(up).map(|cell| cell.voxel(block).ancestor(up));
+                let inside = |voxel: &VoxelKey| region.contains(self.map.lattice.center_m(*voxel, level));
+                found.extend(voxels.filter(inside));
+            });
+            found
+        })
+    }
+
+    /// Calls `f` with each block of a list that can hold a voxel of `region`.
     ///
     /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer.
-    pub fn voxels_by_shard(&self, region: &Region, level: u32) -> impl Iterator<Item = Vec<VoxelKey>> {
+    fn for_each_block(
+        &self,
+        list: &OccupiedVoxelList<'_>,
+        region: &Region,
+        mut f: impl FnMut(VoxelKey, &BlockMask),
+    ) {
+        let (level, blocks) = (list.level(), list.blocks());
         let (_, up) = tier_of(level);
         let candidates = block_bounds(region, self.map.lattice.resolution_m(level - up));
         let volume: f64 = candidates
             .iter()
             .map(|(low, high)| (f64::from(*high) - f64::from(*low) + 1.0).max(0.0))
             .product();
-        self.lists(level).map(move |list| {
-            let (blocks, mut found) = (list.blocks(), Vec::new());
-            if volume < blocks.len() as f64 {
-                let candidates = grid(candidates).map(|block| (block, blocks.get(block)));
-                candidates.for_each(|(block, mask)| self.collect(block, mask, region, level, &mut found));
-            } else {
-                blocks.iter().for_each(|(block, mask)| self.collect(block, mask, region, level, &mut found));
-            }
-            found
-        })
-    }
-
-    fn collect(
-        &self,
-        block: VoxelKey,
-        mask: &BlockMask,
-        region: &Region,
-        level: u32,
-        found: &mut Vec<VoxelKey>,
-    ) {
-        let up = tier_of(level).1;
-        let voxels = mask.cells(up).map(|cell| cell.voxel(block).ancestor(up));
-        found.extend(voxels.filter(|&voxel| region.contains(self.map.lattice.center_m(voxel, level))));
+        if volume < blocks.len() as f64 {
+            grid(candidates).for_each(|block| f(block, blocks.get(block)));
+        } else {
+            blocks.iter().for_each(|(block, mask)| f(block, mask));
+        }
     }
 }
 

@@ -21,6 +21,7 @@ use super::endpoint::Endpoint;
 use super::places::Place;
 use super::stream::{Count, Counted, secure};
 use crate::admission::{HangUp, Peer};
+use crate::sync::polled_by_runtime;
 
 /// How long a client may leave unread what it asked for.
 const UNREAD_MAX: Duration = Duration::from_secs(30);
@@ -30,7 +31,7 @@ impl Endpoint {
     /// gets its place, or the server is going down.
     pub(super) async fn serve(self, stream: Accepted, tls: Option<TlsAcceptor>, place: Place) {
         tokio::select! {
-            () = self.serve_open(stream, tls, &place) => {}
+            () = polled_by_runtime(self.serve_open(stream, tls, &place)) => {}
             () = place.lost() => {}
             () = place.unread_for(UNREAD_MAX) => {}
             () = self.cut.cancelled() => {}

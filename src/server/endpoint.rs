@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use hyper_util::rt::TokioExecutor;
+
 use hyper_util::server::conn::auto::Builder;
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
@@ -12,7 +12,7 @@ use tokio_util::task::TaskTracker;
 
 use super::accepting::Accepting;
 use super::places::Places;
-use super::protocol::Protocol;
+use super::protocol::{Protocol, RuntimeExecutor};
 use super::tls::Tls;
 use crate::config::LimitsConfig;
 
@@ -27,7 +27,7 @@ pub(super) struct Endpoint {
     pub(super) protocol: Protocol,
     pub(super) router: Router,
     pub(super) bounds: Bounds,
-    pub(super) builder: Arc<Builder<TokioExecutor>>,
+    pub(super) builder: Arc<Builder<RuntimeExecutor>>,
     pub(super) closing: CancellationToken,
     pub(super) cut: CancellationToken,
     tls: Option<Tls>,

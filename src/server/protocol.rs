@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
-use hyper_util::rt::{TokioExecutor, TokioTimer};
+use hyper::rt::Executor;
+use hyper_util::rt::TokioTimer;
 use hyper_util::server::conn::auto::Builder;
 
 use crate::config::LimitsConfig;
+use crate::sync::polled_by_runtime;
 use crate::wire::transport;
 
 /// Streams of one HTTP/2 connection at once.
@@ -21,6 +23,16 @@ const EARLY_RESETS_MAX: usize = 20;
 const ERROR_RESETS_MAX: usize = 128;
 /// Bytes by which a gRPC client shows that it is one: HTTP/2's preface.
 const PREFACE_BYTES: usize = 24;
+
+/// Spawns the tasks of connections on the runtime, known as its tasks to the checks of [`crate::sync`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RuntimeExecutor;
+
+impl<F: Future<Output: Send> + Send + 'static> Executor<F> for RuntimeExecutor {
+    fn execute(&self, task: F) {
+        tokio::spawn(polled_by_runtime(task));
+    }
+}
 
 /// What the daemon speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,8 +68,8 @@ impl Protocol {
     }
 
     /// What serves its connections.
-    pub(super) fn builder(self, limits: &LimitsConfig) -> Builder<TokioExecutor> {
-        let mut builder = Builder::new(TokioExecutor::new());
+    pub(super) fn builder(self, limits: &LimitsConfig) -> Builder<RuntimeExecutor> {
+        let mut builder = Builder::new(RuntimeExecutor);
         builder
             .http1()
             .timer(TokioTimer::new())

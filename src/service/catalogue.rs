@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use parking_lot::RwLock;
 use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
@@ -14,6 +13,7 @@ use super::{ErrorCode, MapReach, ServiceError};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap};
 use crate::store::{Cut, DataDir, OpeningProgress, Snapshot, StoreError, StoreSettings};
+use crate::sync::{Rank, RwLock};
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
@@ -41,7 +41,11 @@ impl Catalogue {
                 maps.insert(name, Arc::new(map));
             }
         }
-        Ok(Self { maps: RwLock::new(maps), data_dir: data_dir.map(Arc::new), writing: Default::default() })
+        Ok(Self {
+            maps: RwLock::new(Rank::Brief, maps),
+            data_dir: data_dir.map(Arc::new),
+            writing: Default::default(),
+        })
     }
 
     pub(super) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {

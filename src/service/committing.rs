@@ -15,7 +15,7 @@
 
 mod worker;
 
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 
 use tokio::sync::{OwnedMutexGuard, oneshot, watch};
@@ -26,14 +26,20 @@ use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::store::{MapFolder, Record};
 use worker::Worker;
 
-/// Changes that share one sync, and as many that wait meanwhile; who has one more waits with it in hand.
+/// Changes that share one sync, and as many that wait meanwhile; one more is refused.
 const GROUP_MAX: usize = 256;
 
 /// Keeps one robot's scans in order; held until its change is visible.
 pub(super) type Turn = Arc<OwnedMutexGuard<()>>;
 /// Decides on a change when everything before it is applied; none where there is nothing to change.
 pub(super) type Decision =
-    Box<dyn FnOnce(&MultiResolutionMap) -> Result<Option<Change>, Refusal> + Send + 'static>;
+    Box<dyn FnOnce(&MultiResolutionMap) -> Result<Option<Decided>, Refusal> + Send + 'static>;
+
+/// A change that was decided on in its turn, with the memory that making it takes.
+pub(super) struct Decided {
+    pub(super) change: Change,
+    pub(super) lent: Option<Promise>,
+}
 
 /// A change on its way into the map.
 pub(super) enum Proposal {
@@ -117,12 +123,21 @@ impl Committing {
         Ok(Self { inbox, stopped })
     }
 
-    /// Hands a change over, not from an async thread; its outcome comes when it is visible, and with [`Durability::Always`] durable.
-    pub(super) fn propose(&self, proposal: Proposal) -> oneshot::Receiver<Outcome> {
+    /// Hands a change over; its outcome comes when it is visible, and with [`Durability::Always`] durable. Does not
+    /// wait: the thread of a map whose disk hangs takes nothing from its queue, and who waited for a place in it would
+    /// keep a thread from the other maps.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` where the queue is full.
+    pub(super) fn propose(&self, proposal: Proposal) -> Result<oneshot::Receiver<Outcome>, ServiceError> {
         let (answer, outcome) = oneshot::channel();
-        // Where the thread is gone, so is the sender of the outcome.
-        drop(self.inbox.send(Waiting { proposal, answer }));
-        outcome
+        match self.inbox.try_send(Waiting { proposal, answer }) {
+            // Where the thread is gone, so is the sender of the outcome.
+            Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(outcome),
+            Err(TrySendError::Full(_)) => Err(ServiceError::overloaded(format!(
+                "{GROUP_MAX} changes of this map wait for its disk already: try again"
+            ))),
+        }
     }
 
     /// Why the map takes no more changes.

@@ -2,21 +2,23 @@
 
 use std::sync::Arc;
 
-use super::committing::{Proposal, Refusal, Step};
+use super::committing::{Decided, Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
 use crate::geometry::Point;
-use crate::map::{AnsweredRequest, Change, Committed, DeletionRecord, Region, Request};
-use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
+use crate::map::{
+    AnsweredRequest, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request, SHARDS,
+};
+use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
 
 impl HostedMap {
     /// Sets a deletion on its way, unless it was done before.
     pub(super) fn propose_deletion(
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
-        room: &Room,
+        room: &Arc<Room>,
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request { id, digest: digest(deletion) });
@@ -25,14 +27,20 @@ impl HostedMap {
             return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, state, replayed: true }));
         }
         room.check_to_shrink()?;
-        let (map, deletion) = (Arc::clone(self), Arc::clone(deletion));
+        let (map, deletion, room) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(room));
         // Which voxels are meant is decided when nobody else can change the map.
-        let decide = move |_: &_| {
+        let decide = move |core: &MultiResolutionMap| {
             map.still_unanswered(request.as_ref())?;
+            let lent = room.lend(search_bytes(core, &deletion), "a deletion")?;
             let voxels = map.targets_of(&deletion)?;
-            Ok((!voxels.is_empty()).then_some(Change::Deletion(DeletionRecord { voxels, request })))
+            if voxels.is_empty() {
+                return Ok(None);
+            }
+            drop(lent);
+            let lent = Some(room.lend(removal_bytes(core, &voxels), "a deletion")?);
+            Ok(Some(Decided { change: Change::Deletion(DeletionRecord { voxels, request }), lent }))
         };
-        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)));
+        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |Committed { revision, voxels: removed }| DeletionAnswer {
             removed,
@@ -69,14 +77,16 @@ impl HostedMap {
 
     fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
         let level = deletion.level;
-        let keys = match &deletion.target {
+        let keys: Vec<VoxelKey> = match &deletion.target {
             DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
             DeletionTarget::Keys(keys) => {
                 keys.iter().map(|&key| in_range(key, level)).collect::<Result<_, _>>()?
             }
-            DeletionTarget::Region(region) => self.map.view().voxels_in(region, level),
+            DeletionTarget::Region(region) => {
+                return Ok(self.map.long_read().view().finest_in(region, level));
+            }
         };
-        Ok(self.map.view().descendants_of(keys, level))
+        Ok(self.map.long_read().view().descendants_of(keys, level))
     }
 
     fn keys_of(&self, points: &[Point], level: u32) -> Result<Vec<VoxelKey>, ServiceError> {
@@ -86,6 +96,30 @@ impl HostedMap {
         keys.ok_or_else(|| self.point_without_voxel(points, &quantise))
     }
 }
+
+/// Memory that finding out which voxels a deletion means takes: what it names, and the blocks of what it finds, which
+/// are not more than the map has.
+fn search_bytes(map: &MultiResolutionMap, deletion: &Deletion) -> u64 {
+    let named = match &deletion.target {
+        DeletionTarget::Points(points) => points.len(),
+        DeletionTarget::Keys(keys) => keys.len(),
+        DeletionTarget::Region(_) => 0,
+    };
+    (named * (size_of::<VoxelKey>() + BLOCK_BYTES) + 2 * map.set_bytes()) as u64
+}
+
+/// Memory that taking voxels out takes: two copies of their blocks, their record, the keys of one shard's voxels with
+/// what their filters lose, and a copy of the filters' planes.
+fn removal_bytes(map: &MultiResolutionMap, voxels: &VoxelSet) -> u64 {
+    const OF_RECORD: usize = 3;
+    const OF_SHARD: usize = 36;
+    let count = voxels.len();
+    let planes = map.plane_bytes().min(count * 64);
+    (2 * voxels.blocks().len() * BLOCK_BYTES + count * OF_RECORD + count * OF_SHARD / SHARDS + planes) as u64
+}
+
+/// A block's key and mask.
+const BLOCK_BYTES: usize = size_of::<(VoxelKey, BlockMask)>();
 
 fn in_range(key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
     let range = INDEX_MIN >> level..=INDEX_MAX >> level;

@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use parking_lot::Mutex;
 use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
@@ -17,8 +16,9 @@ use super::{
     VoxelListing, check_not_stopped,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{MapName, MultiResolutionMap, Region, RobotName, TrajectoryPose};
+use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName, TrajectoryPose};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError};
+use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
 use crate::voxel::{LatticeFromPoints, VoxelKey};
 
@@ -77,7 +77,7 @@ impl HostedMap {
             folder,
             committing,
             announced,
-            turns: Mutex::default(),
+            turns: Mutex::new(Rank::Brief, HashMap::new()),
             is_put_off: AtomicBool::default(),
         })
     }
@@ -181,8 +181,29 @@ impl HostedMap {
         Err(ServiceError::new(ErrorCode::FailedPrecondition, "map_replaced", message))
     }
 
+    /// Answers a query. One of many points keeps changes from beginning meanwhile, so that no shorter one queues behind
+    /// a change that waits for it.
     pub(super) fn query(
         &self,
+        query: &PointQuery,
+        stop: StopSignal<'_>,
+    ) -> Result<PointAnswer, ServiceError> {
+        let points = query.points.as_slice();
+        let _long_read = (points.len() > POINTS_PER_STEP).then(|| self.map.long_read());
+        let view = self.map.view_of(points, &query.map_from_points.unwrap_or_else(Pose::identity));
+        self.query_in(view, query, stop)
+    }
+
+    /// Answers a query where it need not wait for a lock.
+    pub(super) fn try_query(&self, query: &PointQuery) -> Option<Result<PointAnswer, ServiceError>> {
+        let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
+        let view = self.map.try_view_of(query.points.as_slice(), &map_from_points)?;
+        Some(self.query_in(view, query, StopSignal::NEVER))
+    }
+
+    fn query_in(
+        &self,
+        view: MapView<'_>,
         query: &PointQuery,
         stop: StopSignal<'_>,
     ) -> Result<PointAnswer, ServiceError> {
@@ -190,7 +211,6 @@ impl HostedMap {
         let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
         let quantise = self.map.lattice().from_points(&map_from_points);
         let mut occupied = vec![0; points.len().div_ceil(64)];
-        let view = self.map.view_of(points, &map_from_points);
         let mut all_have_a_voxel = true;
         for (points, words) in points.chunks(POINTS_PER_STEP).zip(occupied.chunks_mut(POINTS_PER_STEP / 64)) {
             check_not_stopped(stop)?;
@@ -228,7 +248,8 @@ impl HostedMap {
         most: usize,
         stop: StopSignal<'_>,
     ) -> Result<VoxelListing, ServiceError> {
-        let view = self.map.view();
+        let long_read = self.map.long_read();
+        let view = long_read.view();
         let by_shard: Box<dyn Iterator<Item = Vec<VoxelKey>>> = match region {
             Some(region) => Box::new(view.voxels_by_shard(region, level)),
             None => Box::new(view.lists(level).map(|list| list.iter().collect())),
@@ -255,7 +276,7 @@ impl HostedMap {
     }
 
     pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
-        let described = self.map.describe(rate_samples, RATE_SEED);
+        let (described, storage) = (self.map.describe(rate_samples, RATE_SEED), self.storage());
         let trajectory = self.map.trajectory();
         MapInfo {
             name: self.name.clone(),
@@ -266,7 +287,7 @@ impl HostedMap {
             robots: trajectory.robots(),
             set_bytes: described.set_bytes,
             moment_bytes: described.moment_bytes,
-            storage: self.storage(),
+            storage,
         }
     }
 

@@ -55,7 +55,7 @@ impl HostedMap {
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
         let prepared = Prepared { change, record, if_empty: placement.as_first, turn, promise };
-        let outcome = self.committing.propose(Proposal::Prepared(prepared.into()));
+        let outcome = self.committing.propose(Proposal::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let answer = ScanAnswer { points_skipped, ..answer };
         Ok(Step::Proposed(outcome, Box::new(move |committed| map.committed(answer, committed))))
@@ -102,7 +102,9 @@ impl HostedMap {
         let all = scan.request.points.as_slice();
         let mut words = vec![0; all.len().div_ceil(64)];
         let quantise = self.map.lattice().from_points(map_from_sensor);
-        self.map.view().query(all, &quantise, level, Lookup::Exact, &mut words);
+        let long_read = self.map.long_read();
+        long_read.view().query(all, &quantise, level, Lookup::Exact, &mut words);
+        drop(long_read);
         for (word, points) in words.iter_mut().zip(all.chunks(64)) {
             let counts = |(i, &point): (usize, &Point)| u64::from(scan.counts(point)) << i;
             *word = !*word & points.iter().enumerate().map(counts).sum::<u64>();
@@ -111,10 +113,13 @@ impl HostedMap {
         Foreground { bitmap: bitmap(words, all.len()), points }
     }
 
-    /// True of a scan whose id was accepted before: it adds nothing.
-    pub(super) fn knows(&self, request: &ScanRequest) -> bool {
-        let accepted = |scan_id| self.map.trajectory().find(&request.robot, scan_id).is_some();
-        request.scan_id.is_some_and(accepted)
+    /// True of a scan whose id was not accepted before, so that it may add something. Does not wait: while the
+    /// trajectory changes it says false, and who then aligns the scan finds out.
+    pub(super) fn is_new(&self, request: &ScanRequest) -> bool {
+        let Some(trajectory) = self.map.try_trajectory() else {
+            return false;
+        };
+        request.scan_id.is_none_or(|scan_id| trajectory.find(&request.robot, scan_id).is_none())
     }
 
     /// The first answer again, where this scan was accepted before.
@@ -163,9 +168,9 @@ impl HostedMap {
     /// The pose that a guess stands for.
     fn resolve(&self, request: &ScanRequest, first: bool) -> Result<Pose, ServiceError> {
         let ScanRequest { guess, robot, timestamp_ns, .. } = request;
-        let last = || self.map.trajectory().last_of(robot).map(|pose| pose.map_from_sensor);
-        let last_or_origin = || match last() {
-            Some(pose) => Ok(pose),
+        let trajectory = self.map.trajectory();
+        let last_or_origin = || match trajectory.last_of(robot) {
+            Some(pose) => Ok(pose.map_from_sensor),
             None if first => Ok(Pose::identity()),
             None => {
                 let message = format!(
@@ -179,7 +184,7 @@ impl HostedMap {
             Guess::Pose(map_from_sensor) => Ok(*map_from_sensor),
             Guess::Last => last_or_origin(),
             Guess::Motion(last_from_sensor) => Ok(last_or_origin()? * last_from_sensor),
-            Guess::ConstantVelocity => match self.map.trajectory().last_two_of(robot) {
+            Guess::ConstantVelocity => match trajectory.last_two_of(robot) {
                 Some((last, before)) => Ok(constant_velocity(before, last, *timestamp_ns)),
                 None => last_or_origin(),
             },

@@ -8,6 +8,7 @@ use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
 use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError};
 use crate::map::{MapName, MapSettings};
+use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
 
 /// Absent neighbours of occupied voxels on which a description measures each level's false positives.
@@ -125,6 +126,6 @@ impl MapService {
 async fn to_its_end<T: Send + 'static>(
     change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
 ) -> Result<T, ServiceError> {
-    let done = tokio::spawn(change).await;
+    let done = tokio::spawn(polled_by_runtime(change)).await;
     done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
 }

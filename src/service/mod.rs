@@ -71,7 +71,7 @@ struct Inner {
     mapping: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
-    room: Room,
+    room: Arc<Room>,
 }
 
 impl MapService {
@@ -89,7 +89,7 @@ impl MapService {
             queries: Pool::new("query", settings.query_threads, waiting)?,
             mapping: Pool::new("mapping", settings.mapping_threads, waiting)?,
             localization: Pool::new("localization", settings.localization_threads, waiting)?,
-            room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()),
+            room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
             settings,
         };
         Ok(Self { inner: Arc::new(inner), reach: MapReach::Every })
@@ -140,8 +140,10 @@ impl MapService {
         if let Some(revision) = query.min_revision {
             map.reached(revision, self.limits().min_revision_wait_max).await?;
         }
-        if query.points.len() <= pool::INLINE_POINTS {
-            return map.query(&query, StopSignal::NEVER);
+        if query.points.len() <= pool::INLINE_POINTS
+            && let Some(answer) = map.try_query(&query)
+        {
+            return answer;
         }
         self.inner.queries.run(move |stop| map.query(&query, stop)).await?
     }
@@ -155,7 +157,7 @@ impl MapService {
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
-        if !map.knows(&scan) {
+        if map.is_new(&scan) {
             self.inner.room.check_to_grow()?;
         }
         let turn = Arc::new(map.turn_of(&scan.robot).await);

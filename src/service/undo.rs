@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::committing::{Proposal, Refusal, Step};
+use super::committing::{Decided, Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
@@ -43,7 +43,6 @@ impl HostedMap {
 
         let (map, count) = (Arc::clone(self), scans.len());
         let decide = move |core: &MultiResolutionMap| {
-            let _until_decided = lent;
             map.still_unanswered(request.as_ref())?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
@@ -51,9 +50,10 @@ impl HostedMap {
             folder.observe(&mut observations, seen, StopSignal::NEVER).map_err(unreadable)?;
             let voxels = observations.held_by_targets_alone();
             let moments = observations.moments_without_targets();
-            Ok(Some(Change::Undo(UndoRecord { scans, voxels, moments, request })))
+            let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
+            Ok(Some(Decided { change, lent: Some(lent) }))
         };
-        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)));
+        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |Committed { revision, voxels: removed }| UndoAnswer {
             scans: count,

@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{oneshot, watch};
 
-use super::{Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Turn, Waiting, record_of};
+use super::{
+    Decided, Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Turn, Waiting, record_of,
+};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
@@ -23,13 +25,14 @@ pub(super) struct Worker {
     unsynced: Option<Instant>,
 }
 
-/// A change that is decided, with its record and the one who waits.
-struct Decided {
+/// A change to be made, with its record and the one who waits.
+struct Pending {
     change: Change,
     record: Option<Record>,
     answer: oneshot::Sender<Outcome>,
     /// Kept until the change is visible.
-    _held: Option<(Turn, Promise)>,
+    _turn: Option<Turn>,
+    _memory: Option<Promise>,
 }
 
 impl Worker {
@@ -81,7 +84,7 @@ impl Worker {
                             continue;
                         }
                     }
-                    group.push(Decided { change, record, answer, _held: Some((turn, promise)) });
+                    group.push(Pending { change, record, answer, _turn: Some(turn), _memory: Some(promise) });
                 }
                 Proposal::Undecided(decide) => {
                     self.commit_group(&mut group);
@@ -93,34 +96,36 @@ impl Worker {
         self.commit_group(&mut group);
     }
 
-    fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Decided>) {
+    fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {
         let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
         let decided = || match decide(&self.map)? {
-            Some(change) => {
-                let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
-                Ok(Some((change, record)))
+            Some(decided) => {
+                let record = self.folder.as_ref().map(|_| record_of(&decided.change)).transpose()?;
+                Ok(Some((decided, record)))
             }
             None => Ok(None),
         };
         match decided() {
-            Ok(Some((change, record))) => group.push(Decided { change, record, answer, _held: None }),
+            Ok(Some((Decided { change, lent }, record))) => {
+                group.push(Pending { change, record, answer, _turn: None, _memory: lent });
+            }
             Ok(None) => drop(answer.send(Ok(unchanged))),
             Err(refusal) => drop(answer.send(Err(refusal))),
         }
     }
 
     /// Durable, then visible, then acknowledged.
-    fn commit_group(&mut self, group: &mut Vec<Decided>) {
+    fn commit_group(&mut self, group: &mut Vec<Pending>) {
         if group.is_empty() {
             return;
         }
         if let Err(error) = self.journal(group) {
-            for Decided { answer, .. } in group.drain(..) {
+            for Pending { answer, .. } in group.drain(..) {
                 drop(answer.send(Err(Refusal::Failed(error.clone()))));
             }
             return;
         }
-        for Decided { change, answer, .. } in group.drain(..) {
+        for Pending { change, answer, .. } in group.drain(..) {
             let committed = self.map.committer().apply(&change);
             debug_assert_ne!(committed.revision, *self.announced.borrow(), "every record makes a revision");
             self.announced.send_replace(committed.revision);
@@ -129,14 +134,14 @@ impl Worker {
     }
 
     /// Appends a group and, where that is asked for, syncs it.
-    fn journal(&mut self, group: &[Decided]) -> Result<(), ServiceError> {
+    fn journal(&mut self, group: &[Pending]) -> Result<(), ServiceError> {
         if let Some(stop) = self.stopped.get() {
             return Err(stop.refusal(&self.name));
         }
         let Some(folder) = &self.folder else {
             return Ok(());
         };
-        let records: Vec<&Record> = group.iter().filter_map(|decided| decided.record.as_ref()).collect();
+        let records: Vec<&Record> = group.iter().filter_map(|pending| pending.record.as_ref()).collect();
         let durable = folder.append(&records).and_then(|_| match folder.settings().durability {
             Durability::Always => folder.sync(),
             Durability::Interval(_) => Ok(()),
