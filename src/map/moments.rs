@@ -111,7 +111,9 @@ impl MomentShard {
         match lost {
             MomentsLost::Everything => *self = Self::default(),
             MomentsLost::Some { gone, rebuilt } => {
-                gone.iter().for_each(|voxel| drop(self.0.remove(voxel)));
+                for voxel in gone {
+                    self.0.remove(voxel);
+                }
                 self.set(rebuilt);
             }
         }
