@@ -1,12 +1,17 @@
 //! Eight clients at once, over both protocols, on overlapping regions of one map: what they were told is what a
 //! serial replay gives.
 //!
-//! Runs for `MROL_STRESS_SECONDS` (3 where not set; CI takes 60).
+//! Runs for `MROL_STRESS_SECONDS` (3 where not set; CI takes 60). With the feature `deadlock_detection` it fails as soon as
+//! threads wait for each other in a circle; without, once nothing has moved for a while.
 
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+#[path = "../common/mod.rs"]
 mod common;
+mod newcomers;
+#[path = "../watchdog/mod.rs"]
+mod watchdog;
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -23,10 +28,13 @@ use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
+use watchdog::{Beat, Watchdog};
 
 const MAP: &str = "shared";
 const RESOLUTION_M: f64 = 0.1;
 const LEVELS: u32 = 4;
+/// How long nothing may happen.
+const STILL_MAX: Duration = Duration::from_secs(20);
 
 /// What a client did and was told.
 enum Event {
@@ -84,13 +92,14 @@ fn guess(random: &mut ChaCha8Rng) -> Pose {
 }
 
 /// One client over gRPC.
-async fn grpc_client(url: String, seed: u64, end: Instant) -> History {
+async fn grpc_client(url: String, seed: u64, end: Instant, heart: Beat) -> History {
     let client = Client::connect(&url).await.expect("a connection");
     let map = MapName::new(MAP).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut history = History::new();
     let mut scan_id = 0;
     while Instant::now() < end {
+        heart.beat();
         let event = match random.random_range(0..10) {
             0..3 => {
                 scan_id += 1;
@@ -136,7 +145,7 @@ async fn grpc_client(url: String, seed: u64, end: Instant) -> History {
 }
 
 /// One client over HTTP.
-async fn http_client(base: String, seed: u64, end: Instant) -> History {
+async fn http_client(base: String, seed: u64, end: Instant, heart: Beat) -> History {
     let client = reqwest::Client::new();
     let post = |path: &str, body: serde_json::Value| {
         let request = client.post(format!("{base}/v1/maps/{MAP}/{path}")).json(&body);
@@ -151,6 +160,7 @@ async fn http_client(base: String, seed: u64, end: Instant) -> History {
     let mut history = History::new();
     let mut scan_id = 0;
     while Instant::now() < end {
+        heart.beat();
         let event = match random.random_range(0..10) {
             0..3 => {
                 scan_id += 1;
@@ -272,12 +282,14 @@ async fn what_eight_clients_were_told_is_a_serial_history() {
     let url = format!("http://{}", daemon.grpc);
     daemon.make_map(MAP).await;
     let end = Instant::now() + Duration::from_secs(seconds());
+    let watchdog = Watchdog::begin(std::process::id(), STILL_MAX);
     let mut clients = tokio::task::JoinSet::new();
     for seed in 0..4 {
-        clients.spawn(grpc_client(url.clone(), seed, end));
-        clients.spawn(http_client(daemon.url(""), 100 + seed, end));
+        clients.spawn(grpc_client(url.clone(), seed, end, watchdog.heart()));
+        clients.spawn(http_client(daemon.url(""), 100 + seed, end, watchdog.heart()));
     }
     let history = clients.join_all().await.into_iter().flatten().collect();
+    drop(watchdog);
 
     let replayed = assert_serial(history);
     let expected: VoxelSet = replayed.view().voxels();

@@ -1,13 +1,15 @@
 //! `kill -9` at random moments under four writers, on the real program, round after round in one data folder: every
 //! acknowledged change is there after each restart, in its order, nothing is half applied, and the map is that of a
-//! plain model.
+//! plain model. Beside them a second map is deleted, made again and restored under its name all the time.
 //!
 //! Twenty rounds; `MROL_CRASH_ROUNDS=200 cargo test --test crash -- --nocapture` is the long form.
 
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+#[path = "../process/mod.rs"]
 mod process;
+mod remaker;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -22,6 +24,7 @@ use mrol::voxel::{Lattice, VoxelKey};
 use process::Process;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use remaker::Remaker;
 use tokio::sync::watch;
 
 const WRITERS: usize = 4;
@@ -208,10 +211,13 @@ impl Model {
 
 /// The newest of two or more snapshots.
 fn newest_snapshot(data: &Path) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(data.join("maps/office")).unwrap();
-    let paths = entries.map(|entry| entry.unwrap().path());
-    let mut snapshots: Vec<PathBuf> =
-        paths.filter(|path| path.extension().is_some_and(|extension| extension == "mrol")).collect();
+    let entries = |folder: &Path| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    // A map's folder bears its name, with or without the uuid after it.
+    let folder =
+        entries(&data.join("maps")).find(|path| path.file_stem().is_some_and(|stem| stem == "office"))?;
+    let mut snapshots: Vec<PathBuf> = entries(&folder)
+        .filter(|path| path.extension().is_some_and(|extension| extension == "mrol"))
+        .collect();
     snapshots.sort_unstable();
     (snapshots.len() > 1).then(|| snapshots.pop()).flatten()
 }
@@ -229,7 +235,7 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
     let folder = data.path().to_str().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut writers: Vec<Writer> = (0..WRITERS).map(Writer::new).collect();
-    let mut model = Model::default();
+    let (mut model, mut remaker) = (Model::default(), Remaker::new());
     let (mut unanswered, mut damaged) = (0, 0);
     for round in 0..rounds() {
         let server = Process::start(folder, if round % 4 == 3 { &WRITTEN[..] } else { &SYNCED });
@@ -247,16 +253,19 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
         let done = writers.iter_mut().flat_map(|writer| std::mem::take(&mut writer.done)).collect();
         model.follow(done);
         model.assert_equals(&client, round).await;
+        unanswered += remaker.settle(&client, round).await;
 
         let (tell, gone) = watch::channel(false);
         let working: Vec<_> =
             writers.drain(..).map(|writer| tokio::spawn(writer.work(client.clone(), gone.clone()))).collect();
+        let remaking = tokio::spawn(remaker.work(client.clone(), gone.clone()));
         tokio::time::sleep(Duration::from_millis(rng.random_range(20..900))).await;
         server.kill();
         tell.send_replace(true);
         for writer in working {
             writers.push(writer.await.unwrap());
         }
+        remaker = remaking.await.unwrap();
         if let Some(newest) = newest_snapshot(data.path()).filter(|_| round % 3 > 0) {
             damage(&newest);
             damaged += 1;
@@ -264,10 +273,13 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
     }
     println!(
         "{} rounds: {} changes, {} voxels, {unanswered} changes in flight when it was killed, {damaged} starts with a \
-         damaged snapshot",
+         damaged snapshot; {:?}",
         rounds(),
         model.revision,
-        model.holders.len()
+        model.holders.len(),
+        remaker.counts
     );
+    let remaker::Counts { created, restored, deleted, inserted } = remaker.counts;
+    assert!(created > 1 && restored > 1 && deleted > 1 && inserted > 1, "no map was made again");
     assert!(unanswered > 0 && damaged > 0, "{unanswered} unanswered, {damaged} damaged");
 }
