@@ -118,3 +118,85 @@ impl Probes {
         self.limits.health_watch_max
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn probes(change: impl FnOnce(&mut AdmissionLimits)) -> Probes {
+        let mut limits = AdmissionLimits::default();
+        change(&mut limits);
+        Probes::new(&limits)
+    }
+
+    fn post(body: Body) -> Request {
+        let mut request = Request::new(body);
+        *request.method_mut() = Method::POST;
+        request
+    }
+
+    fn endless() -> Request {
+        post(Body::from_stream(tokio_stream::pending::<Result<Bytes, axum::Error>>()))
+    }
+
+    async fn ask(probes: &Probes, operation: Operation, request: Request) -> Result<Response, ServiceError> {
+        probes.answer(operation, request, async |_| Ok(Response::new(Body::from("ok")))).await
+    }
+
+    #[tokio::test]
+    async fn the_body_of_a_check_is_small() {
+        let probes = probes(|limits| limits.probe_body_bytes_max = 8);
+        let of = |bytes| post(Body::from(vec![0; bytes]));
+        assert!(ask(&probes, Operation::HealthCheck, of(8)).await.is_ok());
+        let refused = ask(&probes, Operation::HealthCheck, of(9)).await.unwrap_err();
+        assert!(refused.message.contains("probe_body_bytes_max is 8"), "{refused}");
+        assert_eq!(refused.code, ErrorCode::InvalidArgument);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_body_of_a_check_comes_in_time() {
+        let start = tokio::time::Instant::now();
+        let refused = ask(&probes(|_| {}), Operation::HealthCheck, endless()).await.unwrap_err();
+        assert_eq!((refused.code, start.elapsed().as_secs()), (ErrorCode::DeadlineExceeded, 5));
+        assert!(refused.message.contains("probe_time_max_s is 5"), "{refused}");
+    }
+
+    #[tokio::test]
+    async fn where_all_places_are_taken_the_oldest_check_gives_way() {
+        let probes = probes(|limits| limits.probes_max = 1);
+        let check = || ask(&probes, Operation::HealthCheck, endless());
+        let newcomer = async {
+            tokio::time::sleep(Duration::from_millis(2)).await;
+            ask(&probes, Operation::Live, Request::new(Body::empty())).await
+        };
+        let (old, new) = tokio::join!(check(), newcomer);
+        assert!(old.unwrap_err().message.contains("probes_max is 1"));
+        assert!(new.is_ok());
+    }
+
+    #[tokio::test]
+    async fn watches_are_few_and_one_a_connection() {
+        let probes = probes(|limits| limits.health_watches_max = 2);
+        let connections = [OfConnection::new(false), OfConnection::new(false), OfConnection::new(false)];
+        let watch = async |connection: &OfConnection| {
+            let mut request = post(Body::empty());
+            request.extensions_mut().insert(connection.clone());
+            ask(&probes, Operation::HealthWatch, request).await
+        };
+        let first = watch(&connections[0]).await.unwrap();
+        let again = watch(&connections[0]).await.unwrap_err();
+        assert!(again.message.contains("health watches of one connection is 1"), "{again}");
+        let second = watch(&connections[1]).await.unwrap();
+        let refused = watch(&connections[2]).await.unwrap_err();
+        assert!(refused.message.contains("health_watches_max is 2"), "{refused}");
+        drop((first, second));
+        assert!(watch(&connections[2]).await.is_ok() && watch(&connections[0]).await.is_ok());
+    }
+
+    #[test]
+    fn what_was_taken_for_health_answers_nothing_else() {
+        let (reserved, usual) = (OfConnection::new(true), OfConnection::new(false));
+        assert!(reserved.check(true).is_ok() && usual.check(false).is_ok());
+        assert!(reserved.check(false).unwrap_err().message.contains("connections_reserved"));
+    }
+}

@@ -31,7 +31,9 @@ async fn map_files_that_become_much_when_they_are_restored() {
     for (what, said) in restore_all(&format!("http://{}", siege.http()), &hostile_files()).await {
         println!("{what}: {said}");
         let reasons = ["bad_map_file", "map_full", "memory_full"];
-        assert!(reasons.iter().any(|reason| said.contains(reason)), "{what}: {said}");
+        // What a newer version wrote is left out: a small map.
+        let is_fine = what == "unknown fields" && said.starts_with("201");
+        assert!(is_fine || reasons.iter().any(|reason| said.contains(reason)), "{what}: {said}");
     }
     siege.end().await;
 }
