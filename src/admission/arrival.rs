@@ -11,9 +11,6 @@ use super::bodies::{Bodies, Charge};
 use super::quota::{Quota, Taken};
 use crate::service::{ErrorCode, ServiceError};
 
-/// A body that was silent for less than this gives way to nobody: it may be on a slow path.
-const GRACE: Duration = Duration::from_secs(1);
-
 /// What is known of a body.
 #[derive(Debug)]
 pub(super) struct Body {
@@ -64,17 +61,10 @@ impl Body {
         (arriving && self.left_alone.is_none()).then(|| self.in_time.elapsed())
     }
 
-    /// The same where that is long enough for others to go first.
-    pub(super) fn gives_way_after(&self) -> Option<Duration> {
-        self.silence().filter(|silence| *silence >= GRACE)
-    }
-
-    /// For how long the answer to it has waited to be read, where that is long enough for others to go first.
+    /// For how long the answer to it has waited to be read.
     pub(super) fn unread_for(&self) -> Option<Duration> {
         match self.state {
-            State::Complete { unread: Some(since), .. } => {
-                Some(since.elapsed()).filter(|wait| *wait >= GRACE)
-            }
+            State::Complete { unread: Some(since), .. } => Some(since.elapsed()),
             _ => None,
         }
     }

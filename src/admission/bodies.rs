@@ -13,6 +13,9 @@ use super::limits::AdmissionLimits;
 use super::quota::Quota;
 use crate::service::{ErrorCode, ServiceError};
 
+/// A body of a request that was silent for less than this gives way to nobody: it may be on a slow path.
+const GRACE: Duration = Duration::from_secs(1);
+
 /// The reason of a body that was ended for its silence.
 pub const BODY_SILENT: &str = "body_silent";
 
@@ -20,9 +23,21 @@ pub const BODY_SILENT: &str = "body_silent";
 #[derive(Debug, Clone)]
 pub(super) struct Bodies(Arc<Inner>);
 
+/// Bounds on the bodies of some kind of requests.
+#[derive(Debug, Clone)]
+struct Bounds {
+    /// The limit on requests, by its name.
+    requests: (&'static str, usize),
+    bytes_max: usize,
+    silence_max: Duration,
+    bytes_per_s_min: u32,
+    /// A body that was silent for less than this gives way to nobody.
+    grace: Duration,
+}
+
 #[derive(Debug)]
 struct Inner {
-    limits: AdmissionLimits,
+    limits: Bounds,
     /// Of requests whose bodies have arrived.
     requests: Quota,
     known: Mutex<Known>,
@@ -47,9 +62,32 @@ pub struct Charge {
 }
 
 impl Bodies {
+    /// Those of requests that work is done for.
     pub(super) fn new(limits: &AdmissionLimits) -> Self {
-        let requests = Quota::new("requests_max", limits.requests_max);
-        Self(Arc::new(Inner { limits: limits.clone(), requests, known: Mutex::default() }))
+        Self::within(Bounds {
+            requests: ("requests_max", limits.requests_max),
+            bytes_max: limits.body_bytes_max,
+            silence_max: limits.body_silence_max,
+            bytes_per_s_min: limits.body_bytes_per_s_min,
+            grace: GRACE,
+        })
+    }
+
+    /// Those of probes, of which the limit `name` allows `most`. Each is small and comes at once, so that the one that has
+    /// waited for longest gives way, however short that was: nobody fills all places and keeps them.
+    pub(super) fn of_probes(limits: &AdmissionLimits, name: &'static str, most: usize) -> Self {
+        Self::within(Bounds {
+            requests: (name, most),
+            bytes_max: usize::MAX,
+            silence_max: limits.probe_time_max,
+            bytes_per_s_min: u32::MAX,
+            grace: Duration::ZERO,
+        })
+    }
+
+    fn within(limits: Bounds) -> Self {
+        let (name, most) = limits.requests;
+        Self(Arc::new(Inner { requests: Quota::new(name, most), limits, known: Mutex::default() }))
     }
 
     /// A body begins to arrive.
@@ -59,8 +97,8 @@ impl Bodies {
     pub(super) fn begin(&self, is_stream: bool, hang_up: Option<HangUp>) -> Result<Arrival, ServiceError> {
         let mut known = self.0.known.lock();
         if !is_stream {
-            let full = known.arriving >= self.0.limits.requests_max;
-            if full && !known.end_most_silent(None, &self.0.requests.refusal()) {
+            let full = known.arriving >= self.0.limits.requests.1;
+            if full && !known.end_most_silent(None, self.0.limits.grace, &self.0.requests.refusal()) {
                 return Err(self.0.requests.refusal());
             }
             known.arriving += 1;
@@ -84,7 +122,7 @@ impl Bodies {
 
     /// How long so many bytes may take.
     fn time_of(&self, bytes: usize) -> Duration {
-        match self.0.limits.body_bytes_per_s_min {
+        match self.0.limits.bytes_per_s_min {
             0 => Duration::MAX,
             least => Duration::from_secs_f64(bytes as f64 / f64::from(least)),
         }
@@ -108,7 +146,7 @@ impl Bodies {
     pub(super) fn complete(&self, number: u64) -> Result<(), ServiceError> {
         let mut known = self.0.known.lock();
         if self.0.requests.is_full() {
-            known.hang_up_on_least_read(&self.0.requests.refusal());
+            known.hang_up_on_least_read(self.0.limits.grace, &self.0.requests.refusal());
         }
         known.change(number, |body| body.complete(&self.0.requests)).unwrap_or(Ok(()))
     }
@@ -154,8 +192,7 @@ impl Bodies {
 
     /// Ends the bodies that have been silent for longer than they may.
     pub(super) fn end_silent(&self) {
-        let AdmissionLimits { body_silence_max: silence_max, body_bytes_per_s_min: least, .. } =
-            self.0.limits;
+        let Bounds { silence_max, bytes_per_s_min: least, .. } = self.0.limits;
         let message = format!(
             "body_silence_max is {silence_max:?}, body_bytes_per_s_min is {least}: nothing more of the body came, or too slowly"
         );
@@ -176,14 +213,14 @@ impl Bodies {
 
     /// Ends silent bodies other than `own` until there is room for `bytes`.
     fn make_room(&self, known: &mut Known, own: Option<u64>, bytes: usize) -> Result<(), ServiceError> {
-        let most = self.0.limits.body_bytes_max;
+        let most = self.0.limits.bytes_max;
         let refusal = || {
             ServiceError::overloaded(format!(
                 "body_bytes_max is {most}: other requests hold that much, try again"
             ))
         };
         while known.bytes.saturating_add(bytes) > most {
-            if !known.end_most_silent(own, &refusal()) {
+            if !known.end_most_silent(own, self.0.limits.grace, &refusal()) {
                 return Err(refusal());
             }
         }
@@ -194,9 +231,11 @@ impl Bodies {
 impl Known {
     /// Ends the body that has been silent for longest and is not `own`; false where there is none. What it had in memory
     /// is free.
-    fn end_most_silent(&mut self, own: Option<u64>, refusal: &ServiceError) -> bool {
+    fn end_most_silent(&mut self, own: Option<u64>, grace: Duration, refusal: &ServiceError) -> bool {
         let others = self.bodies.iter().filter(|(number, _)| Some(**number) != own);
-        let silent = others.filter_map(|(&number, body)| Some((body.gives_way_after()?, number)));
+        let silent = others.filter_map(|(&number, body)| {
+            Some((body.silence().filter(|silence| *silence >= grace)?, number))
+        });
         let Some((_, number)) = silent.max() else {
             return false;
         };
@@ -205,8 +244,9 @@ impl Known {
     }
 
     /// Ends the request whose answer has waited to be read for longest, with its connection; if there is one.
-    fn hang_up_on_least_read(&mut self, refusal: &ServiceError) {
-        let unread = self.bodies.iter().filter_map(|(&number, body)| Some((body.unread_for()?, number)));
+    fn hang_up_on_least_read(&mut self, grace: Duration, refusal: &ServiceError) {
+        let unread_for = |body: &Body| body.unread_for().filter(|wait| *wait >= grace);
+        let unread = self.bodies.iter().filter_map(|(&number, body)| Some((unread_for(body)?, number)));
         if let Some((_, number)) = unread.max() {
             self.change(number, |body| {
                 body.end(refusal.clone());

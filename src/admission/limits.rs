@@ -21,6 +21,21 @@ pub struct AdmissionLimits {
     pub caller_requests_per_s_max: u32,
     /// As many may come at once. 100.
     pub caller_burst_max: u32,
+    /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are taken,
+    /// the oldest gives way. 64.
+    pub probes_max: usize,
+    /// Bytes of the body of a health check, which comes as it is: nothing is inflated. 1 KiB.
+    pub probe_body_bytes_max: usize,
+    /// How long the body of a health check may take. 5 s.
+    pub probe_time_max: Duration,
+    /// Scrapes of the metrics that wait or are being read. 16.
+    pub scrapes_max: usize,
+    /// How long the text of a scrape answers those that follow. 1 s.
+    pub scrape_kept: Duration,
+    /// Calls of `grpc.health.v1.Health/Watch`, one a connection. 16.
+    pub health_watches_max: usize,
+    /// How long one of them lasts that came without a key. 600 s.
+    pub health_watch_max: Duration,
 }
 
 impl Default for AdmissionLimits {
@@ -33,6 +48,13 @@ impl Default for AdmissionLimits {
             body_bytes_per_s_min: 1024,
             caller_requests_per_s_max: 0,
             caller_burst_max: 100,
+            probes_max: 64,
+            probe_body_bytes_max: 1 << 10,
+            probe_time_max: Duration::from_secs(5),
+            scrapes_max: 16,
+            scrape_kept: Duration::from_secs(1),
+            health_watches_max: 16,
+            health_watch_max: Duration::from_secs(600),
         }
     }
 }

@@ -7,34 +7,43 @@
 //!
 //! A request counts as one in work when its body has arrived, so that nobody keeps others out by sending slowly. Bodies
 //! count by the bytes that have come, not by what was declared; where there is no room for more, the one that has been
-//! silent for longest gives way. Probes pass by all of this.
+//! silent for longest gives way.
+//!
+//! Probes need no key and are answered whatever else is done, so they have limits of their own: small bodies that come at
+//! once (`probes_max`, `probe_body_bytes_max`, `probe_time_max`), few scrapes (`scrapes_max`) and few watches
+//! (`health_watches_max`).
 
 mod arrival;
 mod bodies;
 mod held_body;
 mod limits;
 mod metered_body;
+mod of_connection;
+mod probes;
 mod quota;
 mod rate;
 
 pub use arrival::{Arrival, HangUp};
 pub use bodies::{BODY_SILENT, Charge};
 pub use limits::AdmissionLimits;
+pub use of_connection::OfConnection;
 pub use rate::{Asking, Peer};
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use axum::body::Body;
+use axum::body::{Body, HttpBody};
 use axum::extract::Request;
-use axum::http::Method;
+use axum::http::{Extensions, Method};
 use axum::response::Response;
 
-use crate::access::Operation;
+use crate::access::{Authorized, Operation};
 use crate::lifecycle::Lifecycle;
 use crate::service::ServiceError;
 use bodies::Bodies;
 use held_body::HeldBody;
 use metered_body::MeteredBody;
+use probes::Probes;
 use quota::Quota;
 use rate::Rates;
 
@@ -48,6 +57,16 @@ struct Inner {
     rates: Option<Rates>,
     streams: Quota,
     bodies: Bodies,
+    probes: Probes,
+}
+
+/// An answer of no more bytes than this is not counted: `requests_max` bounds how many there are.
+const SMALL_ANSWER_BYTES: usize = 16 << 10;
+
+/// Memory of an answer, which is given back when that is sent. A clone is the same memory.
+#[derive(Debug, Clone)]
+struct Kept {
+    _charge: Arc<Charge>,
 }
 
 /// How much of what is limited is in use.
@@ -71,6 +90,7 @@ impl Admission {
             rates: Rates::new(limits),
             streams: Quota::new("streams_max", limits.streams_max),
             bodies: Bodies::new(limits),
+            probes: Probes::new(limits),
         }))
     }
 
@@ -88,11 +108,11 @@ impl Admission {
     where
         F: Future<Output = Result<Response, ServiceError>>,
     {
-        let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
+        self.check_connection(operation, &request)?;
         if operation.is_probe() {
-            let response = handle(request).await?;
-            return Ok(response.map(|body| Body::new(HeldBody::new(body, None, place))));
+            return self.0.probes.answer(operation, request, handle).await;
         }
+        let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
         if let Some(rates) = &self.0.rates {
             rates.check(&Asking::of(request.extensions()))?;
         }
@@ -100,13 +120,32 @@ impl Admission {
         let arrival = self.0.bodies.begin(operation.is_stream(), hang_up)?;
         let request = Self::metered(request, &arrival)?;
         let answered = self.0.lifecycle.admit(handle(request)).await?;
-        let response = arrival.refusal().map_or(answered, Err)?;
+        let mut response = arrival.refusal().map_or(answered, Err)?;
+        let kept = self.kept_for(&mut response)?;
         // Streams are told that the server is going down; other answers are waited for.
         let held = (!operation.is_stream()).then(|| self.0.lifecycle.hold());
         if held.is_some() {
             drop(arrival.take());
         }
-        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, held)))))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, held, kept)))))
+    }
+
+    /// Notes that a key came by a connection, and keeps to health what was taken for it.
+    fn check_connection(&self, operation: Operation, request: &Request) -> Result<(), ServiceError> {
+        let Some(connection) = request.extensions().get::<OfConnection>() else { return Ok(()) };
+        let authorized = request.extensions().get::<Authorized>();
+        if authorized.is_some_and(|authorized| authorized.caller.name().is_some()) {
+            connection.show_key();
+        }
+        connection.check(operation.is_probe() && operation != Operation::Metrics)
+    }
+
+    /// Memory that an answer takes: what its handler says, or the bytes of a body that is there as a whole.
+    fn kept_for(&self, response: &mut Response) -> Result<(Option<Kept>, Option<Charge>), ServiceError> {
+        let said = response.extensions_mut().remove::<Kept>();
+        let bytes = HttpBody::size_hint(response.body()).exact().unwrap_or_default() as usize;
+        let whole = (said.is_none() && bytes > SMALL_ANSWER_BYTES).then(|| self.keep(bytes)).transpose()?;
+        Ok((said, whole))
     }
 
     /// Lets the next message of a stream in.
@@ -128,6 +167,28 @@ impl Admission {
     /// `ResourceExhausted` when there is no room.
     pub fn keep(&self, bytes: usize) -> Result<Charge, ServiceError> {
         self.0.bodies.charge(bytes)
+    }
+
+    /// [`Admission::keep`] for an answer that is not made of pieces; it goes with its `extensions`. Small ones are not
+    /// counted.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn keep_with_answer(&self, bytes: usize, extensions: &mut Extensions) -> Result<(), ServiceError> {
+        if bytes > SMALL_ANSWER_BYTES {
+            extensions.insert(Kept { _charge: self.keep(bytes)?.into() });
+        }
+        Ok(())
+    }
+
+    /// How long the text of a scrape answers those that follow.
+    pub fn scrape_kept(&self) -> Duration {
+        self.0.probes.scrape_kept()
+    }
+
+    /// How long a health watch without a key lasts.
+    pub fn health_watch_max(&self) -> Duration {
+        self.0.probes.watch_max()
     }
 
     /// Ends what has been silent for too long, and forgets callers who have not come for a while; to be called now and

@@ -17,6 +17,9 @@ pub struct LimitsConfig {
     /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle, it
     /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
     pub connections_max: usize,
+    /// Connections of each protocol besides, where all of those are in use: for health checks alone, and for
+    /// `probe_time_max_s` at most. Where all of these are taken too, the oldest gives way. 16.
+    pub connections_reserved: usize,
     /// Seconds until a connection has to be secure and to begin to speak. 10.
     pub connection_opening_max_s: f64,
     /// Seconds that an HTTP connection may stay without a request, or take for a request's headers. 30.
@@ -37,6 +40,20 @@ pub struct LimitsConfig {
     pub caller_requests_per_s_max: u32,
     /// See [`AdmissionLimits::caller_burst_max`].
     pub caller_burst_max: u32,
+    /// See [`AdmissionLimits::probes_max`].
+    pub probes_max: usize,
+    /// See [`AdmissionLimits::probe_body_bytes_max`].
+    pub probe_body_bytes_max: usize,
+    /// See [`AdmissionLimits::probe_time_max`]; seconds.
+    pub probe_time_max_s: f64,
+    /// See [`AdmissionLimits::scrapes_max`].
+    pub scrapes_max: usize,
+    /// See [`AdmissionLimits::scrape_kept`]; seconds.
+    pub scrape_kept_s: f64,
+    /// See [`AdmissionLimits::health_watches_max`].
+    pub health_watches_max: usize,
+    /// See [`AdmissionLimits::health_watch_max`]; seconds.
+    pub health_watch_max_s: f64,
     /// See [`Limits::points_per_request_max`].
     pub points_per_request_max: usize,
     /// See [`Limits::keys_per_request_max`].
@@ -51,6 +68,8 @@ pub struct LimitsConfig {
     pub jobs_waiting_max: usize,
     /// See [`Limits::map_file_bytes_max`].
     pub map_file_bytes_max: usize,
+    /// See [`Limits::map_file_scans_max`].
+    pub map_file_scans_max: usize,
     /// See [`Limits::min_revision_wait_max`]; seconds.
     pub min_revision_wait_max_s: f64,
     /// See [`Limits::localization_time_max`]; seconds.
@@ -76,6 +95,7 @@ impl Default for LimitsConfig {
         Self {
             message_bytes_max: crate::wire::transport::MESSAGE_BYTES_MAX,
             connections_max: 2048,
+            connections_reserved: 16,
             connection_opening_max_s: 10.0,
             http_idle_max_s: 30.0,
             grpc_idle_max_s: 600.0,
@@ -86,6 +106,13 @@ impl Default for LimitsConfig {
             body_bytes_per_s_min: admission.body_bytes_per_s_min,
             caller_requests_per_s_max: admission.caller_requests_per_s_max,
             caller_burst_max: admission.caller_burst_max,
+            probes_max: admission.probes_max,
+            probe_body_bytes_max: admission.probe_body_bytes_max,
+            probe_time_max_s: admission.probe_time_max.as_secs_f64(),
+            scrapes_max: admission.scrapes_max,
+            scrape_kept_s: admission.scrape_kept.as_secs_f64(),
+            health_watches_max: admission.health_watches_max,
+            health_watch_max_s: admission.health_watch_max.as_secs_f64(),
             points_per_request_max: limits.points_per_request_max,
             keys_per_request_max: limits.keys_per_request_max,
             maps_max: limits.maps_max,
@@ -93,6 +120,7 @@ impl Default for LimitsConfig {
             listed_voxels_max: limits.listed_voxels_max,
             jobs_waiting_max: limits.jobs_waiting_max,
             map_file_bytes_max: limits.map_file_bytes_max,
+            map_file_scans_max: limits.map_file_scans_max,
             min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
             localization_time_max_s: limits.localization_time_max.as_secs_f64(),
             localization_candidates_max: limits.localization_candidates_max,
@@ -116,6 +144,13 @@ impl LimitsConfig {
             body_bytes_per_s_min: self.body_bytes_per_s_min,
             caller_requests_per_s_max: self.caller_requests_per_s_max,
             caller_burst_max: self.caller_burst_max,
+            probes_max: self.probes_max,
+            probe_body_bytes_max: self.probe_body_bytes_max,
+            probe_time_max: Duration::from_secs_f64(self.probe_time_max_s),
+            scrapes_max: self.scrapes_max,
+            scrape_kept: Duration::from_secs_f64(self.scrape_kept_s),
+            health_watches_max: self.health_watches_max,
+            health_watch_max: Duration::from_secs_f64(self.health_watch_max_s),
         }
     }
 
@@ -129,6 +164,11 @@ impl LimitsConfig {
             ("limits.requests_max", self.requests_max, 1, "1 to 1048576"),
             ("limits.streams_max", self.streams_max, 1, "1 to 1048576"),
             ("limits.jobs_waiting_max", self.jobs_waiting_max, 0, "0 to 1048576"),
+            ("limits.probes_max", self.probes_max, 1, "1 to 1048576"),
+            ("limits.probe_body_bytes_max", self.probe_body_bytes_max, 64, "64 to 1048576"),
+            ("limits.scrapes_max", self.scrapes_max, 1, "1 to 1048576"),
+            ("limits.health_watches_max", self.health_watches_max, 0, "0 to 1048576"),
+            ("limits.connections_reserved", self.connections_reserved, 0, "0 to 1048576"),
         ] {
             if !(least..=1 << 20).contains(&value) {
                 return range(key, allowed, value.to_string());
@@ -141,6 +181,9 @@ impl LimitsConfig {
             ("limits.http_idle_max_s", self.http_idle_max_s),
             ("limits.grpc_idle_max_s", self.grpc_idle_max_s),
             ("limits.body_silence_max_s", self.body_silence_max_s),
+            ("limits.probe_time_max_s", self.probe_time_max_s),
+            ("limits.scrape_kept_s", self.scrape_kept_s),
+            ("limits.health_watch_max_s", self.health_watch_max_s),
         ] {
             if !(0.0..=86_400.0).contains(&seconds) {
                 return range(key, "0 to 86400", seconds.to_string());
@@ -180,6 +223,7 @@ impl LimitsConfig {
             listed_voxels_max: self.listed_voxels_max,
             jobs_waiting_max: self.jobs_waiting_max,
             map_file_bytes_max: self.map_file_bytes_max,
+            map_file_scans_max: self.map_file_scans_max,
             min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
             localization_time_max: Duration::from_secs_f64(self.localization_time_max_s),
             localization_candidates_max: self.localization_candidates_max,

@@ -17,6 +17,7 @@ use super::whole_messages::WholeMessages;
 use super::{deadline, status};
 use crate::access::{Authorized, Gate, Operation};
 use crate::admission::Admission;
+use crate::service::{ErrorCode, ServiceError};
 
 /// How much of an unknown path is repeated to who sent it.
 const PATH_LENGTH_MAX: usize = 80;
@@ -49,6 +50,7 @@ impl Around {
         if let Some(key) = key {
             self.gate.metrics().key_used("grpc", key);
         }
+        let has_key = key.is_some();
         let begin = Instant::now();
         let (deadline, compressed) = (deadline::of(call.headers()), Compressed::of(call.headers()));
         call.extensions_mut().insert(compressed);
@@ -60,11 +62,28 @@ impl Around {
         let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
         match Status::from_header_map(response.headers()) {
             Some(refused) => status::naming_the_limit(refused, self.message_bytes_max).into_http(),
-            None => match deadline {
-                Some(deadline) => TimelyBody::wrap(response, deadline, begin),
-                None => response,
-            },
+            None => {
+                let response = match deadline {
+                    Some(most) => TimelyBody::wrap(response, most, begin, deadline::reached(most)),
+                    None => response,
+                };
+                match operation == Operation::HealthWatch && !has_key {
+                    true => self.watch_for_a_while(response, begin),
+                    false => response,
+                }
+            }
         }
+    }
+
+    /// Ends a health watch of somebody without a key after a while: places are few.
+    fn watch_for_a_while(&self, response: Response, begin: Instant) -> Response {
+        let most = self.admission.health_watch_max();
+        let message = format!(
+            "health_watch_max_s is {}: a watch without a key ends then, watch again",
+            most.as_secs_f64()
+        );
+        let over = ServiceError::new(ErrorCode::DeadlineExceeded, "health_watch_over", message);
+        TimelyBody::wrap(response, most, begin, over)
     }
 }
 

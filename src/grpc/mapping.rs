@@ -43,7 +43,10 @@ impl Mapping for Adapter {
         let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
         let answer = service.maps().align_scan(&map, scan).await?;
-        Ok(Response::new(answer.into()))
+        let bytes = answer.foreground.as_ref().map_or(0, |foreground| foreground.bitmap.len());
+        let mut response = Response::new(answer.into());
+        self.admission.keep_with_answer(bytes, response.extensions_mut())?;
+        Ok(response)
     }
 
     async fn localize(

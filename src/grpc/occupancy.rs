@@ -21,7 +21,10 @@ impl Occupancy for Adapter {
         let service = service_of(&request)?;
         let (map, query) = request.into_inner().try_into()?;
         let answer = service.query_points(&map, query).await?;
-        Ok(Response::new(answer.into()))
+        let bytes = answer.occupied.len();
+        let mut response = Response::new(answer.into());
+        self.admission.keep_with_answer(bytes, response.extensions_mut())?;
+        Ok(response)
     }
 
     async fn query_points_stream(

@@ -11,29 +11,35 @@ use hyper::body::{Frame, SizeHint};
 use tokio::time::{Sleep, sleep_until};
 use tonic::Status;
 
-use super::deadline;
+use crate::service::ServiceError;
 
 /// A body that goes, with whoever makes it, when the time is up; the call's status says so.
 pub(super) struct TimelyBody {
     /// None when it has ended.
     body: Option<Body>,
-    deadline: Duration,
+    /// What its status says then.
+    late: ServiceError,
     reached: Pin<Box<Sleep>>,
 }
 
 impl TimelyBody {
-    /// The same response, of a call that began at `begin`.
-    pub(super) fn wrap(response: Response, deadline: Duration, begin: Instant) -> Response {
+    /// The same response, of a call that began at `begin` and ends with `late`.
+    pub(super) fn wrap(
+        response: Response,
+        deadline: Duration,
+        begin: Instant,
+        late: ServiceError,
+    ) -> Response {
         // A deadline beyond all time is none.
         let Some(end) = begin.checked_add(deadline) else { return response };
         let reached = Box::pin(sleep_until(end.into()));
-        response.map(|body| Body::new(Self { body: Some(body), deadline, reached }))
+        response.map(|body| Body::new(Self { body: Some(body), late, reached }))
     }
 
     fn late(&self) -> HeaderMap {
         let mut trailers = HeaderMap::new();
         // Without a status the client takes the call for cut, which it is.
-        let _ = Status::from(deadline::reached(self.deadline)).add_header(&mut trailers);
+        let _ = Status::from(self.late.clone()).add_header(&mut trailers);
         trailers
     }
 }
@@ -82,7 +88,8 @@ mod tests {
         }));
         let response = Response::new(Body::from_stream(endless));
         let deadline = Duration::from_secs(3);
-        let response = TimelyBody::wrap(response, deadline, tokio::time::Instant::now().into_std());
+        let begin = tokio::time::Instant::now().into_std();
+        let response = TimelyBody::wrap(response, deadline, begin, crate::grpc::deadline::reached(deadline));
         let sent = response.into_body().collect().await.unwrap();
         let trailers = sent.trailers().unwrap();
         assert_eq!(trailers["grpc-status"], "4");

@@ -14,8 +14,9 @@ use crate::wire::InField;
 const JSON: &str = "application/json";
 const OCTET_STREAM: &str = "application/octet-stream";
 
-/// Memory for JSON and what is made of it, as a multiple of the former: points are longer than their shortest text.
-const JSON_AND_PARSED: usize = 4;
+/// Memory for JSON and what is made of it, as a multiple of the former: points are longer than their shortest text of
+/// eight bytes, and lie in a list that doubles its room, the old one beside the new; the answer to them is shorter.
+const JSON_AND_PARSED: usize = 6;
 
 /// JSON of more bytes than this is parsed away from the threads that serve connections.
 const PARSED_INLINE_MAX: usize = 64 << 10;

@@ -14,6 +14,7 @@ mod parameters;
 mod probes;
 mod routes;
 mod scans;
+mod scrapes;
 mod starting;
 mod trajectory;
 mod undo;
@@ -29,21 +30,24 @@ use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetReques
 use crate::access::Gate;
 use crate::admission::Admission;
 use around::Around;
+use scrapes::Scrapes;
 
 /// What every handler has at hand, besides the service that its caller may use.
 #[derive(Debug, Clone)]
 struct Adapter {
     admission: Admission,
     message_bytes_max: usize,
+    scrapes: Scrapes,
 }
 
 /// All routes. Bodies of more than `message_bytes_max` are refused.
 pub fn router(gate: Gate, admission: Admission, message_bytes_max: usize) -> Router {
     let around = Around { gate, admission: admission.clone() };
+    let scrapes = Scrapes::new(admission.scrape_kept());
     routes::of_operations()
         .layer(DefaultBodyLimit::max(message_bytes_max))
         .layer(from_fn_with_state(around, around::request))
         .layer(PropagateRequestIdLayer::x_request_id())
         .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
-        .with_state(Adapter { admission, message_bytes_max })
+        .with_state(Adapter { admission, message_bytes_max, scrapes })
 }

@@ -1,15 +1,18 @@
 //! What orchestrators and Prometheus ask: answered whatever the pools are doing.
 
 use axum::Json;
-use axum::extract::State;
+use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde_json::{Value, json};
 
 use super::Adapter;
 use super::around::Service;
+use super::error::HttpError;
+use crate::access::Authorized;
 use crate::map::MapName;
 use crate::service::Shortage;
+use crate::telemetry::MeteredService;
 
 /// `GET /livez`: 200 while the process lives.
 pub(super) async fn live() -> &'static str {
@@ -41,13 +44,21 @@ pub(super) async fn ready(
     }
 }
 
-/// `GET /metrics`: Prometheus' text form.
-pub(super) async fn metrics(Service(service): Service) -> impl IntoResponse {
+/// `GET /metrics`: Prometheus' text form. One text answers all scrapes of a second.
+pub(super) async fn metrics(
+    State(adapter): State<Adapter>,
+    request: Request,
+) -> Result<impl IntoResponse, HttpError> {
+    let Authorized { caller, service } = Authorized::of(request.extensions())?;
+    let text = adapter.scrapes.text(caller.reach(), async || scrape(service).await).await?;
+    Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text))
+}
+
+async fn scrape(service: &MeteredService) -> String {
     let maps = service.maps().list_maps().await.unwrap_or_else(|error| {
         // The counters say most when the server is overloaded, so they are told without the maps.
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    let text = service.metrics().render(&service.maps().pools(), &maps);
-    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text)
+    service.render(&maps)
 }

@@ -9,6 +9,7 @@ mod bulk;
 mod change;
 pub mod commit;
 mod contents;
+mod filter_room;
 mod info;
 pub mod lookup;
 mod moments;

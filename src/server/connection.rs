@@ -34,6 +34,7 @@ impl Endpoint {
             () = polled_by_runtime(self.serve_open(stream, tls, &place)) => {}
             () = place.lost() => {}
             () = place.unread_for(UNREAD_MAX) => {}
+            () = sleep(self.bounds.reserved_max), if place.is_reserved() => {}
             () = self.cut.cancelled() => {}
         }
     }
@@ -90,6 +91,7 @@ async fn answer(
     let used = place.used();
     request.extensions_mut().insert(peer);
     request.extensions_mut().insert(HangUp(place.hang_up()));
+    request.extensions_mut().insert(place.shared());
     let response = router.oneshot(request).await?;
     Ok(response.map(|body| Body::new(AnswerBody::new(body, used))))
 }

@@ -42,20 +42,23 @@ pub(super) struct Bounds {
     pub(super) opening_max: Duration,
     /// Without a request.
     pub(super) idle_max: Duration,
+    /// In all, where it was taken for a health check while all places were in use.
+    pub(super) reserved_max: Duration,
 }
 
 impl Endpoint {
     pub(super) fn new(protocol: Protocol, router: Router, tls: Option<Tls>, limits: &LimitsConfig) -> Self {
         let opening_max = Duration::from_secs_f64(limits.connection_opening_max_s);
+        let reserved_max = Duration::from_secs_f64(limits.probe_time_max_s);
         Self {
             protocol,
             router,
-            bounds: Bounds { opening_max, idle_max: protocol.idle_max(limits) },
+            bounds: Bounds { opening_max, idle_max: protocol.idle_max(limits), reserved_max },
             builder: protocol.builder(limits).into(),
             closing: CancellationToken::new(),
             cut: CancellationToken::new(),
             tls,
-            places: Places::new(limits.connections_max),
+            places: Places::new(limits.connections_max, limits.connections_reserved),
             tasks: TaskTracker::new(),
         }
     }

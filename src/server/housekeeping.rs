@@ -26,7 +26,7 @@ pub(super) async fn keep_house(service: MeteredService, files: ReloadedFiles, li
     loop {
         tokio::select! {
             () = lifecycle.draining() => return,
-            _ = upkeep.tick() => service.metrics().upkeep(),
+            _ = upkeep.tick() => service.upkeep(),
             _ = looking.tick(), if files.exist() => files.refresh().await,
             _ = saving.tick() => if let Err(error) = service.maps().save_due().await {
                 tracing::error!(%error, "a snapshot cannot be written");

@@ -12,12 +12,13 @@ const BESIDES_CONNECTIONS: usize = 512;
 /// Asks the system for as many as `connections_max` takes, which is more than most give a process by themselves. Without
 /// a file nobody could connect, while idle connections do not give way before all their places are taken.
 pub(super) fn within_allowed(limits: LimitsConfig) -> LimitsConfig {
-    let needed = 2 * limits.connections_max + BESIDES_CONNECTIONS;
+    let besides = BESIDES_CONNECTIONS + 2 * limits.connections_reserved;
+    let needed = 2 * limits.connections_max + besides;
     let allowed = allowed(needed as u64).try_into().unwrap_or(usize::MAX);
     if allowed >= needed {
         return limits;
     }
-    let connections_max = connections_with(allowed);
+    let connections_max = connections_with(allowed, besides);
     tracing::warn!(
         open_files = allowed,
         needed,
@@ -40,8 +41,8 @@ fn allowed(needed: u64) -> u64 {
 }
 
 /// Connections of each protocol.
-fn connections_with(files: usize) -> usize {
-    (files - BESIDES_CONNECTIONS.min(files / 2)) / 2
+fn connections_with(files: usize, besides: usize) -> usize {
+    (files - besides.min(files / 2)) / 2
 }
 
 #[cfg(test)]
@@ -50,8 +51,9 @@ mod tests {
 
     #[test]
     fn connections_leave_files_for_the_rest() {
-        assert_eq!(connections_with(4608), 2048);
-        assert_eq!(connections_with(1024), 256);
-        assert_eq!(connections_with(64), 16);
+        assert_eq!(connections_with(4608, BESIDES_CONNECTIONS), 2048);
+        assert_eq!(connections_with(4640, BESIDES_CONNECTIONS + 32), 2048);
+        assert_eq!(connections_with(1024, BESIDES_CONNECTIONS), 256);
+        assert_eq!(connections_with(64, BESIDES_CONNECTIONS), 16);
     }
 }

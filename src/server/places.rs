@@ -1,8 +1,12 @@
 //! Places for the connections of a protocol.
 //!
-//! Where all are taken, a new connection gets that of the one which has been idle for longest. Connections that
-//! nobody uses can therefore never keep others out, however many there are; those in use are fewer than the places,
-//! since requests and streams in flight have lower limits.
+//! Where all are taken, a new connection gets that of another: of the one without a key that has been idle for longest,
+//! then of the one without a key whose client has left an answer unread for longest, then of the one with a key that
+//! has been idle for longest. Connections that nobody uses can therefore never keep others out, however many there are;
+//! those in use are fewer than the places, since requests and streams in flight have lower limits.
+//!
+//! Should all be in use nonetheless, a new connection gets a place of some that are kept for health checks, for a moment;
+//! the oldest of those gives way.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,10 +17,16 @@ use parking_lot::Mutex;
 use tokio::time::{Instant, sleep};
 use tokio_util::sync::CancellationToken;
 
+use crate::admission::OfConnection;
+
+/// How long a client without a key may leave an answer unread while others find no place.
+const UNREAD_GRACE: Duration = Duration::from_secs(1);
+
 /// The places of a protocol. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
     most: usize,
+    reserved_most: usize,
     taken: Arc<Mutex<Taken>>,
 }
 
@@ -24,6 +34,8 @@ pub(super) struct Places {
 struct Taken {
     /// By the order in which they came.
     connections: BTreeMap<u64, Connection>,
+    /// The same of those kept for health checks: when each came is all that counts.
+    reserved: BTreeMap<u64, CancellationToken>,
     next: u64,
 }
 
@@ -34,7 +46,12 @@ struct Connection {
     /// When the last request was done, or since it came.
     idle_since: Instant,
     lost: CancellationToken,
+    shared: OfConnection,
+    unread: Unread,
 }
+
+/// Since when pieces of answers have been on their way, by answer.
+type Unread = Arc<Mutex<BTreeMap<u64, Instant>>>;
 
 /// The place of one connection, free again when this is dropped. A clone is another handle on it.
 #[derive(Debug, Clone)]
@@ -45,8 +62,9 @@ struct Held {
     number: u64,
     places: Places,
     lost: CancellationToken,
-    /// Since when pieces of answers have been on their way, by answer.
-    unread: Mutex<BTreeMap<u64, Instant>>,
+    shared: OfConnection,
+    is_reserved: bool,
+    unread: Unread,
     next_answer: AtomicU64,
 }
 
@@ -58,36 +76,71 @@ pub(super) struct InUse {
 }
 
 impl Places {
-    pub(super) fn new(most: usize) -> Self {
-        Self { most, taken: Arc::default() }
+    /// `most` places, and `reserved_most` for health checks besides.
+    pub(super) fn new(most: usize, reserved_most: usize) -> Self {
+        Self { most, reserved_most, taken: Arc::default() }
     }
 
-    /// A place for a new connection; none where all are taken by connections in use.
+    /// A place for a new connection; none where all are taken by connections in use, and none are reserved.
     pub(super) fn take(&self) -> Option<Place> {
         let mut taken = self.taken.lock();
-        if taken.connections.len() >= self.most {
-            taken.free_the_idlest()?;
+        let has_place = taken.connections.len() < self.most || taken.free_one();
+        if !has_place {
+            taken.free_a_reserved_one(self.reserved_most)?;
         }
-        let (number, lost) = (taken.next, CancellationToken::new());
+        let (number, lost, unread) = (taken.next, CancellationToken::new(), Unread::default());
+        let shared = OfConnection::new(!has_place);
         taken.next += 1;
-        let connection = Connection { requests: 0, idle_since: Instant::now(), lost: lost.clone() };
-        taken.connections.insert(number, connection);
+        if has_place {
+            let (lost, shared, unread) = (lost.clone(), shared.clone(), Arc::clone(&unread));
+            let connection = Connection { requests: 0, idle_since: Instant::now(), lost, shared, unread };
+            taken.connections.insert(number, connection);
+        } else {
+            taken.reserved.insert(number, lost.clone());
+        }
         Some(Place(Arc::new(Held {
             number,
             places: self.clone(),
             lost,
-            unread: Mutex::default(),
+            shared,
+            is_reserved: !has_place,
+            unread,
             next_answer: AtomicU64::new(0),
         })))
     }
 }
 
 impl Taken {
-    fn free_the_idlest(&mut self) -> Option<()> {
-        let idle = self.connections.iter().filter(|(_, connection)| connection.requests == 0);
-        let (&number, _) = idle.min_by_key(|(_, connection)| connection.idle_since)?;
-        self.connections.remove(&number)?.lost.cancel();
-        Some(())
+    /// Takes the place of a connection that gives way; false where none does.
+    fn free_one(&mut self) -> bool {
+        let first_of = |gives_way: &dyn Fn(&Connection) -> Option<Instant>| {
+            let able = self.connections.iter().filter_map(|(&number, it)| Some((gives_way(it)?, number)));
+            able.min().map(|(_, number)| number)
+        };
+        let idle = |it: &Connection| (it.requests == 0).then_some(it.idle_since);
+        let without_key = |it: &Connection| !it.shared.has_key();
+        let number = first_of(&|it| idle(it).filter(|_| without_key(it)))
+            .or_else(|| first_of(&|it| it.unread_since().filter(|_| without_key(it))))
+            .or_else(|| first_of(&|it| idle(it)));
+        let freed = number.and_then(|number| self.connections.remove(&number));
+        freed.map(|connection| connection.lost.cancel()).is_some()
+    }
+
+    /// Makes sure that one of `most` reserved places is free; none where there are none.
+    fn free_a_reserved_one(&mut self, most: usize) -> Option<()> {
+        if self.reserved.len() >= most {
+            let (_, oldest) = self.reserved.pop_first()?;
+            oldest.cancel();
+        }
+        (most > 0).then_some(())
+    }
+}
+
+impl Connection {
+    /// Since when its client has read nothing of an answer, where that is long enough for others to go first.
+    fn unread_since(&self) -> Option<Instant> {
+        let oldest = self.unread.lock().values().min().copied();
+        oldest.filter(|since| since.elapsed() >= UNREAD_GRACE)
     }
 }
 
@@ -96,6 +149,16 @@ impl Place {
     pub(super) fn used(&self) -> InUse {
         self.change(|connection| connection.requests += 1);
         InUse { place: self.clone(), answer: self.0.next_answer.fetch_add(1, Ordering::Relaxed) }
+    }
+
+    /// What its requests share.
+    pub(super) fn shared(&self) -> OfConnection {
+        self.0.shared.clone()
+    }
+
+    /// True where it was taken for health checks alone, while all others were in use.
+    pub(super) fn is_reserved(&self) -> bool {
+        self.0.is_reserved
     }
 
     /// Ends the connection when it is cancelled.
@@ -169,7 +232,9 @@ impl Drop for InUse {
 
 impl Drop for Held {
     fn drop(&mut self) {
-        self.places.taken.lock().connections.remove(&self.number);
+        let mut taken = self.places.taken.lock();
+        taken.connections.remove(&self.number);
+        taken.reserved.remove(&self.number);
     }
 }
 
@@ -179,7 +244,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_newcomer_gets_the_place_that_was_idle_for_longest() {
-        let places = Places::new(2);
+        let places = Places::new(2, 0);
         let first = places.take().unwrap();
         sleep(Duration::from_secs(1)).await;
         let second = places.take().unwrap();
@@ -196,7 +261,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_place_in_use_is_nobody_elses() {
-        let places = Places::new(1);
+        let places = Places::new(1, 0);
         let place = places.take().unwrap();
         let used = place.used();
         assert!(places.take().is_none());
@@ -205,8 +270,41 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
+    async fn who_has_shown_no_key_gives_way_first() {
+        let places = Places::new(3, 0);
+        let keyed = places.take().unwrap();
+        keyed.0.shared.show_key();
+        sleep(Duration::from_secs(9)).await;
+        let (idle, unread) = (places.take().unwrap(), places.take().unwrap());
+        let used = unread.used();
+        used.handed_over();
+        let _first = places.take().unwrap().used();
+        assert!(idle.0.lost.is_cancelled() && !keyed.0.lost.is_cancelled() && !unread.0.lost.is_cancelled());
+        sleep(UNREAD_GRACE).await;
+        let _second = places.take().unwrap().used();
+        assert!(unread.0.lost.is_cancelled() && !keyed.0.lost.is_cancelled());
+        let _third = places.take().unwrap().used();
+        assert!(keyed.0.lost.is_cancelled());
+        assert!(places.take().is_none());
+    }
+
+    #[tokio::test]
+    async fn where_all_are_in_use_some_places_are_left_for_health() {
+        let places = Places::new(1, 2);
+        let used = places.take().unwrap().used();
+        let (one, two) = (places.take().unwrap(), places.take().unwrap());
+        assert!(one.is_reserved() && two.is_reserved() && !used.place.is_reserved());
+        let three = places.take().unwrap();
+        assert!(one.0.lost.is_cancelled() && !two.0.lost.is_cancelled() && three.is_reserved());
+        drop((one, two, three));
+        assert_eq!(places.taken.lock().reserved.len(), 0);
+        drop(used);
+        assert!(!places.take().unwrap().is_reserved());
+    }
+
+    #[tokio::test(start_paused = true)]
     async fn an_answer_that_nobody_reads_is_found_out() {
-        let place = Places::new(1).take().unwrap();
+        let place = Places::new(1, 0).take().unwrap();
         let (slow, quick) = (place.used(), place.used());
         let start = Instant::now();
         slow.handed_over();
@@ -231,7 +329,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn idle_time_is_counted_from_the_last_request() {
-        let place = Places::new(1).take().unwrap();
+        let place = Places::new(1, 0).take().unwrap();
         let (start, used) = (Instant::now(), place.used());
         let idle = tokio::spawn({
             let place = place.clone();

@@ -8,6 +8,7 @@ use std::time::Instant;
 use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
+use super::map_file::BuiltMap;
 use super::reach::Reachable;
 use super::{ErrorCode, MapReach, ServiceError};
 use crate::bloom::FilterSettings;
@@ -77,15 +78,15 @@ impl Catalogue {
             return same_settings(map, settings).map(|map| (map, false));
         }
         self.check_room(maps_max)?;
-        let empty = Snapshot::of(&MultiResolutionMap::new(settings)?, Uuid::new_v4());
-        self.add(name.name(), empty).await.map(|map| (map, true))
+        let empty = MultiResolutionMap::new(settings)?;
+        self.add(name.name(), Uuid::new_v4(), empty).await.map(|map| (map, true))
     }
 
-    /// The map of `snapshot` under a name that is free.
+    /// A map that was built of a map file, under a name that is free.
     pub(super) async fn restore(
         &self,
         name: Reachable,
-        snapshot: Snapshot,
+        built: BuiltMap,
         maps_max: usize,
     ) -> Result<Arc<HostedMap>, ServiceError> {
         let _writing = self.writing.lock().await;
@@ -95,7 +96,9 @@ impl Catalogue {
             return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
         }
         self.check_room(maps_max)?;
-        self.add(name.name(), snapshot).await
+        // `saving` is held until its snapshot is written.
+        let BuiltMap { uuid, map, saving: _saving } = built;
+        self.add(name.name(), uuid, map).await
     }
 
     fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
@@ -107,12 +110,18 @@ impl Catalogue {
         Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message))
     }
 
-    /// Takes a map into the catalogue, kept and named; the caller holds `writing`.
-    async fn add(&self, name: &MapName, snapshot: Snapshot) -> Result<Arc<HostedMap>, ServiceError> {
-        let (snapshot, kept_name) = (Arc::new(snapshot), name.clone());
-        let kept = Arc::clone(&snapshot);
-        let folder = self.on_disk(move |data_dir| data_dir.create(&kept_name, &kept)).await?;
-        let (uuid, map) = (snapshot.uuid, Arc::unwrap_or_clone(snapshot).restore()?);
+    /// Takes a map into the catalogue, kept and named; the caller holds `writing`. It is built already: what is made
+    /// durable is known to fit into memory.
+    async fn add(
+        &self,
+        name: &MapName,
+        uuid: Uuid,
+        map: MultiResolutionMap,
+    ) -> Result<Arc<HostedMap>, ServiceError> {
+        let (map, kept_name) = (Arc::new(map), name.clone());
+        let kept = Arc::clone(&map);
+        let create = move |data_dir: &DataDir| data_dir.create(&kept_name, &Snapshot::of(&kept, uuid));
+        let folder = self.on_disk(create).await?;
         let map = Arc::new(HostedMap::new(name.clone(), uuid, map, folder)?);
         self.maps.write().insert(name.clone(), Arc::clone(&map));
         Ok(map)
@@ -165,6 +174,8 @@ impl Catalogue {
 
 fn load(data_dir: &DataDir, name: &MapName, progress: &OpeningProgress) -> Result<HostedMap, ServiceError> {
     let start = Instant::now();
+    // Where the system ends the process for want of memory, the log says with which map.
+    tracing::info!(map = %name, "opening");
     let opened = data_dir.map(name, progress).map_err(not_stored)?;
     for damaged in &opened.damaged {
         tracing::warn!(map = %name, %damaged, "a snapshot is damaged: set aside, an older one and more journal are used");

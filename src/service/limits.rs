@@ -21,6 +21,8 @@ pub struct Limits {
     pub jobs_waiting_max: usize,
     /// Bytes of a map file that is restored, before and after compression. 1 GiB.
     pub map_file_bytes_max: usize,
+    /// Scans of a map file that is restored, and as many that were taken out again. 20,000,000.
+    pub map_file_scans_max: usize,
     /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
     pub min_revision_wait_max: Duration,
     /// How long a search with no guess may take. 60 s.
@@ -44,6 +46,7 @@ impl Default for Limits {
             listed_voxels_max: 20_000_000,
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
+            map_file_scans_max: 20_000_000,
             min_revision_wait_max: Duration::from_secs(10),
             localization_time_max: Duration::from_secs(60),
             localization_candidates_max: 16,

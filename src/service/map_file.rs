@@ -2,10 +2,13 @@
 
 use uuid::Uuid;
 
+use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
+use super::room::Promise;
 use super::room::Room;
 use super::{ErrorCode, Limits, MapFile, ServiceError, check_not_stopped};
-use crate::store::Snapshot;
+use crate::map::MultiResolutionMap;
+use crate::store::{MapFileError, MapFileLimits, Snapshot};
 use crate::util::StopSignal;
 
 impl HostedMap {
@@ -21,15 +24,50 @@ impl HostedMap {
     }
 }
 
-/// What a file holds, as a map of its own.
-pub(super) fn from_file(file: &[u8], limits: &Limits) -> Result<Snapshot, ServiceError> {
-    let decoded = Snapshot::decode_within(file, limits.map_file_bytes_max as u64);
-    let bad = |reason| ServiceError::invalid("bad_map_file", format!("map file: {reason}"));
-    let snapshot = decoded.map_err(bad)?;
-    let (voxels, most) = (snapshot.contents.voxels.len(), limits.voxels_per_map_max);
-    if voxels > most {
-        let message = format!("the map file has {voxels} voxels, voxels_per_map_max is {most}");
-        return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message));
+/// A map that was built of a file and is kept nowhere yet.
+pub(super) struct BuiltMap {
+    pub(super) uuid: Uuid,
+    pub(super) map: MultiResolutionMap,
+    /// Memory for its first snapshot.
+    pub(super) saving: Promise,
+}
+
+/// What a file holds, as a map of its own. Memory is reserved for each part before it is built, so that a file which is
+/// small and becomes much is refused and not built.
+pub(super) fn from_file(file: &[u8], limits: &Limits, room: &Room) -> Result<BuiltMap, ServiceError> {
+    let bounds = MapFileLimits {
+        body_bytes_max: limits.map_file_bytes_max as u64,
+        voxels_max: limits.voxels_per_map_max,
+        scans_max: limits.map_file_scans_max,
+    };
+    // What was reserved before lies in memory by the time more is asked for, and is measured there.
+    let mut part = None;
+    let mut reserve = |bytes| {
+        drop(part.take());
+        part = Some(room.reserve(bytes)?);
+        Ok(())
+    };
+    let Snapshot { settings, contents, .. } =
+        Snapshot::decode_within(file, &bounds, &mut reserve).map_err(not_read)?;
+    let moments = contents.moments.as_slice().len();
+    reserve(settings.empty_filter_bytes() + growth_bytes(&settings, &contents.voxels, moments))?;
+    let map = MultiResolutionMap::restore(settings, contents)?;
+    drop(part.take());
+    let saving = room.reserve(snapshot_bytes(&map))?;
+    Ok(BuiltMap { uuid: Uuid::new_v4(), map, saving })
+}
+
+fn not_read(refusal: MapFileError<ServiceError>) -> ServiceError {
+    match refusal {
+        MapFileError::NoMemory(refusal) => refusal,
+        MapFileError::Bad(reason) => ServiceError::invalid("bad_map_file", format!("map file: {reason}")),
+        MapFileError::TooLarge { .. } => {
+            ServiceError::new(ErrorCode::ResourceExhausted, "map_full", refusal.to_string())
+        }
     }
-    Ok(Snapshot { uuid: Uuid::new_v4(), ..snapshot })
+}
+
+/// Bytes of memory that a snapshot of `map` takes while it is made: 55 to 70 % of the map's were measured.
+pub(super) fn snapshot_bytes(map: &MultiResolutionMap) -> u64 {
+    map.memory_bytes() as u64 / 4 * 3
 }

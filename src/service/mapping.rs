@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::committing::{Prepared, Proposal, Step, Turn, record_of};
+use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
 use super::room::Room;
 use super::usable_scan::UsableScan;
@@ -50,7 +51,9 @@ impl HostedMap {
         if !request.at_guess && self.is_standing(&scan_record, &settings.standing) {
             return Ok(Step::Answered(ScanAnswer { accepted: true, standing: true, ..answer }));
         }
-        let promise = room.promise(growth_bytes(&scan_record))?;
+        let ScanRecord { voxels, moments, .. } = &scan_record;
+        let moments = moments.as_slice().len();
+        let promise = room.promise(growth_bytes(self.map.settings(), voxels, moments))?;
         let points_skipped = scan_record.pose.points_skipped;
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
@@ -269,18 +272,6 @@ impl HostedMap {
             standing: false,
         }
     }
-}
-
-/// The most memory by which a scan was seen to make a map grow, the journal's record of it included. With every point
-/// alone in its block it comes to 800 bytes a point, where 650 were measured.
-fn growth_bytes(record: &ScanRecord) -> u64 {
-    const OF_BLOCK: usize = 512;
-    const OF_VOXEL: usize = 32;
-    const OF_MOMENTS: usize = 256;
-    let ScanRecord { voxels, moments, .. } = record;
-    let bytes =
-        voxels.blocks().len() * OF_BLOCK + voxels.len() * OF_VOXEL + moments.as_slice().len() * OF_MOMENTS;
-    bytes as u64
 }
 
 /// Where a robot is that goes on as it went from `before` to `last`.

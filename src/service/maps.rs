@@ -26,12 +26,16 @@ impl MapService {
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
         let name = self.reach.check(&name)?;
-        if self.inner.catalogue.get(&name).is_err() {
+        let is_new = self.inner.catalogue.get(&name).is_err();
+        let settings = settings.checked()?;
+        if is_new {
             self.inner.room.check_to_grow()?;
         }
         let inner = Arc::clone(&self.inner);
-        let create =
-            async move { inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await };
+        let create = async move {
+            let _empty = is_new.then(|| inner.room.reserve(settings.empty_filter_bytes())).transpose()?;
+            inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await
+        };
         let (map, created) = to_its_end(create).await?;
         Ok((self.describe(map).await?, created))
     }
@@ -52,6 +56,11 @@ impl MapService {
         let maps = self.inner.catalogue.within(&self.reach);
         let describe = move |_: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
         self.inner.queries.run(describe).await
+    }
+
+    /// The names of the maps that the caller may name.
+    pub fn map_names(&self) -> Vec<MapName> {
+        self.inner.catalogue.within(&self.reach).iter().map(|map| map.name.clone()).collect()
     }
 
     /// The maps that take no changes since their journal failed, by name, with the reason.
@@ -82,16 +91,17 @@ impl MapService {
     ///
     /// # Errors
     /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
-    /// is a map of that name; `ResourceExhausted` beyond `maps_max` or `voxels_per_map_max`, or while disk or memory is
-    /// nearly full.
+    /// is a map of that name; `ResourceExhausted` beyond `maps_max`, `voxels_per_map_max` or `map_file_scans_max`, where
+    /// there is no memory for what it holds, or while disk or memory is nearly full.
     pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
         let name = self.reach.check(&name)?;
         self.inner.room.check_to_grow()?;
         let inner = Arc::clone(&self.inner);
-        let snapshot = self.inner.mapping.run(move |_| from_file(&file, &inner.settings.limits)).await??;
+        let build = move |_: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room);
+        let built = self.inner.mapping.run(build).await??;
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
-        let map = to_its_end(async move { inner.catalogue.restore(name, snapshot, maps_max).await }).await?;
+        let map = to_its_end(async move { inner.catalogue.restore(name, built, maps_max).await }).await?;
         self.describe(map).await
     }
 

@@ -8,6 +8,7 @@ mod deletion;
 mod digest;
 mod error;
 mod gauges;
+mod growth;
 mod hosted_map;
 mod limits;
 mod localization;

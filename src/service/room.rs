@@ -79,6 +79,18 @@ impl Room {
         self.watermarks.check_to_grow().map(|()| promise)
     }
 
+    /// Memory for a part of what is built bit by bit, and may be far too much. It is refused where a scan would be; others
+    /// do not notice.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` where there is no room for it below the mark.
+    pub(super) fn reserve(&self, bytes: u64) -> Result<Promise, ServiceError> {
+        let promise = self.count(bytes);
+        let memory = self.memory().map(|it| self.with_promised(it));
+        let shortage = memory.and_then(|memory| self.marks.memory(memory, false));
+        shortage.map_or(Ok(promise), |shortage| Err(shortage.refusal("")))
+    }
+
     /// Memory for a while, for `whom`. It may lie above the marks: what shrinks a map and what saves it needs some as well.
     ///
     /// # Errors
@@ -167,6 +179,14 @@ mod tests {
         assert!(room.promise(0).is_err());
         drop(one);
         assert!(room.promise(0).is_ok());
+    }
+
+    #[test]
+    fn what_is_reserved_and_refused_keeps_nobody_from_growing() {
+        let room = room(700, 10_000);
+        let refused = room.reserve(200 * MIB).unwrap_err();
+        assert_eq!(refused.reason, "memory_full");
+        assert!(room.reserve(100 * MIB).is_ok() && room.promise(MIB).is_ok());
     }
 
     #[test]

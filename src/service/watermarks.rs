@@ -92,7 +92,7 @@ impl Marks {
         (free < least).then_some(Shortage::Disk { free, low, back })
     }
 
-    fn memory(&self, memory: MemoryReading, is_short: bool) -> Option<Shortage> {
+    pub(super) fn memory(&self, memory: MemoryReading, is_short: bool) -> Option<Shortage> {
         let in_use = memory.resident_bytes;
         let high = self.memory_high_bytes.unwrap_or(memory.allowed_bytes / 100 * 85);
         let back = self.memory_back_bytes.unwrap_or(high / 100 * 94);

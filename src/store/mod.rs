@@ -42,4 +42,4 @@ pub use journal::{
 pub use map_folder::{FolderUse, MapFolder, OpenedMap};
 pub use progress::{Opened, OpeningProgress};
 pub use settings::{Durability, DurabilityError, StoreSettings};
-pub use snapshot::{FORMAT_VERSION, Snapshot};
+pub use snapshot::{FORMAT_VERSION, MapFileError, MapFileLimits, Snapshot};

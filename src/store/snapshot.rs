@@ -9,6 +9,13 @@
 //!     24  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto
 //! ```
 
+mod body;
+mod fields;
+mod limits;
+
+pub use limits::{MapFileError, MapFileLimits};
+
+use std::convert::Infallible;
 use std::path::Path;
 
 use prost::Message;
@@ -16,9 +23,9 @@ use uuid::Uuid;
 
 use super::codec::{Unreadable, moments};
 use super::{FileSystem, StoreError, folder, pb};
-use crate::bloom::FilterSettings;
-use crate::map::{AnsweredRequest, MapContents, MapSettings, MultiResolutionMap, Trajectory, TrajectoryPose};
-use crate::voxel::{BlockMask, MomentSet, VoxelSet};
+use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+use body::Body;
+use limits::Memory;
 
 /// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
 /// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms.
@@ -27,8 +34,6 @@ const MAGIC: &[u8; 8] = b"MROL-MAP";
 const HEADER_BYTES: usize = 24;
 const VERSION: std::ops::Range<usize> = 8..12;
 const CHECKED_FROM: usize = 16;
-/// Bodies beyond this are refused before memory is taken: 4 billion voxels of a surface.
-const BODY_BYTES_MAX: u64 = 8 << 30;
 const ZSTD_LEVEL: i32 = 1;
 
 /// A map at one revision.
@@ -91,20 +96,40 @@ impl Snapshot {
         Ok(bytes)
     }
 
-    /// The inverse of [`Snapshot::encode`].
+    /// The inverse of [`Snapshot::encode`], of a file of one's own.
     ///
     /// # Errors
     /// What is wrong with the bytes, and where.
     pub fn decode(bytes: &[u8]) -> Result<Self, Unreadable> {
-        Self::decode_within(bytes, BODY_BYTES_MAX)
+        let decoded = Self::decode_within(bytes, &MapFileLimits::OWN, |_| Ok::<_, Infallible>(()));
+        decoded.map_err(|refusal| refusal.to_string())
     }
 
-    /// The same, where nobody knows who made the bytes: a body of more than `body_bytes_max` is refused before memory
-    /// is taken for it.
+    /// Reads a file of which nobody knows who made it. `reserve` is asked for the bytes of each part before it is built:
+    /// what was asked for before is there by then.
     ///
     /// # Errors
-    /// As there.
-    pub fn decode_within(bytes: &[u8], body_bytes_max: u64) -> Result<Self, Unreadable> {
+    /// When something is wrong with the bytes, they hold more than `limits` allow, or `reserve` refuses.
+    pub fn decode_within<E>(
+        bytes: &[u8],
+        limits: &MapFileLimits,
+        reserve: impl FnMut(u64) -> Result<(), E>,
+    ) -> Result<Self, MapFileError<E>> {
+        let mut memory = Memory(reserve);
+        let (compressed, length) = Self::checked_frame(bytes)?;
+        let most = limits.body_bytes_max;
+        if length > most {
+            return Err(format!("a body of {length} bytes, at most {most} are read").into());
+        }
+        // A frame of less would be of less than its header says, and is refused all the same.
+        memory.reserve(length as usize)?;
+        let body = zstd::bulk::decompress(compressed, length as usize)
+            .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;
+        Body::of(&body).map_err(|e| format!("the body: {e}"))?.read(limits, &mut memory)
+    }
+
+    /// The compressed body of a file whose header is right, and the bytes that it says it is of.
+    fn checked_frame(bytes: &[u8]) -> Result<(&[u8], u64), Unreadable> {
         let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
             format!("{} bytes are too few for a map file's header of {HEADER_BYTES}", bytes.len())
         })?;
@@ -124,13 +149,7 @@ impl Snapshot {
             ));
         }
         let length = u64::from(u32_at(header, 16)) | u64::from(u32_at(header, 20)) << 32;
-        if length > body_bytes_max {
-            return Err(format!("a body of {length} bytes, at most {body_bytes_max} are read"));
-        }
-        let body = zstd::bulk::decompress(&bytes[HEADER_BYTES..], length as usize)
-            .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;
-        let message = pb::Snapshot::decode(&body[..]).map_err(|e| format!("the body: {e}"))?;
-        Self::from_message(message)
+        Ok((&bytes[HEADER_BYTES..], length))
     }
 
     fn to_message(&self) -> pb::Snapshot {
@@ -151,49 +170,6 @@ impl Snapshot {
             moments: Some(moments::beside(voxels, moments)),
         }
     }
-
-    fn from_message(message: pb::Snapshot) -> Result<Self, Unreadable> {
-        let filter =
-            FilterSettings { hashes: message.filter_hashes, bits_per_key: message.filter_bits_per_voxel };
-        let settings = MapSettings { resolution_m: message.resolution_m, levels: message.levels, filter };
-        let poses: Vec<TrajectoryPose> =
-            message.trajectory.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?;
-        let withdrawn = message.withdrawn.into_iter().map(Into::into).collect();
-        let requests = message.requests.into_iter().map(AnsweredRequest::try_from);
-        let voxels = match message.voxels {
-            Some(voxels) => voxels.try_into()?,
-            None => voxels_of_version_1(&message.block_keys, &message.block_masks)?,
-        };
-        let contents = MapContents {
-            revision: message.revision,
-            moments: match message.moments {
-                Some(moments) => moments::read(&moments, &voxels)?,
-                None => MomentSet::of_centers(&voxels),
-            },
-            voxels,
-            trajectory: Trajectory::new(poses, withdrawn),
-            requests: requests.collect::<Result<_, _>>()?,
-        };
-        let uuid = Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?;
-        let contents = contents.checked().map_err(|e| e.to_string())?;
-        Ok(Self { uuid, settings: settings.checked().map_err(|e| e.to_string())?, contents })
-    }
-}
-
-fn voxels_of_version_1(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, Unreadable> {
-    let (masks, rest) = masks.as_chunks::<{ BlockMask::BYTES }>();
-    if masks.len() != keys.len() || !rest.is_empty() {
-        return Err(format!(
-            "{} block keys with {} bytes of masks",
-            keys.len(),
-            masks.len() * BlockMask::BYTES
-        ));
-    }
-    let block = |(&key, mask): (&u64, &[u8; BlockMask::BYTES])| {
-        let key = VoxelSet::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
-        Ok((key, BlockMask::from_le_bytes(mask)))
-    };
-    keys.iter().zip(masks).map(block).collect()
 }
 
 fn checksum(bytes: &[u8], version: u32) -> u32 {
@@ -209,8 +185,8 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 mod tests {
     use super::*;
     use crate::geometry;
-    use crate::map::{RequestId, RobotName, WithdrawnScan};
-    use crate::voxel::{Moments, VoxelKey};
+    use crate::map::{AnsweredRequest, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan};
+    use crate::voxel::{MomentSet, Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
         let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
@@ -278,7 +254,9 @@ mod tests {
     fn a_file_without_moments_is_restored_with_those_of_voxel_centres() {
         let mut message = snapshot().to_message();
         message.moments = None;
-        let old = Snapshot::from_message(message).unwrap().contents;
+        let body = message.encode_to_vec();
+        let memory = &mut Memory(|_| Ok::<_, Infallible>(()));
+        let old = Body::of(&body).unwrap().read(&MapFileLimits::OWN, memory).unwrap().contents;
         assert_eq!(old.moments, MomentSet::of_centers(&old.voxels));
         let points: i64 = old.moments.as_slice().iter().map(|(_, moments)| moments.count()).sum();
         assert_eq!(points, 5000);
@@ -288,5 +266,45 @@ mod tests {
     fn a_restored_map_is_the_map() {
         let map = snapshot().restore().unwrap();
         assert_eq!(Snapshot::of(&map, snapshot().uuid), snapshot());
+    }
+
+    fn within(limits: MapFileLimits, memory: u64) -> MapFileError<u64> {
+        let mut asked = 0;
+        let reserve = |bytes| {
+            asked += bytes;
+            if asked > memory { Err(asked) } else { Ok(()) }
+        };
+        Snapshot::decode_within(&snapshot().encode().unwrap(), &limits, reserve).unwrap_err()
+    }
+
+    #[test]
+    fn limits_are_named_where_a_file_holds_more() {
+        let voxels = MapFileLimits { voxels_max: 4999, ..MapFileLimits::OWN };
+        let refused = within(voxels, u64::MAX).to_string();
+        assert_eq!(refused, "the map file has 5000 voxels, voxels_per_map_max is 4999");
+        let blocks = MapFileLimits { voxels_max: 9, ..MapFileLimits::OWN };
+        assert!(within(blocks, u64::MAX).to_string().contains("blocks of voxels, voxels_per_map_max is 9"));
+        let scans = MapFileLimits { scans_max: 0, ..MapFileLimits::OWN };
+        assert_eq!(within(scans, u64::MAX).to_string(), "the map file has 1 scans, map_file_scans_max is 0");
+        let bytes = MapFileLimits { body_bytes_max: 99, ..MapFileLimits::OWN };
+        assert!(matches!(within(bytes, u64::MAX), MapFileError::Bad(why) if why.contains("at most 99")));
+        let exact = MapFileLimits { voxels_max: 5000, scans_max: 1, ..MapFileLimits::OWN };
+        let file = snapshot().encode().unwrap();
+        assert!(Snapshot::decode_within(&file, &exact, |_| Ok::<_, Infallible>(())).is_ok());
+    }
+
+    #[test]
+    fn memory_is_asked_for_before_each_part() {
+        let mut asked = Vec::new();
+        let reserve = |bytes| {
+            asked.push(bytes);
+            Ok::<_, Infallible>(())
+        };
+        Snapshot::decode_within(&snapshot().encode().unwrap(), &MapFileLimits::OWN, reserve).unwrap();
+        assert_eq!(asked.len(), 4, "body, voxels, moments, trajectory and requests: {asked:?}");
+        let sums = asked.iter().scan(0, |sum, bytes| Some(std::mem::replace(sum, *sum + bytes)));
+        for sum in sums {
+            assert!(matches!(within(MapFileLimits::OWN, sum), MapFileError::NoMemory(_)), "{sum}");
+        }
     }
 }

@@ -1,10 +1,27 @@
 //! The gauges of the maps, written afresh at each scrape in Prometheus' text form:
 //! `name{label="value",...} number`.
 
+use std::collections::BTreeMap;
 use std::fmt::{Display, Write};
 
-use crate::map::LevelInfo;
+use super::map_counters::{self, Series};
+use crate::map::{LevelInfo, MapName};
 use crate::service::{MapInfo, MapStorage, PoolUse};
+
+/// Appends what was counted by map.
+pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Series, u64>)]) {
+    for counted in map_counters::Family::ALL {
+        let mut family = Family::begin_as(text, counted.name(), counted.help(), "counter");
+        for (map, counters) in maps {
+            for ((_, label), count) in counters.iter().filter(|((family, _), _)| *family == counted) {
+                match label {
+                    Some((label, value)) => family.sample(&[("map", map), (label, value)], count),
+                    None => family.sample(&[("map", map)], count),
+                }
+            }
+        }
+    }
+}
 
 /// Appends the gauges of `pools`.
 pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
@@ -22,7 +39,7 @@ pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
     for (name, what, value) in families {
         let mut family = Family::begin(text, name, what);
         for pool in pools {
-            family.gauge(&[("pool", &pool.name)], value(pool));
+            family.sample(&[("pool", &pool.name)], value(pool));
         }
     }
 }
@@ -31,25 +48,25 @@ pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
 pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     let mut family = Family::begin(text, "mrol_map_voxels", "Occupied voxels, by map and level");
     for (map, level) in levels(maps) {
-        family.gauge(&[("map", &map.name), ("level", &level.level)], level.voxels);
+        family.sample(&[("map", &map.name), ("level", &level.level)], level.voxels);
     }
     let mut family =
         Family::begin(text, "mrol_map_set_bytes", "Bytes of the exact sets of all levels, by map");
     for map in maps {
-        family.gauge(&[("map", &map.name)], map.set_bytes);
+        family.sample(&[("map", &map.name)], map.set_bytes);
     }
     let mut family = Family::begin(text, "mrol_map_moment_bytes", "Bytes of the points' moments, by map");
     for map in maps {
-        family.gauge(&[("map", &map.name)], map.moment_bytes);
+        family.sample(&[("map", &map.name)], map.moment_bytes);
     }
     write_filters(text, maps);
     let mut family = Family::begin(text, "mrol_map_revision", "Committed changes, by map");
     for map in maps {
-        family.gauge(&[("map", &map.name)], map.state.revision);
+        family.sample(&[("map", &map.name)], map.state.revision);
     }
     let mut family = Family::begin(text, "mrol_map_scans", "Accepted scans, by map");
     for map in maps {
-        family.gauge(&[("map", &map.name)], map.scans);
+        family.sample(&[("map", &map.name)], map.scans);
     }
     write_storage(text, maps);
 }
@@ -59,7 +76,7 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
     let mut family = Family::begin(text, "mrol_map_filter_bytes", what);
     for (map, level) in levels(maps) {
         for (part, bytes) in [("plane", level.plane_bytes), ("counters", level.counter_bytes)] {
-            family.gauge(&[("map", &map.name), ("level", &level.level), ("part", &part)], bytes);
+            family.sample(&[("map", &map.name), ("level", &level.level), ("part", &part)], bytes);
         }
     }
     let what = "False positive rate of the filters, by map, level and kind: by the closed form of their layout, \
@@ -73,7 +90,7 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
         ];
         for (kind, rate) in rates {
             if let Some(rate) = rate {
-                family.gauge(&[("map", &map.name), ("level", &level.level), ("kind", &kind)], rate);
+                family.sample(&[("map", &map.name), ("level", &level.level), ("kind", &kind)], rate);
             }
         }
     }
@@ -107,7 +124,7 @@ fn write_storage(text: &mut String, maps: &[MapInfo]) {
     for (name, what, value) in families {
         let mut family = Family::begin(text, name, what);
         for (map, storage) in kept() {
-            family.gauge(&[("map", map)], value(storage));
+            family.sample(&[("map", map)], value(storage));
         }
     }
 }
@@ -120,13 +137,17 @@ struct Family<'a> {
 
 impl<'a> Family<'a> {
     fn begin(text: &'a mut String, name: &'static str, what: &str) -> Self {
+        Self::begin_as(text, name, what, "gauge")
+    }
+
+    fn begin_as(text: &'a mut String, name: &'static str, what: &str, kind: &str) -> Self {
         // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} gauge");
+        let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} {kind}");
         Self { text, name }
     }
 
     /// One sample. No label value needs escaping: names of maps hold neither quotes nor backslashes.
-    fn gauge(&mut self, labels: &[(&str, &dyn Display)], value: impl Display) {
+    fn sample(&mut self, labels: &[(&str, &dyn Display)], value: impl Display) {
         let _ = write!(self.text, "{}", self.name);
         for (i, (label, value)) in labels.iter().enumerate() {
             let _ = write!(self.text, "{}{label}=\"{value}\"", if i == 0 { '{' } else { ',' });
@@ -142,7 +163,7 @@ mod tests {
     #[test]
     fn a_family_is_help_type_and_samples() {
         let mut text = String::new();
-        Family::begin(&mut text, "m", "What it is").gauge(&[("map", &"a"), ("level", &2)], 0.5);
+        Family::begin(&mut text, "m", "What it is").sample(&[("map", &"a"), ("level", &2)], 0.5);
         assert_eq!(text, "# HELP m What it is\n# TYPE m gauge\nm{map=\"a\",level=\"2\"} 0.5\n");
     }
 }

@@ -3,8 +3,8 @@
 use super::Metrics;
 use crate::map::MapName;
 use crate::service::{
-    Deletion, DeletionAnswer, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer, ScanRequest,
-    ServiceError, Undo, UndoAnswer,
+    Deletion, DeletionAnswer, MapInfo, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer,
+    ScanRequest, ServiceError, Undo, UndoAnswer,
 };
 
 /// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
@@ -34,6 +34,18 @@ impl MeteredService {
     /// Where its work is counted.
     pub fn metrics(&self) -> &Metrics {
         &self.metrics
+    }
+
+    /// Everything that is measured in Prometheus' text form, with what is known of `maps`.
+    pub fn render(&self, maps: &[MapInfo]) -> String {
+        self.metrics.render(&self.service.pools(), &self.service.map_names(), maps)
+    }
+
+    /// Folds what was measured, and forgets what was measured of maps that are gone; to be called now and then with a
+    /// service that reaches every map.
+    pub fn upkeep(&self) {
+        self.metrics.upkeep();
+        self.metrics.keep_maps(&self.service.map_names());
     }
 
     /// [`MapService::measure`], shown. May block as well.

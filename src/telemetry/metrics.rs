@@ -1,5 +1,6 @@
 //! Counters and latencies, kept by one server and rendered for Prometheus.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,8 +10,11 @@ use metrics::{
 };
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
+use parking_lot::Mutex;
+
 use super::exposition;
 use super::log::TelemetryError;
+use super::map_counters::{Family, MapCounters};
 use crate::admission::InUse;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName};
@@ -19,6 +23,12 @@ use crate::service::{MapInfo, PoolUse, Readings, Shortage};
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds.
 const SECONDS_BUCKETS: [f64; 14] =
     [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+
+/// Names of keys with a series of their own: those that came later are counted together. A file of keys may change as
+/// often as one likes, and what was counted once stays.
+const KEY_SERIES_MAX: usize = 1000;
+/// The label of those; no key has such a name.
+const OTHER_KEYS: &str = "(others)";
 
 const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
@@ -30,17 +40,18 @@ const BODY_BYTES: &str = "mrol_body_bytes";
 const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
 const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
 const WRITES_REFUSED: &str = "mrol_writes_refused";
-const POINTS_QUERIED: &str = "mrol_points_queried_total";
-const SCANS: &str = "mrol_scans_total";
-const SCANS_UNDONE: &str = "mrol_scans_undone_total";
-const VOXELS_REMOVED: &str = "mrol_voxels_removed_total";
 
 /// The metrics of one server. A clone is another handle on the same ones.
 ///
 /// The recorder is the server's own and not the process's, so that several servers in one process (tests, a
 /// demo) count apart.
 #[derive(Debug, Clone)]
-pub struct Metrics(Arc<PrometheusRecorder>);
+pub struct Metrics {
+    recorder: Arc<PrometheusRecorder>,
+    maps: MapCounters,
+    /// Names of keys that have a series.
+    keys: Arc<Mutex<BTreeSet<String>>>,
+}
 
 impl Metrics {
     /// Metrics that are all zero.
@@ -50,7 +61,8 @@ impl Metrics {
     pub fn new() -> Result<Self, TelemetryError> {
         let latency = Matcher::Full(REQUEST_SECONDS.to_owned());
         let builder = PrometheusBuilder::new().set_buckets_for_metric(latency, &SECONDS_BUCKETS)?;
-        let metrics = Self(Arc::new(builder.build_recorder()));
+        let recorder = Arc::new(builder.build_recorder());
+        let metrics = Self { recorder, maps: MapCounters::default(), keys: Arc::default() };
         metrics.record(describe);
         Ok(metrics)
     }
@@ -72,7 +84,8 @@ impl Metrics {
 
     /// Counts a call or request that was let in with a key.
     pub fn key_used(&self, protocol: &'static str, key: &str) {
-        self.record(|| counter!(KEY_REQUESTS, "protocol" => protocol, "key" => key.to_owned()).increment(1));
+        let key = self.label_of_key(key);
+        self.record(|| counter!(KEY_REQUESTS, "protocol" => protocol, "key" => key).increment(1));
     }
 
     /// Says whether what a file holds is in force: false where it changed into something that cannot be used.
@@ -109,34 +122,34 @@ impl Metrics {
 
     /// Counts points that were answered.
     pub fn points_queried(&self, map: &MapName, lookup: Lookup, points: usize) {
-        let lookup = match lookup {
-            Lookup::Exact => "exact",
-            Lookup::Bloom => "bloom",
-        };
-        self.record(|| {
-            counter!(POINTS_QUERIED, "map" => map.to_string(), "lookup" => lookup).increment(points as u64);
-        });
+        self.maps.points_queried(map, lookup, points);
     }
 
     /// Counts a scan that was judged for insertion.
     pub fn scan(&self, map: &MapName, verdict: Verdict) {
-        self.record(|| counter!(SCANS, "map" => map.to_string(), "verdict" => verdict.as_str()).increment(1));
+        self.maps.scan(map, verdict);
     }
 
     /// Counts scans that were taken out again.
     pub fn scans_undone(&self, map: &MapName, scans: usize) {
-        self.record(|| counter!(SCANS_UNDONE, "map" => map.to_string()).increment(scans as u64));
+        self.maps.count(map, (Family::ScansUndone, None), scans);
     }
 
     /// Counts finest voxels that a deletion or an undo removed.
     pub fn voxels_removed(&self, map: &MapName, voxels: usize) {
-        self.record(|| counter!(VOXELS_REMOVED, "map" => map.to_string()).increment(voxels as u64));
+        self.maps.count(map, (Family::VoxelsRemoved, None), voxels);
     }
 
-    /// Everything in Prometheus' text form, with gauges of `pools` and `maps` as they are now: a map that is gone leaves no
-    /// gauge behind.
-    pub fn render(&self, pools: &[PoolUse], maps: &[MapInfo]) -> String {
-        let mut text = self.0.handle().render();
+    /// Forgets what was counted of maps that are not among `names`.
+    pub fn keep_maps(&self, names: &[MapName]) {
+        self.maps.keep(names);
+    }
+
+    /// Everything in Prometheus' text form, with counters of the maps `names` and gauges of `pools` and `maps` as they are
+    /// now: a map that is gone leaves nothing behind.
+    pub fn render(&self, pools: &[PoolUse], names: &[MapName], maps: &[MapInfo]) -> String {
+        let mut text = self.recorder.handle().render();
+        exposition::write_counters(&mut text, &self.maps.of(names));
         exposition::write_pools(&mut text, pools);
         exposition::write_maps(&mut text, maps);
         text
@@ -144,11 +157,23 @@ impl Metrics {
 
     /// Folds what was recorded into the histograms; to be called now and then, lest it pile up between scrapes.
     pub fn upkeep(&self) {
-        self.0.handle().run_upkeep();
+        self.recorder.handle().run_upkeep();
+    }
+
+    /// The name of a key, where not too many have come and gone already.
+    fn label_of_key(&self, key: &str) -> String {
+        let mut keys = self.keys.lock();
+        if !keys.contains(key) {
+            if keys.len() >= KEY_SERIES_MAX {
+                return OTHER_KEYS.to_owned();
+            }
+            keys.insert(key.to_owned());
+        }
+        key.to_owned()
     }
 
     fn record(&self, f: impl FnOnce()) {
-        with_local_recorder(&*self.0, f);
+        with_local_recorder(&*self.recorder, f);
     }
 }
 
@@ -169,10 +194,6 @@ fn describe() {
     describe_gauge!(DISK_FREE_BYTES, "Bytes free on the disk of the data folder");
     describe_gauge!(MEMORY_RESIDENT_BYTES, "Bytes that the process has in memory");
     describe_gauge!(WRITES_REFUSED, "1 while changes are refused, by reason");
-    describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
-    describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
-    describe_counter!(SCANS_UNDONE, "Scans taken out again, by map");
-    describe_counter!(VOXELS_REMOVED, "Finest voxels removed by deletions and undos, by map");
 }
 
 #[cfg(test)]
@@ -187,7 +208,7 @@ mod tests {
         metrics.points_queried(&map, Lookup::Bloom, 7);
         metrics.points_queried(&map, Lookup::Bloom, 5);
         metrics.scan(&map, Verdict::LowOverlap);
-        let text = metrics.render(&[], &[]);
+        let text = metrics.render(&[], &[map], &[]);
         for line in [
             r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
             r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
@@ -201,9 +222,38 @@ mod tests {
     }
 
     #[test]
+    fn a_map_that_is_gone_leaves_no_series() {
+        let metrics = Metrics::new().unwrap();
+        let [kept, gone] = ["kept", "gone"].map(|name| MapName::new(name).unwrap());
+        for map in [&kept, &gone] {
+            metrics.points_queried(map, Lookup::Exact, 1);
+            metrics.scan(map, Verdict::Accepted);
+            metrics.scans_undone(map, 1);
+            metrics.voxels_removed(map, 1);
+        }
+        let names = std::slice::from_ref(&kept);
+        let text = metrics.render(&[], names, &[]);
+        assert!(text.contains(r#"map="kept""#) && !text.contains("gone"), "{text}");
+        metrics.keep_maps(names);
+        assert!(!metrics.render(&[], &[kept, gone], &[]).contains("gone"));
+    }
+
+    #[test]
+    fn keys_have_so_many_series_and_no_more() {
+        let metrics = Metrics::new().unwrap();
+        for key in 0..KEY_SERIES_MAX + 2 {
+            metrics.key_used("http", &format!("key-{key}"));
+        }
+        metrics.key_used("http", "key-0");
+        let text = metrics.render(&[], &[], &[]);
+        assert_eq!(text.matches("mrol_key_requests_total{").count(), KEY_SERIES_MAX + 1);
+        assert!(text.contains(r#"key="(others)"} 2"#) && text.contains(r#"key="key-0"} 2"#));
+    }
+
+    #[test]
     fn two_servers_count_apart() {
         let (one, other) = (Metrics::new().unwrap(), Metrics::new().unwrap());
         one.request("http", "GetMap", "200", Duration::ZERO);
-        assert!(!other.render(&[], &[]).contains("GetMap"));
+        assert!(!other.render(&[], &[], &[]).contains("GetMap"));
     }
 }

@@ -2,6 +2,7 @@
 
 mod exposition;
 mod log;
+mod map_counters;
 mod metered;
 mod metrics;
 

@@ -153,6 +153,8 @@ fn config(data: &TempDir, change: impl FnOnce(&mut Config)) -> Config {
     let mut config = Config { data_dir: data.path().to_owned(), ..Config::default() };
     config.http.listen.set_port(0);
     config.grpc.listen.set_port(0);
+    // What a test has just done is to be seen.
+    config.limits.scrape_kept_s = 0.0;
     change(&mut config);
     config
 }

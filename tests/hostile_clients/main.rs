@@ -10,12 +10,17 @@
 mod bombs;
 #[path = "../common/mod.rs"]
 mod common;
+mod control_group;
 mod floods;
 mod frames;
 mod headers;
+mod health;
 mod honest;
+mod hostile_files;
 mod idle;
+mod map_files;
 mod memory;
+mod metrics;
 mod probe;
 #[path = "../process/mod.rs"]
 mod process;

@@ -55,16 +55,21 @@ pub(crate) struct Siege {
 impl Siege {
     /// A daemon that has served honest clients for a moment: what it holds then is what it needs anyway.
     pub(crate) async fn begin(name: &'static str) -> Self {
+        Self::begin_within(name, "", under_attack()).await
+    }
+
+    /// [`Siege::begin`] with more limits, for an attack that may take no more than `bytes` of memory.
+    pub(crate) async fn begin_within(name: &'static str, limits: &str, bytes: usize) -> Self {
         let ground = GROUND.lock().await;
         let data = tempfile::tempdir().unwrap();
         let settings = data.path().join("mrol.toml");
-        std::fs::write(&settings, self::settings()).unwrap();
+        std::fs::write(&settings, self::settings() + limits).unwrap();
         let folder = data.path().join("maps");
         let process = Process::start(folder.to_str().unwrap(), &["--config", settings.to_str().unwrap()]);
         let mut honest = Honest::begin(&process.http, &process.grpc).await;
         honest.wait_for_answers(50).await;
         let memory = Memory::of(process.id());
-        let bound = memory.resident() + under_attack();
+        let bound = memory.resident() + bytes;
         memory.forget_peak();
         let probe = Probe::begin(address(&process.http));
         Self { name, process, probe, honest, bound, _data: data, _ground: ground }

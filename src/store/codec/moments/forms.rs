@@ -52,7 +52,10 @@ pub(super) fn read(message: &pb::Moments, voxels: usize) -> Result<Vec<Moments>,
             .and_then(Moments::from_numbers)
             .ok_or_else(|| format!("moments of voxel {i} are those of no points"))
     };
-    let moments = forms.iter().enumerate().map(voxel).collect::<Result<_, _>>()?;
+    let mut moments = Vec::with_capacity(voxels);
+    for moments_of_voxel in forms.iter().enumerate().map(voxel) {
+        moments.push(moments_of_voxel?);
+    }
     match unread {
         Unread { points: [], numbers: [] } => Ok(moments),
         Unread { points, numbers } => Err(format!(

@@ -1,0 +1,56 @@
+//! What is known of a connection that a request came by.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::quota::{Quota, Taken};
+use crate::service::ServiceError;
+
+/// What the requests of one connection share; to be found among their extensions. A clone is another handle on it.
+#[derive(Debug, Clone)]
+pub struct OfConnection(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    has_key: AtomicBool,
+    /// It was taken when all places were in use: for health checks alone.
+    is_reserved: bool,
+    watches: Quota,
+}
+
+impl OfConnection {
+    /// Of a new connection; `is_reserved` where it may ask for nothing but health.
+    pub fn new(is_reserved: bool) -> Self {
+        let watches = Quota::new("health watches of one connection", 1);
+        Self(Arc::new(Shared { has_key: AtomicBool::new(false), is_reserved, watches }))
+    }
+
+    /// True once a request came with a key that counts.
+    pub fn has_key(&self) -> bool {
+        self.0.has_key.load(Ordering::Relaxed)
+    }
+
+    /// A request came with a key that counts.
+    pub(crate) fn show_key(&self) {
+        self.0.has_key.store(true, Ordering::Relaxed);
+    }
+
+    /// # Errors
+    /// Where nothing but health may be asked for.
+    pub(super) fn check(&self, asks_for_health: bool) -> Result<(), ServiceError> {
+        if !self.0.is_reserved || asks_for_health {
+            return Ok(());
+        }
+        let message = "connections_max are in use, and this connection is one of connections_reserved: it answers health \
+                       checks alone, try again";
+        Err(ServiceError::overloaded(message))
+    }
+
+    /// The connection's one health watch.
+    ///
+    /// # Errors
+    /// Where it has one.
+    pub(super) fn watch(&self) -> Result<Taken, ServiceError> {
+        self.0.watches.take()
+    }
+}

@@ -1,0 +1,256 @@
+//! The body of a map file. What it holds is counted first: of each part memory is asked for before it is built.
+
+use prost::Message;
+use uuid::Uuid;
+
+use super::Snapshot;
+use super::fields::{Fields, Value, count_bytes, count_varints};
+use super::limits::{MapFileError, MapFileLimits, Memory};
+use crate::bloom::FilterSettings;
+use crate::map::{AnsweredRequest, MapContents, MapSettings, REQUESTS_KEPT, Trajectory, TrajectoryPose};
+use crate::store::codec::{Unreadable, moments};
+use crate::store::pb;
+use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
+
+/// The numbers of the fields, as `proto/mrol/store/v1` has them.
+mod number {
+    pub(super) const UUID: u64 = 1;
+    pub(super) const RESOLUTION_M: u64 = 2;
+    pub(super) const LEVELS: u64 = 3;
+    pub(super) const FILTER_HASHES: u64 = 4;
+    pub(super) const FILTER_BITS_PER_VOXEL: u64 = 5;
+    pub(super) const REVISION: u64 = 6;
+    pub(super) const BLOCK_KEYS: u64 = 7;
+    pub(super) const BLOCK_MASKS: u64 = 8;
+    pub(super) const TRAJECTORY: u64 = 9;
+    pub(super) const VOXELS: u64 = 10;
+    pub(super) const WITHDRAWN: u64 = 11;
+    pub(super) const REQUESTS: u64 = 12;
+    pub(super) const MOMENTS: u64 = 13;
+
+    /// In `Voxels` and `Moments`.
+    pub(super) const KEY_GAPS: u64 = 1;
+    /// In `Moments`.
+    pub(super) const NUMBERS: u64 = 2;
+    pub(super) const FORMS: u64 = 3;
+}
+
+/// Bytes of one scan or request: a name, an overlap for each level and some numbers are a few hundred.
+const RECORD_BYTES_MAX: usize = 4096;
+/// Bytes of memory of a number that is read one by one into a list, which doubles its room: the old and the new one.
+const NUMBER_BYTES: usize = 3 * size_of::<u64>();
+/// Of a scan in the trajectory: itself as it was read and in a list that doubles its room, its overlaps and name, and its
+/// places by robot and id.
+const SCAN_BYTES: usize = 3 * size_of::<TrajectoryPose>() + 12 * size_of::<f64>() + 240;
+/// Of a request, which is found by its id.
+const REQUEST_BYTES: usize = 2 * size_of::<AnsweredRequest>() + 160;
+const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
+/// Of a voxel's moments: its key twice, the moments by themselves and with their key.
+const MOMENT_BYTES: usize =
+    2 * size_of::<VoxelKey>() + size_of::<Moments>() + size_of::<(VoxelKey, Moments)>();
+
+/// A body whose fields were found, and nothing built of them.
+#[derive(Debug, Default)]
+pub(super) struct Body<'a> {
+    all: &'a [u8],
+    uuid: &'a [u8],
+    settings: [f64; 2],
+    levels: u32,
+    hashes: u32,
+    revision: u64,
+    block_keys: &'a [u8],
+    block_masks: &'a [u8],
+    voxels: Option<&'a [u8]>,
+    moments: Option<&'a [u8]>,
+    scans: usize,
+    withdrawn: usize,
+    requests: usize,
+}
+
+impl<'a> Body<'a> {
+    /// Finds the fields of a body.
+    ///
+    /// # Errors
+    /// When it is no message, or has a part twice that there is one of.
+    pub(super) fn of(all: &'a [u8]) -> Result<Self, Unreadable> {
+        let mut body = Self { all, ..Self::default() };
+        for field in Fields::of(all) {
+            body.take(field?)?;
+        }
+        Ok(body)
+    }
+
+    fn take(&mut self, field: (u64, Value<'a>)) -> Result<(), Unreadable> {
+        use Value::{Bytes, Fixed64, Varint};
+        let small = |value: u64, what: &str| {
+            u32::try_from(value).map_err(|_| format!("{what} is too large: {value}"))
+        };
+        match field {
+            (number::UUID, Bytes(uuid)) => self.uuid = uuid,
+            (number::RESOLUTION_M, Fixed64(bits)) => self.settings[0] = f64::from_bits(bits),
+            (number::LEVELS, Varint(levels)) => self.levels = small(levels, "levels")?,
+            (number::FILTER_HASHES, Varint(hashes)) => self.hashes = small(hashes, "filter_hashes")?,
+            (number::FILTER_BITS_PER_VOXEL, Fixed64(bits)) => self.settings[1] = f64::from_bits(bits),
+            (number::REVISION, Varint(revision)) => self.revision = revision,
+            (number::BLOCK_KEYS, Bytes(keys)) if self.block_keys.is_empty() => self.block_keys = keys,
+            (number::BLOCK_MASKS, Bytes(masks)) if self.block_masks.is_empty() => self.block_masks = masks,
+            (number::VOXELS, Bytes(voxels)) if self.voxels.is_none() => self.voxels = Some(voxels),
+            (number::MOMENTS, Bytes(moments)) if self.moments.is_none() => self.moments = Some(moments),
+            (number::TRAJECTORY, Bytes(_)) => self.scans += 1,
+            (number::WITHDRAWN, Bytes(_)) => self.withdrawn += 1,
+            (number::REQUESTS, Bytes(_)) => self.requests += 1,
+            (known @ number::UUID..=number::MOMENTS, _) => {
+                return Err(format!("field {known} comes twice, or is of another kind"));
+            }
+            // Of a newer version, which says so where it matters.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// What it holds.
+    ///
+    /// # Errors
+    /// When it is wrong, holds more than `limits` allow, or there is no `memory` for it.
+    pub(super) fn read<E>(
+        self,
+        limits: &MapFileLimits,
+        memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
+    ) -> Result<Snapshot, MapFileError<E>> {
+        let uuid = Uuid::from_slice(self.uuid).map_err(|e| format!("uuid: {e}"))?;
+        let settings = self.settings()?;
+        self.check_counts(limits)?;
+        let voxels = self.voxels(limits, memory)?;
+        let moments = self.moments(&voxels, memory)?;
+        memory.reserve(self.scans * SCAN_BYTES + self.withdrawn * 16 + self.requests * REQUEST_BYTES)?;
+        let contents = MapContents {
+            revision: self.revision,
+            voxels,
+            moments,
+            trajectory: Trajectory::new(self.scans()?, self.withdrawn()?),
+            requests: self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?,
+        };
+        let contents = contents.checked().map_err(|e| e.to_string())?;
+        Ok(Snapshot { uuid, settings, contents })
+    }
+
+    fn settings(&self) -> Result<MapSettings, Unreadable> {
+        let [resolution_m, bits_per_key] = self.settings;
+        let filter = FilterSettings { hashes: self.hashes, bits_per_key };
+        let settings = MapSettings { resolution_m, levels: self.levels, filter };
+        settings.checked().map_err(|e| e.to_string())
+    }
+
+    fn check_counts<E>(&self, limits: &MapFileLimits) -> Result<(), MapFileError<E>> {
+        let (limit, most) = ("map_file_scans_max", limits.scans_max);
+        for (what, count) in [("scans", self.scans), ("withdrawn scans", self.withdrawn)] {
+            if count > most {
+                return Err(MapFileError::TooLarge { what, count, limit, most });
+            }
+        }
+        if self.requests > REQUESTS_KEPT {
+            let message = format!("{} requests, a map remembers {REQUESTS_KEPT}", self.requests);
+            return Err(MapFileError::Bad(message));
+        }
+        Ok(())
+    }
+
+    fn voxels<E>(
+        &self,
+        limits: &MapFileLimits,
+        memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
+    ) -> Result<VoxelSet, MapFileError<E>> {
+        let within = |what, count| match count > limits.voxels_max {
+            true => {
+                let (limit, most) = ("voxels_per_map_max", limits.voxels_max);
+                Err(MapFileError::TooLarge { what, count, limit, most })
+            }
+            false => Ok(()),
+        };
+        let of_version_1 = self.block_keys.len() / size_of::<u64>();
+        let blocks = self.voxels.map_or(Ok(of_version_1), |it| count_varints(it, number::KEY_GAPS))?;
+        // None of them is empty.
+        within("blocks of voxels", blocks)?;
+        memory.reserve(blocks * BLOCK_BYTES)?;
+        let voxels = match self.voxels {
+            Some(message) => decoded::<pb::Voxels>(message, "voxels")?.try_into()?,
+            None => voxels_of_version_1(self.block_keys, self.block_masks)?,
+        };
+        within("voxels", voxels.len())?;
+        Ok(voxels)
+    }
+
+    fn moments<E>(
+        &self,
+        voxels: &VoxelSet,
+        memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
+    ) -> Result<MomentSet, MapFileError<E>> {
+        let beside = || voxels.blocks().iter().map(|(_, mask)| mask.count(MOMENT_LEVEL)).sum::<usize>();
+        let Some(message) = self.moments else {
+            memory.reserve(beside() * MOMENT_BYTES)?;
+            return Ok(MomentSet::of_centers(voxels));
+        };
+        let count = |field| count_varints(message, field);
+        let (gaps, numbers) = (count(number::KEY_GAPS)?, count(number::NUMBERS)?);
+        let forms = count_bytes(message, number::FORMS)?;
+        let keys = if gaps == 0 && forms > 0 { beside() } else { gaps };
+        memory.reserve((gaps + numbers) * NUMBER_BYTES + keys.max(forms) * MOMENT_BYTES)?;
+        Ok(moments::read(&decoded(message, "moments")?, voxels)?)
+    }
+
+    fn scans(&self) -> Result<Vec<TrajectoryPose>, Unreadable> {
+        let mut scans = Vec::with_capacity(self.scans);
+        for record in self.records(number::TRAJECTORY) {
+            scans.push(decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?);
+        }
+        Ok(scans)
+    }
+
+    fn withdrawn(&self) -> Result<Vec<crate::map::WithdrawnScan>, Unreadable> {
+        let mut withdrawn = Vec::with_capacity(self.withdrawn);
+        for record in self.records(number::WITHDRAWN) {
+            withdrawn.push(decoded::<pb::WithdrawnScan>(record?, "a withdrawn scan")?.into());
+        }
+        Ok(withdrawn)
+    }
+
+    /// The bytes of each of the messages of a repeated field.
+    fn records(&self, number: u64) -> impl Iterator<Item = Result<&'a [u8], Unreadable>> {
+        let of_number = move |field: Result<_, Unreadable>| match field {
+            Ok((n, Value::Bytes(record))) if n == number => Some(match record.len() > RECORD_BYTES_MAX {
+                true => {
+                    Err(format!("a record of {} bytes, at most {RECORD_BYTES_MAX} are one", record.len()))
+                }
+                false => Ok(record),
+            }),
+            Ok(_) => None,
+            Err(unreadable) => Some(Err(unreadable)),
+        };
+        Fields::of(self.all).filter_map(of_number)
+    }
+}
+
+fn request(record: Result<&[u8], Unreadable>) -> Result<AnsweredRequest, Unreadable> {
+    decoded::<pb::AnsweredRequest>(record?, "a request")?.try_into()
+}
+
+fn decoded<M: Message + Default>(bytes: &[u8], what: &str) -> Result<M, Unreadable> {
+    M::decode(bytes).map_err(|e| format!("{what}: {e}"))
+}
+
+fn voxels_of_version_1(keys: &[u8], masks: &[u8]) -> Result<VoxelSet, Unreadable> {
+    let ((keys, odd), (masks, rest)) = (keys.as_chunks(), masks.as_chunks::<{ BlockMask::BYTES }>());
+    if masks.len() != keys.len() || !odd.is_empty() || !rest.is_empty() {
+        return Err(format!(
+            "{} block keys with {} bytes of masks",
+            keys.len(),
+            masks.len() * BlockMask::BYTES
+        ));
+    }
+    let block = |(&key, mask): (&[u8; 8], &[u8; BlockMask::BYTES])| {
+        let key = u64::from_le_bytes(key);
+        let key = VoxelSet::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
+        Ok((key, BlockMask::from_le_bytes(mask)))
+    };
+    keys.iter().zip(masks).map(block).collect()
+}

@@ -1,0 +1,140 @@
+//! The fields of a protobuf message as they stand in its bytes: nothing is built of them, so that they can be counted
+//! before memory is taken.
+
+use crate::store::codec::Unreadable;
+
+/// The value of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Value<'a> {
+    /// Of wire type 0.
+    Varint(u64),
+    /// Of wire type 1.
+    Fixed64(u64),
+    /// Of wire type 2: bytes, a text, a message, or packed numbers.
+    Bytes(&'a [u8]),
+    /// Of wire type 5.
+    Fixed32,
+}
+
+/// The fields of a message, in their order, with their numbers.
+#[derive(Debug, Clone)]
+pub(super) struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(super) fn of(message: &'a [u8]) -> Self {
+        Self(message)
+    }
+
+    fn field(&mut self) -> Option<(u64, Value<'a>)> {
+        let key = varint(&mut self.0)?;
+        let value = match key & 7 {
+            0 => Value::Varint(varint(&mut self.0)?),
+            1 => {
+                let (bytes, rest) = self.0.split_first_chunk()?;
+                self.0 = rest;
+                Value::Fixed64(u64::from_le_bytes(*bytes))
+            }
+            2 => {
+                let length = usize::try_from(varint(&mut self.0)?).ok()?;
+                Value::Bytes(self.0.split_off(..length)?)
+            }
+            5 => self.0.split_off(..4).map(|_| Value::Fixed32)?,
+            // Groups are as old as protobuf, and nothing of ours.
+            _ => return None,
+        };
+        Some((key >> 3, value))
+    }
+}
+
+impl<'a> Iterator for Fields<'a> {
+    type Item = Result<(u64, Value<'a>), Unreadable>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.0.is_empty() {
+            return None;
+        }
+        let left = self.0.len();
+        Some(self.field().ok_or_else(|| {
+            self.0 = &[];
+            format!("the field {left} bytes before the end of its message is none, or is cut short")
+        }))
+    }
+}
+
+/// How many numbers a message holds in the repeated field `number`, packed or one by one.
+pub(super) fn count_varints(message: &[u8], number: u64) -> Result<usize, Unreadable> {
+    let mut count = 0;
+    for field in Fields::of(message) {
+        count += match field? {
+            (n, Value::Bytes(packed)) if n == number => packed.iter().filter(|&&byte| byte < 128).count(),
+            (n, Value::Varint(_)) if n == number => 1,
+            _ => 0,
+        };
+    }
+    Ok(count)
+}
+
+/// Bytes of the field `number` of a message, all its occurrences together.
+pub(super) fn count_bytes(message: &[u8], number: u64) -> Result<usize, Unreadable> {
+    let mut count = 0;
+    for field in Fields::of(message) {
+        if let (n, Value::Bytes(bytes)) = field?
+            && n == number
+        {
+            count += bytes.len();
+        }
+    }
+    Ok(count)
+}
+
+/// Takes a varint off the front; none where it is cut short, or of more than 64 bits.
+fn varint(bytes: &mut &[u8]) -> Option<u64> {
+    let mut value = 0u64;
+    for shift in (0..64).step_by(7) {
+        let byte = *bytes.split_off_first()?;
+        value |= u64::from(byte & 127).checked_shl(shift)?;
+        if byte < 128 {
+            return Some(value);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::pb;
+    use prost::Message;
+
+    #[test]
+    fn fields_are_read_as_they_were_written() {
+        let message = pb::Snapshot {
+            uuid: vec![7; 16].into(),
+            levels: 300,
+            block_keys: vec![1, 2],
+            withdrawn: vec![pb::WithdrawnScan { scan: 1, revision: 2 }; 2],
+            ..pb::Snapshot::default()
+        };
+        let bytes = message.encode_to_vec();
+        let fields: Vec<_> = Fields::of(&bytes).map(Result::unwrap).collect();
+        assert_eq!(fields[0], (1, Value::Bytes(&[7; 16])));
+        assert_eq!(fields[1], (3, Value::Varint(300)));
+        assert!(matches!(fields[2], (7, Value::Bytes(keys)) if keys.len() == 16));
+        assert_eq!(fields.iter().filter(|(number, _)| *number == 11).count(), 2);
+        for cut in 1..bytes.len() {
+            // Between two fields a message may end.
+            let _ = Fields::of(&bytes[..cut]).map_while(Result::ok).count();
+        }
+        assert!(Fields::of(&bytes[..5]).last().unwrap().is_err());
+    }
+
+    #[test]
+    fn numbers_are_counted_packed_and_one_by_one() {
+        let message = pb::Voxels { key_gaps: vec![1, 300, 1 << 40], octrees: vec![1; 9].into() };
+        let bytes = message.encode_to_vec();
+        assert_eq!(count_varints(&bytes, 1), Ok(3));
+        assert_eq!(count_bytes(&bytes, 2), Ok(9));
+        assert_eq!(count_varints(&[8, 1, 8, 2, 8, 3], 1), Ok(3));
+        assert!(count_varints(&[8], 1).is_err() && count_bytes(&[10, 200], 1).is_err());
+    }
+}

@@ -1,0 +1,67 @@
+//! Scrapes and answers that are asked for again and again, and never read.
+
+use serde_json::json;
+use tokio::io::AsyncWriteExt;
+use tokio::net::TcpStream;
+use tokio::time::{Duration, timeout};
+
+use crate::common::client;
+use crate::frames::{END_HEADERS, END_STREAM, HEADERS, frame, literal, opening};
+use crate::siege::{ATTACK, MIB, Siege};
+
+const CONNECTIONS: usize = 8;
+/// HTTP/2's name for how much of an answer may be on its way.
+const INITIAL_WINDOW_SIZE: u16 = 4;
+/// Maps with as many levels as there can be: their gauges come to half a MiB.
+const MAPS: usize = 60;
+const LEVELS: usize = 12;
+
+#[tokio::test]
+async fn scrapes_that_nobody_reads() {
+    // Of some 400 MiB four texts are in memory at once, and what connections hold.
+    let siege = Siege::begin_within("scrapes unread", "", 96 * MIB).await;
+    for map in 0..MAPS {
+        let settings = json!({"resolution_m": 0.1, "levels": LEVELS});
+        let put = client().put(format!("http://{}/v1/maps/map-{map}", siege.http())).json(&settings);
+        assert_eq!(put.send().await.unwrap().status(), 201);
+    }
+    let get: Vec<u8> =
+        [(":method", "GET"), (":scheme", "http"), (":path", "/metrics"), (":authority", "localhost")]
+            .iter()
+            .flat_map(|(name, value)| literal(name, value))
+            .collect();
+    let scrapes =
+        (1..240).step_by(2).flat_map(|stream| frame(HEADERS, END_HEADERS | END_STREAM, stream, &get));
+    let scrapes: Vec<u8> = opening(&[(INITIAL_WINDOW_SIZE, 0)]).into_iter().chain(scrapes).collect();
+    let mut unread = Vec::new();
+    for _ in 0..CONNECTIONS {
+        let mut connection = TcpStream::connect(siege.http()).await.unwrap();
+        connection.write_all(&scrapes).await.unwrap();
+        unread.push(connection);
+    }
+    tokio::time::sleep(2 * ATTACK).await;
+    siege.end().await;
+}
+
+#[tokio::test]
+async fn answers_in_json_that_nobody_reads() {
+    const POINTS: usize = 1_000_000;
+    // 64 MiB of bodies and answers, and what two threads have in hand: points, and the text that is made of them.
+    let siege = Siege::begin_within("large answers unread", "", (64 + 192) * MIB).await;
+    let body = format!("{{\"points\":[{}[0,0,0]]}}", "[0,0,0],".repeat(POINTS - 1));
+    let head = format!(
+        "POST /v1/maps/hall/occupancy HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\n\
+         content-length: {}\r\n\r\n",
+        body.len()
+    );
+    let request = [head.as_bytes(), body.as_bytes()].concat();
+    let mut unread = Vec::new();
+    for _ in 0..100 {
+        let mut connection = TcpStream::connect(siege.http()).await.unwrap();
+        // Who is refused for want of room has sent less.
+        let _ = timeout(Duration::from_secs(2), connection.write_all(&request)).await;
+        unread.push(connection);
+    }
+    tokio::time::sleep(ATTACK).await;
+    siege.end().await;
+}
