@@ -9,6 +9,7 @@ mod json;
 mod localization;
 mod map_file;
 mod maps;
+mod object;
 mod occupancy;
 mod parameters;
 mod probes;
@@ -17,6 +18,7 @@ mod scans;
 mod starting;
 mod trajectory;
 mod undo;
+mod unreadable;
 mod voxels;
 
 pub use starting::starting;

@@ -8,11 +8,12 @@ use serde_json::{Value, json};
 
 use super::Adapter;
 use super::around::Service;
+use super::parameters::NoParameters;
 use crate::map::MapName;
 use crate::service::Shortage;
 
 /// `GET /livez`: 200 while the process lives.
-pub(super) async fn live() -> &'static str {
+pub(super) async fn live(NoParameters: NoParameters) -> &'static str {
     "ok"
 }
 
@@ -22,8 +23,9 @@ pub(super) async fn live() -> &'static str {
 pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
+    NoParameters: NoParameters,
 ) -> (StatusCode, Json<Value>) {
-    if adapter.admission.lifecycle().is_draining() {
+    if adapter.admission.lifecycle().is_leaving() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
     } else {
         let maps = service.maps().read_only_maps();
@@ -42,7 +44,7 @@ pub(super) async fn ready(
 }
 
 /// `GET /metrics`: Prometheus' text form.
-pub(super) async fn metrics(Service(service): Service) -> impl IntoResponse {
+pub(super) async fn metrics(Service(service): Service, NoParameters: NoParameters) -> impl IntoResponse {
     let maps = service.maps().list_maps().await.unwrap_or_else(|error| {
         // The counters say most when the server is overloaded, so they are told without the maps.
         tracing::warn!(%error, "metrics without gauges of the maps");

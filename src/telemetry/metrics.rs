@@ -1,5 +1,6 @@
 //! Counters and latencies, kept by one server and rendered for Prometheus.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,21 +10,40 @@ use metrics::{
 };
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
+use parking_lot::Mutex;
+
 use super::exposition;
 use super::log::TelemetryError;
 use crate::admission::InUse;
 use crate::align::Verdict;
-use crate::map::{Lookup, MapName};
+use crate::map::{Lookup, MapName, RobotName};
 use crate::service::{MapInfo, PoolUse, Readings, Shortage};
 
-/// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds.
-const SECONDS_BUCKETS: [f64; 14] =
-    [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+/// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
+/// beside a disk that hangs as long as that.
+const SECONDS_BUCKETS: [f64; 17] = [
+    0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0, 30.0,
+    60.0,
+];
 
+/// The robot of all scans that came after those of [`Metrics::ROBOTS_MAX`] others.
+const OTHER_ROBOTS: &str = "other";
+
+/// The commit that was built, where whoever built it said so.
+const COMMIT: &str = match option_env!("MROL_COMMIT") {
+    Some(commit) if !commit.is_empty() => commit,
+    _ => "unknown",
+};
+
+const BUILD_INFO: &str = "mrol_build_info";
 const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
 const KEY_REQUESTS: &str = "mrol_key_requests_total";
-const FILE_IN_FORCE: &str = "mrol_file_in_force";
+const REQUESTS_DENIED: &str = "mrol_requests_denied_total";
+const CONNECTIONS_ACCEPTED: &str = "mrol_connections_accepted_total";
+const CONNECTIONS_REFUSED: &str = "mrol_connections_refused_total";
+const CONNECTIONS_OPEN: &str = "mrol_connections_open";
+const FILE_RELOAD_OK: &str = "mrol_file_reload_ok";
 const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
 const STREAMS_OPEN: &str = "mrol_streams_open";
 const BODY_BYTES: &str = "mrol_body_bytes";
@@ -32,6 +52,7 @@ const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
 const WRITES_REFUSED: &str = "mrol_writes_refused";
 const POINTS_QUERIED: &str = "mrol_points_queried_total";
 const SCANS: &str = "mrol_scans_total";
+const ROBOT_SCANS: &str = "mrol_robot_scans_total";
 const SCANS_UNDONE: &str = "mrol_scans_undone_total";
 const VOXELS_REMOVED: &str = "mrol_voxels_removed_total";
 
@@ -40,9 +61,20 @@ const VOXELS_REMOVED: &str = "mrol_voxels_removed_total";
 /// The recorder is the server's own and not the process's, so that several servers in one process (tests, a
 /// demo) count apart.
 #[derive(Debug, Clone)]
-pub struct Metrics(Arc<PrometheusRecorder>);
+pub struct Metrics(Arc<Kept>);
+
+#[derive(Debug)]
+struct Kept {
+    recorder: PrometheusRecorder,
+    /// Robots whose scans are counted by name.
+    robots: Mutex<BTreeSet<RobotName>>,
+}
 
 impl Metrics {
+    /// Robots whose scans are counted by name; the scans of all others are counted together. Names come from callers, and
+    /// a series is kept for as long as the server runs.
+    pub const ROBOTS_MAX: usize = 100;
+
     /// Metrics that are all zero.
     ///
     /// # Errors
@@ -50,8 +82,13 @@ impl Metrics {
     pub fn new() -> Result<Self, TelemetryError> {
         let latency = Matcher::Full(REQUEST_SECONDS.to_owned());
         let builder = PrometheusBuilder::new().set_buckets_for_metric(latency, &SECONDS_BUCKETS)?;
-        let metrics = Self(Arc::new(builder.build_recorder()));
+        let kept = Kept { recorder: builder.build_recorder(), robots: Mutex::default() };
+        let metrics = Self(Arc::new(kept));
         metrics.record(describe);
+        metrics.record(|| {
+            gauge!(BUILD_INFO, "version" => env!("CARGO_PKG_VERSION"), "commit" => COMMIT, "features" => features())
+                .set(1.0);
+        });
         Ok(metrics)
     }
 
@@ -75,9 +112,31 @@ impl Metrics {
         self.record(|| counter!(KEY_REQUESTS, "protocol" => protocol, "key" => key.to_owned()).increment(1));
     }
 
-    /// Says whether what a file holds is in force: false where it changed into something that cannot be used.
-    pub fn file_in_force(&self, file: &'static str, in_force: bool) {
-        self.record(|| gauge!(FILE_IN_FORCE, "file" => file).set(f64::from(u8::from(in_force))));
+    /// Counts a call or request of a caller who may not ask for it, by the word that says why.
+    pub fn denied(&self, protocol: &'static str, reason: impl Into<SharedString>) {
+        self.record(|| {
+            counter!(REQUESTS_DENIED, "protocol" => protocol, "reason" => reason.into()).increment(1);
+        });
+    }
+
+    /// Counts a connection that `listener` accepted, and as open until the answer is dropped.
+    #[must_use]
+    pub fn connection_opened(&self, listener: &'static str) -> OpenConnection {
+        self.record(|| {
+            counter!(CONNECTIONS_ACCEPTED, "listener" => listener).increment(1);
+            gauge!(CONNECTIONS_OPEN, "listener" => listener).increment(1.0);
+        });
+        OpenConnection { metrics: self.clone(), listener }
+    }
+
+    /// Counts a connection that `listener` closed at once, since there was no place for it.
+    pub fn connection_refused(&self, listener: &'static str) {
+        self.record(|| counter!(CONNECTIONS_REFUSED, "listener" => listener).increment(1));
+    }
+
+    /// Says whether a file could be read again when it changed: false where it became something that cannot be used.
+    pub fn file_reload(&self, file: &'static str, ok: bool) {
+        self.record(|| gauge!(FILE_RELOAD_OK, "file" => file).set(f64::from(u8::from(ok))));
     }
 
     /// Says how much of what is limited is in use.
@@ -118,9 +177,25 @@ impl Metrics {
         });
     }
 
-    /// Counts a scan that was judged for insertion.
-    pub fn scan(&self, map: &MapName, verdict: Verdict) {
-        self.record(|| counter!(SCANS, "map" => map.to_string(), "verdict" => verdict.as_str()).increment(1));
+    /// Counts a scan of `robot` that was judged for insertion.
+    pub fn scan(&self, map: &MapName, robot: &RobotName, verdict: Verdict) {
+        let robot = self.label_of(robot);
+        self.record(|| {
+            counter!(SCANS, "map" => map.to_string(), "verdict" => verdict.as_str()).increment(1);
+            counter!(ROBOT_SCANS, "robot" => robot, "verdict" => verdict.as_str()).increment(1);
+        });
+    }
+
+    /// The robot's name, or the word for all those that came too late to have a series of their own.
+    fn label_of(&self, robot: &RobotName) -> String {
+        let mut robots = self.0.robots.lock();
+        if !robots.contains(robot) {
+            if robots.len() >= Self::ROBOTS_MAX {
+                return OTHER_ROBOTS.to_owned();
+            }
+            robots.insert(robot.clone());
+        }
+        robot.to_string()
     }
 
     /// Counts scans that were taken out again.
@@ -136,7 +211,7 @@ impl Metrics {
     /// Everything in Prometheus' text form, with gauges of `pools` and `maps` as they are now: a map that is gone leaves no
     /// gauge behind.
     pub fn render(&self, pools: &[PoolUse], maps: &[MapInfo]) -> String {
-        let mut text = self.0.handle().render();
+        let mut text = self.0.recorder.handle().render();
         exposition::write_pools(&mut text, pools);
         exposition::write_maps(&mut text, maps);
         text
@@ -144,20 +219,48 @@ impl Metrics {
 
     /// Folds what was recorded into the histograms; to be called now and then, lest it pile up between scrapes.
     pub fn upkeep(&self) {
-        self.0.handle().run_upkeep();
+        self.0.recorder.handle().run_upkeep();
     }
 
     fn record(&self, f: impl FnOnce()) {
-        with_local_recorder(&*self.0, f);
+        with_local_recorder(&self.0.recorder, f);
     }
 }
 
+/// A connection that is counted as open.
+#[derive(Debug)]
+pub struct OpenConnection {
+    metrics: Metrics,
+    listener: &'static str,
+}
+
+impl Drop for OpenConnection {
+    fn drop(&mut self) {
+        self.metrics.record(|| gauge!(CONNECTIONS_OPEN, "listener" => self.listener).decrement(1.0));
+    }
+}
+
+/// The features of the crate that were compiled in.
+fn features() -> String {
+    let features = [("client", cfg!(feature = "client")), ("server", cfg!(feature = "server"))];
+    let compiled = features.into_iter().filter(|(_, compiled)| *compiled).map(|(name, _)| name);
+    compiled.collect::<Vec<_>>().join(",")
+}
+
 fn describe() {
+    describe_gauge!(BUILD_INFO, "1, with the version, the commit and the features that were built");
     describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
     describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
     describe_counter!(KEY_REQUESTS, "Calls and requests let in, by protocol and name of their key");
+    describe_counter!(
+        REQUESTS_DENIED,
+        "Calls and requests of callers who may not ask for them, by protocol and reason"
+    );
+    describe_counter!(CONNECTIONS_ACCEPTED, "Connections accepted, by listener");
+    describe_counter!(CONNECTIONS_REFUSED, "Connections closed at once for want of a place, by listener");
+    describe_gauge!(CONNECTIONS_OPEN, "Connections that are open, by listener");
     describe_gauge!(
-        FILE_IN_FORCE,
+        FILE_RELOAD_OK,
         "0 where a file changed into what cannot be used, and what it held before goes on"
     );
     describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
@@ -171,6 +274,10 @@ fn describe() {
     describe_gauge!(WRITES_REFUSED, "1 while changes are refused, by reason");
     describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
     describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
+    describe_counter!(
+        ROBOT_SCANS,
+        "Scans judged for insertion, by robot (those after the first hundred as other) and verdict"
+    );
     describe_counter!(SCANS_UNDONE, "Scans taken out again, by map");
     describe_counter!(VOXELS_REMOVED, "Finest voxels removed by deletions and undos, by map");
 }
@@ -186,17 +293,56 @@ mod tests {
         metrics.request("grpc", "QueryPoints", "ok", Duration::from_millis(3));
         metrics.points_queried(&map, Lookup::Bloom, 7);
         metrics.points_queried(&map, Lookup::Bloom, 5);
-        metrics.scan(&map, Verdict::LowOverlap);
+        metrics.scan(&map, &RobotName::new("r").unwrap(), Verdict::LowOverlap);
         let text = metrics.render(&[], &[]);
         for line in [
             r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
             r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
             r#"mrol_points_queried_total{map="a",lookup="bloom"} 12"#,
             r#"mrol_scans_total{map="a",verdict="low_overlap"} 1"#,
+            r#"mrol_robot_scans_total{robot="r",verdict="low_overlap"} 1"#,
+            r#"le="60"} 1"#,
+            concat!(r#"mrol_build_info{version=""#, env!("CARGO_PKG_VERSION"), "\""),
             "# TYPE mrol_request_seconds histogram",
             "# HELP mrol_scans_total Scans judged",
         ] {
             assert!(text.contains(line), "{line} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn robots_beyond_the_bound_are_counted_together() {
+        let (metrics, map) = (Metrics::new().unwrap(), MapName::new("a").unwrap());
+        let scan = |robot: usize| {
+            let robot = RobotName::new(&format!("r{robot}")).unwrap();
+            metrics.scan(&map, &robot, Verdict::Accepted);
+        };
+        (0..Metrics::ROBOTS_MAX + 2).for_each(scan);
+        scan(0);
+        let text = metrics.render(&[], &[]);
+        assert_eq!(text.matches("mrol_robot_scans_total{").count(), Metrics::ROBOTS_MAX + 1);
+        for line in [
+            r#"{robot="r0",verdict="accepted"} 2"#,
+            r#"{robot="r99",verdict="accepted"} 1"#,
+            r#"{robot="other",verdict="accepted"} 2"#,
+        ] {
+            assert!(text.contains(line), "{line} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_connection_is_open_until_it_is_dropped() {
+        let metrics = Metrics::new().unwrap();
+        let open = metrics.connection_opened("http");
+        metrics.connection_refused("http");
+        assert!(metrics.render(&[], &[]).contains(r#"mrol_connections_open{listener="http"} 1"#));
+        drop(open);
+        let text = metrics.render(&[], &[]);
+        for line in ["open", "accepted_total", "refused_total"]
+            .map(|name| format!("mrol_connections_{name}{{listener=\"http\"}}"))
+        {
+            let value = if line.contains("open") { "0" } else { "1" };
+            assert!(text.contains(&format!("{line} {value}")), "{line} {value} is not in\n{text}");
         }
     }
 
