@@ -9,29 +9,42 @@ use crate::service::{ErrorCode, ServiceError};
 /// The state of a server's life, shared by its listeners. A clone is another handle on the same state.
 ///
 /// ```text
-/// serving --drain()--> draining: new requests are refused, those in flight go on
+/// serving --leave()--> leaving: it says that it is not ready, and serves on
+///         --drain()--> draining: new requests are refused, those in flight go on
 ///         --cut()----> cut: those in flight are refused too
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Lifecycle {
+    leaving: CancellationToken,
     draining: CancellationToken,
     cut: CancellationToken,
     in_flight: TaskTracker,
 }
 
 impl Lifecycle {
-    /// True once the server is going down.
+    /// True once the server was told to end: whoever sends requests is to send them elsewhere.
+    pub fn is_leaving(&self) -> bool {
+        self.leaving.is_cancelled()
+    }
+
+    /// Says from now on that the server is not ready, while it serves on: balancers and probes need a while to see it.
+    pub fn leave(&self) {
+        self.leaving.cancel();
+    }
+
+    /// True once new requests are refused.
     pub fn is_draining(&self) -> bool {
         self.draining.is_cancelled()
     }
 
-    /// Waits until the server is going down.
+    /// Waits until new requests are refused.
     pub async fn draining(&self) {
         self.draining.cancelled().await;
     }
 
     /// Refuses new requests from now on.
     pub fn drain(&self) {
+        self.leave();
         self.draining.cancel();
         self.in_flight.close();
     }
@@ -79,6 +92,16 @@ pub fn draining() -> ServiceError {
 mod tests {
     use super::*;
     use std::future::{pending, ready};
+
+    #[tokio::test]
+    async fn a_leaving_server_serves_on() {
+        let lifecycle = Lifecycle::default();
+        lifecycle.leave();
+        assert!(lifecycle.is_leaving() && !lifecycle.is_draining());
+        assert_eq!(lifecycle.admit(ready(1)).await, Ok(1));
+        lifecycle.drain();
+        assert!(lifecycle.is_draining());
+    }
 
     #[tokio::test]
     async fn a_draining_server_refuses_new_requests_and_cuts_old_ones_when_told() {

@@ -21,16 +21,17 @@ mod watch;
 
 pub use error::ServerError;
 pub use files::ReloadedFiles;
-pub use signal::{exit_when_told, reload_on_hangup, shutdown_signal};
+pub use signal::{Hangups, exit_after, exit_when_told, shutdown_signal};
 pub use tls::TlsError;
 
 use std::net::SocketAddr;
 use std::path::Path;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::task::{JoinError, JoinSet};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use crate::access::{Access, Gate};
 use crate::admission::Admission;
@@ -52,6 +53,9 @@ use watch::{measure, watch};
 
 /// How long connections have to close once their requests are done: what is left then is idle or half open.
 const CLOSING_MAX: Duration = Duration::from_secs(1);
+
+/// How long the end of the process may take once everything has been waited for.
+const ENDING_MAX: Duration = Duration::from_secs(5);
 
 /// A server that is bound to its addresses and not yet answering.
 #[derive(Debug)]
@@ -91,14 +95,17 @@ impl Server {
         let settings = ServiceSettings { gauges: Some(gauges), ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let progress = Arc::new(OpeningProgress::default());
-        let starting = Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits);
+        tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
+        let metrics = Metrics::new()?;
+        let starting =
+            Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits, metrics.clone());
         let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
         starting.end().await;
         let service = opened
             .map_err(|panic| ServerError::Stopped("opening the maps", panic.to_string()))?
             .map_err(ServerError::Open)?;
         Ok(Self {
-            service: MeteredService::new(service, Metrics::new()?),
+            service: MeteredService::new(service, metrics),
             access,
             tls,
             lifecycle: Lifecycle::default(),
@@ -140,14 +147,24 @@ impl Server {
         ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone())
     }
 
-    /// Serves until `shutdown`, then goes down: refuses what is new, waits `drain_seconds` at most for what is in
-    /// flight, saves the maps.
+    /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what
+    /// is in flight, its connections, saving, and a while for what comes after.
+    pub fn down_within(&self) -> Duration {
+        let Config { drain_delay_s, drain_seconds, .. } = self.config;
+        let waited = drain_delay_s.saturating_add(drain_seconds.saturating_mul(2));
+        Duration::from_secs(waited).saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
+    }
+
+    /// Serves until `shutdown`, then goes down: says for `drain_delay_s` that it is not ready, refuses what is new, waits
+    /// `drain_seconds` at most for what is in flight, and as long at most for the maps to be saved.
     ///
     /// Idle and half-open connections do not keep it from going down: after their requests connections have
     /// a second to close. HTTP takes connections while requests are in flight, so that `/readyz` tells.
     ///
     /// # Errors
-    /// When a listener stops by itself, or the maps cannot be saved at the end.
+    /// When a listener stops by itself, or the maps cannot be saved at the end, or not in time: a disk may hang. A thread
+    /// of the runtime is then in its hands, so that the runtime has to be left behind
+    /// ([`tokio::runtime::Runtime::shutdown_background`]).
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
         let Self { config, access, tls, service, lifecycle, .. } = &self;
         let bytes_max = config.limits.message_bytes_max;
@@ -155,24 +172,42 @@ impl Server {
         let admission = Admission::new(&config.limits.admission(), lifecycle.clone());
         let (routes, health) = grpc::routes(gate.clone(), admission.clone(), bytes_max)?;
         let router = http::router(gate, admission.clone(), bytes_max);
-        let grpc = Endpoint::new(Protocol::Grpc, routes.into_axum_router(), tls.clone(), &config.limits);
-        let http = Endpoint::new(Protocol::Http, router, tls.clone(), &config.limits);
+        let endpoint = |protocol, router| {
+            Endpoint::new(protocol, router, tls.clone(), &config.limits, service.metrics().clone())
+        };
+        let grpc = endpoint(Protocol::Grpc, routes.into_axum_router());
+        let http = endpoint(Protocol::Http, router);
 
         let (config, service, lifecycle) = (config.clone(), service.clone(), lifecycle.clone());
         let files = self.files();
-        measure(&service).await;
+        let mut shutdown = pin!(shutdown);
+        tokio::select! {
+            () = measure(&service) => {}
+            () = &mut shutdown => {
+                tracing::info!("told to end before it served: ends");
+                return Ok(());
+            }
+        }
         let mut accepting = self.accept(&grpc, &http);
         let watching = tokio::spawn(watch(service.clone(), admission));
         let housekeeping = tokio::spawn(keep_house(service.clone(), files, lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {
-            () = shutdown => Ok(()),
+            () = &mut shutdown => Ok(()),
             stopped = accepting.join_next() => stopped.map_or(Ok(()), |end| Err(stopped_by_itself(end))),
         };
 
-        tracing::info!(drain_seconds = config.drain_seconds, "draining");
         health.set_not_serving().await;
+        lifecycle.leave();
+        if ended.is_ok() && config.drain_delay_s > 0 {
+            tracing::info!(
+                drain_delay_s = config.drain_delay_s,
+                "told to end: not ready any more, and serving on"
+            );
+            sleep(config.drain_delay()).await;
+        }
+        tracing::info!(drain_seconds = config.drain_seconds, "draining");
         lifecycle.drain();
         grpc.close();
         if timeout(config.drain(), lifecycle.idle()).await.is_err() {
@@ -184,9 +219,15 @@ impl Server {
             grpc.cut();
             http.cut();
         }
-        // It ends by itself when draining begins; waiting keeps its last saving apart from the one below.
-        let _ended = tokio::join!(housekeeping, watching);
-        let maps = service.maps().save().await.map_err(ServerError::Save)?;
+        let saving = async {
+            // They end by themselves when draining begins; waiting keeps the last saving of the one apart from this.
+            let _ended = tokio::join!(housekeeping, watching);
+            service.maps().save().await
+        };
+        let saved = timeout(config.drain(), saving).await;
+        let maps = saved
+            .map_err(|_| ServerError::SavingTooLong(config.drain_seconds))?
+            .map_err(ServerError::Save)?;
         tracing::info!(maps, "saved, ending");
         ended
     }

@@ -73,9 +73,9 @@ async fn jobs_whose_callers_have_gone_are_not_begun_and_one_in_hand_stops() {
 
     waiting.iter().for_each(JoinHandle::abort);
     until(&daemon, "waiting", 0).await;
-    assert_eq!(jobs(&daemon, "given_up").await, 4);
+    assert_eq!(jobs(&daemon, "cancelled_total").await, 4);
     in_hand.abort();
-    until(&daemon, "given_up", 5).await;
+    until(&daemon, "cancelled_total", 5).await;
     until(&daemon, "running", 0).await;
     assert_eq!(jobs(&daemon, "begun").await, begun + 1);
     // There is room again.
@@ -91,7 +91,7 @@ async fn an_http_client_that_disconnects_takes_its_work_along() {
     let gone = tokio::spawn(post.send());
     until(&daemon, "running", 1).await;
     gone.abort();
-    until(&daemon, "given_up", 1).await;
+    until(&daemon, "cancelled_total", 1).await;
     assert_eq!(jobs(&daemon, "running").await, 0);
 }
 
@@ -130,6 +130,6 @@ async fn a_stream_that_is_dropped_takes_its_request_in_hand_along() {
     let answers = daemon.mapping().await.insert_scan_stream(tokio_stream::once(scan)).await.unwrap();
     until(&daemon, "running", 1).await;
     drop(answers);
-    until(&daemon, "given_up", 1).await;
+    until(&daemon, "cancelled_total", 1).await;
     assert_eq!((jobs(&daemon, "running").await, daemon.contents("a").await.0), (0, revision));
 }

@@ -68,8 +68,8 @@ async fn a_map_whose_journal_fails_is_read_only_and_says_so() {
         r#"mrol_map_read_only{map="ill"} 1"#,
         r#"mrol_map_read_only{map="well"} 0"#,
         r#"mrol_map_durable_revision{map="well"} 1"#,
-        r#"mrol_journal_records{map="well"} 1"#,
-        r#"mrol_journal_syncs{map="well"} 1"#,
+        r#"mrol_journal_records_total{map="well"} 1"#,
+        r#"mrol_journal_sync_seconds_count{map="well"} 1"#,
     ] {
         assert!(metrics.contains(line), "{line} is not in\n{metrics}");
     }

@@ -6,7 +6,8 @@ mod common;
 mod process;
 
 use std::fs::{self, File};
-use std::process::Command;
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{Daemon, PATIENCE, bytes_of, client, identity_json, json_of, query_pb, row, scan_pb};
@@ -223,6 +224,17 @@ async fn metrics_count_what_was_done_and_forget_maps_that_are_gone() {
         r#"mrol_points_queried_total{map="a",lookup="bloom"} 10"#,
         r#"mrol_scans_total{map="a",verdict="accepted"} 1"#,
         r#"mrol_scans_total{map="a",verdict="low_overlap"} 1"#,
+        r#"mrol_robot_scans_total{robot="r",verdict="low_overlap"} 1"#,
+        r#"mrol_robot_scans_total{robot="setup",verdict="accepted"} 1"#,
+        r#"mrol_connections_open{listener="grpc"} 1"#,
+        r#"mrol_connections_accepted_total{listener="http"} "#,
+        r#"mrol_build_info{version=""#,
+        r#"mrol_journal_sync_seconds_bucket{map="a",le="60"} 2"#,
+        r#"mrol_commit_seconds_count{map="a"} 2"#,
+        r#"mrol_job_wait_seconds_bucket{pool="mapping",le="+Inf"} "#,
+        r#"mrol_map_snapshot_age_seconds{map="a"} "#,
+        r#"mrol_map_snapshot_failures_total{map="a"} 0"#,
+        r#"mrol_map_disk_bytes{map="a"} "#,
         r#"mrol_voxels_removed_total{map="a"} 3"#,
         r#"mrol_map_voxels{map="a",level="0"} 17"#,
         r#"mrol_map_revision{map="a"} 2"#,
@@ -234,6 +246,11 @@ async fn metrics_count_what_was_done_and_forget_maps_that_are_gone() {
         r#"mrol_filter_false_positive_rate{map="a",level="0",kind="measured"} "#,
     ] {
         assert!(text.contains(line), "{line} is not in\n{text}");
+    }
+    assert!(daemon.metric("mrol_map_disk_bytes{map=\"a\"}").await.unwrap() > 100.0);
+    for family in text.lines().filter_map(|line| line.strip_prefix("# TYPE ")) {
+        let (name, kind) = family.split_once(' ').unwrap();
+        assert_eq!(name.ends_with("_total"), kind == "counter", "{family}");
     }
     daemon.delete("/v1/maps/a").await;
     let text = daemon.get("/metrics").await.text().await.unwrap();
@@ -323,4 +340,107 @@ fn with_few_open_files_it_keeps_fewer_connections_and_says_so() {
     for part in ["fewer open files", "open_files=512", "needed=4608", "connections_max=128"] {
         assert!(said.contains(part), "{part} is not in {said}");
     }
+}
+
+/// A pipe that nobody writes to or reads from: who opens it waits for ever, as on a disk that hangs.
+fn make_hang(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().expect("mkfifo").success());
+}
+
+/// The exit code of a process that must end by itself.
+async fn code_at_end(server: Process) -> Option<i32> {
+    let ended = tokio::time::timeout(PATIENCE, tokio::task::spawn_blocking(|| server.ended())).await;
+    ended.expect("its end").unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn told_to_end_while_a_disk_that_hangs_is_read_it_ends() {
+    let data = tempfile::tempdir().unwrap();
+    fs::create_dir(data.path().join("maps")).unwrap();
+    make_hang(&data.path().join("maps/attic.mrol"));
+    let log = data.path().join("log");
+    let mut serve = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    serve.args(["serve", "--data-dir", data.path().to_str().unwrap()]);
+    serve.args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"]);
+    let mut server = serve.stdout(Stdio::null()).stderr(File::create(&log).unwrap()).spawn().unwrap();
+    let said = || fs::read_to_string(&log).unwrap();
+    wait_until(async || said().contains("opening the maps")).await;
+    let tell = Command::new("kill").args(["-s", "TERM", &server.id().to_string()]).status();
+    assert!(tell.unwrap().success());
+    let start = Instant::now();
+    let code = loop {
+        match server.try_wait().unwrap() {
+            Some(status) => break status.code(),
+            None if start.elapsed() > PATIENCE => {
+                server.kill().unwrap();
+                panic!("it opens maps still: {}", said());
+            }
+            None => tokio::time::sleep(Duration::from_millis(10)).await,
+        }
+    };
+    assert_eq!(code, Some(0), "{}", said());
+    assert!(said().contains("told to end while the maps are being opened"), "{}", said());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn with_a_disk_that_hangs_at_the_end_it_ends_within_its_bound() {
+    let data = tempfile::tempdir().unwrap();
+    let log = data.path().join("log");
+    let server = Process::start_with_log(
+        data.path().to_str().unwrap(),
+        &["--drain-seconds", "1"],
+        "warn",
+        File::create(&log).unwrap().into(),
+    );
+    let map = format!("{}/v1/maps/a", server.http);
+    client().put(&map).json(&json!({"resolution_m": 0.1})).send().await.unwrap();
+    let scan = json!({"robot": "r", "points": row(9), "guess": identity_json(), "align": false});
+    let put = client().post(format!("{map}/scans")).json(&scan).send().await.unwrap();
+    assert_eq!(put.status(), StatusCode::OK);
+    let folder = fs::read_dir(data.path().join("maps")).unwrap().next().unwrap().unwrap().path();
+    make_hang(&folder.join(".unfinished-snapshot-00000000000000000001.mrol"));
+    server.signal("TERM");
+    assert_ne!(code_at_end(server).await, Some(0));
+    let said = fs::read_to_string(&log).unwrap();
+    assert!(said.contains("saving the maps took longer than"), "{said}");
+
+    // What was acknowledged is there without the snapshot.
+    let server = Process::start(data.path().to_str().unwrap(), &[]);
+    let described = client().get(format!("{}/v1/maps/a", server.http)).send().await.unwrap();
+    assert_eq!(json_of(described).await["revision"], 1);
+    assert_eq!(server.stop(), Some(0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hangup_with_nothing_to_read_again_ends_nothing() {
+    let data = tempfile::tempdir().unwrap();
+    let server = Process::start(data.path().to_str().unwrap(), &[]);
+    server.signal("HUP");
+    server.signal("HUP");
+    // The signals were sent before the request, and the process would have died of them before it answered.
+    for _ in 0..20 {
+        let live = client().get(format!("{}/livez", server.http)).send().await.expect("a server that lives");
+        assert_eq!(live.status(), StatusCode::OK);
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(server.stop(), Some(0));
+}
+#[tokio::test(flavor = "multi_thread")]
+async fn before_it_drains_it_says_that_it_is_not_ready_and_serves_on() {
+    let daemon = Daemon::start_with(|config| config.drain_delay_s = 3).await;
+    daemon.make_map("a").await;
+    let mut health = HealthClient::new(daemon.channel().await);
+    let (grpc, url) = (daemon.grpc, daemon.url(""));
+    let stopping = daemon.tell_to_stop();
+    let get = async |path: &str| client().get(format!("{url}{path}")).send().await.unwrap();
+    wait_until(async || get("/readyz").await.status() == StatusCode::SERVICE_UNAVAILABLE).await;
+    assert_eq!(json_of(get("/readyz").await).await, json!({"ready": false, "reason": "draining"}));
+    assert_eq!(health.check(HealthCheckRequest::default()).await.unwrap().into_inner().status, 2);
+    // Whoever has not heard of it yet is served, also over a new connection.
+    assert_eq!(get("/v1/maps/a").await.status(), StatusCode::OK);
+    let made = client().put(format!("{url}/v1/maps/b")).json(&json!({"resolution_m": 0.1})).send().await;
+    assert_eq!(made.unwrap().status(), StatusCode::CREATED);
+    TcpStream::connect(grpc).await.expect("a listener");
+    stopping.stopped().await;
+    TcpStream::connect(grpc).await.expect_err("no listener");
 }

@@ -11,7 +11,7 @@ use serde_json::json;
 use super::error::CliError;
 use super::output::Output;
 use crate::config::{Config, ConfigError};
-use crate::server::{Server, exit_when_told, reload_on_hangup, shutdown_signal};
+use crate::server::{Hangups, Server, exit_after, exit_when_told, shutdown_signal};
 use crate::telemetry::start_logging;
 
 const EXAMPLES: &str = "\
@@ -29,8 +29,8 @@ EXAMPLES:
 
 The first line on standard output says where it serves; the log goes to standard error. Settings come from
 defaults, then the file of --config (TOML), then MROL_... variables, then the options here. SIGTERM and Ctrl-C
-end it: requests in flight are finished, maps are saved; the second time at once. Whatever ends it, nothing
-acknowledged is lost.";
+end it: requests in flight are finished, maps are saved, within a bound even where a disk hangs; the second time at
+once. SIGHUP reads keys and certificates again. Whatever ends it, nothing acknowledged is lost.";
 
 /// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
 #[derive(Debug, clap::Args)]
@@ -92,31 +92,39 @@ pub(super) struct ServeOptions {
     /// Seconds after which a map that changed is written to a snapshot [default: 300]
     #[arg(long, value_name = "SECONDS")]
     snapshot_interval_s: Option<u64>,
-    /// Seconds that requests in flight may take when it ends [default: 10]
+    /// Seconds that requests in flight may take when it ends, and saving the maps after them [default: 10]
     #[arg(long, value_name = "SECONDS")]
     drain_seconds: Option<u64>,
+    /// Seconds that it serves on when it is told to end, while /readyz says that it is not ready [default: 0]
+    #[arg(long, value_name = "SECONDS")]
+    drain_delay_s: Option<u64>,
 }
 
 impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
         start_logging(config.log.format, &config.log.level).map_err(CliError::usage)?;
-        let server = Server::bind(config).await?;
-        let mut shutdown = pin!(shutdown_signal());
-        // Heard from now on: who reads the addresses may send the signal right away.
-        tokio::select! {
+        let (hangups, mut shutdown) = (Hangups::hear(), pin!(shutdown_signal()));
+        // The signal is heard from now on. The thread that opens maps is left behind then, wherever it is: nothing was
+        // acknowledged, and what it writes is whole or not there.
+        let server = tokio::select! {
             biased;
-            () = &mut shutdown => return Ok(()),
-            () = std::future::ready(()) => {}
-        }
-        tokio::spawn(reload_on_hangup(server.files()));
+            () = &mut shutdown => {
+                tracing::info!("told to end while the maps are being opened: ends, nothing is lost");
+                return Ok(());
+            }
+            server = Server::bind(config) => server?,
+        };
+        tokio::spawn(hangups.reload(server.files()));
         match output.print(&Serving::of(&server)) {
             // A daemon need not have a reader.
             Ok(()) | Err(CliError::OutputClosed) => {}
             Err(error) => return Err(error),
         }
+        let down_within = server.down_within();
         let shutdown = async {
             shutdown.await;
+            exit_after(down_within);
             tokio::spawn(exit_when_told());
         };
         Ok(server.run(shutdown).await?)
@@ -139,6 +147,7 @@ impl ServeOptions {
                 "snapshot_interval_s": self.snapshot_interval_s,
             },
             "drain_seconds": self.drain_seconds,
+            "drain_delay_s": self.drain_delay_s,
         });
         Config::load(self.config.as_deref(), options)
     }

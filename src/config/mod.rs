@@ -38,6 +38,9 @@ use crate::service::{ServiceSettings, StandingSettings};
 /// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
 const VARIABLE_PREFIX: &str = "MROL_";
 
+/// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
+const DRAIN_DELAY_MAX_S: u64 = 3600;
+
 /// All settings of the daemon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -46,8 +49,11 @@ pub struct Config {
     pub data_dir: PathBuf,
     /// How maps are kept.
     pub store: StoreConfig,
-    /// Seconds that requests in flight may take when the server goes down. 10.
+    /// Seconds that requests in flight may take when the server goes down, and saving the maps after them. 10.
     pub drain_seconds: u64,
+    /// Seconds that the server goes on to serve after it was told to end, while `/readyz` says that it is not ready: for
+    /// balancers that look at it now and then. 0; 5 in the container image.
+    pub drain_delay_s: u64,
     /// The HTTP listener; 127.0.0.1:7333.
     pub http: ListenerConfig,
     /// The gRPC listener; 127.0.0.1:7334.
@@ -77,6 +83,7 @@ impl Default for Config {
             data_dir: "./mrol-data".into(),
             store: StoreConfig::default(),
             drain_seconds: 10,
+            drain_delay_s: 0,
             http: listener(7333),
             grpc: listener(7334),
             access: AccessConfig::default(),
@@ -137,6 +144,9 @@ impl Config {
                 return range(key, "0 to 1024", threads.to_string());
             }
         }
+        if self.drain_delay_s > DRAIN_DELAY_MAX_S {
+            return range("drain_delay_s", "0 to 3600", self.drain_delay_s.to_string());
+        }
         self.limits.check()?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
@@ -170,15 +180,20 @@ impl Config {
         }
     }
 
-    /// Time that requests in flight may take when the server goes down.
+    /// Time that requests in flight may take when the server goes down, and saving the maps after them.
     pub fn drain(&self) -> Duration {
         Duration::from_secs(self.drain_seconds)
+    }
+
+    /// Time that the server goes on to serve after it was told to end.
+    pub fn drain_delay(&self) -> Duration {
+        Duration::from_secs(self.drain_delay_s)
     }
 }
 
 /// The variables that mean this program; see [`Config::load`].
 fn variables() -> Env {
-    let top = ["data_dir", "drain_seconds"];
+    let top = ["data_dir", "drain_seconds", "drain_delay_s"];
     Env::prefixed(VARIABLE_PREFIX)
         .filter(move |key| key.as_str().contains("__") || top.iter().any(|name| key == *name))
         .split("__")
@@ -254,6 +269,15 @@ mod tests {
         assert!(error("[log]\nformat = \"xml\"").contains("xml"));
         let missing = Config::load(Some(Path::new("no-such-file.toml")), json!({})).unwrap_err();
         assert!(missing.to_string().contains("no-such-file.toml"));
+    }
+
+    #[test]
+    fn the_delay_before_draining_has_an_end() {
+        let delay = |seconds: u64| load(&format!("drain_delay_s = {seconds}"), json!({}));
+        assert_eq!(delay(3600).unwrap().drain_delay(), Duration::from_secs(3600));
+        let error = delay(3601).unwrap_err().to_string();
+        assert!(error.contains("drain_delay_s must be 0 to 3600, got 3601"), "{error}");
+        assert_eq!(Config::default().drain_delay_s, 0);
     }
 
     #[test]

@@ -61,7 +61,7 @@ impl Around {
         let answer = self.admission.answer(operation, call, handle).instrument(span).await;
         let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
         match Status::from_header_map(response.headers()) {
-            Some(refused) => status::naming_the_limit(refused, self.message_bytes_max).into_http(),
+            Some(refused) => status::of_request(refused, self.message_bytes_max).into_http(),
             None => {
                 let response = match deadline {
                     Some(most) => TimelyBody::wrap(response, most, begin, deadline::reached(most)),
@@ -98,6 +98,8 @@ async fn call(State(around): State<Around>, mut request: Request, next: Next) ->
         Err(refusal) => refusal.into_http(),
     };
     let code = code(&response);
+    let reason = response.headers().get(status::REASON).map(|reason| reason.as_bytes());
+    status::count_denial(around.gate.metrics(), code, reason);
     if code != Code::Ok || !operation.is_some_and(answers_message_by_message) {
         around.gate.metrics().request("grpc", name, status::label(code), start.elapsed());
     }

@@ -4,6 +4,7 @@ use tonic::metadata::MetadataValue;
 use tonic::{Code, Status};
 
 use crate::service::{ErrorCode, ServiceError};
+use crate::telemetry::Metrics;
 
 /// The metadata that holds the word for programs.
 pub(super) const REASON: &str = "mrol-reason";
@@ -38,15 +39,32 @@ impl From<ServiceError> for Status {
     }
 }
 
-/// tonic's own refusal of a message, which names no limit, in our words; any other status as it is.
-pub(super) fn naming_the_limit(status: Status, message_bytes_max: usize) -> Status {
+/// The reason of a message that cannot be read.
+const BAD_MESSAGE: &str = "bad_message";
+
+/// tonic's own refusal of a message in our words, any other status as it is: one that is too large names the limit, and
+/// one that cannot be read (no protobuf, cut off, compressed in a way that nobody named) is the client's mistake, which
+/// tonic calls an internal error. Our own failures have a reason, and are left alone.
+pub(super) fn of_request(status: Status, message_bytes_max: usize) -> Status {
     let of_tonic = status.metadata().get(REASON).is_none();
     match status.code() {
         Code::OutOfRange | Code::ResourceExhausted if of_tonic => {
             let message = format!("message_bytes_max is {message_bytes_max}: {}", status.message());
             ServiceError::new(ErrorCode::ResourceExhausted, "message_too_large", message).into()
         }
+        Code::Internal if of_tonic => {
+            let message = format!("the message cannot be read: {}", status.message());
+            ServiceError::invalid(BAD_MESSAGE, message).into()
+        }
         _ => status,
+    }
+}
+
+/// Counts a refusal of a caller who may not ask for what was asked for; anything else counts for nothing here.
+pub(super) fn count_denial(metrics: &Metrics, code: Code, reason: Option<&[u8]>) {
+    if matches!(code, Code::Unauthenticated | Code::PermissionDenied) {
+        let reason = String::from_utf8_lossy(reason.unwrap_or(b"unknown")).into_owned();
+        metrics.denied("grpc", reason);
     }
 }
 
@@ -83,5 +101,19 @@ mod tests {
         let status = Status::from(error);
         assert_eq!((status.code(), status.message()), (Code::FailedPrecondition, "no guess"));
         assert_eq!(status.metadata().get(REASON).unwrap(), "guess_required");
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_the_clients_mistake_and_a_defect_stays_one() {
+        let unreadable = of_request(Status::internal("Unexpected EOF decoding stream."), 1);
+        assert_eq!(unreadable.code(), Code::InvalidArgument);
+        assert_eq!(unreadable.metadata().get(REASON).unwrap(), BAD_MESSAGE);
+        let defect = ServiceError::new(ErrorCode::Internal, "job_panicked", "a defect");
+        assert_eq!(of_request(defect.into(), 1).code(), Code::Internal);
+        let large = of_request(Status::out_of_range("too large"), 7);
+        assert_eq!(
+            (large.code(), large.message()),
+            (Code::ResourceExhausted, "message_bytes_max is 7: too large")
+        );
     }
 }

@@ -106,7 +106,7 @@ impl<M: Message> Reader<M> {
             Err(unreadable) => Err(self
                 .arrival
                 .refusal()
-                .map_or_else(|| status::naming_the_limit(unreadable, self.message_bytes_max), Status::from)),
+                .map_or_else(|| status::of_request(unreadable, self.message_bytes_max), Status::from)),
         })
     }
 }
@@ -160,6 +160,8 @@ impl<H> Worker<H> {
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
         let metrics = self.authorized.service.metrics();
         metrics.request("grpc", self.operation.name(), status::label(code), start.elapsed());
+        let reason = answer.as_ref().err().and_then(|status| status.metadata().get(status::REASON));
+        status::count_denial(metrics, code, reason.map(|reason| reason.as_bytes()));
         answer
     }
 

@@ -10,7 +10,7 @@ use axum::response::{IntoResponse, Response};
 use tower_http::request_id::RequestId;
 use tracing::Instrument;
 
-use super::error::{self, HttpError};
+use super::error::{self, HttpError, Reason};
 use crate::access::{Authorized, Gate, Operation};
 use crate::admission::Admission;
 use crate::telemetry::MeteredService;
@@ -33,6 +33,9 @@ pub(super) async fn request(State(around): State<Around>, mut request: Request, 
     };
     let (status, elapsed) = (response.status(), start.elapsed());
     around.gate.metrics().request("http", name, status.as_str().to_owned(), elapsed);
+    if let Some(reason) = Reason::of_denial(&response) {
+        around.gate.metrics().denied("http", reason);
+    }
     tracing::debug!(operation = name, status = status.as_u16(), ?elapsed, "http request");
     response
 }

@@ -6,7 +6,8 @@ use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 
 use super::error::{HttpError, excerpt};
-use super::{Adapter, parameters};
+use super::object::Object;
+use super::{Adapter, parameters, unreadable};
 use crate::admission::Arrival;
 use crate::service::{ErrorCode, PointCloud, ServiceError};
 use crate::wire::InField;
@@ -110,8 +111,9 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
-    let not_json = |error| ServiceError::invalid("bad_json", format!("body: {error}"));
-    Ok(serde_json::from_slice(body).map_err(not_json)?)
+    let not_json = |error| ServiceError::invalid("bad_json", unreadable::body::<T>(body, &error));
+    let Object(parsed) = serde_json::from_slice(body).map_err(not_json)?;
+    Ok(parsed)
 }
 
 /// A body of bytes that are no points: at most `most` of them, which is the limit `limit`.

@@ -7,6 +7,7 @@ use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonState};
+use super::object::Object;
 use super::parameters::{Map, request_id_of};
 use crate::map::Region;
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
@@ -17,8 +18,8 @@ use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub(super) struct DeletionJson {
     points: Option<JsonPoints>,
     voxels: Option<Vec<[i32; 3]>>,
-    r#box: Option<BoxJson>,
-    sphere: Option<SphereJson>,
+    r#box: Option<Object<BoxJson>>,
+    sphere: Option<Object<SphereJson>>,
     #[serde(default)]
     level: u32,
     request_id: Option<String>,
@@ -89,10 +90,10 @@ impl TryFrom<DeletionJson> for DeletionTarget {
         match (json.points, json.voxels, json.r#box, json.sphere) {
             (Some(points), None, None, None) => Ok(Self::Points(points.into())),
             (None, Some(voxels), None, None) => Ok(Self::Keys(keys_of(&voxels)?)),
-            (None, None, Some(BoxJson { min_m, max_m }), None) => {
+            (None, None, Some(Object(BoxJson { min_m, max_m })), None) => {
                 Ok(Self::Region(Region::cuboid(min_m, max_m)?))
             }
-            (None, None, None, Some(SphereJson { center_m, radius_m })) => {
+            (None, None, None, Some(Object(SphereJson { center_m, radius_m }))) => {
                 Ok(Self::Region(Region::ball(center_m, radius_m)?))
             }
             _ => {

@@ -61,6 +61,7 @@ impl IntoResponse for HttpError {
         let (_, word) = status_of(code);
         let body = json!({"error": {"code": word, "reason": reason, "message": message}});
         let mut response = (self.status, Json(body)).into_response();
+        response.extensions_mut().insert(Reason(reason));
         let headers = response.headers_mut();
         if let Some(wait) = retry_after {
             headers.insert(header::RETRY_AFTER, (wait.as_secs_f64().ceil() as u64).into());
@@ -72,6 +73,18 @@ impl IntoResponse for HttpError {
             headers.insert(header::ALLOW, allow);
         }
         response
+    }
+}
+
+/// The word of the failure that a response tells; to be found among its extensions.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reason(pub(super) &'static str);
+
+impl Reason {
+    /// Why the caller was not let in, where that is what `response` says.
+    pub(super) fn of_denial(response: &Response) -> Option<&'static str> {
+        let denied = matches!(response.status(), StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN);
+        response.extensions().get::<Self>().filter(|_| denied).map(|reason| reason.0)
     }
 }
 

@@ -1,8 +1,9 @@
 //! The pieces of JSON that several routes share.
 
-use serde::de::{SeqAccess, Visitor};
+use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::error::excerpt;
 use crate::geometry::{self, Point, Pose, PoseError};
 use crate::map::Lookup;
 use crate::service::{MapState, PointCloud};
@@ -65,12 +66,29 @@ impl From<&Pose> for JsonPose {
 }
 
 /// `"exact"` or `"bloom"`.
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) enum JsonLookup {
     #[default]
     Exact,
     Bloom,
+}
+
+impl<'de> Deserialize<'de> for JsonLookup {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        word_of(deserializer, &[("exact", Self::Exact), ("bloom", Self::Bloom)])
+    }
+}
+
+/// One of a few words, and what it stands for.
+pub(super) fn word_of<'de, D: Deserializer<'de>, T: Copy>(
+    deserializer: D,
+    words: &[(&str, T)],
+) -> Result<T, D::Error> {
+    let given = String::deserialize(deserializer)?;
+    words.iter().find(|(word, _)| *word == given).map(|(_, value)| *value).ok_or_else(|| {
+        let words: Vec<String> = words.iter().map(|(word, _)| format!("{word:?}")).collect();
+        D::Error::custom(format!("must be {}, got {:?}", words.join(" or "), excerpt(&given)))
+    })
 }
 
 impl From<JsonLookup> for Lookup {

@@ -7,6 +7,7 @@ use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonPose, JsonState};
+use super::object::Object;
 use super::parameters::{self, Map};
 use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use crate::service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, ServiceError};
@@ -15,8 +16,8 @@ use crate::service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, P
 #[serde(deny_unknown_fields)]
 pub(super) struct LocalizationJson {
     points: JsonPoints,
-    gravity: Option<GravityJson>,
-    search_box: Option<BoxJson>,
+    gravity: Option<Object<GravityJson>>,
+    search_box: Option<Object<BoxJson>>,
     time_limit_s: Option<f64>,
     #[serde(default)]
     candidates: u32,
@@ -103,8 +104,8 @@ impl TryFrom<LocalizationJson> for LocalizationRequest {
 
     fn try_from(scan: LocalizationJson) -> Result<Self, ServiceError> {
         let gravity =
-            scan.gravity.map(|gravity| Gravity::new(gravity.in_sensor, gravity.in_map.unwrap_or(MAP_DOWN)));
-        let search_box = scan.search_box.map(|given| SearchBox::new(given.min_m, given.max_m));
+            scan.gravity.map(|Object(given)| Gravity::new(given.in_sensor, given.in_map.unwrap_or(MAP_DOWN)));
+        let search_box = scan.search_box.map(|Object(given)| SearchBox::new(given.min_m, given.max_m));
         Ok(Self {
             points: scan.points.into(),
             query: LocalizationQuery {

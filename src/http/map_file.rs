@@ -10,7 +10,7 @@ use axum::response::{IntoResponse, Json, Response};
 use super::around::Service;
 use super::error::HttpError;
 use super::maps::MapOut;
-use super::parameters::Map;
+use super::parameters::{Map, NoParameters};
 use super::{Adapter, body, headers};
 use crate::wire::snapshot_pieces;
 
@@ -18,6 +18,7 @@ pub(super) async fn take(
     State(adapter): State<Adapter>,
     Service(service): Service,
     Map(map): Map,
+    NoParameters: NoParameters,
 ) -> Result<Response, HttpError> {
     let file = service.maps().snapshot_map(&map).await?;
     let mut headers = headers::of_state(&file.state);
@@ -38,6 +39,7 @@ pub(super) async fn take(
 pub(super) async fn restore(
     Service(service): Service,
     Map(map): Map,
+    NoParameters: NoParameters,
     request: Request,
 ) -> Result<(StatusCode, Json<MapOut>), HttpError> {
     let service = service.maps();

@@ -8,7 +8,8 @@ use super::around::Service;
 use super::body;
 use super::error::HttpError;
 use super::json::JsonState;
-use super::parameters::Map;
+use super::object::Object;
+use super::parameters::{Map, NoParameters};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapSettings};
 use crate::service::{MapInfo, MapStorage};
@@ -19,7 +20,7 @@ pub(super) struct SettingsIn {
     resolution_m: f64,
     levels: Option<u32>,
     #[serde(default)]
-    filter: FilterIn,
+    filter: Object<FilterIn>,
 }
 
 #[derive(Default, Deserialize)]
@@ -31,12 +32,13 @@ struct FilterIn {
 
 impl SettingsIn {
     fn or(self, filter: FilterSettings) -> MapSettings {
+        let Object(given) = self.filter;
         MapSettings {
             resolution_m: self.resolution_m,
             levels: self.levels.unwrap_or(LEVELS_DEFAULT),
             filter: FilterSettings {
-                hashes: self.filter.hashes.unwrap_or(filter.hashes),
-                bits_per_key: self.filter.bits_per_voxel.unwrap_or(filter.bits_per_key),
+                hashes: given.hashes.unwrap_or(filter.hashes),
+                bits_per_key: given.bits_per_voxel.unwrap_or(filter.bits_per_key),
             },
         }
     }
@@ -105,17 +107,28 @@ pub(super) async fn create(
     Ok((status, Json(info.into())))
 }
 
-pub(super) async fn describe(Service(service): Service, Map(name): Map) -> Result<Json<MapOut>, HttpError> {
+pub(super) async fn describe(
+    Service(service): Service,
+    Map(name): Map,
+    NoParameters: NoParameters,
+) -> Result<Json<MapOut>, HttpError> {
     let info = service.maps().map_info(&name).await?;
     Ok(Json(info.into()))
 }
 
-pub(super) async fn list(Service(service): Service) -> Result<Json<MapsOut>, HttpError> {
+pub(super) async fn list(
+    Service(service): Service,
+    NoParameters: NoParameters,
+) -> Result<Json<MapsOut>, HttpError> {
     let maps = service.maps().list_maps().await?;
     Ok(Json(MapsOut { maps: maps.into_iter().map(Into::into).collect() }))
 }
 
-pub(super) async fn delete(Service(service): Service, Map(name): Map) -> Result<StatusCode, HttpError> {
+pub(super) async fn delete(
+    Service(service): Service,
+    Map(name): Map,
+    NoParameters: NoParameters,
+) -> Result<StatusCode, HttpError> {
     service.maps().delete_map(&name).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -9,6 +9,7 @@ mod json;
 mod localization;
 mod map_file;
 mod maps;
+mod object;
 mod occupancy;
 mod parameters;
 mod probes;
@@ -18,6 +19,7 @@ mod scrapes;
 mod starting;
 mod trajectory;
 mod undo;
+mod unreadable;
 mod voxels;
 
 pub use starting::starting;

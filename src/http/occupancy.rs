@@ -9,6 +9,7 @@ use super::body::Points;
 use super::error::HttpError;
 use super::headers;
 use super::json::{JsonLookup, JsonPoints, JsonPose, JsonState};
+use super::object::Object;
 use super::parameters::{self, Map};
 use crate::geometry::Pose;
 use crate::service::{PointAnswer, PointCloud, PointQuery, ServiceError};
@@ -18,7 +19,7 @@ use crate::wire::{InField, uuid_from};
 #[serde(deny_unknown_fields)]
 pub(super) struct QueryJson {
     points: JsonPoints,
-    map_from_points: Option<JsonPose>,
+    map_from_points: Option<Object<JsonPose>>,
     #[serde(default)]
     level: u32,
     #[serde(default)]
@@ -65,7 +66,7 @@ impl TryFrom<QueryJson> for PointQuery {
     type Error = ServiceError;
 
     fn try_from(query: QueryJson) -> Result<Self, ServiceError> {
-        let pose = query.map_from_points.map(|pose| Pose::try_from(pose).in_field("map_from_points"));
+        let pose = query.map_from_points.map(|Object(pose)| Pose::try_from(pose).in_field("map_from_points"));
         Ok(Self {
             points: query.points.into(),
             map_from_points: pose.transpose()?,

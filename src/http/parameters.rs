@@ -1,5 +1,7 @@
 //! What stands in the address: the map's name, and the parameters of the query.
 
+use std::error::Error;
+
 use axum::extract::{FromRequestParts, Path, Query};
 use axum::http::Uri;
 use axum::http::request::Parts;
@@ -7,6 +9,7 @@ use serde::de::DeserializeOwned;
 
 use super::Adapter;
 use super::error::{HttpError, excerpt};
+use super::unreadable;
 use crate::access::Authorized;
 use crate::geometry::{self, Pose};
 use crate::map::{MapName, RequestId};
@@ -44,11 +47,31 @@ impl<T: DeserializeOwned> FromRequestParts<Adapter> for Parameters<T> {
     }
 }
 
+/// The parameters of a request that takes none: whoever gives one means something that would not happen.
+pub(super) struct NoParameters;
+
+impl<S: Sync> FromRequestParts<S> for NoParameters {
+    type Rejection = HttpError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, HttpError> {
+        match parts.uri.query().filter(|query| !query.is_empty()) {
+            None => Ok(Self),
+            Some(query) => {
+                let message =
+                    format!("{} takes no parameters, got {:?}", excerpt(parts.uri.path()), excerpt(query));
+                Err(ServiceError::invalid("bad_query", message).into())
+            }
+        }
+    }
+}
+
 /// Parses the query of an address.
 pub(super) fn from_query<T: DeserializeOwned>(uri: &Uri) -> Result<T, HttpError> {
     let parsed = Query::try_from_uri(uri);
-    let Query(parameters) =
-        parsed.map_err(|rejection| ServiceError::invalid("bad_query", rejection.body_text()))?;
+    let Query(parameters) = parsed.map_err(|rejection| {
+        let said = rejection.source().map_or_else(|| rejection.body_text(), ToString::to_string);
+        ServiceError::invalid("bad_query", unreadable::query(&said))
+    })?;
     Ok(parameters)
 }
 

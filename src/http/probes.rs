@@ -9,13 +9,14 @@ use serde_json::{Value, json};
 use super::Adapter;
 use super::around::Service;
 use super::error::HttpError;
+use super::parameters::NoParameters;
 use crate::access::Authorized;
 use crate::map::MapName;
 use crate::service::Shortage;
 use crate::telemetry::MeteredService;
 
 /// `GET /livez`: 200 while the process lives.
-pub(super) async fn live() -> &'static str {
+pub(super) async fn live(NoParameters: NoParameters) -> &'static str {
     "ok"
 }
 
@@ -25,8 +26,9 @@ pub(super) async fn live() -> &'static str {
 pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
+    NoParameters: NoParameters,
 ) -> (StatusCode, Json<Value>) {
-    if adapter.admission.lifecycle().is_draining() {
+    if adapter.admission.lifecycle().is_leaving() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
     } else {
         let maps = service.maps().read_only_maps();

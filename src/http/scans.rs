@@ -1,12 +1,13 @@
 //! `POST /v1/maps/{map}/scans` and `/alignment`: insert a scan, or only align it.
 
 use axum::response::Json;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonPose, JsonState};
+use super::json::{JsonPoints, JsonPose, JsonState, word_of};
+use super::object::Object;
 use super::parameters::{self, Map};
 use crate::align::{Direction, Guess, Method};
 use crate::geometry::Pose;
@@ -22,8 +23,8 @@ pub(super) struct ScanJson {
     scan_id: Option<u64>,
     points: JsonPoints,
     timestamp_ns: Option<i64>,
-    guess: Option<JsonPose>,
-    motion: Option<JsonPose>,
+    guess: Option<Object<JsonPose>>,
+    motion: Option<Object<JsonPose>>,
     #[serde(default)]
     constant_velocity: bool,
     #[serde(default = "yes")]
@@ -40,12 +41,19 @@ pub(super) struct ScanJson {
 }
 
 /// `"refined"`, `"overlap"` or `"weighted_sum"`.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy)]
 enum JsonMethod {
     Refined,
     Overlap,
     WeightedSum,
+}
+
+impl<'de> Deserialize<'de> for JsonMethod {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let words =
+            [("refined", Self::Refined), ("overlap", Self::Overlap), ("weighted_sum", Self::WeightedSum)];
+        word_of(deserializer, &words)
+    }
 }
 
 impl From<JsonMethod> for Method {
@@ -159,8 +167,8 @@ impl TryFrom<ScanJson> for ScanRequest {
     type Error = ServiceError;
 
     fn try_from(scan: ScanJson) -> Result<Self, ServiceError> {
-        let guess = scan.guess.map(|pose| Pose::try_from(pose).in_field("guess")).transpose()?;
-        let motion = scan.motion.map(|pose| Pose::try_from(pose).in_field("motion")).transpose()?;
+        let guess = scan.guess.map(|Object(pose)| Pose::try_from(pose).in_field("guess")).transpose()?;
+        let motion = scan.motion.map(|Object(pose)| Pose::try_from(pose).in_field("motion")).transpose()?;
         Ok(Self {
             scan_id: scan.scan_id,
             timestamp_ns: scan.timestamp_ns,

@@ -10,6 +10,7 @@ use axum::{Json, Router};
 use serde_json::json;
 
 use super::error::HttpError;
+use super::parameters::NoParameters;
 use super::probes;
 use crate::service::{ErrorCode, ServiceError};
 use crate::store::{Opened, OpeningProgress};
@@ -24,7 +25,7 @@ pub fn starting(progress: Arc<OpeningProgress>) -> Router {
 }
 
 /// `GET /readyz`: 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.
-async fn ready(State(progress): State<Arc<OpeningProgress>>) -> Response {
+async fn ready(State(progress): State<Arc<OpeningProgress>>, NoParameters: NoParameters) -> Response {
     let Opened { bytes, bytes_read, maps, maps_open } = progress.opened();
     let body = json!({
         "ready": false, "reason": "starting",

@@ -15,6 +15,7 @@ use super::places::Places;
 use super::protocol::{Protocol, RuntimeExecutor};
 use super::tls::Tls;
 use crate::config::LimitsConfig;
+use crate::telemetry::Metrics;
 
 /// A protocol with its connections, whatever sockets they come from. A clone is another handle on the same ones.
 ///
@@ -30,6 +31,7 @@ pub(super) struct Endpoint {
     pub(super) builder: Arc<Builder<RuntimeExecutor>>,
     pub(super) closing: CancellationToken,
     pub(super) cut: CancellationToken,
+    metrics: Metrics,
     tls: Option<Tls>,
     places: Places,
     tasks: TaskTracker,
@@ -47,7 +49,13 @@ pub(super) struct Bounds {
 }
 
 impl Endpoint {
-    pub(super) fn new(protocol: Protocol, router: Router, tls: Option<Tls>, limits: &LimitsConfig) -> Self {
+    pub(super) fn new(
+        protocol: Protocol,
+        router: Router,
+        tls: Option<Tls>,
+        limits: &LimitsConfig,
+        metrics: Metrics,
+    ) -> Self {
         let opening_max = Duration::from_secs_f64(limits.connection_opening_max_s);
         let reserved_max = Duration::from_secs_f64(limits.probe_time_max_s);
         Self {
@@ -57,6 +65,7 @@ impl Endpoint {
             builder: protocol.builder(limits).into(),
             closing: CancellationToken::new(),
             cut: CancellationToken::new(),
+            metrics,
             tls,
             places: Places::new(limits.connections_max, limits.connections_reserved),
             tasks: TaskTracker::new(),
@@ -66,6 +75,7 @@ impl Endpoint {
     /// Takes connections of `sockets` until told to close. One for which there is no place is closed at once: that
     /// tells its client more than silence would.
     pub(super) async fn accept(self, sockets: Accepting) {
+        let listener = self.listener(&sockets);
         loop {
             let stream = tokio::select! {
                 biased;
@@ -75,13 +85,31 @@ impl Endpoint {
             match self.places.take() {
                 Some(place) => {
                     let tls = self.tls_at(&sockets);
-                    self.tasks.spawn(self.clone().serve(stream, tls, place));
+                    let open = self.metrics.connection_opened(listener);
+                    let serving = self.clone().serve(stream, tls, place);
+                    self.tasks.spawn(async move {
+                        serving.await;
+                        drop(open);
+                    });
                 }
-                None => tracing::warn!(
-                    protocol = self.protocol.as_str(),
-                    "connections_max are in use: another is closed"
-                ),
+                None => {
+                    self.metrics.connection_refused(listener);
+                    tracing::warn!(
+                        protocol = self.protocol.as_str(),
+                        "connections_max are in use: another is closed"
+                    );
+                }
             }
+        }
+    }
+
+    /// What connections of `sockets` are counted as.
+    fn listener(&self, sockets: &Accepting) -> &'static str {
+        match (self.protocol, sockets) {
+            (Protocol::Http, Accepting::Tcp(_)) => "http",
+            (Protocol::Http, Accepting::Unix(_)) => "http_socket",
+            (Protocol::Grpc, Accepting::Tcp(_)) => "grpc",
+            (Protocol::Grpc, Accepting::Unix(_)) => "grpc_socket",
         }
     }
 

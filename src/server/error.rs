@@ -62,6 +62,12 @@ pub enum ServerError {
     /// A part of the server stopped by itself.
     #[error("{0} stopped: {1}")]
     Stopped(&'static str, String),
+    /// A disk that hangs kept the maps from being written at the end.
+    #[error(
+        "saving the maps took longer than drain_seconds ({0} s): a disk hangs or is slow. Nothing acknowledged is lost, \
+         the journals have it; the next start takes longer"
+    )]
+    SavingTooLong(u64),
     /// The maps could not be written at the end.
     #[error("the maps cannot be saved: {0}")]
     Save(ServiceError),

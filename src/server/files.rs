@@ -37,7 +37,7 @@ impl ReloadedFiles {
     pub(super) fn new(access: Access, tls: Option<Tls>, metrics: Metrics) -> Self {
         for (file, is_there) in [(KEYS, access.keys().is_some()), (CERTIFICATES, tls.is_some())] {
             if is_there {
-                metrics.file_in_force(file, true);
+                metrics.file_reload(file, true);
             }
         }
         Self { access, tls, metrics }
@@ -75,7 +75,7 @@ impl ReloadedFiles {
             None | Some(Reload::Unchanged) => {}
             Some(Reload::Anew) => {
                 tracing::info!(file, "in force");
-                self.metrics.file_in_force(file, true);
+                self.metrics.file_reload(file, true);
             }
             Some(Reload::Refused(error)) => {
                 tracing::error!(
@@ -83,7 +83,7 @@ impl ReloadedFiles {
                     error = error.to_string(),
                     "cannot be used: what it held before stays in force"
                 );
-                self.metrics.file_in_force(file, false);
+                self.metrics.file_reload(file, false);
             }
         }
     }

@@ -1,8 +1,12 @@
 //! What tells the process to end, or to read its files again.
 
+use std::time::Duration;
+
+use tokio::signal::unix::{Signal, SignalKind, signal};
+
 use super::ReloadedFiles;
 
-/// Waits for the process to be told to end: ctrl-c, or SIGTERM where there is one.
+/// Waits for the process to be told to end: ctrl-c or SIGTERM.
 pub async fn shutdown_signal() {
     let interrupted = async {
         if let Err(error) = tokio::signal::ctrl_c().await {
@@ -16,9 +20,7 @@ pub async fn shutdown_signal() {
     }
 }
 
-#[cfg(unix)]
 async fn terminated() {
-    use tokio::signal::unix::{SignalKind, signal};
     match signal(SignalKind::terminate()) {
         Ok(mut signal) => {
             signal.recv().await;
@@ -30,13 +32,11 @@ async fn terminated() {
     }
 }
 
-#[cfg(not(unix))]
-async fn terminated() {
-    std::future::pending().await
-}
-
 /// Exit code of a server that was told to end a second time: as of a program that ctrl-c ended.
 const INTERRUPTED: i32 = 130;
+
+/// Exit code of a server that could not go down within its bound.
+const STUCK: i32 = 1;
 
 /// Ends the process at once when it is told to end: for a server that is going down, and is told a second time that it
 /// takes too long. What was acknowledged as synced is in the journal.
@@ -46,19 +46,44 @@ pub async fn exit_when_told() {
     std::process::exit(INTERRUPTED);
 }
 
-/// Reads `files` again each time that the process gets SIGHUP, for ever. Where there are none, the signal keeps its
-/// meaning and ends the process.
-pub async fn reload_on_hangup(files: ReloadedFiles) {
-    use tokio::signal::unix::{SignalKind, signal};
-    if !files.exist() {
-        return;
+/// Ends the process after `bound`, should it still be there: a thread that hangs in a read or a write of a disk cannot be
+/// ended, and would keep the process for as long as the disk hangs. It needs nothing of the runtime, whose threads may
+/// hang as well.
+pub fn exit_after(bound: Duration) {
+    let watch = move || {
+        std::thread::sleep(bound);
+        tracing::error!(
+            ?bound,
+            "the server did not go down within its bound: ends now; what was acknowledged is kept"
+        );
+        std::process::exit(STUCK);
+    };
+    if let Err(error) = std::thread::Builder::new().name("mrol-exit".into()).spawn(watch) {
+        tracing::error!(%error, "no thread watches over the bound of going down");
     }
-    match signal(SignalKind::hangup()) {
-        Ok(mut signal) => {
-            while signal.recv().await.is_some() {
+}
+
+/// The hangup signals of the process (SIGHUP), which mean "read your files again" and end nothing from the moment that
+/// this is made.
+#[derive(Debug)]
+pub struct Hangups(Option<Signal>);
+
+impl Hangups {
+    /// Begins to hear them.
+    pub fn hear() -> Self {
+        let heard = signal(SignalKind::hangup());
+        Self(heard.inspect_err(|error| tracing::error!(%error, "sighup cannot be heard")).ok())
+    }
+
+    /// Reads `files` again at each signal, for ever.
+    pub async fn reload(self, files: ReloadedFiles) {
+        let Some(mut signals) = self.0 else { return };
+        while signals.recv().await.is_some() {
+            if files.exist() {
                 files.reload().await;
+            } else {
+                tracing::info!("sighup: there are no files to read again");
             }
         }
-        Err(error) => tracing::error!(%error, "sighup cannot be heard"),
     }
 }

@@ -13,6 +13,7 @@ use super::tls::Tls;
 use crate::config::LimitsConfig;
 use crate::http;
 use crate::store::OpeningProgress;
+use crate::telemetry::Metrics;
 
 /// Answers until the maps are open.
 pub(super) struct Starting {
@@ -27,8 +28,9 @@ impl Starting {
         tls: Option<Tls>,
         progress: Arc<OpeningProgress>,
         limits: &LimitsConfig,
+        metrics: Metrics,
     ) -> Self {
-        let endpoint = Endpoint::new(Protocol::Http, http::starting(progress), tls, limits);
+        let endpoint = Endpoint::new(Protocol::Http, http::starting(progress), tls, limits, metrics);
         let socket = Accepting::Tcp(Arc::clone(&socket.listener));
         let accepting = tokio::spawn(endpoint.clone().accept(socket));
         Self { endpoint, accepting }

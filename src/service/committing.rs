@@ -24,6 +24,7 @@ use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::store::{MapFolder, Record};
+use crate::util::{Durations, SharedDurations};
 use worker::Worker;
 
 /// Changes that share one sync, and as many that wait meanwhile; one more is refused.
@@ -97,6 +98,7 @@ struct Waiting {
 pub(super) struct Committing {
     inbox: SyncSender<Waiting>,
     stopped: Arc<OnceLock<Stop>>,
+    durations: Arc<SharedDurations>,
 }
 
 /// Closures have no form to print.
@@ -117,10 +119,11 @@ impl Committing {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
         let thread = std::thread::Builder::new().name(format!("mrol-commit-{name}"));
-        let worker = Worker::new(name, map, folder, announced, Arc::clone(&stopped));
+        let durations = Arc::<SharedDurations>::default();
+        let worker = Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations));
         let started = thread.spawn(move || worker.run(&waiting));
         started.map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
-        Ok(Self { inbox, stopped })
+        Ok(Self { inbox, stopped, durations })
     }
 
     /// Hands a change over; its outcome comes when it is visible, and with [`Durability::Always`] durable. Does not
@@ -138,6 +141,11 @@ impl Committing {
                 "{GROUP_MAX} changes of this map wait for its disk already: try again"
             ))),
         }
+    }
+
+    /// How long groups of changes took to become durable and visible.
+    pub(super) fn durations(&self) -> Durations {
+        self.durations.read()
     }
 
     /// Why the map takes no more changes.

@@ -288,6 +288,7 @@ impl HostedMap {
             robots: trajectory.robots(),
             set_bytes: described.set_bytes,
             moment_bytes: described.moment_bytes,
+            commits: self.committing.durations(),
             storage,
         }
     }
@@ -301,12 +302,15 @@ impl HostedMap {
     }
 
     fn storage(&self) -> Option<MapStorage> {
-        let FolderUse { durable, snapshot, undo_from, journal } = self.folder.as_ref()?.used();
+        let used: FolderUse = self.folder.as_ref()?.used();
         Some(MapStorage {
-            durable_revision: durable,
-            snapshot_revision: snapshot,
-            undo_from_revision: undo_from,
-            journal,
+            durable_revision: used.durable,
+            snapshot_revision: used.snapshot,
+            undo_from_revision: used.undo_from,
+            journal: used.journal,
+            snapshot_age: used.snapshot_age,
+            snapshot_failures: used.snapshot_failures,
+            disk_bytes: used.disk_bytes,
             failure: self.failure().map(str::to_owned),
         })
     }

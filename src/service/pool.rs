@@ -6,11 +6,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use tokio::sync::{Semaphore, oneshot};
 
 use super::{ErrorCode, ServiceError};
-use crate::util::StopSignal;
+use crate::util::{Durations, SharedDurations, StopSignal};
 
 /// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing them
 /// over, with two wake-ups, takes some 70 us, and answering them 15 to 100 where the look-up is as wide as a machine of
@@ -34,7 +35,8 @@ pub(super) struct Pool {
 #[derive(Debug, Default)]
 struct Counts {
     begun: AtomicU64,
-    given_up: AtomicU64,
+    cancelled: AtomicU64,
+    waits: SharedDurations,
 }
 
 /// What became of the jobs of a pool.
@@ -48,8 +50,10 @@ pub struct PoolUse {
     pub running: usize,
     /// Jobs that a thread took in hand, since the start.
     pub begun: u64,
-    /// Jobs whose callers went before the answer, while they waited or were in hand, since the start.
-    pub given_up: u64,
+    /// Jobs that were cancelled since the start: their callers went before the answer.
+    pub cancelled: u64,
+    /// How long jobs waited for a thread, since the start.
+    pub waits: Durations,
 }
 
 impl Pool {
@@ -90,7 +94,9 @@ impl Pool {
             return Err(ServiceError::overloaded(message));
         };
         let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
+        let begin = Instant::now();
         let thread = Arc::clone(&self.free).acquire_owned().await.map_err(|_| failed())?;
+        self.counts.waits.record(begin.elapsed());
         let (answer, answered) = oneshot::channel();
         let span = tracing::Span::current();
         self.threads.spawn(move || {
@@ -117,12 +123,13 @@ impl Pool {
             waiting: all.saturating_sub(running),
             running,
             begun: self.counts.begun.load(Ordering::Relaxed),
-            given_up: self.counts.given_up.load(Ordering::Relaxed),
+            cancelled: self.counts.cancelled.load(Ordering::Relaxed),
+            waits: self.counts.waits.read(),
         }
     }
 }
 
-/// A job without an answer: given up where it is dropped as such.
+/// A job without an answer: cancelled where it is dropped as such.
 struct Unanswered {
     counts: Arc<Counts>,
     answered: bool,
@@ -137,7 +144,7 @@ impl Unanswered {
 impl Drop for Unanswered {
     fn drop(&mut self) {
         if !self.answered {
-            self.counts.given_up.fetch_add(1, Ordering::Relaxed);
+            self.counts.cancelled.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -191,8 +198,8 @@ mod tests {
         running.await.unwrap().unwrap();
         assert_eq!(waiting.await.unwrap().unwrap(), 2);
         assert_eq!(pool.run(|_| 4).await.unwrap(), 4);
-        let PoolUse { waiting, running, begun, given_up, .. } = pool.in_use();
-        assert_eq!((waiting, running, begun, given_up), (0, 0, 3, 0));
+        let PoolUse { waiting, running, begun, cancelled, .. } = pool.in_use();
+        assert_eq!((waiting, running, begun, cancelled), (0, 0, 3, 0));
     }
 
     #[tokio::test]
@@ -207,7 +214,7 @@ mod tests {
         until(|| pool.in_use().waiting == 1).await;
         gone.abort();
         assert!(gone.await.unwrap_err().is_cancelled());
-        assert_eq!((pool.in_use().waiting, pool.in_use().given_up), (0, 1));
+        assert_eq!((pool.in_use().waiting, pool.in_use().cancelled), (0, 1));
         assert_eq!(Arc::strong_count(&held), 1);
         release.send(()).unwrap();
         running.await.unwrap().unwrap();
@@ -226,7 +233,7 @@ mod tests {
         });
         until(|| pool.in_use().running == 1).await;
         gone.abort();
-        until(|| pool.in_use().given_up == 1).await;
+        until(|| pool.in_use().cancelled == 1).await;
         assert_eq!(pool.in_use().running, 0);
     }
 

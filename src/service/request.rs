@@ -11,6 +11,7 @@ use crate::geometry::{Point, Pose};
 use crate::map::{LevelInfo, Lookup, MapName, MapSettings, Region, RequestId, RobotName, TrajectoryPose};
 use crate::scan::PointFilter;
 use crate::store::JournalUse;
+use crate::util::Durations;
 use crate::voxel::VoxelKey;
 
 /// Points as they came from the wire: 12 bytes each, shared, never copied.
@@ -337,6 +338,9 @@ pub struct MapInfo {
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments, which alignments are refined with.
     pub moment_bytes: usize,
+    /// How long groups of changes took to become durable and visible since the server was started; not sent over the
+    /// wire.
+    pub commits: Durations,
     /// How it is kept; not at all without a data folder.
     pub storage: Option<MapStorage>,
 }
@@ -350,8 +354,14 @@ pub struct MapStorage {
     pub snapshot_revision: u64,
     /// Scans of this revision and later can be undone.
     pub undo_from_revision: u64,
-    /// What the journal has done since the server was started; not sent over the wire.
+    /// What the journal has done since the server was started; not sent over the wire, as all below but `failure`.
     pub journal: JournalUse,
+    /// Time since the newest snapshot was written, or since the server was started where that was later.
+    pub snapshot_age: Duration,
+    /// Snapshots that could not be written since the server was started.
+    pub snapshot_failures: u64,
+    /// Bytes on disk.
+    pub disk_bytes: u64,
     /// Why the map takes no changes, where it does not.
     pub failure: Option<String>,
 }

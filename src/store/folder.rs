@@ -48,6 +48,12 @@ pub(super) fn sweep(files: &dyn FileSystem, folder: &Path) -> Result<(), StoreEr
     Ok(())
 }
 
+/// Bytes of the files in `folder`; what the system does not tell counts for nothing.
+pub(super) fn bytes_in(files: &dyn FileSystem, folder: &Path) -> u64 {
+    let names = files.list(folder).unwrap_or_default();
+    names.iter().filter_map(|name| files.size(&folder.join(name)).ok()).sum()
+}
+
 /// The folder that a file is in.
 pub(super) fn folder_of(path: &Path) -> &Path {
     match path.parent() {

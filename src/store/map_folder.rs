@@ -9,6 +9,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
@@ -30,6 +31,8 @@ pub struct MapFolder {
     /// Revisions of those on disk, ascending; held while one is written.
     snapshots: Mutex<Vec<u64>>,
     saved: Mutex<Saved>,
+    /// Bytes of the folder when they were last counted, less those appended to the journal until then; wrapping.
+    counted_bytes: AtomicU64,
 }
 
 /// How long after one that could not be written the next snapshot is due at the earliest: to make one takes a while of
@@ -46,6 +49,8 @@ struct Saved {
     appended: u64,
     /// When the next one could not be written.
     failed: Option<Instant>,
+    /// How many could not be, since the start.
+    failures: u64,
 }
 
 /// A map as it was found.
@@ -76,6 +81,12 @@ pub struct FolderUse {
     pub undo_from: u64,
     /// What the journal has done.
     pub journal: JournalUse,
+    /// Time since the newest snapshot was written, or since the folder was opened where that was later.
+    pub snapshot_age: Duration,
+    /// Snapshots that could not be written since the folder was opened.
+    pub snapshot_failures: u64,
+    /// Bytes of the files in the folder.
+    pub disk_bytes: u64,
 }
 
 impl MapFolder {
@@ -164,8 +175,9 @@ impl MapFolder {
         found: u64,
     ) -> Self {
         let (journal, snapshots) = (Mutex::new(journal), Mutex::new(snapshots));
-        let saved = Mutex::new(Saved { at: Instant::now(), found, appended: 0, failed: None });
-        Self { files, path, settings, journal, snapshots, saved }
+        let saved = Mutex::new(Saved { at: Instant::now(), found, appended: 0, failed: None, failures: 0 });
+        let counted_bytes = AtomicU64::new(folder::bytes_in(&*files, &path));
+        Self { files, path, settings, journal, snapshots, saved, counted_bytes }
     }
 
     /// Appends records; see [`Journal::append`].
@@ -195,7 +207,20 @@ impl MapFolder {
     /// # Errors
     /// `NoRoom` for a larger one; when the system refuses, or the journal stopped. What was there is then there still.
     pub fn save(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
-        self.write(snapshot, bytes_max).inspect_err(|_| self.saved.lock().failed = Some(Instant::now()))
+        let written = self.write(snapshot, bytes_max).inspect_err(|_| {
+            let mut saved = self.saved.lock();
+            saved.failed = Some(Instant::now());
+            saved.failures += 1;
+        });
+        self.count_bytes();
+        written
+    }
+
+    /// Counts what is in the folder, so that who asks later need not look at the disk.
+    fn count_bytes(&self) {
+        let bytes = folder::bytes_in(&*self.files, &self.path);
+        let appended = self.journal.lock().used().bytes;
+        self.counted_bytes.store(bytes.wrapping_sub(appended), Ordering::Relaxed);
     }
 
     fn write(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
@@ -213,13 +238,15 @@ impl MapFolder {
             snapshots.push(revision);
         }
         let appended = self.journal.lock().used().bytes;
-        *self.saved.lock() = Saved { at: Instant::now(), found: 0, appended, failed: None };
+        let mut saved = self.saved.lock();
+        *saved = Saved { at: Instant::now(), found: 0, appended, failed: None, failures: saved.failures };
+        drop(saved);
         self.forget(&mut snapshots, snapshot.contents.trajectory.withdrawn())
     }
 
     /// True when there is much journal since the last snapshot, or that is old; not just after one that failed.
     pub fn snapshot_is_due(&self) -> bool {
-        let Saved { at, found, appended, failed } = *self.saved.lock();
+        let Saved { at, found, appended, failed, .. } = *self.saved.lock();
         if failed.is_some_and(|failed| failed.elapsed() < AGAIN_AFTER) {
             return false;
         }
@@ -302,8 +329,17 @@ impl MapFolder {
             let snapshots = self.snapshots.lock();
             (snapshots.first().copied().unwrap_or_default(), snapshots.last().copied().unwrap_or_default())
         };
+        let Saved { at, failures, .. } = *self.saved.lock();
         let journal = self.journal.lock();
         let undo_from = journal.tail().map_or(journal.head() + 1, |tail| tail.max(oldest + 1));
-        FolderUse { durable: journal.durable(), snapshot: newest, undo_from, journal: journal.used() }
+        FolderUse {
+            durable: journal.durable(),
+            snapshot: newest,
+            undo_from,
+            journal: journal.used(),
+            snapshot_age: at.elapsed(),
+            snapshot_failures: failures,
+            disk_bytes: self.counted_bytes.load(Ordering::Relaxed).wrapping_add(journal.used().bytes),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The gauges of the maps, written afresh at each scrape in Prometheus' text form:
+//! What is known of maps and pools, written afresh at each scrape in Prometheus' text form:
 //! `name{label="value",...} number`.
 
 use std::collections::BTreeMap;
@@ -7,11 +7,12 @@ use std::fmt::{Display, Write};
 use super::map_counters::{self, Series};
 use crate::map::{LevelInfo, MapName};
 use crate::service::{MapInfo, MapStorage, PoolUse};
+use crate::util::Durations;
 
 /// Appends what was counted by map.
 pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Series, u64>)]) {
     for counted in map_counters::Family::ALL {
-        let mut family = Family::begin_as(text, counted.name(), counted.help(), "counter");
+        let mut family = Family::begin(text, counted.name(), Kind::Counter, counted.help());
         for (map, counters) in maps {
             for ((_, label), count) in counters.iter().filter(|((family, _), _)| *family == counted) {
                 match label {
@@ -23,48 +24,61 @@ pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Serie
     }
 }
 
-/// Appends the gauges of `pools`.
+/// Appends what is known of `pools`.
 pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
     type Value = fn(&PoolUse) -> u64;
-    let families: [(&'static str, &str, Value); 4] = [
-        ("mrol_jobs_waiting", "Jobs that wait for a thread, by pool", |pool| pool.waiting as u64),
-        ("mrol_jobs_running", "Jobs in hand, by pool", |pool| pool.running as u64),
-        ("mrol_jobs_begun", "Jobs that were taken in hand since the start, by pool", |pool| pool.begun),
+    let families: [(&'static str, Kind, &str, Value); 4] = [
+        ("mrol_jobs_waiting", Kind::Gauge, "Jobs that wait for a thread, by pool", |pool| {
+            pool.waiting as u64
+        }),
+        ("mrol_jobs_running", Kind::Gauge, "Jobs in hand, by pool", |pool| pool.running as u64),
+        ("mrol_jobs_begun_total", Kind::Counter, "Jobs that were taken in hand, by pool", |pool| pool.begun),
         (
-            "mrol_jobs_given_up",
-            "Jobs whose callers went before the answer since the start, by pool",
-            |pool| pool.given_up,
+            "mrol_jobs_cancelled_total",
+            Kind::Counter,
+            "Jobs whose callers went before the answer, by pool",
+            |pool| pool.cancelled,
         ),
     ];
-    for (name, what, value) in families {
-        let mut family = Family::begin(text, name, what);
+    for (name, kind, what, value) in families {
+        let mut family = Family::begin(text, name, kind, what);
         for pool in pools {
             family.sample(&[("pool", &pool.name)], value(pool));
         }
+    }
+    let what = "Seconds that jobs waited for a thread, by pool";
+    let mut family = Family::begin(text, "mrol_job_wait_seconds", Kind::Histogram, what);
+    for pool in pools {
+        family.histogram(("pool", &pool.name), &pool.waits);
     }
 }
 
 /// Appends the gauges of `maps`.
 pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
-    let mut family = Family::begin(text, "mrol_map_voxels", "Occupied voxels, by map and level");
+    let mut family = Family::begin(text, "mrol_map_voxels", Kind::Gauge, "Occupied voxels, by map and level");
     for (map, level) in levels(maps) {
         family.sample(&[("map", &map.name), ("level", &level.level)], level.voxels);
     }
-    let mut family =
-        Family::begin(text, "mrol_map_set_bytes", "Bytes of the exact sets of all levels, by map");
+    let mut family = Family::begin(
+        text,
+        "mrol_map_set_bytes",
+        Kind::Gauge,
+        "Bytes of the exact sets of all levels, by map",
+    );
     for map in maps {
         family.sample(&[("map", &map.name)], map.set_bytes);
     }
-    let mut family = Family::begin(text, "mrol_map_moment_bytes", "Bytes of the points' moments, by map");
+    let mut family =
+        Family::begin(text, "mrol_map_moment_bytes", Kind::Gauge, "Bytes of the points' moments, by map");
     for map in maps {
         family.sample(&[("map", &map.name)], map.moment_bytes);
     }
     write_filters(text, maps);
-    let mut family = Family::begin(text, "mrol_map_revision", "Committed changes, by map");
+    let mut family = Family::begin(text, "mrol_map_revision", Kind::Gauge, "Committed changes, by map");
     for map in maps {
         family.sample(&[("map", &map.name)], map.state.revision);
     }
-    let mut family = Family::begin(text, "mrol_map_scans", "Accepted scans, by map");
+    let mut family = Family::begin(text, "mrol_map_scans", Kind::Gauge, "Accepted scans, by map");
     for map in maps {
         family.sample(&[("map", &map.name)], map.scans);
     }
@@ -73,7 +87,7 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
 
 fn write_filters(text: &mut String, maps: &[MapInfo]) {
     let what = "Bytes of the filters, by map, level and part: the plane that look-ups read, the counters";
-    let mut family = Family::begin(text, "mrol_map_filter_bytes", what);
+    let mut family = Family::begin(text, "mrol_map_filter_bytes", Kind::Gauge, what);
     for (map, level) in levels(maps) {
         for (part, bytes) in [("plane", level.plane_bytes), ("counters", level.counter_bytes)] {
             family.sample(&[("map", &map.name), ("level", &level.level), ("part", &part)], bytes);
@@ -81,7 +95,7 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
     }
     let what = "False positive rate of the filters, by map, level and kind: by the closed form of their layout, \
                 by eq. (1) of the paper, as measured now";
-    let mut family = Family::begin(text, "mrol_filter_false_positive_rate", what);
+    let mut family = Family::begin(text, "mrol_filter_false_positive_rate", Kind::Gauge, what);
     for (map, level) in levels(maps) {
         let rates = [
             ("expected", Some(level.expected_rate)),
@@ -104,27 +118,74 @@ fn levels(maps: &[MapInfo]) -> impl Iterator<Item = (&MapInfo, &LevelInfo)> {
 fn write_storage(text: &mut String, maps: &[MapInfo]) {
     let kept = || maps.iter().filter_map(|map| Some((&map.name, map.storage.as_ref()?)));
     type Value = fn(&MapStorage) -> f64;
-    let families: [(&'static str, &str, Value); 7] = [
-        ("mrol_map_durable_revision", "Last revision known to be synced, by map", |s| {
+    let families: [(&'static str, Kind, &str, Value); 8] = [
+        ("mrol_map_durable_revision", Kind::Gauge, "Last revision known to be synced, by map", |s| {
             s.durable_revision as f64
         }),
-        ("mrol_map_snapshot_revision", "Revision of the newest snapshot, by map", |s| {
+        ("mrol_map_snapshot_revision", Kind::Gauge, "Revision of the newest snapshot, by map", |s| {
             s.snapshot_revision as f64
         }),
-        ("mrol_map_read_only", "1 where the journal failed and the map takes no changes, by map", |s| {
-            f64::from(u8::from(s.failure.is_some()))
+        (
+            "mrol_map_snapshot_age_seconds",
+            Kind::Gauge,
+            "Seconds since the newest snapshot was written, or since the start where that was later, by map",
+            |s| s.snapshot_age.as_secs_f64(),
+        ),
+        (
+            "mrol_map_snapshot_failures_total",
+            Kind::Counter,
+            "Snapshots that could not be written, by map",
+            |s| s.snapshot_failures as f64,
+        ),
+        ("mrol_map_disk_bytes", Kind::Gauge, "Bytes on disk: snapshots and journal, by map", |s| {
+            s.disk_bytes as f64
         }),
-        ("mrol_journal_records", "Records appended since the start, by map", |s| s.journal.records as f64),
-        ("mrol_journal_bytes", "Bytes appended since the start, by map", |s| s.journal.bytes as f64),
-        ("mrol_journal_syncs", "Syncs since the start, by map", |s| s.journal.syncs as f64),
-        ("mrol_journal_sync_seconds", "Seconds spent in syncs since the start, by map", |s| {
-            s.journal.sync_time.as_secs_f64()
+        (
+            "mrol_map_read_only",
+            Kind::Gauge,
+            "1 where the journal failed and the map takes no changes, by map",
+            |s| f64::from(u8::from(s.failure.is_some())),
+        ),
+        ("mrol_journal_records_total", Kind::Counter, "Records appended, by map", |s| {
+            s.journal.records as f64
         }),
+        ("mrol_journal_bytes_total", Kind::Counter, "Bytes appended, by map", |s| s.journal.bytes as f64),
     ];
-    for (name, what, value) in families {
-        let mut family = Family::begin(text, name, what);
+    for (name, kind, what, value) in families {
+        let mut family = Family::begin(text, name, kind, what);
         for (map, storage) in kept() {
             family.sample(&[("map", map)], value(storage));
+        }
+    }
+    let what = "Seconds that syncs of the journal took, by map";
+    let mut family = Family::begin(text, "mrol_journal_sync_seconds", Kind::Histogram, what);
+    for (map, storage) in kept() {
+        family.histogram(("map", map), &storage.journal.syncs);
+    }
+    let what = "Seconds from a group of changes in hand to durable and visible, by map";
+    let mut family = Family::begin(text, "mrol_commit_seconds", Kind::Histogram, what);
+    for map in maps {
+        family.histogram(("map", &map.name), &map.commits);
+    }
+}
+
+/// What Prometheus makes of a family.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    /// Goes up and down.
+    Gauge,
+    /// Counts since the start; its name ends with `_total`.
+    Counter,
+    /// How many took how long.
+    Histogram,
+}
+
+impl Kind {
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Gauge => "gauge",
+            Self::Counter => "counter",
+            Self::Histogram => "histogram",
         }
     }
 }
@@ -136,19 +197,29 @@ struct Family<'a> {
 }
 
 impl<'a> Family<'a> {
-    fn begin(text: &'a mut String, name: &'static str, what: &str) -> Self {
-        Self::begin_as(text, name, what, "gauge")
-    }
-
-    fn begin_as(text: &'a mut String, name: &'static str, what: &str, kind: &str) -> Self {
+    fn begin(text: &'a mut String, name: &'static str, kind: Kind, what: &str) -> Self {
         // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} {kind}");
+        let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} {}", kind.as_str());
         Self { text, name }
     }
 
     /// One sample. No label value needs escaping: names of maps hold neither quotes nor backslashes.
     fn sample(&mut self, labels: &[(&str, &dyn Display)], value: impl Display) {
-        let _ = write!(self.text, "{}", self.name);
+        self.part("", labels, value);
+    }
+
+    /// The classes of a histogram with this label, their sum and their number.
+    fn histogram(&mut self, label: (&str, &dyn Display), durations: &Durations) {
+        for (bound_s, count) in durations.at_most() {
+            self.part("_bucket", &[label, ("le", &bound_s)], count);
+        }
+        self.part("_bucket", &[label, ("le", &"+Inf")], durations.count());
+        self.part("_sum", &[label], durations.sum().as_secs_f64());
+        self.part("_count", &[label], durations.count());
+    }
+
+    fn part(&mut self, suffix: &str, labels: &[(&str, &dyn Display)], value: impl Display) {
+        let _ = write!(self.text, "{}{suffix}", self.name);
         for (i, (label, value)) in labels.iter().enumerate() {
             let _ = write!(self.text, "{}{label}=\"{value}\"", if i == 0 { '{' } else { ',' });
         }
@@ -159,11 +230,33 @@ impl<'a> Family<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
     fn a_family_is_help_type_and_samples() {
         let mut text = String::new();
-        Family::begin(&mut text, "m", "What it is").sample(&[("map", &"a"), ("level", &2)], 0.5);
+        Family::begin(&mut text, "m", Kind::Gauge, "What it is").sample(&[("map", &"a"), ("level", &2)], 0.5);
         assert_eq!(text, "# HELP m What it is\n# TYPE m gauge\nm{map=\"a\",level=\"2\"} 0.5\n");
+    }
+
+    #[test]
+    fn a_histogram_is_cumulative_and_ends_with_all() {
+        let mut durations = Durations::default();
+        for seconds in [0.002, 0.002, 20.0, 100.0] {
+            durations.record(Duration::from_secs_f64(seconds));
+        }
+        let mut text = String::new();
+        Family::begin(&mut text, "m", Kind::Histogram, "What").histogram(("map", &"a"), &durations);
+        for line in [
+            "# TYPE m histogram\n",
+            "m_bucket{map=\"a\",le=\"0.001\"} 0\n",
+            "m_bucket{map=\"a\",le=\"0.0025\"} 2\n",
+            "m_bucket{map=\"a\",le=\"60\"} 3\n",
+            "m_bucket{map=\"a\",le=\"+Inf\"} 4\n",
+            "m_sum{map=\"a\"} 120.004\n",
+            "m_count{map=\"a\"} 4\n",
+        ] {
+            assert!(text.contains(line), "{line} is not in {text}");
+        }
     }
 }

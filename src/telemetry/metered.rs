@@ -70,9 +70,10 @@ impl MeteredService {
     /// # Errors
     /// Those of the service.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        let robot = scan.robot.clone();
         let answer = self.service.insert_scan(map, scan).await?;
         if !answer.replayed {
-            self.metrics.scan(map, answer.verdict);
+            self.metrics.scan(map, &robot, answer.verdict);
         }
         Ok(answer)
     }

@@ -17,12 +17,15 @@ use super::log::TelemetryError;
 use super::map_counters::{Family, MapCounters};
 use crate::admission::InUse;
 use crate::align::Verdict;
-use crate::map::{Lookup, MapName};
+use crate::map::{Lookup, MapName, RobotName};
 use crate::service::{MapInfo, PoolUse, Readings, Shortage};
 
-/// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds.
-const SECONDS_BUCKETS: [f64; 14] =
-    [0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+/// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
+/// beside a disk that hangs as long as that.
+const SECONDS_BUCKETS: [f64; 17] = [
+    0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0, 30.0,
+    60.0,
+];
 
 /// Names of keys with a series of their own: those that came later are counted together. A file of keys may change as
 /// often as one likes, and what was counted once stays.
@@ -30,30 +33,54 @@ const KEY_SERIES_MAX: usize = 1000;
 /// The label of those; no key has such a name.
 const OTHER_KEYS: &str = "(others)";
 
+/// The robot of all scans that came after those of [`Metrics::ROBOTS_MAX`] others.
+const OTHER_ROBOTS: &str = "other";
+
+/// The commit that was built, where whoever built it said so.
+const COMMIT: &str = match option_env!("MROL_COMMIT") {
+    Some(commit) if !commit.is_empty() => commit,
+    _ => "unknown",
+};
+
+const BUILD_INFO: &str = "mrol_build_info";
 const REQUESTS: &str = "mrol_requests_total";
 const REQUEST_SECONDS: &str = "mrol_request_seconds";
 const KEY_REQUESTS: &str = "mrol_key_requests_total";
-const FILE_IN_FORCE: &str = "mrol_file_in_force";
+const REQUESTS_DENIED: &str = "mrol_requests_denied_total";
+const CONNECTIONS_ACCEPTED: &str = "mrol_connections_accepted_total";
+const CONNECTIONS_REFUSED: &str = "mrol_connections_refused_total";
+const CONNECTIONS_OPEN: &str = "mrol_connections_open";
+const FILE_RELOAD_OK: &str = "mrol_file_reload_ok";
 const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
 const STREAMS_OPEN: &str = "mrol_streams_open";
 const BODY_BYTES: &str = "mrol_body_bytes";
 const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
 const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
 const WRITES_REFUSED: &str = "mrol_writes_refused";
+const ROBOT_SCANS: &str = "mrol_robot_scans_total";
 
 /// The metrics of one server. A clone is another handle on the same ones.
 ///
 /// The recorder is the server's own and not the process's, so that several servers in one process (tests, a
 /// demo) count apart.
 #[derive(Debug, Clone)]
-pub struct Metrics {
-    recorder: Arc<PrometheusRecorder>,
+pub struct Metrics(Arc<Kept>);
+
+#[derive(Debug)]
+struct Kept {
+    recorder: PrometheusRecorder,
     maps: MapCounters,
     /// Names of keys that have a series.
-    keys: Arc<Mutex<BTreeSet<String>>>,
+    keys: Mutex<BTreeSet<String>>,
+    /// Robots whose scans are counted by name.
+    robots: Mutex<BTreeSet<RobotName>>,
 }
 
 impl Metrics {
+    /// Robots whose scans are counted by name; the scans of all others are counted together. Names come from callers, and
+    /// a series is kept for as long as the server runs.
+    pub const ROBOTS_MAX: usize = 100;
+
     /// Metrics that are all zero.
     ///
     /// # Errors
@@ -61,9 +88,15 @@ impl Metrics {
     pub fn new() -> Result<Self, TelemetryError> {
         let latency = Matcher::Full(REQUEST_SECONDS.to_owned());
         let builder = PrometheusBuilder::new().set_buckets_for_metric(latency, &SECONDS_BUCKETS)?;
-        let recorder = Arc::new(builder.build_recorder());
-        let metrics = Self { recorder, maps: MapCounters::default(), keys: Arc::default() };
+        let recorder = builder.build_recorder();
+        let kept =
+            Kept { recorder, maps: MapCounters::default(), keys: Mutex::default(), robots: Mutex::default() };
+        let metrics = Self(Arc::new(kept));
         metrics.record(describe);
+        metrics.record(|| {
+            gauge!(BUILD_INFO, "version" => env!("CARGO_PKG_VERSION"), "commit" => COMMIT, "features" => features())
+                .set(1.0);
+        });
         Ok(metrics)
     }
 
@@ -88,9 +121,31 @@ impl Metrics {
         self.record(|| counter!(KEY_REQUESTS, "protocol" => protocol, "key" => key).increment(1));
     }
 
-    /// Says whether what a file holds is in force: false where it changed into something that cannot be used.
-    pub fn file_in_force(&self, file: &'static str, in_force: bool) {
-        self.record(|| gauge!(FILE_IN_FORCE, "file" => file).set(f64::from(u8::from(in_force))));
+    /// Counts a call or request of a caller who may not ask for it, by the word that says why.
+    pub fn denied(&self, protocol: &'static str, reason: impl Into<SharedString>) {
+        self.record(|| {
+            counter!(REQUESTS_DENIED, "protocol" => protocol, "reason" => reason.into()).increment(1);
+        });
+    }
+
+    /// Counts a connection that `listener` accepted, and as open until the answer is dropped.
+    #[must_use]
+    pub fn connection_opened(&self, listener: &'static str) -> OpenConnection {
+        self.record(|| {
+            counter!(CONNECTIONS_ACCEPTED, "listener" => listener).increment(1);
+            gauge!(CONNECTIONS_OPEN, "listener" => listener).increment(1.0);
+        });
+        OpenConnection { metrics: self.clone(), listener }
+    }
+
+    /// Counts a connection that `listener` closed at once, since there was no place for it.
+    pub fn connection_refused(&self, listener: &'static str) {
+        self.record(|| counter!(CONNECTIONS_REFUSED, "listener" => listener).increment(1));
+    }
+
+    /// Says whether a file could be read again when it changed: false where it became something that cannot be used.
+    pub fn file_reload(&self, file: &'static str, ok: bool) {
+        self.record(|| gauge!(FILE_RELOAD_OK, "file" => file).set(f64::from(u8::from(ok))));
     }
 
     /// Says how much of what is limited is in use.
@@ -122,34 +177,50 @@ impl Metrics {
 
     /// Counts points that were answered.
     pub fn points_queried(&self, map: &MapName, lookup: Lookup, points: usize) {
-        self.maps.points_queried(map, lookup, points);
+        self.0.maps.points_queried(map, lookup, points);
     }
 
-    /// Counts a scan that was judged for insertion.
-    pub fn scan(&self, map: &MapName, verdict: Verdict) {
-        self.maps.scan(map, verdict);
+    /// Counts a scan of `robot` that was judged for insertion.
+    pub fn scan(&self, map: &MapName, robot: &RobotName, verdict: Verdict) {
+        self.0.maps.scan(map, verdict);
+        let robot = self.label_of_robot(robot);
+        self.record(|| {
+            counter!(ROBOT_SCANS, "robot" => robot, "verdict" => verdict.as_str()).increment(1);
+        });
+    }
+
+    /// The robot's name, or the word for all those that came too late to have a series of their own.
+    fn label_of_robot(&self, robot: &RobotName) -> String {
+        let mut robots = self.0.robots.lock();
+        if !robots.contains(robot) {
+            if robots.len() >= Self::ROBOTS_MAX {
+                return OTHER_ROBOTS.to_owned();
+            }
+            robots.insert(robot.clone());
+        }
+        robot.to_string()
     }
 
     /// Counts scans that were taken out again.
     pub fn scans_undone(&self, map: &MapName, scans: usize) {
-        self.maps.count(map, (Family::ScansUndone, None), scans);
+        self.0.maps.count(map, (Family::ScansUndone, None), scans);
     }
 
     /// Counts finest voxels that a deletion or an undo removed.
     pub fn voxels_removed(&self, map: &MapName, voxels: usize) {
-        self.maps.count(map, (Family::VoxelsRemoved, None), voxels);
+        self.0.maps.count(map, (Family::VoxelsRemoved, None), voxels);
     }
 
     /// Forgets what was counted of maps that are not among `names`.
     pub fn keep_maps(&self, names: &[MapName]) {
-        self.maps.keep(names);
+        self.0.maps.keep(names);
     }
 
     /// Everything in Prometheus' text form, with counters of the maps `names` and gauges of `pools` and `maps` as they are
     /// now: a map that is gone leaves nothing behind.
     pub fn render(&self, pools: &[PoolUse], names: &[MapName], maps: &[MapInfo]) -> String {
-        let mut text = self.recorder.handle().render();
-        exposition::write_counters(&mut text, &self.maps.of(names));
+        let mut text = self.0.recorder.handle().render();
+        exposition::write_counters(&mut text, &self.0.maps.of(names));
         exposition::write_pools(&mut text, pools);
         exposition::write_maps(&mut text, maps);
         text
@@ -157,12 +228,12 @@ impl Metrics {
 
     /// Folds what was recorded into the histograms; to be called now and then, lest it pile up between scrapes.
     pub fn upkeep(&self) {
-        self.recorder.handle().run_upkeep();
+        self.0.recorder.handle().run_upkeep();
     }
 
     /// The name of a key, where not too many have come and gone already.
     fn label_of_key(&self, key: &str) -> String {
-        let mut keys = self.keys.lock();
+        let mut keys = self.0.keys.lock();
         if !keys.contains(key) {
             if keys.len() >= KEY_SERIES_MAX {
                 return OTHER_KEYS.to_owned();
@@ -173,16 +244,44 @@ impl Metrics {
     }
 
     fn record(&self, f: impl FnOnce()) {
-        with_local_recorder(&*self.recorder, f);
+        with_local_recorder(&self.0.recorder, f);
     }
 }
 
+/// A connection that is counted as open.
+#[derive(Debug)]
+pub struct OpenConnection {
+    metrics: Metrics,
+    listener: &'static str,
+}
+
+impl Drop for OpenConnection {
+    fn drop(&mut self) {
+        self.metrics.record(|| gauge!(CONNECTIONS_OPEN, "listener" => self.listener).decrement(1.0));
+    }
+}
+
+/// The features of the crate that were compiled in.
+fn features() -> String {
+    let features = [("client", cfg!(feature = "client")), ("server", cfg!(feature = "server"))];
+    let compiled = features.into_iter().filter(|(_, compiled)| *compiled).map(|(name, _)| name);
+    compiled.collect::<Vec<_>>().join(",")
+}
+
 fn describe() {
+    describe_gauge!(BUILD_INFO, "1, with the version, the commit and the features that were built");
     describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
     describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
     describe_counter!(KEY_REQUESTS, "Calls and requests let in, by protocol and name of their key");
+    describe_counter!(
+        REQUESTS_DENIED,
+        "Calls and requests of callers who may not ask for them, by protocol and reason"
+    );
+    describe_counter!(CONNECTIONS_ACCEPTED, "Connections accepted, by listener");
+    describe_counter!(CONNECTIONS_REFUSED, "Connections closed at once for want of a place, by listener");
+    describe_gauge!(CONNECTIONS_OPEN, "Connections that are open, by listener");
     describe_gauge!(
-        FILE_IN_FORCE,
+        FILE_RELOAD_OK,
         "0 where a file changed into what cannot be used, and what it held before goes on"
     );
     describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
@@ -194,6 +293,10 @@ fn describe() {
     describe_gauge!(DISK_FREE_BYTES, "Bytes free on the disk of the data folder");
     describe_gauge!(MEMORY_RESIDENT_BYTES, "Bytes that the process has in memory");
     describe_gauge!(WRITES_REFUSED, "1 while changes are refused, by reason");
+    describe_counter!(
+        ROBOT_SCANS,
+        "Scans judged for insertion, by robot (those after the first hundred as other) and verdict"
+    );
 }
 
 #[cfg(test)]
@@ -207,13 +310,16 @@ mod tests {
         metrics.request("grpc", "QueryPoints", "ok", Duration::from_millis(3));
         metrics.points_queried(&map, Lookup::Bloom, 7);
         metrics.points_queried(&map, Lookup::Bloom, 5);
-        metrics.scan(&map, Verdict::LowOverlap);
+        metrics.scan(&map, &RobotName::new("r").unwrap(), Verdict::LowOverlap);
         let text = metrics.render(&[], &[map], &[]);
         for line in [
             r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
             r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
             r#"mrol_points_queried_total{map="a",lookup="bloom"} 12"#,
             r#"mrol_scans_total{map="a",verdict="low_overlap"} 1"#,
+            r#"mrol_robot_scans_total{robot="r",verdict="low_overlap"} 1"#,
+            r#"le="60"} 1"#,
+            concat!(r#"mrol_build_info{version=""#, env!("CARGO_PKG_VERSION"), "\""),
             "# TYPE mrol_request_seconds histogram",
             "# HELP mrol_scans_total Scans judged",
         ] {
@@ -227,7 +333,7 @@ mod tests {
         let [kept, gone] = ["kept", "gone"].map(|name| MapName::new(name).unwrap());
         for map in [&kept, &gone] {
             metrics.points_queried(map, Lookup::Exact, 1);
-            metrics.scan(map, Verdict::Accepted);
+            metrics.scan(map, &RobotName::new("r").unwrap(), Verdict::Accepted);
             metrics.scans_undone(map, 1);
             metrics.voxels_removed(map, 1);
         }
@@ -248,6 +354,42 @@ mod tests {
         let text = metrics.render(&[], &[], &[]);
         assert_eq!(text.matches("mrol_key_requests_total{").count(), KEY_SERIES_MAX + 1);
         assert!(text.contains(r#"key="(others)"} 2"#) && text.contains(r#"key="key-0"} 2"#));
+    }
+
+    #[test]
+    fn robots_beyond_the_bound_are_counted_together() {
+        let (metrics, map) = (Metrics::new().unwrap(), MapName::new("a").unwrap());
+        let scan = |robot: usize| {
+            let robot = RobotName::new(&format!("r{robot}")).unwrap();
+            metrics.scan(&map, &robot, Verdict::Accepted);
+        };
+        (0..Metrics::ROBOTS_MAX + 2).for_each(scan);
+        scan(0);
+        let text = metrics.render(&[], &[], &[]);
+        assert_eq!(text.matches("mrol_robot_scans_total{").count(), Metrics::ROBOTS_MAX + 1);
+        for line in [
+            r#"{robot="r0",verdict="accepted"} 2"#,
+            r#"{robot="r99",verdict="accepted"} 1"#,
+            r#"{robot="other",verdict="accepted"} 2"#,
+        ] {
+            assert!(text.contains(line), "{line} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_connection_is_open_until_it_is_dropped() {
+        let metrics = Metrics::new().unwrap();
+        let open = metrics.connection_opened("http");
+        metrics.connection_refused("http");
+        assert!(metrics.render(&[], &[], &[]).contains(r#"mrol_connections_open{listener="http"} 1"#));
+        drop(open);
+        let text = metrics.render(&[], &[], &[]);
+        for line in ["open", "accepted_total", "refused_total"]
+            .map(|name| format!("mrol_connections_{name}{{listener=\"http\"}}"))
+        {
+            let value = if line.contains("open") { "0" } else { "1" };
+            assert!(text.contains(&format!("{line} {value}")), "{line} {value} is not in\n{text}");
+        }
     }
 
     #[test]

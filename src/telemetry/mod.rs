@@ -8,4 +8,4 @@ mod metrics;
 
 pub use log::{LogFormat, TelemetryError, start_logging};
 pub use metered::MeteredService;
-pub use metrics::Metrics;
+pub use metrics::{Metrics, OpenConnection};

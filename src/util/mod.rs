@@ -1,8 +1,11 @@
-//! Small tools that know nothing of maps: bits of a word, a prefetch, the stop signal of long work.
+//! Small tools that know nothing of maps: bits of a word, a prefetch, how long things take, the
+//! stop signal of long work.
 
 pub(crate) mod bits;
+mod durations;
 mod prefetch;
 mod stop_signal;
 
+pub use durations::{Durations, SharedDurations};
 pub(crate) use prefetch::prefetch;
 pub use stop_signal::StopSignal;

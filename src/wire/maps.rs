@@ -1,11 +1,14 @@
 //! Maps, their settings and their descriptions (`maps.proto`).
 
+use std::time::Duration;
+
 use super::types::count_from;
 use super::{InField, pb, required};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
 use crate::service::{MapInfo, MapStorage, ServiceError};
 use crate::store::JournalUse;
+use crate::util::Durations;
 
 /// The name and settings of a map to make; `filter` fills in what the request leaves to the server.
 ///
@@ -127,6 +130,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             scans: count_from(info.scans),
             robots: robots.in_field("map.robots")?,
             set_bytes: count_from(info.set_bytes),
+            commits: Durations::default(),
             storage: info.storage.map(Into::into),
             moment_bytes: count_from(info.moment_bytes),
         })
@@ -151,6 +155,9 @@ impl From<pb::MapStorage> for MapStorage {
             snapshot_revision: storage.snapshot_revision,
             undo_from_revision: storage.undo_from_revision,
             journal: JournalUse::default(),
+            snapshot_age: Duration::ZERO,
+            snapshot_failures: 0,
+            disk_bytes: 0,
             failure: (!storage.read_only.is_empty()).then_some(storage.read_only),
         }
     }

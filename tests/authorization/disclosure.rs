@@ -70,7 +70,7 @@ async fn metrics_count_by_key_and_are_open_where_the_settings_say_so() {
     let metrics = server.http(Method::GET, "/metrics", Some(&key), None).await.text().await.unwrap();
     for line in [
         r#"mrol_key_requests_total{protocol="http",key="prometheus"} 1"#,
-        r#"mrol_file_in_force{file="keys"} 1"#,
+        r#"mrol_file_reload_ok{file="keys"} 1"#,
     ] {
         assert!(metrics.contains(line), "{line} is not in\n{metrics}");
     }

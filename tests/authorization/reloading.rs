@@ -53,13 +53,13 @@ async fn a_broken_file_leaves_the_keys_that_were_and_shows_in_the_metrics() {
     {
         fs::write(&file, broken).unwrap();
         let start = Instant::now();
-        while !metric(&server, r#"mrol_file_in_force{file="keys"} 0"#).await {
+        while !metric(&server, r#"mrol_file_reload_ok{file="keys"} 0"#).await {
             assert!(start.elapsed() < PATIENCE, "{broken:?} is not noticed");
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
         until(&server, &key, StatusCode::OK).await;
         fs::write(&file, &good).unwrap();
-        while !metric(&server, r#"mrol_file_in_force{file="keys"} 1"#).await {
+        while !metric(&server, r#"mrol_file_reload_ok{file="keys"} 1"#).await {
             assert!(start.elapsed() < PATIENCE, "it stays broken");
             tokio::time::sleep(Duration::from_millis(50)).await;
         }

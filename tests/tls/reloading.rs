@@ -53,7 +53,7 @@ async fn a_broken_certificate_leaves_the_one_that_was() {
     let in_force = async || {
         let metrics = metrics_over_tls(&daemon, &authority).await;
         metrics.lines().find_map(|line| {
-            line.strip_prefix("mrol_file_in_force{file=\"certificates\"} ").map(str::to_owned)
+            line.strip_prefix("mrol_file_reload_ok{file=\"certificates\"} ").map(str::to_owned)
         })
     };
     assert_eq!(in_force().await.as_deref(), Some("1"));

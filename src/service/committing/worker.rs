@@ -13,6 +13,7 @@ use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
 use crate::store::{Durability, MapFolder, Record, StoreError};
+use crate::util::SharedDurations;
 
 /// What a map's thread works with.
 pub(super) struct Worker {
@@ -21,6 +22,7 @@ pub(super) struct Worker {
     folder: Option<Arc<MapFolder>>,
     announced: watch::Sender<u64>,
     stopped: Arc<OnceLock<Stop>>,
+    durations: Arc<SharedDurations>,
     /// Since when something waits to be synced at an interval.
     unsynced: Option<Instant>,
 }
@@ -42,8 +44,9 @@ impl Worker {
         folder: Option<Arc<MapFolder>>,
         announced: watch::Sender<u64>,
         stopped: Arc<OnceLock<Stop>>,
+        durations: Arc<SharedDurations>,
     ) -> Self {
-        Self { name, map, folder, announced, stopped, unsynced: None }
+        Self { name, map, folder, announced, stopped, durations, unsynced: None }
     }
 
     /// Makes changes until nobody can send one any more.
@@ -119,6 +122,7 @@ impl Worker {
         if group.is_empty() {
             return;
         }
+        let begin = Instant::now();
         if let Err(error) = self.journal(group) {
             for Pending { answer, .. } in group.drain(..) {
                 drop(answer.send(Err(Refusal::Failed(error.clone()))));
@@ -131,6 +135,7 @@ impl Worker {
             self.announced.send_replace(committed.revision);
             drop(answer.send(Ok(committed)));
         }
+        self.durations.record(begin.elapsed());
     }
 
     /// Appends a group and, where that is asked for, syncs it.

@@ -3,13 +3,14 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use uuid::Uuid;
 
 use super::segment::{self, Frames};
 use super::{Changes, Journal, Record, Revised, frame};
 use crate::store::{Appending, FileSystem, StoreError};
+use crate::util::Durations;
 
 /// A journal as segments in a map's folder. It appends to segments that it began itself, never to one it found.
 #[derive(Debug)]
@@ -34,10 +35,8 @@ pub struct JournalUse {
     pub records: u64,
     /// Bytes appended, frames included.
     pub bytes: u64,
-    /// Times that it was synced.
-    pub syncs: u64,
-    /// How long that took.
-    pub sync_time: Duration,
+    /// How often it was synced, and how long that took.
+    pub syncs: Durations,
 }
 
 /// Where a map's segments are.
@@ -142,8 +141,7 @@ impl SegmentedJournal {
         {
             let start = Instant::now();
             active.file.sync().map_err(StoreError::io(&active.path))?;
-            self.used.syncs += 1;
-            self.used.sync_time += start.elapsed();
+            self.used.syncs.record(start.elapsed());
             self.durable = self.head;
         }
         Ok(())

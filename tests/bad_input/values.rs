@@ -1,60 +1,13 @@
-//! Bad input: a clear error that names field, value and limit, and a map that did not change.
+//! Values that are out of range, missing, or of the wrong form.
 
-#![cfg(feature = "server")]
-
-mod common;
-
-use common::{Daemon, bytes_of, client, guess_pb, identity_json, json_of, points_pb, query_pb, row, scan_pb};
 use mrol::wire::pb;
 use pb::delete_voxels_request::Target;
 use reqwest::StatusCode;
-use serde_json::{Value, json};
-use tonic::{Code, Status};
+use serde_json::json;
+use tonic::Code;
 
-/// A server with a map `a` of ten voxels and room for 100 points a request.
-async fn daemon() -> Daemon {
-    let daemon = Daemon::start_with(|config| {
-        config.limits.points_per_request_max = 100;
-        config.limits.keys_per_request_max = 100;
-        config.limits.message_bytes_max = 20_000;
-    });
-    let daemon = daemon.await;
-    daemon.make_map("a").await;
-    daemon.put_in("a", &row(10)).await;
-    daemon
-}
-
-async fn assert_unchanged(daemon: &Daemon) {
-    let expected: Vec<[i64; 3]> = (0..10).map(|i| [i, 0, 0]).collect();
-    assert_eq!(daemon.contents("a").await, (1, expected));
-}
-
-/// The message holds each of the words.
-#[track_caller]
-fn assert_says(message: &str, words: &[&str]) {
-    for word in words {
-        assert!(message.contains(word), "{word:?} is not in {message:?}");
-    }
-}
-
-/// The error is a 400 whose message holds the words.
-#[track_caller]
-fn assert_refused((status, error): (StatusCode, Value), words: &[&str]) {
-    assert_eq!(status, StatusCode::BAD_REQUEST, "{error}");
-    assert_eq!(error["error"]["code"], "invalid_argument");
-    assert_says(error["error"]["message"].as_str().unwrap_or_default(), words);
-}
-
-#[track_caller]
-fn assert_invalid(status: &Status, words: &[&str]) {
-    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
-    assert!(status.metadata().contains_key("mrol-reason"));
-    assert_says(status.message(), words);
-}
-
-async fn refused(answer: reqwest::Response) -> (StatusCode, Value) {
-    (answer.status(), json_of(answer).await)
-}
+use crate::common::{bytes_of, client, guess_pb, identity_json, json_of, points_pb, query_pb, row, scan_pb};
+use crate::{assert_invalid, assert_refused, assert_says, assert_unchanged, daemon, refused};
 
 #[tokio::test]
 async fn points_that_fall_in_no_voxel_are_named_by_their_place() {
@@ -90,7 +43,7 @@ async fn points_that_fall_in_no_voxel_are_named_by_their_place() {
 async fn what_is_no_pose_is_refused_with_its_norm() {
     let daemon = daemon().await;
     let twice = pb::Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 2.0 };
-    let pose = pb::Pose { rotation: Some(twice), ..common::pose_pb([0.0; 3]) };
+    let pose = pb::Pose { rotation: Some(twice), ..crate::common::pose_pb([0.0; 3]) };
     let query = pb::QueryPointsRequest { map_from_points: Some(pose), ..query_pb("a", &row(1)) };
     let status = daemon.occupancy().await.query_points(query).await.unwrap_err();
     assert_invalid(&status, &["map_from_points", "rotation", "norm 2", "0.001"]);
@@ -284,8 +237,8 @@ async fn json_that_is_not_what_a_route_takes_is_refused_with_its_place() {
     for (body, words) in [
         (r#"{"points": [[1, 2, 3]"#, ["line 1", "EOF"]),
         (r#"{"points": [[1, 2]]}"#, ["line 1", "length 2"]),
-        (r#"{"points": [[1, 2, "x"]]}"#, ["line 1", "f32"]),
-        ("{\n\"points\": [], \"level\": -1}", ["line 2", "u32"]),
+        (r#"{"points": [[1, 2, "x"]]}"#, ["line 1", "number"]),
+        ("{\n\"points\": [], \"level\": -1}", ["line 2", "whole number"]),
         (r#"{"points": [], "lookup": "maybe"}"#, ["maybe", "exact"]),
         (r#"{"points": [], "colour": 1}"#, ["colour", "points"]),
         (r#"{"level": 0}"#, ["missing field", "points"]),
@@ -296,10 +249,10 @@ async fn json_that_is_not_what_a_route_takes_is_refused_with_its_place() {
         assert_refused(refused(post.body(body).send().await.unwrap()).await, &words);
     }
     for (parameters, words) in [
-        ("level=x", ["level", "invalid"]),
+        ("level=x", ["level", "whole number"]),
         ("colour=1", ["colour", "unknown"]),
         ("lookup=maybe", ["lookup", "maybe"]),
-        ("min_revision=-1", ["min_revision", "invalid"]),
+        ("min_revision=-1", ["min_revision", "whole number"]),
         ("map_uuid=1", ["map_uuid", "\"1\""]),
     ] {
         let route = format!("/v1/maps/a/occupancy?{parameters}");
