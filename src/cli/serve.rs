@@ -101,14 +101,16 @@ impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
         start_logging(config.log.format, &config.log.level).map_err(CliError::usage)?;
-        let server = Server::bind(config).await?;
         let mut shutdown = pin!(shutdown_signal());
-        // Heard from now on: who reads the addresses may send the signal right away.
-        tokio::select! {
+        // Heard from now on: maps may take long to open, and who reads the addresses may send the signal right away.
+        let server = tokio::select! {
             biased;
-            () = &mut shutdown => return Ok(()),
-            () = std::future::ready(()) => {}
-        }
+            () = &mut shutdown => {
+                tracing::info!("told to end while the maps are opened");
+                return Ok(());
+            }
+            server = Server::bind(config) => server?,
+        };
         tokio::spawn(reload_on_hangup(server.files()));
         match output.print(&Serving::of(&server)) {
             // A daemon need not have a reader.

@@ -3,10 +3,14 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 3
+//!      8  4      format version, u32 little-endian: 4
 //!     12  4      CRC-32C of the version, from version 3 on, and of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
-//!     24  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto
+//!     24  8      from version 4 on: head of the map's journal when the file was written, the last revision that may
+//!                have been acknowledged, u64 little-endian
+//!     32  16     from version 4 on: uuid of the map, as in the body
+//!     48  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto; from 24 on up to
+//!                version 3
 //! ```
 
 use std::path::Path;
@@ -21,10 +25,16 @@ use crate::map::{AnsweredRequest, MapContents, MapSettings, MultiResolutionMap, 
 use crate::voxel::{BlockMask, MomentSet, VoxelSet};
 
 /// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
-/// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms.
-pub const FORMAT_VERSION: u32 = 3;
+/// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms, up to version 3 a header neither
+/// head nor uuid.
+pub const FORMAT_VERSION: u32 = 4;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
-const HEADER_BYTES: usize = 24;
+pub(super) const HEADER_BYTES: usize = 48;
+/// Up to version 3.
+const OLD_HEADER_BYTES: usize = 24;
+const BODY_BYTES_AT: usize = 16;
+const HEAD_AT: usize = 24;
+const UUID_AT: usize = 32;
 const VERSION: std::ops::Range<usize> = 8..12;
 const CHECKED_FROM: usize = 16;
 /// Bodies beyond this are refused before memory is taken: 4 billion voxels of a surface.
@@ -85,9 +95,10 @@ impl Snapshot {
         bytes.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
         bytes.extend_from_slice(&[0; 4]);
         bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&self.contents.revision.to_le_bytes());
+        bytes.extend_from_slice(self.uuid.as_bytes());
         bytes.extend(zstd::bulk::compress(&body, ZSTD_LEVEL)?);
-        let checksum = checksum(&bytes, FORMAT_VERSION);
-        bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
+        set_checksum(&mut bytes);
         Ok(bytes)
     }
 
@@ -105,9 +116,7 @@ impl Snapshot {
     /// # Errors
     /// As there.
     pub fn decode_within(bytes: &[u8], body_bytes_max: u64) -> Result<Self, Unreadable> {
-        let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
-            format!("{} bytes are too few for a map file's header of {HEADER_BYTES}", bytes.len())
-        })?;
+        let header = bytes.get(..OLD_HEADER_BYTES).ok_or_else(|| too_short(bytes))?;
         if &header[..8] != MAGIC {
             return Err("not a map file: it does not begin with MROL-MAP".into());
         }
@@ -117,6 +126,8 @@ impl Snapshot {
                 "format version {version}, this build reads 1 to {FORMAT_VERSION}: use a newer one"
             ));
         }
+        let header_bytes = if version < 4 { OLD_HEADER_BYTES } else { HEADER_BYTES };
+        let compressed = bytes.get(header_bytes..).ok_or_else(|| too_short(bytes))?;
         let (stored, computed) = (u32_at(header, 12), checksum(bytes, version));
         if stored != computed {
             return Err(format!(
@@ -127,8 +138,8 @@ impl Snapshot {
         if length > body_bytes_max {
             return Err(format!("a body of {length} bytes, at most {body_bytes_max} are read"));
         }
-        let body = zstd::bulk::decompress(&bytes[HEADER_BYTES..], length as usize)
-            .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;
+        let body = zstd::bulk::decompress(compressed, length as usize)
+            .map_err(|e| format!("the body from offset {header_bytes} on: {e}"))?;
         let message = pb::Snapshot::decode(&body[..]).map_err(|e| format!("the body: {e}"))?;
         Self::from_message(message)
     }
@@ -178,6 +189,42 @@ impl Snapshot {
         let contents = contents.checked().map_err(|e| e.to_string())?;
         Ok(Self { uuid, settings: settings.checked().map_err(|e| e.to_string())?, contents })
     }
+}
+
+fn too_short(bytes: &[u8]) -> Unreadable {
+    format!("{} bytes are too few for a map file's header", bytes.len())
+}
+
+/// The head of the journal that the map file `bytes`, which is whole, was written beside; none up to version 3.
+pub(super) fn head_of(bytes: &[u8]) -> Option<u64> {
+    let header = bytes.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
+    Some(u64_at(header, HEAD_AT))
+}
+
+/// Writes the head of the journal into the map file `bytes`.
+pub(super) fn set_head(bytes: &mut [u8], head: u64) {
+    bytes[HEAD_AT..UUID_AT].copy_from_slice(&head.to_le_bytes());
+    set_checksum(bytes);
+}
+
+/// The uuid in the header of a map file, which may be damaged; none up to version 3.
+pub(super) fn uuid_in(header: &[u8]) -> Option<Uuid> {
+    let header = header.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
+    Uuid::from_slice(&header[UUID_AT..]).ok()
+}
+
+/// Bytes of the body of the map file `bytes` before compression.
+pub(crate) fn body_bytes(bytes: &[u8]) -> u64 {
+    bytes.get(..OLD_HEADER_BYTES).map_or(0, |header| u64_at(header, BODY_BYTES_AT))
+}
+
+fn set_checksum(bytes: &mut [u8]) {
+    let checksum = checksum(bytes, FORMAT_VERSION);
+    bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
+}
+
+fn u64_at(bytes: &[u8], offset: usize) -> u64 {
+    u64::from(u32_at(bytes, offset)) | u64::from(u32_at(bytes, offset + 4)) << 32
 }
 
 fn voxels_of_version_1(keys: &[u64], masks: &[u8]) -> Result<VoxelSet, Unreadable> {
@@ -250,6 +297,15 @@ mod tests {
     }
 
     #[test]
+    fn a_snapshot_says_whose_it_is_and_where_the_journal_was() {
+        let mut bytes = snapshot().encode().unwrap();
+        assert_eq!((head_of(&bytes), uuid_in(&bytes)), (Some(42), Some(snapshot().uuid)));
+        set_head(&mut bytes, 45);
+        assert_eq!(head_of(&bytes), Some(45));
+        assert_eq!(Snapshot::decode(&bytes).unwrap(), snapshot());
+    }
+
+    #[test]
     fn a_flipped_bit_anywhere_is_an_error() {
         let bytes = snapshot().encode().unwrap();
         for bit in 0..bytes.len() * 8 {
@@ -270,8 +326,8 @@ mod tests {
     #[test]
     fn a_newer_version_is_refused_by_name() {
         let mut bytes = snapshot().encode().unwrap();
-        bytes[8] = 4;
-        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 4"));
+        bytes[8] = 5;
+        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 5"));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::fmt::{Display, Write};
 
 use crate::map::LevelInfo;
-use crate::service::{MapInfo, MapStorage, PoolUse};
+use crate::service::{MapInfo, MapStorage, PoolUse, UnavailableMap};
 
 /// Appends the gauges of `pools`.
 pub(super) fn write_pools(text: &mut String, pools: &[PoolUse]) {
@@ -52,6 +52,15 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
         family.gauge(&[("map", &map.name)], map.scans);
     }
     write_storage(text, maps);
+}
+
+/// Appends which maps could not be opened.
+pub(super) fn write_unavailable(text: &mut String, maps: &[UnavailableMap]) {
+    let what = "1 where the map could not be opened, by map";
+    let mut family = Family::begin(text, "mrol_map_unavailable", what);
+    for map in maps {
+        family.gauge(&[("map", &map.name)], 1);
+    }
 }
 
 fn write_filters(text: &mut String, maps: &[MapInfo]) {

@@ -14,7 +14,7 @@ use super::log::TelemetryError;
 use crate::admission::InUse;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName};
-use crate::service::{MapInfo, PoolUse, Readings, Shortage};
+use crate::service::{MapInfo, PoolUse, Readings, Shortage, UnavailableMap};
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds.
 const SECONDS_BUCKETS: [f64; 14] =
@@ -133,12 +133,13 @@ impl Metrics {
         self.record(|| counter!(VOXELS_REMOVED, "map" => map.to_string()).increment(voxels as u64));
     }
 
-    /// Everything in Prometheus' text form, with gauges of `pools` and `maps` as they are now: a map that is gone leaves no
-    /// gauge behind.
-    pub fn render(&self, pools: &[PoolUse], maps: &[MapInfo]) -> String {
+    /// Everything in Prometheus' text form, with gauges of `pools`, `maps` and those that are `unavailable` as they are now:
+    /// a map that is gone leaves no gauge behind.
+    pub fn render(&self, pools: &[PoolUse], maps: &[MapInfo], unavailable: &[UnavailableMap]) -> String {
         let mut text = self.0.handle().render();
         exposition::write_pools(&mut text, pools);
         exposition::write_maps(&mut text, maps);
+        exposition::write_unavailable(&mut text, unavailable);
         text
     }
 
@@ -187,7 +188,7 @@ mod tests {
         metrics.points_queried(&map, Lookup::Bloom, 7);
         metrics.points_queried(&map, Lookup::Bloom, 5);
         metrics.scan(&map, Verdict::LowOverlap);
-        let text = metrics.render(&[], &[]);
+        let text = metrics.render(&[], &[], &[]);
         for line in [
             r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
             r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
@@ -204,6 +205,6 @@ mod tests {
     fn two_servers_count_apart() {
         let (one, other) = (Metrics::new().unwrap(), Metrics::new().unwrap());
         one.request("http", "GetMap", "200", Duration::ZERO);
-        assert!(!other.render(&[], &[]).contains("GetMap"));
+        assert!(!other.render(&[], &[], &[]).contains("GetMap"));
     }
 }
