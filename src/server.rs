@@ -73,10 +73,10 @@ pub struct Server {
 
 impl Server {
     /// Binds both addresses and opens the maps. Meanwhile HTTP says at `/readyz` how far that has come. Unix sockets
-    /// are made when that is done.
+    /// are made when that is done. Dropped before, it stops opening maps.
     ///
     /// # Errors
-    /// When a map, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
+    /// When the data folder, the keys or a certificate cannot be read, an address is taken, or a socket cannot be made; where there are no keys
     /// and an address can be reached from elsewhere, unless the settings allow that.
     pub async fn bind(config: Config) -> Result<Self, ServerError> {
         let gauges = SystemGauges { data_dir: config.service_settings().data_dir };
@@ -99,6 +99,7 @@ impl Server {
         let metrics = Metrics::new()?;
         let starting =
             Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits, metrics.clone());
+        let _until_open = CancelOpening(Arc::clone(&progress));
         let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
         starting.end().await;
         let service = opened
@@ -246,6 +247,15 @@ impl Server {
             }
         }
         accepting
+    }
+}
+
+/// Ends the opening of maps that nobody waits for any more.
+struct CancelOpening(Arc<OpeningProgress>);
+
+impl Drop for CancelOpening {
+    fn drop(&mut self) {
+        self.0.cancel();
     }
 }
 

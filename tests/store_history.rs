@@ -18,7 +18,7 @@ use mrol::map::{
     Change, DeletionRecord, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
     UndoRecord,
 };
-use mrol::store::{DataDir, MapFolder, OpeningProgress, Record, Snapshot, StoreSettings};
+use mrol::store::{DataDir, MapFolder, Observed, OpeningProgress, Record, Snapshot, StoreSettings};
 use mrol::util::StopSignal;
 use mrol::voxel::{Moments, VoxelKey, VoxelSet};
 use plain_set::{PlainSet, assert_equal, up};
@@ -163,9 +163,8 @@ impl Kept {
     /// False where the journal does not reach back to the scans.
     fn undo(&self, scans: &[u64]) -> bool {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
-        let Some((observations, seen)) =
-            self.folder.observations(scans, &withdrawn, StopSignal::NEVER).unwrap()
-        else {
+        let observed = self.folder.observations(scans, &withdrawn, StopSignal::NEVER).unwrap();
+        let Some(Observed { observations, revision: seen, .. }) = observed else {
             let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
             assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());
             return false;

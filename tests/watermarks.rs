@@ -175,7 +175,7 @@ async fn a_full_disk_refuses_every_change_and_no_question_until_there_is_room() 
     refused_call(mapping.delete_voxels(deletion_pb()).await, "disk_full");
     refused_call(mapping.undo_scans(undo_pb()).await, "disk_full");
     refused_call(maps.create_map(new_map_pb()).await, "disk_full");
-    let restored = pb::RestoreMapRequest { map: "b".into(), data: file.clone().into() };
+    let restored = pb::RestoreMapRequest { map: "b".into(), data: file.clone().into(), replace: false };
     refused_call(maps.restore_map(tokio_stream::iter([restored])).await, "disk_full");
 
     is_read(&daemon).await;

@@ -54,6 +54,9 @@ impl Doctor {
 
 fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
     let names = data_dir.names()?;
+    for path in data_dir.not_understood()? {
+        output.note(format!("not understood, and left alone: {}", path.display()));
+    }
     let output = output.with_bar_of(names.len(), "maps");
     let mut problems = 0;
     for name in names {
@@ -107,6 +110,7 @@ struct Report {
     records: u64,
     torn_bytes: u64,
     set_aside: Vec<AsideOut>,
+    not_understood: Vec<String>,
     problems: Vec<String>,
 }
 
@@ -118,12 +122,23 @@ struct AsideOut {
 
 impl Report {
     fn of(name: &MapName, diagnosis: Diagnosis) -> Self {
-        let Diagnosis { snapshots, segments, records, revision, voxels, torn_bytes, set_aside, problems } =
-            diagnosis;
+        let Diagnosis { snapshots, segments, records, revision, voxels, torn_bytes, .. } = diagnosis;
+        let Diagnosis { set_aside, not_understood, problems, .. } = diagnosis;
         let map = name.to_string();
         let aside = |AsideFile { name, bytes }| AsideOut { file: name, bytes };
         let set_aside = set_aside.into_iter().map(aside).collect();
-        Self { map, revision, voxels, snapshots, segments, records, torn_bytes, set_aside, problems }
+        Self {
+            map,
+            revision,
+            voxels,
+            snapshots,
+            segments,
+            records,
+            torn_bytes,
+            set_aside,
+            not_understood,
+            problems,
+        }
     }
 }
 
@@ -140,6 +155,9 @@ impl Display for Report {
         }
         for AsideOut { file, bytes: size } in &self.set_aside {
             write!(f, "\n  set aside, and read by nobody: {file}, {}", bytes(*size as usize))?;
+        }
+        for file in &self.not_understood {
+            write!(f, "\n  not understood, and left alone: {file}")?;
         }
         self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
     }

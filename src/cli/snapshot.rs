@@ -16,7 +16,7 @@ use crate::store::{Disk, Snapshot};
 
 const SNAPSHOT_EXAMPLES: &str = "\
 EXAMPLES:
-  mrol snapshot backup/                          every map of the server, as backup/NAME.mrol
+  mrol snapshot --all backup/                    every map of the server, as backup/NAME.mrol; so does no --map
   mrol snapshot backup/ --map office --map lab
   mrol snapshot backup/ --server http://robot-7:7334
 
@@ -29,8 +29,11 @@ EXAMPLES:
   mrol restore backup/office.mrol                as map office
   mrol restore backup/*.mrol --server http://robot-8:7334
   mrol restore backup/office.mrol --map office-before
+  mrol restore backup/office.mrol --replace      in the place of map office, which is kept
 
-A restored map has a uuid of its own, since its history may go on otherwise. There must be no map of that name.";
+A restored map has a uuid of its own, since its history may go on otherwise. There must be no map of that name, but with
+--replace: the map that was there is kept as NAME-replaced-REVISION until somebody deletes it, and at every moment, also
+of a crash, there is one map of the name.";
 
 /// Back maps of a running server up, as files
 #[derive(Debug, clap::Args)]
@@ -39,6 +42,9 @@ pub(super) struct TakeSnapshots {
     /// Where the files go; made where it is not there
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
+    /// Every map of the server, as where no map is named
+    #[arg(long, conflicts_with = "maps")]
+    all: bool,
     /// Only this map; may be repeated
     #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
     maps: Vec<MapName>,
@@ -56,6 +62,9 @@ pub(super) struct Restore {
     /// Another name for the map; of one file
     #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
     map: Option<MapName>,
+    /// Take the place of a map of that name, which is kept as NAME-replaced-REVISION
+    #[arg(long)]
+    replace: bool,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -63,7 +72,7 @@ pub(super) struct Restore {
 impl TakeSnapshots {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let client = self.server.connect().await?;
-        let names = match self.maps.is_empty() {
+        let names = match self.all || self.maps.is_empty() {
             true => client.list_maps().await?.into_iter().map(|info| info.name).collect(),
             false => self.maps,
         };
@@ -84,7 +93,7 @@ async fn take(client: &Client, name: &MapName, folder: &Path) -> Result<Saved, C
     let damaged =
         |reason| CliError::failed(format!("what the server sent of map {name} is no map: {reason}"));
     let snapshot = Snapshot::decode(&file).map_err(damaged)?;
-    snapshot.write(&Disk, &path)?;
+    snapshot.write(&Disk::default(), &path)?;
     let (revision, voxels) = (snapshot.contents.revision, snapshot.contents.voxels.len());
     Ok(Saved { map: name.to_string(), file: path.display().to_string(), revision, voxels, bytes: file.len() })
 }
@@ -103,7 +112,10 @@ impl Restore {
             let name = self.map.clone().map_or_else(|| name_of(path), Ok)?;
             let unreadable = |error| CliError::failed(format!("{}: {error}", path.display()));
             let file = std::fs::read(path).map_err(unreadable)?;
-            let info = client.restore_map(&name, file.into()).await?;
+            let info = match self.replace {
+                true => client.replace_map(&name, file.into()).await?,
+                false => client.restore_map(&name, file.into()).await?,
+            };
             let voxels = info.levels.first().map_or(0, |level| level.voxels);
             output.print(&Restored { map: name.to_string(), revision: info.state.revision, voxels })?;
             output.step();

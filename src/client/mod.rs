@@ -143,7 +143,20 @@ impl Client {
     /// # Errors
     /// When the server refuses, or cannot be reached.
     pub async fn restore_map(&self, map: &MapName, file: Bytes) -> Result<MapInfo, ClientError> {
-        let pieces = tokio_stream::iter(restore_pieces(map, file));
+        self.restore(map, file, false).await
+    }
+
+    /// The same in the place of the map of that name, if there is one, which is kept as `NAME-replaced-REVISION` until it
+    /// is deleted.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn replace_map(&self, map: &MapName, file: Bytes) -> Result<MapInfo, ClientError> {
+        self.restore(map, file, true).await
+    }
+
+    async fn restore(&self, map: &MapName, file: Bytes, replace: bool) -> Result<MapInfo, ClientError> {
+        let pieces = tokio_stream::iter(restore_pieces(map, file, replace));
         self.domain(self.connection.maps().restore_map(pieces).await)
     }
 

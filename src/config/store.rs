@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::store::{Durability, StoreSettings};
+use crate::store::{Durability, StoreMode, StoreSettings};
 
 /// How maps are kept; see [`StoreSettings`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,6 +19,12 @@ pub struct StoreConfig {
     pub snapshot_interval_s: u64,
     /// Revisions behind the newest within which a scan can be undone, at least. 20,000.
     pub undo_revisions: u64,
+    /// Bytes of snapshots and journal that are kept for undo alone, at most. 4 GiB.
+    pub undo_bytes_max: u64,
+    /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
+    /// execution. `0700`.
+    #[serde(with = "as_text")]
+    pub mode: StoreMode,
 }
 
 impl Default for StoreConfig {
@@ -29,6 +35,8 @@ impl Default for StoreConfig {
             snapshot_journal_mib: store.snapshot_journal_bytes >> 20,
             snapshot_interval_s: store.snapshot_interval.as_secs(),
             undo_revisions: store.undo_revisions,
+            undo_bytes_max: store.undo_bytes_max,
+            mode: store.mode,
         }
     }
 }
@@ -40,6 +48,8 @@ impl StoreConfig {
             snapshot_journal_bytes: self.snapshot_journal_mib << 20,
             snapshot_interval: Duration::from_secs(self.snapshot_interval_s),
             undo_revisions: self.undo_revisions,
+            undo_bytes_max: self.undo_bytes_max,
+            mode: self.mode,
             ..StoreSettings::default()
         }
     }

@@ -42,8 +42,9 @@ impl Maps for Adapter {
         request: Request<pb::ListMapsRequest>,
     ) -> Result<Response<pb::ListMapsResponse>, Status> {
         let service = service_of(&request)?;
-        let maps = service.maps().list_maps().await?;
-        Ok(Response::new(maps.into()))
+        let service = service.maps();
+        let maps = service.list_maps().await?;
+        Ok(Response::new((maps, service.unavailable_maps()).into()))
     }
 
     async fn delete_map(
@@ -79,22 +80,22 @@ impl Maps for Adapter {
         let service = service.maps();
         let most = service.limits().map_file_bytes_max;
         let arrival = Arrival::of(pieces.extensions())?.clone();
-        let (name, file) = gather(pieces.into_inner(), &arrival, caller.reach(), most).await?;
-        let info = service.restore_map(name, file).await?;
+        let (name, replace, file) = gather(pieces.into_inner(), &arrival, caller.reach(), most).await?;
+        let info = service.restore_map(name, file, replace).await?;
         Ok(Response::new(pb::RestoreMapResponse { map: Some(info.into()) }))
     }
 }
 
-/// The name and the bytes of a file that comes in pieces. One of more than `most` bytes is refused, and one for a map
+/// The name, whether it is to be replaced, and the bytes of a file that comes in pieces. One of more than `most` bytes is refused, and one for a map
 /// that the caller may not name, before the second piece.
 async fn gather(
     mut pieces: Streaming<pb::RestoreMapRequest>,
     arrival: &Arrival,
     reach: &MapReach,
     most: usize,
-) -> Result<(MapName, Bytes), Status> {
+) -> Result<(MapName, bool, Bytes), Status> {
     let mut piece = pieces.message().await?.unwrap_or_default();
-    let name = map_name(&piece.map)?;
+    let (name, replace) = (map_name(&piece.map)?, piece.replace);
     reach.permit(&name)?;
     let mut file = BytesMut::new();
     loop {
@@ -107,7 +108,7 @@ async fn gather(
         file.extend_from_slice(&piece.data);
         match pieces.message().await? {
             Some(next) => piece = next,
-            None => return Ok((name, file.freeze())),
+            None => return Ok((name, replace, file.freeze())),
         }
     }
 }

@@ -6,11 +6,12 @@ use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
+use serde::Deserialize;
 
 use super::around::Service;
 use super::error::HttpError;
 use super::maps::MapOut;
-use super::parameters::{Map, NoParameters};
+use super::parameters::{Map, NoParameters, Parameters};
 use super::{Adapter, body, headers};
 use crate::wire::snapshot_pieces;
 
@@ -36,14 +37,23 @@ pub(super) async fn take(
     Ok((headers, Body::from_stream(tokio_stream::iter(pieces))).into_response())
 }
 
+/// The parameters of a restore.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RestoreIn {
+    /// Take the place of the map of that name.
+    #[serde(default)]
+    replace: bool,
+}
+
 pub(super) async fn restore(
     Service(service): Service,
     Map(map): Map,
-    NoParameters: NoParameters,
+    Parameters(RestoreIn { replace }): Parameters<RestoreIn>,
     request: Request,
 ) -> Result<(StatusCode, Json<MapOut>), HttpError> {
     let service = service.maps();
     let file = body::octets(request, service.limits().map_file_bytes_max, "map_file_bytes_max").await?;
-    let info = service.restore_map(map, file).await?;
+    let info = service.restore_map(map, file, replace).await?;
     Ok((StatusCode::CREATED, Json(info.into())))
 }

@@ -12,7 +12,7 @@ use super::object::Object;
 use super::parameters::{Map, NoParameters};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapSettings};
-use crate::service::{MapInfo, MapStorage};
+use crate::service::{MapInfo, MapStorage, UnavailableMap};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -94,6 +94,15 @@ struct LevelOut {
 #[derive(Serialize)]
 pub(super) struct MapsOut {
     maps: Vec<MapOut>,
+    /// Those that could not be opened.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    unavailable: Vec<UnavailableOut>,
+}
+
+#[derive(Serialize)]
+struct UnavailableOut {
+    map: String,
+    reason: String,
 }
 
 pub(super) async fn create(
@@ -120,8 +129,11 @@ pub(super) async fn list(
     Service(service): Service,
     NoParameters: NoParameters,
 ) -> Result<Json<MapsOut>, HttpError> {
-    let maps = service.maps().list_maps().await?;
-    Ok(Json(MapsOut { maps: maps.into_iter().map(Into::into).collect() }))
+    let service = service.maps();
+    let maps = service.list_maps().await?.into_iter().map(Into::into).collect();
+    let unavailable = service.unavailable_maps().into_iter();
+    let out = |UnavailableMap { name, reason }| UnavailableOut { map: name.to_string(), reason };
+    Ok(Json(MapsOut { maps, unavailable: unavailable.map(out).collect() }))
 }
 
 pub(super) async fn delete(

@@ -12,7 +12,7 @@ use super::error::HttpError;
 use super::parameters::NoParameters;
 use crate::access::Authorized;
 use crate::map::MapName;
-use crate::service::Shortage;
+use crate::service::{Shortage, UnavailableMap};
 use crate::telemetry::MeteredService;
 
 /// `GET /livez`: 200 while the process lives.
@@ -21,8 +21,9 @@ pub(super) async fn live(NoParameters: NoParameters) -> &'static str {
 }
 
 /// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not. Maps that take no changes since
-/// their journal failed are named to whoever may name them; they answer queries all the same. So does a server whose disk
-/// or memory is nearly full: it stays ready, and `writes_refused` holds the reasons.
+/// their journal failed are named to whoever may name them; they answer queries all the same. So are maps that could not
+/// be opened (`unavailable`), with what helps: the others are served. A server whose disk
+/// or memory is nearly full stays ready, and `writes_refused` holds the reasons.
 pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -37,6 +38,11 @@ pub(super) async fn ready(
         let mut body = json!({"ready": true});
         if !read_only.is_empty() {
             body["read_only"] = read_only.into();
+        }
+        let maps = service.maps().unavailable_maps();
+        if !maps.is_empty() {
+            let named = |map: &UnavailableMap| json!({"map": map.name.as_str(), "reason": map.reason});
+            body["unavailable"] = maps.iter().map(named).collect();
         }
         let shortages = service.maps().shortages();
         if !shortages.is_empty() {

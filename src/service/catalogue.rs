@@ -10,22 +10,32 @@ use uuid::Uuid;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
 use super::reach::Reachable;
-use super::{ErrorCode, MapReach, ServiceError};
+use super::{ErrorCode, MapReach, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
-use crate::map::{MapName, MapSettings, MultiResolutionMap};
-use crate::store::{Cut, DataDir, OpeningProgress, Snapshot, StoreError, StoreSettings};
+use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
+use crate::store::{
+    Cut, DataDir, MapFolder, OpenedMap, OpeningProgress, Snapshot, StoreError, StoreSettings,
+};
 use crate::sync::{Rank, RwLock};
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
 pub(super) struct Catalogue {
-    maps: RwLock<BTreeMap<MapName, Arc<HostedMap>>>,
+    maps: RwLock<Named>,
     data_dir: Option<Arc<DataDir>>,
     writing: tokio::sync::Mutex<()>,
 }
 
+/// What the names stand for.
+#[derive(Debug, Default)]
+struct Named {
+    open: BTreeMap<MapName, Arc<HostedMap>>,
+    /// Why it could not be opened.
+    unavailable: BTreeMap<MapName, String>,
+}
+
 impl Catalogue {
-    /// Opens the maps of `data_dir`; without one, nothing outlives the process.
+    /// Opens the maps of `data_dir`, as many as can be opened; without one, nothing outlives the process.
     pub(super) fn open(
         data_dir: Option<&Path>,
         settings: &StoreSettings,
@@ -33,37 +43,49 @@ impl Catalogue {
     ) -> Result<Self, ServiceError> {
         let open = |path: &Path| DataDir::open(path, settings.clone());
         let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
-        let mut maps = BTreeMap::new();
-        if let Some(data_dir) = &data_dir {
-            let names = data_dir.take_stock().map_err(not_stored)?;
-            data_dir.expect(&names, progress).map_err(not_stored)?;
-            for name in names {
-                let map = load(data_dir, &name, progress)?;
-                maps.insert(name, Arc::new(map));
-            }
-        }
-        Ok(Self {
-            maps: RwLock::new(Rank::Brief, maps),
-            data_dir: data_dir.map(Arc::new),
-            writing: Default::default(),
-        })
+        let maps = data_dir.as_ref().map(|data_dir| open_all(data_dir, progress)).transpose()?;
+        let maps = RwLock::new(Rank::Brief, maps.unwrap_or_default());
+        Ok(Self { maps, data_dir: data_dir.map(Arc::new), writing: Default::default() })
     }
 
     pub(super) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
         let name = name.name();
-        self.maps.read().get(name).cloned().ok_or_else(|| {
-            let message = format!("map {name} does not exist: make it first, or list the maps there are");
-            ServiceError::new(ErrorCode::NotFound, "map_not_found", message)
-        })
+        let maps = self.maps.read();
+        let missing = || match maps.unavailable.get(name) {
+            Some(reason) => unavailable(name, reason),
+            None => {
+                let message = format!("map {name} does not exist: make it first, or list the maps there are");
+                ServiceError::new(ErrorCode::NotFound, "map_not_found", message)
+            }
+        };
+        maps.open.get(name).cloned().ok_or_else(missing)
+    }
+
+    /// The map of that name; none where the name is free.
+    fn find(&self, name: &Reachable) -> Result<Option<Arc<HostedMap>>, ServiceError> {
+        match self.get(name) {
+            Ok(map) => Ok(Some(map)),
+            Err(error) if error.code == ErrorCode::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 
     /// The maps that a caller may name.
     pub(super) fn within(&self, reach: &MapReach) -> Vec<Arc<HostedMap>> {
-        self.maps.read().values().filter(|map| reach.covers(&map.name)).cloned().collect()
+        self.maps.read().open.values().filter(|map| reach.covers(&map.name)).cloned().collect()
+    }
+
+    /// Those that could not be opened.
+    pub(super) fn unavailable_within(&self, reach: &MapReach) -> Vec<UnavailableMap> {
+        let maps = self.maps.read();
+        let reachable = maps.unavailable.iter().filter(|(name, _)| reach.covers(name));
+        reachable
+            .map(|(name, reason)| UnavailableMap { name: name.clone(), reason: reason.clone() })
+            .collect()
     }
 
     fn all(&self) -> Vec<Arc<HostedMap>> {
-        self.maps.read().values().cloned().collect()
+        self.maps.read().open.values().cloned().collect()
     }
 
     /// The map of that name; true when it was not there.
@@ -74,35 +96,46 @@ impl Catalogue {
         maps_max: usize,
     ) -> Result<(Arc<HostedMap>, bool), ServiceError> {
         let _writing = self.writing.lock().await;
-        if let Ok(map) = self.get(&name) {
+        let found = self.find(&name)?;
+        if let Some(map) = found {
             return same_settings(map, settings).map(|map| (map, false));
         }
         self.check_room(maps_max)?;
-        let empty = MultiResolutionMap::new(settings)?;
+        let empty = move || Ok(MultiResolutionMap::new(settings)?);
         self.add(name.name(), Uuid::new_v4(), empty).await.map(|map| (map, true))
     }
 
-    /// A map that was built of a map file, under a name that is free.
+    /// A map that was built of a map file under a name that is free; with `replace` under any, where the map that was
+    /// there is kept under another name.
     pub(super) async fn restore(
         &self,
         name: Reachable,
         built: BuiltMap,
         maps_max: usize,
+        replace: bool,
     ) -> Result<Arc<HostedMap>, ServiceError> {
         let _writing = self.writing.lock().await;
-        if self.get(&name).is_ok() {
-            let message =
-                format!("map {} exists: delete it first, or restore under another name", name.name());
+        let old = self.find(&name)?;
+        if old.is_some() && !replace {
+            let message = format!(
+                "map {} exists: delete it first, restore under another name, or replace it",
+                name.name()
+            );
             return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
         }
         self.check_room(maps_max)?;
         // `saving` is held until its snapshot is written.
         let BuiltMap { uuid, map, saving: _saving } = built;
-        self.add(name.name(), uuid, map).await
+        let build = move || Ok(map);
+        match old {
+            None => self.add(name.name(), uuid, build).await,
+            Some(old) => self.replace(old, uuid, build).await,
+        }
     }
 
     fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
-        let count = self.maps.read().len();
+        let maps = self.maps.read();
+        let count = maps.open.len() + maps.unavailable.len();
         if count < maps_max {
             return Ok(());
         }
@@ -110,35 +143,99 @@ impl Catalogue {
         Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message))
     }
 
-    /// Takes a map into the catalogue, kept and named; the caller holds `writing`. It is built already: what is made
-    /// durable is known to fit into memory.
+    /// Takes a map into the catalogue, kept and named; the caller holds `writing`. It is built before it is kept: one that
+    /// the server cannot build is not found again at its next start.
     async fn add(
         &self,
         name: &MapName,
         uuid: Uuid,
-        map: MultiResolutionMap,
+        build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
-        let (map, kept_name) = (Arc::new(map), name.clone());
-        let kept = Arc::clone(&map);
-        let create = move |data_dir: &DataDir| data_dir.create(&kept_name, &Snapshot::of(&kept, uuid));
-        let folder = self.on_disk(create).await?;
-        let map = Arc::new(HostedMap::new(name.clone(), uuid, map, folder)?);
-        self.maps.write().insert(name.clone(), Arc::clone(&map));
+        let (data_dir, of) = (self.data_dir.clone(), name.clone());
+        let map = blocking(move || {
+            let map = build()?;
+            let create = |data_dir: Arc<DataDir>| data_dir.create(&of, &Snapshot::of(&map, uuid));
+            let folder = data_dir.map(create).transpose().map_err(not_stored)?;
+            HostedMap::new(of, uuid, map, folder).map(Arc::new)
+        })
+        .await?;
+        self.maps.write().open.insert(name.clone(), Arc::clone(&map));
         Ok(map)
+    }
+
+    /// Puts another map in the place of `old`, which gets a name of its own; the caller holds `writing`.
+    async fn replace(
+        &self,
+        old: Arc<HostedMap>,
+        uuid: Uuid,
+        build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
+    ) -> Result<Arc<HostedMap>, ServiceError> {
+        let (data_dir, name) = (self.data_dir.clone(), old.name.clone());
+        let taken: Vec<MapName> = {
+            let maps = self.maps.read();
+            maps.open.keys().chain(maps.unavailable.keys()).cloned().collect()
+        };
+        let exchanged = blocking(move || {
+            let map = build()?;
+            // Its revision, and so its new name, is known from now on.
+            old.committing.end_replaced();
+            let kept = name_of_replaced(&old.name, old.map.revision(), &taken);
+            let exchange = || {
+                let kept = kept?;
+                let replace = |data_dir: Arc<DataDir>| match &old.folder {
+                    Some(folder) => {
+                        let first = Snapshot::of(&map, uuid);
+                        data_dir.replace(&old.name, folder, &kept, &first).map(Some).map_err(not_stored)
+                    }
+                    None => Ok(None),
+                };
+                let folder = data_dir.map_or(Ok(None), replace)?;
+                let new = HostedMap::new(old.name.clone(), uuid, map, folder)?;
+                Ok((kept, new))
+            };
+            match exchange() {
+                Ok((kept, new)) => Ok((Arc::new(new), Arc::new(old.again_as(kept)?), None)),
+                Err(error) => {
+                    let old = Arc::new(old.again_as(old.name.clone())?);
+                    Ok((Arc::clone(&old), old, Some(error)))
+                }
+            }
+        });
+        let (there, kept, error): (Arc<HostedMap>, Arc<HostedMap>, Option<ServiceError>) = exchanged.await?;
+        let mut maps = self.maps.write();
+        maps.open.insert(kept.name.clone(), Arc::clone(&kept));
+        maps.open.insert(name.clone(), Arc::clone(&there));
+        drop(maps);
+        if let Some(error) = error {
+            return Err(error);
+        }
+        tracing::info!(map = %name, kept = %kept.name, "replaced");
+        Ok(there)
     }
 
     pub(super) async fn delete(&self, name: &Reachable) -> Result<(), ServiceError> {
         let _writing = self.writing.lock().await;
         let map = self.get(name)?;
-        self.on_disk({
-            let (name, uuid) = (map.name.clone(), map.uuid);
-            move |data_dir| data_dir.remove(&name, uuid)
+        let folder = map.folder.clone();
+        let removed =
+            self.on_disk(move |data_dir| folder.map_or(Ok(()), |folder| data_dir.remove(&folder))).await;
+        let is_gone = map.folder.as_deref().is_none_or(MapFolder::is_gone);
+        if is_gone {
+            self.maps.write().open.remove(&map.name);
+            // Who still holds the map may read it, but nothing is kept of it any more.
+            map.committing.end();
+        }
+        removed.map(drop).map_err(|error| match is_gone {
+            true => {
+                let message = format!(
+                    "map {} is gone, but the disk did not say that this outlives a loss of power ({}): look whether it \
+                     is there after the next restart",
+                    map.name, error.message
+                );
+                ServiceError::new(ErrorCode::Unavailable, "outcome_unknown", message)
+            }
+            false => error,
         })
-        .await?;
-        self.maps.write().remove(&map.name);
-        // Who still holds the map may read it, but nothing is kept of it any more.
-        map.committing.end();
-        Ok(())
     }
 
     /// Writes a snapshot of each map by `save`, which says whether it did; the number of those that it wrote. One that
@@ -166,19 +263,56 @@ impl Catalogue {
         let Some(data_dir) = self.data_dir.clone() else {
             return Ok(None);
         };
-        let done = tokio::task::spawn_blocking(move || job(&data_dir)).await;
-        let done = done.map_err(|e| ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string()))?;
-        done.map(Some).map_err(not_stored)
+        blocking(move || job(&data_dir).map(Some).map_err(not_stored)).await
     }
 }
 
-fn load(data_dir: &DataDir, name: &MapName, progress: &OpeningProgress) -> Result<HostedMap, ServiceError> {
-    let start = Instant::now();
-    // Where the system ends the process for want of memory, the log says with which map.
-    tracing::info!(map = %name, "opening");
-    let opened = data_dir.map(name, progress).map_err(not_stored)?;
+/// Opens what can be opened.
+fn open_all(data_dir: &DataDir, progress: &OpeningProgress) -> Result<Named, ServiceError> {
+    let stock = data_dir.take_stock().map_err(not_stored)?;
+    for path in stock.not_understood {
+        tracing::warn!(path = %path.display(), "not understood, and left alone: no map");
+    }
+    data_dir.expect(&stock.maps, progress);
+    let mut maps = Named::default();
+    for name in stock.maps {
+        tracing::info!(map = %name, "opening");
+        let start = Instant::now();
+        match data_dir.map(&name, progress) {
+            Ok(opened) => {
+                report(&name, &opened, start);
+                let map = HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder))?;
+                maps.open.insert(name, Arc::new(map));
+            }
+            Err(error @ StoreError::Cancelled) => return Err(not_stored(error)),
+            Err(error) => maps.set_unavailable(name, &error),
+        }
+    }
+    for (name, error) in stock.refused {
+        // The map that is there is served; the file waits for somebody.
+        if maps.open.contains_key(&name) || maps.unavailable.contains_key(&name) {
+            tracing::error!(map = %name, %error, "a map file is not taken in");
+        } else {
+            maps.set_unavailable(name, &error);
+        }
+    }
+    Ok(maps)
+}
+
+impl Named {
+    fn set_unavailable(&mut self, name: MapName, error: &StoreError) {
+        tracing::error!(map = %name, %error, "cannot be opened: the map is unavailable, the others are served");
+        self.unavailable.insert(name, error.to_string());
+    }
+}
+
+/// Says what was found of a map.
+fn report(name: &MapName, opened: &OpenedMap, start: Instant) {
     for damaged in &opened.damaged {
         tracing::warn!(map = %name, %damaged, "a snapshot is damaged: set aside, an older one and more journal are used");
+    }
+    for file in &opened.not_understood {
+        tracing::warn!(map = %name, file, "a file in the map's folder is not understood, and left alone");
     }
     if let Some(Cut { path, offset, bytes, reason }) = &opened.recovered.cut {
         let file = path.display();
@@ -190,7 +324,33 @@ fn load(data_dir: &DataDir, name: &MapName, progress: &OpeningProgress) -> Resul
     let (revision, replayed, snapshot) = (opened.map.revision(), opened.recovered.replayed, opened.snapshot);
     let (voxels, elapsed) = (opened.map.voxels(0), start.elapsed());
     tracing::info!(map = %name, revision, snapshot, replayed, voxels, ?elapsed, "opened");
-    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder))
+}
+
+fn unavailable(name: &MapName, reason: &str) -> ServiceError {
+    let message = format!("map {name} could not be opened: {reason}; then restart the server");
+    ServiceError::new(ErrorCode::Unavailable, "map_unavailable", message)
+}
+
+/// The name that a map gets whose name another takes: `NAME-replaced-REVISION`, cut to fit.
+fn name_of_replaced(name: &MapName, revision: u64, taken: &[MapName]) -> Result<MapName, ServiceError> {
+    let candidate = |again: u32| {
+        let again = if again == 1 { String::new() } else { format!("-{again}") };
+        let end = format!("-replaced-{revision}{again}");
+        let start: String = name.as_str().chars().take(NAME_LENGTH_MAX - end.len()).collect();
+        MapName::new(&format!("{start}{end}"))
+    };
+    let mut names = (1..=taken.len() as u32 + 1).map(candidate);
+    let free = names.find(|name| name.as_ref().map_or(true, |name| !taken.contains(name)));
+    let none = || ServiceError::new(ErrorCode::Conflict, "map_exists", format!("no name is free for {name}"));
+    Ok(free.ok_or_else(none)??)
+}
+
+/// Does something on a thread that may block.
+async fn blocking<T: Send + 'static>(
+    job: impl FnOnce() -> Result<T, ServiceError> + Send + 'static,
+) -> Result<T, ServiceError> {
+    let done = tokio::task::spawn_blocking(job).await;
+    done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
 }
 
 /// Making a map again as it is changes nothing; as another it is a conflict.
@@ -213,4 +373,23 @@ fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<Hoste
 
 fn not_stored(error: StoreError) -> ServiceError {
     ServiceError::new(ErrorCode::Internal, "not_stored", error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_replaced_map_fits_and_is_free() {
+        let name = |text: &str| MapName::new(text).unwrap();
+        let office = name("office");
+        let first = name_of_replaced(&office, 41, std::slice::from_ref(&office)).unwrap();
+        assert_eq!(first, name("office-replaced-41"));
+        let second = name_of_replaced(&office, 41, &[office.clone(), first]).unwrap();
+        assert_eq!(second, name("office-replaced-41-2"));
+        let long = name(&"a".repeat(NAME_LENGTH_MAX));
+        let cut = name_of_replaced(&long, 1 << 53, &[]).unwrap();
+        assert_eq!(cut.as_str().len(), NAME_LENGTH_MAX);
+        assert!(cut.as_str().ends_with("a-replaced-9007199254740992"), "{cut:?}");
+    }
 }

@@ -22,8 +22,8 @@ use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 
 use super::room::Promise;
 use super::{ErrorCode, ServiceError};
-use crate::map::{Change, Committed, MapName, MultiResolutionMap};
-use crate::store::{MapFolder, Record};
+use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
+use crate::store::{MapFolder, Record, StoreError};
 use crate::util::{Durations, SharedDurations};
 use worker::Worker;
 
@@ -157,6 +157,17 @@ impl Committing {
     pub(super) fn end(&self) {
         self.stopped.get_or_init(|| Stop::Deleted);
     }
+
+    /// Another map takes its place: it takes no more changes here, and when this returns, none is on its way.
+    pub(super) fn end_replaced(&self) {
+        self.stopped.get_or_init(|| Stop::Replaced);
+        let (answer, behind_all) = oneshot::channel();
+        let proposal = Proposal::Undecided(Box::new(|_| Ok(None)));
+        // Waits for a place in the queue; where the thread is gone, so are its changes.
+        if self.inbox.send(Waiting { proposal, answer }).is_ok() {
+            drop(behind_all.blocking_recv());
+        }
+    }
 }
 
 /// Why a map takes no more changes.
@@ -166,6 +177,8 @@ pub(super) enum Stop {
     Failed(String),
     /// It was deleted.
     Deleted,
+    /// Another has its name now.
+    Replaced,
 }
 
 impl Stop {
@@ -182,8 +195,29 @@ impl Stop {
             Self::Deleted => {
                 ServiceError::new(ErrorCode::NotFound, "map_not_found", format!("map {name} was deleted"))
             }
+            Self::Replaced => {
+                let message = format!("map {name} was replaced by another: ask for its map_uuid");
+                ServiceError::new(ErrorCode::FailedPrecondition, "map_replaced", message)
+            }
         }
     }
+}
+
+/// What to say to whose change was handed to a journal that failed then.
+fn outcome_unknown(name: &MapName, error: &StoreError) -> ServiceError {
+    let message = format!(
+        "the journal of map {name} failed while this change was written ({error}): it may be there after the next \
+         restart of the server; the same scan_id or request_id, sent again then, tells"
+    );
+    ServiceError::new(ErrorCode::Unavailable, "outcome_unknown", message)
+}
+
+/// What to say where the map has no revision left.
+fn revisions_used_up(name: &MapName) -> ServiceError {
+    let message = format!(
+        "map {name} is at revision {REVISION_MAX}, the last that there is: make another map, and insert there"
+    );
+    ServiceError::new(ErrorCode::FailedPrecondition, "revisions_used_up", message)
 }
 
 /// The record of a change.

@@ -68,7 +68,23 @@ impl HostedMap {
         map: impl Into<Arc<MultiResolutionMap>>,
         folder: Option<MapFolder>,
     ) -> Result<Self, ServiceError> {
-        let (map, folder) = (map.into(), folder.map(Arc::new));
+        Self::of_shared(name, uuid, map.into(), folder.map(Arc::new))
+    }
+
+    /// The same map under the name `name`, once this one has ended.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn again_as(&self, name: MapName) -> Result<Self, ServiceError> {
+        Self::of_shared(name, self.uuid, Arc::clone(&self.map), self.folder.clone())
+    }
+
+    fn of_shared(
+        name: MapName,
+        uuid: Uuid,
+        map: Arc<MultiResolutionMap>,
+        folder: Option<Arc<MapFolder>>,
+    ) -> Result<Self, ServiceError> {
         let (announcing, announced) = watch::channel(map.revision());
         let committing = Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing)?;
         Ok(Self {
@@ -100,7 +116,7 @@ impl HostedMap {
         let (start, snapshot) = (Instant::now(), Snapshot::of(&self.map, self.uuid));
         let saved = folder.save(&snapshot, room.file_bytes_max());
         // Its folder may go while it is written.
-        if self.committing.stopped() == Some(&Stop::Deleted) {
+        if matches!(saved, Err(StoreError::Gone)) {
             return Ok(false);
         }
         if let Err(no_room @ StoreError::NoRoom { .. }) = &saved {
@@ -111,6 +127,19 @@ impl HostedMap {
         self.is_put_off.store(false, Ordering::Relaxed);
         tracing::info!(map = %self.name, revision = snapshot.contents.revision, elapsed = ?start.elapsed(), "saved");
         Ok(true)
+    }
+
+    /// Gives up what is kept for undo alone, where the disk is so full that changes will be refused next.
+    pub(super) fn make_room(&self, room: &Room) -> Result<(), StoreError> {
+        let Some(folder) = self.folder.as_ref().filter(|_| room.is_disk_scarce()) else { return Ok(()) };
+        match folder.give_up_undo() {
+            Ok(true) => {
+                tracing::warn!(map = %self.name, "the disk is nearly full: what was kept for undo is given up")
+            }
+            Ok(false) | Err(StoreError::Gone) => {}
+            Err(error) => return Err(error),
+        }
+        Ok(())
     }
 
     /// There is no room for a snapshot: said once, tried again and again. Nothing is lost, since the journal is kept until
@@ -297,7 +326,7 @@ impl HostedMap {
     pub(super) fn failure(&self) -> Option<&str> {
         match self.committing.stopped()? {
             Stop::Failed(reason) => Some(reason),
-            Stop::Deleted => None,
+            Stop::Deleted | Stop::Replaced => None,
         }
     }
 

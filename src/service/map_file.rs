@@ -8,18 +8,35 @@ use super::room::Promise;
 use super::room::Room;
 use super::{ErrorCode, Limits, MapFile, ServiceError, check_not_stopped};
 use crate::map::MultiResolutionMap;
-use crate::store::{MapFileError, MapFileLimits, Snapshot};
+use crate::store::{MapFileError, MapFileLimits, Snapshot, body_bytes};
 use crate::util::StopSignal;
 
 impl HostedMap {
     /// The map as a file, at one revision.
-    pub(super) fn to_file(&self, room: &Room, stop: StopSignal<'_>) -> Result<MapFile, ServiceError> {
+    ///
+    /// # Errors
+    /// `ResourceExhausted` for one that [`from_file`] would refuse: a backup that cannot be restored is none.
+    pub(super) fn to_file(
+        &self,
+        room: &Room,
+        limits: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<MapFile, ServiceError> {
         let _lent = room.lend(self.snapshot_bytes(), "a map file")?;
         let snapshot = Snapshot::of(&self.map, self.uuid);
         check_not_stopped(stop)?;
         let encoded = snapshot.encode();
         let bytes =
             encoded.map_err(|e| ServiceError::new(ErrorCode::Internal, "not_encoded", e.to_string()))?;
+        let (size, most) = (body_bytes(&bytes).max(bytes.len() as u64), limits.map_file_bytes_max as u64);
+        if size > most {
+            let message = format!(
+                "map {} takes {size} bytes as a map file, before compression, and map_file_bytes_max is {most}: raise \
+                 limits.map_file_bytes_max here, and where the file is to be restored",
+                self.name
+            );
+            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_file_too_large", message));
+        }
         Ok(MapFile { bytes: bytes.into(), state: self.state(snapshot.contents.revision) })
     }
 }

@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
-use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError};
+use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError, UnavailableMap};
 use crate::map::{MapName, MapSettings};
 use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
@@ -69,10 +69,16 @@ impl MapService {
         maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
     }
 
+    /// The maps that could not be opened, by name, with the reason and what helps. Their names are taken.
+    pub fn unavailable_maps(&self) -> Vec<UnavailableMap> {
+        self.inner.catalogue.unavailable_within(&self.reach)
+    }
+
     /// Takes a map out, in memory and on disk.
     ///
     /// # Errors
-    /// `NotFound` without such a map; `Internal` when its file cannot be removed.
+    /// `NotFound` without such a map; `Internal` when its file cannot be removed; `Unavailable` with `outcome_unknown`
+    /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
         let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
         to_its_end(async move { inner.catalogue.delete(&name).await }).await
@@ -81,19 +87,27 @@ impl MapService {
     /// A map as a map file, at one revision.
     ///
     /// # Errors
-    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, or there is no memory for it.
+    /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, there is no memory for it, or the file
+    /// would be larger than `map_file_bytes_max`, so that nobody could restore it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
-        self.inner.queries.run(move |stop| map.to_file(&inner.room, stop)).await?
+        self.inner.queries.run(move |stop| map.to_file(&inner.room, &inner.settings.limits, stop)).await?
     }
 
-    /// Makes a map from a map file, under a uuid of its own.
+    /// Makes a map from a map file, under a uuid of its own. With `replace` it takes the place of the map of that name,
+    /// if there is one, which is kept as `NAME-replaced-REVISION` until somebody deletes it.
     ///
     /// # Errors
     /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
-    /// is a map of that name; `ResourceExhausted` beyond `maps_max`, `voxels_per_map_max` or `map_file_scans_max`, where
-    /// there is no memory for what it holds, or while disk or memory is nearly full.
-    pub async fn restore_map(&self, name: MapName, file: Bytes) -> Result<MapInfo, ServiceError> {
+    /// is a map of that name, unless `replace` says that it is to be kept under another; `ResourceExhausted` beyond
+    /// `maps_max`, `voxels_per_map_max` or `map_file_scans_max`, where there is no memory for what it holds, or while disk
+    /// or memory is nearly full.
+    pub async fn restore_map(
+        &self,
+        name: MapName,
+        file: Bytes,
+        replace: bool,
+    ) -> Result<MapInfo, ServiceError> {
         let name = self.reach.check(&name)?;
         self.inner.room.check_to_grow()?;
         let inner = Arc::clone(&self.inner);
@@ -101,7 +115,8 @@ impl MapService {
         let built = self.inner.mapping.run(build).await??;
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
-        let map = to_its_end(async move { inner.catalogue.restore(name, built, maps_max).await }).await?;
+        let restore = async move { inner.catalogue.restore(name, built, maps_max, replace).await };
+        let map = to_its_end(restore).await?;
         self.describe(map).await
     }
 
@@ -119,6 +134,8 @@ impl MapService {
     /// # Errors
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
+        let inner = Arc::clone(&self.inner);
+        self.inner.catalogue.save(move |map| map.make_room(&inner.room).map(|()| false)).await?;
         self.save_maps(Saving::Due).await
     }
 

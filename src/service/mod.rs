@@ -35,8 +35,8 @@ pub use pool::PoolUse;
 pub use reach::MapReach;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
-    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer,
-    UndoTarget, VoxelListing,
+    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, UnavailableMap, Undo,
+    UndoAnswer, UndoTarget, VoxelListing,
 };
 pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
 pub use shortage::Shortage;

@@ -365,3 +365,12 @@ pub struct MapStorage {
     /// Why the map takes no changes, where it does not.
     pub failure: Option<String>,
 }
+
+/// A map that could not be opened. Nothing can be done with it but to put its files right, and to start again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnavailableMap {
+    /// Its name, which is taken.
+    pub name: MapName,
+    /// Why, and the command that helps.
+    pub reason: String,
+}

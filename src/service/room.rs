@@ -121,6 +121,12 @@ impl Room {
         self.disk_free_bytes().map_or(u64::MAX, |free| free.saturating_sub(least))
     }
 
+    /// True where so little of the disk is free that nothing should be kept that can be spared. May block.
+    pub(super) fn is_disk_scarce(&self) -> bool {
+        let Marks { disk_free_low_bytes, disk_free_back_bytes, .. } = self.marks;
+        disk_free_low_bytes > 0 && self.disk_free_bytes().is_some_and(|free| free < disk_free_back_bytes)
+    }
+
     fn count(&self, bytes: u64) -> Promise {
         self.promised_bytes.fetch_add(bytes, Ordering::Relaxed);
         Promise { bytes, promised_bytes: Arc::clone(&self.promised_bytes) }

@@ -39,7 +39,7 @@ impl HostedMap {
         let lent = room.lend(self.snapshot_bytes(), "an undo")?;
         let observed = folder.observations(&scans, &withdrawn, stop).map_err(unreadable)?;
         check_not_stopped(stop)?;
-        let (mut observations, seen) = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
+        let mut observed = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
         let (map, count) = (Arc::clone(self), scans.len());
         let decide = move |core: &MultiResolutionMap| {
@@ -47,9 +47,9 @@ impl HostedMap {
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
-            folder.observe(&mut observations, seen, StopSignal::NEVER).map_err(unreadable)?;
-            let voxels = observations.held_by_targets_alone();
-            let moments = observations.moments_without_targets();
+            folder.observe(&mut observed, StopSignal::NEVER).map_err(unreadable)?;
+            let voxels = observed.observations.held_by_targets_alone();
+            let moments = observed.observations.moments_without_targets();
             let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
             Ok(Some(Decided { change, lent: Some(lent) }))
         };
@@ -98,10 +98,11 @@ impl HostedMap {
     fn out_of_reach(&self, folder: &MapFolder, first: u64) -> ServiceError {
         let message = format!(
             "undo reaches back to revision {} of map {}, and the first of the scans made revision {first}; \
-             store.undo_revisions is {}",
+             store.undo_revisions is {}, store.undo_bytes_max {}",
             folder.used().undo_from,
             self.name,
-            folder.settings().undo_revisions
+            folder.settings().undo_revisions,
+            folder.settings().undo_bytes_max
         );
         ServiceError::new(ErrorCode::FailedPrecondition, "undo_out_of_reach", message)
     }

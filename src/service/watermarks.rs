@@ -3,9 +3,8 @@
 //! Each gauge has two marks, so that a value that trembles about one of them does not open and shut the door at each
 //! look. Reads, alignments and searches go on meanwhile.
 
-use parking_lot::RwLock;
-
 use super::{MemoryReading, Readings, ServiceError, Shortage};
+use crate::sync::{Rank, RwLock};
 
 /// Where changes are refused, and where they are taken again.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,7 +45,7 @@ struct Shortages {
 
 impl Watermarks {
     pub(super) fn new(marks: Marks) -> Self {
-        Self { marks, now: RwLock::default() }
+        Self { marks, now: RwLock::new(Rank::Brief, Shortages::default()) }
     }
 
     /// Takes note of readings. Of what nothing was read, all stays as it was.

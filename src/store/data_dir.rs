@@ -2,29 +2,43 @@
 //!
 //! ```text
 //! DATA_DIR/lock                   held by the one process that uses the folder
-//! DATA_DIR/maps/NAME/             a map, see `map_folder.rs`
+//! DATA_DIR/maps/NAME.UUID/        a map, see `map_folder.rs`
+//! DATA_DIR/maps/NAME/             a map of a former release: gets its uuid when it is opened
 //! DATA_DIR/maps/NAME.mrol         a map file (of version 1, a backup, of `mrol map --out`): taken in when it is found
 //! DATA_DIR/maps/.unfinished-...   what a crash left: swept away
 //! ```
 //!
-//! The folder *is* the catalogue. A map's name is its folder's; uuid and settings are in each of its snapshots. That
+//! The folder *is* the catalogue. A map's name and uuid are its folder's; its settings are in each of its snapshots. That
 //! a map is made or deleted is one rename of its folder, which is atomic, so there is no second store that could
 //! disagree with the files, and nothing to repair between the two. Likewise requests: which scans and deletions were
 //! accepted is part of the changes themselves, durable in the same record.
+//!
+//! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted goes
+//! into its own folder, and never into that of the next map of its name.
 
+mod entry;
+mod stock;
+
+pub(super) use entry::Entry;
+pub use stock::Stock;
+
+use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use uuid::Uuid;
 
+use super::checked_files::CheckedFiles;
 use super::map_folder::{MapFolder, OpenedMap};
+use super::replacement::{self, REPLACES, Replacement};
+use super::snapshot_files::newest_good;
 use super::{Disk, FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, snapshot_files};
 use crate::map::MapName;
+use crate::sync::{Mutex, Rank};
 
 const MAPS: &str = "maps";
 const LOCK_FILE: &str = "lock";
-const MAP_FILE_SUFFIX: &str = ".mrol";
 
 /// The folder where a server keeps its maps. Only one process may hold it.
 #[derive(Debug)]
@@ -32,6 +46,8 @@ pub struct DataDir {
     files: Arc<dyn FileSystem>,
     maps: PathBuf,
     settings: StoreSettings,
+    /// Names of folders that are no map's any more, or never became one's, and may be there still: something failed.
+    leftovers: Mutex<BTreeSet<String>>,
     /// Locked as long as it is open.
     _lock: Option<File>,
 }
@@ -42,11 +58,12 @@ impl DataDir {
     /// # Errors
     /// When another process holds it or the system refuses.
     pub fn open(path: &Path, settings: StoreSettings) -> Result<Self, StoreError> {
-        make_folder(&Disk, path).map_err(StoreError::io(path))?;
+        let disk = Disk::of_mode(settings.mode);
+        make_folder(&disk, path).map_err(StoreError::io(path))?;
         let lock_path = path.join(LOCK_FILE);
-        let lock = File::create(&lock_path).map_err(StoreError::io(&lock_path))?;
+        let lock = disk.creation().open(&lock_path).map_err(StoreError::io(&lock_path))?;
         match lock.try_lock() {
-            Ok(()) => Ok(Self { _lock: Some(lock), ..Self::on(Arc::new(Disk), path, settings)? }),
+            Ok(()) => Ok(Self { _lock: Some(lock), ..Self::on(Arc::new(disk), path, settings)? }),
             Err(TryLockError::WouldBlock) => Err(StoreError::InUse(path.to_owned())),
             Err(TryLockError::Error(e)) => Err(StoreError::io(lock_path)(e)),
         }
@@ -57,113 +74,202 @@ impl DataDir {
     /// # Errors
     /// When the file system refuses.
     pub fn on(files: Arc<dyn FileSystem>, path: &Path, settings: StoreSettings) -> Result<Self, StoreError> {
-        let maps = path.join(MAPS);
+        let (files, maps) = (CheckedFiles::around(files), path.join(MAPS));
         let make = || make_folder(&*files, path).and_then(|()| make_folder(&*files, &maps));
         make().map_err(StoreError::io(&maps))?;
-        Ok(Self { files, maps, settings, _lock: None })
+        let leftovers = Mutex::new(Rank::Brief, BTreeSet::new());
+        Ok(Self { files, maps, settings, leftovers, _lock: None })
     }
 
-    /// The names of the maps kept here, in order; map files that lie about become maps, and what a crash left
-    /// unfinished goes.
-    ///
-    /// # Errors
-    /// When the folder or a map file cannot be read.
-    pub fn take_stock(&self) -> Result<Vec<MapName>, StoreError> {
-        folder::sweep(&*self.files, &self.maps)?;
-        let entries = self.files.list(&self.maps).map_err(StoreError::io(&self.maps))?;
-        for name in entries.iter().filter_map(|entry| entry.strip_suffix(MAP_FILE_SUFFIX)) {
-            if let Ok(name) = MapName::new(name) {
-                self.take_in(&name, entries.iter().any(|entry| entry == name.as_str()))?;
-            }
-        }
-        self.names()
-    }
-
-    /// The names of the maps kept here, in order.
+    /// The names of the maps kept here, in order, those that cannot be opened among them.
     ///
     /// # Errors
     /// When the folder cannot be read.
     pub fn names(&self) -> Result<Vec<MapName>, StoreError> {
-        let entries = self.files.list(&self.maps).map_err(StoreError::io(&self.maps))?;
-        Ok(entries.iter().filter_map(|entry| MapName::new(entry).ok()).collect())
-    }
-
-    /// Makes a map's folder of a map file.
-    fn take_in(&self, name: &MapName, exists: bool) -> Result<(), StoreError> {
-        let file = self.maps.join(format!("{name}{MAP_FILE_SUFFIX}"));
-        let snapshot = Snapshot::read(&*self.files, &file)?;
-        if !exists {
-            MapFolder::create(&self.files, &self.path(name), &snapshot)?;
-        } else if self.first_snapshot(name)?.uuid != snapshot.uuid {
-            let reason = format!("map {name} exists already: rename the file, or move it away");
-            return Err(StoreError::damaged(&file, reason));
-        }
-        // Where a crash came between the two, the folder is there and only the file has to go.
-        let removed = self.files.remove(&file).and_then(|()| self.files.sync(&self.maps));
-        removed.map_err(StoreError::io(&file))
-    }
-
-    fn first_snapshot(&self, name: &MapName) -> Result<Snapshot, StoreError> {
-        let path = self.path(name);
-        let oldest =
-            snapshot_files::snapshot_revisions(&*self.files, &path)?.first().copied().unwrap_or_default();
-        Snapshot::read(&*self.files, &path.join(snapshot_files::snapshot_name(oldest)))
-    }
-
-    /// Counts what opening the maps `names` will take.
-    ///
-    /// # Errors
-    /// When a folder cannot be read.
-    pub fn expect(&self, names: &[MapName], progress: &OpeningProgress) -> Result<(), StoreError> {
-        for name in names {
-            progress.expect_map(snapshot_files::bytes_to_read(&*self.files, &self.path(name))?);
-        }
-        Ok(())
+        let names = self.entries()?.iter().filter_map(|entry| Entry::of(entry).into_map()).collect();
+        Ok(BTreeSet::into_iter(names).collect())
     }
 
     /// Opens a map.
     ///
     /// # Errors
-    /// When its files cannot be read, or miss something that may have been acknowledged.
+    /// When its files cannot be read, or miss something that may have been acknowledged; when two folders claim to be it.
     pub fn map(&self, name: &MapName, progress: &OpeningProgress) -> Result<OpenedMap, StoreError> {
+        let (path, uuid) = self.adopted(name)?;
         let files = Arc::clone(&self.files);
-        let opened = MapFolder::open(files, self.path(name), self.settings.clone(), progress)?;
+        let opened = MapFolder::open(files, path, uuid, self.settings.clone(), progress)?;
         progress.map_is_open();
         Ok(opened)
+    }
+
+    /// Opens a map without the revisions of which there is no trace but that they had been acknowledged, and writes a
+    /// snapshot that expects them no more; the map's revision.
+    pub(super) fn go_on_without(&self, name: &MapName) -> Result<u64, StoreError> {
+        let (path, uuid) = self.adopted(name)?;
+        let (files, progress) = (Arc::clone(&self.files), OpeningProgress::default());
+        let opened = MapFolder::open_at(files, path, uuid, self.settings.clone(), &progress, false)?;
+        let snapshot = Snapshot::of(&opened.map, uuid);
+        opened.folder.save(&snapshot, u64::MAX)?;
+        Ok(snapshot.contents.revision)
     }
 
     /// Makes a map; it is there as a whole or not at all.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// When the system refuses, or there is a map of that name.
     pub fn create(&self, name: &MapName, first: &Snapshot) -> Result<MapFolder, StoreError> {
-        let path = self.path(name);
-        MapFolder::create(&self.files, &path, first)?;
-        MapFolder::new(Arc::clone(&self.files), path, self.settings.clone(), first)
+        self.clear_leftovers()?;
+        if let Some(entry) = self.folders_of(name)?.into_iter().next() {
+            return Err(StoreError::damaged(&self.maps.join(entry), format!("map {name} exists")));
+        }
+        let entry = Entry::folder_name(name, first.uuid);
+        self.make(&entry, first, None)?;
+        self.folder(&entry, first)
+    }
+
+    /// Makes a map that takes the place of `old` under its name `name`; that map gets the name `kept`.
+    ///
+    /// # Errors
+    /// When the system refuses; all is then as it was, in memory. Where the system refused to take back what it had done,
+    /// the next start may find the exchange made.
+    pub fn replace(
+        &self,
+        name: &MapName,
+        old: &MapFolder,
+        kept: &MapName,
+        first: &Snapshot,
+    ) -> Result<MapFolder, StoreError> {
+        self.clear_leftovers()?;
+        let new = Entry::folder_name(name, first.uuid);
+        let old_entry = old.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let replacement = Replacement { old: old_entry, kept: Entry::folder_name(kept, old.uuid()) };
+        self.make(&new, first, Some(&replacement))?;
+        // Nobody uses it before it is known to stay.
+        let exchange = || {
+            let folder = self.folder(&new, first)?;
+            old.move_to(&self.maps.join(&replacement.kept))?;
+            Ok(folder)
+        };
+        let folder = exchange().inspect_err(|_| self.leave(&new))?;
+        // Where it stays, the next start takes it away.
+        drop(replacement::finish(&*self.files, &self.maps.join(&new)));
+        Ok(folder)
     }
 
     /// Takes a map away. When this returns it is gone for good, though not all its bytes may be.
     ///
     /// # Errors
-    /// When the system refuses.
-    pub fn remove(&self, name: &MapName, uuid: Uuid) -> Result<(), StoreError> {
-        let path = self.path(name);
-        // With the uuid, since the name may come again and go again.
-        let gone = folder::unfinished(&self.maps.join(format!("{name}-{uuid}")));
-        let renamed = self.files.rename(&path, &gone).and_then(|()| self.files.sync(&self.maps));
-        renamed.map_err(StoreError::io(&path))?;
+    /// When the system refuses. Where [`MapFolder::is_gone`] says so all the same, the map is gone, and only the loss of
+    /// power could bring it back.
+    pub fn remove(&self, folder: &MapFolder) -> Result<(), StoreError> {
+        let path = folder.path();
+        let gone = folder::unfinished(&path);
+        folder.take_away(&gone)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if let Err(error) = self.files.sync(&self.maps) {
+            self.leftovers.lock().insert(name);
+            return Err(StoreError::io(&path)(error));
+        }
         // What is left is swept away at the next start.
         drop(self.files.remove_folder(&gone));
         Ok(())
     }
 
-    pub(super) fn files(&self) -> &Arc<dyn FileSystem> {
-        &self.files
+    /// A map's folder with its first snapshot, whole and under its name, or not there.
+    fn make(&self, entry: &str, first: &Snapshot, replaces: Option<&Replacement>) -> Result<(), StoreError> {
+        let path = self.maps.join(entry);
+        let aside = folder::unfinished(&path);
+        let make = || {
+            self.files.create_folder(&aside).map_err(StoreError::io(&aside))?;
+            if let Some(replaces) = replaces {
+                folder::replace(&*self.files, &aside.join(REPLACES), &replaces.encode())?;
+            }
+            let snapshot = snapshot_files::snapshot_name(first.contents.revision);
+            first.write(&*self.files, &aside.join(snapshot))?;
+            let renamed = self.files.rename(&aside, &path).and_then(|()| self.files.sync(&self.maps));
+            renamed.map_err(StoreError::io(&path))
+        };
+        make().inspect_err(|_| self.leave(entry))
     }
 
-    /// A map's name can be no path, see [`MapName`].
-    pub(super) fn path(&self, name: &MapName) -> PathBuf {
-        self.maps.join(name.as_str())
+    /// The folder whose one snapshot was just written.
+    fn folder(&self, entry: &str, first: &Snapshot) -> Result<MapFolder, StoreError> {
+        MapFolder::new(Arc::clone(&self.files), self.maps.join(entry), self.settings.clone(), first)
+    }
+
+    /// Notes that a folder is no map's, and takes it away where that can be done.
+    fn leave(&self, entry: &str) {
+        self.leftovers.lock().insert(entry.to_owned());
+        drop(self.clear_leftovers());
+    }
+
+    /// Takes away what failed operations left, for good: the next map of the name could not be told from it after a
+    /// crash.
+    fn clear_leftovers(&self) -> Result<(), StoreError> {
+        let leftovers = self.leftovers.lock().clone();
+        if leftovers.is_empty() {
+            return Ok(());
+        }
+        let entries = self.entries()?;
+        for entry in &leftovers {
+            let path = self.maps.join(entry);
+            let aside = folder::unfinished(&path);
+            if entries.contains(entry) {
+                self.files.rename(&path, &aside).map_err(StoreError::io(&path))?;
+            }
+        }
+        self.files.sync(&self.maps).map_err(StoreError::io(&self.maps))?;
+        for entry in &leftovers {
+            // What is left is swept away at the next start.
+            drop(self.files.remove_folder(&folder::unfinished(&self.maps.join(entry))));
+        }
+        self.leftovers.lock().retain(|entry| !leftovers.contains(entry));
+        Ok(())
+    }
+
+    fn entries(&self) -> Result<Vec<String>, StoreError> {
+        self.files.list(&self.maps).map_err(StoreError::io(&self.maps))
+    }
+
+    /// The names of the folders that claim to be that map.
+    fn folders_of(&self, name: &MapName) -> Result<Vec<String>, StoreError> {
+        let mut entries = self.entries()?;
+        entries.retain(|entry| Entry::of(entry).into_map().as_ref() == Some(name));
+        Ok(entries)
+    }
+
+    /// The folder of a map.
+    ///
+    /// # Errors
+    /// Where there is none, or more than one.
+    pub(super) fn path(&self, name: &MapName) -> Result<PathBuf, StoreError> {
+        match &self.folders_of(name)?[..] {
+            [] => Err(StoreError::NoFolder(name.clone())),
+            [one] => Ok(self.maps.join(one)),
+            [first, second, ..] => {
+                let (first, second) = (self.maps.join(first), self.maps.join(second));
+                Err(StoreError::TwoFolders { name: name.clone(), first, second })
+            }
+        }
+    }
+
+    /// The folder of a map with the uuid in its name; one of a former release gets it now.
+    fn adopted(&self, name: &MapName) -> Result<(PathBuf, Uuid), StoreError> {
+        let path = self.path(name)?;
+        if let Entry::Map { uuid, .. } = Entry::of_path(&path) {
+            return Ok((path, uuid));
+        }
+        let mut revisions = snapshot_files::snapshot_revisions(&*self.files, &path)?;
+        let newest = newest_good(&*self.files, &path, &mut revisions, &OpeningProgress::default())?;
+        let uuid = newest.snapshot.uuid;
+        let adopted = self.maps.join(Entry::folder_name(name, uuid));
+        let renamed = self.files.rename(&path, &adopted).and_then(|()| self.files.sync(&self.maps));
+        renamed.map_err(StoreError::io(&path))?;
+        Ok((adopted, uuid))
+    }
+
+    pub(super) fn files(&self) -> &Arc<dyn FileSystem> {
+        &self.files
     }
 }
 

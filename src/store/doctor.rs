@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
+use super::data_dir::Entry;
+use super::folder::FolderPath;
 use super::journal::{self, Inspected};
-use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
+use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot, snapshot_files};
 use crate::map::{MapName, MultiResolutionMap};
 
 /// What was found of a map.
@@ -20,6 +22,8 @@ pub struct Diagnosis {
     pub records: u64,
     /// The revision that the files give; none where there is no good snapshot.
     pub revision: Option<u64>,
+    /// The last revision that the snapshots know to have been acknowledged.
+    pub acknowledged: u64,
     /// Finest voxels at that revision.
     pub voxels: usize,
     /// Bytes that a crash left unfinished, which the next start cuts off: nothing acknowledged is among them.
@@ -27,8 +31,16 @@ pub struct Diagnosis {
     /// Files that were set aside since they could not be read. Damaged snapshots among them go with the snapshots of
     /// their age; parts of a journal stay until somebody removes them.
     pub set_aside: Vec<AsideFile>,
+    /// Files in the folder that nobody understands: no harm, but somebody put them there.
+    pub not_understood: Vec<String>,
     /// What is wrong, a sentence each.
     pub problems: Vec<String>,
+}
+
+impl Diagnosis {
+    fn of_problem(error: &StoreError) -> Self {
+        Self { problems: vec![error.to_string()], ..Self::default() }
+    }
 }
 
 /// A file that nobody reads any more.
@@ -55,14 +67,26 @@ pub struct SetAside {
 /// # Errors
 /// When the system refuses. What is wrong with the files is in the diagnosis.
 pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreError> {
-    let (files, path) = (data_dir.files(), data_dir.path(name));
-    let mut diagnosis = Diagnosis { set_aside: aside_files(&**files, &path)?, ..Diagnosis::default() };
+    let files = data_dir.files();
+    let path = match data_dir.path(name) {
+        Ok(path) => path,
+        Err(error @ StoreError::TwoFolders { .. }) => return Ok(Diagnosis::of_problem(&error)),
+        Err(error) => return Err(error),
+    };
+    let mut diagnosis = Diagnosis {
+        set_aside: aside_files(&**files, &path)?,
+        not_understood: snapshot_files::not_understood(&**files, &path)?,
+        ..Diagnosis::default()
+    };
     let mut snapshots = read_snapshots(&**files, &path, &mut diagnosis)?;
     let Some(oldest) = snapshots.pop() else {
         diagnosis.problems.push(format!("{}: no snapshot can be read", path.display()));
         return Ok(diagnosis);
     };
-    let uuid = oldest.uuid;
+    let uuid = match Entry::of_path(&path) {
+        Entry::Map { uuid, .. } => uuid,
+        _ => oldest.uuid,
+    };
     let map = oldest.restore().map_err(|e| StoreError::damaged(&path, e.to_string()))?;
     let mut replay = Replay { map, snapshots, problems: Vec::new() };
     replay.read_journal(files, &path, uuid, &mut diagnosis)?;
@@ -71,7 +95,13 @@ pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreEr
         replay.map = newest.restore().map_err(|e| StoreError::damaged(&path, e.to_string()))?;
     }
     diagnosis.problems.append(&mut replay.problems);
-    (diagnosis.revision, diagnosis.voxels) = (Some(replay.map.revision()), replay.map.voxels(0));
+    let revision = replay.map.revision();
+    (diagnosis.revision, diagnosis.voxels) = (Some(revision), replay.map.voxels(0));
+    if revision < diagnosis.acknowledged && diagnosis.problems.is_empty() {
+        let acknowledged = diagnosis.acknowledged;
+        let missing = StoreError::RevisionsMissing { folder: path, last: revision, acknowledged };
+        diagnosis.problems.push(missing.to_string());
+    }
     Ok(diagnosis)
 }
 
@@ -90,17 +120,30 @@ fn read_snapshots(
     diagnosis: &mut Diagnosis,
 ) -> Result<Vec<Snapshot>, StoreError> {
     let mut snapshots: Vec<Snapshot> = Vec::new();
+    let expected = match Entry::of_path(path) {
+        Entry::Map { uuid, .. } => Some(uuid),
+        _ => None,
+    };
     for revision in snapshot_files::snapshot_revisions(files, path)?.into_iter().rev() {
         let file = path.join(snapshot_files::snapshot_name(revision));
-        match Snapshot::read(files, &file) {
+        let bytes = files.read(&file).map_err(StoreError::io(&file))?;
+        match Snapshot::decode(&bytes).map_err(|reason| StoreError::damaged(&file, reason)) {
             Ok(snapshot) if snapshot.contents.revision != revision => {
                 let found = snapshot.contents.revision;
                 diagnosis.problems.push(format!("{}: it holds revision {found}", file.display()));
             }
-            Ok(snapshot) if snapshots.first().is_some_and(|newest| newest.uuid != snapshot.uuid) => {
+            Ok(snapshot)
+                if expected
+                    .or(snapshots.first().map(|newest| newest.uuid))
+                    .is_some_and(|it| it != snapshot.uuid) =>
+            {
                 diagnosis.problems.push(format!("{}: another map's, by its uuid", file.display()));
             }
-            Ok(snapshot) => snapshots.push(snapshot),
+            Ok(snapshot) => {
+                let head = snapshot::head_of(&bytes).unwrap_or_default().max(revision);
+                diagnosis.acknowledged = diagnosis.acknowledged.max(head);
+                snapshots.push(snapshot);
+            }
             Err(error @ StoreError::Damaged { .. }) => diagnosis.problems.push(error.to_string()),
             Err(error) => return Err(error),
         }
@@ -132,7 +175,8 @@ impl Replay {
             if Some(first) != expected {
                 self.gap(expected.unwrap_or_default(), first);
             }
-            let inspected = journal::inspect(files, path.to_owned(), uuid, first, |revision, change| {
+            let folder = FolderPath::new(path.to_owned());
+            let inspected = journal::inspect(files, &folder, uuid, first, |revision, change| {
                 self.make(revision, &change)
             })?;
             let Inspected { next, torn_bytes, damage, .. } = inspected;
@@ -192,9 +236,25 @@ pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>,
             Err(StoreError::JournalDamaged { path, offset, .. }) => {
                 aside.extend(set_aside_from(&**data_dir.files(), &path, offset)?);
             }
+            Err(StoreError::Foreign { path, .. }) => {
+                aside.push(move_aside(&**data_dir.files(), &path)?);
+            }
+            Err(StoreError::RevisionsMissing { .. }) => {
+                let revision = data_dir.go_on_without(name)?;
+                return Ok(Some(SetAside { files: aside, revision }));
+            }
             Err(error) => return Err(error),
         }
     }
+}
+
+/// Gives a file a name under which nobody looks for it.
+fn move_aside(files: &dyn FileSystem, path: &Path) -> Result<PathBuf, StoreError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let to = path.with_file_name(format!("{name}.damaged"));
+    let renamed = files.rename(path, &to).and_then(|()| files.sync(folder::folder_of(path)));
+    renamed.map_err(StoreError::io(path))?;
+    Ok(to)
 }
 
 /// Moves a segment from `offset` on, and all later ones, to names under which nobody looks for them.

@@ -2,6 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use uuid::Uuid;
+
+use crate::map::{MapName, REVISION_MAX};
+
 /// Why a map could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
@@ -41,6 +45,58 @@ pub enum StoreError {
         /// The first revision that is lost.
         revision: u64,
     },
+    /// The journal ends before a revision that had been acknowledged: files are missing.
+    #[error(
+        "{}: the journal ends at revision {last}, and revision {acknowledged} had been acknowledged: put the missing \
+         files back; {} goes on without them",
+        .folder.display(), set_aside_command(&.folder.join("journal"))
+    )]
+    RevisionsMissing {
+        /// The map's folder.
+        folder: PathBuf,
+        /// The last revision that is there.
+        last: u64,
+        /// The last that is known to have been acknowledged.
+        acknowledged: u64,
+    },
+    /// A file in a map's folder is another map's.
+    #[error(
+        "{}: it is another map's: its uuid is {found}, that of the map is {expected}; move it away, or {} does",
+        .path.display(), set_aside_command(.path)
+    )]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Whose it is.
+        found: Uuid,
+        /// Whose folder it is in.
+        expected: Uuid,
+    },
+    /// Two folders claim to be one map.
+    #[error(
+        "map {name} has two folders, {} and {}: find out which one it is (`mrol doctor`), and move the other away",
+        .first.display(), .second.display()
+    )]
+    TwoFolders {
+        /// The map.
+        name: MapName,
+        /// One of them.
+        first: PathBuf,
+        /// Another.
+        second: PathBuf,
+    },
+    /// A map's folder is not there.
+    #[error("map {0} has no folder")]
+    NoFolder(MapName),
+    /// The map has no revision left for another change.
+    #[error("the map is at revision {0}, and {REVISION_MAX} is the last that there is: make another map")]
+    RevisionsUsedUp(u64),
+    /// The map was deleted, and its folder with it.
+    #[error("the map was deleted")]
+    Gone,
+    /// Nobody wants the maps any more.
+    #[error("the opening of the maps was ended")]
+    Cancelled,
     /// A snapshot would take what the journal needs.
     #[error(
         "a snapshot of {bytes} bytes does not fit on the disk, at most {bytes_max} leave enough for the journal"
@@ -74,9 +130,10 @@ impl StoreError {
     }
 }
 
-/// What helps against a damaged file `DATA_DIR/maps/MAP/FILE`.
+/// What helps against a damaged file `DATA_DIR/maps/MAP.UUID/FILE`.
 fn set_aside_command(file: &Path) -> String {
-    let map = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+    let folder = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+    let map = folder.split('.').next().unwrap_or_default();
     let data_dir = file.ancestors().nth(3).unwrap_or(file);
     format!("`mrol doctor {} --set-aside {map}`", data_dir.display())
 }

@@ -1,9 +1,11 @@
 //! What the store asks of a file system, and no more: tests put one in its place that fails on demand.
 
 use std::fmt::Debug;
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::io::{self, Read, Write};
 use std::path::Path;
+
+use super::StoreMode;
 
 /// The operations that maps are kept with.
 ///
@@ -27,6 +29,16 @@ pub trait FileSystem: Debug + Send + Sync {
     /// # Errors
     /// See above.
     fn read(&self, file: &Path) -> io::Result<Vec<u8>>;
+
+    /// The first bytes of a file: so many, or all where there are fewer.
+    ///
+    /// # Errors
+    /// See above.
+    fn read_start(&self, file: &Path, bytes: usize) -> io::Result<Vec<u8>> {
+        let mut start = self.read(file)?;
+        start.truncate(bytes);
+        Ok(start)
+    }
 
     /// A file's size in bytes.
     ///
@@ -89,11 +101,37 @@ pub trait Appending: Debug + Send {
 
 /// The file system of this machine.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Disk;
+pub struct Disk {
+    mode: Option<StoreMode>,
+}
+
+impl Disk {
+    /// The same, where files and folders are made with the permissions `mode`, not with those of the process.
+    pub fn of_mode(mode: StoreMode) -> Self {
+        Self { mode: Some(mode) }
+    }
+
+    /// How a file is made that is to be written.
+    pub(super) fn creation(self) -> OpenOptions {
+        let mut options = File::options();
+        options.write(true).create(true).truncate(true);
+        #[cfg(unix)]
+        if let Some(mode) = self.mode {
+            std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode.of_files());
+        }
+        options
+    }
+}
 
 impl FileSystem for Disk {
     fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        fs::create_dir_all(folder)
+        let mut builder = DirBuilder::new();
+        builder.recursive(true);
+        #[cfg(unix)]
+        if let Some(mode) = self.mode {
+            std::os::unix::fs::DirBuilderExt::mode(&mut builder, mode.of_folders());
+        }
+        builder.create(folder)
     }
 
     fn list(&self, folder: &Path) -> io::Result<Vec<String>> {
@@ -107,12 +145,18 @@ impl FileSystem for Disk {
         fs::read(file)
     }
 
+    fn read_start(&self, file: &Path, bytes: usize) -> io::Result<Vec<u8>> {
+        let mut start = Vec::new();
+        File::open(file)?.take(bytes as u64).read_to_end(&mut start)?;
+        Ok(start)
+    }
+
     fn size(&self, file: &Path) -> io::Result<u64> {
         Ok(fs::metadata(file)?.len())
     }
 
     fn create(&self, file: &Path) -> io::Result<Box<dyn Appending>> {
-        Ok(Box::new(DiskFile(File::create(file)?)))
+        Ok(Box::new(DiskFile(self.creation().open(file)?)))
     }
 
     fn truncate(&self, file: &Path, bytes: u64) -> io::Result<()> {

@@ -1,11 +1,36 @@
 //! Folders and files that are whole or not there.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::{FileSystem, StoreError};
+use crate::sync::{Mutex, Rank};
+
+/// Where a folder is, for all who use it: a map may get another name while it is open.
+#[derive(Debug, Clone)]
+pub(super) struct FolderPath(Arc<Mutex<PathBuf>>);
+
+impl FolderPath {
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self(Arc::new(Mutex::new(Rank::Brief, path)))
+    }
+
+    pub(super) fn get(&self) -> PathBuf {
+        self.0.lock().clone()
+    }
+
+    pub(super) fn set(&self, path: PathBuf) {
+        *self.0.lock() = path;
+    }
+
+    /// The file of that name.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.0.lock().join(name)
+    }
+}
 
 /// What the name of something unfinished begins with: swept away when it is found.
-const UNFINISHED: &str = ".unfinished-";
+pub(super) const UNFINISHED: &str = ".unfinished-";
 
 /// Where a path is made before it gets its name.
 pub(super) fn unfinished(path: &Path) -> PathBuf {

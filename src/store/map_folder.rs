@@ -1,199 +1,115 @@
 //! The folder of one map: snapshots, and the journal that goes on from them.
 //!
 //! ```text
-//! office/snapshot-00000000000000000000.mrol      at that revision
-//! office/snapshot-00000000000000004711.mrol
-//! office/journal-00000000000000000001.log        from that revision on
-//! office/journal-00000000000000004712.log
+//! office.UUID/snapshot-00000000000000000000.mrol      at that revision
+//! office.UUID/snapshot-00000000000000004711.mrol
+//! office.UUID/journal-00000000000000000001.log        from that revision on
+//! office.UUID/journal-00000000000000004712.log
 //! ```
+//!
+//! Two locks are held while files are written, that of the snapshots and that of the journal, and only who writes waits
+//! for them. What readers ask is in [`Facts`].
+
+mod facts;
+mod opening;
+
+pub use facts::FolderUse;
+pub use opening::OpenedMap;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use parking_lot::Mutex;
 use uuid::Uuid;
 
-use super::journal::{Journal, JournalUse, Known, Record, Recovered, SegmentedJournal};
-use super::snapshot_files::{forget_damaged, newest_good, set_aside, snapshot_name, snapshot_revisions};
-use super::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, retention};
-use crate::map::{MultiResolutionMap, Observations, WithdrawnScan};
+use super::folder::FolderPath;
+use super::journal::{Journal, Place, Record, SegmentedJournal};
+use super::retention::UndoReach;
+use super::snapshot_files::{Sizes, forget_damaged, snapshot_name};
+use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
+use crate::map::{Observations, WithdrawnScan};
+use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
+use facts::{Facts, Pin};
 
 /// What keeps a map across crashes.
 #[derive(Debug)]
 pub struct MapFolder {
     files: Arc<dyn FileSystem>,
-    path: PathBuf,
+    uuid: Uuid,
+    path: FolderPath,
     settings: StoreSettings,
+    /// Where the journal's segments are.
+    place: Place,
     journal: Mutex<SegmentedJournal>,
-    /// Revisions of those on disk, ascending; held while one is written.
-    snapshots: Mutex<Vec<u64>>,
-    saved: Mutex<Saved>,
-    /// Bytes of the folder when they were last counted, less those appended to the journal until then; wrapping.
-    counted_bytes: AtomicU64,
+    /// Held while a snapshot is written, or old ones are removed.
+    snapshots: Mutex<()>,
+    /// It was taken away. Changed while both locks are held.
+    is_gone: AtomicBool,
+    facts: Facts,
 }
 
-/// How long after one that could not be written the next snapshot is due at the earliest: to make one takes a while of
-/// a thread, and a disk that is full does not empty at once.
-const AGAIN_AFTER: Duration = Duration::from_secs(5);
-
-/// How much journal there is behind the newest snapshot, and since when.
-#[derive(Debug, Clone, Copy)]
-struct Saved {
-    at: Instant,
-    /// Bytes of journal that were found behind it at the start.
-    found: u64,
-    /// Bytes that had been appended when it was written.
-    appended: u64,
-    /// When the next one could not be written.
-    failed: Option<Instant>,
-    /// How many could not be, since the start.
-    failures: u64,
-}
-
-/// A map as it was found.
+/// Who held which voxels, as the journal tells. What it was read from stays there until this is dropped.
 #[derive(Debug)]
-pub struct OpenedMap {
-    /// Where it is kept.
-    pub folder: MapFolder,
-    /// Of this incarnation of the map.
-    pub uuid: Uuid,
-    /// At the revision of the last durable change.
-    pub map: MultiResolutionMap,
-    /// The snapshot it was read from.
-    pub snapshot: u64,
-    /// What was found behind it.
-    pub recovered: Recovered,
-    /// Newer snapshots that could not be read, and were set aside.
-    pub damaged: Vec<String>,
-}
-
-/// How much is kept of a map, and how.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FolderUse {
-    /// The last revision that is known to be durable.
-    pub durable: u64,
-    /// The newest snapshot's revision.
-    pub snapshot: u64,
-    /// Scans of this revision and later can be undone.
-    pub undo_from: u64,
-    /// What the journal has done.
-    pub journal: JournalUse,
-    /// Time since the newest snapshot was written, or since the folder was opened where that was later.
-    pub snapshot_age: Duration,
-    /// Snapshots that could not be written since the folder was opened.
-    pub snapshot_failures: u64,
-    /// Bytes of the files in the folder.
-    pub disk_bytes: u64,
+pub struct Observed {
+    /// Up to `revision`.
+    pub observations: Observations,
+    /// The head of the journal when it was read.
+    pub revision: u64,
+    _pin: Pin,
 }
 
 impl MapFolder {
-    /// Makes a map's folder with its first snapshot; it is there as a whole or not at all.
-    pub(super) fn create(
-        files: &Arc<dyn FileSystem>,
-        path: &Path,
-        first: &Snapshot,
-    ) -> Result<(), StoreError> {
-        let aside = folder::unfinished(path);
-        files.create_folder(&aside).map_err(StoreError::io(&aside))?;
-        first.write(&**files, &aside.join(snapshot_name(first.contents.revision)))?;
-        let above = folder::folder_of(path);
-        files.rename(&aside, path).and_then(|()| files.sync(above)).map_err(StoreError::io(path))
-    }
-
-    /// A folder whose one snapshot was just written.
-    pub(super) fn new(
-        files: Arc<dyn FileSystem>,
-        path: PathBuf,
-        settings: StoreSettings,
-        first: &Snapshot,
-    ) -> Result<Self, StoreError> {
-        let revision = first.contents.revision;
-        let known = Known { snapshot: revision, durable: revision };
-        let segment_bytes_max = settings.segment_bytes_max;
-        let nothing = |_, _| Ok(());
-        let (journal, _) = SegmentedJournal::recover(
-            Arc::clone(&files),
-            &path,
-            first.uuid,
-            known,
-            segment_bytes_max,
-            &OpeningProgress::default(),
-            nothing,
-        )?;
-        Ok(Self::with(files, path, settings, journal, vec![revision], 0))
-    }
-
-    /// Opens a map: the newest good snapshot, and every change of the journal after it.
-    ///
-    /// # Errors
-    /// When the system refuses, no snapshot is good, or the journal misses something that may have been
-    /// acknowledged: the error names file, offset and what helps.
-    pub(super) fn open(
-        files: Arc<dyn FileSystem>,
-        path: PathBuf,
-        settings: StoreSettings,
-        progress: &OpeningProgress,
-    ) -> Result<OpenedMap, StoreError> {
-        folder::sweep(&*files, &path)?;
-        let mut revisions = snapshot_revisions(&*files, &path)?;
-        let durable = revisions.last().copied().unwrap_or_default();
-        let (snapshot, damaged) = newest_good(&*files, &path, &mut revisions, progress)?;
-        let (uuid, revision) = (snapshot.uuid, snapshot.contents.revision);
-        let map_settings = snapshot.settings;
-        let map = MultiResolutionMap::restore(map_settings, snapshot.contents)
-            .map_err(|e| StoreError::damaged(&path, e.to_string()))?;
-        let replay = |revision, change| {
-            let committed = map.committer().apply(&change);
-            let made = format!("replayed, it makes revision {}", committed.revision);
-            (committed.revision == revision).then_some(()).ok_or(made)
-        };
-        let known = Known { snapshot: revision, durable };
-        let (journal, recovered) = SegmentedJournal::recover(
-            Arc::clone(&files),
-            &path,
-            uuid,
-            known,
-            settings.segment_bytes_max,
-            progress,
-            replay,
-        )?;
-        set_aside(&*files, &path, &damaged)?;
-        let folder = Self::with(files, path, settings, journal, revisions, recovered.bytes);
-        let damaged = damaged.into_iter().map(|(_, error)| error.to_string()).collect();
-        Ok(OpenedMap { folder, uuid, map, snapshot: revision, recovered, damaged })
-    }
-
     fn with(
         files: Arc<dyn FileSystem>,
-        path: PathBuf,
+        uuid: Uuid,
+        path: FolderPath,
         settings: StoreSettings,
         journal: SegmentedJournal,
         snapshots: Vec<u64>,
         found: u64,
     ) -> Self {
-        let (journal, snapshots) = (Mutex::new(journal), Mutex::new(snapshots));
-        let saved = Mutex::new(Saved { at: Instant::now(), found, appended: 0, failed: None, failures: 0 });
-        let counted_bytes = AtomicU64::new(folder::bytes_in(&*files, &path));
-        Self { files, path, settings, journal, snapshots, saved, counted_bytes }
+        let folder = Self {
+            files,
+            uuid,
+            path,
+            settings,
+            place: journal.place().clone(),
+            facts: Facts::new(&journal, snapshots, found),
+            journal: Mutex::new(Rank::Journal, journal),
+            snapshots: Mutex::new(Rank::Snapshots, ()),
+            is_gone: AtomicBool::default(),
+        };
+        folder.count_bytes();
+        folder
     }
 
     /// Appends records; see [`Journal::append`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; `Gone` where the map was deleted.
     pub fn append(&self, records: &[&Record]) -> Result<u64, StoreError> {
-        self.journal.lock().append(records)
+        self.in_journal(|journal| journal.append(records))
     }
 
     /// Makes all that was appended durable; see [`Journal::sync`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; `Gone` where the map was deleted.
     pub fn sync(&self) -> Result<(), StoreError> {
-        self.journal.lock().sync()
+        self.in_journal(Journal::sync)
+    }
+
+    /// Does something with the journal, and tells of it.
+    fn in_journal<T>(
+        &self,
+        act: impl FnOnce(&mut SegmentedJournal) -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        let mut journal = self.journal.lock();
+        self.check_there()?;
+        let done = act(&mut journal);
+        self.facts.tell(&journal);
+        done
     }
 
     /// How the map is kept.
@@ -202,76 +118,89 @@ impl MapFolder {
     }
 
     /// Writes a snapshot of at most `bytes_max` beside the others, and forgets snapshots and journal that nobody needs any
-    /// more. Where it cannot, a while passes before the next one is due.
+    /// more. Where it cannot, a while passes before the next one is due. Nothing is written where there is a newer one.
     ///
     /// # Errors
     /// `NoRoom` for a larger one; when the system refuses, or the journal stopped. What was there is then there still.
     pub fn save(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
-        let written = self.write(snapshot, bytes_max).inspect_err(|_| {
-            let mut saved = self.saved.lock();
-            saved.failed = Some(Instant::now());
-            saved.failures += 1;
-        });
+        let written = self.write(snapshot, bytes_max).inspect_err(|_| self.facts.tell_not_saved());
         self.count_bytes();
         written
     }
 
     /// Counts what is in the folder, so that who asks later need not look at the disk.
     fn count_bytes(&self) {
-        let bytes = folder::bytes_in(&*self.files, &self.path);
-        let appended = self.journal.lock().used().bytes;
-        self.counted_bytes.store(bytes.wrapping_sub(appended), Ordering::Relaxed);
+        self.facts.tell_bytes(folder::bytes_in(&*self.files, &self.path.get()));
     }
 
     fn write(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
-        let mut snapshots = self.snapshots.lock();
         let revision = snapshot.contents.revision;
-        let path = self.path.join(snapshot_name(revision));
-        let file = snapshot.encode().map_err(StoreError::io(&path))?;
+        // Before any lock: it takes seconds of a large map.
+        let mut file = snapshot.encode().map_err(StoreError::io(self.path.get()))?;
         if file.len() as u64 > bytes_max {
             return Err(StoreError::NoRoom { bytes: file.len() as u64, bytes_max });
         }
-        // What the snapshot holds is durable in the journal before; what comes next begins a segment.
-        self.journal.lock().end_segment()?;
-        folder::replace(&*self.files, &path, &file)?;
-        if snapshots.last() != Some(&revision) {
-            snapshots.push(revision);
+        let _writing = self.snapshots.lock();
+        self.check_there()?;
+        if snapshot.uuid != self.uuid {
+            let (found, expected) = (snapshot.uuid, self.uuid);
+            return Err(StoreError::Foreign { path: self.path.get(), found, expected });
         }
-        let appended = self.journal.lock().used().bytes;
-        let mut saved = self.saved.lock();
-        *saved = Saved { at: Instant::now(), found: 0, appended, failed: None, failures: saved.failures };
-        drop(saved);
-        self.forget(&mut snapshots, snapshot.contents.trajectory.withdrawn())
+        if revision < self.facts.newest_snapshot() {
+            return Ok(());
+        }
+        // What the snapshot holds is durable in the journal before; what comes next begins a segment.
+        let (head, appended) = self.in_journal(|journal| {
+            journal.end_segment()?;
+            Ok((journal.head(), journal.used().bytes))
+        })?;
+        // What was acknowledged while it was encoded is in the journal alone: who opens the map is to miss it.
+        snapshot::set_head(&mut file, head.max(revision));
+        folder::replace(&*self.files, &self.path.file(&snapshot_name(revision)), &file)?;
+        self.facts.tell_saved(revision, appended);
+        self.forget(self.undo_reach(), snapshot.contents.trajectory.withdrawn())
     }
 
     /// True when there is much journal since the last snapshot, or that is old; not just after one that failed.
     pub fn snapshot_is_due(&self) -> bool {
-        let Saved { at, found, appended, failed, .. } = *self.saved.lock();
-        if failed.is_some_and(|failed| failed.elapsed() < AGAIN_AFTER) {
-            return false;
-        }
-        let bytes = found + self.journal.lock().used().bytes - appended;
-        bytes >= self.settings.snapshot_journal_bytes || at.elapsed() >= self.settings.snapshot_interval
+        self.facts.snapshot_is_due(&self.settings)
     }
 
-    fn forget(&self, snapshots: &mut Vec<u64>, withdrawn: &[WithdrawnScan]) -> Result<(), StoreError> {
-        let head = snapshots.last().copied().unwrap_or_default();
-        let kept = retention::kept(snapshots, head, self.settings.undo_revisions, withdrawn);
+    /// Forgets what is kept for undo alone, for want of room on the disk; true where there was something.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn give_up_undo(&self) -> Result<bool, StoreError> {
+        let before = self.used().undo_from;
+        let _writing = self.snapshots.lock();
+        self.check_there()?;
+        self.forget(UndoReach { bytes_max: 0, ..self.undo_reach() }, &[])?;
+        Ok(self.used().undo_from != before)
+    }
+
+    fn undo_reach(&self) -> UndoReach {
+        UndoReach { revisions: self.settings.undo_revisions, bytes_max: self.settings.undo_bytes_max }
+    }
+
+    /// Removes the snapshots and the journal that nobody needs; the lock of the snapshots is held.
+    fn forget(&self, reach: UndoReach, withdrawn: &[WithdrawnScan]) -> Result<(), StoreError> {
+        let path = self.path.get();
+        let sizes = Sizes::of(&*self.files, &path)?;
+        let kept = self.facts.forget(reach, withdrawn, &sizes);
         // The journal first: a snapshot without the journal behind it would be a gap, one more is not.
         if let Some(base) = kept.first() {
-            self.journal.lock().truncate_before(base + 1)?;
-            forget_damaged(&*self.files, &self.path, *base)?;
+            self.in_journal(|journal| journal.truncate_before(base + 1))?;
+            forget_damaged(&*self.files, &path, *base)?;
         }
-        for &revision in snapshots.iter().filter(|revision| !kept.contains(revision)) {
-            let path = self.path.join(snapshot_name(revision));
+        for revision in sizes.snapshots.keys().filter(|revision| !kept.contains(revision)) {
+            let path = path.join(snapshot_name(*revision));
             self.files.remove(&path).map_err(StoreError::io(&path))?;
         }
-        *snapshots = kept;
-        self.files.sync(&self.path).map_err(StoreError::io(&self.path))
+        self.files.sync(&path).map_err(StoreError::io(&path))
     }
 
-    /// Who holds which voxels, up to the present head of the journal, and that head; none where the journal does
-    /// not reach back to the first of `scans`.
+    /// Who holds which voxels, up to the present head of the journal; none where the journal does not reach back to the
+    /// first of `scans`.
     ///
     /// # Errors
     /// When a snapshot or the journal cannot be read.
@@ -280,66 +209,96 @@ impl MapFolder {
         scans: &[u64],
         withdrawn: &[WithdrawnScan],
         stop: StopSignal<'_>,
-    ) -> Result<Option<(Observations, u64)>, StoreError> {
-        let Some(base) = self.base_of(scans, withdrawn) else {
+    ) -> Result<Option<Observed>, StoreError> {
+        let Some(pin) = self.facts.pin_base_of(scans, withdrawn) else {
             return Ok(None);
         };
-        let path = self.path.join(snapshot_name(base));
-        let base_contents = Snapshot::read(&*self.files, &path)?.contents;
-        let mut observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
-        let head = self.observe(&mut observations, base, stop)?;
-        Ok(Some((observations, head)))
+        let base = pin.snapshot;
+        let base_contents = Snapshot::read(&*self.files, &self.path.file(&snapshot_name(base)))?.contents;
+        let observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
+        let mut observed = Observed { observations, revision: base, _pin: pin };
+        self.observe(&mut observed, stop)?;
+        Ok(Some(observed))
     }
 
-    /// Shows `observations` the changes after revision `seen`, while somebody wants to know; the head of the journal.
+    /// Shows `observed` the changes that it has not seen, while somebody wants to know.
     ///
     /// # Errors
     /// When the journal cannot be read.
-    pub fn observe(
-        &self,
-        observations: &mut Observations,
-        seen: u64,
-        stop: StopSignal<'_>,
-    ) -> Result<u64, StoreError> {
-        let (changes, head) = {
-            let journal = self.journal.lock();
-            (journal.read_from(seen + 1), journal.head())
-        };
+    pub fn observe(&self, observed: &mut Observed, stop: StopSignal<'_>) -> Result<(), StoreError> {
+        let (segments, head) = self.facts.journal();
+        let changes = self.place.read_from(observed.revision + 1, &segments, head);
         for change in changes.take_while(|_| !stop.is_stopped()) {
             let (revision, change) = change?;
-            observations.observe(revision, &change);
+            observed.observations.observe(revision, &change);
         }
-        Ok(head)
+        observed.revision = head;
+        Ok(())
     }
 
-    /// The newest snapshot that undo can begin with.
-    fn base_of(&self, scans: &[u64], withdrawn: &[WithdrawnScan]) -> Option<u64> {
-        let first = *scans.iter().min()?;
-        let snapshots = self.snapshots.lock();
-        let tail = self.journal.lock().tail()?;
-        let fits = |&&snapshot: &&u64| {
-            snapshot < first && tail <= snapshot + 1 && retention::is_base(snapshot, withdrawn)
-        };
-        snapshots.iter().rfind(fits).copied()
-    }
-
-    /// How much is kept, and how.
+    /// How much is kept, and how. Waits for no disk.
     pub fn used(&self) -> FolderUse {
-        let (oldest, newest) = {
-            let snapshots = self.snapshots.lock();
-            (snapshots.first().copied().unwrap_or_default(), snapshots.last().copied().unwrap_or_default())
-        };
-        let Saved { at, failures, .. } = *self.saved.lock();
-        let journal = self.journal.lock();
-        let undo_from = journal.tail().map_or(journal.head() + 1, |tail| tail.max(oldest + 1));
-        FolderUse {
-            durable: journal.durable(),
-            snapshot: newest,
-            undo_from,
-            journal: journal.used(),
-            snapshot_age: at.elapsed(),
-            snapshot_failures: failures,
-            disk_bytes: self.counted_bytes.load(Ordering::Relaxed).wrapping_add(journal.used().bytes),
+        self.facts.used()
+    }
+
+    /// True where the map was deleted, and this folder with it.
+    pub fn is_gone(&self) -> bool {
+        self.is_gone.load(Ordering::Acquire)
+    }
+
+    /// # Errors
+    /// Where it is gone; asked while one of the locks is held.
+    fn check_there(&self) -> Result<(), StoreError> {
+        if self.is_gone() { Err(StoreError::Gone) } else { Ok(()) }
+    }
+
+    pub(super) fn uuid(&self) -> Uuid {
+        self.uuid
+    }
+
+    pub(super) fn path(&self) -> PathBuf {
+        self.path.get()
+    }
+
+    /// Gives the folder another name, for good. It may be used meanwhile, and waits.
+    ///
+    /// # Errors
+    /// When the system refuses; it has then the name of before, as far as anybody can tell.
+    pub(super) fn move_to(&self, to: &Path) -> Result<(), StoreError> {
+        let _writing = self.snapshots.lock();
+        let _appending = self.journal.lock();
+        let from = self.path.get();
+        self.rename(&from, to)?;
+        if let Err(error) = self.files.sync(folder::folder_of(to)) {
+            match self.rename(to, &from) {
+                Ok(()) => return Err(StoreError::io(&from)(error)),
+                Err(_) => self.path.set(to.to_owned()),
+            }
+            return Err(StoreError::io(&from)(error));
+        }
+        self.path.set(to.to_owned());
+        Ok(())
+    }
+
+    /// Gives the folder a name under which nobody looks for it; nothing is written there any more. Not durable before
+    /// the folder above is synced.
+    ///
+    /// # Errors
+    /// When the system refuses; it is then as it was.
+    pub(super) fn take_away(&self, to: &Path) -> Result<(), StoreError> {
+        let _writing = self.snapshots.lock();
+        let _appending = self.journal.lock();
+        self.check_there()?;
+        self.rename(&self.path.get(), to)?;
+        self.is_gone.store(true, Ordering::Release);
+        Ok(())
+    }
+
+    /// Renames, and looks what became of it where the system says that it failed.
+    fn rename(&self, from: &Path, to: &Path) -> Result<(), StoreError> {
+        match self.files.rename(from, to) {
+            Err(_) if self.files.list(from).is_err() && self.files.list(to).is_ok() => Ok(()),
+            renamed => renamed.map_err(StoreError::io(from)),
         }
     }
 }

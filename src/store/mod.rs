@@ -17,6 +17,7 @@
 //!
 //! Byte layouts: `snapshot.rs`, `journal/segment.rs`, `journal/frame.rs`, `proto/mrol/store/v1`.
 
+mod checked_files;
 mod codec;
 mod data_dir;
 pub mod doctor;
@@ -25,21 +26,25 @@ mod file_system;
 mod folder;
 mod journal;
 mod map_folder;
+mod mode;
 mod pb;
 mod progress;
+mod replacement;
 mod retention;
 mod settings;
 mod snapshot;
 mod snapshot_files;
 
-pub use data_dir::DataDir;
+pub use data_dir::{DataDir, Stock};
 pub use error::StoreError;
 pub use file_system::{Appending, Disk, FileSystem};
 pub use journal::{
     Changes, Cut, JOURNAL_VERSION, Journal, JournalUse, RECORD_BYTES_MAX, Record, Recovered, Revised,
     SegmentedJournal,
 };
-pub use map_folder::{FolderUse, MapFolder, OpenedMap};
+pub use map_folder::{FolderUse, MapFolder, Observed, OpenedMap};
+pub use mode::{StoreMode, StoreModeError};
 pub use progress::{Opened, OpeningProgress};
 pub use settings::{Durability, DurabilityError, StoreSettings};
+pub(crate) use snapshot::body_bytes;
 pub use snapshot::{FORMAT_VERSION, MapFileError, MapFileLimits, Snapshot};

@@ -1,6 +1,8 @@
 //! How far the opening of the maps has come.
 
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+use super::StoreError;
 
 /// Counted by who opens maps, read by who asks whether the server is ready.
 #[derive(Debug, Default)]
@@ -9,6 +11,7 @@ pub struct OpeningProgress {
     bytes_read: AtomicU64,
     maps: AtomicU64,
     maps_open: AtomicU64,
+    cancelled: AtomicBool,
 }
 
 /// How far it has come.
@@ -33,6 +36,17 @@ impl OpeningProgress {
             maps: self.maps.load(Relaxed),
             maps_open: self.maps_open.load(Relaxed),
         }
+    }
+
+    /// Ends the opening early: nobody wants the maps any more.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Relaxed);
+    }
+
+    /// # Errors
+    /// Where nobody wants the maps any more.
+    pub(super) fn check_wanted(&self) -> Result<(), StoreError> {
+        if self.cancelled.load(Relaxed) { Err(StoreError::Cancelled) } else { Ok(()) }
     }
 
     /// One more map of so many bytes will be opened.

@@ -10,7 +10,11 @@
 //!           |<--------------------- journal ----------------------->|
 //! ```
 
+use super::snapshot_files::Sizes;
 use crate::map::WithdrawnScan;
+
+/// The newest snapshot, and one in case that is damaged.
+const FOR_RECOVERY: usize = 2;
 
 /// The revisions of the snapshots to keep, of `snapshots`, ascending. The journal is kept from the first of them on.
 pub(super) fn kept(
@@ -25,11 +29,49 @@ pub(super) fn kept(
         snapshots.iter().filter(|&&snapshot| snapshot <= reach).rfind(can_be_base).or(snapshots.first());
     // So that the base can move on without all snapshots being kept until then.
     let next = snapshots.iter().filter(|&snapshot| Some(snapshot) > base).find(can_be_base);
-    let newest = snapshots.iter().rev().take(2);
+    let newest = snapshots.iter().rev().take(FOR_RECOVERY);
     let mut kept: Vec<u64> = base.into_iter().chain(next).chain(newest).copied().collect();
     kept.sort_unstable();
     kept.dedup();
     kept
+}
+
+/// How far back undo reaches, at most.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct UndoReach {
+    pub(super) revisions: u64,
+    /// Of snapshots and journal that nothing else needs.
+    pub(super) bytes_max: u64,
+}
+
+/// The same within a number of bytes: where what undo alone needs is more, it reaches less far back.
+pub(super) fn kept_within(
+    snapshots: &[u64],
+    head: u64,
+    reach: UndoReach,
+    withdrawn: &[WithdrawnScan],
+    sizes: &Sizes,
+) -> Vec<u64> {
+    let mut candidates = snapshots;
+    loop {
+        let kept = kept(candidates, head, reach.revisions, withdrawn);
+        if candidates.len() <= FOR_RECOVERY || undo_bytes(&kept, sizes) <= reach.bytes_max {
+            return kept;
+        }
+        let after_base = candidates.partition_point(|&snapshot| snapshot <= kept[0]);
+        candidates = &candidates[after_base.min(candidates.len() - FOR_RECOVERY)..];
+    }
+}
+
+/// Bytes of the snapshots `kept`, and of the journal from the first of them on, that recovery does not need.
+fn undo_bytes(kept: &[u64], sizes: &Sizes) -> u64 {
+    let (for_undo, for_recovery) = kept.split_at(kept.len().saturating_sub(FOR_RECOVERY));
+    let (Some(&base), Some(&needed)) = (for_undo.first(), for_recovery.first()) else { return 0 };
+    let snapshots = for_undo.iter().filter_map(|snapshot| sizes.snapshots.get(snapshot)).sum::<u64>();
+    let firsts: Vec<u64> = sizes.segments.keys().copied().collect();
+    let is_for_undo = |pair: &&[u64]| pair[1] > base + 1 && pair[1] <= needed + 1;
+    let segments = firsts.windows(2).filter(is_for_undo).filter_map(|pair| sizes.segments.get(&pair[0]));
+    snapshots + segments.sum::<u64>()
 }
 
 /// True when a snapshot holds nothing of a scan that was withdrawn after it: who holds which of its voxels could
@@ -61,6 +103,24 @@ mod tests {
             let covered = head - snapshots[0];
             assert!(covered >= undo.min(head) && covered <= 2 * undo + 20, "at {head}: {snapshots:?}");
         }
+    }
+
+    #[test]
+    fn undo_reaches_less_far_back_where_it_would_take_too_many_bytes() {
+        let snapshots: Vec<u64> = (0..10).map(|i| i * 10).collect();
+        let sizes = Sizes {
+            snapshots: snapshots.iter().map(|&snapshot| (snapshot, 5)).collect(),
+            segments: snapshots.iter().map(|&snapshot| (snapshot + 1, 100)).collect(),
+        };
+        let kept = |bytes_max| {
+            let reach = UndoReach { revisions: 1000, bytes_max };
+            kept_within(&snapshots, 95, reach, &[], &sizes)
+        };
+        // Two snapshots, and the segments from the first of them to that which recovery begins with.
+        assert_eq!(kept(810), [0, 10, 80, 90]);
+        assert_eq!(kept(809), [10, 20, 80, 90]);
+        assert_eq!(kept(310), [50, 60, 80, 90]);
+        assert_eq!(kept(0), [80, 90]);
     }
 
     #[test]

@@ -4,6 +4,8 @@ use std::fmt::{self, Display};
 use std::str::FromStr;
 use std::time::Duration;
 
+use super::StoreMode;
+
 /// When a change may be acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Durability {
@@ -61,6 +63,11 @@ pub struct StoreSettings {
     /// Revisions behind the newest within which a scan can be undone, at least: so long the journal outlives the
     /// snapshots. 20,000.
     pub undo_revisions: u64,
+    /// Bytes of snapshots and journal that are kept for undo alone: where they are more, undo reaches less far back than
+    /// `undo_revisions`. 4 GiB, which is 20,000 scans of 200 KiB.
+    pub undo_bytes_max: u64,
+    /// Permissions of the data folder.
+    pub mode: StoreMode,
     /// Bytes after which a segment of the journal is ended. 64 MiB.
     pub segment_bytes_max: u64,
 }
@@ -72,6 +79,8 @@ impl Default for StoreSettings {
             snapshot_journal_bytes: 32 << 20,
             snapshot_interval: Duration::from_secs(300),
             undo_revisions: 20_000,
+            undo_bytes_max: 4 << 30,
+            mode: StoreMode::default(),
             segment_bytes_max: 64 << 20,
         }
     }

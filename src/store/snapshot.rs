@@ -3,10 +3,14 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 3
+//!      8  4      format version, u32 little-endian: 4
 //!     12  4      CRC-32C of the version, from version 3 on, and of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
-//!     24  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto
+//!     24  8      from version 4 on: head of the map's journal when the file was written, the last revision that may
+//!                have been acknowledged, u64 little-endian
+//!     32  16     from version 4 on: uuid of the map, as in the body
+//!     48  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto; from 24 on up to
+//!                version 3
 //! ```
 
 mod body;
@@ -28,10 +32,16 @@ use body::Body;
 use limits::Memory;
 
 /// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
-/// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms.
-pub const FORMAT_VERSION: u32 = 3;
+/// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms, up to version 3 a header neither
+/// head nor uuid.
+pub const FORMAT_VERSION: u32 = 4;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
-const HEADER_BYTES: usize = 24;
+pub(super) const HEADER_BYTES: usize = 48;
+/// Up to version 3.
+const OLD_HEADER_BYTES: usize = 24;
+const BODY_BYTES_AT: usize = 16;
+const HEAD_AT: usize = 24;
+const UUID_AT: usize = 32;
 const VERSION: std::ops::Range<usize> = 8..12;
 const CHECKED_FROM: usize = 16;
 const ZSTD_LEVEL: i32 = 1;
@@ -90,9 +100,10 @@ impl Snapshot {
         bytes.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
         bytes.extend_from_slice(&[0; 4]);
         bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&self.contents.revision.to_le_bytes());
+        bytes.extend_from_slice(self.uuid.as_bytes());
         bytes.extend(zstd::bulk::compress(&body, ZSTD_LEVEL)?);
-        let checksum = checksum(&bytes, FORMAT_VERSION);
-        bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
+        set_checksum(&mut bytes);
         Ok(bytes)
     }
 
@@ -124,15 +135,13 @@ impl Snapshot {
         // A frame of less would be of less than its header says, and is refused all the same.
         memory.reserve(length as usize)?;
         let body = zstd::bulk::decompress(compressed, length as usize)
-            .map_err(|e| format!("the body from offset {HEADER_BYTES} on: {e}"))?;
+            .map_err(|e| format!("the body from offset {} on: {e}", bytes.len() - compressed.len()))?;
         Body::of(&body).map_err(|e| format!("the body: {e}"))?.read(limits, &mut memory)
     }
 
     /// The compressed body of a file whose header is right, and the bytes that it says it is of.
     fn checked_frame(bytes: &[u8]) -> Result<(&[u8], u64), Unreadable> {
-        let header = bytes.get(..HEADER_BYTES).ok_or_else(|| {
-            format!("{} bytes are too few for a map file's header of {HEADER_BYTES}", bytes.len())
-        })?;
+        let header = bytes.get(..OLD_HEADER_BYTES).ok_or_else(|| too_short(bytes))?;
         if &header[..8] != MAGIC {
             return Err("not a map file: it does not begin with MROL-MAP".into());
         }
@@ -142,14 +151,15 @@ impl Snapshot {
                 "format version {version}, this build reads 1 to {FORMAT_VERSION}: use a newer one"
             ));
         }
+        let header_bytes = if version < 4 { OLD_HEADER_BYTES } else { HEADER_BYTES };
+        let compressed = bytes.get(header_bytes..).ok_or_else(|| too_short(bytes))?;
         let (stored, computed) = (u32_at(header, 12), checksum(bytes, version));
         if stored != computed {
             return Err(format!(
                 "checksum {computed:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
             ));
         }
-        let length = u64::from(u32_at(header, 16)) | u64::from(u32_at(header, 20)) << 32;
-        Ok((&bytes[HEADER_BYTES..], length))
+        Ok((compressed, u64_at(header, BODY_BYTES_AT)))
     }
 
     fn to_message(&self) -> pb::Snapshot {
@@ -172,6 +182,42 @@ impl Snapshot {
     }
 }
 
+fn too_short(bytes: &[u8]) -> Unreadable {
+    format!("{} bytes are too few for a map file's header", bytes.len())
+}
+
+/// The head of the journal that the map file `bytes`, which is whole, was written beside; none up to version 3.
+pub(super) fn head_of(bytes: &[u8]) -> Option<u64> {
+    let header = bytes.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
+    Some(u64_at(header, HEAD_AT))
+}
+
+/// Writes the head of the journal into the map file `bytes`.
+pub(super) fn set_head(bytes: &mut [u8], head: u64) {
+    bytes[HEAD_AT..UUID_AT].copy_from_slice(&head.to_le_bytes());
+    set_checksum(bytes);
+}
+
+/// The uuid in the header of a map file, which may be damaged; none up to version 3.
+pub(super) fn uuid_in(header: &[u8]) -> Option<Uuid> {
+    let header = header.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
+    Uuid::from_slice(&header[UUID_AT..]).ok()
+}
+
+/// Bytes of the body of the map file `bytes` before compression.
+pub(crate) fn body_bytes(bytes: &[u8]) -> u64 {
+    bytes.get(..OLD_HEADER_BYTES).map_or(0, |header| u64_at(header, BODY_BYTES_AT))
+}
+
+fn set_checksum(bytes: &mut [u8]) {
+    let checksum = checksum(bytes, FORMAT_VERSION);
+    bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
+}
+
+fn u64_at(bytes: &[u8], offset: usize) -> u64 {
+    u64::from(u32_at(bytes, offset)) | u64::from(u32_at(bytes, offset + 4)) << 32
+}
+
 fn checksum(bytes: &[u8], version: u32) -> u32 {
     let of_version = if version < 3 { 0 } else { crc32c::crc32c(&bytes[VERSION]) };
     crc32c::crc32c_append(of_version, &bytes[CHECKED_FROM..])
@@ -185,8 +231,8 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 mod tests {
     use super::*;
     use crate::geometry;
-    use crate::map::{AnsweredRequest, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan};
-    use crate::voxel::{MomentSet, Moments, VoxelKey};
+    use crate::map::{RequestId, RobotName, WithdrawnScan};
+    use crate::voxel::{Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
         let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
@@ -226,6 +272,15 @@ mod tests {
     }
 
     #[test]
+    fn a_snapshot_says_whose_it_is_and_where_the_journal_was() {
+        let mut bytes = snapshot().encode().unwrap();
+        assert_eq!((head_of(&bytes), uuid_in(&bytes)), (Some(42), Some(snapshot().uuid)));
+        set_head(&mut bytes, 45);
+        assert_eq!(head_of(&bytes), Some(45));
+        assert_eq!(Snapshot::decode(&bytes).unwrap(), snapshot());
+    }
+
+    #[test]
     fn a_flipped_bit_anywhere_is_an_error() {
         let bytes = snapshot().encode().unwrap();
         for bit in 0..bytes.len() * 8 {
@@ -246,17 +301,15 @@ mod tests {
     #[test]
     fn a_newer_version_is_refused_by_name() {
         let mut bytes = snapshot().encode().unwrap();
-        bytes[8] = 4;
-        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 4"));
+        bytes[8] = 5;
+        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 5"));
     }
 
     #[test]
     fn a_file_without_moments_is_restored_with_those_of_voxel_centres() {
         let mut message = snapshot().to_message();
         message.moments = None;
-        let body = message.encode_to_vec();
-        let memory = &mut Memory(|_| Ok::<_, Infallible>(()));
-        let old = Body::of(&body).unwrap().read(&MapFileLimits::OWN, memory).unwrap().contents;
+        let old = Snapshot::from_message(message).unwrap().contents;
         assert_eq!(old.moments, MomentSet::of_centers(&old.voxels));
         let points: i64 = old.moments.as_slice().iter().map(|(_, moments)| moments.count()).sum();
         assert_eq!(points, 5000);
@@ -266,45 +319,5 @@ mod tests {
     fn a_restored_map_is_the_map() {
         let map = snapshot().restore().unwrap();
         assert_eq!(Snapshot::of(&map, snapshot().uuid), snapshot());
-    }
-
-    fn within(limits: MapFileLimits, memory: u64) -> MapFileError<u64> {
-        let mut asked = 0;
-        let reserve = |bytes| {
-            asked += bytes;
-            if asked > memory { Err(asked) } else { Ok(()) }
-        };
-        Snapshot::decode_within(&snapshot().encode().unwrap(), &limits, reserve).unwrap_err()
-    }
-
-    #[test]
-    fn limits_are_named_where_a_file_holds_more() {
-        let voxels = MapFileLimits { voxels_max: 4999, ..MapFileLimits::OWN };
-        let refused = within(voxels, u64::MAX).to_string();
-        assert_eq!(refused, "the map file has 5000 voxels, voxels_per_map_max is 4999");
-        let blocks = MapFileLimits { voxels_max: 9, ..MapFileLimits::OWN };
-        assert!(within(blocks, u64::MAX).to_string().contains("blocks of voxels, voxels_per_map_max is 9"));
-        let scans = MapFileLimits { scans_max: 0, ..MapFileLimits::OWN };
-        assert_eq!(within(scans, u64::MAX).to_string(), "the map file has 1 scans, map_file_scans_max is 0");
-        let bytes = MapFileLimits { body_bytes_max: 99, ..MapFileLimits::OWN };
-        assert!(matches!(within(bytes, u64::MAX), MapFileError::Bad(why) if why.contains("at most 99")));
-        let exact = MapFileLimits { voxels_max: 5000, scans_max: 1, ..MapFileLimits::OWN };
-        let file = snapshot().encode().unwrap();
-        assert!(Snapshot::decode_within(&file, &exact, |_| Ok::<_, Infallible>(())).is_ok());
-    }
-
-    #[test]
-    fn memory_is_asked_for_before_each_part() {
-        let mut asked = Vec::new();
-        let reserve = |bytes| {
-            asked.push(bytes);
-            Ok::<_, Infallible>(())
-        };
-        Snapshot::decode_within(&snapshot().encode().unwrap(), &MapFileLimits::OWN, reserve).unwrap();
-        assert_eq!(asked.len(), 4, "body, voxels, moments, trajectory and requests: {asked:?}");
-        let sums = asked.iter().scan(0, |sum, bytes| Some(std::mem::replace(sum, *sum + bytes)));
-        for sum in sums {
-            assert!(matches!(within(MapFileLimits::OWN, sum), MapFileError::NoMemory(_)), "{sum}");
-        }
     }
 }

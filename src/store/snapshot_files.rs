@@ -1,9 +1,14 @@
 //! The snapshots in a map's folder: their names, the newest good one, and damaged ones set aside.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::journal::first_revision;
-use super::{FileSystem, OpeningProgress, Snapshot, StoreError};
+use uuid::Uuid;
+
+use super::folder::UNFINISHED;
+use super::journal::{SEGMENT_HEADER_BYTES, first_revision, owner_of_segment};
+use super::replacement::REPLACES;
+use super::{FileSystem, OpeningProgress, Snapshot, StoreError, snapshot};
 use crate::map::REVISION_MAX;
 
 /// Bytes that opening the map in `folder` has to read: its newest snapshot, and the journal from there on.
@@ -25,11 +30,8 @@ pub(super) fn snapshot_name(revision: u64) -> String {
 const SET_ASIDE: &str = ".damaged";
 
 fn snapshot_revision(name: &str) -> Option<u64> {
-    name.strip_prefix("snapshot-")?
-        .strip_suffix(".mrol")?
-        .parse()
-        .ok()
-        .filter(|&revision| revision <= REVISION_MAX)
+    let revision = name.strip_prefix("snapshot-")?.strip_suffix(".mrol")?.parse().ok()?;
+    (revision <= REVISION_MAX && snapshot_name(revision) == name).then_some(revision)
 }
 
 /// Revisions of the snapshots in `folder`, ascending.
@@ -40,30 +42,118 @@ pub(super) fn snapshot_revisions(files: &dyn FileSystem, folder: &Path) -> Resul
 
 pub(super) type Damaged = (u64, StoreError);
 
+/// The newest good snapshot of a folder.
+pub(super) struct Newest {
+    pub(super) snapshot: Snapshot,
+    /// The head of the journal when it was written, or more.
+    pub(super) head: u64,
+    /// Newer ones that cannot be read.
+    pub(super) damaged: Vec<Damaged>,
+}
+
 /// The newest snapshot that can be read, and the newer ones that cannot, which leave `revisions`.
 pub(super) fn newest_good(
     files: &dyn FileSystem,
     folder: &Path,
     revisions: &mut Vec<u64>,
     progress: &OpeningProgress,
-) -> Result<(Snapshot, Vec<Damaged>), StoreError> {
+) -> Result<Newest, StoreError> {
     let mut damaged = Vec::new();
     while let Some(&revision) = revisions.last() {
+        progress.check_wanted()?;
         let path = folder.join(snapshot_name(revision));
-        progress.read(files.size(&path).map_err(StoreError::io(&path))?);
-        match Snapshot::read(files, &path) {
-            Ok(snapshot) if snapshot.contents.revision == revision => return Ok((snapshot, damaged)),
+        let bytes = files.read(&path).map_err(StoreError::io(&path))?;
+        progress.read(bytes.len() as u64);
+        match Snapshot::decode(&bytes) {
+            Ok(snapshot) if snapshot.contents.revision == revision => {
+                let head = snapshot::head_of(&bytes).unwrap_or_default().max(revision);
+                return Ok(Newest { snapshot, head, damaged });
+            }
             Ok(other) => {
                 let reason = format!("it holds revision {}, not that of its name", other.contents.revision);
                 damaged.push((revision, StoreError::damaged(&path, reason)));
             }
-            Err(error @ StoreError::Damaged { .. }) => damaged.push((revision, error)),
-            Err(error) => return Err(error),
+            Err(reason) => damaged.push((revision, StoreError::damaged(&path, reason))),
         }
         revisions.pop();
     }
     let none = || StoreError::damaged(folder, "no snapshot in it: restore one with `mrol restore`");
     Err(damaged.into_iter().next().map_or_else(none, |(_, error)| error))
+}
+
+/// Checks that every snapshot and every segment in `folder` is the map's, as far as it can be read; what cannot is found
+/// when it is read. The snapshots of the revisions `read` were looked at before.
+///
+/// # Errors
+/// `Foreign` for one that is another map's.
+pub(super) fn check_owner(
+    files: &dyn FileSystem,
+    folder: &Path,
+    uuid: Uuid,
+    read: &[u64],
+) -> Result<(), StoreError> {
+    for name in files.list(folder).map_err(StoreError::io(folder))? {
+        let path = folder.join(&name);
+        let found = if first_revision(&name).is_some() {
+            let header = files.read_start(&path, SEGMENT_HEADER_BYTES).map_err(StoreError::io(&path))?;
+            owner_of_segment(&header)
+        } else if snapshot_revision(&name).is_some_and(|revision| !read.contains(&revision)) {
+            owner_of_snapshot(files, &path, uuid)?
+        } else {
+            None
+        };
+        if let Some(found) = found.filter(|&found| found != uuid) {
+            return Err(StoreError::Foreign { path, found, expected: uuid });
+        }
+    }
+    Ok(())
+}
+
+/// Whose a snapshot is. Where its header does not say that it is that of `expected`, all of it is read: the header may be
+/// damaged.
+fn owner_of_snapshot(
+    files: &dyn FileSystem,
+    path: &Path,
+    expected: Uuid,
+) -> Result<Option<Uuid>, StoreError> {
+    let header = files.read_start(path, snapshot::HEADER_BYTES).map_err(StoreError::io(path))?;
+    if snapshot::uuid_in(&header) == Some(expected) {
+        return Ok(Some(expected));
+    }
+    let bytes = files.read(path).map_err(StoreError::io(path))?;
+    Ok(Snapshot::decode(&bytes).ok().map(|snapshot| snapshot.uuid))
+}
+
+/// The names in `folder` that nobody understands: neither snapshot nor segment, nor set aside.
+pub(super) fn not_understood(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
+    let mut names = files.list(folder).map_err(StoreError::io(folder))?;
+    names.retain(|name| {
+        let is_ours = name.ends_with(SET_ASIDE) || name.starts_with(UNFINISHED) || name == REPLACES;
+        !is_ours && snapshot_revision(name).is_none() && first_revision(name).is_none()
+    });
+    Ok(names)
+}
+
+/// Bytes of the snapshots and segments in a folder, by revision.
+#[derive(Debug, Default)]
+pub(super) struct Sizes {
+    pub(super) snapshots: BTreeMap<u64, u64>,
+    pub(super) segments: BTreeMap<u64, u64>,
+}
+
+impl Sizes {
+    pub(super) fn of(files: &dyn FileSystem, folder: &Path) -> Result<Self, StoreError> {
+        let mut sizes = Self::default();
+        for name in files.list(folder).map_err(StoreError::io(folder))? {
+            let size = || files.size(&folder.join(&name)).map_err(StoreError::io(folder.join(&name)));
+            if let Some(revision) = snapshot_revision(&name) {
+                sizes.snapshots.insert(revision, size()?);
+            } else if let Some(first) = first_revision(&name) {
+                sizes.segments.insert(first, size()?);
+            }
+        }
+        Ok(sizes)
+    }
 }
 
 /// Gives damaged snapshots names under which nobody looks for them.

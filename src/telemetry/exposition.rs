@@ -6,7 +6,7 @@ use std::fmt::{Display, Write};
 
 use super::map_counters::{self, Series};
 use crate::map::{LevelInfo, MapName};
-use crate::service::{MapInfo, MapStorage, PoolUse};
+use crate::service::{MapInfo, MapStorage, PoolUse, UnavailableMap};
 use crate::util::Durations;
 
 /// Appends what was counted by map.
@@ -83,6 +83,15 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
         family.sample(&[("map", &map.name)], map.scans);
     }
     write_storage(text, maps);
+}
+
+/// Appends which maps could not be opened.
+pub(super) fn write_unavailable(text: &mut String, maps: &[UnavailableMap]) {
+    let what = "1 where the map could not be opened, by map";
+    let mut family = Family::begin(text, "mrol_map_unavailable", Kind::Gauge, what);
+    for map in maps {
+        family.sample(&[("map", &map.name)], 1);
+    }
 }
 
 fn write_filters(text: &mut String, maps: &[MapInfo]) {

@@ -38,7 +38,8 @@ impl MeteredService {
 
     /// Everything that is measured in Prometheus' text form, with what is known of `maps`.
     pub fn render(&self, maps: &[MapInfo]) -> String {
-        self.metrics.render(&self.service.pools(), &self.service.map_names(), maps)
+        let (pools, names) = (self.service.pools(), self.service.map_names());
+        self.metrics.render(&pools, &names, maps, &self.service.unavailable_maps())
     }
 
     /// Folds what was measured, and forgets what was measured of maps that are gone; to be called now and then with a

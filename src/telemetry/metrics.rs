@@ -18,7 +18,7 @@ use super::map_counters::{Family, MapCounters};
 use crate::admission::InUse;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName, RobotName};
-use crate::service::{MapInfo, PoolUse, Readings, Shortage};
+use crate::service::{MapInfo, PoolUse, Readings, Shortage, UnavailableMap};
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
 /// beside a disk that hangs as long as that.
@@ -216,13 +216,20 @@ impl Metrics {
         self.0.maps.keep(names);
     }
 
-    /// Everything in Prometheus' text form, with counters of the maps `names` and gauges of `pools` and `maps` as they are
-    /// now: a map that is gone leaves nothing behind.
-    pub fn render(&self, pools: &[PoolUse], names: &[MapName], maps: &[MapInfo]) -> String {
+    /// Everything in Prometheus' text form, with counters of the maps `names`, and with gauges of `pools`, `maps` and those
+    /// that are `unavailable` as they are now: a map that is gone leaves nothing behind.
+    pub fn render(
+        &self,
+        pools: &[PoolUse],
+        names: &[MapName],
+        maps: &[MapInfo],
+        unavailable: &[UnavailableMap],
+    ) -> String {
         let mut text = self.0.recorder.handle().render();
         exposition::write_counters(&mut text, &self.0.maps.of(names));
         exposition::write_pools(&mut text, pools);
         exposition::write_maps(&mut text, maps);
+        exposition::write_unavailable(&mut text, unavailable);
         text
     }
 
@@ -311,7 +318,7 @@ mod tests {
         metrics.points_queried(&map, Lookup::Bloom, 7);
         metrics.points_queried(&map, Lookup::Bloom, 5);
         metrics.scan(&map, &RobotName::new("r").unwrap(), Verdict::LowOverlap);
-        let text = metrics.render(&[], &[map], &[]);
+        let text = metrics.render(&[], &[map], &[], &[]);
         for line in [
             r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
             r#"mrol_request_seconds_bucket{protocol="grpc",operation="QueryPoints",le="0.005"} 1"#,
@@ -338,10 +345,10 @@ mod tests {
             metrics.voxels_removed(map, 1);
         }
         let names = std::slice::from_ref(&kept);
-        let text = metrics.render(&[], names, &[]);
+        let text = metrics.render(&[], names, &[], &[]);
         assert!(text.contains(r#"map="kept""#) && !text.contains("gone"), "{text}");
         metrics.keep_maps(names);
-        assert!(!metrics.render(&[], &[kept, gone], &[]).contains("gone"));
+        assert!(!metrics.render(&[], &[kept, gone], &[], &[]).contains("gone"));
     }
 
     #[test]
@@ -351,7 +358,7 @@ mod tests {
             metrics.key_used("http", &format!("key-{key}"));
         }
         metrics.key_used("http", "key-0");
-        let text = metrics.render(&[], &[], &[]);
+        let text = metrics.render(&[], &[], &[], &[]);
         assert_eq!(text.matches("mrol_key_requests_total{").count(), KEY_SERIES_MAX + 1);
         assert!(text.contains(r#"key="(others)"} 2"#) && text.contains(r#"key="key-0"} 2"#));
     }
@@ -365,7 +372,7 @@ mod tests {
         };
         (0..Metrics::ROBOTS_MAX + 2).for_each(scan);
         scan(0);
-        let text = metrics.render(&[], &[], &[]);
+        let text = metrics.render(&[], &[], &[], &[]);
         assert_eq!(text.matches("mrol_robot_scans_total{").count(), Metrics::ROBOTS_MAX + 1);
         for line in [
             r#"{robot="r0",verdict="accepted"} 2"#,
@@ -381,9 +388,9 @@ mod tests {
         let metrics = Metrics::new().unwrap();
         let open = metrics.connection_opened("http");
         metrics.connection_refused("http");
-        assert!(metrics.render(&[], &[], &[]).contains(r#"mrol_connections_open{listener="http"} 1"#));
+        assert!(metrics.render(&[], &[], &[], &[]).contains(r#"mrol_connections_open{listener="http"} 1"#));
         drop(open);
-        let text = metrics.render(&[], &[], &[]);
+        let text = metrics.render(&[], &[], &[], &[]);
         for line in ["open", "accepted_total", "refused_total"]
             .map(|name| format!("mrol_connections_{name}{{listener=\"http\"}}"))
         {
@@ -396,6 +403,6 @@ mod tests {
     fn two_servers_count_apart() {
         let (one, other) = (Metrics::new().unwrap(), Metrics::new().unwrap());
         one.request("http", "GetMap", "200", Duration::ZERO);
-        assert!(!other.render(&[], &[], &[]).contains("GetMap"));
+        assert!(!other.render(&[], &[], &[], &[]).contains("GetMap"));
     }
 }

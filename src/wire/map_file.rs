@@ -16,13 +16,14 @@ pub fn snapshot_pieces(file: MapFile) -> impl Iterator<Item = pb::SnapshotMapRes
     pieces(bytes).map(move |data| pb::SnapshotMapResponse { data, state: Some(state.into()), file_bytes })
 }
 
-/// The messages that make the map `map` of a file.
+/// The messages that make the map `map` of a file, in the place of the one of that name where `replace` says so.
 pub fn restore_pieces(
     map: &MapName,
     file: Bytes,
+    replace: bool,
 ) -> impl Iterator<Item = pb::RestoreMapRequest> + Send + use<> {
     let map = map.to_string();
-    pieces(file).map(move |data| pb::RestoreMapRequest { map: map.clone(), data })
+    pieces(file).map(move |data| pb::RestoreMapRequest { map: map.clone(), data, replace })
 }
 
 fn pieces(bytes: Bytes) -> impl Iterator<Item = Bytes> + Send {

@@ -6,7 +6,7 @@ use super::types::count_from;
 use super::{InField, pb, required};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
-use crate::service::{MapInfo, MapStorage, ServiceError};
+use crate::service::{MapInfo, MapStorage, ServiceError, UnavailableMap};
 use crate::store::JournalUse;
 use crate::util::Durations;
 
@@ -86,9 +86,13 @@ impl TryFrom<pb::RestoreMapResponse> for MapInfo {
     }
 }
 
-impl From<Vec<MapInfo>> for pb::ListMapsResponse {
-    fn from(maps: Vec<MapInfo>) -> Self {
-        Self { maps: maps.into_iter().map(Into::into).collect() }
+impl From<(Vec<MapInfo>, Vec<UnavailableMap>)> for pb::ListMapsResponse {
+    fn from((maps, unavailable): (Vec<MapInfo>, Vec<UnavailableMap>)) -> Self {
+        let message = |UnavailableMap { name, reason }| pb::UnavailableMap { map: name.to_string(), reason };
+        Self {
+            maps: maps.into_iter().map(Into::into).collect(),
+            unavailable: unavailable.into_iter().map(message).collect(),
+        }
     }
 }
 

@@ -43,7 +43,8 @@ async fn a_request_is_refused_before_its_body() {
 async fn a_map_file_is_refused_with_its_first_piece() {
     let (server, key) = Guarded::start_with(|keys| keys.add("own", Scope::Admin, Some(&["own"]))).await;
     let (send, pieces) = tokio::sync::mpsc::channel(1);
-    let first = pb::RestoreMapRequest { map: "other".into(), data: b"the first of many"[..].into() };
+    let first =
+        pb::RestoreMapRequest { map: "other".into(), data: b"the first of many"[..].into(), replace: false };
     send.send(first).await.unwrap();
     let mut request = Request::new(tokio_stream::wrappers::ReceiverStream::new(pieces));
     request.metadata_mut().insert("authorization", format!("Bearer {}", key.reveal()).parse().unwrap());

@@ -46,7 +46,7 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
         Operation::DeleteMap => pb::DeleteMapRequest { map }.encode_to_vec(),
         Operation::SnapshotMap => pb::SnapshotMapRequest { map }.encode_to_vec(),
         Operation::RestoreMap => {
-            pb::RestoreMapRequest { map, data: b"no map file"[..].into() }.encode_to_vec()
+            pb::RestoreMapRequest { map, data: b"no map file"[..].into(), replace: false }.encode_to_vec()
         }
         Operation::Reflect => {
             let message_request = Some(MessageRequest::ListServices(String::new()));

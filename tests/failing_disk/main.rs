@@ -6,6 +6,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 #![expect(unreachable_pub, reason = "a test has no crate to reach it from")]
 
+mod incarnations;
 mod simulated;
 mod workload;
 
@@ -14,7 +15,7 @@ use std::sync::Arc;
 
 use mrol::store::{FileSystem, OpenedMap, StoreError};
 use simulated::{Fault, SimulatedDisk};
-use workload::{FOLDER, History, open, run};
+use workload::{History, MAPS, open, run};
 
 /// What the map is after a start; it must be one that the history had, at the last acknowledged change or later.
 fn assert_kept(disk: &SimulatedDisk, history: &History, what: &str) -> u64 {
@@ -34,8 +35,9 @@ fn assert_kept(disk: &SimulatedDisk, history: &History, what: &str) -> u64 {
 
 /// The files of a map's folder.
 fn files(disk: &SimulatedDisk) -> Vec<PathBuf> {
-    let folder = Path::new(FOLDER);
-    disk.list(folder).unwrap().into_iter().map(|name| folder.join(name)).collect()
+    let maps = Path::new(MAPS);
+    let folder = maps.join(&disk.list(maps).unwrap()[0]);
+    disk.list(&folder).unwrap().into_iter().map(|name| folder.join(name)).collect()
 }
 
 fn is_snapshot(path: &Path) -> bool {

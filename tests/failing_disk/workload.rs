@@ -18,7 +18,7 @@ use uuid::Uuid;
 
 use super::simulated::SimulatedDisk;
 
-pub const FOLDER: &str = "data/maps/office";
+pub const MAPS: &str = "data/maps";
 const GROUPS: u64 = 18;
 
 /// What was done, and what the map was after each change that was tried.
@@ -43,7 +43,7 @@ fn office() -> MapName {
 /// Opens the map, where there is one.
 pub fn open(disk: &SimulatedDisk) -> Result<Option<OpenedMap>, StoreError> {
     let data_dir = DataDir::on(Arc::new(disk.clone()), Path::new("data"), settings())?;
-    let names = data_dir.take_stock()?;
+    let names = data_dir.take_stock()?.maps;
     names.first().map(|name| data_dir.map(name, &OpeningProgress::default())).transpose()
 }
 

@@ -126,7 +126,7 @@ enum Place {
 
 impl Place {
     fn open(file: &Path) -> Result<Self, CliError> {
-        let snapshot = Snapshot::read(&Disk, file)?;
+        let snapshot = Snapshot::read(&Disk::default(), file)?;
         let state = MapState { revision: snapshot.contents.revision, map_uuid: snapshot.uuid };
         Ok(Self::File(Box::new(snapshot.restore().map_err(CliError::failed)?), state))
     }

@@ -141,7 +141,7 @@ impl Map {
             write_trajectory(path, &run.trajectory).map_err(CliError::writing(path))?;
         }
         if let Some(path) = &self.out {
-            Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk, path)?;
+            Snapshot::of(mapper.map(), Uuid::new_v4()).write(&Disk::default(), path)?;
         }
         Ok(())
     }

@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use tokio::sync::{oneshot, watch};
 
 use super::{
-    Decided, Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Turn, Waiting, record_of,
+    Decided, Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Turn, Waiting, outcome_unknown,
+    record_of, revisions_used_up,
 };
-use crate::map::{Change, Committed, MapName, MultiResolutionMap};
+use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
 use crate::store::{Durability, MapFolder, Record, StoreError};
@@ -119,6 +120,10 @@ impl Worker {
 
     /// Durable, then visible, then acknowledged.
     fn commit_group(&mut self, group: &mut Vec<Pending>) {
+        let left = usize::try_from(REVISION_MAX.saturating_sub(self.map.revision())).unwrap_or(usize::MAX);
+        for Pending { answer, .. } in group.drain(left.min(group.len())..) {
+            drop(answer.send(Err(Refusal::Failed(revisions_used_up(&self.name)))));
+        }
         if group.is_empty() {
             return;
         }
@@ -147,17 +152,31 @@ impl Worker {
             return Ok(());
         };
         let records: Vec<&Record> = group.iter().filter_map(|pending| pending.record.as_ref()).collect();
-        let durable = folder.append(&records).and_then(|_| match folder.settings().durability {
-            Durability::Always => folder.sync(),
-            Durability::Interval(_) => Ok(()),
-        });
-        durable.map_err(|error| self.stop(&error))?;
+        folder.append(&records).map_err(|error| match error {
+            // Nothing was written.
+            StoreError::JournalStopped(_) | StoreError::Gone | StoreError::RevisionsUsedUp(_) => {
+                self.stop(&error)
+            }
+            error => self.lost_track(&error),
+        })?;
+        if folder.settings().durability == Durability::Always {
+            folder.sync().map_err(|error| self.lost_track(&error))?;
+        }
         self.unsynced.get_or_insert_with(Instant::now);
         Ok(())
     }
 
+    /// Changes were handed to the journal, and nobody knows what became of them.
+    fn lost_track(&self, error: &StoreError) -> ServiceError {
+        self.stop(error);
+        outcome_unknown(&self.name, error)
+    }
+
     /// From now on the map takes no changes: what the disk holds is unknown.
     fn stop(&self, error: &StoreError) -> ServiceError {
+        if matches!(error, StoreError::Gone) {
+            return self.stopped.get_or_init(|| Stop::Deleted).refusal(&self.name);
+        }
         tracing::error!(map = %self.name, %error, "the journal failed: the map is read only from now on");
         self.stopped.get_or_init(|| Stop::Failed(error.to_string())).refusal(&self.name)
     }

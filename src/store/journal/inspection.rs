@@ -1,6 +1,5 @@
 //! A look at a segment that changes nothing.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use uuid::Uuid;
@@ -8,6 +7,7 @@ use uuid::Uuid;
 use super::segment::{Break, Frames};
 use super::segmented::Place;
 use crate::map::Change;
+use crate::store::folder::FolderPath;
 use crate::store::{FileSystem, StoreError};
 
 /// What stands in a segment.
@@ -27,12 +27,12 @@ pub(in crate::store) struct Inspected {
 /// When the file cannot be read at all.
 pub(in crate::store) fn inspect(
     files: &Arc<dyn FileSystem>,
-    folder: PathBuf,
+    folder: &FolderPath,
     map: Uuid,
     first: u64,
     mut each: impl FnMut(u64, Change) -> Result<(), String>,
 ) -> Result<Inspected, StoreError> {
-    let place = Place { files: Arc::clone(files), folder, map };
+    let place = Place { files: Arc::clone(files), folder: folder.clone(), map };
     let path = place.path(first);
     let bytes = place.read(&path)?;
     let mut inspected = Inspected { next: first, torn_bytes: 0, damage: None };
@@ -50,7 +50,7 @@ pub(in crate::store) fn inspect(
     match read() {
         Ok(damage) => inspected.damage = damage,
         Err(broken) if broken.torn => inspected.torn_bytes = (bytes.len() - broken.offset) as u64,
-        Err(broken) => inspected.damage = Some(broken.of(&path)),
+        Err(broken) => inspected.damage = Some(broken.of(&path, map)),
     }
     Ok(inspected)
 }

@@ -16,7 +16,8 @@ pub use record::{RECORD_BYTES_MAX, Record};
 pub(super) use recovery::Known;
 pub use recovery::{Cut, Recovered};
 pub use segment::JOURNAL_VERSION;
-pub(super) use segment::{HEADER_BYTES as SEGMENT_HEADER_BYTES, first_revision};
+pub(super) use segment::{HEADER_BYTES as SEGMENT_HEADER_BYTES, first_revision, owner as owner_of_segment};
+pub(super) use segmented::Place;
 pub use segmented::{JournalUse, SegmentedJournal};
 
 use super::StoreError;

@@ -8,6 +8,7 @@ use uuid::Uuid;
 use super::segment::{self, Break, Frames};
 use super::segmented::{Place, SegmentedJournal};
 use crate::map::Change;
+use crate::store::folder::FolderPath;
 use crate::store::{FileSystem, OpeningProgress, StoreError};
 
 /// What was found in a journal behind a snapshot.
@@ -41,7 +42,8 @@ pub struct Cut {
 pub(in crate::store) struct Known {
     /// The snapshot's revision: what comes after it is replayed.
     pub(in crate::store) snapshot: u64,
-    /// Everything up to here had been durable: a snapshot of it was written, readable or not.
+    /// Everything up to here had been durable: a snapshot of it was written, readable or not, or one that knew the head
+    /// of the journal.
     pub(in crate::store) durable: u64,
 }
 
@@ -56,16 +58,17 @@ impl SegmentedJournal {
     /// `replay` fails.
     pub(in crate::store) fn recover(
         files: Arc<dyn FileSystem>,
-        folder: &Path,
+        folder: &FolderPath,
         map: Uuid,
         known: Known,
         segment_bytes_max: u64,
         progress: &OpeningProgress,
         mut replay: impl FnMut(u64, Change) -> Result<(), String>,
     ) -> Result<(Self, Recovered), StoreError> {
-        let names = files.list(folder).map_err(StoreError::io(folder))?;
+        let path = folder.get();
+        let names = files.list(&path).map_err(StoreError::io(&path))?;
         let segments: Vec<u64> = names.iter().filter_map(|name| segment::first_revision(name)).collect();
-        let place = Place { files, folder: folder.to_owned(), map };
+        let place = Place { files, folder: folder.clone(), map };
         let mut journal = Self::at(place, segments, known.snapshot, segment_bytes_max);
         let mut recovered = Recovered::default();
         let needed = journal.segments.partition_point(|&first| first <= known.snapshot + 1);
@@ -79,9 +82,13 @@ impl SegmentedJournal {
             let bytes = journal.place.read(&path)?;
             progress.read(bytes.len() as u64);
             let mut segment = Segment { path: &path, bytes: &bytes, first, last: i + 1 == needed.len() };
-            expected = segment.replay(&journal.place, known, &mut recovered, &mut replay)?;
+            expected = segment.replay(&journal.place, known, progress, &mut recovered, &mut replay)?;
         }
         journal.head = known.snapshot.max(expected - 1);
+        if journal.head < known.durable {
+            let (last, acknowledged) = (journal.head, known.durable);
+            return Err(StoreError::RevisionsMissing { folder: path, last, acknowledged });
+        }
         journal.durable = journal.head;
         Ok((journal, recovered))
     }
@@ -106,6 +113,7 @@ impl Segment<'_> {
         &mut self,
         place: &Place,
         known: Known,
+        progress: &OpeningProgress,
         recovered: &mut Recovered,
         replay: &mut impl FnMut(u64, Change) -> Result<(), String>,
     ) -> Result<u64, StoreError> {
@@ -121,6 +129,7 @@ impl Segment<'_> {
                 Err(broken) => return self.ends_with(broken, place, known, recovered),
             };
             if frame.revision > known.snapshot {
+                progress.check_wanted()?;
                 let made = frame.change().and_then(|change| replay(frame.revision, change));
                 made.map_err(|reason| StoreError::at(self.path, at, frame.revision, reason))?;
                 recovered.replayed += 1;
@@ -141,17 +150,23 @@ impl Segment<'_> {
         known: Known,
         recovered: &mut Recovered,
     ) -> Result<u64, StoreError> {
-        let needed = broken.last_behind.unwrap_or(broken.revision) > known.snapshot;
         let revision = broken.revision;
         if self.last && broken.torn && revision > known.durable {
             recovered.cut = Some(self.cut(broken, place)?);
             Ok(revision)
-        } else if self.last && revision <= known.snapshot && !needed {
-            recovered.harmless = Some(broken.of(self.path).to_string());
+        } else if self.is_harmless(&broken, known) {
+            recovered.harmless = Some(broken.of(self.path, place.map).to_string());
             Ok(known.snapshot + 1)
         } else {
-            Err(broken.of(self.path))
+            Err(broken.of(self.path, place.map))
         }
+    }
+
+    /// True where the snapshot holds all that had ever been acknowledged, as far as anything tells. A segment of another
+    /// map tells that the folder is not what it should be.
+    fn is_harmless(&self, broken: &Break, known: Known) -> bool {
+        let newest = broken.last_behind.unwrap_or(broken.revision).max(broken.revision).max(known.durable);
+        self.last && newest <= known.snapshot && broken.foreign.is_none()
     }
 
     fn cut(&self, broken: Break, place: &Place) -> Result<Cut, StoreError> {

@@ -3,11 +3,13 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-JNL"
-//!      8  4      format version, u32 little-endian: 2
+//!      8  4      format version, u32 little-endian: 3
 //!     12  4      CRC-32C of bytes 16 to 64, u32 little-endian
 //!     16  16     uuid of the map
 //!     32  8      revision of the first frame, u64 little-endian
-//!     40  24     zero
+//!     40  8      the journal's head when the segment was begun, the last revision that is durable before it, u64
+//!                little-endian; zero up to version 2
+//!     48  16     zero
 //!     64  rest   frames, see `frame.rs`
 //! ```
 //!
@@ -21,10 +23,13 @@ use super::frame::{self, Frame};
 use crate::map::REVISION_MAX;
 use crate::store::StoreError;
 
-/// The version that this build writes; it reads this one and all before. In version 1 moments had no forms.
-pub const JOURNAL_VERSION: u32 = 2;
+/// The version that this build writes; it reads this one and all before. In version 1 moments had no forms, up to
+/// version 2 segments had no head.
+pub const JOURNAL_VERSION: u32 = 3;
 const MAGIC: &[u8; 8] = b"MROL-JNL";
 const CHECKED_FROM: usize = 16;
+const UUID_BYTES: usize = 16;
+const HEAD: usize = 40;
 pub(crate) const HEADER_BYTES: usize = 64;
 
 /// The name of the segment that begins with revision `first`.
@@ -34,16 +39,14 @@ pub(super) fn file_name(first: u64) -> String {
 
 /// The first revision of the segment of that name, where it is one's.
 pub(crate) fn first_revision(name: &str) -> Option<u64> {
-    name.strip_prefix("journal-")?
-        .strip_suffix(".log")?
-        .parse()
-        .ok()
-        .filter(|&revision| revision <= REVISION_MAX)
+    let first = name.strip_prefix("journal-")?.strip_suffix(".log")?.parse().ok()?;
+    (first <= REVISION_MAX && file_name(first) == name).then_some(first)
 }
 
-/// What a segment begins with.
+/// What a segment begins with that comes after revision `first - 1`, which is durable.
 pub(super) fn header(map: Uuid, first: u64) -> Vec<u8> {
-    let checked = [&map.as_bytes()[..], &first.to_le_bytes(), &[0; 24]].concat();
+    let head = first.saturating_sub(1);
+    let checked = [&map.as_bytes()[..], &first.to_le_bytes(), &head.to_le_bytes(), &[0; 16]].concat();
     let (version, checksum) = (JOURNAL_VERSION.to_le_bytes(), crc32c::crc32c(&checked).to_le_bytes());
     [&MAGIC[..], &version, &checksum, &checked].concat()
 }
@@ -60,6 +63,8 @@ pub(crate) struct Break {
     pub(crate) reason: String,
     /// Nothing that is known to have been durable is lost with it: a crash while it was written explains it.
     pub(crate) torn: bool,
+    /// The segment is that map's.
+    pub(crate) foreign: Option<Uuid>,
 }
 
 /// Where the reading of a segment's frames has come to; its bytes are handed in at each step.
@@ -83,7 +88,10 @@ impl Frames {
         };
         match check_header(header, &expected) {
             Ok(()) => Ok(frames),
-            Err(reason) => Err(frames.broken(bytes, 0, reason, blank)),
+            Err(reason) => {
+                let foreign = owner(header).filter(|&owner| owner != map);
+                Err(Break { foreign, ..frames.broken(bytes, 0, reason, blank) })
+            }
         }
     }
 
@@ -119,7 +127,8 @@ impl Frames {
         let behind = frame::newest_behind(bytes, offset + 1, self.map);
         let was_durable = behind.is_some_and(|newest| newest.durable >= self.revision);
         let (revision, torn) = (self.revision, torn && !was_durable);
-        Break { offset, revision, last_behind: behind.map(|newest| newest.revision), reason, torn }
+        let last_behind = behind.map(|newest| newest.revision);
+        Break { offset, revision, last_behind, reason, torn, foreign: None }
     }
 }
 
@@ -137,7 +146,10 @@ fn check_header(header: &[u8], expected: &[u8]) -> Result<(), String> {
     if crc32c::crc32c(&header[CHECKED_FROM..]) != stored {
         return Err("the segment's header has a wrong checksum".into());
     }
-    if header[CHECKED_FROM..] != expected[CHECKED_FROM..] {
+    // Up to version 2 a segment had no head.
+    let has_head = version >= 3 || header[HEAD..].iter().any(|&byte| byte != 0);
+    let end = if has_head { HEADER_BYTES } else { HEAD };
+    if header[CHECKED_FROM..end] != expected[CHECKED_FROM..end] {
         return Err(
             "another map's, or renamed: uuid or first revision differ from the snapshot and the name".into(),
         );
@@ -145,9 +157,21 @@ fn check_header(header: &[u8], expected: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
+/// The uuid of the map whose segment begins with `header`, where that is whole.
+pub(crate) fn owner(header: &[u8]) -> Option<Uuid> {
+    let header = header.get(..HEADER_BYTES).filter(|header| header[..8] == MAGIC[..])?;
+    let stored = u32::from_le_bytes(std::array::from_fn(|i| header[12 + i]));
+    let is_whole = crc32c::crc32c(&header[CHECKED_FROM..]) == stored;
+    let uuid = Uuid::from_slice(&header[CHECKED_FROM..CHECKED_FROM + UUID_BYTES]).ok();
+    uuid.filter(|_| is_whole)
+}
+
 impl Break {
-    /// As an error of the segment at `path`.
-    pub(super) fn of(self, path: &Path) -> StoreError {
+    /// As an error of the segment at `path` of the map `map`.
+    pub(super) fn of(self, path: &Path, map: Uuid) -> StoreError {
+        if let Some(found) = self.foreign {
+            return StoreError::Foreign { path: path.to_owned(), found, expected: map };
+        }
         StoreError::at(path, self.offset, self.revision, self.reason)
     }
 }

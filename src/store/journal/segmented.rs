@@ -9,6 +9,8 @@ use uuid::Uuid;
 
 use super::segment::{self, Frames};
 use super::{Changes, Journal, Record, Revised, frame};
+use crate::map::REVISION_MAX;
+use crate::store::folder::FolderPath;
 use crate::store::{Appending, FileSystem, StoreError};
 use crate::util::Durations;
 
@@ -41,9 +43,9 @@ pub struct JournalUse {
 
 /// Where a map's segments are.
 #[derive(Debug, Clone)]
-pub(super) struct Place {
+pub(in crate::store) struct Place {
     pub(super) files: Arc<dyn FileSystem>,
-    pub(super) folder: PathBuf,
+    pub(super) folder: FolderPath,
     pub(super) map: Uuid,
 }
 
@@ -82,6 +84,16 @@ impl SegmentedJournal {
     /// The first revision that can be read; none without a segment.
     pub fn tail(&self) -> Option<u64> {
         self.segments.first().copied()
+    }
+
+    /// The first revisions of its segments, ascending.
+    pub(in crate::store) fn segments(&self) -> &[u64] {
+        &self.segments
+    }
+
+    /// Where they are.
+    pub(in crate::store) fn place(&self) -> &Place {
+        &self.place
     }
 
     /// Ends the present segment: what comes next begins another, so that this one can be forgotten as a whole.
@@ -150,6 +162,10 @@ impl SegmentedJournal {
 
 impl Journal for SegmentedJournal {
     fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError> {
+        // Refused before anything is written: the journal goes on.
+        if records.len() as u64 > REVISION_MAX.saturating_sub(self.head) {
+            return Err(StoreError::RevisionsUsedUp(self.head));
+        }
         self.or_stop(|journal| journal.write(records))
     }
 
@@ -162,14 +178,7 @@ impl Journal for SegmentedJournal {
     }
 
     fn read_from(&self, revision: u64) -> Changes {
-        let first = self.segments.partition_point(|&first| first <= revision).saturating_sub(1);
-        Box::new(Reader {
-            place: self.place.clone(),
-            segments: self.segments[first..].iter().copied().collect(),
-            revision,
-            head: self.head,
-            open: None,
-        })
+        self.place.read_from(revision, &self.segments, self.head)
     }
 
     fn truncate_before(&mut self, revision: u64) -> Result<(), StoreError> {
@@ -179,13 +188,21 @@ impl Journal for SegmentedJournal {
             self.place.files.remove(&path).map_err(StoreError::io(&path))?;
             self.segments.remove(0);
         }
-        self.place.files.sync(&self.place.folder).map_err(StoreError::io(&self.place.folder))
+        let folder = self.place.folder.get();
+        self.place.files.sync(&folder).map_err(StoreError::io(&folder))
     }
 }
 
 impl Place {
     pub(super) fn path(&self, first: u64) -> PathBuf {
-        self.folder.join(segment::file_name(first))
+        self.folder.file(&segment::file_name(first))
+    }
+
+    /// The changes from `revision` to `head`, of the segments that begin with the revisions `segments`.
+    pub(in crate::store) fn read_from(&self, revision: u64, segments: &[u64], head: u64) -> Changes {
+        let first = segments.partition_point(|&first| first <= revision).saturating_sub(1);
+        let segments = segments[first..].iter().copied().collect();
+        Box::new(Reader { place: self.clone(), segments, revision, head, open: None })
     }
 
     /// A segment without a frame, in the place of one that is there.
@@ -193,7 +210,7 @@ impl Place {
         let mut file = self.files.create(&self.path(first))?;
         file.append(&segment::header(self.map, first))?;
         file.sync()?;
-        self.files.sync(&self.folder)?;
+        self.files.sync(&self.folder.get())?;
         Ok(file)
     }
 
@@ -244,7 +261,7 @@ impl Reader {
                 continue;
             };
             let at = frames.offset();
-            match frames.next(bytes).map_err(|broken| broken.of(path))? {
+            match frames.next(bytes).map_err(|broken| broken.of(path, self.place.map))? {
                 Some(frame) if frame.revision == self.revision => {
                     let change = frame.change();
                     let change = change.map_err(|reason| StoreError::at(path, at, self.revision, reason))?;
@@ -259,12 +276,13 @@ impl Reader {
     fn next_segment(&mut self) -> Result<OpenSegment, StoreError> {
         let missing = || {
             let reason = format!("revision {} is no longer kept", self.revision);
-            StoreError::damaged(&self.place.folder, reason)
+            StoreError::damaged(&self.place.folder.get(), reason)
         };
         let first = self.segments.pop_front().filter(|&first| first <= self.revision).ok_or_else(missing)?;
         let path = self.place.path(first);
         let bytes = self.place.read(&path)?;
-        let frames = Frames::of(&bytes, self.place.map, first).map_err(|broken| broken.of(&path))?;
+        let frames =
+            Frames::of(&bytes, self.place.map, first).map_err(|broken| broken.of(&path, self.place.map))?;
         Ok(OpenSegment { path, bytes, frames })
     }
 }

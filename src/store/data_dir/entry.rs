@@ -1,0 +1,84 @@
+//! What the names in the folder of maps mean.
+
+use std::path::Path;
+
+use uuid::Uuid;
+
+use crate::map::MapName;
+use crate::store::folder::UNFINISHED;
+
+const MAP_FILE_SUFFIX: &str = ".mrol";
+
+/// What a name in the folder of maps means. A map's name has no dot, so that each means one thing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::store) enum Entry {
+    /// A map's folder.
+    Map { name: MapName, uuid: Uuid },
+    /// One of a former release.
+    OldMap(MapName),
+    /// A map file that is to become a map.
+    MapFile(MapName),
+    /// What a crash left.
+    Unfinished,
+    /// Nobody knows.
+    Unknown,
+}
+
+impl Entry {
+    pub(in crate::store) fn of(entry: &str) -> Self {
+        if entry.starts_with(UNFINISHED) {
+            return Self::Unfinished;
+        }
+        if let Some(name) = entry.strip_suffix(MAP_FILE_SUFFIX).and_then(|name| MapName::new(name).ok()) {
+            return Self::MapFile(name);
+        }
+        match entry.split_once('.') {
+            None => MapName::new(entry).map_or(Self::Unknown, Self::OldMap),
+            Some((name, uuid)) => match (MapName::new(name), Uuid::parse_str(uuid)) {
+                (Ok(name), Ok(uuid)) if Self::folder_name(&name, uuid) == entry => Self::Map { name, uuid },
+                _ => Self::Unknown,
+            },
+        }
+    }
+
+    pub(in crate::store) fn of_path(path: &Path) -> Self {
+        Self::of(&path.file_name().unwrap_or_default().to_string_lossy())
+    }
+
+    /// The name of the map whose folder it is.
+    pub(in crate::store) fn into_map(self) -> Option<MapName> {
+        match self {
+            Self::Map { name, .. } | Self::OldMap(name) => Some(name),
+            Self::MapFile(_) | Self::Unfinished | Self::Unknown => None,
+        }
+    }
+
+    /// The name of a map's folder.
+    pub(in crate::store) fn folder_name(name: &MapName, uuid: Uuid) -> String {
+        format!("{name}.{uuid}")
+    }
+
+    /// The name of a map file.
+    pub(in crate::store) fn file_name(name: &MapName) -> String {
+        format!("{name}{MAP_FILE_SUFFIX}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_name_means_one_thing() {
+        let (office, uuid) = (MapName::new("office").unwrap(), Uuid::from_u128(7));
+        let folder = Entry::folder_name(&office, uuid);
+        assert_eq!(Entry::of(&folder), Entry::Map { name: office.clone(), uuid });
+        assert_eq!(Entry::of("office"), Entry::OldMap(office.clone()));
+        assert_eq!(Entry::of("office.mrol"), Entry::MapFile(office));
+        assert_eq!(Entry::of(&format!(".unfinished-{folder}")), Entry::Unfinished);
+        let simple = format!("office.{}", uuid.simple());
+        for other in ["Office", "office.txt", "office.mrol.bak", ".mrol", "lost+found", &simple, ""] {
+            assert_eq!(Entry::of(other), Entry::Unknown, "{other}");
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! What a data folder holds at a start, once what a crash left is put right.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use super::{DataDir, Entry};
+use crate::map::MapName;
+use crate::store::replacement::{self, Replacement};
+use crate::store::{OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
+
+/// What a data folder holds.
+#[derive(Debug, Default)]
+pub struct Stock {
+    /// The names of the maps that are kept, in order.
+    pub maps: Vec<MapName>,
+    /// Those of map files that could not become maps, and why. Nobody is to take their names meanwhile.
+    pub refused: Vec<(MapName, StoreError)>,
+    /// Files and folders that nobody understands.
+    pub not_understood: Vec<PathBuf>,
+}
+
+impl DataDir {
+    /// Takes stock: sweeps away what a crash left unfinished, ends what it came between, and makes maps of the map files
+    /// that lie about.
+    ///
+    /// # Errors
+    /// When the folder cannot be read, or the system refuses. What is wrong with one map keeps no other from being
+    /// opened.
+    pub fn take_stock(&self) -> Result<Stock, StoreError> {
+        folder::sweep(&*self.files, &self.maps)?;
+        self.end_replacements()?;
+        let mut stock = Stock::default();
+        for entry in self.entries()? {
+            match Entry::of(&entry) {
+                Entry::MapFile(name) => {
+                    if let Err(error) = self.take_in(&name) {
+                        stock.refused.push((name, error));
+                    }
+                }
+                Entry::Unknown => stock.not_understood.push(self.maps.join(entry)),
+                Entry::Map { .. } | Entry::OldMap(_) | Entry::Unfinished => {}
+            }
+        }
+        stock.maps = self.names()?;
+        Ok(stock)
+    }
+
+    /// Files and folders that nobody understands.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn not_understood(&self) -> Result<Vec<PathBuf>, StoreError> {
+        let unknown = |entry: &String| Entry::of(entry) == Entry::Unknown;
+        Ok(self.entries()?.into_iter().filter(unknown).map(|entry| self.maps.join(entry)).collect())
+    }
+
+    /// Counts what opening the maps `names` will take. What is wrong with one of them is told when it is opened.
+    pub fn expect(&self, names: &[MapName], progress: &OpeningProgress) {
+        for name in names {
+            let bytes = self.path(name).and_then(|path| snapshot_files::bytes_to_read(&*self.files, &path));
+            progress.expect_map(bytes.unwrap_or_default());
+        }
+    }
+
+    /// Ends the replacements of maps that a crash came between.
+    fn end_replacements(&self) -> Result<(), StoreError> {
+        for entry in self.entries()? {
+            if !matches!(Entry::of(&entry), Entry::Map { .. }) {
+                continue;
+            }
+            let new = self.maps.join(&entry);
+            // Told when the map is opened, where something is wrong with it.
+            let Ok(Some(replacement)) = Replacement::in_folder(&*self.files, &new) else { continue };
+            replacement.keep_old(&*self.files, &self.maps)?;
+            replacement::finish(&*self.files, &new)?;
+        }
+        Ok(())
+    }
+
+    /// Makes a map's folder of a map file.
+    fn take_in(&self, name: &MapName) -> Result<(), StoreError> {
+        let file = self.maps.join(Entry::file_name(name));
+        let snapshot = Snapshot::read(&*self.files, &file)?;
+        let taken = Entry::folder_name(name, snapshot.uuid);
+        let folders: BTreeSet<String> = self.folders_of(name)?.into_iter().collect();
+        if folders.is_empty() {
+            self.make(&taken, &snapshot, None)?;
+        } else if !folders.contains(&taken) {
+            let reason = format!("map {name} exists already: rename the file, or move it away");
+            return Err(StoreError::damaged(&file, reason));
+        }
+        // Where a crash came between the two, the folder is there and only the file has to go.
+        let removed = self.files.remove(&file).and_then(|()| self.files.sync(&self.maps));
+        removed.map_err(StoreError::io(&file))
+    }
+}

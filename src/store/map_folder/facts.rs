@@ -1,0 +1,204 @@
+//! What many ask of a map's folder, where nobody waits for a disk to be told.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::map::WithdrawnScan;
+use crate::store::StoreSettings;
+use crate::store::journal::{Journal, JournalUse, SegmentedJournal};
+use crate::store::retention::{self, UndoReach};
+use crate::store::snapshot_files::Sizes;
+use crate::sync::{Mutex, MutexGuard, Rank};
+
+/// How long after one that could not be written the next snapshot is due at the earliest: to make one takes a while of
+/// a thread, and a disk that is full does not empty at once.
+const AGAIN_AFTER: Duration = Duration::from_secs(5);
+
+/// How much is kept of a map, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FolderUse {
+    /// The last revision that is known to be durable.
+    pub durable: u64,
+    /// The newest snapshot's revision.
+    pub snapshot: u64,
+    /// Scans of this revision and later can be undone.
+    pub undo_from: u64,
+    /// What the journal has done.
+    pub journal: JournalUse,
+    /// Time since the newest snapshot was written, or since the folder was opened where that was later.
+    pub snapshot_age: Duration,
+    /// Snapshots that could not be written since the folder was opened.
+    pub snapshot_failures: u64,
+    /// Bytes of the files in the folder.
+    pub disk_bytes: u64,
+}
+
+/// What is known of a folder. Whoever writes there tells it after each step; a clone is another handle on the same.
+#[derive(Debug, Clone)]
+pub(super) struct Facts(Arc<Mutex<Known>>);
+
+#[derive(Debug)]
+struct Known {
+    head: u64,
+    durable: u64,
+    journal: JournalUse,
+    /// First revisions of the segments, ascending.
+    segments: Vec<u64>,
+    /// Revisions of the snapshots, ascending.
+    snapshots: Vec<u64>,
+    /// Those that somebody reads the journal from just now.
+    pinned: Vec<u64>,
+    saved: Saved,
+    /// Bytes of the folder when they were last counted, less those appended to the journal until then; wrapping.
+    counted_bytes: u64,
+}
+
+/// How much journal there is behind the newest snapshot, and since when.
+#[derive(Debug, Clone, Copy)]
+struct Saved {
+    at: Instant,
+    /// Bytes of journal that were found behind it at the start.
+    found: u64,
+    /// Bytes that had been appended when it was written.
+    appended: u64,
+    /// When the next one could not be written.
+    failed: Option<Instant>,
+    /// How many could not be, since the start.
+    failures: u64,
+}
+
+/// Keeps a snapshot, and the journal from it on, until it is dropped.
+#[derive(Debug)]
+pub(super) struct Pin {
+    facts: Facts,
+    pub(super) snapshot: u64,
+}
+
+impl Drop for Pin {
+    fn drop(&mut self) {
+        let mut known = self.facts.lock();
+        if let Some(at) = known.pinned.iter().position(|&pinned| pinned == self.snapshot) {
+            known.pinned.swap_remove(at);
+        }
+    }
+}
+
+impl Facts {
+    pub(super) fn new(journal: &SegmentedJournal, snapshots: Vec<u64>, found: u64) -> Self {
+        let saved = Saved { at: Instant::now(), found, appended: 0, failed: None, failures: 0 };
+        let known = Known {
+            head: journal.head(),
+            durable: journal.durable(),
+            journal: journal.used(),
+            segments: journal.segments().to_vec(),
+            snapshots,
+            pinned: Vec::new(),
+            saved,
+            counted_bytes: 0,
+        };
+        Self(Arc::new(Mutex::new(Rank::Brief, known)))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Known> {
+        self.0.lock()
+    }
+
+    /// The journal was written.
+    pub(super) fn tell(&self, journal: &SegmentedJournal) {
+        let mut known = self.lock();
+        (known.head, known.durable, known.journal) = (journal.head(), journal.durable(), journal.used());
+        known.segments.clear();
+        known.segments.extend_from_slice(journal.segments());
+    }
+
+    /// A snapshot was written, when so many bytes of journal had been appended.
+    pub(super) fn tell_saved(&self, revision: u64, appended: u64) {
+        let mut known = self.lock();
+        let at = known.snapshots.partition_point(|&snapshot| snapshot < revision);
+        if known.snapshots.get(at) != Some(&revision) {
+            known.snapshots.insert(at, revision);
+        }
+        let failures = known.saved.failures;
+        known.saved = Saved { at: Instant::now(), found: 0, appended, failed: None, failures };
+    }
+
+    /// A snapshot could not be written.
+    pub(super) fn tell_not_saved(&self) {
+        let mut known = self.lock();
+        known.saved.failed = Some(Instant::now());
+        known.saved.failures += 1;
+    }
+
+    /// The files of the folder were counted.
+    pub(super) fn tell_bytes(&self, bytes: u64) {
+        let mut known = self.lock();
+        known.counted_bytes = bytes.wrapping_sub(known.journal.bytes);
+    }
+
+    pub(super) fn newest_snapshot(&self) -> u64 {
+        self.lock().snapshots.last().copied().unwrap_or_default()
+    }
+
+    pub(super) fn snapshot_is_due(&self, settings: &StoreSettings) -> bool {
+        let known = self.lock();
+        let Saved { at, found, appended, failed, .. } = known.saved;
+        if failed.is_some_and(|failed| failed.elapsed() < AGAIN_AFTER) {
+            return false;
+        }
+        let bytes = found + known.journal.bytes - appended;
+        bytes >= settings.snapshot_journal_bytes || at.elapsed() >= settings.snapshot_interval
+    }
+
+    pub(super) fn used(&self) -> FolderUse {
+        let known = self.lock();
+        let oldest = known.snapshots.first().copied().unwrap_or_default();
+        let snapshot = known.snapshots.last().copied().unwrap_or_default();
+        let tail = known.segments.first().copied();
+        let undo_from = tail.map_or(known.head + 1, |tail| tail.max(oldest + 1));
+        FolderUse {
+            durable: known.durable,
+            snapshot,
+            undo_from,
+            journal: known.journal,
+            snapshot_age: known.saved.at.elapsed(),
+            snapshot_failures: known.saved.failures,
+            disk_bytes: known.counted_bytes.wrapping_add(known.journal.bytes),
+        }
+    }
+
+    /// The first revisions of the segments, and the head of the journal.
+    pub(super) fn journal(&self) -> (Vec<u64>, u64) {
+        let known = self.lock();
+        (known.segments.clone(), known.head)
+    }
+
+    /// The newest snapshot that undo can begin with, which stays as long as somebody reads from there.
+    pub(super) fn pin_base_of(&self, scans: &[u64], withdrawn: &[WithdrawnScan]) -> Option<Pin> {
+        let first = *scans.iter().min()?;
+        let mut known = self.lock();
+        let tail = known.segments.first().copied()?;
+        let fits = |&&snapshot: &&u64| {
+            snapshot < first && tail <= snapshot + 1 && retention::is_base(snapshot, withdrawn)
+        };
+        let snapshot = known.snapshots.iter().rfind(fits).copied()?;
+        known.pinned.push(snapshot);
+        drop(known);
+        Some(Pin { facts: self.clone(), snapshot })
+    }
+
+    /// Forgets the snapshots that nobody needs any more: nobody begins to read them from now on. Those that are kept.
+    pub(super) fn forget(&self, reach: UndoReach, withdrawn: &[WithdrawnScan], sizes: &Sizes) -> Vec<u64> {
+        let mut known = self.lock();
+        let head = known.snapshots.last().copied().unwrap_or_default();
+        let mut kept = retention::kept_within(&known.snapshots, head, reach, withdrawn, sizes);
+        kept.extend_from_slice(&known.pinned);
+        kept.sort_unstable();
+        kept.dedup();
+        if let Some(base) = kept.first() {
+            let needed = known.segments.partition_point(|first| *first <= base + 1).saturating_sub(1);
+            known.segments.drain(..needed);
+        }
+        known.snapshots.clone_from(&kept);
+        kept
+    }
+}

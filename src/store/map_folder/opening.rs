@@ -1,0 +1,119 @@
+//! A map's folder when it is made, and when it is found.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use uuid::Uuid;
+
+use super::{FolderPath, MapFolder};
+use crate::map::MultiResolutionMap;
+use crate::store::journal::{Known, Recovered, SegmentedJournal};
+use crate::store::snapshot_files::{
+    Newest, check_owner, newest_good, not_understood, set_aside, snapshot_name, snapshot_revisions,
+};
+use crate::store::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder};
+
+/// A map as it was found.
+#[derive(Debug)]
+pub struct OpenedMap {
+    /// Where it is kept.
+    pub folder: MapFolder,
+    /// Of this incarnation of the map.
+    pub uuid: Uuid,
+    /// At the revision of the last durable change.
+    pub map: MultiResolutionMap,
+    /// The snapshot it was read from.
+    pub snapshot: u64,
+    /// What was found behind it.
+    pub recovered: Recovered,
+    /// Newer snapshots that could not be read, and were set aside.
+    pub damaged: Vec<String>,
+    /// Files in the folder that nobody understands.
+    pub not_understood: Vec<String>,
+}
+
+impl MapFolder {
+    /// A folder whose one snapshot was just written.
+    pub(in crate::store) fn new(
+        files: Arc<dyn FileSystem>,
+        path: PathBuf,
+        settings: StoreSettings,
+        first: &Snapshot,
+    ) -> Result<Self, StoreError> {
+        let (revision, path) = (first.contents.revision, FolderPath::new(path));
+        let known = Known { snapshot: revision, durable: revision };
+        let progress = OpeningProgress::default();
+        let (journal, _) = SegmentedJournal::recover(
+            Arc::clone(&files),
+            &path,
+            first.uuid,
+            known,
+            settings.segment_bytes_max,
+            &progress,
+            |_, _| Ok(()),
+        )?;
+        Ok(Self::with(files, first.uuid, path, settings, journal, vec![revision], 0))
+    }
+
+    /// Opens the folder of the map `uuid`: the newest good snapshot, and every change of the journal after it.
+    ///
+    /// # Errors
+    /// When the system refuses, no snapshot is good, a file is another map's, or the journal misses something that may
+    /// have been acknowledged: the error names file, offset and what helps.
+    pub(in crate::store) fn open(
+        files: Arc<dyn FileSystem>,
+        path: PathBuf,
+        uuid: Uuid,
+        settings: StoreSettings,
+        progress: &OpeningProgress,
+    ) -> Result<OpenedMap, StoreError> {
+        Self::open_at(files, path, uuid, settings, progress, true)
+    }
+
+    /// The same, where the loss of revisions of which there is no trace but that they had been acknowledged may be taken.
+    pub(in crate::store) fn open_at(
+        files: Arc<dyn FileSystem>,
+        path: PathBuf,
+        uuid: Uuid,
+        settings: StoreSettings,
+        progress: &OpeningProgress,
+        must_reach_head: bool,
+    ) -> Result<OpenedMap, StoreError> {
+        progress.check_wanted()?;
+        folder::sweep(&*files, &path)?;
+        let mut revisions = snapshot_revisions(&*files, &path)?;
+        let last_written = revisions.last().copied().unwrap_or_default();
+        let Newest { snapshot, head, damaged } = newest_good(&*files, &path, &mut revisions, progress)?;
+        let revision = snapshot.contents.revision;
+        if snapshot.uuid != uuid {
+            let path = path.join(snapshot_name(revision));
+            return Err(StoreError::Foreign { path, found: snapshot.uuid, expected: uuid });
+        }
+        let read: Vec<u64> = damaged.iter().map(|(revision, _)| *revision).chain([revision]).collect();
+        check_owner(&*files, &path, uuid, &read)?;
+        let map = MultiResolutionMap::restore(snapshot.settings, snapshot.contents)
+            .map_err(|e| StoreError::damaged(&path, e.to_string()))?;
+        let replay = |revision, change| {
+            let committed = map.committer().apply(&change);
+            let made = format!("replayed, it makes revision {}", committed.revision);
+            (committed.revision == revision).then_some(()).ok_or(made)
+        };
+        let durable = if must_reach_head { last_written.max(head) } else { revision };
+        let (known, at) = (Known { snapshot: revision, durable }, FolderPath::new(path.clone()));
+        let segment_bytes_max = settings.segment_bytes_max;
+        let (journal, recovered) = SegmentedJournal::recover(
+            Arc::clone(&files),
+            &at,
+            uuid,
+            known,
+            segment_bytes_max,
+            progress,
+            replay,
+        )?;
+        set_aside(&*files, &path, &damaged)?;
+        let not_understood = not_understood(&*files, &path)?;
+        let damaged = damaged.into_iter().map(|(_, error)| error.to_string()).collect();
+        let folder = Self::with(files, uuid, at, settings, journal, revisions, recovered.bytes);
+        Ok(OpenedMap { folder, uuid, map, snapshot: revision, recovered, damaged, not_understood })
+    }
+}
