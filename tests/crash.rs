@@ -7,12 +7,14 @@
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+mod map_folders;
 mod process;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use map_folders::folder_of;
 use mrol::align::Guess;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
@@ -208,7 +210,7 @@ impl Model {
 
 /// The newest of two or more snapshots.
 fn newest_snapshot(data: &Path) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(data.join("maps/office")).unwrap();
+    let entries = std::fs::read_dir(folder_of(data, "office")).unwrap();
     let paths = entries.map(|entry| entry.unwrap().path());
     let mut snapshots: Vec<PathBuf> =
         paths.filter(|path| path.extension().is_some_and(|extension| extension == "mrol")).collect();
