@@ -3,6 +3,7 @@
 #![cfg(feature = "server")]
 
 mod common;
+mod map_folders;
 mod process;
 
 use std::fs::{self, File};
@@ -11,6 +12,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{Daemon, PATIENCE, bytes_of, client, identity_json, json_of, query_pb, row, scan_pb};
+use map_folders::folder_of;
 use mrol::config::Config;
 use mrol::server::Server;
 use mrol::wire::pb;
@@ -182,7 +184,7 @@ async fn changed_maps_are_written_to_snapshots_beside_the_running_server() {
     let daemon = Daemon::start_with(|config| config.store.snapshot_interval_s = 1).await;
     daemon.make_map("a").await;
     daemon.put_in("a", &row(5)).await;
-    let snapshot = daemon.data.path().join("maps/a/snapshot-00000000000000000001.mrol");
+    let snapshot = folder_of(daemon.data.path(), "a").join("snapshot-00000000000000000001.mrol");
     wait_until(async || snapshot.exists()).await;
     // It is a map file like any other: another server takes it in.
     let copied = tempfile::tempdir().unwrap();

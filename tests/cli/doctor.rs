@@ -1,9 +1,11 @@
 //! `mrol doctor` on folders that are well, torn and damaged.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
 
 use serde_json::json;
 
+use super::map_folders::folder_of;
 use super::process::Process;
 use super::{Sequence, complaint, mrol, objects};
 
@@ -19,7 +21,7 @@ fn killed(sequence: &Sequence) -> String {
 }
 
 fn journal(sequence: &Sequence) -> PathBuf {
-    sequence.path("data/maps/office/journal-00000000000000000001.log").into()
+    folder_of(Path::new(&sequence.path("data")), "office").join("journal-00000000000000000001.log")
 }
 
 #[test]
@@ -69,11 +71,11 @@ fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
         told.contains("map office: NOT WELL; revision 1") && told.contains("damaged at offset"),
         "{told}"
     );
-    let ports = ["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"];
-    let refused =
-        complaint(&[&["serve", "--data-dir", &data, "--log-level", "error"], &ports[..]].concat(), 1);
+    let server = Process::start_with_log(&data, &[], "off", Stdio::inherit());
+    let refused = complaint(&["maps", "show", "office", "--server", &server.grpc], 1);
     assert!(refused.contains("journal-00000000000000000001.log: damaged at offset"), "{refused}");
     assert!(refused.contains("--set-aside office`"), "{refused}");
+    assert_eq!(server.stop(), Some(0));
 
     let opens = &objects(&["doctor", &data, "--set-aside", "office"])[0];
     assert_eq!(opens, &json!({"map": "office", "revision": 1}));
@@ -84,4 +86,30 @@ fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
     let server = Process::start(&data, &[]);
     let shown = &objects(&["maps", "show", "office", "--server", &server.grpc])[0];
     assert_eq!((&shown["revision"], &shown["scans"]), (&json!(1), &json!(1)));
+}
+
+#[test]
+fn what_nobody_understands_is_told_and_is_no_problem() {
+    let sequence = Sequence::of(1);
+    let data = killed(&sequence);
+    let folder = folder_of(Path::new(&data), "office");
+    std::fs::write(folder.join("notes.txt"), "mine").unwrap();
+    std::fs::write(folder.with_file_name("lost+found"), "").unwrap();
+    let told = mrol(&["doctor", &data]).assert().code(0).get_output().clone();
+    assert!(String::from_utf8(told.stdout).unwrap().contains("not understood, and left alone: notes.txt"));
+    assert!(String::from_utf8(told.stderr).unwrap().contains("lost+found"));
+}
+
+#[test]
+fn two_folders_of_one_map_are_both_named() {
+    let sequence = Sequence::of(1);
+    let data = killed(&sequence);
+    let folder = folder_of(Path::new(&data), "office");
+    let copy = folder.with_file_name("office.00000000-0000-0000-0000-000000000007");
+    std::fs::create_dir(&copy).unwrap();
+    let told = mrol(&["doctor", &data]).assert().code(1).get_output().clone();
+    let told = String::from_utf8(told.stdout).unwrap();
+    for path in [&folder, &copy] {
+        assert!(told.contains(path.to_str().unwrap()), "{told}");
+    }
 }

@@ -10,6 +10,8 @@ mod experiment;
 mod help;
 mod local;
 mod localize;
+#[path = "../map_folders/mod.rs"]
+mod map_folders;
 #[path = "../process/mod.rs"]
 mod process;
 mod remote;

@@ -7,6 +7,8 @@
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+#[path = "../map_folders/mod.rs"]
+mod map_folders;
 #[path = "../process/mod.rs"]
 mod process;
 mod remaker;
@@ -15,6 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use map_folders::folder_of;
 use mrol::align::Guess;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};

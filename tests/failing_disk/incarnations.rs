@@ -4,8 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mrol::geometry::Pose;
-use mrol::map::{Change, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use mrol::store::{DataDir, FileSystem, MapFolder, OpeningProgress, Record, Snapshot, StoreSettings};
+use mrol::map::{
+    Change, MapContents, MapName, MapSettings, MultiResolutionMap, REVISION_MAX, RobotName, ScanRecord,
+    TrajectoryPose,
+};
+use mrol::store::{
+    DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
+};
+use mrol::util::StopSignal;
 use mrol::voxel::{VoxelKey, VoxelSet};
 use uuid::Uuid;
 
@@ -154,4 +160,182 @@ fn revisions_behind_a_snapshot_that_a_damaged_journal_hides_are_missed() {
     let opened = data_dir(&disk).map(&office(), &OpeningProgress::default());
     let opened = opened.map(|opened| opened.map.revision());
     assert!(opened.is_err(), "opened at revision {opened:?}, 4 was acknowledged");
+}
+
+/// A map of four changes under the name, and another to take its place.
+struct Exchange {
+    data: DataDir,
+    old: MultiResolutionMap,
+    old_folder: MapFolder,
+    new: MultiResolutionMap,
+    new_uuid: Uuid,
+}
+
+impl Exchange {
+    fn on(disk: &SimulatedDisk) -> Self {
+        let (data, old, new) = (data_dir(disk), empty(), empty());
+        let old_folder = data.create(&office(), &Snapshot::of(&old, Uuid::new_v4())).unwrap();
+        (0..4).for_each(|i| commit(&old_folder, &old, i));
+        let aside = data.create(&kept(), &Snapshot::of(&new, Uuid::new_v4())).unwrap();
+        (10..12).for_each(|i| commit(&aside, &new, i));
+        data.remove(&aside).unwrap();
+        Self { data, old, old_folder, new, new_uuid: Uuid::new_v4() }
+    }
+
+    fn run(&self) -> Result<MapFolder, StoreError> {
+        self.data.replace(&office(), &self.old_folder, &kept(), &Snapshot::of(&self.new, self.new_uuid))
+    }
+}
+
+fn kept() -> MapName {
+    MapName::new("office-replaced-4").unwrap()
+}
+
+/// The maps that a start finds.
+fn found(disk: &SimulatedDisk) -> Vec<(MapName, OpenedMap)> {
+    let data = data_dir(disk);
+    let stock = data.take_stock().unwrap();
+    assert!(stock.refused.is_empty() && stock.not_understood.is_empty(), "{stock:?}");
+    let open = |name: MapName| {
+        let opened = data.map(&name, &OpeningProgress::default());
+        (name.clone(), opened.unwrap_or_else(|error| panic!("{name}: {error}")))
+    };
+    stock.maps.into_iter().map(open).collect()
+}
+
+#[test]
+fn a_crash_at_any_step_of_a_replacement_leaves_one_map_of_the_name_and_loses_neither() {
+    let whole = SimulatedDisk::default();
+    let exchange = Exchange::on(&whole);
+    whole.set_fault(None);
+    exchange.run().unwrap();
+    let operations = whole.operations();
+    assert!(operations > 8, "{operations} operations");
+    let (mut before, mut after) = (0, 0);
+    for at in 0..=operations {
+        for fault in [Fault::Crash(at), Fault::Fails(at)] {
+            let disk = SimulatedDisk::default();
+            let exchange = Exchange::on(&disk);
+            disk.set_fault(Some(fault));
+            let exchanged = exchange.run();
+            disk.set_fault(None);
+            if matches!(fault, Fault::Fails(_)) {
+                // Whatever came of it, the old map goes on where it is.
+                commit(&exchange.old_folder, &exchange.old, 20);
+            }
+            for seed in 0..10 {
+                let what = format!("{fault:?}, seed {seed}");
+                let disk = disk.after_crash(seed);
+                let maps = found(&disk);
+                let names: Vec<&MapName> = maps.iter().map(|(name, _)| name).collect();
+                let contents = |i: usize| maps[i].1.map.contents();
+                if names == [&office()] {
+                    assert!(exchanged.is_err(), "{what}: the exchange was acknowledged");
+                    assert!(contents(0) == exchange.old.contents(), "{what}: another map");
+                    before += 1;
+                } else {
+                    assert_eq!(names, [&office(), &kept()], "{what}");
+                    assert!(contents(0) == exchange.new.contents(), "{what}: not the new map");
+                    assert!(contents(1) == exchange.old.contents(), "{what}: not the old map");
+                    after += 1;
+                }
+                drop(maps);
+                assert_eq!(found(&disk).len(), data_dir(&disk).names().unwrap().len(), "{what}, and again");
+            }
+        }
+    }
+    assert!(before > 20 && after > 20, "{before} before, {after} after");
+}
+
+#[test]
+fn a_folder_of_a_former_release_gets_its_uuid_and_loses_nothing() {
+    let disk = SimulatedDisk::default();
+    let (data, map, uuid) = (data_dir(&disk), empty(), Uuid::new_v4());
+    let folder = data.create(&office(), &Snapshot::of(&map, uuid)).unwrap();
+    (0..3).for_each(|i| commit(&folder, &map, i));
+    let maps = Path::new("data/maps");
+    disk.rename(&maps.join(format!("office.{uuid}")), &maps.join("office")).unwrap();
+    disk.sync(maps).unwrap();
+    for at in 0..4 {
+        let disk = disk.copy();
+        disk.set_fault(Some(Fault::Crash(at)));
+        drop(data_dir(&disk).map(&office(), &OpeningProgress::default()));
+        for seed in 0..10 {
+            let disk = disk.after_crash(seed);
+            let maps = found(&disk);
+            assert_eq!((maps.len(), &maps[0].0, maps[0].1.uuid), (1, &office(), uuid));
+            assert!(maps[0].1.map.contents() == map.contents());
+            assert_eq!(disk.list(Path::new("data/maps")).unwrap(), [format!("office.{uuid}")]);
+        }
+    }
+}
+
+#[test]
+fn two_folders_of_one_name_are_reported_with_both_named() {
+    let disk = SimulatedDisk::default();
+    let data = data_dir(&disk);
+    data.create(&office(), &Snapshot::of(&empty(), Uuid::from_u128(1))).unwrap();
+    disk.create_folder(Path::new("data/maps/office")).unwrap();
+    let error = data.map(&office(), &OpeningProgress::default()).unwrap_err().to_string();
+    assert!(error.contains("data/maps/office,") || error.contains("data/maps/office and"), "{error}");
+    assert!(error.contains(&format!("office.{}", Uuid::from_u128(1))), "{error}");
+    assert_eq!(data.names().unwrap(), [office()]);
+    assert!(data.create(&office(), &Snapshot::of(&empty(), Uuid::new_v4())).is_err());
+}
+
+#[test]
+fn a_map_takes_no_more_changes_than_there_are_revisions() {
+    let disk = SimulatedDisk::default();
+    let data = data_dir(&disk);
+    let contents = MapContents::at(REVISION_MAX - 1, VoxelSet::default());
+    let map = MultiResolutionMap::restore(MapSettings::new(0.1, 5), contents).unwrap();
+    let folder = data.create(&office(), &Snapshot::of(&map, Uuid::new_v4())).unwrap();
+    commit(&folder, &map, 1);
+    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+    let more = Change::Insertion(ScanRecord::of_voxels(pose, VoxelSet::default()));
+    let refused = folder.append(&[&Record::of(&more).unwrap()]).unwrap_err();
+    assert!(matches!(refused, StoreError::RevisionsUsedUp(REVISION_MAX)), "{refused}");
+    let opened = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();
+    assert!(opened.map.contents() == map.contents(), "the last acknowledged change is lost");
+}
+
+#[test]
+fn what_undo_alone_needs_is_bounded_in_bytes_and_stays_while_it_is_read() {
+    let disk = SimulatedDisk::default();
+    let settings = StoreSettings { undo_bytes_max: 4000, ..StoreSettings::default() };
+    let data = DataDir::on(Arc::new(disk.clone()), Path::new("data"), settings).unwrap();
+    let (map, uuid) = (empty(), Uuid::new_v4());
+    let folder = data.create(&office(), &Snapshot::of(&map, uuid)).unwrap();
+    let grow = |from: i32| {
+        (from..from + 10).for_each(|i| commit(&folder, &map, i));
+        folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+    };
+    grow(0);
+    let scan = folder.used().undo_from;
+    let reading = folder.observations(&[scan], &[], StopSignal::NEVER).unwrap().unwrap();
+    (1..20).for_each(|i| grow(i * 10));
+    assert_eq!(folder.used().undo_from, scan, "what is read went");
+    let mut reading = reading;
+    folder.observe(&mut reading, StopSignal::NEVER).unwrap();
+    assert_eq!(reading.revision, 200);
+    drop(reading);
+    grow(200);
+    let reach = folder.used().undo_from;
+    assert!(reach > 100 && reach < 200, "undo reaches back to {reach}");
+    assert!(folder.give_up_undo().unwrap());
+    assert_eq!(folder.used().undo_from, 201);
+    assert!(!folder.give_up_undo().unwrap());
+    drop((folder, data));
+    let opened = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();
+    assert!(opened.map.contents() == map.contents());
+}
+
+#[test]
+fn an_opening_that_nobody_wants_any_more_ends() {
+    let disk = SimulatedDisk::default();
+    let data = data_dir(&disk);
+    data.create(&office(), &Snapshot::of(&empty(), Uuid::new_v4())).unwrap();
+    let progress = OpeningProgress::default();
+    progress.cancel();
+    assert!(matches!(data.map(&office(), &progress), Err(StoreError::Cancelled)));
 }

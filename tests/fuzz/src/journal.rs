@@ -180,7 +180,12 @@ pub(super) fn with_record(record: &[u8]) -> Result<OpenedMap, StoreError> {
 fn open(disk: &SimulatedDisk) -> Result<OpenedMap, StoreError> {
     let opened = data_dir(disk).map(&name(), &OpeningProgress::default());
     opened.inspect_err(|error| {
-        let clear = matches!(error, StoreError::Damaged { .. } | StoreError::JournalDamaged { .. });
+        let clear = matches!(
+            error,
+            StoreError::Damaged { .. }
+                | StoreError::JournalDamaged { .. }
+                | StoreError::RevisionsMissing { .. }
+        );
         assert!(clear, "{error}");
     })
 }
@@ -194,7 +199,7 @@ fn name() -> MapName {
 }
 
 fn path(file: &str) -> PathBuf {
-    Path::new("data/maps/office").join(file)
+    Path::new("data/maps").join(format!("office.{MAP}")).join(file)
 }
 
 fn read(disk: &SimulatedDisk, file: &str) -> Vec<u8> {
