@@ -6,8 +6,10 @@ mod connection;
 mod endpoint;
 mod entrance;
 mod error;
+mod expiry;
 mod files;
 mod gauges;
+mod handshakes;
 mod housekeeping;
 mod open_files;
 mod places;
@@ -42,6 +44,7 @@ use crate::telemetry::{MeteredService, Metrics};
 use crate::{grpc, http};
 use accepting::{Accepting, TcpSocket};
 use endpoint::Endpoint;
+use files::Warnings;
 use gauges::SystemGauges;
 use housekeeping::keep_house;
 use protocol::Protocol;
@@ -91,7 +94,8 @@ impl Server {
         let settings = ServiceSettings { gauges: Some(gauges), ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let progress = Arc::new(OpeningProgress::default());
-        let starting = Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits);
+        let routes = http::starting(Arc::clone(&progress), access.clone());
+        let starting = Starting::serve(&http, tls.clone(), routes, &config.limits);
         let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
         starting.end().await;
         let service = opened
@@ -137,7 +141,11 @@ impl Server {
 
     /// The files that are read again while it runs.
     pub fn files(&self) -> ReloadedFiles {
-        ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone())
+        let warnings = Warnings {
+            keys: self.config.access.expiry_warning(),
+            certificates: self.config.tls.expiry_warning(),
+        };
+        ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone(), warnings)
     }
 
     /// Serves until `shutdown`, then goes down: refuses what is new, waits `drain_seconds` at most for what is in
@@ -163,7 +171,8 @@ impl Server {
         measure(&service).await;
         let mut accepting = self.accept(&grpc, &http);
         let watching = tokio::spawn(watch(service.clone(), admission));
-        let housekeeping = tokio::spawn(keep_house(service.clone(), files, lifecycle.clone()));
+        let looking = tokio::spawn(files.look_after(lifecycle.clone()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {
@@ -186,6 +195,8 @@ impl Server {
         }
         // It ends by itself when draining begins; waiting keeps its last saving apart from the one below.
         let _ended = tokio::join!(housekeeping, watching);
+        // A file system that hangs does not keep the server from ending.
+        looking.abort();
         let maps = service.maps().save().await.map_err(ServerError::Save)?;
         tracing::info!(maps, "saved, ending");
         ended

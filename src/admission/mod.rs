@@ -93,9 +93,9 @@ impl Admission {
             let response = handle(request).await?;
             return Ok(response.map(|body| Body::new(HeldBody::new(body, None, place))));
         }
-        if let Some(rates) = &self.0.rates {
-            rates.check(&Asking::of(request.extensions()))?;
-        }
+        let asking = Asking::of(request.extensions());
+        self.check_rate(&asking)?;
+        let own_place = asking.begin()?;
         let hang_up = request.extensions().get().cloned();
         let arrival = self.0.bodies.begin(operation.is_stream(), hang_up)?;
         let request = Self::metered(request, &arrival)?;
@@ -106,7 +106,7 @@ impl Admission {
         if held.is_some() {
             drop(arrival.take());
         }
-        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, held)))))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held)))))
     }
 
     /// Lets the next message of a stream in.
@@ -114,7 +114,7 @@ impl Admission {
     /// # Errors
     /// `ResourceExhausted` when the caller asks too often.
     pub fn check_rate(&self, asking: &Asking) -> Result<(), ServiceError> {
-        self.0.rates.as_ref().map_or(Ok(()), |rates| rates.check(asking))
+        asking.check_rate(self.0.rates.as_ref())
     }
 
     /// Whether the server is going down.

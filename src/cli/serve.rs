@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::error::CliError;
 use super::output::Output;
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, unknown_variables};
 use crate::server::{Server, exit_when_told, reload_on_hangup, shutdown_signal};
 use crate::telemetry::start_logging;
 
@@ -101,6 +101,9 @@ impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
         start_logging(config.log.format, &config.log.level).map_err(CliError::usage)?;
+        for variable in unknown_variables() {
+            tracing::warn!(variable, "is no setting and of no use here");
+        }
         let server = Server::bind(config).await?;
         let mut shutdown = pin!(shutdown_signal());
         // Heard from now on: who reads the addresses may send the signal right away.

@@ -30,7 +30,7 @@ pub(super) struct Endpoint {
     pub(super) builder: Arc<Builder<TokioExecutor>>,
     pub(super) closing: CancellationToken,
     pub(super) cut: CancellationToken,
-    tls: Option<Tls>,
+    pub(super) tls: Option<Tls>,
     places: Places,
     tasks: TaskTracker,
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use axum::Router;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
@@ -11,8 +12,6 @@ use super::endpoint::Endpoint;
 use super::protocol::Protocol;
 use super::tls::Tls;
 use crate::config::LimitsConfig;
-use crate::http;
-use crate::store::OpeningProgress;
 
 /// Answers until the maps are open.
 pub(super) struct Starting {
@@ -22,13 +21,8 @@ pub(super) struct Starting {
 
 impl Starting {
     /// Begins to answer at `socket`.
-    pub(super) fn serve(
-        socket: &TcpSocket,
-        tls: Option<Tls>,
-        progress: Arc<OpeningProgress>,
-        limits: &LimitsConfig,
-    ) -> Self {
-        let endpoint = Endpoint::new(Protocol::Http, http::starting(progress), tls, limits);
+    pub(super) fn serve(socket: &TcpSocket, tls: Option<Tls>, routes: Router, limits: &LimitsConfig) -> Self {
+        let endpoint = Endpoint::new(Protocol::Http, routes, tls, limits);
         let socket = Accepting::Tcp(Arc::clone(&socket.listener));
         let accepting = tokio::spawn(endpoint.clone().accept(socket));
         Self { endpoint, accepting }
