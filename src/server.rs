@@ -6,8 +6,10 @@ mod connection;
 mod endpoint;
 mod entrance;
 mod error;
+mod expiry;
 mod files;
 mod gauges;
+mod handshakes;
 mod housekeeping;
 mod open_files;
 mod places;
@@ -43,6 +45,7 @@ use crate::telemetry::{MeteredService, Metrics};
 use crate::{grpc, http};
 use accepting::{Accepting, TcpSocket};
 use endpoint::Endpoint;
+use files::Warnings;
 use gauges::SystemGauges;
 use housekeeping::keep_house;
 use protocol::Protocol;
@@ -97,8 +100,8 @@ impl Server {
         let progress = Arc::new(OpeningProgress::default());
         tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
         let metrics = Metrics::new()?;
-        let starting =
-            Starting::serve(&http, tls.clone(), Arc::clone(&progress), &config.limits, metrics.clone());
+        let routes = http::starting(Arc::clone(&progress), access.clone());
+        let starting = Starting::serve(&http, tls.clone(), routes, &config.limits, metrics.clone());
         let _until_open = CancelOpening(Arc::clone(&progress));
         let opened = tokio::task::spawn_blocking(move || MapService::open(settings, &progress)).await;
         starting.end().await;
@@ -145,7 +148,11 @@ impl Server {
 
     /// The files that are read again while it runs.
     pub fn files(&self) -> ReloadedFiles {
-        ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone())
+        let warnings = Warnings {
+            keys: self.config.access.expiry_warning(),
+            certificates: self.config.tls.expiry_warning(),
+        };
+        ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone(), warnings)
     }
 
     /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what
@@ -191,7 +198,8 @@ impl Server {
         }
         let mut accepting = self.accept(&grpc, &http);
         let watching = tokio::spawn(watch(service.clone(), admission));
-        let housekeeping = tokio::spawn(keep_house(service.clone(), files, lifecycle.clone()));
+        let looking = tokio::spawn(files.look_after(lifecycle.clone()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {
@@ -220,6 +228,8 @@ impl Server {
             grpc.cut();
             http.cut();
         }
+        // A file system that hangs does not keep the server from ending.
+        looking.abort();
         let saving = async {
             // They end by themselves when draining begins; waiting keeps the last saving of the one apart from this.
             let _ended = tokio::join!(housekeeping, watching);

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::Key;
-use crate::service::{ErrorCode, MapReach, ServiceError};
+use super::{Allowance, Key};
+use crate::service::{MapReach, ScanReach, ServiceError};
 
 /// Who asks for something: the holder of a key, or anybody.
 #[derive(Debug, Clone)]
@@ -33,11 +33,47 @@ impl Caller {
         &self.reach
     }
 
+    /// The scans that the caller may send and undo.
+    pub fn scans(&self) -> ScanReach {
+        self.key.as_ref().map(|key| key.scan_reach()).unwrap_or_default()
+    }
+
+    /// What is left of the bounds of the caller's key.
+    pub fn allowance(&self) -> Option<&Arc<Allowance>> {
+        self.key.as_ref().map(|key| &key.allowance)
+    }
+
+    /// True of the holder of a key, which may end.
+    pub fn has_key(&self) -> bool {
+        self.key.is_some()
+    }
+
     /// Waits until the caller's key counts no longer: what was begun with it, and goes on and on, ends with this.
-    pub async fn withdrawn(&self) -> ServiceError {
-        let Some(key) = &self.key else { return std::future::pending().await };
-        key.withdrawn.cancelled().await;
-        let message = format!("key {} was withdrawn or changed", key.name);
-        ServiceError::new(ErrorCode::Unauthenticated, "key_withdrawn", message)
+    pub fn withdrawn(&self) -> impl Future<Output = ServiceError> + Send + 'static {
+        let key = self.key.clone();
+        async move {
+            let Some(key) = key else { return std::future::pending().await };
+            key.end.token().cancelled().await;
+            key.ended()
+        }
+    }
+
+    /// What comes of `work` while the caller's key counts.
+    ///
+    /// # Errors
+    /// Those of `work`; `Unauthenticated` as soon as the key counts no longer: the work is dropped, as it is where its
+    /// client has gone.
+    pub async fn while_valid<T>(
+        &self,
+        work: impl Future<Output = Result<T, ServiceError>>,
+    ) -> Result<T, ServiceError> {
+        if !self.has_key() {
+            return work.await;
+        }
+        tokio::select! {
+            biased;
+            ended = self.withdrawn() => Err(ended),
+            done = work => done,
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Where every request comes in.
 
 use axum::http::header::AUTHORIZATION;
-use axum::http::{Extensions, HeaderMap};
+use axum::http::{Extensions, HeaderMap, Request};
 
 use super::{Access, Caller, Operation, Secret};
 use crate::service::{ErrorCode, ServiceError};
@@ -46,16 +46,25 @@ impl Gate {
     /// Lets a request in. The secret is taken out of its headers, so that nothing further in can show it.
     ///
     /// # Errors
-    /// `Unauthenticated` and `PermissionDenied`, as [`Access::authorize`] says.
-    pub fn authorize(
+    /// `Unauthenticated` and `PermissionDenied`, as [`Access::authorize`] and [`Access::check_site`] say.
+    pub fn authorize<B>(
         &self,
         operation: Operation,
-        headers: &mut HeaderMap,
+        request: &mut Request<B>,
     ) -> Result<Authorized, ServiceError> {
-        let secret = taken_from(headers);
+        let secret = taken_from(request.headers_mut());
+        self.access.check_site(operation, request)?;
         let caller = self.access.authorize(operation, secret.as_ref())?;
-        let service = self.service.limited_to(caller.reach().clone());
+        let service = self.service.limited_to(caller.reach().clone(), caller.scans());
         Ok(Authorized { caller, service })
+    }
+
+    /// Asks whether a request that is for no operation names this server.
+    ///
+    /// # Errors
+    /// `PermissionDenied` where it does not.
+    pub fn check_host<B>(&self, request: &Request<B>) -> Result<(), ServiceError> {
+        self.access.check_host(request)
     }
 
     /// Where requests are counted.

@@ -1,38 +1,143 @@
 //! A key: who holds it, and what it is for.
 
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
+use std::time::SystemTime;
+
 use tokio_util::sync::CancellationToken;
 
-use super::{Digest, Scope};
-use crate::service::MapReach;
+use super::{Allowance, Digest, Expiry, KeyLimits, Scope};
+use crate::map::RobotName;
+use crate::service::{ErrorCode, MapReach, ScanReach, ServiceError};
 
 /// Characters of a key's name, at most.
 const NAME_LENGTH_MAX: usize = 64;
 
 /// Who a key was made for: 1 to 64 of `[A-Za-z0-9_.-]`, fit for a log line and a metric's label.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct KeyName(std::sync::Arc<str>);
+pub struct KeyName(Arc<str>);
 
-/// A key as the server knows it.
+/// A key as the server knows it: a secret's hash and what it opens.
 #[derive(Debug)]
 pub struct Key {
     pub(super) name: KeyName,
     pub(super) digest: Digest,
     pub(super) scope: Scope,
     pub(super) reach: MapReach,
-    /// Set when it counts no longer.
-    pub(super) withdrawn: CancellationToken,
+    pub(super) robots: Option<Arc<BTreeSet<RobotName>>>,
+    pub(super) expires: Option<Expiry>,
+    pub(super) allowance: Arc<Allowance>,
+    pub(super) end: Arc<End>,
 }
 
+/// The end of a key, which what was begun with it waits for.
+#[derive(Debug, Default)]
+pub(super) struct End {
+    token: CancellationToken,
+    reason: OnceLock<Ended>,
+}
+
+/// Why a key counts no longer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ended {
+    Withdrawn,
+    Expired,
+}
+
+/// The reason of a refusal where a key's time is up.
+pub(super) const KEY_EXPIRED: &str = "key_expired";
+
 impl Key {
-    /// A key that counts.
+    /// A key that counts, for every robot and for ever.
     pub fn new(name: KeyName, digest: Digest, scope: Scope, reach: MapReach) -> Self {
-        Self { name, digest, scope, reach, withdrawn: CancellationToken::new() }
+        Self {
+            name,
+            digest,
+            scope,
+            reach,
+            robots: None,
+            expires: None,
+            allowance: Arc::new(Allowance::new(KeyLimits::default())),
+            end: Arc::default(),
+        }
     }
 
-    /// True where both open the same to the same.
+    /// The same for the scans of `robots` alone.
+    pub fn for_robots(self, robots: impl IntoIterator<Item = RobotName>) -> Self {
+        Self { robots: Some(Arc::new(robots.into_iter().collect())), ..self }
+    }
+
+    /// The same until `expires`.
+    pub fn until(self, expires: Expiry) -> Self {
+        Self { expires: Some(expires), ..self }
+    }
+
+    /// The same with bounds of its own.
+    pub fn with_limits(self, limits: KeyLimits) -> Self {
+        Self { allowance: Arc::new(Allowance::new(limits)), ..self }
+    }
+
+    /// The same for another secret, with an end of its own: during a rotation both count.
+    pub(super) fn former(&self, digest: Digest, expires: Option<Expiry>) -> Self {
+        Self {
+            name: self.name.clone(),
+            digest,
+            scope: self.scope,
+            reach: self.reach.clone(),
+            robots: self.robots.clone(),
+            expires: [self.expires, expires].into_iter().flatten().min(),
+            allowance: Arc::clone(&self.allowance),
+            end: Arc::default(),
+        }
+    }
+
+    /// True where both open the same to the same; until when, and how often, may differ.
     pub(super) fn is_same_as(&self, other: &Self) -> bool {
-        (&self.name, self.digest, self.scope, &self.reach)
-            == (&other.name, other.digest, other.scope, &other.reach)
+        (&self.name, self.digest, self.scope, &self.reach, &self.robots)
+            == (&other.name, other.digest, other.scope, &other.reach, &other.robots)
+    }
+
+    /// Whose scans its holder may send and undo.
+    pub(super) fn scan_reach(&self) -> ScanReach {
+        ScanReach { robots: self.robots.clone(), undo_of_others: self.scope >= Scope::Write }
+    }
+
+    /// True where its time is up at `now`.
+    pub(super) fn is_expired(&self, now: SystemTime) -> bool {
+        self.expires.is_some_and(|expires| expires.is_past(now))
+    }
+
+    /// Why nobody gets in with it any more, where that is so at `now`.
+    pub(super) fn expired(&self, now: SystemTime) -> Option<ServiceError> {
+        let expires = self.expires.filter(|_| self.is_expired(now))?;
+        let message = format!("key {} expired at {expires}: ask for a new one", self.name);
+        Some(ServiceError::new(ErrorCode::Unauthenticated, KEY_EXPIRED, message))
+    }
+
+    /// What to tell whoever was let in with it when it ended.
+    pub(super) fn ended(&self) -> ServiceError {
+        let (reason, what) = match self.end.reason.get() {
+            Some(Ended::Expired) => (KEY_EXPIRED, "expired"),
+            Some(Ended::Withdrawn) | None => ("key_withdrawn", "was withdrawn or changed"),
+        };
+        ServiceError::new(ErrorCode::Unauthenticated, reason, format!("key {} {what}", self.name))
+    }
+}
+
+impl End {
+    /// Ends what was begun with the key.
+    pub(super) fn come(&self, reason: Ended) {
+        // The first reason is the one.
+        let _ = self.reason.set(reason);
+        self.token.cancel();
+    }
+
+    pub(super) fn has_come(&self) -> bool {
+        self.token.is_cancelled()
+    }
+
+    pub(super) fn token(&self) -> &CancellationToken {
+        &self.token
     }
 }
 

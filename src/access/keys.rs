@@ -2,11 +2,13 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, SystemTime};
 
 use subtle::ConditionallySelectable;
 
+use super::key::Ended;
 use super::key_file::{self, KeyFileError};
-use super::{Key, Secret};
+use super::{Expiry, Key, KeyName, Secret};
 use crate::reload::is_open_to_others;
 
 /// All keys of a file.
@@ -28,10 +30,9 @@ impl Keys {
 
     fn after(former: Option<&Self>, keys: Vec<Key>) -> Self {
         let former = former.map(|keys| keys.0.as_slice()).unwrap_or_default();
-        let kept = |key: &Key| former.iter().find(|other| other.is_same_as(key)).cloned();
-        let keys: Vec<_> = keys.into_iter().map(|key| kept(&key).unwrap_or_else(|| Arc::new(key))).collect();
-        let gone = former.iter().filter(|key| !keys.iter().any(|other| Arc::ptr_eq(key, other)));
-        gone.for_each(|key| key.withdrawn.cancel());
+        let keys: Vec<_> = keys.into_iter().map(|key| Arc::new(continued(key, former))).collect();
+        let gone = former.iter().filter(|key| !keys.iter().any(|other| Arc::ptr_eq(&key.end, &other.end)));
+        gone.for_each(|key| key.end.come(Ended::Withdrawn));
         Self(keys)
     }
 
@@ -45,7 +46,19 @@ impl Keys {
         self.0.get(place as usize).cloned()
     }
 
-    /// How many there are.
+    /// Ends what was begun with keys whose time is up at `now`; to be called every second or so.
+    pub(super) fn end_expired(&self, now: SystemTime) {
+        let expired = self.0.iter().filter(|key| key.is_expired(now));
+        expired.for_each(|key| key.end.come(Ended::Expired));
+    }
+
+    /// The keys whose time is up at `now` or within `warning`, with their ends.
+    pub(super) fn expiring(&self, now: SystemTime, warning: Duration) -> Vec<(KeyName, Expiry)> {
+        let ends = self.0.iter().filter_map(|key| Some((key.name.clone(), key.expires?)));
+        ends.filter(|(_, expires)| expires.is_near(now, warning)).collect()
+    }
+
+    /// How many there are, the former secrets of keys that are being rotated among them.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -54,6 +67,16 @@ impl Keys {
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
+}
+
+/// The same key as it was before, where it was there: what was begun with it goes on, and what its limits have left
+/// stays.
+fn continued(key: Key, former: &[Arc<Key>]) -> Key {
+    let same = former.iter().find(|other| other.is_same_as(&key) && !other.end.has_come());
+    let end = same.map_or_else(|| Arc::clone(&key.end), |same| Arc::clone(&same.end));
+    let alike = |other: &&Arc<Key>| other.name == key.name && other.allowance.limits == key.allowance.limits;
+    let allowance = former.iter().find(alike).map(|other| Arc::clone(&other.allowance));
+    Key { end, allowance: allowance.unwrap_or_else(|| Arc::clone(&key.allowance)), ..key }
 }
 
 #[cfg(test)]
@@ -80,10 +103,29 @@ mod tests {
         let keys = |second| vec![key("a", "1", Scope::Read), key("b", "2", second)];
         let former = Keys::after(None, keys(Scope::Admin));
         let same = Keys::after(Some(&former), keys(Scope::Admin));
-        assert!(same.0.iter().zip(&former.0).all(|(new, old)| Arc::ptr_eq(new, old)));
+        assert!(same.0.iter().zip(&former.0).all(|(new, old)| Arc::ptr_eq(&new.end, &old.end)));
         let less = Keys::after(Some(&same), keys(Scope::Write));
-        assert!(!less.0[0].withdrawn.is_cancelled() && former.0[1].withdrawn.is_cancelled());
+        assert!(!less.0[0].end.has_come() && former.0[1].end.has_come());
         Keys::after(Some(&less), Vec::new());
-        assert!(former.0[0].withdrawn.is_cancelled());
+        assert!(former.0[0].end.has_come());
+    }
+
+    #[test]
+    fn a_key_that_is_prolonged_goes_on_and_one_whose_time_is_up_ends_with_that_reason() {
+        let until = |text| vec![key("a", "1", Scope::Read).until(Expiry::parse(text).unwrap())];
+        let first = Keys::after(None, until("2027-01-31"));
+        let longer = Keys::after(Some(&first), until("2027-02-28"));
+        assert!(!first.0[0].end.has_come() && Arc::ptr_eq(&first.0[0].allowance, &longer.0[0].allowance));
+        let at = |s| SystemTime::UNIX_EPOCH + Duration::from_secs(s);
+        longer.end_expired(at(1_801_353_600));
+        assert!(!first.0[0].end.has_come());
+        longer.end_expired(at(1_803_772_800));
+        assert!(first.0[0].end.has_come());
+        assert_eq!(first.0[0].ended().reason, "key_expired");
+        // Prolonged after its end it is another beginning.
+        let again = Keys::after(Some(&longer), until("2028-01-31"));
+        assert!(!again.0[0].end.has_come());
+        assert_eq!(longer.expiring(at(0), Duration::from_secs(1)), []);
+        assert_eq!(longer.expiring(at(1_803_772_790), Duration::from_secs(10)).len(), 1);
     }
 }

@@ -1,9 +1,13 @@
 //! Who may do what: the operations, the scope that each takes, and the keys that callers show.
 //!
 //! A request passes two checks. [`Gate::authorize`] asks, before anything of its body is read, whether the caller's key
-//! is for the operation; the service that it hands out then refuses every map that the key is not for.
+//! is for the operation, and whether a page of another site may be behind it; the service that it hands out then refuses
+//! every map and every robot that the key is not for.
 
+mod allowance;
+mod answer;
 mod caller;
+mod expiry;
 mod gate;
 mod key;
 mod key_file;
@@ -12,13 +16,18 @@ mod operation;
 mod rules;
 mod scope;
 mod secret;
+mod site;
 
+pub use allowance::{Allowance, InWork, KeyLimits};
+pub use answer::{Ending, revocable};
 pub use caller::Caller;
+pub use expiry::Expiry;
 pub use gate::{Authorized, Gate};
 pub use key::{Key, KeyName};
-pub use key_file::{KeyFileError, add_to_file, to_toml};
+pub use key_file::{KeyEntry, KeyFileError, add_to_file, list_file, revoke_in_file, rotate_in_file, to_toml};
 pub use keys::Keys;
 pub use operation::{Operation, Route};
 pub use rules::{Access, KEY_UNKNOWN};
 pub use scope::Scope;
 pub use secret::{Digest, Secret};
+pub use site::{CROSS_SITE, HOST_NOT_ALLOWED, ReachedAt, is_host};

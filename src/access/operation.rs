@@ -4,7 +4,7 @@
 //! answered, so nothing can be served without a rule.
 
 use super::Scope;
-use super::Scope::{Admin, Read, Write};
+use super::Scope::{Admin, Insert, Read, Write};
 
 /// Where HTTP has an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,17 +53,17 @@ macro_rules! operations {
     };
 }
 
-// A scope of `None` asks for no key.
+// A scope of `None` asks for no key. Of undo, `Insert` covers that of named robots' scans: the service asks for the rest.
 operations! {
     QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
     ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
-    InsertScan:        Some(Write), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
-    InsertScanStream:  Some(Write), grpc "/mrol.v1.Mapping/InsertScanStream";
+    InsertScan:        Some(Insert), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
+    InsertScanStream:  Some(Insert), grpc "/mrol.v1.Mapping/InsertScanStream";
     AlignScan:         Some(Read),  grpc "/mrol.v1.Mapping/AlignScan",           http POST "/v1/maps/{map}/alignment";
     Localize:          Some(Read),  grpc "/mrol.v1.Mapping/Localize",            http POST "/v1/maps/{map}/localize";
     DeleteVoxels:      Some(Write), grpc "/mrol.v1.Mapping/DeleteVoxels",        http POST "/v1/maps/{map}/deletions";
-    UndoScans:         Some(Write), grpc "/mrol.v1.Mapping/UndoScans",           http POST "/v1/maps/{map}/undo";
+    UndoScans:         Some(Insert), grpc "/mrol.v1.Mapping/UndoScans",           http POST "/v1/maps/{map}/undo";
     GetTrajectory:     Some(Read),  grpc "/mrol.v1.Mapping/GetTrajectory",       http GET "/v1/maps/{map}/trajectory";
     CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";
     GetMap:            Some(Read),  grpc "/mrol.v1.Maps/GetMap",                 http GET "/v1/maps/{map}";
@@ -88,6 +88,11 @@ impl Operation {
     /// The least scope of a key that may ask for it; none where no key is needed.
     pub fn scope(self) -> Option<Scope> {
         self.row().scope
+    }
+
+    /// True for what changes maps.
+    pub fn is_change(self) -> bool {
+        self.scope().is_some_and(|scope| scope > Read)
     }
 
     /// The path of the gRPC call.

@@ -2,8 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, SystemTime};
 
-use super::{Caller, Key, KeyFileError, Keys, Operation, Scope, Secret};
+use axum::http::Request;
+
+use super::site::{Hosts, check_origin};
+use super::{Caller, Expiry, Key, KeyFileError, KeyName, Keys, Operation, Scope, Secret};
 use crate::reload::Reloaded;
 use crate::service::{ErrorCode, MapReach, ServiceError};
 
@@ -14,12 +18,19 @@ pub struct Access {
     keys: Option<Arc<Reloaded<Keys, KeyFileError>>>,
     /// Whether [`Operation::Metrics`] asks for no key.
     metrics_open: bool,
+    /// The names that it answers to where there are no keys.
+    hosts: Hosts,
 }
 
 impl Access {
     /// Anybody who can connect may do anything.
     pub fn open() -> Self {
-        Self { keys: None, metrics_open: true }
+        Self { keys: None, metrics_open: true, hosts: Hosts::default() }
+    }
+
+    /// The same for requests to these names as well, where there are no keys.
+    pub fn at_hosts<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
+        Self { hosts: Hosts::new(names), ..self }
     }
 
     /// The holders of a file's keys may do what the keys are for.
@@ -29,12 +40,44 @@ impl Access {
     pub fn by_keys_of(file: &Path, metrics_open: bool) -> Result<Self, KeyFileError> {
         let path: PathBuf = file.to_owned();
         let keys = Reloaded::new(vec![path.clone()], move |former| Keys::read(&path, former))?;
-        Ok(Self { keys: Some(Arc::new(keys)), metrics_open })
+        Ok(Self { keys: Some(Arc::new(keys)), metrics_open, hosts: Hosts::default() })
     }
 
     /// The keys, where there are any.
     pub fn keys(&self) -> Option<&Reloaded<Keys, KeyFileError>> {
         self.keys.as_deref()
+    }
+
+    /// Asks whether a browser may have sent a request for `operation` without its user's knowledge. Where keys are asked
+    /// for, no other site can show one, so that names do not matter.
+    ///
+    /// # Errors
+    /// `PermissionDenied` with `host_not_allowed` or `cross_site`.
+    pub fn check_site<B>(&self, operation: Operation, request: &Request<B>) -> Result<(), ServiceError> {
+        if self.keys.is_none() {
+            self.hosts.check(request)?;
+        }
+        if operation.is_change() { check_origin(request) } else { Ok(()) }
+    }
+
+    /// Asks whether a request names this server, as [`Access::check_site`] does.
+    ///
+    /// # Errors
+    /// `PermissionDenied` with `host_not_allowed`.
+    pub fn check_host<B>(&self, request: &Request<B>) -> Result<(), ServiceError> {
+        if self.keys.is_none() { self.hosts.check(request) } else { Ok(()) }
+    }
+
+    /// Ends what was begun with keys whose time is up at `now`.
+    pub fn end_expired(&self, now: SystemTime) {
+        if let Some(keys) = &self.keys {
+            keys.current().end_expired(now);
+        }
+    }
+
+    /// The keys whose time is up at `now` or within `warning`, with their ends.
+    pub fn expiring(&self, now: SystemTime, warning: Duration) -> Vec<(KeyName, Expiry)> {
+        self.keys.as_ref().map(|keys| keys.current().expiring(now, warning)).unwrap_or_default()
     }
 
     /// Says who the holder of `secret` is, if that is somebody who may ask for `operation`.
@@ -50,9 +93,13 @@ impl Access {
         }
         let key = secret.and_then(|secret| keys.current().find(secret));
         let Some(scope) = operation.scope() else {
+            let key = key.filter(|key| !key.is_expired(SystemTime::now()));
             return Ok(key.map_or_else(|| Caller::without_key(MapReach::none()), Caller::with));
         };
         let key = key.ok_or_else(|| no_key(operation, secret.is_some()))?;
+        if let Some(refusal) = key.expired(SystemTime::now()) {
+            return Err(refusal);
+        }
         check_scope(operation, scope, &key)?;
         check_reach(operation, &key)?;
         Ok(Caller::with(key))

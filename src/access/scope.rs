@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 pub enum Scope {
     /// Everything that changes nothing.
     Read,
-    /// Changes of what maps hold: scans, deletions, undo.
+    /// Scans, and undo of the scans of its own robots.
+    Insert,
+    /// Changes of what maps hold: deletions, undo of anything.
     Write,
     /// Making, restoring and deleting maps.
     Admin,
@@ -18,12 +20,13 @@ pub enum Scope {
 
 impl Scope {
     /// All, the least first.
-    pub const ALL: [Self; 3] = [Self::Read, Self::Write, Self::Admin];
+    pub const ALL: [Self; 4] = [Self::Read, Self::Insert, Self::Write, Self::Admin];
 
     /// Its word in files, errors and on the command line.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Read => "read",
+            Self::Insert => "insert",
             Self::Write => "write",
             Self::Admin => "admin",
         }

@@ -113,9 +113,9 @@ impl Admission {
             return self.0.probes.answer(operation, request, handle).await;
         }
         let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
-        if let Some(rates) = &self.0.rates {
-            rates.check(&Asking::of(request.extensions()))?;
-        }
+        let asking = Asking::of(request.extensions());
+        self.check_rate(&asking)?;
+        let own_place = asking.begin()?;
         let hang_up = request.extensions().get().cloned();
         let arrival = self.0.bodies.begin(operation.is_stream(), hang_up)?;
         let request = Self::metered(request, &arrival)?;
@@ -127,7 +127,7 @@ impl Admission {
         if held.is_some() {
             drop(arrival.take());
         }
-        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, held, kept)))))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held, kept)))))
     }
 
     /// Notes that a key came by a connection, and keeps to health what was taken for it.
@@ -153,7 +153,7 @@ impl Admission {
     /// # Errors
     /// `ResourceExhausted` when the caller asks too often.
     pub fn check_rate(&self, asking: &Asking) -> Result<(), ServiceError> {
-        self.0.rates.as_ref().map_or(Ok(()), |rates| rates.check(asking))
+        asking.check_rate(self.0.rates.as_ref())
     }
 
     /// Whether the server is going down.

@@ -2,6 +2,7 @@
 
 use std::net::IpAddr;
 use std::num::NonZeroU32;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::http::Extensions;
@@ -10,7 +11,7 @@ use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 
 use super::limits::AdmissionLimits;
-use crate::access::Authorized;
+use crate::access::{Allowance, Authorized, InWork};
 use crate::service::ServiceError;
 
 /// Where a request came from; whom it counts for where there is no key.
@@ -32,24 +33,46 @@ impl std::fmt::Display for Peer {
 }
 
 /// Whom a request counts for: the name of its key, or where there is none the place that it came from.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Asking(String);
+#[derive(Debug, Clone)]
+pub struct Asking {
+    name: String,
+    /// The bounds of its key.
+    own: Option<Arc<Allowance>>,
+}
 
 impl Asking {
     /// As a request's extensions say.
     pub fn of(request: &Extensions) -> Self {
-        let key = request.get::<Authorized>().and_then(|authorized| authorized.caller.name());
-        Self(match (key, request.get::<Peer>()) {
+        let caller = request.get::<Authorized>().map(|authorized| &authorized.caller);
+        let name = match (caller.and_then(|caller| caller.name()), request.get::<Peer>()) {
             (Some(key), _) => format!("key {key}"),
             (None, Some(peer)) => peer.to_string(),
             (None, None) => "somebody".into(),
-        })
+        };
+        Self { name, own: caller.and_then(|caller| caller.allowance()).cloned() }
+    }
+
+    /// Counts a request by the rate of the caller's key, or by `rates` where it has none.
+    ///
+    /// # Errors
+    /// When the caller asks too often.
+    pub(super) fn check_rate(&self, rates: Option<&Rates>) -> Result<(), ServiceError> {
+        let own = self.own.as_ref().and_then(|own| own.check_rate(&self.name));
+        own.unwrap_or_else(|| rates.map_or(Ok(()), |rates| rates.check(self)))
+    }
+
+    /// Takes a place among those of the caller's key.
+    ///
+    /// # Errors
+    /// When all are taken.
+    pub(super) fn begin(&self) -> Result<InWork, ServiceError> {
+        self.own.as_ref().map_or(Ok(None), |own| own.begin(&self.name))
     }
 }
 
 /// Counts requests by caller.
 pub(super) struct Rates {
-    limiter: RateLimiter<Asking, HashMapStateStore<Asking>, DefaultClock>,
+    limiter: RateLimiter<String, HashMapStateStore<String>, DefaultClock>,
     per_s_max: NonZeroU32,
 }
 
@@ -65,11 +88,11 @@ impl Rates {
     /// # Errors
     /// When the caller asks too often; the error says when to come again.
     pub(super) fn check(&self, asking: &Asking) -> Result<(), ServiceError> {
-        self.limiter.check_key(asking).map_err(|not_yet| {
+        self.limiter.check_key(&asking.name).map_err(|not_yet| {
             let wait = not_yet.wait_time_from(DefaultClock::default().now());
             let message = format!(
                 "caller_requests_per_s_max is {}: {} asks more often, try again in {wait:.1?}",
-                self.per_s_max, asking.0
+                self.per_s_max, asking.name
             );
             ServiceError::overloaded(message).retry_after(wait.max(Duration::from_millis(1)))
         })

@@ -1,6 +1,10 @@
 //! `mrol key`: keys for callers.
 
+mod change;
+mod list;
+
 use std::fmt::{self, Display};
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use clap::{Subcommand, ValueEnum};
@@ -9,24 +13,27 @@ use serde::Serialize;
 use super::error::CliError;
 use super::output::Output;
 use super::parse;
-use crate::access::{Key, KeyName, Scope, Secret, add_to_file, to_toml};
-use crate::map::MapName;
+use crate::access::{Expiry, Key, KeyLimits, KeyName, Scope, Secret, add_to_file, to_toml};
+use crate::map::{MapName, RobotName};
 use crate::service::MapReach;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol key new --name planner --scope read --file keys.toml
-  mrol key new --name r1 --scope write --maps hall,office --file keys.toml
+  mrol key new --name r1 --scope insert --maps hall,office --robots r1 --expires 2027-01-31 --file keys.toml
+  mrol key list --file keys.toml                 every key, without its secret, which nobody knows any more
+  mrol key rotate --name r1 --file keys.toml     another secret; the former one counts for 24 hours more
+  mrol key revoke --name r1 --file keys.toml     what was begun with it ends
   mrol serve --keys-file keys.toml               asks for keys, and reads the file again when it changes
   MROL_KEY=mrol_... mrol maps list               shows one; or --key-file FILE, --key SECRET
 
-read: everything that changes nothing. write: scans, deletions and undo as well. admin: makes, restores and deletes maps
-as well.
+read: everything that changes nothing. insert: scans, and undo of the scans of its robots as well. write: deletions and
+undo of anything as well. admin: makes, restores and deletes maps as well.
 
-The secret is printed once and kept nowhere: the file holds its hash. To take a key back, take its table out of the
-file; what was begun with it ends.";
+The secret is printed once and kept nowhere: the file holds its hash. A file is changed as a whole and by one command at a
+time; comments in it stay.";
 
-/// Make keys for callers of the server
+/// Make, list, rotate and revoke the keys of callers of the server
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Keys {
@@ -38,6 +45,12 @@ pub(super) struct Keys {
 enum Action {
     /// Make a key, and print its secret
     New(NewKey),
+    /// Print what each key is for, and until when
+    List(list::ListKeys),
+    /// Take a key out of its file
+    Revoke(change::RevokeKey),
+    /// Give a key another secret, and print that
+    Rotate(change::RotateKey),
 }
 
 #[derive(Debug, clap::Args)]
@@ -51,6 +64,21 @@ struct NewKey {
     /// The maps that it is for, separated by commas [default: every map]
     #[arg(long, value_name = "MAPS", value_delimiter = ',', value_parser = parse::map_name)]
     maps: Option<Vec<MapName>>,
+    /// The robots whose scans it sends and undoes, separated by commas [default: every robot]
+    #[arg(long, value_name = "ROBOTS", value_delimiter = ',', value_parser = robot)]
+    robots: Option<Vec<RobotName>>,
+    /// Until when it counts: 2027-01-31 or 2027-01-31T12:00:00Z [default: for ever]
+    #[arg(long, value_name = "TIME", value_parser = expiry)]
+    expires: Option<Expiry>,
+    /// Requests a second of its holder [default: limits.caller_requests_per_s_max of the server]
+    #[arg(long, value_name = "N")]
+    requests_per_s_max: Option<NonZeroU32>,
+    /// As many may come at once [default: 100]
+    #[arg(long, value_name = "N", requires = "requests_per_s_max")]
+    burst_max: Option<NonZeroU32>,
+    /// Requests of its holder in work at a time [default: any number]
+    #[arg(long, value_name = "N")]
+    requests_at_once_max: Option<NonZeroU32>,
     /// The file of keys to add it to [default: it is printed]
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
@@ -59,6 +87,7 @@ struct NewKey {
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum ScopeName {
     Read,
+    Insert,
     Write,
     Admin,
 }
@@ -71,33 +100,59 @@ struct Made {
     sha256: String,
     scope: Scope,
     maps: Option<Vec<String>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robots: Option<Vec<String>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expires: Option<String>,
     #[serde(skip)]
     toml: Option<String>,
 }
 
 impl Keys {
     pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
-        let Action::New(new) = self.action;
-        new.run(output)
+        match self.action {
+            Action::New(new) => new.run(output),
+            Action::List(list) => list.run(output),
+            Action::Revoke(revoke) => revoke.run(output),
+            Action::Rotate(rotate) => rotate.run(output),
+        }
     }
 }
 
 impl NewKey {
     fn run(self, output: &Output) -> Result<(), CliError> {
         let secret = Secret::random().map_err(CliError::failed)?;
-        let (digest, scope) = (secret.digest(), self.scope.into());
-        let reach = self.maps.clone().map_or(MapReach::Every, MapReach::from_iter);
-        let key = Key::new(self.name.clone(), digest, scope, reach);
+        let key = self.key(&secret);
         if let Some(file) = &self.file {
             add_to_file(file, &key).map_err(CliError::failed)?;
         }
         output.print(&Made {
             name: self.name.to_string(),
             secret: secret.reveal().to_owned(),
-            sha256: digest.to_string(),
-            scope,
+            sha256: secret.digest().to_string(),
+            scope: self.scope.into(),
             maps: self.maps.map(|maps| maps.iter().map(ToString::to_string).collect()),
+            robots: self.robots.map(|robots| robots.iter().map(|robot| robot.as_str().to_owned()).collect()),
+            expires: self.expires.map(|expires| expires.to_string()),
             toml: self.file.is_none().then(|| to_toml(&key)),
+        })
+    }
+
+    fn key(&self, secret: &Secret) -> Key {
+        let reach = self.maps.clone().map_or(MapReach::Every, MapReach::from_iter);
+        let key = Key::new(self.name.clone(), secret.digest(), self.scope.into(), reach);
+        let key = match &self.robots {
+            Some(robots) => key.for_robots(robots.iter().cloned()),
+            None => key,
+        };
+        let key = match self.expires {
+            Some(expires) => key.until(expires),
+            None => key,
+        };
+        key.with_limits(KeyLimits {
+            requests_per_s_max: self.requests_per_s_max,
+            burst_max: self.burst_max,
+            requests_at_once_max: self.requests_at_once_max,
         })
     }
 }
@@ -113,6 +168,7 @@ impl From<ScopeName> for Scope {
     fn from(name: ScopeName) -> Self {
         match name {
             ScopeName::Read => Self::Read,
+            ScopeName::Insert => Self::Insert,
             ScopeName::Write => Self::Write,
             ScopeName::Admin => Self::Admin,
         }
@@ -121,4 +177,14 @@ impl From<ScopeName> for Scope {
 
 fn name(text: &str) -> Result<KeyName, String> {
     KeyName::new(text).ok_or_else(|| format!("a name is 1 to 64 of [A-Za-z0-9_.-], got {text:?}"))
+}
+
+fn robot(text: &str) -> Result<RobotName, String> {
+    RobotName::new(text).map_err(|error| error.to_string())
+}
+
+fn expiry(text: &str) -> Result<Expiry, String> {
+    Expiry::parse(text).ok_or_else(|| {
+        format!("a time is 2027-01-31 or, with its offset, 2027-01-31T12:00:00Z, got {text:?}")
+    })
 }

@@ -133,6 +133,19 @@ mod tests {
     }
 
     #[test]
+    fn variables_of_options_are_told_from_settings() {
+        fn variables(command: &clap::Command, found: &mut std::collections::BTreeSet<String>) {
+            let names = command.get_arguments().filter_map(|argument| argument.get_env());
+            found.extend(names.map(|name| name.to_string_lossy().into_owned()));
+            command.get_subcommands().for_each(|command| variables(command, found));
+        }
+        let mut found = std::collections::BTreeSet::new();
+        variables(&CommandLine::command(), &mut found);
+        let known = crate::config::VARIABLES_OF_COMMANDS.iter().map(|name| format!("MROL_{name}"));
+        assert_eq!(found, known.collect());
+    }
+
+    #[test]
     fn every_command_says_what_it_does_and_shows_examples() {
         for command in CommandLine::command().get_subcommands() {
             assert!(command.get_about().is_some(), "{}", command.get_name());

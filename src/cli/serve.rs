@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::error::CliError;
 use super::output::Output;
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, unknown_variables};
 use crate::server::{Hangups, Server, exit_after, exit_when_told, shutdown_signal};
 use crate::telemetry::start_logging;
 
@@ -104,6 +104,9 @@ impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
         start_logging(config.log.format, &config.log.level).map_err(CliError::usage)?;
+        for variable in unknown_variables() {
+            tracing::warn!(variable, "is no setting and of no use here");
+        }
         let (hangups, mut shutdown) = (Hangups::hear(), pin!(shutdown_signal()));
         // The signal is heard from now on. The thread that opens maps is left behind then, wherever it is: nothing was
         // acknowledged, and what it writes is whole or not there.

@@ -31,6 +31,24 @@ pub enum ConfigError {
         /// The one that is.
         by: &'static str,
     },
+    /// Two settings that mean opposite things.
+    #[error("{one} and {other} contradict each other: set one of them")]
+    Contradiction {
+        /// The one.
+        one: &'static str,
+        /// The other.
+        other: &'static str,
+    },
+    /// A variable that would be a setting if it were spelled otherwise.
+    #[error(
+        "variable {name} is no setting: a section and its setting are joined by two underscores, {meant}"
+    )]
+    Variable {
+        /// As it is.
+        name: String,
+        /// As it must be.
+        meant: String,
+    },
     /// Numbers of a robot's table that make no filter.
     #[error("robots.{name}: {error}")]
     Robot {

@@ -10,6 +10,7 @@ mod scans;
 mod store;
 mod threads;
 mod tls;
+mod variables;
 
 pub use access::AccessConfig;
 pub use error::ConfigError;
@@ -21,6 +22,9 @@ pub use scans::{AlignmentConfig, MethodConfig, RobotConfig};
 pub use store::StoreConfig;
 pub use threads::ThreadsConfig;
 pub use tls::TlsConfig;
+#[cfg(test)]
+pub(crate) use variables::OF_COMMANDS as VARIABLES_OF_COMMANDS;
+pub use variables::unknown_variables;
 
 use std::collections::BTreeMap;
 use std::net::Ipv4Addr;
@@ -34,9 +38,6 @@ use serde::{Deserialize, Serialize};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::service::{ServiceSettings, StandingSettings};
-
-/// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
-const VARIABLE_PREFIX: &str = "MROL_";
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: u64 = 3600;
@@ -103,12 +104,15 @@ impl Config {
     /// was not given) do not count.
     ///
     /// A variable counts when it names a setting at the top (`MROL_DATA_DIR`) or holds the `__` between section
-    /// and key (`MROL_HTTP__LISTEN`). Others are left alone: container platforms set names such as
-    /// `MROL_SERVICE_HOST` for every service called mrol.
+    /// and key (`MROL_HTTP__LISTEN`). One that would be a setting with `__` in place of `_` is refused. Others are left
+    /// alone, since container platforms set names such as `MROL_SERVICE_HOST` for every service called mrol; what
+    /// nobody is known to set, [`unknown_variables`] lists.
     ///
     /// # Errors
-    /// For a key that is none, a value of the wrong kind or out of range, or a file that is not there.
+    /// For a key that is none, a value of the wrong kind or out of range, a file that is not there, or a variable that
+    /// is spelled wrong.
     pub fn load(file: Option<&Path>, overrides: impl Serialize) -> Result<Self, ConfigError> {
+        variables::check(variables::of_environment())?;
         let mut figment = Figment::from(Serialized::defaults(Self::default()));
         if let Some(file) = file {
             if !file.is_file() {
@@ -119,8 +123,11 @@ impl Config {
         let overrides = serde_json::to_value(overrides)
             .map_err(|error| ConfigError::Value(Box::new(error.to_string().into())))?;
         let given = Serialized::globals(without_nulls(overrides));
-        let config: Self =
-            figment.merge(variables()).merge(given).extract().map_err(|e| ConfigError::Value(Box::new(e)))?;
+        let config: Self = figment
+            .merge(settings_of_environment())
+            .merge(given)
+            .extract()
+            .map_err(|e| ConfigError::Value(Box::new(e)))?;
         config.checked()
     }
 
@@ -148,6 +155,8 @@ impl Config {
             return range("drain_delay_s", "0 to 3600", self.drain_delay_s.to_string());
         }
         self.limits.check()?;
+        self.access.check()?;
+        access::check_warning("tls.expiry_warning_days", self.tls.expiry_warning_days)?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
         }
@@ -192,10 +201,9 @@ impl Config {
 }
 
 /// The variables that mean this program; see [`Config::load`].
-fn variables() -> Env {
-    let top = ["data_dir", "drain_seconds", "drain_delay_s"];
-    Env::prefixed(VARIABLE_PREFIX)
-        .filter(move |key| key.as_str().contains("__") || top.iter().any(|name| key == *name))
+fn settings_of_environment() -> Env {
+    Env::prefixed(variables::PREFIX)
+        .filter(|key| key.as_str().contains("__") || variables::TOP.iter().any(|name| key == *name))
         .split("__")
 }
 
@@ -278,6 +286,26 @@ mod tests {
         let error = delay(3601).unwrap_err().to_string();
         assert!(error.contains("drain_delay_s must be 0 to 3600, got 3601"), "{error}");
         assert_eq!(Config::default().drain_delay_s, 0);
+    }
+
+    #[test]
+    fn access_is_open_or_by_keys_and_answers_to_hosts() {
+        let error = |toml| load(toml, json!({})).unwrap_err().to_string();
+        let both = error("[access]\nopen = true\nkeys_file = \"k\"");
+        assert!(both.contains("access.open") && both.contains("access.keys_file"), "{both}");
+        assert!(load("[access]\nopen = false\nkeys_file = \"k\"", json!({})).is_ok());
+        let host = error("[access]\nhosts = [\"mrol\", \"mrol:7333\"]");
+        assert!(
+            host.contains("access.hosts must be names or addresses without ports, got \"mrol:7333\""),
+            "{host}"
+        );
+        assert!(load("[access]\nhosts = [\"mrol\", \"10.0.0.1\"]", json!({})).is_ok());
+        for section in ["access", "tls"] {
+            let days = |days| load(&format!("[{section}]\nexpiry_warning_days = {days}"), json!({}));
+            let refused = days(3651).unwrap_err().to_string();
+            assert!(refused.contains("expiry_warning_days must be 0 to 3650, got 3651"), "{refused}");
+            assert!(days(3650).is_ok() && days(0).is_ok());
+        }
     }
 
     #[test]

@@ -6,16 +6,18 @@ use std::time::Instant;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::{Request, State};
+use axum::http::HeaderMap;
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::Response;
 use tonic::{Code, Status};
+use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, RequestId, SetRequestIdLayer};
 use tracing::Instrument;
 
 use super::inflation::{Compressed, Inflation};
 use super::timely_body::TimelyBody;
 use super::whole_messages::WholeMessages;
-use super::{deadline, status};
-use crate::access::{Authorized, Gate, Operation};
+use super::{deadline, not_grpc, status};
+use crate::access::{Authorized, Gate, Operation, revocable};
 use crate::admission::Admission;
 use crate::service::{ErrorCode, ServiceError};
 
@@ -34,19 +36,24 @@ pub(super) struct Around {
 impl Around {
     /// Wraps the services' routes.
     pub(super) fn wrap(self, routes: Router) -> Router {
-        routes.layer(from_fn_with_state(self, call))
+        routes
+            .layer(from_fn_with_state(self, call))
+            .layer(PropagateRequestIdLayer::x_request_id())
+            .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
     }
 
     /// Gives the call what its handler works with, if its caller may ask for it.
     fn authorized(&self, operation: Operation, call: &mut Request) -> Result<Operation, Status> {
-        let authorized = self.gate.authorize(operation, call.headers_mut())?;
+        let authorized = self.gate.authorize(operation, call)?;
         call.extensions_mut().insert(authorized);
         Ok(operation)
     }
 
     async fn answer(&self, operation: Operation, mut call: Request, next: Next) -> Response {
-        let key = call.extensions().get::<Authorized>().and_then(|authorized| authorized.caller.name());
-        let span = tracing::info_span!("grpc", operation = operation.name(), key);
+        let authorized = call.extensions().get::<Authorized>().cloned();
+        let key = authorized.as_ref().and_then(|authorized| authorized.caller.name());
+        let id = call.extensions().get::<RequestId>().and_then(|id| id.header_value().to_str().ok());
+        let span = tracing::info_span!("grpc", operation = operation.name(), request_id = id, key);
         if let Some(key) = key {
             self.gate.metrics().key_used("grpc", key);
         }
@@ -58,7 +65,14 @@ impl Around {
             let call = call.map(|body| Body::new(WholeMessages::new(body, self.message_bytes_max)));
             deadline::within(deadline, self.inflation.within(compressed, next.run(call)))
         };
-        let answer = self.admission.answer(operation, call, handle).instrument(span).await;
+        let answer = self.admission.answer(operation, call, handle);
+        let answer = match &authorized {
+            Some(Authorized { caller, .. }) => {
+                let answer = caller.while_valid(answer).instrument(span).await;
+                answer.map(|response| revocable(response, caller, trailers_of))
+            }
+            None => answer.instrument(span).await,
+        };
         let response = answer.unwrap_or_else(|refusal| Status::from(refusal).into_http());
         match Status::from_header_map(response.headers()) {
             Some(refused) => status::of_request(refused, self.message_bytes_max).into_http(),
@@ -89,6 +103,15 @@ impl Around {
 
 async fn call(State(around): State<Around>, mut request: Request, next: Next) -> Response {
     let start = Instant::now();
+    if let Some(refusal) = not_grpc::refusal(&request) {
+        around.gate.metrics().request(
+            "grpc",
+            "unknown",
+            refusal.status().as_str().to_owned(),
+            start.elapsed(),
+        );
+        return refusal;
+    }
     let operation = Operation::of_call(request.uri().path());
     // Whatever a client may send, it is one of few.
     let name = operation.map_or("unknown", Operation::name);
@@ -105,6 +128,14 @@ async fn call(State(around): State<Around>, mut request: Request, next: Next) ->
     }
     tracing::debug!(operation = name, code = status::label(code), elapsed = ?start.elapsed(), "grpc call");
     response
+}
+
+/// The status of a call that failed after a part of its answer was sent.
+fn trailers_of(error: ServiceError) -> Option<HeaderMap> {
+    let mut trailers = HeaderMap::new();
+    // Without a status the client takes the call for cut, which it is.
+    let _ = Status::from(error).add_header(&mut trailers);
+    Some(trailers)
 }
 
 /// True for calls whose requests are counted one by one where they are answered, and not here.

@@ -5,6 +5,7 @@ mod deadline;
 mod inflation;
 mod mapping;
 mod maps;
+mod not_grpc;
 mod occupancy;
 mod status;
 mod stream;

@@ -11,7 +11,7 @@ use tower_http::request_id::RequestId;
 use tracing::Instrument;
 
 use super::error::{self, HttpError, Reason};
-use crate::access::{Authorized, Gate, Operation};
+use crate::access::{Authorized, Gate, Operation, revocable};
 use crate::admission::Admission;
 use crate::telemetry::MeteredService;
 
@@ -24,7 +24,7 @@ pub(super) struct Around {
 
 pub(super) async fn request(State(around): State<Around>, mut request: Request, next: Next) -> Response {
     let start = Instant::now();
-    let operation = operation(&request);
+    let operation = around.operation(&request);
     // Whatever a client may send, it is one of few.
     let name = operation.as_ref().map_or("unknown", |operation| operation.name());
     let response = match operation.and_then(|operation| around.authorized(operation, &mut request)) {
@@ -43,12 +43,22 @@ pub(super) async fn request(State(around): State<Around>, mut request: Request, 
 impl Around {
     /// Gives the request what its handler works with, if its caller may ask for it.
     fn authorized(&self, operation: Operation, request: &mut Request) -> Result<Operation, HttpError> {
-        let authorized = self.gate.authorize(operation, request.headers_mut())?;
+        let authorized = self.gate.authorize(operation, request)?;
         request.extensions_mut().insert(authorized);
         Ok(operation)
     }
 
+    /// What the request asks for, or the answer where that is nothing there is.
+    fn operation(&self, request: &Request) -> Result<Operation, HttpError> {
+        let asked = operation(request);
+        if asked.is_err() {
+            self.gate.check_host(request)?;
+        }
+        asked
+    }
+
     async fn answer(&self, operation: Operation, request: Request, next: Next) -> Response {
+        let authorized = request.extensions().get::<Authorized>().cloned();
         let id = request.extensions().get::<RequestId>().and_then(|id| id.header_value().to_str().ok());
         let key = request.extensions().get::<Authorized>().and_then(|authorized| authorized.caller.name());
         let span = tracing::info_span!("http", operation = operation.name(), request_id = id, key);
@@ -56,7 +66,15 @@ impl Around {
             self.gate.metrics().key_used("http", key);
         }
         let handle = async |request| Ok(next.run(request).await);
-        let answer = self.admission.answer(operation, request, handle).instrument(span).await;
+        let answer = self.admission.answer(operation, request, handle);
+        let answer = match &authorized {
+            Some(Authorized { caller, .. }) => {
+                // HTTP has no word for an answer that ends early: it is cut.
+                let answer = caller.while_valid(answer).instrument(span).await;
+                answer.map(|response| revocable(response, caller, |_| None))
+            }
+            None => answer.instrument(span).await,
+        };
         answer.unwrap_or_else(|refusal| HttpError::from(refusal).into_response())
     }
 }

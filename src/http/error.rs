@@ -7,7 +7,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-use crate::access::{KEY_UNKNOWN, Operation};
+use crate::access::{HOST_NOT_ALLOWED, KEY_UNKNOWN, Operation};
 use crate::admission;
 use crate::service::{ErrorCode, ServiceError, Shortage};
 
@@ -39,6 +39,7 @@ fn status_of(code: ErrorCode) -> (StatusCode, &'static str) {
 impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
         let status = match error.reason {
+            HOST_NOT_ALLOWED => StatusCode::MISDIRECTED_REQUEST,
             admission::BODY_SILENT => StatusCode::REQUEST_TIMEOUT,
             Shortage::DISK_FULL => StatusCode::INSUFFICIENT_STORAGE,
             Shortage::MEMORY_FULL => StatusCode::SERVICE_UNAVAILABLE,
@@ -91,7 +92,7 @@ impl Reason {
 /// What an unknown caller is to show (RFC 6750, section 3): there is an error only where something was shown.
 fn challenge(reason: &str) -> HeaderValue {
     HeaderValue::from_static(match reason {
-        KEY_UNKNOWN => "Bearer realm=\"mrol\", error=\"invalid_token\"",
+        KEY_UNKNOWN | "key_expired" | "key_withdrawn" => "Bearer realm=\"mrol\", error=\"invalid_token\"",
         _ => "Bearer realm=\"mrol\"",
     })
 }

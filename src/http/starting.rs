@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use axum::extract::State;
+use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Json, Router};
@@ -12,16 +13,26 @@ use serde_json::json;
 use super::error::HttpError;
 use super::parameters::NoParameters;
 use super::probes;
+use crate::access::Access;
 use crate::service::{ErrorCode, ServiceError};
 use crate::store::{Opened, OpeningProgress};
 
 /// The routes of a server that is starting.
-pub fn starting(progress: Arc<OpeningProgress>) -> Router {
+pub fn starting(progress: Arc<OpeningProgress>, access: Access) -> Router {
     Router::new()
         .route("/livez", get(probes::live))
         .route("/readyz", get(ready))
         .fallback(refuse)
+        .layer(from_fn_with_state(access, named))
         .with_state(progress)
+}
+
+/// Answers what names this server.
+async fn named(State(access): State<Access>, request: Request, next: Next) -> Response {
+    match access.check_host(&request) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => HttpError::from(refusal).into_response(),
+    }
 }
 
 /// `GET /readyz`: 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.

@@ -13,6 +13,7 @@ use super::ServerError;
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::stream::Stream;
+use crate::access::ReachedAt;
 use crate::admission::Peer;
 use crate::wire::transport::KEEPALIVE_INTERVAL;
 
@@ -34,6 +35,8 @@ pub(super) enum Accepting {
 pub(super) struct Accepted {
     pub(super) stream: Stream,
     pub(super) peer: Peer,
+    /// None where the system does not say.
+    pub(super) at: Option<ReachedAt>,
 }
 
 /// A TCP address that is listened on; a clone is another handle on the same socket.
@@ -74,11 +77,13 @@ impl Accepting {
             Self::Tcp(listener) => {
                 let (stream, from) = listener.accept().await?;
                 prepare(&stream);
-                Ok(Accepted { stream: Box::new(stream), peer: Peer::Address(from.ip()) })
+                let at = stream.local_addr().ok().map(|at| ReachedAt::Address(at.ip()));
+                Ok(Accepted { stream: Box::new(stream), peer: Peer::Address(from.ip()), at })
             }
             Self::Unix(UnixSocket { listener, .. }) => {
                 let (stream, _) = listener.accept().await?;
-                Ok(Accepted { stream: Box::new(stream), peer: Peer::Local })
+                let at = Some(ReachedAt::UnixSocket);
+                Ok(Accepted { stream: Box::new(stream), peer: Peer::Local, at })
             }
         }
     }

@@ -1,6 +1,7 @@
 //! One connection, from its first byte to its last.
 
 use std::convert::Infallible;
+use std::fmt::Display;
 use std::pin::pin;
 use std::time::Duration;
 
@@ -40,17 +41,18 @@ impl Endpoint {
     }
 
     async fn serve_open(&self, accepted: Accepted, tls: Option<TlsAcceptor>, place: &Place) {
-        let Accepted { stream, peer } = accepted;
+        let Accepted { stream, peer, at } = accepted;
         let stream = match timeout(self.bounds.opening_max, secure(stream, tls)).await {
             Ok(Ok(stream)) => stream,
-            Ok(Err(error)) => {
-                tracing::debug!(protocol = self.protocol.as_str(), %error, "a connection could not be secured");
-                return;
-            }
-            Err(_) => return,
+            Ok(Err(error)) => return self.not_secured(peer, &error),
+            Err(_) => return self.not_secured(peer, &"it did not come in time"),
         };
         let (stream, bytes_read) = Counted::new(stream);
-        let service = service_fn(|request| answer(self.router.clone(), place.clone(), peer, request));
+        let service = service_fn(|mut request: Request<Incoming>| {
+            request.extensions_mut().insert(peer);
+            at.map(|at| request.extensions_mut().insert(at));
+            answer(self.router.clone(), place.clone(), request)
+        });
         let mut connection = pin!(self.builder.serve_connection(TokioIo::new(stream), service));
         tokio::select! {
             _ = &mut connection => return,
@@ -63,6 +65,13 @@ impl Endpoint {
             // What goes wrong with a connection, its client sees; there is nobody else to tell.
             _ = connection => {}
             () = lingering(place) => {}
+        }
+    }
+
+    /// A handshake has failed, for a reason that the client's end may not show.
+    fn not_secured(&self, peer: Peer, why: &dyn Display) {
+        if let Some(tls) = &self.tls {
+            tls.failures().add(self.protocol, peer, why);
         }
     }
 
@@ -85,11 +94,9 @@ async fn lingering(place: &Place) {
 async fn answer(
     router: Router,
     place: Place,
-    peer: Peer,
     mut request: Request<Incoming>,
 ) -> Result<Response<Body>, Infallible> {
     let used = place.used();
-    request.extensions_mut().insert(peer);
     request.extensions_mut().insert(HangUp(place.hang_up()));
     request.extensions_mut().insert(place.shared());
     let response = router.oneshot(request).await?;

@@ -32,7 +32,7 @@ pub(super) struct Endpoint {
     pub(super) closing: CancellationToken,
     pub(super) cut: CancellationToken,
     metrics: Metrics,
-    tls: Option<Tls>,
+    pub(super) tls: Option<Tls>,
     places: Places,
     tasks: TaskTracker,
 }

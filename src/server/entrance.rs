@@ -11,7 +11,8 @@ use crate::config::{AccessConfig, Config};
 /// # Errors
 /// When the keys cannot be read, or there are none, other machines could connect and nobody said that this is meant.
 pub(super) fn access(config: &Config) -> Result<Access, ServerError> {
-    let AccessConfig { keys_file, open, open_metrics } = &config.access;
+    let AccessConfig { keys_file, open, open_metrics, hosts, .. } = &config.access;
+    let everybody = || Access::open().at_hosts(hosts.iter().map(String::as_str));
     let others_connect = |address: &SocketAddr| !address.ip().to_canonical().is_loopback();
     let listeners = [("http", config.http.listen), ("grpc", config.grpc.listen)];
     let reachable = listeners.into_iter().find(|(_, address)| others_connect(address));
@@ -28,9 +29,9 @@ pub(super) fn access(config: &Config) -> Result<Access, ServerError> {
         (None, Some((protocol, address))) if !open => Err(ServerError::Unguarded { protocol, address }),
         (None, Some((protocol, address))) => {
             tracing::warn!(protocol, %address, "whoever reaches this address may do everything: there are no keys");
-            Ok(Access::open())
+            Ok(everybody())
         }
-        (None, None) => Ok(Access::open()),
+        (None, None) => Ok(everybody()),
     }
 }
 

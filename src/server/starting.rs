@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use axum::Router;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
@@ -11,8 +12,6 @@ use super::endpoint::Endpoint;
 use super::protocol::Protocol;
 use super::tls::Tls;
 use crate::config::LimitsConfig;
-use crate::http;
-use crate::store::OpeningProgress;
 use crate::telemetry::Metrics;
 
 /// Answers until the maps are open.
@@ -26,11 +25,11 @@ impl Starting {
     pub(super) fn serve(
         socket: &TcpSocket,
         tls: Option<Tls>,
-        progress: Arc<OpeningProgress>,
+        routes: Router,
         limits: &LimitsConfig,
         metrics: Metrics,
     ) -> Self {
-        let endpoint = Endpoint::new(Protocol::Http, http::starting(progress), tls, limits, metrics);
+        let endpoint = Endpoint::new(Protocol::Http, routes, tls, limits, metrics);
         let socket = Accepting::Tcp(Arc::clone(&socket.listener));
         let accepting = tokio::spawn(endpoint.clone().accept(socket));
         Self { endpoint, accepting }

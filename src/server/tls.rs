@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::crypto::{CryptoProvider, ring};
@@ -10,7 +11,9 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::server::danger::ClientCertVerifier;
 use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
 use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
+use x509_parser::parse_x509_certificate;
 
+use super::handshakes::FailedHandshakes;
 use super::protocol::Protocol;
 use crate::config::TlsConfig;
 use crate::reload::{Reloaded, is_open_to_others};
@@ -38,12 +41,25 @@ pub enum TlsError {
 
 /// What TCP connections are secured with. A clone is another handle on the same certificates.
 #[derive(Debug, Clone)]
-pub(super) struct Tls(Arc<Reloaded<Certificates, TlsError>>);
+pub(super) struct Tls {
+    files: Arc<Reloaded<Certificates, TlsError>>,
+    failures: Arc<FailedHandshakes>,
+}
 
 /// As they were when the files were last read; connections that were made with former ones go on.
 pub(super) struct Certificates {
     http: TlsAcceptor,
     grpc: TlsAcceptor,
+    expiries: Vec<Expiry>,
+}
+
+/// When the first certificate of a file expires.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Expiry {
+    /// Which of the settings names the file.
+    pub(super) setting: &'static str,
+    /// Seconds since 1970 in UTC.
+    pub(super) timestamp_s: i64,
 }
 
 impl Tls {
@@ -60,17 +76,27 @@ impl Tls {
         let (certificate, key, client_ca) = (certificate.clone(), key.clone(), settings.client_ca.clone());
         let read =
             move |_: Option<&Certificates>| Certificates::read(&certificate, &key, client_ca.as_deref());
-        Ok(Some(Self(Arc::new(Reloaded::new(files, read)?))))
+        Ok(Some(Self { files: Arc::new(Reloaded::new(files, read)?), failures: Arc::default() }))
     }
 
     /// The files, to be read again.
     pub(super) fn files(&self) -> &Reloaded<Certificates, TlsError> {
-        &self.0
+        &self.files
+    }
+
+    /// The handshakes that failed.
+    pub(super) fn failures(&self) -> &FailedHandshakes {
+        &self.failures
+    }
+
+    /// When the certificates in force expire.
+    pub(super) fn expiries(&self) -> Vec<Expiry> {
+        self.files.current().expiries.clone()
     }
 
     /// What a new connection is secured with.
     pub(super) fn acceptor(&self, protocol: Protocol) -> TlsAcceptor {
-        let certificates = self.0.current();
+        let certificates = self.files.current();
         match protocol {
             Protocol::Http => certificates.http.clone(),
             Protocol::Grpc => certificates.grpc.clone(),
@@ -85,8 +111,9 @@ impl Certificates {
         }
         let provider = Arc::new(ring::default_provider());
         let chain = certificates_of("tls.certificate", certificate)?;
+        let mut expiries = vec![Expiry::of("tls.certificate", &chain)];
         let key = PrivateKeyDer::from_pem_file(key).map_err(in_file("tls.key", key))?;
-        let verifier = client_ca.map(|path| verifier(path, &provider)).transpose()?;
+        let verifier = client_ca.map(|path| verifier(path, &provider, &mut expiries)).transpose()?;
         let config = ServerConfig::builder_with_provider(provider)
             .with_safe_default_protocol_versions()
             .map_err(TlsError::Certificate)?;
@@ -100,14 +127,39 @@ impl Certificates {
             config.alpn_protocols = protocols.iter().map(|protocol| protocol.as_bytes().to_vec()).collect();
             TlsAcceptor::from(Arc::new(config))
         };
-        Ok(Self { http: speaking(&["h2", "http/1.1"]), grpc: speaking(&["h2"]) })
+        let expiries = expiries.into_iter().flatten().collect();
+        Ok(Self { http: speaking(&["h2", "http/1.1"]), grpc: speaking(&["h2"]), expiries })
+    }
+}
+
+impl Expiry {
+    /// That of the certificate which expires first; none where none can be read, which rustls says in its own words.
+    fn of(setting: &'static str, certificates: &[CertificateDer<'_>]) -> Option<Self> {
+        let not_after = |certificate: &CertificateDer<'_>| {
+            let (_, certificate) = parse_x509_certificate(certificate).ok()?;
+            Some(certificate.validity().not_after.timestamp())
+        };
+        let timestamp_s = certificates.iter().filter_map(not_after).min()?;
+        Some(Self { setting, timestamp_s })
+    }
+
+    /// Seconds from `now` until then; less than none where it has expired.
+    pub(super) fn in_s(self, now: SystemTime) -> i64 {
+        let since_1970 = now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        self.timestamp_s.saturating_sub(since_1970.as_secs().try_into().unwrap_or(i64::MAX))
     }
 }
 
 /// Refuses clients without a certificate that one of the file's has signed.
-fn verifier(path: &Path, provider: &Arc<CryptoProvider>) -> Result<Arc<dyn ClientCertVerifier>, TlsError> {
+fn verifier(
+    path: &Path,
+    provider: &Arc<CryptoProvider>,
+    expiries: &mut Vec<Option<Expiry>>,
+) -> Result<Arc<dyn ClientCertVerifier>, TlsError> {
     let mut roots = RootCertStore::empty();
-    for certificate in certificates_of("tls.client_ca", path)? {
+    let certificates = certificates_of("tls.client_ca", path)?;
+    expiries.push(Expiry::of("tls.client_ca", &certificates));
+    for certificate in certificates {
         roots.add(certificate).map_err(|error| problem("tls.client_ca", path, error))?;
     }
     Ok(WebPkiClientVerifier::builder_with_provider(Arc::new(roots), Arc::clone(provider)).build()?)

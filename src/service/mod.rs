@@ -19,6 +19,7 @@ mod pool;
 mod reach;
 mod request;
 mod room;
+mod scan_reach;
 mod settings;
 mod shortage;
 mod undo;
@@ -38,6 +39,7 @@ pub use request::{
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, UnavailableMap, Undo,
     UndoAnswer, UndoTarget, VoxelListing,
 };
+pub use scan_reach::ScanReach;
 pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
 pub use shortage::Shortage;
 pub use watermarks::Marks;
@@ -60,6 +62,7 @@ use room::Room;
 pub struct MapService {
     inner: Arc<Inner>,
     reach: MapReach,
+    scans: ScanReach,
 }
 
 #[derive(Debug)]
@@ -93,12 +96,13 @@ impl MapService {
             room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
             settings,
         };
-        Ok(Self { inner: Arc::new(inner), reach: MapReach::Every })
+        Ok(Self { inner: Arc::new(inner), reach: MapReach::Every, scans: ScanReach::default() })
     }
 
-    /// The same maps for a caller who may name no others than those of `reach`.
-    pub fn limited_to(&self, reach: MapReach) -> Self {
-        Self { inner: Arc::clone(&self.inner), reach }
+    /// The same maps for a caller who may name no others than those of `reach`, and send and undo no others than the
+    /// scans of `scans`.
+    pub fn limited_to(&self, reach: MapReach, scans: ScanReach) -> Self {
+        Self { inner: Arc::clone(&self.inner), reach, scans }
     }
 
     /// The bounds on what callers may ask.
@@ -156,6 +160,7 @@ impl MapService {
     /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
     /// is nearly full.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        self.scans.permit(&scan.robot)?;
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         if map.is_new(&scan) {
@@ -174,6 +179,7 @@ impl MapService {
     /// # Errors
     /// As for an insertion.
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
+        self.scans.permit(&scan.robot)?;
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let inner = Arc::clone(&self.inner);
@@ -227,6 +233,7 @@ impl MapService {
     /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full, or where there is no memory to
     /// find out in who holds which voxels.
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
+        self.scans.permit_undo(&undo.target)?;
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let inner = Arc::clone(&self.inner);
         self.carry_through(move |stop| map.propose_undo(&undo, &inner.room, stop)).await

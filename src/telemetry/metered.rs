@@ -3,7 +3,7 @@
 use super::Metrics;
 use crate::map::MapName;
 use crate::service::{
-    Deletion, DeletionAnswer, MapInfo, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer,
+    Deletion, DeletionAnswer, MapInfo, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer, ScanReach,
     ScanRequest, ServiceError, Undo, UndoAnswer,
 };
 
@@ -21,9 +21,9 @@ impl MeteredService {
         Self { service, metrics }
     }
 
-    /// The same for a caller who may name no others than the maps of `reach`.
-    pub fn limited_to(&self, reach: MapReach) -> Self {
-        Self { service: self.service.limited_to(reach), metrics: self.metrics.clone() }
+    /// The same for a caller who may name no others than the maps of `reach`, nor send others than the scans of `scans`.
+    pub fn limited_to(&self, reach: MapReach, scans: ScanReach) -> Self {
+        Self { service: self.service.limited_to(reach, scans), metrics: self.metrics.clone() }
     }
 
     /// The service itself.

@@ -51,6 +51,8 @@ const CONNECTIONS_ACCEPTED: &str = "mrol_connections_accepted_total";
 const CONNECTIONS_REFUSED: &str = "mrol_connections_refused_total";
 const CONNECTIONS_OPEN: &str = "mrol_connections_open";
 const FILE_RELOAD_OK: &str = "mrol_file_reload_ok";
+const CERTIFICATE_EXPIRES: &str = "mrol_certificate_expires_timestamp_seconds";
+const HANDSHAKES_FAILED: &str = "mrol_tls_handshakes_failed_total";
 const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
 const STREAMS_OPEN: &str = "mrol_streams_open";
 const BODY_BYTES: &str = "mrol_body_bytes";
@@ -146,6 +148,16 @@ impl Metrics {
     /// Says whether a file could be read again when it changed: false where it became something that cannot be used.
     pub fn file_reload(&self, file: &'static str, ok: bool) {
         self.record(|| gauge!(FILE_RELOAD_OK, "file" => file).set(f64::from(u8::from(ok))));
+    }
+
+    /// Says when the first certificate of the file that `setting` names expires, in seconds since 1970.
+    pub fn certificate_expires(&self, setting: &'static str, timestamp_s: i64) {
+        self.record(|| gauge!(CERTIFICATE_EXPIRES, "setting" => setting).set(timestamp_s as f64));
+    }
+
+    /// Says how many TLS handshakes have failed so far.
+    pub fn handshakes_failed(&self, protocol: &'static str, total: u64) {
+        self.record(|| counter!(HANDSHAKES_FAILED, "protocol" => protocol).absolute(total));
     }
 
     /// Says how much of what is limited is in use.
@@ -291,6 +303,11 @@ fn describe() {
         FILE_RELOAD_OK,
         "0 where a file changed into what cannot be used, and what it held before goes on"
     );
+    describe_gauge!(
+        CERTIFICATE_EXPIRES,
+        "When the first certificate of a file expires, in seconds since 1970"
+    );
+    describe_counter!(HANDSHAKES_FAILED, "TLS handshakes that failed, by protocol");
     describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
     describe_gauge!(STREAMS_OPEN, "Calls whose client streams messages");
     describe_gauge!(
