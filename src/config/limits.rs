@@ -53,6 +53,12 @@ pub struct LimitsConfig {
     pub map_file_bytes_max: usize,
     /// See [`Limits::min_revision_wait_max`]; seconds.
     pub min_revision_wait_max_s: f64,
+    /// See [`Limits::alignment_time_max`]; seconds.
+    pub alignment_time_max_s: f64,
+    /// See [`Limits::insertion_time_max`]; seconds.
+    pub insertion_time_max_s: f64,
+    /// See [`Limits::undo_time_max`]; seconds.
+    pub undo_time_max_s: f64,
     /// See [`Limits::localization_time_max`]; seconds.
     pub localization_time_max_s: f64,
     /// See [`Limits::localization_candidates_max`].
@@ -94,6 +100,9 @@ impl Default for LimitsConfig {
             jobs_waiting_max: limits.jobs_waiting_max,
             map_file_bytes_max: limits.map_file_bytes_max,
             min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
+            alignment_time_max_s: limits.alignment_time_max.as_secs_f64(),
+            insertion_time_max_s: limits.insertion_time_max.as_secs_f64(),
+            undo_time_max_s: limits.undo_time_max.as_secs_f64(),
             localization_time_max_s: limits.localization_time_max.as_secs_f64(),
             localization_candidates_max: limits.localization_candidates_max,
             localization_grid_bytes_max: limits.localization_grid_bytes_max,
@@ -136,6 +145,9 @@ impl LimitsConfig {
         }
         for (key, seconds) in [
             ("limits.min_revision_wait_max_s", self.min_revision_wait_max_s),
+            ("limits.alignment_time_max_s", self.alignment_time_max_s),
+            ("limits.insertion_time_max_s", self.insertion_time_max_s),
+            ("limits.undo_time_max_s", self.undo_time_max_s),
             ("limits.localization_time_max_s", self.localization_time_max_s),
             ("limits.connection_opening_max_s", self.connection_opening_max_s),
             ("limits.http_idle_max_s", self.http_idle_max_s),
@@ -181,6 +193,9 @@ impl LimitsConfig {
             jobs_waiting_max: self.jobs_waiting_max,
             map_file_bytes_max: self.map_file_bytes_max,
             min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
+            alignment_time_max: Duration::from_secs_f64(self.alignment_time_max_s),
+            insertion_time_max: Duration::from_secs_f64(self.insertion_time_max_s),
+            undo_time_max: Duration::from_secs_f64(self.undo_time_max_s),
             localization_time_max: Duration::from_secs_f64(self.localization_time_max_s),
             localization_candidates_max: self.localization_candidates_max,
             localization_grid_bytes_max: self.localization_grid_bytes_max,

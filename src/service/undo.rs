@@ -6,6 +6,7 @@ use super::committing::{Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
+use super::time_limit::TimeLimit;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
 use crate::map::{Change, Committed, MultiResolutionMap, Request, TrajectoryPose, UndoRecord, WithdrawnScan};
 use crate::store::{MapFolder, StoreError};
@@ -20,6 +21,7 @@ impl HostedMap {
         self: &Arc<Self>,
         undo: &Undo,
         room: &Room,
+        limit: &TimeLimit,
         stop: StopSignal<'_>,
     ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
@@ -41,14 +43,18 @@ impl HostedMap {
         check_not_stopped(stop)?;
         let (mut observations, seen) = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
-        let (map, count) = (Arc::clone(self), scans.len());
+        let (map, count, limit) = (Arc::clone(self), scans.len(), limit.clone());
         let decide = move |core: &MultiResolutionMap| {
             let _until_decided = lent;
             map.still_unanswered(request.as_ref())?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
-            folder.observe(&mut observations, seen, StopSignal::NEVER).map_err(unreadable)?;
+            // What came meanwhile is shown while the map waits: that ends with the request's time as well.
+            limit.run(StopSignal::NEVER, |stop| {
+                folder.observe(&mut observations, seen, stop).map_err(unreadable)?;
+                check_not_stopped(stop)
+            })?;
             let voxels = observations.held_by_targets_alone();
             let moments = observations.moments_without_targets();
             Ok(Some(Change::Undo(UndoRecord { scans, voxels, moments, request })))
