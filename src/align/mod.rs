@@ -216,3 +216,6 @@ fn fit(
         lookups: ascent.lookups,
     }
 }
+
+#[cfg(test)]
+mod tests;

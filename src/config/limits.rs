@@ -248,6 +248,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn times_lie_within_a_day() {
+        type Set = fn(&mut LimitsConfig, f64);
+        let times: [(&str, Set); 3] = [
+            ("limits.alignment_time_max_s", |limits, seconds| limits.alignment_time_max_s = seconds),
+            ("limits.insertion_time_max_s", |limits, seconds| limits.insertion_time_max_s = seconds),
+            ("limits.undo_time_max_s", |limits, seconds| limits.undo_time_max_s = seconds),
+        ];
+        for (name, set) in times {
+            for (seconds, is_fine) in
+                [(0.0, true), (86_400.0, true), (86_400.1, false), (-0.1, false), (f64::NAN, false)]
+            {
+                let mut limits = LimitsConfig::default();
+                set(&mut limits, seconds);
+                let checked = limits.check();
+                assert_eq!(checked.is_ok(), is_fine, "{name} {seconds}");
+                assert!(checked.is_ok() || checked.unwrap_err().to_string().contains(name));
+            }
+        }
+    }
+
+    #[test]
     fn what_lies_in_memory_for_a_while_is_an_eighth_of_what_there_is_at_most() {
         let limits = LimitsConfig::default();
         assert_eq!(limits.clone().within_memory(None), limits);

@@ -190,8 +190,8 @@ fn search_settings(grid_bytes_max: usize) -> LocalizationSettings {
     LocalizationSettings { grid_bytes_max, cells_waiting_max, ..usual }
 }
 
-/// What a cell takes that waits to be divided, with the room to grow; rounded up.
-const BYTES_PER_CELL: usize = 128;
+/// What a cell takes that waits to be divided, rounded up; while they move, those before them take half as much.
+const BYTES_PER_CELL: usize = 64;
 
 impl From<LocalizationQueryError> for ServiceError {
     fn from(error: LocalizationQueryError) -> Self {

@@ -11,6 +11,8 @@ mod gauges;
 mod hosted_map;
 mod limits;
 mod localization;
+#[cfg(test)]
+mod looks;
 mod map_file;
 mod mapping;
 mod maps;

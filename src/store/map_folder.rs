@@ -244,7 +244,7 @@ impl MapFolder {
     }
 
     /// Who holds which voxels, up to the present head of the journal, and that head; none where the journal does
-    /// not reach back to the first of `scans`.
+    /// not reach back to the first of `scans`, and where it is stopped.
     ///
     /// # Errors
     /// When a snapshot or the journal cannot be read.
@@ -259,7 +259,10 @@ impl MapFolder {
         };
         let path = self.path.join(snapshot_name(base));
         let base_contents = Snapshot::read(&*self.files, &path)?.contents;
-        let mut observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
+        let Some(mut observations) = Observations::new(scans.to_vec(), withdrawn, &base_contents, stop)
+        else {
+            return Ok(None);
+        };
         let head = self.observe(&mut observations, base, stop)?;
         Ok(Some((observations, head)))
     }

@@ -123,7 +123,6 @@ fn search_and_refine(
     let bounds = Bounds::new(&levels, &sample, &orientations.families, rotations);
     let basins =
         Basins::new(settings.basin_voxels * side_m, settings.basin_deg.to_radians(), settings.basins_max);
-    supervision.take(search::waiting_bytes_max(settings))?;
     let found = Search::new(&bounds, settings, basins, supervision).run();
 
     // 5) Refine the places found by alignment, and rank them.

@@ -36,11 +36,8 @@ const CELLS_PER_REPORT: u32 = 64;
 /// them a millisecond or less.
 const EIGHTS_PER_LOOK: u32 = 64;
 
-/// Bytes that the cells which wait to be divided take at most, with the half that moves while they grow.
-pub(super) fn waiting_bytes_max(settings: &LocalizationSettings) -> usize {
-    let most = settings.cells_waiting_max.saturating_add(8).next_power_of_two();
-    most.saturating_mul(size_of::<Waiting>()) / 2 * 3
-}
+/// Cells that there is room for before any of them waits.
+const ROOM_AT_FIRST: usize = 1024;
 
 /// A search under way.
 pub(super) struct Search<'a, 's> {
@@ -50,6 +47,10 @@ pub(super) struct Search<'a, 's> {
     /// Eights bounded since the last look at the stop signal.
     since_look: u32,
     waiting: BinaryHeap<Waiting>,
+    /// Cells that memory was reserved for.
+    room: usize,
+    /// Beyond which the least promising cells are dropped: no more than there is memory for.
+    waiting_max: usize,
     basins: Basins,
     cells: u64,
     complete: bool,
@@ -62,8 +63,18 @@ impl<'a, 's> Search<'a, 's> {
         basins: Basins,
         supervision: &'a mut Supervision<'s>,
     ) -> Self {
-        let waiting = BinaryHeap::new();
-        Self { bounds, settings, supervision, since_look: 0, waiting, basins, cells: 0, complete: true }
+        Self {
+            bounds,
+            settings,
+            supervision,
+            since_look: 0,
+            waiting: BinaryHeap::new(),
+            room: 0,
+            waiting_max: settings.cells_waiting_max,
+            basins,
+            cells: 0,
+            complete: true,
+        }
     }
 
     /// Finds the poses of highest overlap on the lattice of finest cells.
@@ -142,6 +153,9 @@ impl<'a, 's> Search<'a, 's> {
         let floor = self.floor();
         let counts = turned.bounds_of_eight(first.translation, floor);
         self.cells += 8;
+        if self.waiting.len() + 8 > self.room {
+            self.make_room();
+        }
         let loss = (LOSS_PER_HALVING * f64::from(self.bounds.points())) as i32;
         for (translation, count) in eight(first.translation).zip(counts) {
             let (cell, bound) = (PoseCell { translation, ..first }, count.min(parent));
@@ -150,10 +164,23 @@ impl<'a, 's> Search<'a, 's> {
                 self.waiting.push(Waiting { promise, bound, cell });
             }
         }
-        if self.waiting.len() > self.settings.cells_waiting_max {
+        if self.waiting.len() > self.waiting_max {
             self.drop_least_promising();
         }
         ControlFlow::Continue(())
+    }
+
+    /// Lets twice as many cells wait as there was room for. Where there is no memory for them, no more may wait than now.
+    fn make_room(&mut self) {
+        let room = (2 * self.room).max(ROOM_AT_FIRST);
+        // While they move, both are there.
+        match self.supervision.take(room * size_of::<Waiting>()) {
+            Ok(()) => {
+                self.waiting.reserve_exact(room - self.waiting.len());
+                self.room = room;
+            }
+            Err(_) => self.waiting_max = self.waiting_max.min(self.room.saturating_sub(8)),
+        }
     }
 
     /// Cells bounded by this much or less are of no interest.
@@ -177,7 +204,7 @@ impl<'a, 's> Search<'a, 's> {
         let mut cells = std::mem::take(&mut self.waiting).into_vec();
         let floor = self.floor();
         cells.retain(|waiting| waiting.bound > floor);
-        let most = self.settings.cells_waiting_max / 2;
+        let most = self.waiting_max / 2;
         if cells.len() > most {
             if most > 0 {
                 cells.select_nth_unstable_by(most - 1, |a, b| b.cmp(a));
@@ -314,6 +341,28 @@ mod tests {
         let all = problem.search(|_| false).cells;
         let later = problem.search(|cells| cells > all / 2);
         assert!(!later.complete && later.cells < all);
+    }
+
+    #[test]
+    fn a_search_without_memory_for_more_cells_drops_some_and_says_so() {
+        let problem = Problem::new();
+        let reserved = Cell::new(0);
+        let supervision = &mut Supervision {
+            stop: StopSignal::NEVER,
+            progress: &mut |_| (),
+            reserve: &mut |bytes| {
+                reserved.set(reserved.get() + bytes);
+                reserved.get() <= ROOM_AT_FIRST * size_of::<Waiting>()
+            },
+        };
+        let (found, waited) = problem.with_bounds(|bounds| {
+            let mut search = Search::new(bounds, &problem.settings, Basins::new(0.4, 0.3, 16), supervision);
+            let _ = search.enter_roots();
+            let waited = (search.waiting.len(), search.waiting.capacity());
+            (search.run(), waited)
+        });
+        assert!(waited.0 <= ROOM_AT_FIRST && waited.1 == ROOM_AT_FIRST, "{waited:?}");
+        assert!(!found.complete && !found.places.is_empty());
     }
 
     #[test]

@@ -109,7 +109,7 @@ mod tests {
         let levels = DilatedLevels::of_all(&map, &near, &LocalizationSettings::default());
         // As far as a number of single precision goes: a step of half a voxel would be lost in it.
         let far = |x: f32| SearchSample::of(&[Point::new(x, 0.0, 0.0)], 1, 0, StopSignal::NEVER);
-        let seen_from = |sample, x: f64| {
+        let seen_from = |sample: &SearchSample, x: f64| {
             blocked_share(&levels, sample, &Pose::translation(x, 0.0, 0.0), StopSignal::NEVER)
         };
         for range in [1e5, 1e9, 1e30] {

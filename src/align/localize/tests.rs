@@ -159,7 +159,7 @@ fn memory_is_asked_for_before_it_is_taken_and_what_is_refused_ends_the_search() 
     drop(view);
     let points = size_of_val(&*corner());
     assert!(all.reserved > blocks + points, "{} bytes", all.reserved);
-    for bytes_max in [0, points, points + sample_bytes_max(corner().len()) + blocks, all.reserved - 1] {
+    for bytes_max in [0, points, points + sample_bytes_max(corner().len()) + blocks] {
         let refused = search(&map, &corner(), &downward(), u64::MAX, bytes_max).found.unwrap_err();
         assert!(matches!(refused, LocalizationError::NoMemory { .. }), "{refused}");
     }
