@@ -6,7 +6,7 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use common::{Daemon, PATIENCE, corner, guess_pb, points_pb, query_pb, row, scan_pb};
+use common::{Daemon, PATIENCE, corner, guess_pb, json_of, points_pb, query_pb, row, scan_pb};
 use mrol::wire::pb;
 use tokio::task::JoinHandle;
 use tokio_stream::wrappers::ReceiverStream;
@@ -161,10 +161,11 @@ async fn any_number_of_alignments_keeps_no_scan_from_being_inserted() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_alignment_or_insertion_that_takes_too_long_is_ended_and_the_limit_named() {
+async fn what_takes_too_long_is_ended_and_the_limit_named() {
     let daemon = Daemon::start_with(|config| {
         config.limits.alignment_time_max_s = 0.2;
         config.limits.insertion_time_max_s = 0.3;
+        config.limits.undo_time_max_s = 0.0;
     })
     .await;
     daemon.make_map("a").await;
@@ -177,4 +178,8 @@ async fn an_alignment_or_insertion_that_takes_too_long_is_ended_and_the_limit_na
     let late = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
     assert_eq!(late.code(), Code::DeadlineExceeded, "{late:?}");
     assert!(late.message().contains("insertion_time_max allows, which is 300ms"), "{late:?}");
+
+    let late =
+        json_of(daemon.post("/v1/maps/a/undo", serde_json::json!({"revision": 1})).await).await.to_string();
+    assert!(late.contains("time_limit") && late.contains("undo_time_max allows, which is 0ns"), "{late}");
 }
