@@ -86,7 +86,8 @@ fn until(
     let over = std::cell::Cell::new(false);
     let is_over = || over.get();
     let supervision = &mut Supervision {
-        stop: StopSignal::when(&is_over),
+        stop: StopSignal::NEVER,
+        search_stop: StopSignal::when(&is_over),
         progress: &mut |progress: &SearchProgress| over.set(over.get() || progress.cells >= cells_max),
         reserve: &mut |_| true,
     };

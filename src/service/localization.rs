@@ -13,6 +13,8 @@ use crate::align::localize::{
 use crate::geometry::{Point, Pose};
 use crate::util::StopSignal;
 
+/// Share of the time limit after which a search ends, and what it found is refined.
+pub const SEARCH_SHARE: f64 = 0.9;
 /// Candidates of a request that does not say.
 pub const CANDIDATES_DEFAULT: usize = 5;
 /// How long a search takes at most where the request does not say.
@@ -148,7 +150,8 @@ impl HostedMap {
         stop: StopSignal<'_>,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let start = Instant::now();
-        let stop = stop.by(start + request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT));
+        let limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
+        let stop = stop.by(start + limit);
         let all = request.points.as_slice();
         let _copy = room.lend(size_of_val(all) as u64, WHOM)?;
         let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
@@ -162,6 +165,7 @@ impl HostedMap {
         let mut refused = None;
         let supervision = &mut Supervision {
             stop,
+            search_stop: stop.by(start + limit.mul_f64(SEARCH_SHARE)),
             progress: &mut |_| (),
             reserve: &mut |bytes| {
                 let more = room.lend(bytes as u64, WHOM).map(|promise| lent.push(promise));

@@ -31,7 +31,8 @@ pub use error::{ErrorCode, ServiceError};
 pub use gauges::{Gauges, MemoryReading, Readings};
 pub use limits::Limits;
 pub use localization::{
-    CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, TIME_LIMIT_DEFAULT,
+    CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
+    TIME_LIMIT_DEFAULT,
 };
 pub use pool::PoolUse;
 pub use reach::MapReach;

@@ -27,15 +27,11 @@ pub(super) struct Refinement<'a> {
 
 impl Refinement<'_> {
     /// The distinct candidates that the places lead to, best first: all by some of the scan's points, then the best
-    /// `wish` by all of them. Once the time is up the places are judged where they are, each a few thousand look-ups;
-    /// once nobody waits there is no candidate.
+    /// `wish` by all of them. Once stopped the places are judged where they are, each by a few thousand look-ups.
     pub(super) fn candidates(&self, places: &[Basin], wish: usize) -> Vec<Candidate> {
         let thinned = volumetric_sample_until(self.points, THINNED, self.alignment.seed, self.stop).points;
-        let mut candidates: Vec<Candidate> = places
-            .iter()
-            .take_while(|_| !self.stop.is_cancelled())
-            .map(|place| self.first_at(&thinned, place))
-            .collect();
+        let mut candidates: Vec<Candidate> =
+            places.iter().map(|place| self.first_at(&thinned, place)).collect();
         rank(&mut candidates);
         let mut candidates = self.distinct(candidates);
         for candidate in candidates.iter_mut().take(wish) {

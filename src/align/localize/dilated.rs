@@ -144,8 +144,12 @@ impl DilatedLevels {
         sample: &SearchSample,
         settings: &LocalizationSettings,
     ) -> Self {
-        let alone =
-            &mut Supervision { stop: StopSignal::NEVER, progress: &mut |_| (), reserve: &mut |_| true };
+        let alone = &mut Supervision {
+            stop: StopSignal::NEVER,
+            search_stop: StopSignal::NEVER,
+            progress: &mut |_| (),
+            reserve: &mut |_| true,
+        };
         Self::of(map, sample, None, settings, alone).unwrap()
     }
 

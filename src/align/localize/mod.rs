@@ -66,7 +66,12 @@ pub fn localize(
     settings: &LocalizationSettings,
     alignment: &AlignmentSettings,
 ) -> Result<Localization, LocalizationError> {
-    let alone = &mut Supervision { stop: StopSignal::NEVER, progress: &mut |_| (), reserve: &mut |_| true };
+    let alone = &mut Supervision {
+        stop: StopSignal::NEVER,
+        search_stop: StopSignal::NEVER,
+        progress: &mut |_| (),
+        reserve: &mut |_| true,
+    };
     localize_supervised(map, points, query, settings, alignment, alone)
 }
 

@@ -227,7 +227,12 @@ impl<'a, 's> Search<'a, 's> {
     /// Breaks once it is to end.
     fn look(&mut self) -> ControlFlow<()> {
         self.since_look = 0;
-        if self.supervision.stop.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let Supervision { stop, search_stop, .. } = &self.supervision;
+        if stop.is_stopped() || search_stop.is_stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 
@@ -291,6 +296,7 @@ mod tests {
             let is_stopped = || over.replace(over.get() || is_over(cells.get()));
             let supervision = &mut Supervision {
                 stop: StopSignal::when(&is_stopped),
+                search_stop: StopSignal::NEVER,
                 progress: &mut |progress| cells.set(progress.cells),
                 reserve: &mut |_| true,
             };
@@ -349,6 +355,7 @@ mod tests {
         let reserved = Cell::new(0);
         let supervision = &mut Supervision {
             stop: StopSignal::NEVER,
+            search_stop: StopSignal::NEVER,
             progress: &mut |_| (),
             reserve: &mut |bytes| {
                 reserved.set(reserved.get() + bytes);

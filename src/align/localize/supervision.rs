@@ -7,6 +7,8 @@ use crate::util::StopSignal;
 pub struct Supervision<'a> {
     /// Asked every few milliseconds, in every phase. Stopped, a search answers with what it has.
     pub stop: StopSignal<'a>,
+    /// Asked by the search alone, as often: what it found until then is refined while `stop` lets it.
+    pub search_stop: StopSignal<'a>,
     /// Told every few hundred cells.
     pub progress: &'a mut dyn FnMut(&SearchProgress),
     /// Asked before memory is taken, for so many bytes beside all those before: false refuses them, and ends the search.

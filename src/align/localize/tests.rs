@@ -56,6 +56,7 @@ fn search(
     let last_looks = Cell::new(0);
     let supervision = &mut Supervision {
         stop: StopSignal::when(&is_over),
+        search_stop: StopSignal::NEVER,
         progress: &mut |progress| {
             let (last, most) = *cells.borrow();
             let between = looks.get() - last_looks.replace(looks.get()) + 1;
@@ -131,6 +132,7 @@ fn a_larger_map_and_a_larger_scan_are_looked_at_as_much_oftener() {
         let reserved = Cell::new(0);
         let supervision = &mut Supervision {
             stop: StopSignal::when(&is_over),
+            search_stop: StopSignal::NEVER,
             progress: &mut |_| searching.set(true),
             reserve: &mut |bytes| {
                 reserved.set(reserved.get() + bytes);

@@ -19,7 +19,7 @@ use crate::client::Client;
 use crate::geometry::Point;
 use crate::map::{MapName, MultiResolutionMap};
 use crate::scan::{read_points, scan_files};
-use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapState};
+use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapState, SEARCH_SHARE};
 use crate::store::{Disk, Snapshot};
 use crate::util::StopSignal;
 use report::Localized;
@@ -144,6 +144,9 @@ impl Place {
     }
 }
 
+/// A time limit that no search waits for: a year.
+const LONGEST: Duration = Duration::from_secs(365 * 86_400);
+
 /// Searches in this process, and says how far that is.
 fn find_here(
     map: &MultiResolutionMap,
@@ -161,7 +164,10 @@ fn find_here(
         let SearchProgress { cells, waiting, best_overlap } = progress;
         output.tell(format!("{cells} cells of poses, {waiting} wait, best overlap {best_overlap:.2}"));
     };
-    let stop = match request.time_limit.and_then(|limit| start.checked_add(limit)) {
+    let within = |share: f64| match request
+        .time_limit
+        .and_then(|limit| start.checked_add(limit.min(LONGEST).mul_f64(share)))
+    {
         Some(end) => StopSignal::NEVER.by(end),
         None => StopSignal::NEVER,
     };
@@ -171,7 +177,12 @@ fn find_here(
         &request.query,
         &LocalizationSettings::default(),
         &AlignmentSettings::default(),
-        &mut Supervision { stop, progress: &mut tell, reserve: &mut |_| true },
+        &mut Supervision {
+            stop: within(1.0),
+            search_stop: within(SEARCH_SHARE),
+            progress: &mut tell,
+            reserve: &mut |_| true,
+        },
     )
     .map_err(CliError::failed)?;
     Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
