@@ -31,7 +31,7 @@ fn settings(method: Method) -> AlignmentSettings {
 fn an_alignment_looks_at_the_signal_in_proportion_to_its_work() {
     let (map, guess) = (map(), Pose::translation(0.07, -0.06, 0.05));
     for method in Method::ALL {
-        for count in [3_000, 30_000, 600_000] {
+        for count in [3_000, 30_000, 300_000] {
             let looks = Cell::new(0u64);
             let count_look = || looks.replace(looks.get() + 1) == u64::MAX;
             let points = corner(count);

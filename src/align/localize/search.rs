@@ -293,7 +293,10 @@ mod tests {
         /// Searches until `is_over` of the cells so far.
         fn search(&self, is_over: impl Fn(u64) -> bool) -> Found {
             let (cells, over) = (Cell::new(0), Cell::new(false));
-            let is_stopped = || over.replace(over.get() || is_over(cells.get()));
+            let is_stopped = || {
+                over.set(over.get() || is_over(cells.get()));
+                over.get()
+            };
             let supervision = &mut Supervision {
                 stop: StopSignal::when(&is_stopped),
                 search_stop: StopSignal::NEVER,

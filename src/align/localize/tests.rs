@@ -14,10 +14,12 @@ fn record(points: &[Point], map: &MultiResolutionMap) -> ScanRecord {
     ScanRecord::of_points(pose, points, map.lattice())
 }
 
-/// Two walls and a floor that meet in a corner.
+/// Two walls and a floor that meet in a corner, a point at the centre of each voxel.
 fn corner() -> Vec<Point> {
-    let spans = |n: i32| (0..n).flat_map(move |i| (0..n).map(move |j| (i as f32 * 0.05, j as f32 * 0.05)));
-    let walls = spans(60).flat_map(|(a, b)| [[2.0, a - 1.0, b], [a - 1.0, 2.0, b], [a - 1.0, b - 1.0, 0.0]]);
+    let at = |i: i32| i as f32 * 0.05 + 0.025;
+    let spans = move |n: i32| (0..n).flat_map(move |i| (0..n).map(move |j| (at(i), at(j))));
+    let walls =
+        spans(60).flat_map(|(a, b)| [[2.025, a - 1.0, b], [a - 1.0, 2.025, b], [a - 1.0, b - 1.0, 0.025]]);
     walls.map(Point::from).collect()
 }
 
