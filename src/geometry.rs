@@ -3,7 +3,11 @@
 //! A transform's name holds both frames, so that `p_in_map = map_from_sensor * p_in_sensor`.
 
 use bytemuck::{Pod, Zeroable};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::allocator::Allocator;
+use nalgebra::{
+    DefaultAllocator, DimDiff, DimSub, Isometry3, OMatrix, Quaternion, SymmetricEigen, Translation3, U1,
+    UnitQuaternion, Vector3,
+};
 
 /// A rigid transform in metres, double precision, named `a_from_b` wherever it appears.
 pub type Pose = Isometry3<f64>;
@@ -125,16 +129,50 @@ pub fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (a_from_b.translation.vector.norm(), a_from_b.rotation.angle().to_degrees())
 }
 
+/// Times that a motion is thought to go on at most, see [`extrapolate`]: nobody keeps a velocity for longer.
+pub const EXTRAPOLATION_SHARE_MAX: f64 = 10.0;
+
 /// Where a motion at constant velocity leads that went from `before` to `last`, after `share` of the time that took.
+///
+/// Shares beyond [`EXTRAPOLATION_SHARE_MAX`] either way count as that, and NaN as none. Of poses so far apart that the
+/// numbers end it is `last`.
 pub fn extrapolate(before: &Pose, last: &Pose, share: f64) -> Pose {
+    let share = if share.is_nan() { 0.0 } else { share };
+    let share = share.clamp(-EXTRAPOLATION_SHARE_MAX, EXTRAPOLATION_SHARE_MAX);
     let motion = before.inv_mul(last);
     let turn = UnitQuaternion::from_scaled_axis(motion.rotation.scaled_axis() * share);
-    last * Pose::from_parts(Translation3::from(motion.translation.vector * share), turn)
+    let further = last * Pose::from_parts(Translation3::from(motion.translation.vector * share), turn);
+    if is_finite(&further) { further } else { *last }
+}
+
+/// True when no number of the pose is NaN or infinite.
+pub fn is_finite(pose: &Pose) -> bool {
+    let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+    numbers.copied().all(f64::is_finite)
+}
+
+/// Iterations after which no eigenvalue of a symmetric matrix is waited for; of finite numbers a few dozen do.
+const EIGEN_ITERATIONS_MAX: usize = 1000;
+
+/// Eigenvalues and eigenvectors of a symmetric matrix; none where a number is not finite, or they do not come within
+/// [`EIGEN_ITERATIONS_MAX`] iterations (nalgebra itself would go on for ever, its issue 1025).
+pub(crate) fn symmetric_eigen<D>(matrix: OMatrix<f64, D, D>) -> Option<SymmetricEigen<f64, D>>
+where
+    D: DimSub<U1>,
+    DefaultAllocator: Allocator<D, D> + Allocator<D> + Allocator<DimDiff<D, U1>>,
+{
+    if !matrix.iter().all(|number| number.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS_MAX)?;
+    let finite = eigen.eigenvalues.iter().chain(eigen.eigenvectors.iter()).all(|number| number.is_finite());
+    finite.then_some(eigen)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Matrix3, Matrix6};
 
     #[test]
     fn bytes_at_any_address_are_points() {
@@ -161,6 +199,34 @@ mod tests {
         assert!(metres < 1e-12 && degrees < 1e-5);
         let half = extrapolate(&before, &last, 0.5);
         assert!(((last.inv_mul(&half)).rotation.angle() - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_motion_goes_on_for_a_bounded_time_and_ends_nowhere_else_than_in_numbers() {
+        let last = Pose::translation(1.0, 0.0, 0.0);
+        for (share, x) in
+            [(f64::INFINITY, 11.0), (1e300, 11.0), (10.0, 11.0), (-1e300, -9.0), (f64::NAN, 1.0), (9.5, 10.5)]
+        {
+            assert_eq!(extrapolate(&Pose::identity(), &last, share).translation.x, x, "after {share}");
+        }
+        let (here, far) = (Pose::translation(f64::MAX, 0.0, 0.0), Pose::translation(-f64::MAX, 0.0, 0.0));
+        assert_eq!(extrapolate(&here, &far, 1.0), far);
+    }
+
+    #[test]
+    fn hostile_matrices_have_eigenvalues_or_none_and_end_nothing() {
+        let of = |value: f64| Matrix3::new(value, 1.0, value, 1.0, -value, 2.0, value, 2.0, 1e-300);
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(symmetric_eigen(of(value)).is_none(), "{value}");
+            assert!(symmetric_eigen(Matrix6::from_element(value)).is_none(), "{value}");
+        }
+        for value in [f64::MAX, 1e300, 1e-300, f64::MIN_POSITIVE, 5e-324, 0.0, -1e155] {
+            for finite in [symmetric_eigen(of(value)), symmetric_eigen(Matrix3::from_element(value))] {
+                assert!(finite.is_none_or(|eigen| eigen.eigenvalues.iter().all(|value| value.is_finite())));
+            }
+        }
+        let usual = symmetric_eigen(Matrix3::new(2.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 5.0)).unwrap();
+        assert!((usual.eigenvalues.sum() - 9.0).abs() < 1e-12);
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use common::{Daemon, PATIENCE, corner, guess_pb, points_pb, query_pb, row, scan_pb};
+use common::{Daemon, PATIENCE, corner, guess_pb, json_of, points_pb, query_pb, row, scan_pb};
 use mrol::wire::pb;
 use tokio::task::JoinHandle;
 use tokio_stream::wrappers::ReceiverStream;
@@ -15,10 +15,14 @@ use tonic::{Code, Request, Status};
 /// So many that an ascent with all of them takes minutes.
 const POINTS: usize = 1_000_000;
 
-/// A daemon of one thread for alignments, and a map to align to.
+/// A daemon of one thread for alignments, one for insertions, and a map to align to.
 async fn daemon() -> Daemon {
     let daemon = Daemon::start_with(|config| {
         config.threads.mapping = 1;
+        config.threads.alignment = 1;
+        // What ends work here is that nobody waits for it.
+        config.limits.alignment_time_max_s = 3600.0;
+        config.limits.insertion_time_max_s = 3600.0;
         config.limits.jobs_waiting_max = 4;
     })
     .await;
@@ -44,9 +48,14 @@ async fn align(daemon: &Daemon) -> JoinHandle<Result<tonic::Response<pb::AlignSc
     tokio::spawn(async move { robot.align_scan(endless()).await })
 }
 
-/// What `/metrics` says of the jobs of the mapping pool.
+/// What `/metrics` says of the jobs of a pool.
+async fn jobs_of(daemon: &Daemon, pool: &str, what: &str) -> u64 {
+    daemon.metric(&format!("mrol_jobs_{what}{{pool=\"{pool}\"}}")).await.expect("a gauge") as u64
+}
+
+/// Of those for alignments and insertions together: a test here has jobs in one of them.
 async fn jobs(daemon: &Daemon, what: &str) -> u64 {
-    daemon.metric(&format!("mrol_jobs_{what}{{pool=\"mapping\"}}")).await.expect("a gauge") as u64
+    jobs_of(daemon, "alignment", what).await + jobs_of(daemon, "mapping", what).await
 }
 
 async fn until(daemon: &Daemon, what: &str, count: u64) {
@@ -132,4 +141,45 @@ async fn a_stream_that_is_dropped_takes_its_request_in_hand_along() {
     drop(answers);
     until(&daemon, "cancelled_total", 1).await;
     assert_eq!((jobs(&daemon, "running").await, daemon.contents("a").await.0), (0, revision));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn any_number_of_alignments_keeps_no_scan_from_being_inserted() {
+    let daemon = daemon().await;
+    let mut readers = vec![align(&daemon).await];
+    until(&daemon, "running", 1).await;
+    for _ in 0..4 {
+        readers.push(align(&daemon).await);
+    }
+    until(&daemon, "waiting", 4).await;
+    let mut robot = daemon.mapping().await;
+    let inserted = tokio::time::timeout(PATIENCE, robot.insert_scan(scan_pb("a", "r2", &row(10)))).await;
+    inserted.expect("a thread of its own").unwrap();
+    assert_eq!(jobs_of(&daemon, "alignment", "running").await, 1);
+    readers.iter().for_each(JoinHandle::abort);
+    until(&daemon, "running", 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_takes_too_long_is_ended_and_the_limit_named() {
+    let daemon = Daemon::start_with(|config| {
+        config.limits.alignment_time_max_s = 0.2;
+        config.limits.insertion_time_max_s = 0.3;
+        config.limits.undo_time_max_s = 0.0;
+    })
+    .await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &corner()).await;
+    let late = daemon.mapping().await.align_scan(endless()).await.unwrap_err();
+    assert_eq!(late.code(), Code::DeadlineExceeded, "{late:?}");
+    assert!(late.message().contains("alignment_time_max allows, which is 200ms"), "{late:?}");
+    let pb::AlignScanRequest { map, scan, guess, method, .. } = endless();
+    let scan = pb::InsertScanRequest { map, scan, guess, method, ..Default::default() };
+    let late = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
+    assert_eq!(late.code(), Code::DeadlineExceeded, "{late:?}");
+    assert!(late.message().contains("insertion_time_max allows, which is 300ms"), "{late:?}");
+
+    let late =
+        json_of(daemon.post("/v1/maps/a/undo", serde_json::json!({"revision": 1})).await).await.to_string();
+    assert!(late.contains("time_limit") && late.contains("undo_time_max allows, which is 0ns"), "{late}");
 }

@@ -2,16 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-use std::ops::ControlFlow;
-
 use mrol::align::localize::{
     Gravity, Localization, LocalizationError, LocalizationQuery, LocalizationSettings, MAP_DOWN, SearchBox,
-    SearchProgress, localize,
+    SearchProgress, Supervision, localize_supervised,
 };
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Point, Pose, pose_difference, translation_m};
 use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
 use mrol::scan::{Scene, Tour, tours};
+use mrol::util::StopSignal;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -84,11 +83,15 @@ fn until(
     query: &LocalizationQuery,
     settings: &LocalizationSettings,
 ) -> Result<Localization, LocalizationError> {
-    let mut watch = |progress: &SearchProgress| match progress.cells >= cells_max {
-        true => ControlFlow::Break(()),
-        false => ControlFlow::Continue(()),
+    let over = std::cell::Cell::new(false);
+    let is_over = || over.get();
+    let supervision = &mut Supervision {
+        stop: StopSignal::NEVER,
+        search_stop: StopSignal::when(&is_over),
+        progress: &mut |progress: &SearchProgress| over.set(over.get() || progress.cells >= cells_max),
+        reserve: &mut |_| true,
     };
-    localize(map, points, query, settings, &AlignmentSettings::default(), &mut watch)
+    localize_supervised(map, points, query, settings, &AlignmentSettings::default(), supervision)
 }
 
 #[test]

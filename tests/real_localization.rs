@@ -4,7 +4,6 @@
 
 mod shared_scans;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use mrol::align::localize::{Gravity, Localization, LocalizationQuery, LocalizationSettings, localize};
@@ -62,7 +61,6 @@ impl Place {
             &query,
             &LocalizationSettings::default(),
             &AlignmentSettings::default(),
-            &mut |_| ControlFlow::Continue(()),
         );
         let found = found.unwrap();
         println!(

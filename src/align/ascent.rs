@@ -66,14 +66,18 @@ impl Ascent {
         iterations_max: u32,
         stop: StopSignal<'_>,
     ) {
-        let mut height = overlap.at(std::slice::from_ref(&self.pose))[0];
+        let mut height = overlap.at(std::slice::from_ref(&self.pose), stop)[0];
         self.lookups += overlap.lookups();
         for _ in 0..iterations_max {
             if stop.is_stopped() {
                 return;
             }
             let candidates = neighbours(&self.pose, steps);
-            let heights = overlap.at(&candidates);
+            let heights = overlap.at(&candidates, stop);
+            // Heights of a look-up that was stopped are too low, each by as much as it happens.
+            if stop.is_stopped() {
+                return;
+            }
             self.lookups += overlap.lookups() * candidates.len() as u64;
             let Some(best) = highest(&heights).filter(|&i| heights[i] > height) else {
                 return;

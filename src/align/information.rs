@@ -1,8 +1,8 @@
 //! What an alignment knows of a pose, direction by direction.
 
-use nalgebra::{Matrix6, SymmetricEigen, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
-use crate::geometry::Point;
+use crate::geometry::{Point, symmetric_eigen};
 
 /// The information matrix (inverse covariance) of a pose.
 ///
@@ -40,11 +40,14 @@ impl PoseInformation {
         std::array::from_fn(|row| std::array::from_fn(|column| self.matrix[(row, column)]))
     }
 
-    /// All six principal directions, the least known first.
+    /// All six principal directions, the least known first; of numbers that have none the axes, all open.
     pub fn directions(&self) -> Vec<Direction> {
         let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / self.lever_m });
         let scaled = Matrix6::from_diagonal(&scale) * self.matrix * Matrix6::from_diagonal(&scale);
-        let eigen = SymmetricEigen::new(scaled);
+        let Some(eigen) = symmetric_eigen(scaled) else {
+            let axis = |i: usize| std::array::from_fn(|place| if place == i { 1.0 } else { 0.0 });
+            return (0..6).map(|i| Direction { direction: axis(i), std_m: f64::INFINITY }).collect();
+        };
         let mut directions: Vec<_> = (0..6)
             .map(|i| Direction {
                 direction: eigen.eigenvectors.column(i).into_owned().into(),
@@ -92,5 +95,17 @@ mod tests {
         assert!(open.iter().all(|open| open.std_m.is_infinite() && open.direction[0].abs() < 1e-12));
         let held = information.directions()[5];
         assert!((held.std_m - 0.01).abs() < 1e-12, "{held:?}");
+    }
+
+    #[test]
+    fn numbers_that_are_none_leave_every_direction_open() {
+        for value in [f64::NAN, f64::INFINITY, f64::MAX] {
+            let information =
+                PoseInformation::new(Matrix6::from_element(value), &[Point::new(1e30, 0.0, 0.0)]);
+            let directions = information.directions();
+            assert_eq!(directions.len(), 6);
+            assert!(directions.iter().all(|held| held.std_m.is_infinite() || value.is_finite()));
+            assert!(directions.iter().all(|held| held.direction.iter().all(|c| c.is_finite())));
+        }
     }
 }

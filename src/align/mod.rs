@@ -8,6 +8,7 @@ mod ascent;
 mod information;
 pub mod localize;
 mod overlap;
+mod reach;
 mod refine;
 mod settings;
 mod verdict;
@@ -23,10 +24,11 @@ pub use verdict::{Alignment, Verdict};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
-use crate::voxel::volumetric_sample;
+use crate::voxel::volumetric_sample_until;
 use ascent::{Ascent, Steps};
 use information::root_mean_square_range_m;
-use overlap::Overlap;
+use overlap::{Overlap, level_overlaps_until};
+use reach::within_reach;
 use refine::{refine, surface_fit};
 use verdict::Fit;
 
@@ -59,21 +61,21 @@ struct SampledScan<'a> {
 }
 
 impl<'a> SampledScan<'a> {
-    /// 1) Take a volumetric sample of points.
-    fn new(points: &'a [Point], settings: &AlignmentSettings, stop: StopSignal<'a>) -> Self {
-        let fine = volumetric_sample(
-            points,
-            settings.refinement.sample_points.max(settings.sample_points),
-            settings.seed,
-        );
-        let sample = volumetric_sample(&fine.points, settings.sample_points, settings.seed).points;
+    /// 1) Take a volumetric sample of points: of those that can be on a map that reaches as far as `reach_m`.
+    fn new(points: &'a [Point], reach_m: f64, settings: &AlignmentSettings, stop: StopSignal<'a>) -> Self {
+        let near = within_reach(points, reach_m, stop);
+        let wish = settings.refinement.sample_points.max(settings.sample_points);
+        let fine = volumetric_sample_until(&near, wish, settings.seed, stop);
+        let sample =
+            volumetric_sample_until(&fine.points, settings.sample_points, settings.seed, stop).points;
         Self { points, sample, surface_sample: fine.points, stop }
     }
 }
 
 /// Finds the pose of a scan by sequential multi-resolution alignment (paper III-B), from a guess.
 ///
-/// `points` are in the sensor frame and finite. The map may change meanwhile: each step sees one revision of it.
+/// `points` are in the sensor frame and finite. The map may change meanwhile: each step sees one revision of it, of
+/// scans of more than 262,144 points a few.
 pub fn align(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -83,7 +85,7 @@ pub fn align(
     align_until(map, points, guess, settings, StopSignal::NEVER)
 }
 
-/// The same, which ends where it stands once nobody wants the pose: what it returns then means nothing.
+/// The same, which ends where it stands once it is stopped: what it returns then means nothing.
 pub fn align_until(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -91,7 +93,7 @@ pub fn align_until(
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = SampledScan::new(points, settings, stop);
+    let scan = SampledScan::new(points, map.lattice().reach_m(), settings, stop);
     let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
     let found = match found.is_doubtful(guess, map, settings) {
@@ -108,7 +110,18 @@ pub fn judge_at(
     map_from_sensor: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    let scan = SampledScan::new(points, settings, StopSignal::NEVER);
+    judge_until(map, points, map_from_sensor, settings, StopSignal::NEVER)
+}
+
+/// The same, which means nothing once it is stopped.
+pub fn judge_until(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    map_from_sensor: &Pose,
+    settings: &AlignmentSettings,
+    stop: StopSignal<'_>,
+) -> Alignment {
+    let scan = SampledScan::new(points, map.lattice().reach_m(), settings, stop);
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
@@ -119,7 +132,7 @@ pub fn ascend(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Pose {
-    let scan = SampledScan::new(points, settings, StopSignal::NEVER);
+    let scan = SampledScan::new(points, voxels.lattice().reach_m(), settings, StopSignal::NEVER);
     let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
     climb_sub_voxel(voxels, &scan, &mut ascent, settings);
     ascent.pose
@@ -197,9 +210,12 @@ fn fit(
     Fit {
         map_from_sensor: ascent.pose,
         refined_by_m,
-        level_overlaps: level_overlaps(map, scan.points, &ascent.pose),
-        surfaces: surface_fit(map, &scan.surface_sample, &ascent.pose, &settings.refinement),
+        level_overlaps: level_overlaps_until(map, scan.points, &ascent.pose, scan.stop),
+        surfaces: surface_fit(map, &scan.surface_sample, &ascent.pose, &settings.refinement, scan.stop),
         iterations: ascent.iterations,
         lookups: ascent.lookups,
     }
 }
+
+#[cfg(test)]
+mod tests;

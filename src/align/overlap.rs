@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MultiResolutionMap};
+use crate::util::StopSignal;
 use crate::voxel::Lattice;
 
 /// What alignment by overlap asks: of a map, or of another structure that is compared with it.
@@ -35,6 +36,9 @@ impl OccupiedVoxels for MultiResolutionMap {
     }
 }
 
+/// Look-ups between two looks at the stop signal: a few milliseconds where every one misses all caches.
+pub(super) const LOOKUPS_PER_LOOK: usize = 1 << 18;
+
 /// The overlap of some points with one or more levels of a map, as a function of their pose.
 #[derive(Debug, Clone)]
 pub(super) struct Overlap<'a> {
@@ -60,12 +64,21 @@ impl<'a> Overlap<'a> {
         Self { voxels, points, levels: 0..=voxels.lattice().levels() - 1, lookup }
     }
 
-    /// Points whose voxel is occupied, for each candidate pose.
-    pub(super) fn at(&self, poses: &[Pose]) -> Vec<usize> {
+    /// Points whose voxel is occupied, for each candidate pose; once it is stopped, fewer of them.
+    pub(super) fn at(&self, poses: &[Pose], stop: StopSignal<'_>) -> Vec<usize> {
         let mut heights = vec![0; poses.len()];
-        for level in self.levels.clone() {
-            let hits = self.voxels.hits(self.points, poses, level, self.lookup);
-            heights.iter_mut().zip(hits).for_each(|(sum, hits)| *sum += hits << (self.levels.end() - level));
+        let poses_per_look = (LOOKUPS_PER_LOOK / self.points.len().max(1)).max(1);
+        'levels: for level in self.levels.clone() {
+            let weight = self.levels.end() - level;
+            for (poses, heights) in poses.chunks(poses_per_look).zip(heights.chunks_mut(poses_per_look)) {
+                for points in self.points.chunks(LOOKUPS_PER_LOOK) {
+                    if stop.is_stopped() {
+                        break 'levels;
+                    }
+                    let hits = self.voxels.hits(points, poses, level, self.lookup);
+                    heights.iter_mut().zip(hits).for_each(|(sum, hits)| *sum += hits << weight);
+                }
+            }
         }
         heights
     }
@@ -79,11 +92,33 @@ impl<'a> Overlap<'a> {
 /// Fraction of `points` (sensor frame) in occupied voxels of `level`, exactly, with the sensor at
 /// `map_from_sensor`. 0 without points.
 pub fn overlap(map: &MultiResolutionMap, points: &[Point], map_from_sensor: &Pose, level: u32) -> f64 {
-    let hits = Overlap::new(map, points, level, Lookup::Exact).at(std::slice::from_ref(map_from_sensor));
+    overlap_until(map, points, map_from_sensor, level, StopSignal::NEVER)
+}
+
+fn overlap_until(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    map_from_sensor: &Pose,
+    level: u32,
+    stop: StopSignal<'_>,
+) -> f64 {
+    let overlap = Overlap::new(map, points, level, Lookup::Exact);
+    let hits = overlap.at(std::slice::from_ref(map_from_sensor), stop);
     hits[0] as f64 / points.len().max(1) as f64
 }
 
 /// The [`overlap`] at every level, finest first.
 pub fn level_overlaps(map: &MultiResolutionMap, points: &[Point], map_from_sensor: &Pose) -> Vec<f64> {
-    (0..map.settings().levels).map(|level| overlap(map, points, map_from_sensor, level)).collect()
+    level_overlaps_until(map, points, map_from_sensor, StopSignal::NEVER)
+}
+
+/// The same, which means nothing once it is stopped.
+pub(super) fn level_overlaps_until(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    map_from_sensor: &Pose,
+    stop: StopSignal<'_>,
+) -> Vec<f64> {
+    let levels = 0..map.settings().levels;
+    levels.map(|level| overlap_until(map, points, map_from_sensor, level, stop)).collect()
 }

@@ -9,6 +9,7 @@ use super::overlap::Overlap;
 use super::{Alignment, AlignmentSettings, SampledScan, Verdict, climb, finish};
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
 
 /// Turns of the further guesses about each axis, degrees: the basin of a coarsest level's ascent is some 20 wide.
 const TURNS_DEG: [f64; 4] = [-40.0, -20.0, 20.0, 40.0];
@@ -33,7 +34,7 @@ pub(super) fn align(
     let guesses = around(guess, shift_m);
     let overlap = Overlap::new(map, &scan.sample, coarse, settings.lookup);
     let mut lookups = first.lookups + overlap.lookups() * guesses.len() as u64;
-    let guesses = highest(guesses, &overlap, settings.wide_start.ascents);
+    let guesses = highest(guesses, &overlap, settings.wide_start.ascents, scan.stop);
 
     let climbed: Vec<_> =
         guesses.into_iter().map(|guess| climb(map, scan, guess, coarse, settings)).collect();
@@ -44,7 +45,8 @@ pub(super) fn align(
         metres < SAME_VOXELS * map.lattice().resolution_m(0) && degrees < SAME_DEG
     };
     let mut ends: Vec<Pose> = Vec::new();
-    for end in highest(climbed.iter().map(|ascent| ascent.pose).collect(), &finest, climbed.len()) {
+    for end in highest(climbed.iter().map(|ascent| ascent.pose).collect(), &finest, climbed.len(), scan.stop)
+    {
         if ends.len() < FINISHED && !ends.iter().any(|known| is_same(known, &end)) {
             ends.push(end);
         }
@@ -107,8 +109,8 @@ fn around(guess: &Pose, shift_m: f64) -> Vec<Pose> {
 }
 
 /// The `count` poses of highest overlap, the highest first; of equals the first.
-fn highest(poses: Vec<Pose>, overlap: &Overlap<'_>, count: usize) -> Vec<Pose> {
-    let heights = overlap.at(&poses);
+fn highest(poses: Vec<Pose>, overlap: &Overlap<'_>, count: usize, stop: StopSignal<'_>) -> Vec<Pose> {
+    let heights = overlap.at(&poses, stop);
     let mut ranked: Vec<usize> = (0..poses.len()).collect();
     ranked.sort_by_key(|&i| Reverse(heights[i]));
     ranked.into_iter().take(count).map(|i| poses[i]).collect()

@@ -72,6 +72,12 @@ pub struct LimitsConfig {
     pub map_file_scans_max: usize,
     /// See [`Limits::min_revision_wait_max`]; seconds.
     pub min_revision_wait_max_s: f64,
+    /// See [`Limits::alignment_time_max`]; seconds.
+    pub alignment_time_max_s: f64,
+    /// See [`Limits::insertion_time_max`]; seconds.
+    pub insertion_time_max_s: f64,
+    /// See [`Limits::undo_time_max`]; seconds.
+    pub undo_time_max_s: f64,
     /// See [`Limits::localization_time_max`]; seconds.
     pub localization_time_max_s: f64,
     /// See [`Limits::localization_candidates_max`].
@@ -122,6 +128,9 @@ impl Default for LimitsConfig {
             map_file_bytes_max: limits.map_file_bytes_max,
             map_file_scans_max: limits.map_file_scans_max,
             min_revision_wait_max_s: limits.min_revision_wait_max.as_secs_f64(),
+            alignment_time_max_s: limits.alignment_time_max.as_secs_f64(),
+            insertion_time_max_s: limits.insertion_time_max.as_secs_f64(),
+            undo_time_max_s: limits.undo_time_max.as_secs_f64(),
             localization_time_max_s: limits.localization_time_max.as_secs_f64(),
             localization_candidates_max: limits.localization_candidates_max,
             localization_grid_bytes_max: limits.localization_grid_bytes_max,
@@ -176,6 +185,9 @@ impl LimitsConfig {
         }
         for (key, seconds) in [
             ("limits.min_revision_wait_max_s", self.min_revision_wait_max_s),
+            ("limits.alignment_time_max_s", self.alignment_time_max_s),
+            ("limits.insertion_time_max_s", self.insertion_time_max_s),
+            ("limits.undo_time_max_s", self.undo_time_max_s),
             ("limits.localization_time_max_s", self.localization_time_max_s),
             ("limits.connection_opening_max_s", self.connection_opening_max_s),
             ("limits.http_idle_max_s", self.http_idle_max_s),
@@ -225,6 +237,9 @@ impl LimitsConfig {
             map_file_bytes_max: self.map_file_bytes_max,
             map_file_scans_max: self.map_file_scans_max,
             min_revision_wait_max: Duration::from_secs_f64(self.min_revision_wait_max_s),
+            alignment_time_max: Duration::from_secs_f64(self.alignment_time_max_s),
+            insertion_time_max: Duration::from_secs_f64(self.insertion_time_max_s),
+            undo_time_max: Duration::from_secs_f64(self.undo_time_max_s),
             localization_time_max: Duration::from_secs_f64(self.localization_time_max_s),
             localization_candidates_max: self.localization_candidates_max,
             localization_grid_bytes_max: self.localization_grid_bytes_max,
@@ -275,6 +290,27 @@ impl LimitsConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_lie_within_a_day() {
+        type Set = fn(&mut LimitsConfig, f64);
+        let times: [(&str, Set); 3] = [
+            ("limits.alignment_time_max_s", |limits, seconds| limits.alignment_time_max_s = seconds),
+            ("limits.insertion_time_max_s", |limits, seconds| limits.insertion_time_max_s = seconds),
+            ("limits.undo_time_max_s", |limits, seconds| limits.undo_time_max_s = seconds),
+        ];
+        for (name, set) in times {
+            for (seconds, is_fine) in
+                [(0.0, true), (86_400.0, true), (86_400.1, false), (-0.1, false), (f64::NAN, false)]
+            {
+                let mut limits = LimitsConfig::default();
+                set(&mut limits, seconds);
+                let checked = limits.check();
+                assert_eq!(checked.is_ok(), is_fine, "{name} {seconds}");
+                assert!(checked.is_ok() || checked.unwrap_err().to_string().contains(name));
+            }
+        }
+    }
 
     #[test]
     fn what_lies_in_memory_for_a_while_is_an_eighth_of_what_there_is_at_most() {

@@ -145,6 +145,7 @@ impl Config {
         for (key, threads) in [
             ("threads.query", self.threads.query),
             ("threads.mapping", self.threads.mapping),
+            ("threads.alignment", self.threads.alignment),
             ("threads.localization", self.threads.localization),
         ] {
             if threads > 1024 {
@@ -178,6 +179,7 @@ impl Config {
             gauges: None,
             query_threads: self.threads.query,
             mapping_threads: self.threads.mapping,
+            alignment_threads: self.threads.alignment,
             localization_threads: self.threads.localization,
             alignment: AlignmentSettings {
                 method: self.alignment.method.into(),

@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 pub struct ThreadsConfig {
     /// For queries, listings and descriptions.
     pub query: usize,
-    /// For alignments and changes.
+    /// For insertions, with their alignments, and deletions.
     pub mapping: usize,
+    /// For alignments of scans that are not inserted, which a key for reading may ask for. 1.
+    pub alignment: usize,
     /// For searches with no guess, which take seconds and much memory each. 1.
     pub localization: usize,
 }
 
 impl Default for ThreadsConfig {
     fn default() -> Self {
-        Self { query: 0, mapping: 0, localization: 1 }
+        Self { query: 0, mapping: 0, alignment: 1, localization: 1 }
     }
 }

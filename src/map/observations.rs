@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Change, MapContents, WithdrawnScan};
+use crate::util::StopSignal;
 use crate::voxel::{BlockMask, MomentSet, Moments, VoxelKey, VoxelSet};
 
 /// Who holds each voxel: scans that are to be undone, others, or both.
@@ -23,6 +24,11 @@ pub struct Observations {
     touched: BTreeSet<VoxelKey>,
 }
 
+/// Entries of a base that are taken over between two looks at the stop signal.
+const ENTRIES_PER_LOOK: usize = 16 << 10;
+/// What a tree takes for an entry besides the entry itself, a node of eleven of them being full; rounded up.
+const OF_ENTRY: usize = 16;
+
 #[derive(Debug, Clone, Copy, Default)]
 struct Held {
     by_targets: BlockMask,
@@ -31,21 +37,34 @@ struct Held {
 
 impl Observations {
     /// Begins with `base`, what the map held at a revision before that of any scan of `targets`; its holders are
-    /// others. No scan may lie before the base and be withdrawn after it.
-    pub fn new(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan], base: &MapContents) -> Self {
+    /// others; none once stopped. No scan may lie before the base and be withdrawn after it.
+    pub fn new(
+        mut targets: Vec<u64>,
+        withdrawn: &[WithdrawnScan],
+        base: &MapContents,
+        stop: StopSignal<'_>,
+    ) -> Option<Self> {
         targets.sort_unstable();
         let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();
         withdrawn.sort_unstable();
         let held = |&(block, by_others): &(VoxelKey, BlockMask)| {
             (block, Held { by_targets: BlockMask::EMPTY, by_others })
         };
-        Self {
-            targets,
-            withdrawn,
-            held: base.voxels.blocks().iter().map(held).collect(),
-            moments: base.moments.as_slice().iter().copied().collect(),
-            touched: BTreeSet::new(),
-        }
+        let looks = |entry: usize| !entry.is_multiple_of(ENTRIES_PER_LOOK) || !stop.is_stopped();
+        let blocks = base.voxels.blocks().iter().enumerate().take_while(|(entry, _)| looks(*entry));
+        let held = blocks.map(|(_, block)| held(block)).collect();
+        let moments = base.moments.as_slice().iter().enumerate().take_while(|(entry, _)| looks(*entry));
+        let moments = moments.map(|(_, moments)| *moments).collect();
+        (!stop.is_stopped()).then(|| Self { targets, withdrawn, held, moments, touched: BTreeSet::new() })
+    }
+
+    /// Bytes that observations of a base of so many blocks and voxels with moments take, at most: each entry twice, since
+    /// maps are sorted before they are built.
+    pub fn bytes_max(blocks: usize, moments: usize) -> usize {
+        const OF_BLOCK: usize = size_of::<(VoxelKey, Held)>();
+        const OF_MOMENTS: usize = size_of::<(VoxelKey, Moments)>();
+        let twice = |entry: usize| 2 * entry + OF_ENTRY;
+        blocks.saturating_mul(twice(OF_BLOCK)).saturating_add(moments.saturating_mul(twice(OF_MOMENTS)))
     }
 
     /// The scans that are to be undone, by revision, ascending.
@@ -96,5 +115,39 @@ impl Observations {
     pub fn held_by_targets_alone(&self) -> VoxelSet {
         let alone = |(&block, held): (&VoxelKey, &Held)| (block, held.by_targets.difference(&held.by_others));
         self.held.iter().map(alone).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    fn base(side: i32) -> MapContents {
+        let square = (0..side).flat_map(|x| (0..side).map(move |y| [x * 8, y * 8, 0]));
+        MapContents::at(1, square.filter_map(VoxelKey::new).collect())
+    }
+
+    #[test]
+    fn a_base_is_taken_over_with_looks_at_the_signal_in_proportion_to_its_size() {
+        for side in [50, 200, 400] {
+            let (base, looks) = (base(side), Cell::new(0));
+            let count = || looks.replace(looks.get() + 1) == usize::MAX;
+            assert!(Observations::new(vec![2], &[], &base, StopSignal::when(&count)).is_some());
+            let entries = base.voxels.blocks().len() + base.moments.as_slice().len();
+            assert!(entries / looks.get() <= ENTRIES_PER_LOOK, "{entries} entries, {} looks", looks.get());
+        }
+        let gone = || true;
+        assert!(Observations::new(vec![2], &[], &base(50), StopSignal::when(&gone)).is_none());
+    }
+
+    #[test]
+    fn what_is_reserved_for_a_base_covers_its_entries_twice() {
+        let base = base(100);
+        let (blocks, moments) = (base.voxels.blocks().len(), base.moments.as_slice().len());
+        let entries = blocks * size_of::<(VoxelKey, Held)>() + moments * size_of::<(VoxelKey, Moments)>();
+        let reserved = Observations::bytes_max(blocks, moments);
+        assert!((2 * entries..3 * entries).contains(&reserved), "{reserved} for {entries} bytes of entries");
     }
 }

@@ -98,7 +98,7 @@ impl<'a> OccupiedVoxelList<'a> {
     }
 
     /// The exact set, shared with up to two other levels.
-    pub(super) fn blocks(&self) -> &'a BlockTable {
+    pub(crate) fn blocks(&self) -> &'a BlockTable {
         self.blocks
     }
 }

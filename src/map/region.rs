@@ -19,6 +19,9 @@ pub enum Region {
     },
 }
 
+/// How far from the origin a sphere may lie and reach, metres: ten thousand times as far as the largest map goes.
+pub const SPHERE_M_MAX: f64 = 1e12;
+
 /// Why numbers are not a region.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RegionError {
@@ -28,6 +31,11 @@ pub enum RegionError {
     /// A centre or radius that is not finite, or a negative radius.
     #[error("sphere.center_m must be finite and sphere.radius_m not negative, got {0:?} and {1}")]
     Sphere([f64; 3], f64),
+    /// A centre or radius beyond [`SPHERE_M_MAX`].
+    #[error(
+        "sphere.center_m and sphere.radius_m must lie within {SPHERE_M_MAX:e} m, got {0:?} and {1}: no map goes as far"
+    )]
+    SphereTooFar([f64; 3], f64),
 }
 
 impl Region {
@@ -43,13 +51,14 @@ impl Region {
     /// The ball about `center_m`.
     ///
     /// # Errors
-    /// When a number is not finite or the radius negative.
+    /// When a number is not finite or beyond [`SPHERE_M_MAX`], or the radius negative.
     pub fn ball(center_m: [f64; 3], radius_m: f64) -> Result<Self, RegionError> {
         let finite = center_m.iter().all(|c| c.is_finite()) && radius_m.is_finite();
-        if finite && radius_m >= 0.0 {
-            Ok(Self::Sphere { center_m, radius_m })
-        } else {
-            Err(RegionError::Sphere(center_m, radius_m))
+        let within = center_m.iter().all(|c| c.abs() <= SPHERE_M_MAX) && radius_m <= SPHERE_M_MAX;
+        match (finite && radius_m >= 0.0, within) {
+            (true, true) => Ok(Self::Sphere { center_m, radius_m }),
+            (true, false) => Err(RegionError::SphereTooFar(center_m, radius_m)),
+            (false, _) => Err(RegionError::Sphere(center_m, radius_m)),
         }
     }
 
@@ -60,8 +69,13 @@ impl Region {
                 (0..3).all(|axis| (min_m[axis]..=max_m[axis]).contains(&point_m[axis]))
             }
             Self::Sphere { center_m, radius_m } => {
-                let squared: f64 = (0..3).map(|axis| (point_m[axis] - center_m[axis]).powi(2)).sum();
-                squared <= radius_m * radius_m
+                let from_center = |axis: usize| point_m[axis] - center_m[axis];
+                let squared: f64 = (0..3).map(|axis| from_center(axis).powi(2)).sum();
+                if (squared + radius_m * radius_m).is_finite() {
+                    return squared <= radius_m * radius_m;
+                }
+                // Too far for squares, which only a sphere that nobody checked can be: shares of the radius.
+                (0..3).map(|axis| (from_center(axis) / radius_m).powi(2)).sum::<f64>() <= 1.0
             }
         }
     }
@@ -96,5 +110,31 @@ mod tests {
         assert!(Region::cuboid([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]).is_ok());
         assert!(Region::ball([0.0; 3], -1.0).is_err());
         assert!(Region::ball([0.0; 3], f64::INFINITY).is_err());
+        assert!(Region::ball([f64::NAN, 0.0, 0.0], 1.0).is_err());
+    }
+
+    #[test]
+    fn a_ball_as_far_as_no_map_goes_is_refused_and_holds_nothing_here() {
+        for (center_m, radius_m) in
+            [([1e200, 0.0, 0.0], 1e199), ([0.0, -2e12, 0.0], 1.0), ([0.0; 3], 1.1e12), ([f64::MAX; 3], 0.0)]
+        {
+            let error = Region::ball(center_m, radius_m).unwrap_err();
+            assert!(error.to_string().contains("within 1e12 m"), "{error}");
+        }
+        assert!(Region::ball([1e12, 0.0, -1e12], 1e12).is_ok());
+        let holds = |center_m, radius_m| Region::Sphere { center_m, radius_m }.contains([0.0; 3]);
+        assert!(!holds([1e200, 0.0, 0.0], 1e199) && !holds([1e200; 3], 0.0) && !holds([f64::MAX; 3], 1e308));
+        assert!(holds([1e200, 0.0, 0.0], 1e200) && holds([1e200, 1e200, 0.0], 2e200));
+    }
+
+    #[test]
+    fn a_box_of_any_numbers_holds_what_lies_between_them() {
+        for far in [1e200, f64::MAX, f64::INFINITY] {
+            let cuboid = |min_m, max_m| Region::cuboid(min_m, max_m).unwrap();
+            assert!(cuboid([-far; 3], [far; 3]).contains([0.0; 3]));
+            assert!(!cuboid([1.0; 3], [far; 3]).contains([0.0; 3]));
+            assert!(!cuboid([-far; 3], [-1.0; 3]).contains([0.0; 3]));
+            assert!(Region::cuboid([far; 3], [-far; 3]).is_err());
+        }
     }
 }

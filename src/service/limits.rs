@@ -17,7 +17,7 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
-    /// Jobs that may wait for a query thread, and as many for a mapping thread. 256.
+    /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
     pub jobs_waiting_max: usize,
     /// Bytes of a map file that is restored, before and after compression. 1 GiB.
     pub map_file_bytes_max: usize,
@@ -25,6 +25,12 @@ pub struct Limits {
     pub map_file_scans_max: usize,
     /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
     pub min_revision_wait_max: Duration,
+    /// How long aligning a scan may take that is not inserted. 10 s.
+    pub alignment_time_max: Duration,
+    /// How long aligning and preparing a scan may take that is to be inserted. 30 s.
+    pub insertion_time_max: Duration,
+    /// How long finding out may take what an undo takes back. 60 s.
+    pub undo_time_max: Duration,
     /// How long a search with no guess may take. 60 s.
     pub localization_time_max: Duration,
     /// Candidates of one search, which keeps that many places. 16.
@@ -48,6 +54,9 @@ impl Default for Limits {
             map_file_bytes_max: 1 << 30,
             map_file_scans_max: 20_000_000,
             min_revision_wait_max: Duration::from_secs(10),
+            alignment_time_max: Duration::from_secs(10),
+            insertion_time_max: Duration::from_secs(30),
+            undo_time_max: Duration::from_secs(60),
             localization_time_max: Duration::from_secs(60),
             localization_candidates_max: 16,
             localization_grid_bytes_max: 512 << 20,

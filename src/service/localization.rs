@@ -1,18 +1,20 @@
 //! Where a robot with no guess is in a map.
 
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
+use super::room::{Promise, Room};
 use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::Verdict;
 use crate::align::localize::{
     Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
-    LocalizationSettings, SearchProgress, localize_until,
+    LocalizationSettings, Supervision, localize_supervised,
 };
 use crate::geometry::{Point, Pose};
 use crate::util::StopSignal;
 
+/// Share of the time limit after which a search ends, and what it found is refined.
+pub const SEARCH_SHARE: f64 = 0.9;
 /// Candidates of a request that does not say.
 pub const CANDIDATES_DEFAULT: usize = 5;
 /// How long a search takes at most where the request does not say.
@@ -144,30 +146,56 @@ impl HostedMap {
         &self,
         request: &LocalizationRequest,
         settings: &ServiceSettings,
+        room: &Room,
         stop: StopSignal<'_>,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let start = Instant::now();
-        let time_limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
+        let limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
+        let stop = stop.by(start + limit);
         let all = request.points.as_slice();
+        let _copy = room.lend(size_of_val(all) as u64, WHOM)?;
         let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
         if points.is_empty() {
             let message =
                 format!("none of the scan's {} points is finite: nothing but no-returns", all.len());
             return Err(ServiceError::invalid("no_returns", message));
         }
-        let grid_bytes_max = settings.limits.localization_grid_bytes_max;
-        let search = LocalizationSettings { grid_bytes_max, ..LocalizationSettings::default() };
-        let watch = &mut |_: &SearchProgress| match start.elapsed() >= time_limit {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let search = search_settings(settings.limits.localization_grid_bytes_max);
+        let mut lent: Vec<Promise> = Vec::new();
+        let mut refused = None;
+        let supervision = &mut Supervision {
+            stop,
+            search_stop: stop.by(start + limit.mul_f64(SEARCH_SHARE)),
+            progress: &mut |_| (),
+            reserve: &mut |bytes| {
+                let more = room.lend(bytes as u64, WHOM).map(|promise| lent.push(promise));
+                more.map_err(|error| refused = Some(error)).is_ok()
+            },
         };
         let (map, query) = (&self.map, &request.query);
-        let found = localize_until(map, &points, query, &search, &settings.alignment, watch, stop)?;
-        check_not_stopped(stop)?;
+        let found = localize_supervised(map, &points, query, &search, &settings.alignment, supervision);
+        let found = found.map_err(|error| refused.unwrap_or_else(|| error.into()))?;
+        // Time that is up is an answer. Nobody is there to hear it once the caller has gone.
+        if stop.is_cancelled() {
+            check_not_stopped(stop)?;
+        }
         let state = self.state(found.revision);
         Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
     }
 }
+
+/// Whom a search's memory is lent to.
+const WHOM: &str = "a search with no guess";
+
+/// The search's settings where its grids may take `grid_bytes_max`: the cells that wait take half as much at most.
+fn search_settings(grid_bytes_max: usize) -> LocalizationSettings {
+    let usual = LocalizationSettings::default();
+    let cells_waiting_max = usual.cells_waiting_max.min(grid_bytes_max / 2 / BYTES_PER_CELL);
+    LocalizationSettings { grid_bytes_max, cells_waiting_max, ..usual }
+}
+
+/// What a cell takes that waits to be divided, rounded up; while they move, those before them take half as much.
+const BYTES_PER_CELL: usize = 64;
 
 impl From<LocalizationQueryError> for ServiceError {
     fn from(error: LocalizationQueryError) -> Self {
@@ -181,6 +209,7 @@ impl From<LocalizationError> for ServiceError {
             LocalizationError::EmptyMap => (ErrorCode::FailedPrecondition, "map_empty"),
             LocalizationError::NothingInReach { .. } => (ErrorCode::InvalidArgument, "scan_out_of_range"),
             LocalizationError::NothingThere { .. } => (ErrorCode::InvalidArgument, "nothing_there"),
+            LocalizationError::NoMemory { .. } => (ErrorCode::ResourceExhausted, "memory_full"),
             LocalizationError::TooLarge { .. } => (ErrorCode::ResourceExhausted, "search_too_large"),
         };
         Self::new(code, reason, error.to_string())

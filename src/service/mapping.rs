@@ -12,7 +12,7 @@ use super::{
     ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings,
     check_not_stopped,
 };
-use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align_until, judge_at};
+use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align_until, judge_until};
 use crate::geometry::{Point, Pose, extrapolate, pose_difference};
 use crate::map::{Change, Committed, Lookup, ScanRecord, TrajectoryPose};
 use crate::util::StopSignal;
@@ -48,6 +48,7 @@ impl HostedMap {
             return Ok(Step::Answered(answer));
         }
         let scan_record = self.record(&scan, &placement.alignment)?;
+        check_not_stopped(stop)?;
         if !request.at_guess && self.is_standing(&scan_record, &settings.standing) {
             return Ok(Step::Answered(ScanAnswer { accepted: true, standing: true, ..answer }));
         }
@@ -160,7 +161,7 @@ impl HostedMap {
         let alignment = if first {
             Alignment::trusted(guess, self.map.settings().levels, &scan.points)
         } else if request.at_guess {
-            judge_at(&self.map, &scan.points, &guess, &settings).on_the_callers_word()
+            judge_until(&self.map, &scan.points, &guess, &settings, stop).on_the_callers_word()
         } else {
             align_until(&self.map, &scan.points, &guess, &settings, stop)
         };
@@ -277,8 +278,34 @@ impl HostedMap {
 /// Where a robot is that goes on as it went from `before` to `last`.
 fn constant_velocity(before: &TrajectoryPose, last: &TrajectoryPose, timestamp_ns: Option<i64>) -> Pose {
     let share = match [before.timestamp_ns, last.timestamp_ns, timestamp_ns] {
-        [Some(t0), Some(t1), Some(t2)] if t1 > t0 && t2 > t1 => (t2 - t1) as f64 / (t1 - t0) as f64,
+        // Of timestamps as far apart as the numbers go, the difference is no i64.
+        [Some(t0), Some(t1), Some(t2)] if t1 > t0 && t2 > t1 => {
+            t2.abs_diff(t1) as f64 / t1.abs_diff(t0) as f64
+        }
         _ => 1.0,
     };
     extrapolate(&before.map_from_sensor, &last.map_from_sensor, share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::RobotName;
+
+    fn at(x: f64, timestamp_ns: i64) -> TrajectoryPose {
+        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::translation(x, 0.0, 0.0));
+        TrajectoryPose { timestamp_ns: Some(timestamp_ns), ..pose }
+    }
+
+    #[test]
+    fn a_motion_goes_on_in_proportion_to_the_time_whatever_the_timestamps() {
+        let x = |before, last, now| {
+            constant_velocity(&at(0.0, before), &at(1.0, last), Some(now)).translation.vector.x
+        };
+        assert_eq!(x(0, 2, 3), 1.5);
+        assert!((x(i64::MIN, 0, i64::MAX) - 2.0).abs() < 1e-9);
+        assert_eq!(x(i64::MIN, i64::MAX - 1, i64::MAX), 1.0);
+        assert_eq!(x(i64::MIN, i64::MIN + 1, i64::MAX), 1.0 + crate::geometry::EXTRAPOLATION_SHARE_MAX);
+        assert_eq!(x(i64::MAX, i64::MIN, i64::MAX), 2.0, "a clock that went back tells no share");
+    }
 }

@@ -12,6 +12,8 @@ mod growth;
 mod hosted_map;
 mod limits;
 mod localization;
+#[cfg(test)]
+mod looks;
 mod map_file;
 mod mapping;
 mod maps;
@@ -22,6 +24,7 @@ mod room;
 mod scan_reach;
 mod settings;
 mod shortage;
+mod time_limit;
 mod undo;
 mod usable_scan;
 mod watermarks;
@@ -30,7 +33,8 @@ pub use error::{ErrorCode, ServiceError};
 pub use gauges::{Gauges, MemoryReading, Readings};
 pub use limits::Limits;
 pub use localization::{
-    CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, TIME_LIMIT_DEFAULT,
+    CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
+    TIME_LIMIT_DEFAULT,
 };
 pub use pool::PoolUse;
 pub use reach::MapReach;
@@ -54,6 +58,7 @@ use committing::{Refusal, Step};
 use hosted_map::HostedMap;
 use pool::Pool;
 use room::Room;
+use time_limit::{TimeLimit, check_not_stopped};
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
 ///
@@ -65,14 +70,22 @@ pub struct MapService {
     scans: ScanReach,
 }
 
+/// See [`Inner::undo`].
+const UNDO_THREADS: usize = 1;
+
 #[derive(Debug)]
 struct Inner {
     settings: ServiceSettings,
     catalogue: Catalogue,
     /// For queries, listings and descriptions, so that no alignment starves them.
     queries: Pool,
-    /// For alignments, insertions and deletions.
+    /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     mapping: Pool,
+    /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
+    alignment: Pool,
+    /// For finding out what an undo takes back, which reads a snapshot and the journal behind it: one at a time, since two
+    /// of one map cannot both be made as they were prepared, and each takes memory as the map does.
+    undo: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
     room: Arc<Room>,
@@ -92,6 +105,8 @@ impl MapService {
             catalogue: Catalogue::open(settings.data_dir.as_deref(), &settings.store, progress)?,
             queries: Pool::new("query", settings.query_threads, waiting)?,
             mapping: Pool::new("mapping", settings.mapping_threads, waiting)?,
+            alignment: Pool::new("alignment", settings.alignment_threads, waiting)?,
+            undo: Pool::new("undo", UNDO_THREADS, waiting)?,
             localization: Pool::new("localization", settings.localization_threads, waiting)?,
             room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
             settings,
@@ -126,9 +141,9 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 3] {
-        let Inner { queries, mapping, localization, .. } = &*self.inner;
-        [queries, mapping, localization].map(Pool::in_use)
+    pub fn pools(&self) -> [PoolUse; 5] {
+        let Inner { queries, mapping, alignment, localization, undo, .. } = &*self.inner;
+        [queries, mapping, alignment, localization, undo].map(Pool::in_use)
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -158,7 +173,7 @@ impl MapService {
     /// # Errors
     /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
     /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
-    /// is nearly full.
+    /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         self.scans.permit(&scan.robot)?;
         let map = self.map(map)?;
@@ -168,8 +183,11 @@ impl MapService {
         }
         let turn = Arc::new(map.turn_of(&scan.robot).await);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
-        self.carry_through(move |stop| {
-            map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
+        let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
+        self.carry_through(&self.inner.mapping, move |stop| {
+            limit.run(stop, |stop| {
+                map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
+            })
         })
         .await
     }
@@ -177,13 +195,16 @@ impl MapService {
     /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
     ///
     /// # Errors
-    /// As for an insertion.
+    /// As for an insertion; the limit is `alignment_time_max`.
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
         self.scans.permit(&scan.robot)?;
         let map = self.map(map)?;
         self.limits().check_points(scan.points.len())?;
         let inner = Arc::clone(&self.inner);
-        self.inner.mapping.run(move |stop| map.align_scan(&scan, &inner.settings, stop)).await?
+        let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max);
+        let align =
+            move |stop: StopSignal<'_>| limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop));
+        self.inner.alignment.run(align).await?
     }
 
     /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
@@ -191,7 +212,8 @@ impl MapService {
     /// # Errors
     /// `InvalidArgument` for a scan without a usable point or with too many, a search box away from the map, a time
     /// limit or number of candidates beyond the limits; `FailedPrecondition` where the map is empty;
-    /// `ResourceExhausted` where the map takes more than `localization_grid_bytes_max`; `NotFound`.
+    /// `ResourceExhausted` where the map takes more than `localization_grid_bytes_max`, or there is no memory for the
+    /// search; `NotFound`.
     pub async fn localize(
         &self,
         map: &MapName,
@@ -200,7 +222,7 @@ impl MapService {
         let map = self.map(map)?;
         let request = request.within(self.limits())?;
         let inner = Arc::clone(&self.inner);
-        let search = move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, stop);
+        let search = move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.room, stop);
         self.inner.localization.run(search).await?
     }
 
@@ -222,7 +244,7 @@ impl MapService {
             DeletionTarget::Region(_) => {}
         }
         let (inner, deletion) = (Arc::clone(&self.inner), Arc::new(deletion));
-        self.carry_through(move |_| map.propose_deletion(&deletion, &inner.room)).await
+        self.carry_through(&self.inner.mapping, move |_| map.propose_deletion(&deletion, &inner.room)).await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -231,12 +253,16 @@ impl MapService {
     /// # Errors
     /// `NotFound` without such a map or scan; `FailedPrecondition` for a scan from before what undo reaches, or where
     /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full, or where there is no memory to
-    /// find out in who holds which voxels.
+    /// find out in who holds which voxels; `DeadlineExceeded` with `time_limit` beyond `undo_time_max`.
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         self.scans.permit_undo(&undo.target)?;
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let inner = Arc::clone(&self.inner);
-        self.carry_through(move |stop| map.propose_undo(&undo, &inner.room, stop)).await
+        let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
+        self.carry_through(&self.inner.undo, move |stop| {
+            limit.run(stop, |stop| map.propose_undo(&undo, &inner.room, &limit, stop))
+        })
+        .await
     }
 
     /// The poses of the accepted scans, of one robot or of all.
@@ -268,14 +294,15 @@ impl MapService {
         self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
     }
 
-    /// Prepares a change, waits until it is made, and prepares it again where the map has moved on meanwhile. Whoever goes
+    /// Prepares a change on a thread of `pool`, waits until it is made, and prepares it again where the map has moved on meanwhile. Whoever goes
     /// before it is proposed takes it along; after that it is made.
     async fn carry_through<A: Send + 'static>(
         &self,
+        pool: &Pool,
         propose: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
-            match self.inner.mapping.run(propose.clone()).await?? {
+            match pool.run(propose.clone()).await?? {
                 Step::Answered(answer) => return Ok(answer),
                 Step::Proposed(outcome, answer) => match outcome.await.map_err(committing_ended)? {
                     Ok(committed) => return Ok(answer(committed)),
@@ -288,19 +315,6 @@ impl MapService {
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
         self.inner.catalogue.get(&self.reach.check(name)?)
-    }
-}
-
-/// Ends work that nobody waits for.
-///
-/// # Errors
-/// When the caller has gone, who is therefore not told.
-fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError> {
-    match stop.is_stopped() {
-        true => {
-            Err(ServiceError::new(ErrorCode::DeadlineExceeded, "caller_gone", "nobody waits for the answer"))
-        }
-        false => Ok(()),
     }
 }
 

@@ -24,8 +24,10 @@ pub struct ServiceSettings {
     pub gauges: Option<Arc<dyn Gauges>>,
     /// Threads for queries; 0 = one a core.
     pub query_threads: usize,
-    /// Threads for alignments and changes; 0 = one a core.
+    /// Threads for insertions and deletions; 0 = one a core.
     pub mapping_threads: usize,
+    /// Threads for alignments of scans that are not inserted; 0 = one a core.
+    pub alignment_threads: usize,
     /// Threads for searches with no guess; 0 = one a core.
     pub localization_threads: usize,
     /// Of every alignment.

@@ -6,10 +6,14 @@ use super::committing::{Decided, Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
+use super::time_limit::TimeLimit;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
-use crate::map::{Change, Committed, MultiResolutionMap, Request, TrajectoryPose, UndoRecord, WithdrawnScan};
+use crate::map::{
+    Change, Committed, MultiResolutionMap, Observations, Request, TrajectoryPose, UndoRecord, WithdrawnScan,
+};
 use crate::store::{MapFolder, StoreError};
 use crate::util::StopSignal;
+use crate::voxel::{Moments, VoxelKey};
 
 impl HostedMap {
     /// Sets an undo on its way, unless it was done before.
@@ -20,6 +24,7 @@ impl HostedMap {
         self: &Arc<Self>,
         undo: &Undo,
         room: &Room,
+        limit: &TimeLimit,
         stop: StopSignal<'_>,
     ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
@@ -36,18 +41,22 @@ impl HostedMap {
             return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, state, replayed: false }));
         }
         // The map's content as it was before the first of them.
-        let lent = room.lend(self.snapshot_bytes(), "an undo")?;
+        let lent = room.lend(self.undo_bytes(), "an undo")?;
         let observed = folder.observations(&scans, &withdrawn, stop).map_err(unreadable)?;
         check_not_stopped(stop)?;
         let mut observed = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
-        let (map, count) = (Arc::clone(self), scans.len());
+        let (map, count, limit) = (Arc::clone(self), scans.len(), limit.clone());
         let decide = move |core: &MultiResolutionMap| {
             map.still_unanswered(request.as_ref())?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
-            folder.observe(&mut observed, StopSignal::NEVER).map_err(unreadable)?;
+            // What came meanwhile is shown while the map waits: that ends with the request's time as well.
+            limit.run(StopSignal::NEVER, |stop| {
+                folder.observe(&mut observed, stop).map_err(unreadable)?;
+                check_not_stopped(stop)
+            })?;
             let voxels = observed.observations.held_by_targets_alone();
             let moments = observed.observations.moments_without_targets();
             let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
@@ -62,6 +71,14 @@ impl HostedMap {
             replayed: false,
         };
         Ok(Step::Proposed(outcome, Box::new(answer)))
+    }
+
+    /// Bytes of memory that an undo takes: the snapshot that it begins with, read and decoded, and who holds which voxels of
+    /// it. A map that had more in it then than now takes more.
+    fn undo_bytes(&self) -> u64 {
+        let blocks = self.map.view().lists(0).map(|list| list.blocks().len()).sum();
+        let moments = self.map.moments().bytes() / size_of::<(VoxelKey, Moments)>();
+        self.snapshot_bytes() + Observations::bytes_max(blocks, moments) as u64
     }
 
     /// The revisions of the scans that are meant, ascending, and the scans that were withdrawn before.

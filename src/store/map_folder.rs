@@ -200,7 +200,7 @@ impl MapFolder {
     }
 
     /// Who holds which voxels, up to the present head of the journal; none where the journal does not reach back to the
-    /// first of `scans`.
+    /// first of `scans`, and where it is stopped.
     ///
     /// # Errors
     /// When a snapshot or the journal cannot be read.
@@ -215,7 +215,9 @@ impl MapFolder {
         };
         let base = pin.snapshot;
         let base_contents = Snapshot::read(&*self.files, &self.path.file(&snapshot_name(base)))?.contents;
-        let observations = Observations::new(scans.to_vec(), withdrawn, &base_contents);
+        let Some(observations) = Observations::new(scans.to_vec(), withdrawn, &base_contents, stop) else {
+            return Ok(None);
+        };
         let mut observed = Observed { observations, revision: base, _pin: pin };
         self.observe(&mut observed, stop)?;
         Ok(Some(observed))

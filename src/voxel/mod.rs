@@ -21,6 +21,6 @@ pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
 pub use moments::{MOMENT_LEVEL, MomentSet, Moments};
 pub(crate) use renewal::Renewal;
-pub use sample::{VolumetricSample, volumetric_sample};
+pub use sample::{VolumetricSample, sample_bytes_max, volumetric_sample, volumetric_sample_until};
 pub use set::VoxelSet;
 pub(crate) use slots::{BUCKET, Bucket, Slots};

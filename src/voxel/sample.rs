@@ -4,6 +4,7 @@ use hashbrown::HashMap;
 
 use super::{RESOLUTION_MAX_M, RESOLUTION_MIN_M};
 use crate::geometry::Point;
+use crate::util::StopSignal;
 
 /// A scan thinned to about the wished number of points, evenly in space rather than in angle.
 #[derive(Debug, Clone)]
@@ -20,6 +21,11 @@ const TOLERANCE: f64 = 0.05;
 const TRIALS: usize = 16;
 /// The first of them, metres.
 const FIRST_M: f64 = 0.25;
+/// Points that are looked at between two looks at the stop signal: a millisecond or less.
+const POINTS_PER_LOOK: usize = 16 << 10;
+/// Times the wish that no sample exceeds. Points that are each alone in the coarsest voxel, as no scan's are, would
+/// otherwise all be taken.
+const WISHES_MAX: usize = 4;
 
 /// Takes one random point of each voxel of a sample lattice, whose resolution is found by trial so that
 /// about `wish` points result (paper III-A: "the volumetric sample resolution is adjusted to produce
@@ -30,6 +36,17 @@ const FIRST_M: f64 = 0.25;
 /// The choice within a voxel depends on `seed` and the point's place in the scan alone. `points` are finite;
 /// a scan of at most `wish` points is returned whole.
 pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> VolumetricSample {
+    volumetric_sample_until(points, wish, seed, StopSignal::NEVER)
+}
+
+/// The same, which once it is stopped takes the best of the trials so far; without one, points at even distances in the
+/// order of the scan.
+pub fn volumetric_sample_until(
+    points: &[Point],
+    wish: usize,
+    seed: u64,
+    stop: StopSignal<'_>,
+) -> VolumetricSample {
     if points.len() <= wish {
         return VolumetricSample { points: points.to_vec(), resolution_m: 0.0 };
     }
@@ -37,7 +54,7 @@ pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> Volumetric
     let mut best = Vec::new();
     let (mut resolution_m, mut trial_m) = (coarse_m, FIRST_M);
     for _ in 0..TRIALS {
-        let chosen = one_of_each_voxel(points, trial_m, seed);
+        let Some(chosen) = one_of_each_voxel(points, trial_m, seed, stop) else { break };
         let count = chosen.len();
         if best.is_empty() || count.abs_diff(wish) < best.len().abs_diff(wish) {
             (best, resolution_m) = (chosen, trial_m);
@@ -55,24 +72,45 @@ pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> Volumetric
         let halfway_m = (fine_m * coarse_m).sqrt();
         trial_m = if (fine_m..coarse_m).contains(&of_a_surface_m) { of_a_surface_m } else { halfway_m };
     }
+    if best.is_empty() {
+        best = (0..points.len() as u32).step_by(points.len().div_ceil(wish.max(1))).collect();
+    }
+    if best.len() > wish.saturating_mul(WISHES_MAX).max(1) {
+        best.select_nth_unstable_by_key(wish, |&place| lottery(seed, u64::from(place)));
+        best.truncate(wish);
+    }
     best.sort_unstable();
     VolumetricSample { points: best.into_iter().map(|i| points[i as usize]).collect(), resolution_m }
 }
 
-/// The place in the scan of one point of each voxel of a lattice of `resolution_m`.
-fn one_of_each_voxel(points: &[Point], resolution_m: f64, seed: u64) -> Vec<u32> {
+/// Bytes that a sample of `points` points takes while it is made, at most: a table of as many voxels as points, and the
+/// one of half the size that it grew out of.
+pub fn sample_bytes_max(points: usize) -> usize {
+    const OF_VOXEL: usize = size_of::<([i32; 3], (u64, u32))>() + 1;
+    let places = points.saturating_mul(8).div_ceil(7).next_power_of_two();
+    places / 2 * 3 * OF_VOXEL + 3 * points * size_of::<u32>()
+}
+
+/// The place in the scan of one point of each voxel of a lattice of `resolution_m`, in no order; none once stopped.
+fn one_of_each_voxel(
+    points: &[Point],
+    resolution_m: f64,
+    seed: u64,
+    stop: StopSignal<'_>,
+) -> Option<Vec<u32>> {
     let per_resolution = (1.0 / resolution_m) as f32;
     let mut chosen = HashMap::with_capacity(points.len() / 16);
     for (place, point) in points.iter().enumerate() {
+        if place.is_multiple_of(POINTS_PER_LOOK) && stop.is_stopped() {
+            return None;
+        }
         // Unlike a map's lattice this one need not be exact at its borders or reach far: it saturates.
         let voxel = point.xyz().map(|c| floor(c * per_resolution));
         let ticket = (lottery(seed, place as u64), place as u32);
         let winner = chosen.entry(voxel).or_insert(ticket);
         *winner = ticket.min(*winner);
     }
-    let mut places: Vec<u32> = chosen.into_values().map(|(_, place)| place).collect();
-    places.sort_unstable();
-    places
+    Some(chosen.into_values().map(|(_, place)| place).collect())
 }
 
 /// Rounds down. Plain x86-64 has no instruction for it and would call a library.
@@ -125,5 +163,35 @@ mod tests {
         let sample = |seed| volumetric_sample(&wall(), 500, seed).points;
         assert_eq!(sample(1), sample(1));
         assert_ne!(sample(1), sample(2));
+    }
+
+    #[test]
+    fn a_sample_that_is_stopped_has_about_the_wished_number_of_points() {
+        let looks = std::cell::Cell::new(0);
+        let after = |most: u32| {
+            looks.set(0);
+            let is_over = || looks.replace(looks.get() + 1) >= most;
+            volumetric_sample_until(&wall(), 500, 1, StopSignal::when(&is_over)).points.len()
+        };
+        assert_eq!(after(0), 500);
+        // In the midst of the first trial.
+        assert_eq!((after(2), looks.get()), (500, 3));
+    }
+
+    #[test]
+    fn it_looks_at_the_signal_as_often_as_the_scan_is_large() {
+        for scans in [1, 4, 16] {
+            let looks = std::cell::Cell::new(0);
+            let count = || looks.replace(looks.get() + 1) == usize::MAX;
+            let points = wall().repeat(scans);
+            volumetric_sample_until(&points, 500, 1, StopSignal::when(&count));
+            assert!(looks.get() >= points.len() / POINTS_PER_LOOK, "{} looks", looks.get());
+        }
+    }
+
+    #[test]
+    fn points_alone_in_the_coarsest_voxels_are_thinned_all_the_same() {
+        let apart: Vec<Point> = (0..20_000).map(|i| Point::new(i as f32 * 1000.0, 0.0, 1e30)).collect();
+        assert_eq!(volumetric_sample(&apart, 500, 1).points.len(), 500);
     }
 }

@@ -77,6 +77,12 @@ pub enum LocalizationError {
         /// The scan's largest range.
         range_m: f64,
     },
+    /// Whoever started the search has no memory for it.
+    #[error("there is no memory for {bytes} bytes more of the search")]
+    NoMemory {
+        /// What it asked for.
+        bytes: usize,
+    },
     /// The grids would not fit.
     #[error(
         "the part of the map to search takes {bytes} bytes at the coarsest resolution of use, {resolution_m} m, \

@@ -164,6 +164,7 @@ mod tests {
     use crate::align::localize::LocalizationSettings;
     use crate::geometry::Point;
     use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+    use crate::util::StopSignal;
 
     const RESOLUTION_M: f64 = 0.1;
     const DEPTHS: u32 = 5;
@@ -193,9 +194,9 @@ mod tests {
             part in prop::array::uniform6(0.0..=1.0),
         ) {
             let map = map_of(&map_points);
-            let sample = SearchSample::of(&scan, 100, 0);
+            let sample = SearchSample::of(&scan, 100, 0, StopSignal::NEVER);
             let settings = LocalizationSettings { resolutions_per_range: 20.0, ..Default::default() };
-            let levels = DilatedLevels::of(&map, &sample, None, &settings).unwrap();
+            let levels = DilatedLevels::of_all(&map, &sample, &settings);
             let axis = |a: [i8; 3]| UnitVector3::new_normalize(Vector3::from(a.map(f64::from)) + Vector3::x() * 0.3);
             let orientations = [Orientation::bringing(axis(axes[0]), axis(axes[1]))];
             let side_m = levels.finest().resolution_m();

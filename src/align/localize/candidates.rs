@@ -5,11 +5,11 @@ use super::dilated::DilatedLevels;
 use super::sample::SearchSample;
 use super::sight::blocked_share;
 use super::{Candidate, LocalizationSettings};
-use crate::align::{Alignment, AlignmentSettings, align_until};
+use crate::align::{Alignment, AlignmentSettings, align_until, judge_at};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
-use crate::voxel::volumetric_sample;
+use crate::voxel::volumetric_sample_until;
 
 /// Points that a place is refined with before it is known to be among the best.
 const THINNED: usize = 3000;
@@ -27,23 +27,39 @@ pub(super) struct Refinement<'a> {
 
 impl Refinement<'_> {
     /// The distinct candidates that the places lead to, best first: all by some of the scan's points, then the best
-    /// `wish` by all of them.
+    /// `wish` by all of them. Once stopped the places are judged where they are, each by a few thousand look-ups.
     pub(super) fn candidates(&self, places: &[Basin], wish: usize) -> Vec<Candidate> {
-        let thinned = volumetric_sample(self.points, THINNED, self.alignment.seed).points;
-        let mut candidates: Vec<Candidate> = places
-            .iter()
-            .take_while(|_| !self.stop.is_stopped())
-            .map(|place| self.at(&thinned, &place.map_from_sensor, self.share(place.score)))
-            .collect();
+        let thinned = volumetric_sample_until(self.points, THINNED, self.alignment.seed, self.stop).points;
+        let mut candidates: Vec<Candidate> =
+            places.iter().map(|place| self.first_at(&thinned, place)).collect();
         rank(&mut candidates);
         let mut candidates = self.distinct(candidates);
         for candidate in candidates.iter_mut().take(wish) {
-            *candidate = self.at(self.points, &candidate.map_from_sensor(), candidate.search_overlap);
+            let refined = self.at(self.points, &candidate.map_from_sensor(), candidate.search_overlap);
+            // What was stopped on the way means nothing.
+            if self.stop.is_stopped() {
+                break;
+            }
+            *candidate = refined;
         }
         rank(&mut candidates);
         let mut candidates = self.distinct(candidates);
         set_margins(&mut candidates);
         candidates
+    }
+
+    /// The candidate that a place leads to; the place itself where the time is up.
+    fn first_at(&self, thinned: &[Point], place: &Basin) -> Candidate {
+        let (pose, search_overlap) = (place.map_from_sensor, self.share(place.score));
+        if !self.stop.is_stopped() {
+            let candidate = self.at(thinned, &pose, search_overlap);
+            if !self.stop.is_stopped() {
+                return candidate;
+            }
+        }
+        let alignment = judge_at(self.map, thinned, &pose, self.alignment);
+        let blocked = blocked_share(self.levels, self.sample, &pose, StopSignal::NEVER);
+        Candidate { alignment, search_overlap, blocked, margin: None }
     }
 
     fn share(&self, score: u16) -> f64 {
@@ -52,7 +68,7 @@ impl Refinement<'_> {
 
     fn at(&self, points: &[Point], guess: &Pose, search_overlap: f64) -> Candidate {
         let alignment = self.refined(points, guess);
-        let blocked = blocked_share(self.levels, self.sample, &alignment.map_from_sensor);
+        let blocked = blocked_share(self.levels, self.sample, &alignment.map_from_sensor, self.stop);
         Candidate { alignment, search_overlap, blocked, margin: None }
     }
 

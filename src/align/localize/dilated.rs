@@ -2,17 +2,18 @@
 
 use super::field::DistanceField;
 use super::sample::SearchSample;
-use super::{LocalizationError, LocalizationSettings, SearchBox};
+use super::slabs::{BLOCKS_PER_LOOK, Slabs, VoxelBox};
+use super::supervision::{Unbuilt, check};
+use super::{LocalizationError, LocalizationSettings, SearchBox, Supervision};
 use crate::geometry::translation_m;
-use crate::map::{MultiResolutionMap, TrajectoryPose};
-use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, VoxelKey, VoxelSet};
+use crate::map::MultiResolutionMap;
+use crate::util::StopSignal;
+use crate::voxel::{BLOCK_LEVELS, BlockMask, VoxelKey};
 
 /// Distance fields of a part of the map at several levels, finest first, each twice as coarse as the one before.
 #[derive(Debug)]
 pub(super) struct DilatedLevels {
     fields: Vec<DistanceField>,
-    /// The occupied voxels of the finest field.
-    pub(super) voxels: Vec<VoxelKey>,
     /// Where the sensor is searched.
     pub(super) domain: SearchBox,
     /// Of the map that they were taken from.
@@ -28,56 +29,128 @@ const STRAY_SHARE: f64 = 1e-3;
 const RESOLUTIONS_PER_RANGE_MIN: f64 = 8.0;
 /// Levels beyond which a whole map is a voxel.
 const LEVEL_MAX: f64 = 20.0;
-/// What building a field takes besides it: two of the same size.
-const BYTES_PER_VOXEL: usize = 3;
+/// Grids of a byte a voxel that building a field takes besides it, of the same size.
+const GRIDS_BESIDE: usize = 2;
+/// Poses of a trajectory between two looks at the stop signal.
+const POSES_PER_LOOK: usize = 16 << 10;
 
-/// A box of finest voxels, inclusive.
-type VoxelBox = ([i32; 3], [i32; 3]);
+/// The blocks of one revision of a map, in no order.
+struct Blocks {
+    blocks: Vec<(VoxelKey, BlockMask)>,
+    revision: u64,
+}
+
+impl Blocks {
+    /// A copy of the map's. Changes wait until it is made, and readers do not.
+    fn of(map: &MultiResolutionMap, supervision: &mut Supervision<'_>) -> Result<Self, Unbuilt> {
+        let count = map.view().lists(0).map(|list| list.blocks().len()).sum::<usize>();
+        supervision.take(count * size_of::<(VoxelKey, BlockMask)>())?;
+        let (read, stop) = (map.long_read(), supervision.stop);
+        let view = read.view();
+        let mut blocks = Vec::with_capacity(count);
+        for (block, mask) in view.lists(0).flat_map(|list| list.blocks().iter()) {
+            if blocks.len().is_multiple_of(BLOCKS_PER_LOOK) {
+                check(stop)?;
+            }
+            blocks.push((block, *mask));
+        }
+        Ok(Self { blocks, revision: view.revision() })
+    }
+
+    /// Calls `f` with the voxels of `level` within a box of finest voxels, each once for each block that it is of.
+    fn for_each_voxel(
+        &self,
+        level: u32,
+        (low, high): VoxelBox,
+        stop: StopSignal<'_>,
+        mut f: impl FnMut(VoxelKey),
+    ) -> Result<(), Unbuilt> {
+        let in_block = level.min(BLOCK_LEVELS - 1);
+        let is_inside = |key: &VoxelKey| {
+            let index = key.index();
+            (0..3).all(|axis| (low[axis] >> level..=high[axis] >> level).contains(&index[axis]))
+        };
+        for blocks in self.blocks.chunks(BLOCKS_PER_LOOK) {
+            check(stop)?;
+            for (block, mask) in blocks {
+                let voxels = mask.cells(in_block).map(|cell| cell.voxel(*block).ancestor(level));
+                voxels.filter(is_inside).for_each(&mut f);
+            }
+        }
+        Ok(())
+    }
+}
 
 impl DilatedLevels {
     /// The levels that `sample` can show from within `search_box`; without one, from within the bulk of the map and
     /// around its trajectory.
     ///
     /// # Errors
-    /// When the map has no voxel there, or too many for [`LocalizationSettings::grid_bytes_max`].
+    /// When the map has no voxel there, or too many for [`LocalizationSettings::grid_bytes_max`]; when there is no memory
+    /// for them, or they were stopped.
     pub(super) fn of(
         map: &MultiResolutionMap,
         sample: &SearchSample,
         search_box: Option<SearchBox>,
         settings: &LocalizationSettings,
-    ) -> Result<Self, LocalizationError> {
-        let view = map.view();
-        let (voxels, revision) = (view.voxels(), view.revision());
-        let station = |pose: &TrajectoryPose| translation_m(&pose.map_from_sensor);
-        let stations: Vec<[f64; 3]> = map.trajectory().poses().iter().map(station).collect();
-        drop(view);
+        supervision: &mut Supervision<'_>,
+    ) -> Result<Self, Unbuilt> {
+        let stop = supervision.stop;
+        let blocks = Blocks::of(map, supervision)?;
+        if blocks.blocks.is_empty() {
+            return Err(LocalizationError::EmptyMap.into());
+        }
+        let slabs = Slabs::of(&blocks.blocks, stop)?;
         let resolution_m = |level: u32| map.settings().resolution_m * f64::from(1u32 << level);
-        let all = bounds(&voxels, 0.0).ok_or(LocalizationError::EmptyMap)?;
+        let all = slabs.bounds(0.0).ok_or(LocalizationError::EmptyMap)?;
         let range_m = sample.range_max_m();
         let nothing_there = LocalizationError::NothingThere { range_m };
         let box_of = |(low, high): VoxelBox| SearchBox::of_voxels(low, high, resolution_m(0));
         let (seen, domain) = match search_box {
             Some(given) => (meet(all, given.grown(range_m), resolution_m(0)), given),
             None => {
-                let bulk = bounds(&voxels, STRAY_SHARE).unwrap_or(all);
-                (Some(bulk), stations.into_iter().fold(box_of(bulk), SearchBox::holding))
+                let bulk = slabs.bounds(STRAY_SHARE).unwrap_or(all);
+                (Some(bulk), around_trajectory(map, box_of(bulk), stop)?)
             }
         };
         let seen = seen.ok_or(nothing_there.clone())?;
-        // From further away nothing is in sight.
-        let domain = domain.meet(box_of(seen).grown(range_m)).ok_or(nothing_there.clone())?;
+        // From further away too little is in sight: so the box is finite, whatever was given.
+        let sight_m = sample.sight_m(settings.search_overlap_min) + resolution_m(1);
+        let domain = domain.meet(box_of(seen).grown(sight_m)).ok_or(nothing_there.clone())?;
         let level = finest_level(seen, sample.range_m, resolution_m(0), settings)?;
-        let occupied = ancestors(&voxels, seen, level);
-        if occupied.is_empty() {
-            return Err(nothing_there);
+        supervision.take(grid_bytes(seen, level, settings))?;
+        let mut fields = Vec::new();
+        for up in 0..fields_of(settings) {
+            let [low, high] = [seen.0, seen.1].map(|i| i.map(|i| i >> (level + up)));
+            let mut field = DistanceField::empty(low, high, resolution_m(level + up), stop)?;
+            let mut is_empty = true;
+            blocks.for_each_voxel(level, seen, stop, |voxel| {
+                is_empty = false;
+                field.occupy(voxel.ancestor(up));
+            })?;
+            if is_empty {
+                return Err(nothing_there.into());
+            }
+            field.spread(stop)?;
+            fields.push(field);
         }
-        let field = |up: u32| {
-            let ([low, high], voxels) =
-                ([seen.0, seen.1].map(|i| i.map(|i| i >> (level + up))), occupied.iter());
-            DistanceField::new(voxels.map(|key| key.ancestor(up)), low, high, resolution_m(level + up))
+        Ok(Self { fields, domain, revision: blocks.revision })
+    }
+
+    /// The levels without a search box or supervision.
+    #[cfg(test)]
+    pub(super) fn of_all(
+        map: &MultiResolutionMap,
+        sample: &SearchSample,
+        settings: &LocalizationSettings,
+    ) -> Self {
+        let alone = &mut Supervision {
+            stop: StopSignal::NEVER,
+            search_stop: StopSignal::NEVER,
+            progress: &mut |_| (),
+            reserve: &mut |_| true,
         };
-        let fields = 1 + settings.halvings.saturating_sub(VOXELS_PER_CELL.ilog2());
-        Ok(Self { fields: (0..fields).map(field).collect(), voxels: occupied, domain, revision })
+        Self::of(map, sample, None, settings, alone).unwrap()
     }
 
     /// The finest field.
@@ -92,6 +165,37 @@ impl DilatedLevels {
     }
 }
 
+/// `bulk` and all of the map's poses.
+fn around_trajectory(
+    map: &MultiResolutionMap,
+    bulk: SearchBox,
+    stop: StopSignal<'_>,
+) -> Result<SearchBox, Unbuilt> {
+    let trajectory = map.trajectory();
+    let mut around = bulk;
+    for poses in trajectory.poses().chunks(POSES_PER_LOOK) {
+        check(stop)?;
+        around =
+            poses.iter().fold(around, |around, pose| around.holding(translation_m(&pose.map_from_sensor)));
+    }
+    Ok(around)
+}
+
+/// Number of fields that the cells of a search read.
+fn fields_of(settings: &LocalizationSettings) -> u32 {
+    1 + settings.halvings.saturating_sub(VOXELS_PER_CELL.ilog2())
+}
+
+/// Bytes that the fields take from `level` on, with what is there while the first and largest is built.
+fn grid_bytes(seen: VoxelBox, level: u32, settings: &LocalizationSettings) -> usize {
+    let of_field = |up: u32| {
+        let [low, high] = [seen.0, seen.1].map(|i| i.map(|i| i >> (level + up)));
+        DistanceField::grid(low, high).iter().fold(1usize, |bytes, &side| bytes.saturating_mul(side))
+    };
+    let beside = of_field(0).saturating_mul(GRIDS_BESIDE);
+    (0..fields_of(settings)).fold(beside, |bytes, up| bytes.saturating_add(of_field(up)))
+}
+
 /// The finest level that the search needs, or the one after it that fits the memory.
 fn finest_level(
     seen: VoxelBox,
@@ -103,10 +207,7 @@ fn finest_level(
     let needed = (wish_m / resolution_m).log2().round().clamp(0.0, LEVEL_MAX) as u32;
     let coarsest =
         (range_m / RESOLUTIONS_PER_RANGE_MIN / resolution_m).log2().floor().clamp(0.0, LEVEL_MAX) as u32;
-    let bytes = |level: u32| {
-        let grid = DistanceField::grid(seen.0.map(|i| i >> level), seen.1.map(|i| i >> level));
-        grid.iter().fold(BYTES_PER_VOXEL, |bytes, &side| bytes.saturating_mul(side))
-    };
+    let bytes = |level: u32| grid_bytes(seen, level, settings);
     let (coarsest, bytes_max) = (coarsest.max(needed), settings.grid_bytes_max);
     (needed..=coarsest).find(|&level| bytes(level) <= bytes_max).ok_or_else(|| LocalizationError::TooLarge {
         bytes: bytes(coarsest),
@@ -115,52 +216,10 @@ fn finest_level(
     })
 }
 
-/// The box that holds all blocks of the set but a `stray` share of the voxels at each end of each axis.
-fn bounds(voxels: &VoxelSet, stray: f64) -> Option<VoxelBox> {
-    let mut low = [0; 3];
-    let mut high = [0; 3];
-    for axis in 0..3 {
-        let place = |(block, mask): &(VoxelKey, BlockMask)| (block.index()[axis], mask.count(0));
-        let mut slabs: Vec<(i32, usize)> = voxels.blocks().iter().map(place).collect();
-        slabs.sort_unstable();
-        let strays = (voxels.len() as f64 * stray) as usize;
-        low[axis] = first_beyond(strays, slabs.iter())? << BLOCK_LEVELS;
-        high[axis] = (first_beyond(strays, slabs.iter().rev())? << BLOCK_LEVELS) + BLOCK_SIDE - 1;
-    }
-    Some((low, high))
-}
-
-/// The slab in which more than `strays` voxels have been passed.
-fn first_beyond<'a>(strays: usize, mut slabs: impl Iterator<Item = &'a (i32, usize)>) -> Option<i32> {
-    let mut passed = 0;
-    let beyond = |(_, count): &&(i32, usize)| {
-        passed += count;
-        passed > strays
-    };
-    slabs.find(beyond).map(|(slab, _)| *slab)
-}
-
 /// The part of `all` that lies in `region`.
 fn meet(all: VoxelBox, region: SearchBox, resolution_m: f64) -> Option<VoxelBox> {
     let voxel = |c: f64| (c / resolution_m).floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
     let low = std::array::from_fn(|axis| all.0[axis].max(voxel(region.min_m()[axis])));
     let high = std::array::from_fn(|axis| all.1[axis].min(voxel(region.max_m()[axis])));
     (0..3).all(|axis| low[axis] <= high[axis]).then_some((low, high))
-}
-
-/// The distinct ancestors of the set's voxels within a box of finest voxels, `level` levels up.
-fn ancestors(voxels: &VoxelSet, (low, high): VoxelBox, level: u32) -> Vec<VoxelKey> {
-    let in_block = level.min(BLOCK_LEVELS - 1);
-    let inside = |key: &VoxelKey| {
-        let index = key.index();
-        (0..3).all(|axis| (low[axis] >> level..=high[axis] >> level).contains(&index[axis]))
-    };
-    let of_block = |(block, mask): &(VoxelKey, BlockMask)| {
-        let block = *block;
-        mask.cells(in_block).map(move |cell| cell.voxel(block).ancestor(level))
-    };
-    let mut ancestors: Vec<VoxelKey> = voxels.blocks().iter().flat_map(of_block).filter(inside).collect();
-    ancestors.sort_unstable();
-    ancestors.dedup();
-    ancestors
 }

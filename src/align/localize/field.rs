@@ -1,5 +1,7 @@
 //! A map's level and all its dilations in one grid.
 
+use super::supervision::{Unbuilt, check};
+use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
 /// Chebyshev distances beyond this many voxels are not told apart.
@@ -27,43 +29,102 @@ impl DistanceField {
         std::array::from_fn(|axis| max[axis].abs_diff(min[axis]) as usize + 1 + border)
     }
 
-    /// The field of `occupied` voxels of side `resolution_m`, all of them within `min..=max`.
-    pub(super) fn new(
-        occupied: impl Iterator<Item = VoxelKey>,
+    /// A field around the voxels `min..=max` of side `resolution_m`, none of them occupied yet.
+    pub(super) fn empty(
         min: [i32; 3],
         max: [i32; 3],
         resolution_m: f64,
-    ) -> Self {
+        stop: StopSignal<'_>,
+    ) -> Result<Self, Unbuilt> {
         let size = Self::grid(min, max);
-        let distances = vec![FAR; size.iter().product()];
-        let mut field = Self { resolution_m, min: min.map(|i| i - i32::from(FAR)), size, distances };
-        for voxel in occupied {
-            let cell = field.cell(voxel.index());
-            field.distances[cell] = 0;
-        }
-        field.spread();
-        field
+        let distances = far_everywhere(size.iter().product(), stop)?;
+        Ok(Self { resolution_m, min: min.map(|i| i - i32::from(FAR)), size, distances })
     }
 
+    /// Takes note of an occupied voxel, one of those that the field was made around.
+    pub(super) fn occupy(&mut self, voxel: VoxelKey) {
+        let cell = self.cell(voxel.index());
+        self.distances[cell] = 0;
+    }
+
+    /// Finds the distances to the voxels that are occupied.
+    ///
     /// One voxel further each round: the smallest of 3 x 3 x 3 neighbours, axis by axis, and one.
-    fn spread(&mut self) {
+    pub(super) fn spread(&mut self, stop: StopSignal<'_>) -> Result<(), Unbuilt> {
         let strides = [1, self.size[0], self.size[0] * self.size[1]];
-        let (mut from, mut to) = (vec![FAR; self.distances.len()], vec![FAR; self.distances.len()]);
+        let (mut from, mut to) =
+            (far_everywhere(self.distances.len(), stop)?, far_everywhere(self.distances.len(), stop)?);
         for _ in 0..REACH_MAX {
-            from.copy_from_slice(&self.distances);
+            for (from, distances) in
+                from.chunks_mut(CELLS_PER_LOOK).zip(self.distances.chunks(CELLS_PER_LOOK))
+            {
+                check(stop)?;
+                from.copy_from_slice(distances);
+            }
             for stride in strides {
-                smallest_of_three(&from, stride, &mut to);
+                smallest_of_three(&from, stride, &mut to, stop)?;
                 std::mem::swap(&mut from, &mut to);
             }
-            for (distance, nearest) in self.distances.iter_mut().zip(&from) {
-                *distance = (*distance).min(*nearest + 1);
+            for (distances, from) in
+                self.distances.chunks_mut(CELLS_PER_LOOK).zip(from.chunks(CELLS_PER_LOOK))
+            {
+                check(stop)?;
+                for (distance, nearest) in distances.iter_mut().zip(from) {
+                    *distance = (*distance).min(*nearest + 1);
+                }
             }
         }
+        Ok(())
     }
 
     fn cell(&self, index: [i32; 3]) -> usize {
         let [x, y, z] = std::array::from_fn(|axis| (index[axis] - self.min[axis]) as usize);
         (z * self.size[1] + y) * self.size[0] + x
+    }
+
+    /// True of an occupied voxel.
+    pub(super) fn is_occupied(&self, voxel: VoxelKey) -> bool {
+        let index = voxel.index();
+        let is_inside = |axis: usize| {
+            (0..self.size[axis] as i64).contains(&(i64::from(index[axis]) - i64::from(self.min[axis])))
+        };
+        (0..3).all(is_inside) && self.distances[self.cell(index)] == 0
+    }
+
+    /// About `wish` of the occupied voxels, at even distances in the order of their keys.
+    pub(super) fn some_occupied(&self, wish: usize, stop: StopSignal<'_>) -> Result<Vec<VoxelKey>, Unbuilt> {
+        let mut occupied = 0;
+        for distances in self.distances.chunks(CELLS_PER_LOOK) {
+            check(stop)?;
+            occupied += distances.iter().filter(|&&distance| distance == 0).count();
+        }
+        let stride = occupied.div_ceil(wish.max(1)).max(1);
+        let (mut some, mut passed, mut since_look) = (Vec::new(), 0, 0);
+        let [xs, ys, zs] = std::array::from_fn(|axis| self.in_order_of_keys(axis));
+        for (z, y) in zs.flat_map(|z| ys.clone().map(move |y| (z, y))) {
+            since_look += self.size[0];
+            if since_look >= CELLS_PER_LOOK {
+                since_look = 0;
+                check(stop)?;
+            }
+            let row = self.cell([self.min[0], y, z]);
+            if !self.distances[row..row + self.size[0]].contains(&0) {
+                continue;
+            }
+            for x in xs.clone().filter(|x| self.distances[row + (x - self.min[0]) as usize] == 0) {
+                if passed % stride == 0 {
+                    some.extend(VoxelKey::new([x, y, z]));
+                }
+                passed += 1;
+            }
+        }
+        Ok(some)
+    }
+
+    /// The grid's indices along an axis as keys order them: two's complement, so that -1 comes last.
+    fn in_order_of_keys(&self, axis: usize) -> impl Iterator<Item = i32> + Clone + use<> {
+        let (first, end) = (self.min[axis], self.min[axis] + self.size[axis] as i32);
+        (first.max(0)..end).chain(first..end.min(0))
     }
 
     pub(super) fn resolution_m(&self) -> f64 {
@@ -80,6 +141,23 @@ impl DistanceField {
     pub(super) fn at(&self, place: [f32; 3]) -> u8 {
         let [x, y, z] = std::array::from_fn(|axis| self.clamped(place[axis], axis));
         self.distances[(z * self.size[1] + y) * self.size[0] + x]
+    }
+
+    /// Where on the way from `origin` along `toward` (voxels from the grid's corner) the grid is entered and left, as shares
+    /// of `toward`, none below 0; none where it is passed by, or a number is none.
+    pub(super) fn crossed_by(&self, origin: [f32; 3], toward: [f32; 3]) -> Option<(f32, f32)> {
+        let (mut enters, mut leaves) = (0.0f32, f32::INFINITY);
+        for axis in 0..3 {
+            let size = self.size[axis] as f32;
+            if toward[axis] == 0.0 {
+                (0.0..=size).contains(&origin[axis]).then_some(())?;
+                continue;
+            }
+            let at = |border: f32| (border - origin[axis]) / toward[axis];
+            enters = enters.max(at(0.0).min(at(size)));
+            leaves = leaves.min(at(0.0).max(at(size)));
+        }
+        (enters <= leaves && enters.is_finite()).then_some((enters, leaves))
     }
 
     /// The row of the grid that a coordinate falls in, or the border's on its side.
@@ -162,13 +240,32 @@ fn whole(place: f32, last: f32) -> u32 {
     ((place - 0.5).clamp(0.0, last) + SHIFT).to_bits() - SHIFT.to_bits()
 }
 
-/// The smallest of each value and its neighbours a `stride` away; the ends of the grid are border.
-fn smallest_of_three(from: &[u8], stride: usize, to: &mut [u8]) {
-    let end = from.len() - 2 * stride;
-    let neighbours = from[..end].iter().zip(&from[stride..]).zip(&from[2 * stride..]);
-    for (smallest, ((a, b), c)) in to[stride..].iter_mut().zip(neighbours) {
-        *smallest = *a.min(b).min(c);
+/// Cells of a grid between two looks at the stop signal: a fraction of a millisecond.
+const CELLS_PER_LOOK: usize = 1 << 20;
+
+/// So many cells with nothing near.
+fn far_everywhere(cells: usize, stop: StopSignal<'_>) -> Result<Vec<u8>, Unbuilt> {
+    let mut distances = Vec::with_capacity(cells);
+    while distances.len() < cells {
+        check(stop)?;
+        distances.resize(cells.min(distances.len() + CELLS_PER_LOOK), FAR);
     }
+    Ok(distances)
+}
+
+/// The smallest of each value and its neighbours a `stride` away; the ends of the grid are border.
+fn smallest_of_three(from: &[u8], stride: usize, to: &mut [u8], stop: StopSignal<'_>) -> Result<(), Unbuilt> {
+    let inner = from.len() - 2 * stride;
+    for start in (0..inner).step_by(CELLS_PER_LOOK) {
+        check(stop)?;
+        let end = inner.min(start + CELLS_PER_LOOK);
+        let neighbours =
+            from[start..end].iter().zip(&from[start + stride..]).zip(&from[start + 2 * stride..]);
+        for (smallest, ((a, b), c)) in to[start + stride..].iter_mut().zip(neighbours) {
+            *smallest = *a.min(b).min(c);
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -186,7 +283,11 @@ mod tests {
             std::array::from_fn(|axis| voxels.iter().map(|v| v[axis]).reduce(pick).unwrap())
         };
         let keys = voxels.iter().map(|v| VoxelKey::new(*v).unwrap());
-        DistanceField::new(keys, ends(i32::min), ends(i32::max), resolution_m)
+        let never = StopSignal::NEVER;
+        let mut field = DistanceField::empty(ends(i32::min), ends(i32::max), resolution_m, never).unwrap();
+        keys.for_each(|key| field.occupy(key));
+        field.spread(never).unwrap();
+        field
     }
 
     fn distance(voxels: &[[i32; 3]], index: [i32; 3]) -> u32 {
@@ -195,6 +296,16 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn occupied_voxels_come_in_the_order_of_their_keys(voxels in voxels(), wish in 1usize..20) {
+            let field = field(&voxels, 0.5);
+            let keys: std::collections::BTreeSet<VoxelKey> = voxels.iter().map(|v| VoxelKey::new(*v).unwrap()).collect();
+            prop_assert!(keys.iter().all(|&key| field.is_occupied(key)));
+            prop_assert!(!field.is_occupied(VoxelKey::new([500, 0, 0]).unwrap()));
+            let expected: Vec<_> = keys.iter().copied().step_by(keys.len().div_ceil(wish)).collect();
+            prop_assert_eq!(field.some_occupied(wish, StopSignal::NEVER).unwrap(), expected);
+        }
+
         #[test]
         fn every_voxel_knows_its_distance(voxels in voxels(), index in prop::array::uniform3(-30..30i32)) {
             let field = field(&voxels, 0.5);

@@ -24,18 +24,21 @@ mod sample;
 mod search;
 mod settings;
 mod sight;
+mod slabs;
+mod supervision;
 mod verdict;
 
 pub use answer::{Candidate, Localization, LocalizationError, SearchProgress};
 pub use query::{Gravity, LocalizationQuery, LocalizationQueryError, MAP_DOWN, SearchBox};
 pub use settings::LocalizationSettings;
+pub use supervision::Supervision;
 
-use std::ops::ControlFlow;
-
-use super::AlignmentSettings;
+use super::reach::within_reach;
+use super::{AlignmentSettings, Verdict};
 use crate::geometry::Point;
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
+use crate::voxel::sample_bytes_max;
 use basins::Basins;
 use bound::Bounds;
 use candidates::Refinement;
@@ -44,14 +47,14 @@ use orientation::Orientations;
 use rotation::RotationLattice;
 use sample::SearchSample;
 use search::Search;
+use supervision::Unbuilt;
 use verdict::verdict_on;
 
 /// Finds where in the map a scan was taken, with no guess.
 ///
-/// `points` are in the sensor frame; those farther away than any two places of a map are left out. `watch` is told of the progress every few hundred cells
-/// and stops the search by breaking; the answer is then the best so far, refined. One revision of the map is searched; the
-/// refinement at the end sees the map as it is then. One thread does it all, and the same input gives the same answer
-/// unless `watch` breaks.
+/// `points` are in the sensor frame; those farther away than any two places of a map are left out. One revision of the map
+/// is searched; the refinement at the end sees the map as it is then. One thread does it all, and the same input gives
+/// the same answer.
 ///
 /// # Errors
 /// When the map is empty, has nothing near the search box, or needs more memory than the settings allow; when no point
@@ -62,39 +65,61 @@ pub fn localize(
     query: &LocalizationQuery,
     settings: &LocalizationSettings,
     alignment: &AlignmentSettings,
-    watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
 ) -> Result<Localization, LocalizationError> {
-    localize_until(map, points, query, settings, alignment, watch, StopSignal::NEVER)
+    let alone = &mut Supervision {
+        stop: StopSignal::NEVER,
+        search_stop: StopSignal::NEVER,
+        progress: &mut |_| (),
+        reserve: &mut |_| true,
+    };
+    localize_supervised(map, points, query, settings, alignment, alone)
 }
 
-/// The same, which ends soon after nobody wants the answer: what it returns then means nothing.
+/// The same under supervision. Once it is stopped, which every phase looks at every few milliseconds, the answer is the
+/// best so far, refined by what was left of the time: cut short, and never accepted.
 ///
 /// # Errors
-/// As for [`localize`].
-pub fn localize_until(
+/// As for [`localize`]; when memory is refused.
+pub fn localize_supervised(
     map: &MultiResolutionMap,
     points: &[Point],
     query: &LocalizationQuery,
     settings: &LocalizationSettings,
     alignment: &AlignmentSettings,
-    watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
-    stop: StopSignal<'_>,
+    supervision: &mut Supervision<'_>,
 ) -> Result<Localization, LocalizationError> {
-    let reach_m = map.lattice().reach_m();
-    let in_reach = |point: &Point| point.to_f64().coords.norm() <= reach_m;
-    let points: &[Point] = &points.iter().copied().filter(in_reach).collect::<Vec<_>>();
+    match search_and_refine(map, points, query, settings, alignment, supervision) {
+        Ok(found) => Ok(found),
+        Err(Unbuilt::Stopped) => Ok(Localization::cut_short_at_once(map.revision())),
+        Err(Unbuilt::Refused(error)) => Err(error),
+    }
+}
+
+fn search_and_refine(
+    map: &MultiResolutionMap,
+    points: &[Point],
+    query: &LocalizationQuery,
+    settings: &LocalizationSettings,
+    alignment: &AlignmentSettings,
+    supervision: &mut Supervision<'_>,
+) -> Result<Localization, Unbuilt> {
+    let (stop, reach_m) = (supervision.stop, map.lattice().reach_m());
+    // A copy of the points, and what thinning them takes.
+    supervision.take(size_of_val(points) + sample_bytes_max(points.len()))?;
+    let points: &[Point] = &within_reach(points, reach_m, stop);
+    supervision::check(stop)?;
     if points.is_empty() {
-        return Err(LocalizationError::NothingInReach { reach_m });
+        return Err(LocalizationError::NothingInReach { reach_m }.into());
     }
 
     // 1) Take a few hundred points, even over the surfaces that the scan shows.
-    let sample = SearchSample::of(points, settings.search_points, query.seed);
+    let sample = SearchSample::of(points, settings.search_points, query.seed, stop);
 
     // 2) Dilate one revision of the map, at levels coarser than its own where needed.
-    let levels = DilatedLevels::of(map, &sample, query.search_box, settings)?;
+    let levels = DilatedLevels::of(map, &sample, query.search_box, settings, supervision)?;
 
     // 3) Turn about the way down where it is known, else about what the scan's surfaces and the map's could share.
-    let orientations = Orientations::of(points, &levels, query.gravity.as_ref(), settings);
+    let orientations = Orientations::of(points, &levels, query.gravity.as_ref(), settings, stop)?;
 
     // 4) Bound and divide cells of poses, the most promising first.
     let side_m = levels.finest().resolution_m();
@@ -103,26 +128,41 @@ pub fn localize_until(
     let bounds = Bounds::new(&levels, &sample, &orientations.families, rotations);
     let basins =
         Basins::new(settings.basin_voxels * side_m, settings.basin_deg.to_radians(), settings.basins_max);
-    let watch = &mut |progress: &SearchProgress| match stop.is_stopped() {
-        true => ControlFlow::Break(()),
-        false => watch(progress),
-    };
-    let found = Search::new(&bounds, settings, basins, watch).run();
+    let found = Search::new(&bounds, settings, basins, supervision).run();
 
     // 5) Refine the places found by alignment, and rank them.
     let refinement = Refinement { map, points, levels: &levels, sample: &sample, settings, alignment, stop };
     let mut candidates = refinement.candidates(&found.places, query.candidates);
 
     // 6) Say whether the best of them stands out.
-    let (verdict, reason) = verdict_on(&candidates, !found.complete, settings);
+    let cut_short = !found.complete || stop.is_stopped();
+    let (verdict, reason) = verdict_on(&candidates, cut_short, settings);
     candidates.truncate(query.candidates);
     Ok(Localization {
         verdict,
         reason,
         candidates,
-        exhaustive: found.complete && orientations.all,
-        cut_short: !found.complete,
+        exhaustive: !cut_short && orientations.all,
+        cut_short,
         cells: found.cells,
         revision: levels.revision,
     })
 }
+
+impl Localization {
+    /// Of a search that was stopped before there was anything to search in.
+    fn cut_short_at_once(revision: u64) -> Self {
+        Self {
+            verdict: Verdict::Ambiguous,
+            reason: "the search was cut short before it began".into(),
+            candidates: Vec::new(),
+            exhaustive: false,
+            cut_short: true,
+            cells: 0,
+            revision,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

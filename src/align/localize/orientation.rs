@@ -1,14 +1,17 @@
 //! Which rotations a search considers.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use nalgebra::{UnitQuaternion, UnitVector3, Vector3};
 
 use super::dilated::DilatedLevels;
-use super::normals::dominant_normals;
+use super::normals::{SURFACES_MAX, dominant_normals};
+use super::supervision::{Unbuilt, check};
 use super::{Gravity, LocalizationSettings};
 use crate::geometry::Point;
-use crate::voxel::{Lattice, VoxelKey, VoxelSet};
+use crate::util::StopSignal;
+use crate::voxel::{Cell, Lattice, VoxelKey, VoxelSet};
 
 /// A family of rotations: an axis of the sensor points, up to a tilt, along an axis of the map, and the sensor
 /// is turned about it by any angle.
@@ -54,6 +57,8 @@ pub(super) struct Orientations {
 const MAP_DIRECTIONS: usize = 2;
 /// Directions of the scan's surfaces; most scans show no more.
 const SCAN_DIRECTIONS: usize = 4;
+/// Points of a scan that are quantised between two looks at the stop signal.
+const POINTS_PER_LOOK: usize = 16 << 10;
 
 impl Orientations {
     /// The turns about the way down where it is known. Where not, those that bring one of the scan's dominant surfaces
@@ -63,31 +68,49 @@ impl Orientations {
         levels: &DilatedLevels,
         gravity: Option<&Gravity>,
         settings: &LocalizationSettings,
-    ) -> Self {
+        stop: StopSignal<'_>,
+    ) -> Result<Self, Unbuilt> {
         if let Some(gravity) = gravity {
-            return Self {
+            return Ok(Self {
                 families: vec![Orientation::bringing(gravity.in_sensor, gravity.in_map)],
                 tilt_max_rad: settings.gravity_tolerance_deg.to_radians(),
                 all: true,
-            };
+            });
         }
-        let of_map = dominant_normals(&levels.voxels, MAP_DIRECTIONS);
-        let of_scan = dominant_normals(&voxels_of(points, levels.finest().resolution_m()), SCAN_DIRECTIONS);
+        let field = levels.finest();
+        let some = field.some_occupied(SURFACES_MAX, stop)?;
+        let of_map = dominant_normals(&some, &|voxel| field.is_occupied(voxel), MAP_DIRECTIONS, stop)?;
+        let voxels = voxels_of(points, field.resolution_m(), stop)?;
+        let stride = voxels.len().div_ceil(SURFACES_MAX).max(1);
+        let some: Vec<VoxelKey> =
+            voxels.iter().step_by(stride).map(|(block, cell)| cell.voxel(*block)).collect();
+        let is_seen = |voxel: VoxelKey| voxels.contains(&Cell::of(voxel.index()));
+        let of_scan = dominant_normals(&some, &is_seen, SCAN_DIRECTIONS, stop)?;
         let either_way = |map: UnitVector3<f64>| {
             of_scan.iter().flat_map(move |scan| [*scan, -*scan].map(|scan| Orientation::bringing(scan, map)))
         };
-        Self {
+        Ok(Self {
             families: of_map.into_iter().flat_map(either_way).collect(),
             tilt_max_rad: settings.surface_tolerance_deg.to_radians(),
             all: false,
-        }
+        })
     }
 }
 
-/// The voxels of a scan in its own frame. Coarser than any lattice's limit there is nothing to see.
-fn voxels_of(points: &[Point], resolution_m: f64) -> Vec<VoxelKey> {
-    let voxels = |lattice: Lattice| VoxelSet::of_points(points, &lattice.from_map()).0.iter().collect();
-    Lattice::new(resolution_m, 1).map_or_else(|_| Vec::new(), voxels)
+/// The voxels of a scan in its own frame, by block. Coarser than any lattice's limit there is nothing to see.
+fn voxels_of(
+    points: &[Point],
+    resolution_m: f64,
+    stop: StopSignal<'_>,
+) -> Result<BTreeSet<(VoxelKey, Cell)>, Unbuilt> {
+    let mut voxels = BTreeSet::new();
+    let Ok(lattice) = Lattice::new(resolution_m, 1) else { return Ok(voxels) };
+    for points in points.chunks(POINTS_PER_LOOK) {
+        check(stop)?;
+        let some = VoxelSet::of_points(points, &lattice.from_map()).0;
+        voxels.extend(some.iter().map(|voxel| Cell::of(voxel.index())));
+    }
+    Ok(voxels)
 }
 
 #[cfg(test)]

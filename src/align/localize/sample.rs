@@ -6,7 +6,8 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::Point;
-use crate::voxel::volumetric_sample;
+use crate::util::StopSignal;
+use crate::voxel::volumetric_sample_until;
 
 /// A few hundred points, even over the surfaces that a scan shows, in random order.
 #[derive(Debug, Clone)]
@@ -23,10 +24,13 @@ const THINNING: usize = 20;
 /// Share of the points within [`SearchSample::range_m`].
 const RANGE_QUANTILE: f64 = 0.75;
 
+/// Ranges within which the nearest points lie, with what the search's voxels add: a quarter of the range at most.
+const SIGHT: f64 = 1.25;
+
 impl SearchSample {
     /// Thins `points` (finite, at least one) to `wish` of them.
-    pub(super) fn of(points: &[Point], wish: usize, seed: u64) -> Self {
-        let mut sample = volumetric_sample(points, wish.saturating_mul(THINNING), seed).points;
+    pub(super) fn of(points: &[Point], wish: usize, seed: u64, stop: StopSignal<'_>) -> Self {
+        let mut sample = volumetric_sample_until(points, wish.saturating_mul(THINNING), seed, stop).points;
         // In random order the first points foretell the rest, so that hopeless cells are given up early.
         sample.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
         sample.truncate(wish);
@@ -35,6 +39,16 @@ impl SearchSample {
         ranges.sort_unstable_by(f64::total_cmp);
         let range_m = ranges[((ranges.len() - 1) as f64 * RANGE_QUANTILE) as usize];
         Self { points, range_m }
+    }
+
+    /// Within which a voxel lies of every place where at least `share` of the points fall on the map, metres, from that
+    /// place: where so many do, one of the nearest does. A stray far return has no say, unless `share` is so small that
+    /// strays alone could make it.
+    pub(super) fn sight_m(&self, share: f64) -> f64 {
+        match share > 1.0 - RANGE_QUANTILE {
+            true => self.range_m * SIGHT,
+            false => self.range_max_m(),
+        }
     }
 
     /// The largest distance of a point from the sensor, metres.

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use super::basins::{Basin, Basins};
 use super::bound::{Bounds, PoseCell, Turned, eight};
-use super::{LocalizationSettings, SearchProgress};
+use super::{LocalizationSettings, SearchProgress, Supervision};
 
 /// What a search found.
 #[derive(Debug)]
@@ -32,26 +32,49 @@ struct Waiting {
 const LOSS_PER_HALVING: f64 = 0.04;
 /// Cells divided between two reports of progress.
 const CELLS_PER_REPORT: u32 = 64;
+/// Eights of cells that are bounded between two looks at the stop signal: each is eight look-ups a search point, all of
+/// them a millisecond or less.
+const EIGHTS_PER_LOOK: u32 = 64;
+
+/// Cells that there is room for before any of them waits.
+const ROOM_AT_FIRST: usize = 1024;
 
 /// A search under way.
-pub(super) struct Search<'a> {
+pub(super) struct Search<'a, 's> {
     bounds: &'a Bounds<'a>,
     settings: &'a LocalizationSettings,
-    watch: &'a mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
+    supervision: &'a mut Supervision<'s>,
+    /// Eights bounded since the last look at the stop signal.
+    since_look: u32,
     waiting: BinaryHeap<Waiting>,
+    /// Cells that memory was reserved for.
+    room: usize,
+    /// Beyond which the least promising cells are dropped: no more than there is memory for.
+    waiting_max: usize,
     basins: Basins,
     cells: u64,
     complete: bool,
 }
 
-impl<'a> Search<'a> {
+impl<'a, 's> Search<'a, 's> {
     pub(super) fn new(
         bounds: &'a Bounds<'a>,
         settings: &'a LocalizationSettings,
         basins: Basins,
-        watch: &'a mut dyn FnMut(&SearchProgress) -> ControlFlow<()>,
+        supervision: &'a mut Supervision<'s>,
     ) -> Self {
-        Self { bounds, settings, watch, waiting: BinaryHeap::new(), basins, cells: 0, complete: true }
+        Self {
+            bounds,
+            settings,
+            supervision,
+            since_look: 0,
+            waiting: BinaryHeap::new(),
+            room: 0,
+            waiting_max: settings.cells_waiting_max,
+            basins,
+            cells: 0,
+            complete: true,
+        }
     }
 
     /// Finds the poses of highest overlap on the lattice of finest cells.
@@ -82,7 +105,8 @@ impl<'a> Search<'a> {
                 for z in (0..nz).step_by(2) {
                     for y in (0..ny).step_by(2) {
                         for x in (0..nx).step_by(2) {
-                            self.enter_eight(PoseCell { translation: [x, y, z], ..cell }, &turned, u16::MAX);
+                            let first = PoseCell { translation: [x, y, z], ..cell };
+                            self.enter_eight(first, &turned, u16::MAX)?;
                         }
                     }
                 }
@@ -105,25 +129,33 @@ impl<'a> Search<'a> {
             if cell.depth == 0 {
                 self.basins.offer(Basin { map_from_sensor: self.bounds.center(&cell), score: bound });
             } else {
-                self.divide(cell, bound);
+                self.divide(cell, bound)?;
             }
         }
         ControlFlow::Continue(())
     }
 
-    fn divide(&mut self, cell: PoseCell, bound: u16) {
+    fn divide(&mut self, cell: PoseCell, bound: u16) -> ControlFlow<()> {
         let depth = cell.depth - 1;
         for rotation in self.bounds.rotations.children(cell.depth, cell.rotation) {
             let first = PoseCell { depth, rotation, translation: cell.translation.map(|i| 2 * i), ..cell };
-            self.enter_eight(first, &self.bounds.turned(&first), bound);
+            self.enter_eight(first, &self.bounds.turned(&first), bound)?;
         }
+        ControlFlow::Continue(())
     }
 
     /// Bounds `first` and its seven neighbours of the same parent, and lets those wait that are worth it.
-    fn enter_eight(&mut self, first: PoseCell, turned: &Turned<'_>, parent: u16) {
+    fn enter_eight(&mut self, first: PoseCell, turned: &Turned<'_>, parent: u16) -> ControlFlow<()> {
+        self.since_look += 1;
+        if self.since_look >= EIGHTS_PER_LOOK {
+            self.look()?;
+        }
         let floor = self.floor();
         let counts = turned.bounds_of_eight(first.translation, floor);
         self.cells += 8;
+        if self.waiting.len() + 8 > self.room {
+            self.make_room();
+        }
         let loss = (LOSS_PER_HALVING * f64::from(self.bounds.points())) as i32;
         for (translation, count) in eight(first.translation).zip(counts) {
             let (cell, bound) = (PoseCell { translation, ..first }, count.min(parent));
@@ -132,8 +164,22 @@ impl<'a> Search<'a> {
                 self.waiting.push(Waiting { promise, bound, cell });
             }
         }
-        if self.waiting.len() > self.settings.cells_waiting_max {
+        if self.waiting.len() > self.waiting_max {
             self.drop_least_promising();
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Lets twice as many cells wait as there was room for. Where there is no memory for them, no more may wait than now.
+    fn make_room(&mut self) {
+        let room = (2 * self.room).max(ROOM_AT_FIRST);
+        // While they move, both are there.
+        match self.supervision.take(room * size_of::<Waiting>()) {
+            Ok(()) => {
+                self.waiting.reserve_exact(room - self.waiting.len());
+                self.room = room;
+            }
+            Err(_) => self.waiting_max = self.waiting_max.min(self.room.saturating_sub(8)),
         }
     }
 
@@ -155,28 +201,45 @@ impl<'a> Search<'a> {
 
     /// Half of the cells have to go.
     fn drop_least_promising(&mut self) {
-        let mut cells = std::mem::take(&mut self.waiting).into_sorted_vec();
+        let mut cells = std::mem::take(&mut self.waiting).into_vec();
         let floor = self.floor();
         cells.retain(|waiting| waiting.bound > floor);
-        let most = self.settings.cells_waiting_max / 2;
+        let most = self.waiting_max / 2;
         if cells.len() > most {
-            cells.drain(..cells.len() - most);
+            if most > 0 {
+                cells.select_nth_unstable_by(most - 1, |a, b| b.cmp(a));
+            }
+            cells.truncate(most);
             self.complete = false;
         }
         self.waiting = cells.into();
     }
 
     fn report(&mut self) -> ControlFlow<()> {
-        (self.watch)(&SearchProgress {
+        (self.supervision.progress)(&SearchProgress {
             cells: self.cells,
             waiting: self.waiting.len(),
             best_overlap: f64::from(self.basins.best()) / f64::from(self.bounds.points().max(1)),
-        })
+        });
+        self.look()
+    }
+
+    /// Breaks once it is to end.
+    fn look(&mut self) -> ControlFlow<()> {
+        self.since_look = 0;
+        let Supervision { stop, search_stop, .. } = &self.supervision;
+        if stop.is_stopped() || search_stop.is_stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use nalgebra::Vector3;
 
     use super::*;
@@ -186,6 +249,7 @@ mod tests {
     use crate::align::localize::sample::SearchSample;
     use crate::geometry::{Point, Pose};
     use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+    use crate::util::StopSignal;
 
     /// Two walls and a post, seen from inside.
     fn corner() -> Vec<Point> {
@@ -213,8 +277,8 @@ mod tests {
                 search_overlap_min: 0.3,
                 ..Default::default()
             };
-            let sample = SearchSample::of(&corner(), 80, 1);
-            let levels = DilatedLevels::of(&map, &sample, None, &settings).unwrap();
+            let sample = SearchSample::of(&corner(), 80, 1, StopSignal::NEVER);
+            let levels = DilatedLevels::of_all(&map, &sample, &settings);
             Self { levels, sample, settings }
         }
 
@@ -226,9 +290,21 @@ mod tests {
             of(&Bounds::new(&self.levels, &self.sample, &upright, rotations))
         }
 
-        fn search(&self, watch: &mut dyn FnMut(&SearchProgress) -> ControlFlow<()>) -> Found {
+        /// Searches until `is_over` of the cells so far.
+        fn search(&self, is_over: impl Fn(u64) -> bool) -> Found {
+            let (cells, over) = (Cell::new(0), Cell::new(false));
+            let is_stopped = || {
+                over.set(over.get() || is_over(cells.get()));
+                over.get()
+            };
+            let supervision = &mut Supervision {
+                stop: StopSignal::when(&is_stopped),
+                search_stop: StopSignal::NEVER,
+                progress: &mut |progress| cells.set(progress.cells),
+                reserve: &mut |_| true,
+            };
             self.with_bounds(|bounds| {
-                Search::new(bounds, &self.settings, Basins::new(0.4, 0.3, 16), watch).run()
+                Search::new(bounds, &self.settings, Basins::new(0.4, 0.3, 16), supervision).run()
             })
         }
 
@@ -259,7 +335,7 @@ mod tests {
     #[test]
     fn the_best_place_is_the_best_of_all_poses_of_the_lattice() {
         let problem = Problem::new();
-        let found = problem.search(&mut |_| ControlFlow::Continue(()));
+        let found = problem.search(|_| false);
         assert!(found.complete);
         assert_eq!(found.places[0].score, problem.highest_by_force());
         assert!(found.places.windows(2).all(|pair| pair[0].score >= pair[1].score));
@@ -268,22 +344,42 @@ mod tests {
     #[test]
     fn a_search_that_is_stopped_says_so() {
         let problem = Problem::new();
-        let at_once = problem.search(&mut |_| ControlFlow::Break(()));
+        let at_once = problem.search(|_| true);
         assert!(!at_once.complete && at_once.places.is_empty() && at_once.cells == 0);
 
-        let all = problem.search(&mut |_| ControlFlow::Continue(())).cells;
-        let later = problem.search(&mut |progress| match progress.cells > all / 2 {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        });
+        let all = problem.search(|_| false).cells;
+        let later = problem.search(|cells| cells > all / 2);
         assert!(!later.complete && later.cells < all);
+    }
+
+    #[test]
+    fn a_search_without_memory_for_more_cells_drops_some_and_says_so() {
+        let problem = Problem::new();
+        let reserved = Cell::new(0);
+        let supervision = &mut Supervision {
+            stop: StopSignal::NEVER,
+            search_stop: StopSignal::NEVER,
+            progress: &mut |_| (),
+            reserve: &mut |bytes| {
+                reserved.set(reserved.get() + bytes);
+                reserved.get() <= ROOM_AT_FIRST * size_of::<Waiting>()
+            },
+        };
+        let (found, waited) = problem.with_bounds(|bounds| {
+            let mut search = Search::new(bounds, &problem.settings, Basins::new(0.4, 0.3, 16), supervision);
+            let _ = search.enter_roots();
+            let waited = (search.waiting.len(), search.waiting.capacity());
+            (search.run(), waited)
+        });
+        assert!(waited.0 <= ROOM_AT_FIRST && waited.1 == ROOM_AT_FIRST, "{waited:?}");
+        assert!(!found.complete && !found.places.is_empty());
     }
 
     #[test]
     fn a_search_that_runs_out_of_room_says_so_and_still_finds_a_place() {
         let mut problem = Problem::new();
         problem.settings.cells_waiting_max = 200;
-        let found = problem.search(&mut |_| ControlFlow::Continue(()));
+        let found = problem.search(|_| false);
         assert!(!found.complete && !found.places.is_empty());
     }
 }

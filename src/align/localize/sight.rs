@@ -1,8 +1,10 @@
 //! Free space as evidence: what a sensor looked through cannot be there.
 
 use super::dilated::DilatedLevels;
+use super::field::REACH_MAX;
 use super::sample::SearchSample;
 use crate::geometry::Pose;
+use crate::util::StopSignal;
 
 /// How far from everything, in voxels, a ray is out in the open again.
 const OPEN: u8 = 3;
@@ -10,13 +12,25 @@ const OPEN: u8 = 3;
 const THROUGH: f32 = 1.0;
 /// A ray's steps where something is near, in voxels.
 const STEP: f32 = 0.5;
+/// A ray's steps where nothing is, in voxels.
+const OPEN_STEP: f32 = REACH_MAX as f32;
+
+/// Rays that are followed between two looks at the stop signal, each by at most two steps for each voxel along the grid's
+/// diagonal.
+const RAYS_PER_LOOK: usize = 16;
 
 /// The share of the sample's rays that pass through what the map holds and come out behind it, before they reach
 /// their points. 0 without points.
 ///
 /// Coming out is what counts: a ray along a floor is within its voxels for metres before it ends there. The paper
-/// stores no free space (III-B); this is its converse, the rays of one scan against the occupied voxels.
-pub(super) fn blocked_share(levels: &DilatedLevels, sample: &SearchSample, map_from_sensor: &Pose) -> f64 {
+/// stores no free space (III-B); this is its converse, the rays of one scan against the occupied voxels. It means nothing
+/// once stopped.
+pub(super) fn blocked_share(
+    levels: &DilatedLevels,
+    sample: &SearchSample,
+    map_from_sensor: &Pose,
+    stop: StopSignal<'_>,
+) -> f64 {
     let field = levels.finest();
     let place = |point_m: nalgebra::Point3<f64>| field.in_grid(point_m.coords.into()).map(|c| c as f32);
     let origin = place(map_from_sensor.translation.vector.into());
@@ -24,8 +38,16 @@ pub(super) fn blocked_share(levels: &DilatedLevels, sample: &SearchSample, map_f
         let end = place(map_from_sensor * **point);
         let toward: [f32; 3] = std::array::from_fn(|axis| end[axis] - origin[axis]);
         let length = toward.iter().map(|c| c * c).sum::<f32>().sqrt();
-        let (mut way, mut run, mut inside) = (0.0, 0.0, false);
-        while way < length {
+        // Farther than single precision tells, which is nowhere on a map.
+        if !length.is_finite() {
+            return false;
+        }
+        // Outside of the grid nothing is near: there the ray is passed over in the steps that it takes anyway.
+        let Some((enters, leaves)) = field.crossed_by(origin, toward) else { return false };
+        let open_steps = (enters * length / OPEN_STEP).floor().max(0.0);
+        let end = length.min(leaves * length + 2.0 * OPEN_STEP);
+        let (mut way, mut run, mut inside) = (open_steps * OPEN_STEP, 0.0, false);
+        while way < end {
             let distance = field.at(std::array::from_fn(|axis| origin[axis] + toward[axis] * (way / length)));
             run = if distance == 0 { run + STEP } else { 0.0 };
             inside |= run >= THROUGH;
@@ -37,7 +59,9 @@ pub(super) fn blocked_share(levels: &DilatedLevels, sample: &SearchSample, map_f
         }
         false
     };
-    sample.points.iter().filter(is_blocked).count() as f64 / sample.points.len().max(1) as f64
+    let rays = sample.points.chunks(RAYS_PER_LOOK).take_while(|_| !stop.is_stopped());
+    let blocked: usize = rays.map(|rays| rays.iter().filter(is_blocked).count()).sum();
+    blocked as f64 / sample.points.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -58,9 +82,9 @@ mod tests {
         let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
         let all = [wall.clone(), more].concat();
         map.committer().insert_scan(ScanRecord::of_points(pose, &all, map.lattice()));
-        let sample = SearchSample::of(&wall, 200, 0);
-        let levels = DilatedLevels::of(&map, &sample, None, &LocalizationSettings::default()).unwrap();
-        blocked_share(&levels, &sample, &Pose::identity())
+        let sample = SearchSample::of(&wall, 200, 0, StopSignal::NEVER);
+        let levels = DilatedLevels::of_all(&map, &sample, &LocalizationSettings::default());
+        blocked_share(&levels, &sample, &Pose::identity(), StopSignal::NEVER)
     }
 
     #[test]
@@ -77,5 +101,26 @@ mod tests {
             (0..80).flat_map(|x| (-30..30).map(move |y| Point::new(x as f32 * 0.05, y as f32 * 0.05, -1.05)));
         assert_eq!(blocked(floor.collect()), 0.0);
         assert_eq!(blocked(plane(6.0, -30..30).collect()), 0.0);
+    }
+
+    #[test]
+    fn a_ray_to_a_far_return_takes_no_steps_outside_the_grid() {
+        let wall: Vec<Point> = plane(4.0, -20..20).collect();
+        let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
+        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        map.committer().insert_scan(ScanRecord::of_points(pose, &wall, map.lattice()));
+        let near = SearchSample::of(&wall, 200, 0, StopSignal::NEVER);
+        let levels = DilatedLevels::of_all(&map, &near, &LocalizationSettings::default());
+        // So far that a step of half a voxel is lost in the numbers.
+        let far = |x: f32| SearchSample::of(&[Point::new(x, 0.0, 0.0)], 1, 0, StopSignal::NEVER);
+        let seen_from = |sample: &SearchSample, x: f64| {
+            blocked_share(&levels, sample, &Pose::translation(x, 0.0, 0.0), StopSignal::NEVER)
+        };
+        for range in [1e5, 1e9, 1e15] {
+            assert_eq!(seen_from(&far(range), 0.0), 1.0, "through the wall, {range} m away");
+            assert_eq!(seen_from(&far(-range), 0.0), 0.0, "away from it, {range} m away");
+            assert_eq!(seen_from(&far(range), -1e3), 1.0, "from outside the grid, {range} m away");
+        }
+        assert_eq!(seen_from(&far(1e30), 0.0), 0.0);
     }
 }

@@ -6,6 +6,11 @@ use super::gaussian::Gaussian;
 use super::gaussians::VoxelGaussians;
 use crate::geometry::{Point, Pose};
 use crate::map::MomentsView;
+use crate::util::StopSignal;
+
+/// Points that are matched between two looks at the stop signal: a millisecond, where none of their voxels was asked for
+/// before.
+pub(super) const POINTS_PER_LOOK: usize = 256;
 
 /// What all points say together of how the pose should change.
 ///
@@ -27,13 +32,15 @@ pub(super) struct NormalEquations {
 
 impl NormalEquations {
     /// Of `points` (sensor frame) at `pose`, each against its Gaussian, with the weights of Geman and McClure at
-    /// `robust_scale` (a Mahalanobis distance), so that points of what the map does not show have no say.
+    /// `robust_scale` (a Mahalanobis distance), so that points of what the map does not show have no say. They mean
+    /// nothing once stopped.
     pub(super) fn of(
         points: &[Point],
         pose: &Pose,
         gaussians: &mut VoxelGaussians,
         moments: &MomentsView<'_>,
         robust_scale: f64,
+        stop: StopSignal<'_>,
     ) -> Self {
         let mut equations = Self {
             hessian: Matrix6::zeros(),
@@ -43,7 +50,7 @@ impl NormalEquations {
             inliers: 0,
             fitness: 0.0,
         };
-        for_each_match(points, pose, gaussians, moments, robust_scale, |_, gaussian, matched| {
+        for_each_match(points, pose, gaussians, moments, (robust_scale, stop), |_, gaussian, matched| {
             let weight = matched.fit * matched.fit;
             equations.matched += 1;
             equations.inliers += usize::from(matched.is_inlier);
@@ -86,9 +93,10 @@ pub(super) fn information(
     gaussians: &mut VoxelGaussians,
     moments: &MomentsView<'_>,
     robust_scale: f64,
+    stop: StopSignal<'_>,
 ) -> Matrix6<f64> {
     let mut surfaces: Vec<(f64, Matrix6<f64>)> = Vec::new();
-    for_each_match(points, pose, gaussians, moments, robust_scale, |number, gaussian, matched| {
+    for_each_match(points, pose, gaussians, moments, (robust_scale, stop), |number, gaussian, matched| {
         surfaces.resize(surfaces.len().max(number + 1), (0.0, Matrix6::zeros()));
         let (count, sum) = &mut surfaces[number];
         *count += 1.0;
@@ -115,12 +123,15 @@ fn for_each_match(
     pose: &Pose,
     gaussians: &mut VoxelGaussians,
     moments: &MomentsView<'_>,
-    robust_scale: f64,
+    (robust_scale, stop): (f64, StopSignal<'_>),
     mut f: impl FnMut(usize, &Gaussian, Match),
 ) {
     let rotation = pose.rotation.to_rotation_matrix();
     let scale = robust_scale * robust_scale;
-    for point in points {
+    for (place, point) in points.iter().enumerate() {
+        if place.is_multiple_of(POINTS_PER_LOOK) && stop.is_stopped() {
+            return;
+        }
         let from_sensor = rotation * point.to_f64().coords;
         let in_map = from_sensor + pose.translation.vector;
         if let Some(number) = gaussians.nearest(moments, &in_map) {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::geometry::symmetric_eigen;
 use crate::voxel::Moments;
 
 /// Points that make a Gaussian, at least: fewer say nothing of a surface.
@@ -43,7 +44,7 @@ impl Gaussian {
         }
         let (mean, [xx, xy, xz, yy, yz, zz]) = moments.gaussian()?;
         let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * (unit_m * unit_m);
-        let eigen = covariance.symmetric_eigen();
+        let eigen = symmetric_eigen(covariance)?;
         let mut ascending: [f64; 3] = eigen.eigenvalues.into();
         ascending.sort_unstable_by(f64::total_cmp);
         (ascending[1] >= SPREAD_MIN * side_m * side_m).then(|| Self {

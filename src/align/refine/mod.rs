@@ -69,9 +69,15 @@ pub(super) fn refine(
                 return refined;
             }
             let pose = &refined.map_from_sensor;
-            let equations =
-                NormalEquations::of(points, pose, &mut gaussians, &map.moments(), settings.robust_scale);
-            let Some(step) = equations.solve() else {
+            let equations = NormalEquations::of(
+                points,
+                pose,
+                &mut gaussians,
+                &map.moments(),
+                settings.robust_scale,
+                stop,
+            );
+            let Some(step) = equations.solve().filter(|_| !stop.is_stopped()) else {
                 return refined;
             };
             refined.map_from_sensor = step.applied_to(pose);
@@ -84,19 +90,19 @@ pub(super) fn refine(
     refined
 }
 
-/// Says how `points` lie on the map's surfaces with the sensor at `map_from_sensor`.
+/// Says how `points` lie on the map's surfaces with the sensor at `map_from_sensor`; nothing, once stopped.
 pub(super) fn surface_fit(
     map: &MultiResolutionMap,
     points: &[Point],
     map_from_sensor: &Pose,
     settings: &RefinementSettings,
+    stop: StopSignal<'_>,
 ) -> SurfaceFit {
     let std_m = settings.std_m(map.lattice().resolution_m(0));
     let mut gaussians = VoxelGaussians::new(map, Softness { std_m, spread: SPREAD_TO_JUDGE });
-    let equations =
-        NormalEquations::of(points, map_from_sensor, &mut gaussians, &map.moments(), settings.robust_scale);
-    let information =
-        information(points, map_from_sensor, &mut gaussians, &map.moments(), settings.robust_scale);
+    let scale = settings.robust_scale;
+    let equations = NormalEquations::of(points, map_from_sensor, &mut gaussians, &map.moments(), scale, stop);
+    let information = information(points, map_from_sensor, &mut gaussians, &map.moments(), scale, stop);
     SurfaceFit {
         information: PoseInformation::new(information, points),
         inliers: equations.inliers as f64 / points.len().max(1) as f64,

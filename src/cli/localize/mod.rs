@@ -2,7 +2,6 @@
 
 mod report;
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -13,14 +12,16 @@ use super::remote::ServerOptions;
 use super::scan_report::name_of;
 use crate::align::AlignmentSettings;
 use crate::align::localize::{
-    Gravity, LocalizationQuery, LocalizationSettings, SearchBox, SearchProgress, localize,
+    Gravity, LocalizationQuery, LocalizationSettings, SearchBox, SearchProgress, Supervision,
+    localize_supervised,
 };
 use crate::client::Client;
 use crate::geometry::Point;
 use crate::map::{MapName, MultiResolutionMap};
 use crate::scan::{read_points, scan_files};
-use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapState};
+use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapState, SEARCH_SHARE};
 use crate::store::{Disk, Snapshot};
+use crate::util::StopSignal;
 use report::Localized;
 
 const EXAMPLES: &str = "\
@@ -143,6 +144,9 @@ impl Place {
     }
 }
 
+/// A time limit that no search waits for: a year.
+const LONGEST: Duration = Duration::from_secs(365 * 86_400);
+
 /// Searches in this process, and says how far that is.
 fn find_here(
     map: &MultiResolutionMap,
@@ -156,21 +160,29 @@ fn find_here(
         return Err(CliError::failed(format!("none of the scan's {} points is finite", all.len())));
     }
     let start = Instant::now();
-    let mut watch = |progress: &SearchProgress| {
+    let mut tell = |progress: &SearchProgress| {
         let SearchProgress { cells, waiting, best_overlap } = progress;
         output.tell(format!("{cells} cells of poses, {waiting} wait, best overlap {best_overlap:.2}"));
-        match request.time_limit.is_some_and(|limit| start.elapsed() >= limit) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
     };
-    let found = localize(
+    let within = |share: f64| match request
+        .time_limit
+        .and_then(|limit| start.checked_add(limit.min(LONGEST).mul_f64(share)))
+    {
+        Some(end) => StopSignal::NEVER.by(end),
+        None => StopSignal::NEVER,
+    };
+    let found = localize_supervised(
         map,
         &points,
         &request.query,
         &LocalizationSettings::default(),
         &AlignmentSettings::default(),
-        &mut watch,
+        &mut Supervision {
+            stop: within(1.0),
+            search_stop: within(SEARCH_SHARE),
+            progress: &mut tell,
+            reserve: &mut |_| true,
+        },
     )
     .map_err(CliError::failed)?;
     Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))

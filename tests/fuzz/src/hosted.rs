@@ -58,6 +58,7 @@ impl Hosted {
             limits: limits(),
             query_threads: 1,
             mapping_threads: 1,
+            alignment_threads: 1,
             localization_threads: 1,
             ..ServiceSettings::default()
         };
@@ -126,6 +127,9 @@ fn limits() -> Limits {
         listed_voxels_max: 10_000,
         map_file_bytes_max: MESSAGE_BYTES_MAX,
         min_revision_wait_max: Duration::from_millis(1),
+        alignment_time_max: Duration::from_millis(200),
+        insertion_time_max: Duration::from_millis(200),
+        undo_time_max: Duration::from_millis(200),
         localization_time_max: Duration::from_millis(20),
         localization_candidates_max: 4,
         localization_grid_bytes_max: 4 << 20,

@@ -1,0 +1,88 @@
+//! How long one request may take of the threads for work that uses the CPU.
+
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use super::{ErrorCode, ServiceError};
+use crate::util::StopSignal;
+
+/// The reason of an error of work that was not done in time.
+pub(super) const TIME_LIMIT: &str = "time_limit";
+
+/// A named limit, counted from when a thread first takes the request in hand: what it waits for before, its caller's
+/// deadline bounds. A clone is the same limit of the same request.
+#[derive(Debug, Clone)]
+pub(super) struct TimeLimit {
+    name: &'static str,
+    most: Duration,
+    ends: Arc<OnceLock<Instant>>,
+}
+
+impl TimeLimit {
+    /// The limit `name`, which is `most`.
+    pub(super) fn new(name: &'static str, most: Duration) -> Self {
+        Self { name, most, ends: Arc::default() }
+    }
+
+    /// Runs `job` under `stop` and this limit. An error of a job that was stopped in time names the limit.
+    pub(super) fn run<T>(
+        &self,
+        stop: StopSignal<'_>,
+        job: impl FnOnce(StopSignal<'_>) -> Result<T, ServiceError>,
+    ) -> Result<T, ServiceError> {
+        job(stop.by(*self.ends.get_or_init(|| Instant::now() + self.most))).map_err(|error| self.named(error))
+    }
+
+    /// The error, and where it says that the time is up, which time.
+    pub(super) fn named(&self, error: ServiceError) -> ServiceError {
+        if error.reason != TIME_LIMIT {
+            return error;
+        }
+        let message = format!("the request took longer than {} allows, which is {:?}", self.name, self.most);
+        ServiceError { message, ..error }
+    }
+}
+
+/// Ends work that nobody waits for, or that takes too long.
+///
+/// # Errors
+/// `caller_gone` when the caller has gone, who is therefore not told; `time_limit` when the time is up.
+pub(super) fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError> {
+    let ended = |reason, message: &str| Err(ServiceError::new(ErrorCode::DeadlineExceeded, reason, message));
+    if stop.is_cancelled() {
+        return ended("caller_gone", "nobody waits for the answer");
+    }
+    if stop.is_time_up() {
+        return ended(TIME_LIMIT, "the request took too long");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_whose_time_is_up_is_told_which_limit_and_who_has_gone_is_not() {
+        let limit = TimeLimit::new("alignment_time_max", Duration::ZERO);
+        let error = limit.run(StopSignal::NEVER, check_not_stopped).unwrap_err();
+        assert_eq!((error.code, error.reason), (ErrorCode::DeadlineExceeded, TIME_LIMIT));
+        assert!(error.message.contains("alignment_time_max allows, which is 0ns"), "{}", error.message);
+        let gone = || true;
+        let error = limit.run(StopSignal::when(&gone), check_not_stopped).unwrap_err();
+        assert_eq!(error.reason, "caller_gone");
+        let patient = TimeLimit::new("undo_time_max", Duration::from_secs(3600));
+        assert_eq!(patient.run(StopSignal::NEVER, |stop| check_not_stopped(stop).map(|()| 1)).unwrap(), 1);
+    }
+
+    #[test]
+    fn the_time_of_a_request_that_is_tried_again_goes_on() {
+        let limit = TimeLimit::new("undo_time_max", Duration::from_secs(3600));
+        let ends = |limit: &TimeLimit| {
+            limit.run(StopSignal::NEVER, |_| Ok(())).unwrap();
+            *limit.ends.get().unwrap()
+        };
+        let first = ends(&limit);
+        assert_eq!(ends(&limit.clone()), first);
+    }
+}
