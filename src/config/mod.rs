@@ -138,6 +138,7 @@ impl Config {
             }
         }
         self.limits.check()?;
+        self.store.check()?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
         }

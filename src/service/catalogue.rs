@@ -10,6 +10,7 @@ use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
 use super::reach::Reachable;
+use super::trajectory::thin;
 use super::{ErrorCode, MapReach, ServiceError};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap};
@@ -20,6 +21,7 @@ use crate::store::{Cut, DataDir, OpeningProgress, Snapshot, StoreError, StoreSet
 pub(super) struct Catalogue {
     maps: RwLock<BTreeMap<MapName, Arc<HostedMap>>>,
     data_dir: Option<Arc<DataDir>>,
+    settings: StoreSettings,
     writing: tokio::sync::Mutex<()>,
 }
 
@@ -37,11 +39,12 @@ impl Catalogue {
             let names = data_dir.take_stock().map_err(not_stored)?;
             data_dir.expect(&names, progress).map_err(not_stored)?;
             for name in names {
-                let map = load(data_dir, &name, progress)?;
+                let map = load(data_dir, &name, settings, progress)?;
                 maps.insert(name, Arc::new(map));
             }
         }
-        Ok(Self { maps: RwLock::new(maps), data_dir: data_dir.map(Arc::new), writing: Default::default() })
+        let (maps, data_dir) = (RwLock::new(maps), data_dir.map(Arc::new));
+        Ok(Self { maps, data_dir, settings: settings.clone(), writing: Default::default() })
     }
 
     pub(super) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
@@ -109,7 +112,7 @@ impl Catalogue {
         let kept = Arc::clone(&snapshot);
         let folder = self.on_disk(move |data_dir| data_dir.create(&kept_name, &kept)).await?;
         let (uuid, map) = (snapshot.uuid, Arc::unwrap_or_clone(snapshot).restore()?);
-        let map = Arc::new(HostedMap::new(name.clone(), uuid, map, folder)?);
+        let map = Arc::new(HostedMap::new(name.clone(), uuid, map, folder, &self.settings)?);
         self.maps.write().insert(name.clone(), Arc::clone(&map));
         Ok(map)
     }
@@ -159,7 +162,12 @@ impl Catalogue {
     }
 }
 
-fn load(data_dir: &DataDir, name: &MapName, progress: &OpeningProgress) -> Result<HostedMap, ServiceError> {
+fn load(
+    data_dir: &DataDir,
+    name: &MapName,
+    settings: &StoreSettings,
+    progress: &OpeningProgress,
+) -> Result<HostedMap, ServiceError> {
     let start = Instant::now();
     let opened = data_dir.map(name, progress).map_err(not_stored)?;
     for damaged in &opened.damaged {
@@ -175,7 +183,9 @@ fn load(data_dir: &DataDir, name: &MapName, progress: &OpeningProgress) -> Resul
     let (revision, replayed, snapshot) = (opened.map.revision(), opened.recovered.replayed, opened.snapshot);
     let (voxels, elapsed) = (opened.map.voxels(0), start.elapsed());
     tracing::info!(map = %name, revision, snapshot, replayed, voxels, ?elapsed, "opened");
-    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder))
+    // The snapshot was written before what went when it was there.
+    thin(&opened.map, &opened.folder);
+    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder), settings)
 }
 
 /// Making a map again as it is changes nothing; as another it is a conflict.

@@ -23,7 +23,7 @@ use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap};
-use crate::store::{MapFolder, Record};
+use crate::store::{MapFolder, Record, StoreSettings};
 use worker::Worker;
 
 /// Changes that share one sync, and as many that wait meanwhile; who has one more waits with it in hand.
@@ -107,11 +107,12 @@ impl Committing {
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
         announced: watch::Sender<u64>,
+        settings: &StoreSettings,
     ) -> Result<Self, ServiceError> {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
         let thread = std::thread::Builder::new().name(format!("mrol-commit-{name}"));
-        let worker = Worker::new(name, map, folder, announced, Arc::clone(&stopped));
+        let worker = Worker::new(name, map, folder, announced, Arc::clone(&stopped), settings);
         let started = thread.spawn(move || worker.run(&waiting));
         started.map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
         Ok(Self { inbox, stopped })

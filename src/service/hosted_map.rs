@@ -12,13 +12,14 @@ use uuid::Uuid;
 
 use super::committing::{Committing, Stop};
 use super::room::Room;
+use super::trajectory::thin;
 use super::{
-    ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, TrajectoryAnswer,
-    VoxelListing, check_not_stopped,
+    ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, VoxelListing,
+    check_not_stopped,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{MapName, MultiResolutionMap, Region, RobotName, TrajectoryPose};
-use crate::store::{FolderUse, MapFolder, Snapshot, StoreError};
+use crate::map::{MapName, MultiResolutionMap, Region, RobotName};
+use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::util::StopSignal;
 use crate::voxel::{LatticeFromPoints, VoxelKey};
 
@@ -66,10 +67,12 @@ impl HostedMap {
         uuid: Uuid,
         map: MultiResolutionMap,
         folder: Option<MapFolder>,
+        settings: &StoreSettings,
     ) -> Result<Self, ServiceError> {
         let (map, folder) = (Arc::new(map), folder.map(Arc::new));
         let (announcing, announced) = watch::channel(map.revision());
-        let committing = Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing)?;
+        let committing =
+            Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing, settings)?;
         Ok(Self {
             name,
             uuid,
@@ -107,6 +110,7 @@ impl HostedMap {
             return Ok(false);
         }
         saved?;
+        thin(&self.map, folder);
         self.is_put_off.store(false, Ordering::Relaxed);
         tracing::info!(map = %self.name, revision = snapshot.contents.revision, elapsed = ?start.elapsed(), "saved");
         Ok(true)
@@ -245,15 +249,6 @@ impl HostedMap {
         Ok(VoxelListing { resolution_m, keys, state: self.state(view.revision()) })
     }
 
-    pub(super) fn trajectory(&self, robot: Option<&RobotName>) -> TrajectoryAnswer {
-        let trajectory = self.map.trajectory();
-        let wanted = |pose: &&TrajectoryPose| robot.is_none_or(|robot| *robot == pose.robot);
-        TrajectoryAnswer {
-            poses: trajectory.poses().iter().filter(wanted).cloned().collect(),
-            state: self.state(self.map.revision()),
-        }
-    }
-
     pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
         let described = self.map.describe(rate_samples, RATE_SEED);
         let trajectory = self.map.trajectory();
@@ -262,10 +257,11 @@ impl HostedMap {
             state: self.state(described.revision),
             settings: *self.map.settings(),
             levels: described.levels,
-            scans: trajectory.poses().len(),
+            scans: trajectory.len(),
             robots: trajectory.robots(),
             set_bytes: described.set_bytes,
             moment_bytes: described.moment_bytes,
+            trajectory_bytes: described.trajectory_bytes,
             storage: self.storage(),
         }
     }

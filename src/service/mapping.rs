@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::committing::{Prepared, Proposal, Step, Turn, record_of};
 use super::hosted_map::{HostedMap, bitmap};
 use super::room::Room;
+use super::trajectory::check_not_forgotten;
 use super::usable_scan::UsableScan;
 use super::{
     ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings,
@@ -40,6 +41,7 @@ impl HostedMap {
             return Ok(Step::Answered(answer));
         }
         self.check_voxels(settings)?;
+        self.check_robots(&request.robot, &settings.limits)?;
         room.check_to_grow()?;
         let placement = self.place(&scan, settings, stop)?;
         let answer = self.answer(&scan, &placement);
@@ -113,7 +115,8 @@ impl HostedMap {
 
     /// True of a scan whose id was accepted before: it adds nothing.
     pub(super) fn knows(&self, request: &ScanRequest) -> bool {
-        let accepted = |scan_id| self.map.trajectory().find(&request.robot, scan_id).is_some();
+        let (trajectory, robot) = (self.map.trajectory(), &request.robot);
+        let accepted = |id| trajectory.find(robot, id).is_some() || trajectory.has_forgotten(robot, id);
         request.scan_id.is_some_and(accepted)
     }
 
@@ -124,7 +127,7 @@ impl HostedMap {
         };
         let trajectory = self.map.trajectory();
         let Some(pose) = trajectory.find(&scan.request.robot, scan_id) else {
-            return Ok(None);
+            return check_not_forgotten(&trajectory, &scan.request.robot, scan_id).map(|()| None);
         };
         if pose.digest == scan.digest {
             return Ok(Some(self.answer_again(pose)));

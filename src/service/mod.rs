@@ -20,6 +20,7 @@ mod request;
 mod room;
 mod settings;
 mod shortage;
+mod trajectory;
 mod undo;
 mod usable_scan;
 mod watermarks;
@@ -34,16 +35,17 @@ pub use pool::PoolUse;
 pub use reach::MapReach;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
-    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, Undo, UndoAnswer,
-    UndoTarget, VoxelListing,
+    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery, Undo,
+    UndoAnswer, UndoTarget, VoxelListing,
 };
 pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
 pub use shortage::Shortage;
+pub use trajectory::TrajectoryPieces;
 pub use watermarks::Marks;
 
 use std::sync::Arc;
 
-use crate::map::{MapName, Region, RobotName};
+use crate::map::{MapName, Region};
 use crate::store::OpeningProgress;
 use crate::util::StopSignal;
 use catalogue::Catalogue;
@@ -227,18 +229,6 @@ impl MapService {
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let inner = Arc::clone(&self.inner);
         self.carry_through(move |stop| map.propose_undo(&undo, &inner.room, stop)).await
-    }
-
-    /// The poses of the accepted scans, of one robot or of all.
-    ///
-    /// # Errors
-    /// `NotFound` without such a map.
-    pub async fn trajectory(
-        &self,
-        map: &MapName,
-        robot: Option<&RobotName>,
-    ) -> Result<TrajectoryAnswer, ServiceError> {
-        Ok(self.map(map)?.trajectory(robot))
     }
 
     /// The occupied voxels of a level, in a region or everywhere, all at one revision.

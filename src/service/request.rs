@@ -289,11 +289,24 @@ pub struct UndoAnswer {
     pub replayed: bool,
 }
 
-/// The accepted scans' poses.
+/// Which of the accepted scans' poses.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct TrajectoryQuery {
+    /// Of this robot; of all where none.
+    pub robot: Option<RobotName>,
+    /// Those of scans that made a revision after this one.
+    pub since_revision: u64,
+    /// At most so many; where none, what an answer may hold.
+    pub limit: Option<usize>,
+}
+
+/// The accepted scans' poses, or the next of them.
 #[derive(Debug, Clone)]
 pub struct TrajectoryAnswer {
     /// In the order of acceptance.
     pub poses: Vec<TrajectoryPose>,
+    /// Ask for those since this revision for the next; none where these are the last.
+    pub next_since_revision: Option<u64>,
     /// At this state.
     pub state: MapState,
 }
@@ -337,6 +350,8 @@ pub struct MapInfo {
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments, which alignments are refined with.
     pub moment_bytes: usize,
+    /// Bytes of memory of the trajectory, with what is known of scans whose poses are not kept.
+    pub trajectory_bytes: usize,
     /// How it is kept; not at all without a data folder.
     pub storage: Option<MapStorage>,
 }

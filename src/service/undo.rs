@@ -6,6 +6,7 @@ use super::committing::{Proposal, Refusal, Step};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
+use super::trajectory::check_not_forgotten;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
 use crate::map::{Change, Committed, MultiResolutionMap, Request, TrajectoryPose, UndoRecord, WithdrawnScan};
 use crate::store::{MapFolder, StoreError};
@@ -76,14 +77,14 @@ impl HostedMap {
         };
         let scans = match target {
             UndoTarget::Scan { robot, scan_id } => {
+                check_not_forgotten(&trajectory, robot, *scan_id)?;
                 one(trajectory.find(robot, *scan_id), format!("of scan_id {scan_id} of robot {robot}"))?
             }
             UndoTarget::Revision(revision) => {
                 one(trajectory.at(*revision), format!("that made revision {revision}"))?
             }
             UndoTarget::RobotSince { robot, revision } => {
-                let meant = |pose: &&TrajectoryPose| pose.robot == *robot && pose.revision > *revision;
-                trajectory.poses().iter().filter(meant).map(|pose| pose.revision).collect()
+                trajectory.poses_after(*revision, Some(robot)).map(|pose| pose.revision).collect()
             }
         };
         Ok((scans, trajectory.withdrawn().to_vec()))

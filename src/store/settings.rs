@@ -4,6 +4,8 @@ use std::fmt::{self, Display};
 use std::str::FromStr;
 use std::time::Duration;
 
+use crate::map::TrajectorySpacing;
+
 /// When a change may be acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Durability {
@@ -50,7 +52,7 @@ impl Display for Durability {
 }
 
 /// Settings of a store.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StoreSettings {
     /// When a change may be acknowledged. Always synced.
     pub durability: Durability,
@@ -61,6 +63,8 @@ pub struct StoreSettings {
     /// Revisions behind the newest within which a scan can be undone, at least: so long the journal outlives the
     /// snapshots. 20,000.
     pub undo_revisions: u64,
+    /// How far poses of one robot lie apart that undo reaches no more.
+    pub trajectory_spacing: TrajectorySpacing,
     /// Bytes after which a segment of the journal is ended. 64 MiB.
     pub segment_bytes_max: u64,
 }
@@ -72,6 +76,7 @@ impl Default for StoreSettings {
             snapshot_journal_bytes: 32 << 20,
             snapshot_interval: Duration::from_secs(300),
             undo_revisions: 20_000,
+            trajectory_spacing: TrajectorySpacing::default(),
             segment_bytes_max: 64 << 20,
         }
     }

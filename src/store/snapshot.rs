@@ -14,7 +14,7 @@ use std::path::Path;
 use prost::Message;
 use uuid::Uuid;
 
-use super::codec::{Unreadable, moments};
+use super::codec::{Unreadable, moments, with_forgotten};
 use super::{FileSystem, StoreError, folder, pb};
 use crate::bloom::FilterSettings;
 use crate::map::{AnsweredRequest, MapContents, MapSettings, MultiResolutionMap, Trajectory, TrajectoryPose};
@@ -144,11 +144,12 @@ impl Snapshot {
             revision: *revision,
             block_keys: Vec::new(),
             block_masks: Vec::new().into(),
-            trajectory: trajectory.poses().iter().map(Into::into).collect(),
+            trajectory: trajectory.poses().map(Into::into).collect(),
             voxels: Some(voxels.into()),
             withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
             requests: requests.iter().map(Into::into).collect(),
             moments: Some(moments::beside(voxels, moments)),
+            forgotten: trajectory.forgotten().map(Into::into).collect(),
         }
     }
 
@@ -158,7 +159,11 @@ impl Snapshot {
         let settings = MapSettings { resolution_m: message.resolution_m, levels: message.levels, filter };
         let poses: Vec<TrajectoryPose> =
             message.trajectory.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?;
+        if !poses.is_sorted_by(|one, next| one.revision < next.revision) {
+            return Err("the revisions of its scans must ascend".into());
+        }
         let withdrawn = message.withdrawn.into_iter().map(Into::into).collect();
+        let trajectory = with_forgotten(Trajectory::new(poses, withdrawn), &message.forgotten)?;
         let requests = message.requests.into_iter().map(AnsweredRequest::try_from);
         let voxels = match message.voxels {
             Some(voxels) => voxels.try_into()?,
@@ -171,7 +176,7 @@ impl Snapshot {
                 None => MomentSet::of_centers(&voxels),
             },
             voxels,
-            trajectory: Trajectory::new(poses, withdrawn),
+            trajectory,
             requests: requests.collect::<Result<_, _>>()?,
         };
         let uuid = Uuid::from_slice(&message.uuid).map_err(|e| format!("uuid: {e}"))?;
@@ -237,7 +242,8 @@ mod tests {
                 revision: 42,
                 moments: MomentSet::from_iter([(VoxelKey::new([1, -2, 0]).unwrap(), moments)]),
                 voxels: keys.collect(),
-                trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }]),
+                trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }])
+                    .with_forgotten(&RobotName::new("r0").unwrap(), [(0, 6), (9, 9), (u64::MAX, u64::MAX)]),
                 requests: [request].into_iter().collect(),
             },
         }

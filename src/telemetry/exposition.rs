@@ -42,12 +42,16 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     for map in maps {
         family.gauge(&[("map", &map.name)], map.moment_bytes);
     }
+    let mut family = Family::begin(text, "mrol_map_trajectory_bytes", "Bytes of the trajectory, by map");
+    for map in maps {
+        family.gauge(&[("map", &map.name)], map.trajectory_bytes);
+    }
     write_filters(text, maps);
     let mut family = Family::begin(text, "mrol_map_revision", "Committed changes, by map");
     for map in maps {
         family.gauge(&[("map", &map.name)], map.state.revision);
     }
-    let mut family = Family::begin(text, "mrol_map_scans", "Accepted scans, by map");
+    let mut family = Family::begin(text, "mrol_map_scans", "Accepted scans whose poses are kept, by map");
     for map in maps {
         family.gauge(&[("map", &map.name)], map.scans);
     }

@@ -109,6 +109,7 @@ impl From<MapInfo> for pb::MapInfo {
             set_bytes: info.set_bytes as u64,
             storage: info.storage.map(Into::into),
             moment_bytes: info.moment_bytes as u64,
+            trajectory_bytes: info.trajectory_bytes as u64,
         }
     }
 }
@@ -129,6 +130,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             set_bytes: count_from(info.set_bytes),
             storage: info.storage.map(Into::into),
             moment_bytes: count_from(info.moment_bytes),
+            trajectory_bytes: count_from(info.trajectory_bytes),
         })
     }
 }

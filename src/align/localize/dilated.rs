@@ -49,7 +49,7 @@ impl DilatedLevels {
         let view = map.view();
         let (voxels, revision) = (view.voxels(), view.revision());
         let station = |pose: &TrajectoryPose| translation_m(&pose.map_from_sensor);
-        let stations: Vec<[f64; 3]> = map.trajectory().poses().iter().map(station).collect();
+        let stations: Vec<[f64; 3]> = map.trajectory().poses().map(station).collect();
         drop(view);
         let resolution_m = |level: u32| map.settings().resolution_m * f64::from(1u32 << level);
         let all = bounds(&voxels, 0.0).ok_or(LocalizationError::EmptyMap)?;

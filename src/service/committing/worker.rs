@@ -10,7 +10,10 @@ use super::{Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Tur
 use crate::map::{Change, Committed, MapName, MultiResolutionMap};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
-use crate::store::{Durability, MapFolder, Record, StoreError};
+use crate::store::{Durability, MapFolder, Record, StoreError, StoreSettings};
+
+/// Revisions between two thinnings of the trajectory of a map in memory.
+const THINNED_EVERY: u64 = 4096;
 
 /// What a map's thread works with.
 pub(super) struct Worker {
@@ -19,8 +22,11 @@ pub(super) struct Worker {
     folder: Option<Arc<MapFolder>>,
     announced: watch::Sender<u64>,
     stopped: Arc<OnceLock<Stop>>,
+    settings: StoreSettings,
     /// Since when something waits to be synced at an interval.
     unsynced: Option<Instant>,
+    /// When the trajectory of a map in memory was thinned last.
+    thinned: u64,
 }
 
 /// A change that is decided, with its record and the one who waits.
@@ -39,8 +45,11 @@ impl Worker {
         folder: Option<Arc<MapFolder>>,
         announced: watch::Sender<u64>,
         stopped: Arc<OnceLock<Stop>>,
+        settings: &StoreSettings,
     ) -> Self {
-        Self { name, map, folder, announced, stopped, unsynced: None }
+        let thinned = map.revision();
+        let settings = settings.clone();
+        Self { name, map, folder, announced, stopped, settings, unsynced: None, thinned }
     }
 
     /// Makes changes until nobody can send one any more.
@@ -125,6 +134,18 @@ impl Worker {
             debug_assert_ne!(committed.revision, *self.announced.borrow(), "every record makes a revision");
             self.announced.send_replace(committed.revision);
             drop(answer.send(Ok(committed)));
+        }
+        self.thin_in_memory();
+    }
+
+    /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo would
+    /// reach; that of others is thinned when undo reaches less far.
+    fn thin_in_memory(&mut self) {
+        let revision = self.map.revision();
+        if self.folder.is_none() && revision - self.thinned >= THINNED_EVERY {
+            let before = revision.saturating_sub(self.settings.undo_revisions);
+            self.map.committer().thin(before, &self.settings.trajectory_spacing);
+            self.thinned = revision;
         }
     }
 
