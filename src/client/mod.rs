@@ -229,8 +229,7 @@ impl Client {
         self.domain(self.connection.mapping().undo_scans(request).await)
     }
 
-    /// The poses of the accepted scans, of one robot or of all, as many as there are; the state is that of the last of
-    /// them.
+    /// The poses of the accepted scans, of one robot or of all, as many as there are, all at one revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -244,9 +243,7 @@ impl Client {
         let mut pieces = self.connection.answers::<_, TrajectoryAnswer>(pieces)?;
         let mut all = pieces.next().await.unwrap_or_else(|| Err(missing_message("trajectory")))?;
         while let Some(piece) = pieces.next().await {
-            let TrajectoryAnswer { poses, state, .. } = piece?;
-            all.poses.extend(poses);
-            all.state = state;
+            all.poses.extend(piece?.poses);
         }
         Ok(all)
     }

@@ -9,7 +9,6 @@ use super::stream::{Answers, Message};
 use super::{Adapter, service_of};
 use crate::access::Operation;
 use crate::admission::Arrival;
-use crate::service::TrajectoryPieces;
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
 
@@ -100,8 +99,8 @@ impl Mapping for Adapter {
     ) -> Result<Response<Self::StreamTrajectoryStream>, Status> {
         let service = service_of(&request)?;
         let (map, query) = request.into_inner().try_into()?;
-        let pieces = service.maps().trajectory_pieces(&map, query).await?;
-        let kept = self.admission.keep(TrajectoryPieces::BYTES)?;
+        let pieces = service.maps().trajectory_pieces(&map, query)?;
+        let kept = self.admission.keep(pieces.memory_bytes())?;
         Ok(Response::new(Box::pin(pieces.into_stream().map(move |piece| {
             let _until_sent = &kept;
             Ok(piece?.into())

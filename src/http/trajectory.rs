@@ -56,8 +56,8 @@ pub(super) async fn get(
     let TrajectoryParameters { robot, since_revision, limit } = query;
     let robot = robot.map(|name| RobotName::new(&name)).transpose().map_err(ServiceError::from)?;
     let query = TrajectoryQuery { robot, since_revision, limit };
-    let mut pieces = service.maps().trajectory_pieces(&map, query).await?;
-    let kept = adapter.admission.keep(TrajectoryPieces::BYTES)?;
+    let mut pieces = service.maps().trajectory_pieces(&map, query)?;
+    let kept = adapter.admission.keep(pieces.memory_bytes())?;
     // What fails at once is answered as such.
     let first = pieces.next().await.transpose()?;
     let (outbox, text) = mpsc::channel(1);

@@ -23,64 +23,81 @@ impl MapService {
         query: TrajectoryQuery,
     ) -> Result<TrajectoryAnswer, ServiceError> {
         let (map, most) = (self.map(map)?, self.limits().page(query.limit)?);
-        self.inner.queries.run(move |_| map.trajectory(&query, most, u64::MAX)).await
+        let (trajectory, revision) = map.map.trajectory_and_revision();
+        let state = map.state(revision);
+        self.inner.queries.run(move |_| page(&trajectory, state, &query, most)).await
     }
 
-    /// The same in pieces, as many as it takes. Without a limit, all poses since the revision that is asked for.
+    /// The same in pieces, as many as it takes, all at one revision. Without a limit, all poses since the revision that is
+    /// asked for.
     ///
     /// # Errors
     /// As for a page.
-    pub async fn trajectory_pieces(
+    pub fn trajectory_pieces(
         &self,
         map: &MapName,
         query: TrajectoryQuery,
     ) -> Result<TrajectoryPieces, ServiceError> {
-        let page = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
-        let hosted = self.map(map)?;
-        let (until, state) = (hosted.map.revision(), hosted.state(hosted.map.revision()));
-        let (service, map) = (self.clone(), map.clone());
-        Ok(TrajectoryPieces { service, map, query, left: page, until, state, ended: false })
+        let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
+        let map = self.map(map)?;
+        let (trajectory, revision) = map.map.trajectory_and_revision();
+        let state = map.state(revision);
+        Ok(TrajectoryPieces { service: self.clone(), trajectory, state, query, left, ended: false })
     }
 }
 
-/// The pieces of a trajectory: each is made when it is asked for, at a revision of its own, of scans up to the revision
-/// at which the first was asked for. Nothing is held between two pieces.
+/// The pieces of a trajectory as it was at one revision; each is made when it is asked for.
 #[derive(Debug)]
 pub struct TrajectoryPieces {
     service: MapService,
-    map: MapName,
+    trajectory: Trajectory,
+    state: MapState,
     /// What is still to come.
     query: TrajectoryQuery,
     /// Poses that may still come, where that is bounded.
     left: Option<usize>,
-    until: u64,
-    state: MapState,
     ended: bool,
 }
 
 impl TrajectoryPieces {
-    /// Bytes of memory that pieces take until they are sent, at most: one that is made, one that waits, one that is
-    /// sent; a pose takes less than a KiB in any form.
-    pub const BYTES: usize = 3 * POSES_PER_PIECE * 1024;
-
-    /// The state up to which poses come.
+    /// The state that all poses are of.
     pub fn state(&self) -> MapState {
         self.state
     }
 
-    /// The next piece; none after the last. The first is there even where it has no pose. Only in the last one does
-    /// `next_since_revision` say that there is more than was asked for.
+    /// Bytes of memory that this may come to until the last piece is sent: the trajectory, which the map may cease to
+    /// share meanwhile, and three pieces, one that is made, one that waits, one that is sent; a pose takes less than a
+    /// KiB in any form.
+    pub fn memory_bytes(&self) -> usize {
+        self.trajectory.memory_bytes() + 3 * POSES_PER_PIECE * 1024
+    }
+
+    /// The next piece; none after the last. The first is there even where it has no pose. Only the last one may say where
+    /// more than was asked for begins.
     ///
     /// # Errors
-    /// `NotFound` or `FailedPrecondition` where the map is gone meanwhile, or another has its name; `ResourceExhausted`
-    /// when too many jobs wait. After an error comes no other piece.
+    /// `ResourceExhausted` when too many jobs wait. After an error comes no other piece.
     pub async fn next(&mut self) -> Option<Result<TrajectoryAnswer, ServiceError>> {
         if self.ended {
             return None;
         }
-        let piece = self.piece().await;
-        self.ended = !piece.as_ref().is_ok_and(|(_, goes_on)| *goes_on);
-        Some(piece.map(|(piece, _)| piece))
+        let most = self.left.map_or(POSES_PER_PIECE, |left| left.min(POSES_PER_PIECE));
+        let (trajectory, state, query) = (self.trajectory.clone(), self.state, self.query.clone());
+        let piece = self.service.inner.queries.run(move |_| page(&trajectory, state, &query, most)).await;
+        Some(piece.map(|piece| self.follow(piece)).inspect_err(|_| self.ended = true))
+    }
+
+    /// Takes note of where the next piece begins.
+    fn follow(&mut self, mut piece: TrajectoryAnswer) -> TrajectoryAnswer {
+        self.left = self.left.map(|left| left - piece.poses.len());
+        match piece.next_since_revision {
+            Some(next) if self.left != Some(0) => {
+                self.query.since_revision = next;
+                piece.next_since_revision = None;
+            }
+            _ => self.ended = true,
+        }
+        piece
     }
 
     /// The pieces as a stream, which makes one ahead of the one that is sent.
@@ -95,36 +112,18 @@ impl TrajectoryPieces {
         });
         ReceiverStream::new(pieces)
     }
+}
 
-    /// The next piece, and whether another one follows.
-    async fn piece(&mut self) -> Result<(TrajectoryAnswer, bool), ServiceError> {
-        let map = self.service.map(&self.map)?;
-        map.check_uuid(Some(self.state.map_uuid))?;
-        let most = self.left.map_or(POSES_PER_PIECE, |left| left.min(POSES_PER_PIECE));
-        let (query, until) = (self.query.clone(), self.until);
-        let job = move |_: crate::util::StopSignal<'_>| map.trajectory(&query, most, until);
-        let mut piece = self.service.inner.queries.run(job).await?;
-        self.left = self.left.map(|left| left - piece.poses.len());
-        let goes_on = piece.next_since_revision.is_some() && self.left != Some(0);
-        if goes_on {
-            self.query.since_revision = piece.next_since_revision.take().unwrap_or(self.query.since_revision);
-        }
-        Ok((piece, goes_on))
-    }
+/// At most `most` poses.
+fn page(trajectory: &Trajectory, state: MapState, query: &TrajectoryQuery, most: usize) -> TrajectoryAnswer {
+    let mut wanted = trajectory.poses_after(query.since_revision, query.robot.as_ref());
+    let poses: Vec<_> = wanted.by_ref().take(most).cloned().collect();
+    let last = poses.last().map(|pose| pose.revision);
+    let next_since_revision = last.filter(|_| wanted.next().is_some());
+    TrajectoryAnswer { poses, next_since_revision, state }
 }
 
 impl HostedMap {
-    /// At most `most` poses of scans that made a revision up to `until`.
-    fn trajectory(&self, query: &TrajectoryQuery, most: usize, until: u64) -> TrajectoryAnswer {
-        let (trajectory, revision) = self.map.trajectory_and_revision();
-        let wanted = trajectory.poses_after(query.since_revision, query.robot.as_ref());
-        let mut wanted = wanted.take_while(|pose| pose.revision <= until);
-        let poses: Vec<_> = wanted.by_ref().take(most).cloned().collect();
-        let last = poses.last().map(|pose| pose.revision);
-        let next_since_revision = last.filter(|_| wanted.next().is_some());
-        TrajectoryAnswer { poses, next_since_revision, state: self.state(revision) }
-    }
-
     /// Refuses a robot that the map does not know where it knows as many as it may.
     pub(super) fn check_robots(&self, robot: &RobotName, limits: &Limits) -> Result<(), ServiceError> {
         let (trajectory, most) = (self.map.trajectory(), limits.robots_per_map_max);

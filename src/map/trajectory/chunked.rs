@@ -169,8 +169,9 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
         #[test]
-        fn a_chunked_list_is_a_sorted_map_and_copies_of_it_stay(steps in prop::collection::vec(step(), 1..40)) {
+        fn a_chunked_list_is_a_sorted_map_and_copies_of_it_stay(steps in prop::collection::vec(step(), 1..16)) {
             let (mut list, mut model) = (Chunked::<(u64, u64)>::default(), BTreeMap::new());
             let mut next = 0;
             for step in steps {
