@@ -48,10 +48,12 @@ fn the_second_half_of_the_scans_adds_a_pose_a_minute_and_robot() {
             ..TrajectoryPose::new(names[robot as usize].clone(), place(robot, step, &mut random))
         };
         map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
-        if scan % THINNED_EVERY == 0 {
+        // As far behind at half as in the end.
+        let (is_half, is_end) = (scan == scans / 2, scan + 1 == scans);
+        if scan % THINNED_EVERY == 0 || is_half || is_end {
             map.committer().thin((scan + 1).saturating_sub(REACH), &TrajectorySpacing::default());
         }
-        if scan == scans / 2 {
+        if is_half {
             half = map.trajectory().memory_bytes();
         }
     }

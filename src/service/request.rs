@@ -342,7 +342,7 @@ pub struct MapInfo {
     pub settings: MapSettings,
     /// Finest first.
     pub levels: Vec<LevelInfo>,
-    /// Accepted scans.
+    /// Accepted scans whose poses are kept.
     pub scans: usize,
     /// Who sent them, by name.
     pub robots: Vec<RobotName>,
