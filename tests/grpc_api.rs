@@ -198,7 +198,7 @@ async fn a_trajectory_holds_the_accepted_scans_of_each_robot() {
         robot.insert_scan(scan).await.unwrap();
     }
     let mut trajectory = async |name: &str| {
-        let request = pb::GetTrajectoryRequest { map: "a".into(), robot: name.into() };
+        let request = pb::GetTrajectoryRequest { map: "a".into(), robot: name.into(), ..Default::default() };
         robot.get_trajectory(request).await.unwrap().into_inner().poses
     };
     let all = trajectory("").await;

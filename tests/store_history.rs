@@ -243,7 +243,7 @@ proptest! {
             kept.step(step, &mut model);
             assert_equal(&kept.map, &model.voxels());
             let found: Vec<_> =
-                kept.map.trajectory().poses().iter().map(|pose| (pose.revision, pose.robot.clone())).collect();
+                kept.map.trajectory().poses().map(|pose| (pose.revision, pose.robot.clone())).collect();
             prop_assert_eq!(&found, &model.trajectory);
             let moments: BTreeMap<_, _> =
                 kept.map.moments().to_set().as_slice().iter().map(|(key, moments)| (key.index(), *moments)).collect();

@@ -65,6 +65,7 @@ operations! {
     DeleteVoxels:      Some(Write), grpc "/mrol.v1.Mapping/DeleteVoxels",        http POST "/v1/maps/{map}/deletions";
     UndoScans:         Some(Insert), grpc "/mrol.v1.Mapping/UndoScans",           http POST "/v1/maps/{map}/undo";
     GetTrajectory:     Some(Read),  grpc "/mrol.v1.Mapping/GetTrajectory",       http GET "/v1/maps/{map}/trajectory";
+    StreamTrajectory:  Some(Read),  grpc "/mrol.v1.Mapping/StreamTrajectory";
     CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";
     GetMap:            Some(Read),  grpc "/mrol.v1.Maps/GetMap",                 http GET "/v1/maps/{map}";
     ListMaps:          Some(Read),  grpc "/mrol.v1.Maps/ListMaps",               http GET "/v1/maps";

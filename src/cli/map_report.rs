@@ -20,6 +20,7 @@ pub(super) struct MapReport {
     robots: Vec<String>,
     set_bytes: usize,
     moment_bytes: usize,
+    trajectory_bytes: usize,
     storage: Option<Storage>,
 }
 
@@ -89,6 +90,7 @@ impl From<&MapInfo> for MapReport {
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes,
             moment_bytes: info.moment_bytes,
+            trajectory_bytes: info.trajectory_bytes,
             storage: info.storage.clone().map(Storage::from),
         }
     }
@@ -121,7 +123,8 @@ impl Display for MapReport {
         writeln!(f, "map {} at revision {}, uuid {}", self.map, self.revision, self.map_uuid)?;
         let robots = if self.robots.is_empty() { "nobody".into() } else { self.robots.join(", ") };
         let (sets, moments) = (bytes(self.set_bytes), bytes(self.moment_bytes));
-        writeln!(f, "{} scans from {robots}; exact sets {sets}, moments {moments}", count(self.scans))?;
+        let (scans, poses) = (count(self.scans), bytes(self.trajectory_bytes));
+        writeln!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}")?;
         match &self.storage {
             Some(storage) => writeln!(f, "{storage}")?,
             None => writeln!(f, "in memory only: it ends with the server")?,

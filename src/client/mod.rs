@@ -45,7 +45,7 @@ use tonic::{Request, Response, Status};
 use crate::map::{MapName, Region, RobotName};
 use crate::service::{
     Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, PointAnswer, PointQuery,
-    ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, Undo, UndoAnswer, VoxelListing,
+    ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo, UndoAnswer, VoxelListing,
 };
 use crate::wire::{pb, restore_pieces};
 use connection::Connection;
@@ -182,7 +182,7 @@ impl Client {
         let request = self.request((map, level, region));
         let chunks = self.connection.occupancy().list_voxels(request).await;
         let mut chunks = self.connection.answers::<_, VoxelListing>(chunks)?;
-        let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_listing()))?;
+        let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_message("listing")))?;
         while let Some(chunk) = chunks.next().await {
             listing.keys.extend(chunk?.keys);
         }
@@ -242,7 +242,7 @@ impl Client {
         self.domain(self.connection.mapping().undo_scans(request).await)
     }
 
-    /// The poses of the accepted scans, of one robot or of all.
+    /// The poses of the accepted scans, of one robot or of all, as many as there are, all at one revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -251,7 +251,26 @@ impl Client {
         map: &MapName,
         robot: Option<&RobotName>,
     ) -> Result<TrajectoryAnswer, ClientError> {
-        let request = self.request((map, robot));
+        let query = TrajectoryQuery { robot: robot.cloned(), ..TrajectoryQuery::default() };
+        let pieces = self.connection.mapping().stream_trajectory(self.request((map, query))).await;
+        let mut pieces = self.connection.answers::<_, TrajectoryAnswer>(pieces)?;
+        let mut all = pieces.next().await.unwrap_or_else(|| Err(missing_message("trajectory")))?;
+        while let Some(piece) = pieces.next().await {
+            all.poses.extend(piece?.poses);
+        }
+        Ok(all)
+    }
+
+    /// A page of the poses of the accepted scans; the answer says where the next one begins.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn trajectory_page(
+        &self,
+        map: &MapName,
+        query: TrajectoryQuery,
+    ) -> Result<TrajectoryAnswer, ClientError> {
+        let request = self.request((map, query));
         self.domain(self.connection.mapping().get_trajectory(request).await)
     }
 
@@ -273,6 +292,6 @@ impl Client {
 }
 
 /// A listing has at least one message, so that its state is told.
-fn missing_listing() -> ClientError {
-    ClientError::Answer(ServiceError::invalid("missing_field", "the listing has no message"))
+fn missing_message(what: &str) -> ClientError {
+    ClientError::Answer(ServiceError::invalid("missing_field", format!("the {what} has no message")))
 }

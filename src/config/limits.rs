@@ -64,6 +64,10 @@ pub struct LimitsConfig {
     pub voxels_per_map_max: usize,
     /// See [`Limits::listed_voxels_max`].
     pub listed_voxels_max: usize,
+    /// See [`Limits::trajectory_page_max`].
+    pub trajectory_page_max: usize,
+    /// See [`Limits::robots_per_map_max`].
+    pub robots_per_map_max: usize,
     /// See [`Limits::jobs_waiting_max`].
     pub jobs_waiting_max: usize,
     /// See [`Limits::map_file_bytes_max`].
@@ -124,6 +128,8 @@ impl Default for LimitsConfig {
             maps_max: limits.maps_max,
             voxels_per_map_max: limits.voxels_per_map_max,
             listed_voxels_max: limits.listed_voxels_max,
+            trajectory_page_max: limits.trajectory_page_max,
+            robots_per_map_max: limits.robots_per_map_max,
             jobs_waiting_max: limits.jobs_waiting_max,
             map_file_bytes_max: limits.map_file_bytes_max,
             map_file_scans_max: limits.map_file_scans_max,
@@ -172,6 +178,8 @@ impl LimitsConfig {
         for (key, value, least, allowed) in [
             ("limits.requests_max", self.requests_max, 1, "1 to 1048576"),
             ("limits.streams_max", self.streams_max, 1, "1 to 1048576"),
+            ("limits.trajectory_page_max", self.trajectory_page_max, 1, "1 to 1048576"),
+            ("limits.robots_per_map_max", self.robots_per_map_max, 1, "1 to 1048576"),
             ("limits.jobs_waiting_max", self.jobs_waiting_max, 0, "0 to 1048576"),
             ("limits.probes_max", self.probes_max, 1, "1 to 1048576"),
             ("limits.probe_body_bytes_max", self.probe_body_bytes_max, 64, "64 to 1048576"),
@@ -233,6 +241,8 @@ impl LimitsConfig {
             maps_max: self.maps_max,
             voxels_per_map_max: self.voxels_per_map_max,
             listed_voxels_max: self.listed_voxels_max,
+            trajectory_page_max: self.trajectory_page_max,
+            robots_per_map_max: self.robots_per_map_max,
             jobs_waiting_max: self.jobs_waiting_max,
             map_file_bytes_max: self.map_file_bytes_max,
             map_file_scans_max: self.map_file_scans_max,

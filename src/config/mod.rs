@@ -158,6 +158,7 @@ impl Config {
         self.limits.check()?;
         self.access.check()?;
         access::check_warning("tls.expiry_warning_days", self.tls.expiry_warning_days)?;
+        self.store.check()?;
         if let Some((needed, by)) = self.tls.missing() {
             return Err(ConfigError::Missing { needed, by });
         }

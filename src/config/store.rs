@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::ConfigError;
+use crate::map::TrajectorySpacing;
 use crate::store::{Durability, StoreMode, StoreSettings};
 
 /// How maps are kept; see [`StoreSettings`].
@@ -25,6 +27,12 @@ pub struct StoreConfig {
     /// execution. `0700`.
     #[serde(with = "as_text")]
     pub mode: StoreMode,
+    /// See [`TrajectorySpacing::distance_m`]. 0.5.
+    pub trajectory_spacing_m: f64,
+    /// See [`TrajectorySpacing::rotation_deg`]. 10.
+    pub trajectory_spacing_deg: f64,
+    /// See [`TrajectorySpacing::seconds`]. 60.
+    pub trajectory_spacing_s: f64,
 }
 
 impl Default for StoreConfig {
@@ -37,11 +45,28 @@ impl Default for StoreConfig {
             undo_revisions: store.undo_revisions,
             undo_bytes_max: store.undo_bytes_max,
             mode: store.mode,
+            trajectory_spacing_m: store.trajectory_spacing.distance_m,
+            trajectory_spacing_deg: store.trajectory_spacing.rotation_deg,
+            trajectory_spacing_s: store.trajectory_spacing.seconds,
         }
     }
 }
 
 impl StoreConfig {
+    /// Refuses a spacing that is none.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        for (key, value, range, least, most) in [
+            ("store.trajectory_spacing_m", self.trajectory_spacing_m, "0.01 to 1000", 0.01, 1000.0),
+            ("store.trajectory_spacing_deg", self.trajectory_spacing_deg, "0.1 to 360", 0.1, 360.0),
+            ("store.trajectory_spacing_s", self.trajectory_spacing_s, "0.1 to 1000000", 0.1, 1e6),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(ConfigError::Range { key, range, value: value.to_string() });
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn settings(&self) -> StoreSettings {
         StoreSettings {
             durability: self.durability,
@@ -50,6 +75,11 @@ impl StoreConfig {
             undo_revisions: self.undo_revisions,
             undo_bytes_max: self.undo_bytes_max,
             mode: self.mode,
+            trajectory_spacing: TrajectorySpacing {
+                distance_m: self.trajectory_spacing_m,
+                rotation_deg: self.trajectory_spacing_deg,
+                seconds: self.trajectory_spacing_s,
+            },
             ..StoreSettings::default()
         }
     }

@@ -1,17 +1,21 @@
 //! The Mapping service: what robots do.
 
+use prost::Message as _;
+use tokio_stream::StreamExt;
+use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::stream::{Answers, Message};
 use super::{Adapter, service_of};
 use crate::access::Operation;
-use crate::map::{MapName, RobotName};
+use crate::admission::Arrival;
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
 
 #[tonic::async_trait]
 impl Mapping for Adapter {
     type InsertScanStreamStream = Answers<pb::InsertScanResponse>;
+    type StreamTrajectoryStream = BoxStream<pb::StreamTrajectoryResponse>;
 
     async fn insert_scan(
         &self,
@@ -84,9 +88,26 @@ impl Mapping for Adapter {
         request: Request<pb::GetTrajectoryRequest>,
     ) -> Result<Response<pb::GetTrajectoryResponse>, Status> {
         let service = service_of(&request)?;
-        let (map, robot): (MapName, Option<RobotName>) = request.into_inner().try_into()?;
-        let answer = service.maps().trajectory(&map, robot.as_ref()).await?;
-        Ok(Response::new(answer.into()))
+        let arrival = Arrival::of(request.extensions())?.clone();
+        let (map, query) = request.into_inner().try_into()?;
+        let answer = service.maps().trajectory(&map, query).await?;
+        let answer = pb::GetTrajectoryResponse::from(answer);
+        arrival.at_least(answer.encoded_len())?;
+        Ok(Response::new(answer))
+    }
+
+    async fn stream_trajectory(
+        &self,
+        request: Request<pb::StreamTrajectoryRequest>,
+    ) -> Result<Response<Self::StreamTrajectoryStream>, Status> {
+        let service = service_of(&request)?;
+        let (map, query) = request.into_inner().try_into()?;
+        let pieces = service.maps().trajectory_pieces(&map, query).await?;
+        let kept = self.admission.keep(pieces.memory_bytes())?;
+        Ok(Response::new(Box::pin(pieces.into_stream().map(move |piece| {
+            let _until_sent = &kept;
+            Ok(piece?.into())
+        }))))
     }
 }
 

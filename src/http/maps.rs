@@ -55,6 +55,7 @@ pub(super) struct MapOut {
     robots: Vec<String>,
     set_bytes: usize,
     moment_bytes: usize,
+    trajectory_bytes: usize,
     storage: Option<StorageOut>,
 }
 
@@ -156,6 +157,7 @@ impl From<MapInfo> for MapOut {
             robots: info.robots.iter().map(ToString::to_string).collect(),
             set_bytes: info.set_bytes,
             moment_bytes: info.moment_bytes,
+            trajectory_bytes: info.trajectory_bytes,
             storage: info.storage.map(Into::into),
         }
     }

@@ -45,6 +45,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::Metrics => on(method, probes::metrics),
         Operation::QueryPointsStream
         | Operation::InsertScanStream
+        | Operation::StreamTrajectory
         | Operation::Reflect
         | Operation::HealthCheck
         | Operation::HealthWatch => return None,

@@ -1,26 +1,39 @@
-//! `GET /v1/maps/{map}/trajectory`: the poses of the accepted scans, of all robots or of `?robot=`.
+//! `GET /v1/maps/{map}/trajectory?robot=&since_revision=&limit=`: the poses of the accepted scans, of all robots or of
+//! one. With a `limit`, a page of them, which says where the next one begins; without, all.
 
-use axum::response::Json;
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
+use tokio::sync::mpsc::{self, Sender};
+use tokio_stream::StreamExt;
+use tokio_stream::wrappers::ReceiverStream;
 
+use super::Adapter;
 use super::around::Service;
 use super::error::HttpError;
 use super::json::{JsonPose, JsonState};
 use super::parameters::{Map, Parameters};
 use crate::map::{RobotName, TrajectoryPose};
-use crate::service::{ServiceError, TrajectoryAnswer};
+use crate::service::{ErrorCode, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct TrajectoryQuery {
+pub(super) struct TrajectoryParameters {
     robot: Option<String>,
+    #[serde(default)]
+    since_revision: u64,
+    limit: Option<usize>,
 }
 
+/// What stands behind the poses.
 #[derive(Serialize)]
-pub(super) struct TrajectoryOut {
-    poses: Vec<PoseOut>,
+struct End {
     #[serde(flatten)]
     state: JsonState,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_since_revision: Option<u64>,
 }
 
 #[derive(Serialize)]
@@ -35,19 +48,60 @@ struct PoseOut {
 }
 
 pub(super) async fn get(
+    State(adapter): State<Adapter>,
     Service(service): Service,
     Map(map): Map,
-    Parameters(query): Parameters<TrajectoryQuery>,
-) -> Result<Json<TrajectoryOut>, HttpError> {
-    let robot = query.robot.map(|name| RobotName::new(&name)).transpose().map_err(ServiceError::from)?;
-    let answer = service.maps().trajectory(&map, robot.as_ref()).await?;
-    Ok(Json(answer.into()))
+    Parameters(query): Parameters<TrajectoryParameters>,
+) -> Result<Response, HttpError> {
+    let TrajectoryParameters { robot, since_revision, limit } = query;
+    let robot = robot.map(|name| RobotName::new(&name)).transpose().map_err(ServiceError::from)?;
+    let query = TrajectoryQuery { robot, since_revision, limit };
+    let mut pieces = service.maps().trajectory_pieces(&map, query).await?;
+    let kept = adapter.admission.keep(pieces.memory_bytes())?;
+    // What fails at once is answered as such.
+    let first = pieces.next().await.transpose()?;
+    let (outbox, text) = mpsc::channel(1);
+    tokio::spawn(write(first, pieces, outbox));
+    let text = ReceiverStream::new(text).map(move |piece| {
+        let _until_sent = &kept;
+        piece.map(Bytes::from)
+    });
+    Ok(([(header::CONTENT_TYPE, "application/json")], Body::from_stream(text)).into_response())
 }
 
-impl From<TrajectoryAnswer> for TrajectoryOut {
-    fn from(answer: TrajectoryAnswer) -> Self {
-        Self { poses: answer.poses.iter().map(Into::into).collect(), state: answer.state.into() }
+/// Sends `{"poses":[...],<state>,"next_since_revision":n}` in pieces, the last field where there is more. What fails on
+/// the way breaks the answer off.
+async fn write(
+    first: Option<TrajectoryAnswer>,
+    mut pieces: TrajectoryPieces,
+    outbox: Sender<Result<String, ServiceError>>,
+) {
+    let mut text = "{\"poses\":[".to_owned();
+    let (mut piece, mut comma, mut next_since_revision) = (first.map(Ok), "", None);
+    while let Some(found) = piece {
+        let written = found.and_then(|found| {
+            next_since_revision = found.next_since_revision;
+            for pose in &found.poses {
+                text.push_str(std::mem::replace(&mut comma, ","));
+                text.push_str(&json(&PoseOut::from(pose))?);
+            }
+            Ok(std::mem::take(&mut text))
+        });
+        let failed = written.is_err();
+        if outbox.send(written).await.is_err() || failed {
+            return;
+        }
+        piece = pieces.next().await;
     }
+    let end = json(&End { state: pieces.state().into(), next_since_revision });
+    let end = end.map(|end| format!("],{}", end.trim_start_matches('{')));
+    drop(outbox.send(end).await);
+}
+
+fn json(value: &impl Serialize) -> Result<String, ServiceError> {
+    let not_written =
+        |e: serde_json::Error| ServiceError::new(ErrorCode::Internal, "not_written", e.to_string());
+    serde_json::to_string(value).map_err(not_written)
 }
 
 impl From<&TrajectoryPose> for PoseOut {

@@ -12,7 +12,10 @@ use super::moments::{MomentLocks, MomentsOfShard};
 use super::removal::Removal;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
-use super::{AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, UndoRecord};
+use super::{
+    AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, TrajectorySpacing,
+    UndoRecord,
+};
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 
@@ -101,6 +104,16 @@ impl<'a> Committer<'a> {
         trajectory.withdraw(&undo.scans, committed.revision);
         self.remember(undo.request.as_ref(), committed, undo.scans.len());
         self.publish(committed.revision, committed.voxels)
+    }
+
+    /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](super::Trajectory::thin); the number
+    /// of poses that went. Makes no revision. Readers go on meanwhile.
+    pub fn thin(self, before: u64, spacing: &TrajectorySpacing) -> usize {
+        let mut thinned = self.map.trajectory();
+        let gone = thinned.thin(before, spacing);
+        // What goes is dropped when nobody waits for the lock any more.
+        let _thick = std::mem::replace(&mut *self.map.trajectory.write(), thinned);
+        gone
     }
 
     fn remember(&self, request: Option<&Request>, Committed { revision, voxels }: Committed, scans: usize) {

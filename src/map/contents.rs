@@ -56,7 +56,7 @@ impl MapContents {
             return Err(ContentsError::Revision(self.revision));
         }
         let (scans, withdrawn) = (self.trajectory.poses(), self.trajectory.withdrawn());
-        self.check_order("scans", scans.iter().map(|scan| scan.revision))?;
+        self.check_order("scans", scans.map(|scan| scan.revision))?;
         self.check_order("withdrawn scans", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
         self.check_order("requests", self.requests.iter().map(|request| request.revision))?;
         Ok(self)
@@ -79,7 +79,7 @@ impl MultiResolutionMap {
         // are.
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
-        let (trajectory, requests) = (self.trajectory().clone(), self.requests().clone());
+        let (trajectory, requests) = (self.trajectory(), self.requests().clone());
         let (voxels, moments) = (view.voxels(), moments.to_set());
         MapContents { revision: view.revision(), voxels, moments, trajectory, requests }
     }

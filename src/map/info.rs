@@ -39,6 +39,8 @@ pub struct MapDescription {
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments.
     pub moment_bytes: usize,
+    /// Bytes of memory of the trajectory, with what is known of scans whose poses are not kept.
+    pub trajectory_bytes: usize,
 }
 
 impl MultiResolutionMap {
@@ -54,14 +56,17 @@ impl MultiResolutionMap {
             levels: levels.collect(),
             set_bytes: view.shards().map(Shard::set_bytes).sum(),
             moment_bytes: moments.bytes(),
+            trajectory_bytes: self.trajectory().memory_bytes(),
         }
     }
 
-    /// Bytes of memory of the exact sets of all levels and of the points' moments.
+    /// Bytes of memory of the exact sets of all levels, the points' moments and the trajectory.
     pub fn memory_bytes(&self) -> usize {
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
-        view.shards().map(Shard::set_bytes).sum::<usize>() + moments.bytes()
+        view.shards().map(Shard::set_bytes).sum::<usize>()
+            + moments.bytes()
+            + self.trajectory().memory_bytes()
     }
 
     /// Bytes of memory of the exact sets of all levels.

@@ -39,7 +39,9 @@ pub use region::{Region, RegionError, SPHERE_M_MAX};
 pub use requests::{AnsweredRequest, REQUESTS_KEPT, Requests};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
-pub use trajectory::{ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
+pub use trajectory::{
+    ID_RANGES_PER_ROBOT_MAX, ScanRecord, Trajectory, TrajectoryPose, TrajectorySpacing, WithdrawnScan,
+};
 pub use view::{LongRead, MapView};
 
 use std::sync::atomic::Ordering;
@@ -119,9 +121,16 @@ impl MultiResolutionMap {
         self.shards.iter().all(|shard| shard.read().is_empty())
     }
 
-    /// The poses of the accepted scans.
-    pub fn trajectory(&self) -> RwLockReadGuard<'_, Trajectory> {
-        self.trajectory.read()
+    /// The poses of the accepted scans, as they are now. Nobody waits for who holds them.
+    pub fn trajectory(&self) -> Trajectory {
+        self.trajectory.read().clone()
+    }
+
+    /// The poses of the accepted scans, with a revision at which they are these.
+    pub fn trajectory_and_revision(&self) -> (Trajectory, u64) {
+        // Who adds a pose publishes its revision before others may read.
+        let trajectory = self.trajectory.read();
+        (trajectory.clone(), self.revision())
     }
 
     /// The poses of the accepted scans, where they do not change just now: for threads that may not wait.

@@ -10,6 +10,7 @@ use uuid::Uuid;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
 use super::reach::Reachable;
+use super::trajectory::thin;
 use super::{ErrorCode, MapReach, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
@@ -23,6 +24,7 @@ use crate::sync::{Rank, RwLock};
 pub(super) struct Catalogue {
     maps: RwLock<Named>,
     data_dir: Option<Arc<DataDir>>,
+    settings: StoreSettings,
     writing: tokio::sync::Mutex<()>,
 }
 
@@ -43,9 +45,9 @@ impl Catalogue {
     ) -> Result<Self, ServiceError> {
         let open = |path: &Path| DataDir::open(path, settings.clone());
         let data_dir = data_dir.map(open).transpose().map_err(not_stored)?;
-        let maps = data_dir.as_ref().map(|data_dir| open_all(data_dir, progress)).transpose()?;
-        let maps = RwLock::new(Rank::Brief, maps.unwrap_or_default());
-        Ok(Self { maps, data_dir: data_dir.map(Arc::new), writing: Default::default() })
+        let maps = data_dir.as_ref().map(|data_dir| open_all(data_dir, settings, progress)).transpose()?;
+        let (maps, data_dir) = (RwLock::new(Rank::Brief, maps.unwrap_or_default()), data_dir.map(Arc::new));
+        Ok(Self { maps, data_dir, settings: settings.clone(), writing: Default::default() })
     }
 
     pub(super) fn get(&self, name: &Reachable) -> Result<Arc<HostedMap>, ServiceError> {
@@ -151,12 +153,12 @@ impl Catalogue {
         uuid: Uuid,
         build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
-        let (data_dir, of) = (self.data_dir.clone(), name.clone());
+        let (data_dir, of, settings) = (self.data_dir.clone(), name.clone(), self.settings.clone());
         let map = blocking(move || {
             let map = build()?;
             let create = |data_dir: Arc<DataDir>| data_dir.create(&of, &Snapshot::of(&map, uuid));
             let folder = data_dir.map(create).transpose().map_err(not_stored)?;
-            HostedMap::new(of, uuid, map, folder).map(Arc::new)
+            HostedMap::new(of, uuid, map, folder, &settings).map(Arc::new)
         })
         .await?;
         self.maps.write().open.insert(name.clone(), Arc::clone(&map));
@@ -170,7 +172,7 @@ impl Catalogue {
         uuid: Uuid,
         build: impl FnOnce() -> Result<MultiResolutionMap, ServiceError> + Send + 'static,
     ) -> Result<Arc<HostedMap>, ServiceError> {
-        let (data_dir, name) = (self.data_dir.clone(), old.name.clone());
+        let (data_dir, name, settings) = (self.data_dir.clone(), old.name.clone(), self.settings.clone());
         let taken: Vec<MapName> = {
             let maps = self.maps.read();
             maps.open.keys().chain(maps.unavailable.keys()).cloned().collect()
@@ -190,13 +192,13 @@ impl Catalogue {
                     None => Ok(None),
                 };
                 let folder = data_dir.map_or(Ok(None), replace)?;
-                let new = HostedMap::new(old.name.clone(), uuid, map, folder)?;
+                let new = HostedMap::new(old.name.clone(), uuid, map, folder, &settings)?;
                 Ok((kept, new))
             };
             match exchange() {
-                Ok((kept, new)) => Ok((Arc::new(new), Arc::new(old.again_as(kept)?), None)),
+                Ok((kept, new)) => Ok((Arc::new(new), Arc::new(old.again_as(kept, &settings)?), None)),
                 Err(error) => {
-                    let old = Arc::new(old.again_as(old.name.clone())?);
+                    let old = Arc::new(old.again_as(old.name.clone(), &settings)?);
                     Ok((Arc::clone(&old), old, Some(error)))
                 }
             }
@@ -268,7 +270,11 @@ impl Catalogue {
 }
 
 /// Opens what can be opened.
-fn open_all(data_dir: &DataDir, progress: &OpeningProgress) -> Result<Named, ServiceError> {
+fn open_all(
+    data_dir: &DataDir,
+    settings: &StoreSettings,
+    progress: &OpeningProgress,
+) -> Result<Named, ServiceError> {
     let stock = data_dir.take_stock().map_err(not_stored)?;
     for path in stock.not_understood {
         tracing::warn!(path = %path.display(), "not understood, and left alone: no map");
@@ -281,7 +287,10 @@ fn open_all(data_dir: &DataDir, progress: &OpeningProgress) -> Result<Named, Ser
         match data_dir.map(&name, progress) {
             Ok(opened) => {
                 report(&name, &opened, start);
-                let map = HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder))?;
+                // The snapshot was written before what went when it was there.
+                thin(&opened.map, &opened.folder);
+                let map =
+                    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder), settings)?;
                 maps.open.insert(name, Arc::new(map));
             }
             Err(error @ StoreError::Cancelled) => return Err(not_stored(error)),

@@ -23,7 +23,7 @@ use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
-use crate::store::{MapFolder, Record, StoreError};
+use crate::store::{MapFolder, Record, StoreError, StoreSettings};
 use crate::util::{Durations, SharedDurations};
 use worker::Worker;
 
@@ -115,12 +115,14 @@ impl Committing {
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
         announced: watch::Sender<u64>,
+        settings: &StoreSettings,
     ) -> Result<Self, ServiceError> {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
         let thread = std::thread::Builder::new().name(format!("mrol-commit-{name}"));
         let durations = Arc::<SharedDurations>::default();
-        let worker = Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations));
+        let worker =
+            Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations), settings);
         let started = thread.spawn(move || worker.run(&waiting));
         started.map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
         Ok(Self { inbox, stopped, durations })

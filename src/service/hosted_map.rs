@@ -12,13 +12,14 @@ use uuid::Uuid;
 use super::committing::{Committing, Stop};
 use super::map_file::snapshot_bytes;
 use super::room::Room;
+use super::trajectory::thin;
 use super::{
-    ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, TrajectoryAnswer,
-    VoxelListing, check_not_stopped,
+    ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, VoxelListing,
+    check_not_stopped,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName, TrajectoryPose};
-use crate::store::{FolderUse, MapFolder, Snapshot, StoreError};
+use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
+use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
 use crate::voxel::{LatticeFromPoints, VoxelKey};
@@ -67,16 +68,17 @@ impl HostedMap {
         uuid: Uuid,
         map: impl Into<Arc<MultiResolutionMap>>,
         folder: Option<MapFolder>,
+        settings: &StoreSettings,
     ) -> Result<Self, ServiceError> {
-        Self::of_shared(name, uuid, map.into(), folder.map(Arc::new))
+        Self::of_shared(name, uuid, map.into(), folder.map(Arc::new), settings)
     }
 
     /// The same map under the name `name`, once this one has ended.
     ///
     /// # Errors
     /// As there.
-    pub(super) fn again_as(&self, name: MapName) -> Result<Self, ServiceError> {
-        Self::of_shared(name, self.uuid, Arc::clone(&self.map), self.folder.clone())
+    pub(super) fn again_as(&self, name: MapName, settings: &StoreSettings) -> Result<Self, ServiceError> {
+        Self::of_shared(name, self.uuid, Arc::clone(&self.map), self.folder.clone(), settings)
     }
 
     fn of_shared(
@@ -84,9 +86,11 @@ impl HostedMap {
         uuid: Uuid,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
+        settings: &StoreSettings,
     ) -> Result<Self, ServiceError> {
         let (announcing, announced) = watch::channel(map.revision());
-        let committing = Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing)?;
+        let committing =
+            Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing, settings)?;
         Ok(Self {
             name,
             uuid,
@@ -124,6 +128,7 @@ impl HostedMap {
             return Ok(false);
         }
         saved?;
+        thin(&self.map, folder);
         self.is_put_off.store(false, Ordering::Relaxed);
         tracing::info!(map = %self.name, revision = snapshot.contents.revision, elapsed = ?start.elapsed(), "saved");
         Ok(true)
@@ -296,15 +301,6 @@ impl HostedMap {
         Ok(VoxelListing { resolution_m, keys, state: self.state(view.revision()) })
     }
 
-    pub(super) fn trajectory(&self, robot: Option<&RobotName>) -> TrajectoryAnswer {
-        let trajectory = self.map.trajectory();
-        let wanted = |pose: &&TrajectoryPose| robot.is_none_or(|robot| *robot == pose.robot);
-        TrajectoryAnswer {
-            poses: trajectory.poses().iter().filter(wanted).cloned().collect(),
-            state: self.state(self.map.revision()),
-        }
-    }
-
     pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
         let (described, storage) = (self.map.describe(rate_samples, RATE_SEED), self.storage());
         let trajectory = self.map.trajectory();
@@ -313,11 +309,12 @@ impl HostedMap {
             state: self.state(described.revision),
             settings: *self.map.settings(),
             levels: described.levels,
-            scans: trajectory.poses().len(),
+            scans: trajectory.len(),
             robots: trajectory.robots(),
             set_bytes: described.set_bytes,
             moment_bytes: described.moment_bytes,
             commits: self.committing.durations(),
+            trajectory_bytes: described.trajectory_bytes,
             storage,
         }
     }

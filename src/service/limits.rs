@@ -17,6 +17,10 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
+    /// Poses of one page of a trajectory, and of one that is asked for without a limit. 5,000.
+    pub trajectory_page_max: usize,
+    /// Robots of which one map keeps scans, or ids of scans. 4,096.
+    pub robots_per_map_max: usize,
     /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
     pub jobs_waiting_max: usize,
     /// Bytes of a map file that is restored, before and after compression. 1 GiB.
@@ -50,6 +54,8 @@ impl Default for Limits {
             maps_max: 64,
             voxels_per_map_max: 200_000_000,
             listed_voxels_max: 20_000_000,
+            trajectory_page_max: 5_000,
+            robots_per_map_max: 4_096,
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
             map_file_scans_max: 20_000_000,
@@ -77,6 +83,25 @@ impl Limits {
     pub(super) fn check_keys(&self, keys: usize) -> Result<(), ServiceError> {
         within("keys", "keys_per_request_max", keys, self.keys_per_request_max)
     }
+
+    /// The poses of a page, where `limit` of them are asked for.
+    ///
+    /// # Errors
+    /// When these are none, or more than `trajectory_page_max`.
+    pub(super) fn page(&self, limit: Option<usize>) -> Result<usize, ServiceError> {
+        let most = self.trajectory_page_max;
+        match limit {
+            None => Ok(most),
+            Some(limit) if (1..=most).contains(&limit) => Ok(limit),
+            Some(limit) => {
+                let message = format!(
+                    "limit must be 1 to trajectory_page_max, which is {most}, got {limit}: ask for the next page by \
+                     since_revision"
+                );
+                Err(ServiceError::invalid("page_too_large", message))
+            }
+        }
+    }
 }
 
 fn within(field: &str, limit: &str, count: usize, most: usize) -> Result<(), ServiceError> {
@@ -93,6 +118,19 @@ fn within(field: &str, limit: &str, count: usize, most: usize) -> Result<(), Ser
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_page_is_bounded_on_both_sides_and_the_error_names_the_limit() {
+        let limits = Limits { trajectory_page_max: 10, ..Limits::default() };
+        assert_eq!([None, Some(10), Some(1)].map(|limit| limits.page(limit).unwrap()), [10, 10, 1]);
+        for bad in [0, 11] {
+            let error = limits.page(Some(bad)).unwrap_err();
+            assert!(
+                error.message.contains(&format!("trajectory_page_max, which is 10, got {bad}")),
+                "{error}"
+            );
+        }
+    }
 
     #[test]
     fn a_batch_is_bounded_on_both_sides_and_the_error_names_the_limit() {

@@ -7,6 +7,7 @@ use super::committing::{Prepared, Proposal, Step, Turn, record_of};
 use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
 use super::room::Room;
+use super::trajectory::check_not_forgotten;
 use super::usable_scan::UsableScan;
 use super::{
     ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, StandingSettings,
@@ -41,6 +42,7 @@ impl HostedMap {
             return Ok(Step::Answered(answer));
         }
         self.check_voxels(settings)?;
+        self.check_robots(&request.robot, &settings.limits)?;
         room.check_to_grow()?;
         let placement = self.place(&scan, settings, stop)?;
         let answer = self.answer(&scan, &placement);
@@ -123,7 +125,9 @@ impl HostedMap {
         let Some(trajectory) = self.map.try_trajectory() else {
             return false;
         };
-        request.scan_id.is_none_or(|scan_id| trajectory.find(&request.robot, scan_id).is_none())
+        let robot = &request.robot;
+        let accepted = |id| trajectory.find(robot, id).is_some() || trajectory.has_forgotten(robot, id);
+        !request.scan_id.is_some_and(accepted)
     }
 
     /// The first answer again, where this scan was accepted before.
@@ -133,7 +137,7 @@ impl HostedMap {
         };
         let trajectory = self.map.trajectory();
         let Some(pose) = trajectory.find(&scan.request.robot, scan_id) else {
-            return Ok(None);
+            return check_not_forgotten(&trajectory, &scan.request.robot, scan_id).map(|()| None);
         };
         if pose.digest == scan.digest {
             return Ok(Some(self.answer_again(pose)));

@@ -25,6 +25,7 @@ mod scan_reach;
 mod settings;
 mod shortage;
 mod time_limit;
+mod trajectory;
 mod undo;
 mod usable_scan;
 mod watermarks;
@@ -40,17 +41,18 @@ pub use pool::PoolUse;
 pub use reach::MapReach;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
-    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, UnavailableMap, Undo,
-    UndoAnswer, UndoTarget, VoxelListing,
+    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery,
+    UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
 pub use scan_reach::ScanReach;
 pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
 pub use shortage::Shortage;
+pub use trajectory::TrajectoryPieces;
 pub use watermarks::Marks;
 
 use std::sync::Arc;
 
-use crate::map::{MapName, Region, RobotName};
+use crate::map::{MapName, Region};
 use crate::store::OpeningProgress;
 use crate::util::StopSignal;
 use catalogue::Catalogue;
@@ -263,18 +265,6 @@ impl MapService {
             limit.run(stop, |stop| map.propose_undo(&undo, &inner.room, &limit, stop))
         })
         .await
-    }
-
-    /// The poses of the accepted scans, of one robot or of all.
-    ///
-    /// # Errors
-    /// `NotFound` without such a map.
-    pub async fn trajectory(
-        &self,
-        map: &MapName,
-        robot: Option<&RobotName>,
-    ) -> Result<TrajectoryAnswer, ServiceError> {
-        Ok(self.map(map)?.trajectory(robot))
     }
 
     /// The occupied voxels of a level, in a region or everywhere, all at one revision.

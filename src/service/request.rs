@@ -290,11 +290,24 @@ pub struct UndoAnswer {
     pub replayed: bool,
 }
 
-/// The accepted scans' poses.
+/// Which of the accepted scans' poses.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct TrajectoryQuery {
+    /// Of this robot; of all where none.
+    pub robot: Option<RobotName>,
+    /// Those of scans that made a revision after this one.
+    pub since_revision: u64,
+    /// At most so many; where none, what an answer may hold.
+    pub limit: Option<usize>,
+}
+
+/// The accepted scans' poses, or the next of them.
 #[derive(Debug, Clone)]
 pub struct TrajectoryAnswer {
     /// In the order of acceptance.
     pub poses: Vec<TrajectoryPose>,
+    /// Ask for those since this revision for the next; none where these are the last.
+    pub next_since_revision: Option<u64>,
     /// At this state.
     pub state: MapState,
 }
@@ -330,7 +343,7 @@ pub struct MapInfo {
     pub settings: MapSettings,
     /// Finest first.
     pub levels: Vec<LevelInfo>,
-    /// Accepted scans.
+    /// Accepted scans whose poses are kept.
     pub scans: usize,
     /// Who sent them, by name.
     pub robots: Vec<RobotName>,
@@ -341,6 +354,8 @@ pub struct MapInfo {
     /// How long groups of changes took to become durable and visible since the server was started; not sent over the
     /// wire.
     pub commits: Durations,
+    /// Bytes of memory of the trajectory, with what is known of scans whose poses are not kept.
+    pub trajectory_bytes: usize,
     /// How it is kept; not at all without a data folder.
     pub storage: Option<MapStorage>,
 }

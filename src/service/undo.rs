@@ -7,9 +7,11 @@ use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
 use super::time_limit::TimeLimit;
+use super::trajectory::check_not_forgotten;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
 use crate::map::{
-    Change, Committed, MultiResolutionMap, Observations, Request, TrajectoryPose, UndoRecord, WithdrawnScan,
+    Change, Committed, MultiResolutionMap, Observations, Request, Trajectory, TrajectoryPose, UndoRecord,
+    WithdrawnScan,
 };
 use crate::store::{MapFolder, StoreError};
 use crate::util::StopSignal;
@@ -93,17 +95,25 @@ impl HostedMap {
         };
         let scans = match target {
             UndoTarget::Scan { robot, scan_id } => {
+                check_not_forgotten(&trajectory, robot, *scan_id)?;
                 one(trajectory.find(robot, *scan_id), format!("of scan_id {scan_id} of robot {robot}"))?
             }
             UndoTarget::Revision(revision) => {
+                self.check_reach(&trajectory, *revision)?;
                 one(trajectory.at(*revision), format!("that made revision {revision}"))?
             }
             UndoTarget::RobotSince { robot, revision } => {
-                let meant = |pose: &&TrajectoryPose| pose.robot == *robot && pose.revision > *revision;
-                trajectory.poses().iter().filter(meant).map(|pose| pose.revision).collect()
+                trajectory.poses_after(*revision, Some(robot)).map(|pose| pose.revision).collect()
             }
         };
         Ok((scans, trajectory.withdrawn().to_vec()))
+    }
+
+    /// Refuses a scan that may be out of reach and is not kept.
+    fn check_reach(&self, trajectory: &Trajectory, revision: u64) -> Result<(), ServiceError> {
+        let folder = self.folder.as_ref().filter(|_| trajectory.at(revision).is_none());
+        let out_of_reach = folder.filter(|folder| revision < folder.used().undo_from);
+        out_of_reach.map_or(Ok(()), |folder| Err(self.out_of_reach(folder, revision)))
     }
 
     fn no_observations(&self) -> ServiceError {

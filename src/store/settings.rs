@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use super::StoreMode;
+use crate::map::TrajectorySpacing;
 
 /// When a change may be acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,7 +53,7 @@ impl Display for Durability {
 }
 
 /// Settings of a store.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StoreSettings {
     /// When a change may be acknowledged. Always synced.
     pub durability: Durability,
@@ -68,6 +69,8 @@ pub struct StoreSettings {
     pub undo_bytes_max: u64,
     /// Permissions of the data folder.
     pub mode: StoreMode,
+    /// How far poses of one robot lie apart that undo reaches no more.
+    pub trajectory_spacing: TrajectorySpacing,
     /// Bytes after which a segment of the journal is ended. 64 MiB.
     pub segment_bytes_max: u64,
 }
@@ -81,6 +84,7 @@ impl Default for StoreSettings {
             undo_revisions: 20_000,
             undo_bytes_max: 4 << 30,
             mode: StoreMode::default(),
+            trajectory_spacing: TrajectorySpacing::default(),
             segment_bytes_max: 64 << 20,
         }
     }

@@ -173,11 +173,12 @@ impl Snapshot {
             revision: *revision,
             block_keys: Vec::new(),
             block_masks: Vec::new().into(),
-            trajectory: trajectory.poses().iter().map(Into::into).collect(),
+            trajectory: trajectory.poses().map(Into::into).collect(),
             voxels: Some(voxels.into()),
             withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
             requests: requests.iter().map(Into::into).collect(),
             moments: Some(moments::beside(voxels, moments)),
+            forgotten: trajectory.forgotten().map(Into::into).collect(),
         }
     }
 }
@@ -259,7 +260,8 @@ mod tests {
                 revision: 42,
                 moments: MomentSet::from_iter([(VoxelKey::new([1, -2, 0]).unwrap(), moments)]),
                 voxels: keys.collect(),
-                trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }]),
+                trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }])
+                    .with_forgotten(&RobotName::new("r0").unwrap(), [(0, 6), (9, 9), (u64::MAX, u64::MAX)]),
                 requests: [request].into_iter().collect(),
             },
         }

@@ -73,12 +73,18 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     for map in maps {
         family.sample(&[("map", &map.name)], map.moment_bytes);
     }
+    let mut family =
+        Family::begin(text, "mrol_map_trajectory_bytes", Kind::Gauge, "Bytes of the trajectory, by map");
+    for map in maps {
+        family.sample(&[("map", &map.name)], map.trajectory_bytes);
+    }
     write_filters(text, maps);
     let mut family = Family::begin(text, "mrol_map_revision", Kind::Gauge, "Committed changes, by map");
     for map in maps {
         family.sample(&[("map", &map.name)], map.state.revision);
     }
-    let mut family = Family::begin(text, "mrol_map_scans", Kind::Gauge, "Accepted scans, by map");
+    let mut family =
+        Family::begin(text, "mrol_map_scans", Kind::Gauge, "Accepted scans whose poses are kept, by map");
     for map in maps {
         family.sample(&[("map", &map.name)], map.scans);
     }

@@ -116,6 +116,7 @@ impl From<MapInfo> for pb::MapInfo {
             set_bytes: info.set_bytes as u64,
             storage: info.storage.map(Into::into),
             moment_bytes: info.moment_bytes as u64,
+            trajectory_bytes: info.trajectory_bytes as u64,
         }
     }
 }
@@ -137,6 +138,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             commits: Durations::default(),
             storage: info.storage.map(Into::into),
             moment_bytes: count_from(info.moment_bytes),
+            trajectory_bytes: count_from(info.trajectory_bytes),
         })
     }
 }

@@ -3,26 +3,61 @@
 use super::types::count_from;
 use super::{InField, pb, required};
 use crate::map::{MapName, RobotName, TrajectoryPose};
-use crate::service::{ServiceError, TrajectoryAnswer};
+use crate::service::{ServiceError, TrajectoryAnswer, TrajectoryQuery};
 
-impl TryFrom<pb::GetTrajectoryRequest> for (MapName, Option<RobotName>) {
+impl TryFrom<pb::GetTrajectoryRequest> for (MapName, TrajectoryQuery) {
     type Error = ServiceError;
 
     fn try_from(request: pb::GetTrajectoryRequest) -> Result<Self, ServiceError> {
-        let robot = (!request.robot.is_empty()).then(|| RobotName::new(&request.robot)).transpose()?;
-        Ok((MapName::new(&request.map)?, robot))
+        let pb::GetTrajectoryRequest { map, robot, since_revision, limit } = request;
+        let limit = (limit > 0).then(|| count_from(limit));
+        Ok((MapName::new(&map)?, TrajectoryQuery { robot: robot_of(&robot)?, since_revision, limit }))
     }
 }
 
-impl From<(&MapName, Option<&RobotName>)> for pb::GetTrajectoryRequest {
-    fn from((map, robot): (&MapName, Option<&RobotName>)) -> Self {
-        Self { map: map.to_string(), robot: robot.map(ToString::to_string).unwrap_or_default() }
+impl TryFrom<pb::StreamTrajectoryRequest> for (MapName, TrajectoryQuery) {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::StreamTrajectoryRequest) -> Result<Self, ServiceError> {
+        let pb::StreamTrajectoryRequest { map, robot, since_revision } = request;
+        Ok((MapName::new(&map)?, TrajectoryQuery { robot: robot_of(&robot)?, since_revision, limit: None }))
+    }
+}
+
+/// The robot of that name; every robot where it is empty.
+fn robot_of(name: &str) -> Result<Option<RobotName>, ServiceError> {
+    Ok((!name.is_empty()).then(|| RobotName::new(name)).transpose()?)
+}
+
+impl From<(&MapName, TrajectoryQuery)> for pb::GetTrajectoryRequest {
+    fn from((map, query): (&MapName, TrajectoryQuery)) -> Self {
+        let TrajectoryQuery { robot, since_revision, limit } = query;
+        let robot = robot.map(|robot| robot.to_string()).unwrap_or_default();
+        Self { map: map.to_string(), robot, since_revision, limit: limit.unwrap_or_default() as u64 }
+    }
+}
+
+/// Of a stream nobody limits the poses.
+impl From<(&MapName, TrajectoryQuery)> for pb::StreamTrajectoryRequest {
+    fn from(request: (&MapName, TrajectoryQuery)) -> Self {
+        let pb::GetTrajectoryRequest { map, robot, since_revision, .. } = request.into();
+        Self { map, robot, since_revision }
     }
 }
 
 impl From<TrajectoryAnswer> for pb::GetTrajectoryResponse {
     fn from(answer: TrajectoryAnswer) -> Self {
-        Self { poses: answer.poses.iter().map(Into::into).collect(), state: Some(answer.state.into()) }
+        Self {
+            poses: answer.poses.iter().map(Into::into).collect(),
+            state: Some(answer.state.into()),
+            next_since_revision: answer.next_since_revision,
+        }
+    }
+}
+
+impl From<TrajectoryAnswer> for pb::StreamTrajectoryResponse {
+    fn from(piece: TrajectoryAnswer) -> Self {
+        Self { poses: piece.poses.iter().map(Into::into).collect(), state: Some(piece.state.into()) }
     }
 }
 
@@ -46,8 +81,18 @@ impl TryFrom<pb::GetTrajectoryResponse> for TrajectoryAnswer {
     fn try_from(answer: pb::GetTrajectoryResponse) -> Result<Self, ServiceError> {
         Ok(Self {
             poses: answer.poses.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            next_since_revision: answer.next_since_revision,
             state: required(answer.state, "state")?.try_into()?,
         })
+    }
+}
+
+impl TryFrom<pb::StreamTrajectoryResponse> for TrajectoryAnswer {
+    type Error = ServiceError;
+
+    fn try_from(piece: pb::StreamTrajectoryResponse) -> Result<Self, ServiceError> {
+        let pb::StreamTrajectoryResponse { poses, state } = piece;
+        pb::GetTrajectoryResponse { poses, state, next_since_revision: None }.try_into()
     }
 }
 
@@ -69,5 +114,22 @@ impl TryFrom<pb::TrajectoryPose> for TrajectoryPose {
             new_voxels: count_from(pose.new_voxels),
             digest: 0,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_for_a_page_comes_back() {
+        let robot = Some(RobotName::new("r").unwrap());
+        for query in
+            [TrajectoryQuery::default(), TrajectoryQuery { robot, since_revision: u64::MAX, limit: Some(7) }]
+        {
+            let map = MapName::new("a").unwrap();
+            let request = pb::GetTrajectoryRequest::from((&map, query.clone()));
+            assert_eq!(<(MapName, TrajectoryQuery)>::try_from(request).unwrap(), (map, query));
+        }
     }
 }

@@ -37,6 +37,9 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             pb::UndoScansRequest { map, target, ..Default::default() }.encode_to_vec()
         }
         Operation::GetTrajectory => pb::GetTrajectoryRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::StreamTrajectory => {
+            pb::StreamTrajectoryRequest { map, ..Default::default() }.encode_to_vec()
+        }
         Operation::CreateMap => {
             let settings = Some(pb::MapSettings { resolution_m: 0.1, levels: Some(2), filter: None });
             pb::CreateMapRequest { map, settings }.encode_to_vec()
@@ -85,6 +88,7 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::DeleteVoxels
         | Operation::UndoScans
         | Operation::GetTrajectory
+        | Operation::StreamTrajectory
         | Operation::CreateMap
         | Operation::GetMap
         | Operation::DeleteMap

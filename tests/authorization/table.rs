@@ -21,6 +21,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::AlignScan
         | Operation::Localize
         | Operation::GetTrajectory
+        | Operation::StreamTrajectory
         | Operation::GetMap
         | Operation::ListMaps
         | Operation::SnapshotMap

@@ -171,12 +171,13 @@ fn around_trajectory(
     bulk: SearchBox,
     stop: StopSignal<'_>,
 ) -> Result<SearchBox, Unbuilt> {
-    let trajectory = map.trajectory();
+    let trajectory = map.trajectory().clone();
     let mut around = bulk;
-    for poses in trajectory.poses().chunks(POSES_PER_LOOK) {
-        check(stop)?;
-        around =
-            poses.iter().fold(around, |around, pose| around.holding(translation_m(&pose.map_from_sensor)));
+    for (i, pose) in trajectory.poses().enumerate() {
+        if i.is_multiple_of(POSES_PER_LOOK) {
+            check(stop)?;
+        }
+        around = around.holding(translation_m(&pose.map_from_sensor));
     }
     Ok(around)
 }

@@ -13,8 +13,11 @@ use super::{
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
-use crate::store::{Durability, MapFolder, Record, StoreError};
+use crate::store::{Durability, MapFolder, Record, StoreError, StoreSettings};
 use crate::util::SharedDurations;
+
+/// Revisions between two thinnings of the trajectory of a map in memory.
+const THINNED_EVERY: u64 = 4096;
 
 /// What a map's thread works with.
 pub(super) struct Worker {
@@ -24,8 +27,11 @@ pub(super) struct Worker {
     announced: watch::Sender<u64>,
     stopped: Arc<OnceLock<Stop>>,
     durations: Arc<SharedDurations>,
+    settings: StoreSettings,
     /// Since when something waits to be synced at an interval.
     unsynced: Option<Instant>,
+    /// When the trajectory of a map in memory was thinned last.
+    thinned: u64,
 }
 
 /// A change to be made, with its record and the one who waits.
@@ -46,8 +52,11 @@ impl Worker {
         announced: watch::Sender<u64>,
         stopped: Arc<OnceLock<Stop>>,
         durations: Arc<SharedDurations>,
+        settings: &StoreSettings,
     ) -> Self {
-        Self { name, map, folder, announced, stopped, durations, unsynced: None }
+        let thinned = map.revision();
+        let settings = settings.clone();
+        Self { name, map, folder, announced, stopped, durations, settings, unsynced: None, thinned }
     }
 
     /// Makes changes until nobody can send one any more.
@@ -141,6 +150,18 @@ impl Worker {
             drop(answer.send(Ok(committed)));
         }
         self.durations.record(begin.elapsed());
+        self.thin_in_memory();
+    }
+
+    /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo would
+    /// reach; that of others is thinned when undo reaches less far.
+    fn thin_in_memory(&mut self) {
+        let revision = self.map.revision();
+        if self.folder.is_none() && revision - self.thinned >= THINNED_EVERY {
+            let before = revision.saturating_sub(self.settings.undo_revisions);
+            self.map.committer().thin(before, &self.settings.trajectory_spacing);
+            self.thinned = revision;
+        }
     }
 
     /// Appends a group and, where that is asked for, syncs it.

@@ -7,6 +7,8 @@ pub(super) mod moments;
 mod scan;
 mod voxels;
 
+pub(super) use scan::with_forgotten;
+
 /// What is wrong with a message.
 pub(super) type Unreadable = String;
 

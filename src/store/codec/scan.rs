@@ -2,7 +2,7 @@
 
 use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
-use crate::map::{RobotName, ScanRecord, TrajectoryPose, WithdrawnScan};
+use crate::map::{ID_RANGES_PER_ROBOT_MAX, RobotName, ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
 use crate::store::pb;
 
 impl From<&TrajectoryPose> for pb::ScanPose {
@@ -79,4 +79,43 @@ impl From<pb::WithdrawnScan> for WithdrawnScan {
     fn from(pb::WithdrawnScan { scan, revision }: pb::WithdrawnScan) -> Self {
         Self { scan, revision }
     }
+}
+
+impl From<(&RobotName, &[(u64, u64)])> for pb::ForgottenScans {
+    fn from((robot, ranges): (&RobotName, &[(u64, u64)])) -> Self {
+        let mut end = 0;
+        let gaps = ranges.iter().flat_map(|&(first, last)| {
+            let gap = first - std::mem::replace(&mut end, last);
+            [gap, last - first]
+        });
+        Self { robot: robot.as_str().to_owned(), id_gaps: gaps.collect() }
+    }
+}
+
+/// The trajectory where, besides, these scans are known whose poses are not kept.
+pub(in crate::store) fn with_forgotten(
+    mut trajectory: Trajectory,
+    forgotten: &[pb::ForgottenScans],
+) -> Result<Trajectory, Unreadable> {
+    for pb::ForgottenScans { robot, id_gaps } in forgotten {
+        let robot = RobotName::new(robot).map_err(|e| e.to_string())?;
+        let (ranges, rest) = id_gaps.as_chunks();
+        if !rest.is_empty() || ranges.len() > ID_RANGES_PER_ROBOT_MAX {
+            let most = 2 * ID_RANGES_PER_ROBOT_MAX;
+            let found = id_gaps.len();
+            return Err(format!(
+                "the forgotten ids of robot {robot} are {found} numbers: pairs, at most {most}"
+            ));
+        }
+        let mut end = 0u64;
+        let range = |&[gap, length]: &[u64; 2]| {
+            let first = end.checked_add(gap)?;
+            end = first.checked_add(length)?;
+            Some((first, end))
+        };
+        let ranges: Option<Vec<_>> = ranges.iter().map(range).collect();
+        let ranges = ranges.ok_or_else(|| format!("the forgotten ids of robot {robot} go beyond 2^64"))?;
+        trajectory = trajectory.with_forgotten(&robot, ranges);
+    }
+    Ok(trajectory)
 }

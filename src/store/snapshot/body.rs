@@ -8,7 +8,7 @@ use super::fields::{Fields, Value, count_bytes, count_varints};
 use super::limits::{MapFileError, MapFileLimits, Memory};
 use crate::bloom::FilterSettings;
 use crate::map::{AnsweredRequest, MapContents, MapSettings, REQUESTS_KEPT, Trajectory, TrajectoryPose};
-use crate::store::codec::{Unreadable, moments};
+use crate::store::codec::{Unreadable, moments, with_forgotten};
 use crate::store::pb;
 use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
 
@@ -27,12 +27,16 @@ mod number {
     pub(super) const WITHDRAWN: u64 = 11;
     pub(super) const REQUESTS: u64 = 12;
     pub(super) const MOMENTS: u64 = 13;
+    pub(super) const FORGOTTEN: u64 = 14;
 
     /// In `Voxels` and `Moments`.
     pub(super) const KEY_GAPS: u64 = 1;
     /// In `Moments`.
     pub(super) const NUMBERS: u64 = 2;
     pub(super) const FORMS: u64 = 3;
+
+    /// In `ForgottenScans`.
+    pub(super) const ID_GAPS: u64 = 2;
 }
 
 /// Bytes of one scan or request: a name, an overlap for each level and some numbers are a few hundred.
@@ -44,6 +48,10 @@ const NUMBER_BYTES: usize = 3 * size_of::<u64>();
 const SCAN_BYTES: usize = 3 * size_of::<TrajectoryPose>() + 12 * size_of::<f64>() + 240;
 /// Of a request, which is found by its id.
 const REQUEST_BYTES: usize = 2 * size_of::<AnsweredRequest>() + 160;
+/// Robots whose forgotten scans a file may list.
+const ROBOTS_MAX: usize = 1 << 20;
+/// Of a robot whose scans were forgotten, besides their ids: its name, and its place by name.
+const FORGOTTEN_BYTES: usize = 480;
 const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
 /// Of a voxel's moments: its key twice, the moments by themselves and with their key.
 const MOMENT_BYTES: usize =
@@ -65,6 +73,7 @@ pub(super) struct Body<'a> {
     scans: usize,
     withdrawn: usize,
     requests: usize,
+    forgotten: Vec<&'a [u8]>,
 }
 
 impl<'a> Body<'a> {
@@ -99,7 +108,11 @@ impl<'a> Body<'a> {
             (number::TRAJECTORY, Bytes(_)) => self.scans += 1,
             (number::WITHDRAWN, Bytes(_)) => self.withdrawn += 1,
             (number::REQUESTS, Bytes(_)) => self.requests += 1,
-            (known @ number::UUID..=number::MOMENTS, _) => {
+            (number::FORGOTTEN, Bytes(_)) if self.forgotten.len() == ROBOTS_MAX => {
+                return Err(format!("forgotten scans of more than {ROBOTS_MAX} robots"));
+            }
+            (number::FORGOTTEN, Bytes(robot)) => self.forgotten.push(robot),
+            (known @ number::UUID..=number::FORGOTTEN, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
             // Of a newer version, which says so where it matters.
@@ -127,7 +140,7 @@ impl<'a> Body<'a> {
             revision: self.revision,
             voxels,
             moments,
-            trajectory: Trajectory::new(self.scans()?, self.withdrawn()?),
+            trajectory: self.trajectory(memory)?,
             requests: self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?,
         };
         let contents = contents.checked().map_err(|e| e.to_string())?;
@@ -196,6 +209,22 @@ impl<'a> Body<'a> {
         let keys = if gaps == 0 && forms > 0 { beside() } else { gaps };
         memory.reserve((gaps + numbers) * NUMBER_BYTES + keys.max(forms) * MOMENT_BYTES)?;
         Ok(moments::read(&decoded(message, "moments")?, voxels)?)
+    }
+
+    fn trajectory<E>(
+        &self,
+        memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
+    ) -> Result<Trajectory, MapFileError<E>> {
+        let (scans, withdrawn) = (self.scans()?, self.withdrawn()?);
+        if !scans.is_sorted_by(|one, next| one.revision < next.revision) {
+            return Err("the revisions of its scans must ascend".to_owned().into());
+        }
+        let mut forgotten = Vec::with_capacity(self.forgotten.len());
+        for robot in &self.forgotten {
+            memory.reserve(count_varints(robot, number::ID_GAPS)? * NUMBER_BYTES + FORGOTTEN_BYTES)?;
+            forgotten.push(decoded::<pb::ForgottenScans>(robot, "forgotten scans")?);
+        }
+        Ok(with_forgotten(Trajectory::new(scans, withdrawn), &forgotten)?)
     }
 
     fn scans(&self) -> Result<Vec<TrajectoryPose>, Unreadable> {

@@ -17,6 +17,7 @@ const METHODS: [&str; 17] = [
     "Mapping/DeleteVoxels",
     "Mapping/UndoScans",
     "Mapping/GetTrajectory",
+    "Mapping/StreamTrajectory",
     "Maps/CreateMap",
     "Maps/GetMap",
     "Maps/ListMaps",

@@ -91,7 +91,7 @@ impl Hosted {
 
     /// Changes of the map; none where it is gone.
     pub(super) fn revision(&self) -> Option<u64> {
-        let state = self.runtime.block_on(self.service.maps().trajectory(&name(), None));
+        let state = self.runtime.block_on(self.service.maps().trajectory(&name(), Default::default()));
         state.ok().map(|answer| answer.state.revision)
     }
 

@@ -1,0 +1,90 @@
+//! A scan as it enters a map, and what is kept of it.
+
+use crate::geometry::{Point, Pose};
+use crate::map::RobotName;
+use crate::voxel::{Lattice, MomentSet, VoxelSet};
+
+/// A scan as it enters a map: everything that replaying the insertion needs, nothing that would have to be
+/// computed again in floating point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanRecord {
+    /// What is kept of it in the trajectory; its revision and new voxels are filled in by the commit.
+    pub pose: TrajectoryPose,
+    /// Every distinct finest voxel that the scan touches, known before or not.
+    pub voxels: VoxelSet,
+    /// What its points add to the moments of their voxels.
+    pub moments: MomentSet,
+}
+
+impl ScanRecord {
+    /// What a scan of `points` (sensor frame) taken at `pose` does to a map on `lattice`. Points without a voxel are
+    /// left out and counted in `pose.points_skipped`.
+    pub fn of_points(mut pose: TrajectoryPose, points: &[Point], lattice: &Lattice) -> Self {
+        let quantise = lattice.from_points(&pose.map_from_sensor);
+        let (voxels, out_of_range) = VoxelSet::of_points(points, &quantise);
+        pose.points_skipped += out_of_range;
+        Self { pose, voxels, moments: MomentSet::of_points(points, &quantise) }
+    }
+
+    /// The same of voxels whose points are not known: the refinement of alignments learns nothing from it.
+    pub fn of_voxels(pose: TrajectoryPose, voxels: VoxelSet) -> Self {
+        Self { pose, voxels, moments: MomentSet::default() }
+    }
+}
+
+/// One accepted scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrajectoryPose {
+    /// Who sent it.
+    pub robot: RobotName,
+    /// The robot's own number of the scan.
+    pub scan_id: Option<u64>,
+    /// When it was taken, nanoseconds since the Unix epoch.
+    pub timestamp_ns: Option<i64>,
+    /// Where it was taken.
+    pub map_from_sensor: Pose,
+    /// The revision that it made.
+    pub revision: u64,
+    /// Fraction of its points in occupied voxels before it was added, level by level, finest first.
+    pub level_overlaps: Vec<f64>,
+    /// Steps of its alignment.
+    pub iterations: u32,
+    /// Points that were not finite or out of range.
+    pub points_skipped: usize,
+    /// Finest voxels that it added.
+    pub new_voxels: usize,
+    /// Of the request, so that the same scan sent again is told from another under its id.
+    pub digest: u64,
+}
+
+impl TrajectoryPose {
+    /// A robot's scan at `map_from_sensor`, of which nothing else is known.
+    pub fn new(robot: RobotName, map_from_sensor: Pose) -> Self {
+        Self {
+            robot,
+            scan_id: None,
+            timestamp_ns: None,
+            map_from_sensor,
+            revision: 0,
+            level_overlaps: Vec::new(),
+            iterations: 0,
+            points_skipped: 0,
+            new_voxels: 0,
+            digest: 0,
+        }
+    }
+
+    /// Fraction of the points in occupied voxels of level 0, before the scan was added.
+    pub fn overlap(&self) -> f64 {
+        self.level_overlaps.first().copied().unwrap_or(0.0)
+    }
+}
+
+/// A scan that was taken out again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WithdrawnScan {
+    /// The revision that the scan had made.
+    pub scan: u64,
+    /// The revision that took it out.
+    pub revision: u64,
+}
