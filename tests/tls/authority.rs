@@ -73,6 +73,7 @@ impl Files {
             certificate: Some(self.path("certificate.pem")),
             key: Some(self.path("key.pem")),
             client_ca: client_ca.map(Path::to_owned),
+            ..TlsConfig::default()
         }
     }
 
