@@ -64,7 +64,7 @@ async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
 async fn begun(daemon: &Daemon, declared: usize, sent: usize) -> TcpStream {
     let mut connection = TcpStream::connect(daemon.http).await.expect("a connection");
     let head = format!(
-        "POST /v1/maps/a/occupancy HTTP/1.1\r\nhost: a\r\ncontent-type: application/octet-stream\r\n\
+        "POST /v1/maps/a/occupancy HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/octet-stream\r\n\
          content-length: {declared}\r\n\r\n"
     );
     connection.write_all(head.as_bytes()).await.expect("a head");
@@ -288,8 +288,8 @@ async fn who_does_not_begin_to_speak_is_disconnected() {
     // Its own settings may have been sent.
     said(daemon.grpc, b"PRI * HT").await;
     // Headers that do not end, and a connection that is kept open for nothing.
-    said(daemon.http, b"GET /livez HTTP/1.1\r\nhost: a\r\nx-slow: ").await;
-    let answer = said(daemon.http, b"GET /livez HTTP/1.1\r\nhost: a\r\n\r\n").await;
+    said(daemon.http, b"GET /livez HTTP/1.1\r\nhost: localhost\r\nx-slow: ").await;
+    let answer = said(daemon.http, b"GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n").await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     // A client reconnects where its connection was closed for idleness.
     let mut planner = daemon.occupancy().await;

@@ -112,7 +112,7 @@ async fn told_a_second_time_it_ends_at_once() {
     let address = server.http.strip_prefix("http://").unwrap();
     // A request in flight: its body is waited for, and never comes.
     let mut stuck = TcpStream::connect(address).await.unwrap();
-    let head = "PUT /v1/maps/a HTTP/1.1\r\nhost: mrol\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\
+    let head = "PUT /v1/maps/a HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\
                 expect: 100-continue\r\n\r\n";
     stuck.write_all(head.as_bytes()).await.unwrap();
     let mut answer = [0; 12];

@@ -208,7 +208,6 @@ mod tests {
         assert!(!ok("/", &[("host", "localhost"), ("host", "evil.example")], None));
         assert!(!ok("/", &[], None));
         assert!(ok("/", &[], Some(ReachedAt::UnixSocket)));
-        assert!(ok("http://%2Frun%2Fmrol.sock/", &[], Some(ReachedAt::UnixSocket)));
     }
 
     #[test]

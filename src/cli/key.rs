@@ -65,7 +65,7 @@ struct NewKey {
     #[arg(long, value_name = "MAPS", value_delimiter = ',', value_parser = parse::map_name)]
     maps: Option<Vec<MapName>>,
     /// The robots whose scans it sends and undoes, separated by commas [default: every robot]
-    #[arg(long, value_name = "ROBOTS", value_delimiter = ',', value_parser = robot)]
+    #[arg(long, value_name = "ROBOTS", value_delimiter = ',', value_parser = parse::robot_name)]
     robots: Option<Vec<RobotName>>,
     /// Until when it counts: 2027-01-31 or 2027-01-31T12:00:00Z [default: for ever]
     #[arg(long, value_name = "TIME", value_parser = expiry)]
@@ -177,10 +177,6 @@ impl From<ScopeName> for Scope {
 
 fn name(text: &str) -> Result<KeyName, String> {
     KeyName::new(text).ok_or_else(|| format!("a name is 1 to 64 of [A-Za-z0-9_.-], got {text:?}"))
-}
-
-fn robot(text: &str) -> Result<RobotName, String> {
-    RobotName::new(text).map_err(|error| error.to_string())
 }
 
 fn expiry(text: &str) -> Result<Expiry, String> {

@@ -76,7 +76,10 @@ mod tests {
             Around { gate, admission: Admission::new(&AdmissionLimits::default(), Lifecycle::default()) };
         let stray = Router::new().route("/stray", get(async || "open to all"));
         let stray = stray.layer(from_fn_with_state(around, around::request));
-        let answer = stray.oneshot(Request::get("/stray").body(Body::empty()).unwrap()).await.unwrap();
+        let answer = stray
+            .oneshot(Request::get("/stray").header("host", "localhost").body(Body::empty()).unwrap())
+            .await
+            .unwrap();
         assert_eq!(answer.status(), StatusCode::INTERNAL_SERVER_ERROR);
         let said = to_bytes(answer.into_body(), 1000).await.unwrap();
         assert!(String::from_utf8_lossy(&said).contains("no_rule"), "{said:?}");

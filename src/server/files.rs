@@ -152,7 +152,7 @@ impl ReloadedFiles {
     fn tell_of_keys(&self) {
         for (key, expires) in self.access.expiring(SystemTime::now(), self.warnings.keys) {
             if self.reminders.is_due(format!("key {key} {expires}"), Instant::now()) {
-                tracing::warn!(%key, %expires, "a key expires: `mrol key rotate --expires` prolongs it");
+                tracing::warn!(%key, %expires, "a key expires: a later `expires` in its table prolongs it");
             }
         }
     }

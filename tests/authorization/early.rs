@@ -15,7 +15,7 @@ async fn answer_without_body(server: &Guarded, path: &str, key: Option<&Secret>)
     let authorization =
         key.map(|key| format!("authorization: Bearer {}\r\n", key.reveal())).unwrap_or_default();
     let head = format!(
-        "POST {path} HTTP/1.1\r\nhost: mrol\r\n{authorization}content-type: application/json\r\n\
+        "POST {path} HTTP/1.1\r\nhost: localhost\r\n{authorization}content-type: application/json\r\n\
          content-length: 1000000\r\n\r\n"
     );
     let mut connection = TcpStream::connect(server.daemon.http).await.unwrap();

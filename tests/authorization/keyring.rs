@@ -29,6 +29,14 @@ impl Keyring {
     pub(crate) fn add(&self, name: &str, scope: Scope, maps: Option<&[&str]>) -> Secret {
         add(&self.file(), name, scope, maps)
     }
+
+    /// Gives a key more lines of its table.
+    pub(crate) fn set(&self, name: &str, lines: &str) {
+        let text = std::fs::read_to_string(self.file()).unwrap();
+        let line = format!("name = \"{name}\"\n");
+        assert!(text.contains(&line));
+        std::fs::write(self.file(), text.replace(&line, &format!("{line}{lines}\n"))).unwrap();
+    }
 }
 
 /// Adds a key to a file; its secret.

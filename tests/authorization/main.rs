@@ -4,15 +4,18 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod asking;
+mod browsers;
 #[path = "../common/mod.rs"]
 mod common;
 mod disclosure;
 mod early;
 mod keyring;
+mod lifetimes;
 mod listening;
 mod paths;
 #[path = "../process/mod.rs"]
 mod process;
 mod reloading;
 mod requests;
+mod robots;
 mod table;

@@ -69,7 +69,7 @@ fn escaped(name: &str) -> String {
 /// The status of a request whose path is sent as it is: clients of HTTP tidy paths up.
 async fn status(server: SocketAddr, method: &str, path: &str, body: &str) -> u16 {
     let request = format!(
-        "{method} {path} HTTP/1.1\r\nhost: mrol\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\
+        "{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\
          connection: close\r\n\r\n{body}",
         body.len()
     );

@@ -33,7 +33,8 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             pb::DeleteVoxelsRequest { map, target, ..Default::default() }.encode_to_vec()
         }
         Operation::UndoScans => {
-            let target = Some(pb::undo_scans_request::Target::Revision(1));
+            let scan = pb::RobotScan { robot: "r".into(), scan_id: 1 };
+            let target = Some(pb::undo_scans_request::Target::Scan(scan));
             pb::UndoScansRequest { map, target, ..Default::default() }.encode_to_vec()
         }
         Operation::GetTrajectory => pb::GetTrajectoryRequest { map, ..Default::default() }.encode_to_vec(),
@@ -69,7 +70,7 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         Operation::InsertScan | Operation::AlignScan => {
             Some(json!({"robot": "r", "points": POINTS, "guess": identity_json(), "align": false}))
         }
-        Operation::UndoScans => Some(json!({"revision": 1})),
+        Operation::UndoScans => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::CreateMap => Some(json!({"resolution_m": 0.1, "levels": 2})),
         _ => None,
     }

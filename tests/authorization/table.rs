@@ -27,10 +27,8 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::SnapshotMap
         | Operation::Reflect
         | Operation::Metrics => Some(Scope::Read),
-        Operation::InsertScan
-        | Operation::InsertScanStream
-        | Operation::DeleteVoxels
-        | Operation::UndoScans => Some(Scope::Write),
+        Operation::InsertScan | Operation::InsertScanStream | Operation::UndoScans => Some(Scope::Insert),
+        Operation::DeleteVoxels => Some(Scope::Write),
         Operation::CreateMap | Operation::DeleteMap | Operation::RestoreMap => Some(Scope::Admin),
     }
 }

@@ -48,7 +48,7 @@ fn answer_time(server: SocketAddr) -> Duration {
     let start = Instant::now();
     let mut connection = TcpStream::connect_timeout(&server, 2 * PATIENCE).expect("a connection for /livez");
     connection.set_read_timeout(Some(2 * PATIENCE)).unwrap();
-    connection.write_all(b"GET /livez HTTP/1.1\r\nhost: mrol\r\nconnection: close\r\n\r\n").unwrap();
+    connection.write_all(b"GET /livez HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n").unwrap();
     let mut answer = String::new();
     connection.read_to_string(&mut answer).expect("an answer of /livez");
     assert!(answer.starts_with("HTTP/1.1 200"), "/livez: {answer:?}");

@@ -21,7 +21,7 @@ async fn bodies_of_32_mib_over_http_that_never_come() {
     for client in 0..CONNECTIONS {
         let mut connection = Connection::open_raw(siege.http()).await;
         let head = format!(
-            "POST /v1/maps/hall/occupancy HTTP/1.1\r\nhost: mrol\r\ncontent-type: application/octet-stream\r\n\
+            "POST /v1/maps/hall/occupancy HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/octet-stream\r\n\
              content-length: {MESSAGE_BYTES_MAX}\r\n\r\n"
         );
         assert!(connection.send(&[head.as_bytes(), sent(client)].concat()).await);
@@ -57,7 +57,7 @@ async fn bodies_that_are_abandoned_as_soon_as_they_are_declared() {
     for _ in 0..10 * CONNECTIONS {
         let mut connection = TcpStream::connect(siege.http()).await.unwrap();
         let head = format!(
-            "PUT /v1/maps/hall/snapshot HTTP/1.1\r\nhost: mrol\r\ncontent-type: application/octet-stream\r\n\
+            "PUT /v1/maps/hall/snapshot HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/octet-stream\r\n\
              content-length: {MESSAGE_BYTES_MAX}\r\n\r\n"
         );
         connection.write_all(head.as_bytes()).await.unwrap();

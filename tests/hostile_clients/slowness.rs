@@ -31,7 +31,8 @@ async fn dribble(server: SocketAddr, first: Vec<u8>, then: Vec<u8>) -> Vec<Vec<u
 #[tokio::test]
 async fn headers_over_http_that_do_not_end() {
     let siege = Siege::begin("headers dribbled over HTTP/1").await;
-    dribble(siege.http(), b"GET /v1/maps HTTP/1.1\r\nhost: mrol\r\nx-slow: ".to_vec(), b"a".to_vec()).await;
+    dribble(siege.http(), b"GET /v1/maps HTTP/1.1\r\nhost: localhost\r\nx-slow: ".to_vec(), b"a".to_vec())
+        .await;
     siege.end().await;
 }
 
@@ -47,7 +48,7 @@ async fn headers_over_grpc_that_do_not_end() {
 async fn bodies_over_http_that_do_not_end() {
     let siege = Siege::begin("bodies dribbled over HTTP").await;
     let head = format!(
-        "POST /v1/maps/hall/occupancy HTTP/1.1\r\nhost: mrol\r\ncontent-type: application/octet-stream\r\n\
+        "POST /v1/maps/hall/occupancy HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/octet-stream\r\n\
          content-length: {MESSAGE_BYTES_MAX}\r\n\r\n"
     );
     for answer in dribble(siege.http(), head.into_bytes(), vec![0]).await {

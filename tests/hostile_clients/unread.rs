@@ -22,7 +22,7 @@ async fn send_without_reading(connection: &mut TcpStream, bytes: &[u8]) {
 #[tokio::test]
 async fn answers_over_http_that_nobody_reads() {
     let siege = Siege::begin("answers unread over HTTP").await;
-    let requests = "GET /v1/maps/hall/voxels HTTP/1.1\r\nhost: mrol\r\n\r\n".repeat(1000);
+    let requests = "GET /v1/maps/hall/voxels HTTP/1.1\r\nhost: localhost\r\n\r\n".repeat(1000);
     let mut unread = Vec::new();
     for _ in 0..CONNECTIONS {
         let mut connection = TcpStream::connect(siege.http()).await.unwrap();

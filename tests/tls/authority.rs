@@ -7,6 +7,7 @@ use mrol::client::{Client, ClientError, Credentials};
 use mrol::config::TlsConfig;
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use tempfile::TempDir;
+use time::OffsetDateTime;
 
 use crate::common::Daemon;
 
@@ -33,8 +34,19 @@ impl Authority {
     /// A certificate of a server at localhost, or of a client.
     pub(crate) fn sign(&self) -> Signed {
         let key = KeyPair::generate().unwrap();
-        let params = CertificateParams::new(vec!["localhost".into(), "127.0.0.1".into()]).unwrap();
-        Signed { certificate: params.signed_by(&key, &self.0).unwrap().pem(), key: key.serialize_pem() }
+        self.signed(&key, CertificateParams::new(vec!["localhost".into(), "127.0.0.1".into()]).unwrap())
+    }
+
+    /// The same, which counts until `end`.
+    pub(crate) fn sign_until(&self, end: OffsetDateTime) -> Signed {
+        let key = KeyPair::generate().unwrap();
+        let mut params = CertificateParams::new(vec!["localhost".into(), "127.0.0.1".into()]).unwrap();
+        params.not_after = end;
+        self.signed(&key, params)
+    }
+
+    fn signed(&self, key: &KeyPair, params: CertificateParams) -> Signed {
+        Signed { certificate: params.signed_by(key, &self.0).unwrap().pem(), key: key.serialize_pem() }
     }
 
     /// What a client shows who trusts this authority.
@@ -73,6 +85,7 @@ impl Files {
             certificate: Some(self.path("certificate.pem")),
             key: Some(self.path("key.pem")),
             client_ca: client_ca.map(Path::to_owned),
+            ..TlsConfig::default()
         }
     }
 

@@ -7,6 +7,7 @@ mod authority;
 mod command_line;
 #[path = "../common/mod.rs"]
 mod common;
+mod expiry;
 mod handshake;
 #[path = "../process/mod.rs"]
 mod process;

@@ -72,7 +72,7 @@ async fn a_broken_certificate_leaves_the_one_that_was() {
     }
 }
 
-async fn metrics_over_tls(daemon: &Daemon, authority: &Authority) -> String {
+pub(crate) async fn metrics_over_tls(daemon: &Daemon, authority: &Authority) -> String {
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
     let mut connection = crate::handshake::connected(authority, daemon.http.port(), &[b"http/1.1"]).await;
     connection

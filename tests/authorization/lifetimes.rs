@@ -1,0 +1,171 @@
+//! Keys end, are rotated and revoked; what was begun with them ends as well.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Command;
+use std::time::{Duration, Instant, SystemTime};
+
+use mrol::access::{Expiry, Scope, Secret};
+use mrol::wire::pb;
+use reqwest::{Method, StatusCode};
+use serde_json::Value;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Request};
+
+use crate::common::{PATIENCE, query_pb};
+use crate::keyring::{Guarded, Keyring};
+
+fn key(arguments: &[&str], file: &std::path::Path) -> (bool, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    let output = command.arg("key").args(arguments).arg("--file").arg(file).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap().trim().to_owned();
+    (output.status.success(), text(output.stdout), text(output.stderr))
+}
+
+async fn until(server: &Guarded, key: &Secret, status: StatusCode) -> Value {
+    let start = Instant::now();
+    loop {
+        let answer = server.http(Method::GET, "/v1/maps", Some(key), None).await;
+        if answer.status() == status {
+            return answer.json().await.unwrap();
+        }
+        assert!(start.elapsed() < PATIENCE, "it is never answered with {status}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+fn with_key<T>(message: T, key: &Secret) -> Request<T> {
+    let mut request = Request::new(message);
+    request.metadata_mut().insert("authorization", format!("Bearer {}", key.reveal()).parse().unwrap());
+    request
+}
+
+#[test]
+fn keys_that_are_made_at_once_are_all_in_the_file() {
+    let keyring = Keyring::empty();
+    let making: Vec<_> = (0..12)
+        .map(|i| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+            command.args(["key", "new", "--scope", "read", "--name", &format!("k{i}"), "--file"]);
+            command.arg(keyring.file()).stdout(std::process::Stdio::null()).spawn().unwrap()
+        })
+        .collect();
+    let made =
+        making.into_iter().filter_map(|mut child| child.wait().unwrap().success().then_some(())).count();
+    let (_, listed, _) = key(&["list"], &keyring.file());
+    let names: BTreeSet<_> = listed.lines().map(|line| line.split(':').next().unwrap()).collect();
+    assert_eq!((made, names.len()), (12, 12), "{listed}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_is_refused_from_its_end_on_and_its_stream_ends() {
+    let (server, [past, near]) = Guarded::start_with(|keys| {
+        let past = keys.add("past", Scope::Read, None);
+        keys.set("past", "expires = 2020-01-31");
+        let near = keys.add("near", Scope::Read, None);
+        let end = Expiry::after(SystemTime::now(), Duration::from_secs(4)).unwrap();
+        keys.set("near", &format!("expires = {end}"));
+        [past, near]
+    })
+    .await;
+    server.make_map("own").await;
+    let (send, requests) = tokio::sync::mpsc::channel(1);
+    send.send(query_pb("own", &[[1.0, 2.0, 3.0]])).await.unwrap();
+    let stream = with_key(ReceiverStream::new(requests), &near);
+    let mut answers = server.daemon.occupancy().await.query_points_stream(stream).await.unwrap().into_inner();
+    assert!(answers.message().await.unwrap().is_some());
+
+    let refused = until(&server, &past, StatusCode::UNAUTHORIZED).await;
+    assert_eq!(refused["error"]["reason"], "key_expired");
+    assert!(refused["error"]["message"].as_str().unwrap().contains("2020-01-31T00:00:00Z"));
+    let ended = tokio::time::timeout(PATIENCE, answers.message()).await.unwrap().unwrap_err();
+    assert_eq!(ended.code(), Code::Unauthenticated);
+    assert_eq!(ended.metadata().get("mrol-reason").unwrap(), "key_expired");
+    assert_eq!(until(&server, &near, StatusCode::UNAUTHORIZED).await["error"]["reason"], "key_expired");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn during_a_rotation_both_secrets_count_and_a_revoked_key_none() {
+    let (server, first) = Guarded::start_with(|keys| keys.add("robot", Scope::Read, None)).await;
+    let file = server.keyring.file();
+    fs::write(&file, format!("# ours\n{}", fs::read_to_string(&file).unwrap())).unwrap();
+    let (ok, second, said) = key(&["rotate", "--name", "robot"], &file);
+    assert!(ok, "{said}");
+    let second = Secret::new(second);
+    until(&server, &second, StatusCode::OK).await;
+    until(&server, &first, StatusCode::OK).await;
+    let (ok, _, said) = key(&["rotate", "--name", "robot"], &file);
+    assert!(!ok && said.contains("is being rotated") && said.contains("--end-former"), "{said}");
+    let (_, listed, _) = key(&["list"], &file);
+    assert!(listed.contains("robot: read, every map, every robot, former secret until 20"), "{listed}");
+
+    let (ok, third, said) = key(&["rotate", "--name", "robot", "--end-former"], &file);
+    assert!(ok, "{said}");
+    let third = Secret::new(third);
+    until(&server, &third, StatusCode::OK).await;
+    for former in [&first, &second] {
+        assert_eq!(until(&server, former, StatusCode::UNAUTHORIZED).await["error"]["reason"], "key_unknown");
+    }
+    assert!(key(&["revoke", "--name", "robot"], &file).0);
+    until(&server, &third, StatusCode::UNAUTHORIZED).await;
+    let (ok, _, said) = key(&["revoke", "--name", "robot"], &file);
+    assert!(!ok && said.contains("there is no key robot"), "{said}");
+    assert!(!key(&["revoke", "--name", "master"], &file).0, "the last one stays");
+    assert!(fs::read_to_string(&file).unwrap().starts_with("# ours\n"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_call_that_waits_ends_with_its_key_in_both_protocols() {
+    let (server, key) = Guarded::start_with(|keys| keys.add("waiting", Scope::Read, None)).await;
+    server.make_map("own").await;
+    let wait = pb::QueryPointsRequest { min_revision: Some(1000), ..query_pb("own", &[[1.0, 2.0, 3.0]]) };
+    let mut planner = server.daemon.occupancy().await;
+    let wait = with_key(wait, &key);
+    let call = tokio::spawn(async move { planner.query_points(wait).await });
+    tokio::task::yield_now().await;
+    let path = "/v1/maps/own/occupancy";
+    let body = serde_json::json!({"points": [[1, 2, 3]], "min_revision": 1000});
+    let url = server.daemon.url(path);
+    let request = crate::common::client().post(url).bearer_auth(key.reveal()).json(&body);
+    let request = tokio::spawn(async move { request.send().await.unwrap().text().await.unwrap() });
+    // Both are waiting when the metrics say that they are in work.
+    let start = Instant::now();
+    loop {
+        let metrics =
+            server.http(Method::GET, "/metrics", Some(&server.master), None).await.text().await.unwrap();
+        if metrics.contains("mrol_requests_in_flight{state=\"in_work\"} 2") {
+            break;
+        }
+        assert!(start.elapsed() < PATIENCE, "they never begin:\n{metrics}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert!(crate::lifetimes::key(&["revoke", "--name", "waiting"], &server.keyring.file()).0);
+    let ended = tokio::time::timeout(PATIENCE, call).await.unwrap().unwrap().unwrap_err();
+    assert_eq!(
+        (ended.code(), ended.metadata().get("mrol-reason").unwrap().to_str().unwrap()),
+        (Code::Unauthenticated, "key_withdrawn")
+    );
+    let said = tokio::time::timeout(PATIENCE, request).await.unwrap().unwrap();
+    assert!(said.contains("key_withdrawn"), "{said}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_has_bounds_of_its_own() {
+    let (server, slow) = Guarded::start_with(|keys| {
+        let slow = keys.add("slow", Scope::Read, None);
+        keys.set("slow", "requests_per_s_max = 1\nburst_max = 2");
+        slow
+    })
+    .await;
+    let mut statuses = Vec::new();
+    for _ in 0..3 {
+        statuses.push(server.http(Method::GET, "/v1/maps", Some(&slow), None).await.status().as_u16());
+    }
+    assert!(statuses.contains(&429) && statuses[0] == 200, "{statuses:?}");
+    for _ in 0..10 {
+        assert_eq!(
+            server.http(Method::GET, "/v1/maps", Some(&server.master), None).await.status(),
+            StatusCode::OK
+        );
+    }
+}
