@@ -4,16 +4,19 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use metrics::{
-    SharedString, counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram,
-    with_local_recorder,
-};
+use metrics::{SharedString, counter, gauge, histogram, with_local_recorder};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
 use parking_lot::Mutex;
 
-use super::exposition;
+use super::families::{
+    BODY_BYTES, BUILD_INFO, CONNECTIONS_ACCEPTED, CONNECTIONS_OPEN, CONNECTIONS_REFUSED, DISK_FREE_BYTES,
+    FILE_RELOAD_OK, KEY_REQUESTS, MEMORY_RESIDENT_BYTES, POINTS_QUERIED, REQUEST_SECONDS, REQUESTS,
+    REQUESTS_DENIED, REQUESTS_IN_FLIGHT, ROBOT_SCANS, SCANS, SCANS_UNDONE, STREAMS_OPEN, VOXELS_REMOVED,
+    WRITES_REFUSED,
+};
 use super::log::TelemetryError;
+use super::{exposition, families};
 use crate::admission::InUse;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName, RobotName};
@@ -34,27 +37,6 @@ const COMMIT: &str = match option_env!("MROL_COMMIT") {
     Some(commit) if !commit.is_empty() => commit,
     _ => "unknown",
 };
-
-const BUILD_INFO: &str = "mrol_build_info";
-const REQUESTS: &str = "mrol_requests_total";
-const REQUEST_SECONDS: &str = "mrol_request_seconds";
-const KEY_REQUESTS: &str = "mrol_key_requests_total";
-const REQUESTS_DENIED: &str = "mrol_requests_denied_total";
-const CONNECTIONS_ACCEPTED: &str = "mrol_connections_accepted_total";
-const CONNECTIONS_REFUSED: &str = "mrol_connections_refused_total";
-const CONNECTIONS_OPEN: &str = "mrol_connections_open";
-const FILE_RELOAD_OK: &str = "mrol_file_reload_ok";
-const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
-const STREAMS_OPEN: &str = "mrol_streams_open";
-const BODY_BYTES: &str = "mrol_body_bytes";
-const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
-const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
-const WRITES_REFUSED: &str = "mrol_writes_refused";
-const POINTS_QUERIED: &str = "mrol_points_queried_total";
-const SCANS: &str = "mrol_scans_total";
-const ROBOT_SCANS: &str = "mrol_robot_scans_total";
-const SCANS_UNDONE: &str = "mrol_scans_undone_total";
-const VOXELS_REMOVED: &str = "mrol_voxels_removed_total";
 
 /// The metrics of one server. A clone is another handle on the same ones.
 ///
@@ -84,7 +66,7 @@ impl Metrics {
         let builder = PrometheusBuilder::new().set_buckets_for_metric(latency, &SECONDS_BUCKETS)?;
         let kept = Kept { recorder: builder.build_recorder(), robots: Mutex::default() };
         let metrics = Self(Arc::new(kept));
-        metrics.record(describe);
+        metrics.record(families::describe);
         metrics.record(|| {
             gauge!(BUILD_INFO, "version" => env!("CARGO_PKG_VERSION"), "commit" => COMMIT, "features" => features())
                 .set(1.0);
@@ -245,41 +227,6 @@ fn features() -> String {
     let features = [("client", cfg!(feature = "client")), ("server", cfg!(feature = "server"))];
     let compiled = features.into_iter().filter(|(_, compiled)| *compiled).map(|(name, _)| name);
     compiled.collect::<Vec<_>>().join(",")
-}
-
-fn describe() {
-    describe_gauge!(BUILD_INFO, "1, with the version, the commit and the features that were built");
-    describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
-    describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
-    describe_counter!(KEY_REQUESTS, "Calls and requests let in, by protocol and name of their key");
-    describe_counter!(
-        REQUESTS_DENIED,
-        "Calls and requests of callers who may not ask for them, by protocol and reason"
-    );
-    describe_counter!(CONNECTIONS_ACCEPTED, "Connections accepted, by listener");
-    describe_counter!(CONNECTIONS_REFUSED, "Connections closed at once for want of a place, by listener");
-    describe_gauge!(CONNECTIONS_OPEN, "Connections that are open, by listener");
-    describe_gauge!(
-        FILE_RELOAD_OK,
-        "0 where a file changed into what cannot be used, and what it held before goes on"
-    );
-    describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
-    describe_gauge!(STREAMS_OPEN, "Calls whose client streams messages");
-    describe_gauge!(
-        BODY_BYTES,
-        "Bytes of bodies that have arrived, and of listings and map files on their way out"
-    );
-    describe_gauge!(DISK_FREE_BYTES, "Bytes free on the disk of the data folder");
-    describe_gauge!(MEMORY_RESIDENT_BYTES, "Bytes that the process has in memory");
-    describe_gauge!(WRITES_REFUSED, "1 while changes are refused, by reason");
-    describe_counter!(POINTS_QUERIED, "Points answered, by map and look-up");
-    describe_counter!(SCANS, "Scans judged for insertion, by map and verdict");
-    describe_counter!(
-        ROBOT_SCANS,
-        "Scans judged for insertion, by robot (those after the first hundred as other) and verdict"
-    );
-    describe_counter!(SCANS_UNDONE, "Scans taken out again, by map");
-    describe_counter!(VOXELS_REMOVED, "Finest voxels removed by deletions and undos, by map");
 }
 
 #[cfg(test)]
