@@ -57,6 +57,9 @@ use watch::{measure, watch};
 /// How long connections have to close once their requests are done: what is left then is idle or half open.
 const CLOSING_MAX: Duration = Duration::from_secs(1);
 
+/// The least time for saving the maps at the end: also who waits for no request wants them saved.
+const SAVING_MIN: Duration = Duration::from_secs(5);
+
 /// How long the end of the process may take once everything has been waited for.
 const ENDING_MAX: Duration = Duration::from_secs(5);
 
@@ -158,13 +161,14 @@ impl Server {
     /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what
     /// is in flight, its connections, saving, and a while for what comes after.
     pub fn down_within(&self) -> Duration {
-        let Config { drain_delay_s, drain_seconds, .. } = self.config;
-        let waited = drain_delay_s.saturating_add(drain_seconds.saturating_mul(2));
-        Duration::from_secs(waited).saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
+        let config = &self.config;
+        let waited = config.drain_delay().saturating_add(config.drain()).saturating_add(saving_max(config));
+        waited.saturating_add(CLOSING_MAX).saturating_add(ENDING_MAX)
     }
 
     /// Serves until `shutdown`, then goes down: says for `drain_delay_s` that it is not ready, refuses what is new, waits
-    /// `drain_seconds` at most for what is in flight, and as long at most for the maps to be saved.
+    /// `drain_seconds` at most for what is in flight, and as long at most, or five seconds, for the maps to be
+    /// saved.
     ///
     /// Idle and half-open connections do not keep it from going down: after their requests connections have
     /// a second to close. HTTP takes connections while requests are in flight, so that `/readyz` tells.
@@ -235,10 +239,9 @@ impl Server {
             let _ended = tokio::join!(housekeeping, watching);
             service.maps().save().await
         };
-        let saved = timeout(config.drain(), saving).await;
-        let maps = saved
-            .map_err(|_| ServerError::SavingTooLong(config.drain_seconds))?
-            .map_err(ServerError::Save)?;
+        let most = saving_max(&config);
+        let saved = timeout(most, saving).await;
+        let maps = saved.map_err(|_| ServerError::SavingTooLong(most))?.map_err(ServerError::Save)?;
         tracing::info!(maps, "saved, ending");
         ended
     }
@@ -267,6 +270,11 @@ impl Drop for CancelOpening {
     fn drop(&mut self) {
         self.0.cancel();
     }
+}
+
+/// How long saving the maps may take when the server goes down.
+fn saving_max(config: &Config) -> Duration {
+    config.drain().max(SAVING_MIN)
 }
 
 fn stopped_by_itself(end: Result<(), JoinError>) -> ServerError {

@@ -429,7 +429,7 @@ async fn a_hangup_with_nothing_to_read_again_ends_nothing() {
 }
 #[tokio::test(flavor = "multi_thread")]
 async fn before_it_drains_it_says_that_it_is_not_ready_and_serves_on() {
-    let daemon = Daemon::start_with(|config| config.drain_delay_s = 3).await;
+    let daemon = Daemon::start_with(|config| config.drain_delay_s = 6).await;
     daemon.make_map("a").await;
     let mut health = HealthClient::new(daemon.channel().await);
     let (grpc, url) = (daemon.grpc, daemon.url(""));

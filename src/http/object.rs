@@ -4,7 +4,7 @@ use std::fmt::{Formatter, Result as FmtResult};
 use std::marker::PhantomData;
 
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error, MapAccess, SeqAccess, Visitor};
+use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 /// A value that is written as an object with named fields, and in no other way.
@@ -26,15 +26,11 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for ObjectVisitor<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut Formatter<'_>) -> FmtResult {
-        f.write_str("an object")
+        f.write_str("an object with named fields")
     }
 
     fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<T, A::Error> {
         T::deserialize(MapAccessDeserializer::new(fields))
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, _: A) -> Result<T, A::Error> {
-        Err(A::Error::custom("must be an object with named fields, got an array"))
     }
 }
 
@@ -53,7 +49,9 @@ mod tests {
     fn an_object_is_read_by_its_names_and_an_array_is_none() {
         let Object(Pair { a, b }) = serde_json::from_str(r#"{"b": 2, "a": 1}"#).unwrap();
         assert_eq!((a, b), (1, Some(2)));
-        for (bad, word) in [("[1, 2]", "array"), ("7", "an object"), (r#"{"a": 1, "c": 2}"#, "`c`")] {
+        for (bad, word) in
+            [("[1, 2]", "an object with named fields"), ("7", "an object"), (r#"{"a": 1, "c": 2}"#, "`c`")]
+        {
             let error = serde_json::from_str::<Object<Pair>>(bad).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         }

@@ -38,12 +38,14 @@ const PARAMETERS: [(&str, &str); 6] = [
 /// place, which is not kept while a body is read that may be as large as its limit.
 pub(super) fn body<T: DeserializeOwned>(body: &[u8], error: &serde_json::Error) -> String {
     let mut json = serde_json::Deserializer::from_slice(body);
-    match serde_path_to_error::deserialize::<_, Object<T>>(&mut json) {
-        Err(placed) if placed.path().iter().next().is_some() => {
-            format!("body: {}: {}", placed.path(), in_plain_words(&placed.inner().to_string()))
-        }
-        _ => format!("body: {}", in_plain_words(&error.to_string())),
-    }
+    let Err(placed) = serde_path_to_error::deserialize::<_, Object<T>>(&mut json) else {
+        return format!("body: {}", in_plain_words(&error.to_string()));
+    };
+    let path = placed.path().to_string();
+    // Where it ends before a name is read, the place is a question mark; that of the whole is a dot.
+    let path = path.trim_end_matches(['.', '?']);
+    let separator = if path.is_empty() { "" } else { ": " };
+    format!("body: {path}{separator}{}", in_plain_words(&placed.inner().to_string()))
 }
 
 /// Why the parameters of an address cannot be read; `error` begins with the name of the parameter.

@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use super::TlsError;
 use crate::access::KeyFileError;
@@ -64,10 +65,10 @@ pub enum ServerError {
     Stopped(&'static str, String),
     /// A disk that hangs kept the maps from being written at the end.
     #[error(
-        "saving the maps took longer than drain_seconds ({0} s): a disk hangs or is slow. Nothing acknowledged is lost, \
-         the journals have it; the next start takes longer"
+        "saving the maps took longer than {0:?} (drain_seconds, at least 5 s): a disk hangs or is slow. Nothing \
+         acknowledged is lost, the journals have it; the next start takes longer"
     )]
-    SavingTooLong(u64),
+    SavingTooLong(Duration),
     /// The maps could not be written at the end.
     #[error("the maps cannot be saved: {0}")]
     Save(ServiceError),

@@ -4,17 +4,19 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use metrics::{
-    SharedString, counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram,
-    with_local_recorder,
-};
+use metrics::{SharedString, counter, gauge, histogram, with_local_recorder};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
 use parking_lot::Mutex;
 
-use super::exposition;
+use super::families::{
+    BODY_BYTES, BUILD_INFO, CERTIFICATE_EXPIRES, CONNECTIONS_ACCEPTED, CONNECTIONS_OPEN, CONNECTIONS_REFUSED,
+    DISK_FREE_BYTES, FILE_RELOAD_OK, HANDSHAKES_FAILED, KEY_REQUESTS, MEMORY_RESIDENT_BYTES, REQUEST_SECONDS,
+    REQUESTS, REQUESTS_DENIED, REQUESTS_IN_FLIGHT, ROBOT_SCANS, STREAMS_OPEN, WRITES_REFUSED,
+};
 use super::log::TelemetryError;
 use super::map_counters::{Family, MapCounters};
+use super::{exposition, families};
 use crate::admission::InUse;
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName, RobotName};
@@ -41,25 +43,6 @@ const COMMIT: &str = match option_env!("MROL_COMMIT") {
     Some(commit) if !commit.is_empty() => commit,
     _ => "unknown",
 };
-
-const BUILD_INFO: &str = "mrol_build_info";
-const REQUESTS: &str = "mrol_requests_total";
-const REQUEST_SECONDS: &str = "mrol_request_seconds";
-const KEY_REQUESTS: &str = "mrol_key_requests_total";
-const REQUESTS_DENIED: &str = "mrol_requests_denied_total";
-const CONNECTIONS_ACCEPTED: &str = "mrol_connections_accepted_total";
-const CONNECTIONS_REFUSED: &str = "mrol_connections_refused_total";
-const CONNECTIONS_OPEN: &str = "mrol_connections_open";
-const FILE_RELOAD_OK: &str = "mrol_file_reload_ok";
-const CERTIFICATE_EXPIRES: &str = "mrol_certificate_expires_timestamp_seconds";
-const HANDSHAKES_FAILED: &str = "mrol_tls_handshakes_failed_total";
-const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
-const STREAMS_OPEN: &str = "mrol_streams_open";
-const BODY_BYTES: &str = "mrol_body_bytes";
-const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
-const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
-const WRITES_REFUSED: &str = "mrol_writes_refused";
-const ROBOT_SCANS: &str = "mrol_robot_scans_total";
 
 /// The metrics of one server. A clone is another handle on the same ones.
 ///
@@ -94,7 +77,7 @@ impl Metrics {
         let kept =
             Kept { recorder, maps: MapCounters::default(), keys: Mutex::default(), robots: Mutex::default() };
         let metrics = Self(Arc::new(kept));
-        metrics.record(describe);
+        metrics.record(families::describe);
         metrics.record(|| {
             gauge!(BUILD_INFO, "version" => env!("CARGO_PKG_VERSION"), "commit" => COMMIT, "features" => features())
                 .set(1.0);
@@ -285,42 +268,6 @@ fn features() -> String {
     let features = [("client", cfg!(feature = "client")), ("server", cfg!(feature = "server"))];
     let compiled = features.into_iter().filter(|(_, compiled)| *compiled).map(|(name, _)| name);
     compiled.collect::<Vec<_>>().join(",")
-}
-
-fn describe() {
-    describe_gauge!(BUILD_INFO, "1, with the version, the commit and the features that were built");
-    describe_counter!(REQUESTS, "Requests and messages of streams answered, by protocol, operation and code");
-    describe_histogram!(REQUEST_SECONDS, "Seconds from request to answer, by protocol and operation");
-    describe_counter!(KEY_REQUESTS, "Calls and requests let in, by protocol and name of their key");
-    describe_counter!(
-        REQUESTS_DENIED,
-        "Calls and requests of callers who may not ask for them, by protocol and reason"
-    );
-    describe_counter!(CONNECTIONS_ACCEPTED, "Connections accepted, by listener");
-    describe_counter!(CONNECTIONS_REFUSED, "Connections closed at once for want of a place, by listener");
-    describe_gauge!(CONNECTIONS_OPEN, "Connections that are open, by listener");
-    describe_gauge!(
-        FILE_RELOAD_OK,
-        "0 where a file changed into what cannot be used, and what it held before goes on"
-    );
-    describe_gauge!(
-        CERTIFICATE_EXPIRES,
-        "When the first certificate of a file expires, in seconds since 1970"
-    );
-    describe_counter!(HANDSHAKES_FAILED, "TLS handshakes that failed, by protocol");
-    describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
-    describe_gauge!(STREAMS_OPEN, "Calls whose client streams messages");
-    describe_gauge!(
-        BODY_BYTES,
-        "Bytes of bodies that have arrived, and of listings and map files on their way out"
-    );
-    describe_gauge!(DISK_FREE_BYTES, "Bytes free on the disk of the data folder");
-    describe_gauge!(MEMORY_RESIDENT_BYTES, "Bytes that the process has in memory");
-    describe_gauge!(WRITES_REFUSED, "1 while changes are refused, by reason");
-    describe_counter!(
-        ROBOT_SCANS,
-        "Scans judged for insertion, by robot (those after the first hundred as other) and verdict"
-    );
 }
 
 #[cfg(test)]

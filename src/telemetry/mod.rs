@@ -1,6 +1,7 @@
 //! What the daemon says of itself: log lines and Prometheus metrics.
 
 mod exposition;
+mod families;
 mod log;
 mod map_counters;
 mod metered;

@@ -75,15 +75,15 @@ async fn what_holds_no_message_is_the_clients_mistake_in_every_call() {
 #[tokio::test]
 async fn packed_numbers_of_a_wrong_length_are_named_with_their_field() {
     let daemon = daemon().await;
-    // QueryPointsRequest { points: Points { xyz: five bytes, which are no whole floats } }, for each place of points.
-    for tag in 1..=15_u8 {
-        for inner in 1..=15_u8 {
-            let packed = [&[inner << 3 | 2, 5][..], &[0; 5]].concat();
-            let points = [&[tag << 3 | 2, packed.len() as u8][..], &packed].concat();
-            let (code, reason, message) =
-                answer(daemon.channel().await, "/mrol.v1.Occupancy/QueryPoints", frame(&points)).await;
-            assert_eq!(code, "3", "{tag} {inner}: {reason} {message}");
-        }
+    let field = |number: u8, bytes: &[u8]| [&[number << 3 | 2, bytes.len() as u8][..], bytes].concat();
+    // QueryPointsRequest { map, points: Points { xyz } }, where the numbers are not of four bytes each.
+    for bytes in [1, 5, 7] {
+        let points = field(2, &field(2, &vec![0; bytes]));
+        let message = frame(&[field(1, b"a"), points].concat());
+        let channel = daemon.channel().await;
+        let (code, reason, said) = answer(channel, "/mrol.v1.Occupancy/QueryPoints", message).await;
+        assert_eq!((&*code, &*reason), ("3", "bad_message"), "{bytes}: {said}");
+        assert!(said.contains("xyz"), "{bytes}: {said}");
     }
     assert_unchanged(&daemon).await;
 }
