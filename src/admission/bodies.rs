@@ -211,7 +211,7 @@ impl Bodies {
         InUse { requests: self.0.requests.taken(), arriving: known.arriving, streams: 0, bytes: known.bytes }
     }
 
-    /// Ends silent bodies other than `own` until there is room for `bytes`.
+    /// Ends silent bodies other than `own`, and then answers that nobody reads, until there is room for `bytes`.
     fn make_room(&self, known: &mut Known, own: Option<u64>, bytes: usize) -> Result<(), ServiceError> {
         let most = self.0.limits.bytes_max;
         let refusal = || {
@@ -221,7 +221,11 @@ impl Bodies {
         };
         while known.bytes.saturating_add(bytes) > most {
             if !known.end_most_silent(own, self.0.limits.grace, &refusal()) {
-                return Err(refusal());
+                // Of one that holds its answer elsewhere, the memory is free a little later.
+                let freed = known.hang_up_on_least_read(self.0.limits.grace, &refusal());
+                if freed.is_none_or(|bytes| bytes == 0) {
+                    return Err(refusal());
+                }
             }
         }
         Ok(())
@@ -243,16 +247,18 @@ impl Known {
         true
     }
 
-    /// Ends the request whose answer has waited to be read for longest, with its connection; if there is one.
-    fn hang_up_on_least_read(&mut self, grace: Duration, refusal: &ServiceError) {
+    /// Ends the request whose answer has waited to be read for longest, with its connection; the bytes that it held, if
+    /// there is one.
+    fn hang_up_on_least_read(&mut self, grace: Duration, refusal: &ServiceError) -> Option<usize> {
         let unread_for = |body: &Body| body.unread_for().filter(|wait| *wait >= grace);
         let unread = self.bodies.iter().filter_map(|(&number, body)| Some((unread_for(body)?, number)));
-        if let Some((_, number)) = unread.max() {
-            self.change(number, |body| {
-                body.end(refusal.clone());
-                body.hang_up();
-            });
-        }
+        let (_, number) = unread.max()?;
+        self.change(number, |body| {
+            let bytes = body.bytes();
+            body.end(refusal.clone());
+            body.hang_up();
+            bytes
+        })
     }
 
     /// Changes a body, and the sums with it.

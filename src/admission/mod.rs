@@ -34,7 +34,7 @@ use std::time::Duration;
 
 use axum::body::{Body, HttpBody};
 use axum::extract::Request;
-use axum::http::{Extensions, Method};
+use axum::http::Method;
 use axum::response::Response;
 
 use crate::access::{Authorized, Operation};
@@ -63,10 +63,16 @@ struct Inner {
 /// An answer of no more bytes than this is not counted: `requests_max` bounds how many there are.
 const SMALL_ANSWER_BYTES: usize = 16 << 10;
 
-/// Memory of an answer, which is given back when that is sent. A clone is the same memory.
-#[derive(Debug, Clone)]
-struct Kept {
-    _charge: Arc<Charge>,
+/// Bytes of memory that an answer takes besides those of its body that are there already: to be put among its extensions
+/// by a handler whose body is made later.
+#[derive(Debug, Clone, Copy)]
+pub struct AnswerBytes(pub usize);
+
+/// Memory that an answer takes until it is sent: what its handler says, or the bytes of a body that is there as a whole.
+fn answer_bytes(response: &mut Response) -> usize {
+    let whole = HttpBody::size_hint(response.body()).exact().unwrap_or_default();
+    let bytes = response.extensions_mut().remove().map_or(whole as usize, |AnswerBytes(bytes)| bytes);
+    if bytes > SMALL_ANSWER_BYTES { bytes } else { 0 }
 }
 
 /// How much of what is limited is in use.
@@ -121,13 +127,16 @@ impl Admission {
         let request = Self::metered(request, &arrival)?;
         let answered = self.0.lifecycle.admit(handle(request)).await?;
         let mut response = arrival.refusal().map_or(answered, Err)?;
-        let kept = self.kept_for(&mut response)?;
         // Streams are told that the server is going down; other answers are waited for.
         let held = (!operation.is_stream()).then(|| self.0.lifecycle.hold());
         if held.is_some() {
             drop(arrival.take());
+            match answer_bytes(&mut response) {
+                0 => {}
+                bytes => arrival.add(bytes)?,
+            }
         }
-        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held, kept)))))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held)))))
     }
 
     /// Notes that a key came by a connection, and keeps to health what was taken for it.
@@ -138,14 +147,6 @@ impl Admission {
             connection.show_key();
         }
         connection.check(operation.is_probe() && operation != Operation::Metrics)
-    }
-
-    /// Memory that an answer takes: what its handler says, or the bytes of a body that is there as a whole.
-    fn kept_for(&self, response: &mut Response) -> Result<(Option<Kept>, Option<Charge>), ServiceError> {
-        let said = response.extensions_mut().remove::<Kept>();
-        let bytes = HttpBody::size_hint(response.body()).exact().unwrap_or_default() as usize;
-        let whole = (said.is_none() && bytes > SMALL_ANSWER_BYTES).then(|| self.keep(bytes)).transpose()?;
-        Ok((said, whole))
     }
 
     /// Lets the next message of a stream in.
@@ -167,18 +168,6 @@ impl Admission {
     /// `ResourceExhausted` when there is no room.
     pub fn keep(&self, bytes: usize) -> Result<Charge, ServiceError> {
         self.0.bodies.charge(bytes)
-    }
-
-    /// [`Admission::keep`] for an answer that is not made of pieces; it goes with its `extensions`. Small ones are not
-    /// counted.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn keep_with_answer(&self, bytes: usize, extensions: &mut Extensions) -> Result<(), ServiceError> {
-        if bytes > SMALL_ANSWER_BYTES {
-            extensions.insert(Kept { _charge: self.keep(bytes)?.into() });
-        }
-        Ok(())
     }
 
     /// How long the text of a scrape answers those that follow.

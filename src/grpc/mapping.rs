@@ -8,7 +8,7 @@ use tonic::{Request, Response, Status, Streaming};
 use super::stream::{Answers, Message};
 use super::{Adapter, service_of};
 use crate::access::Operation;
-use crate::admission::Arrival;
+use crate::admission::{AnswerBytes, Arrival};
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
 
@@ -49,7 +49,7 @@ impl Mapping for Adapter {
         let answer = service.maps().align_scan(&map, scan).await?;
         let bytes = answer.foreground.as_ref().map_or(0, |foreground| foreground.bitmap.len());
         let mut response = Response::new(answer.into());
-        self.admission.keep_with_answer(bytes, response.extensions_mut())?;
+        response.extensions_mut().insert(AnswerBytes(bytes));
         Ok(response)
     }
 

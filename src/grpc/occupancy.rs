@@ -6,6 +6,7 @@ use tonic::{Request, Response, Status, Streaming};
 use super::stream::{Answers, Message};
 use super::{Adapter, service_of};
 use crate::access::Operation;
+use crate::admission::AnswerBytes;
 use crate::wire::{pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
 
@@ -23,7 +24,7 @@ impl Occupancy for Adapter {
         let answer = service.query_points(&map, query).await?;
         let bytes = answer.occupied.len();
         let mut response = Response::new(answer.into());
-        self.admission.keep_with_answer(bytes, response.extensions_mut())?;
+        response.extensions_mut().insert(AnswerBytes(bytes));
         Ok(response)
     }
 

@@ -18,8 +18,8 @@ const LEVELS: usize = 12;
 
 #[tokio::test]
 async fn scrapes_that_nobody_reads() {
-    // Of some 400 MiB four texts are in memory at once, and what connections hold.
-    let siege = Siege::begin_within("scrapes unread", "", 96 * MIB).await;
+    // Of a hundred MiB four texts are in memory at once, and what connections hold.
+    let siege = Siege::begin_within("scrapes unread", "", 56 * MIB).await;
     for map in 0..MAPS {
         let settings = json!({"resolution_m": 0.1, "levels": LEVELS});
         let put = client().put(format!("http://{}/v1/maps/map-{map}", siege.http())).json(&settings);

@@ -157,6 +157,13 @@ impl<'a> Body<'a> {
     fn check_counts<E>(&self, limits: &MapFileLimits) -> Result<(), MapFileError<E>> {
         let (limit, most) = ("map_file_scans_max", limits.scans_max);
         for (what, count) in [("scans", self.scans), ("withdrawn scans", self.withdrawn)] {
+            // Each has made a revision of its own.
+            if count as u64 > self.revision {
+                return Err(MapFileError::Bad(format!(
+                    "{count} {what} of a map at revision {}",
+                    self.revision
+                )));
+            }
             if count > most {
                 return Err(MapFileError::TooLarge { what, count, limit, most });
             }
