@@ -95,8 +95,8 @@ impl<M: Message> Reader<M> {
     }
 
     async fn next(&mut self) -> Option<Read<M>> {
-        let message = self.inflation.within(self.compressed, self.requests.message()).await;
-        Some(match message.transpose()? {
+        let message = self.inflation.within(self.compressed, self.requests.message()).await.transpose()?;
+        Some(match message {
             // Compressed, it came as less.
             Ok(message) => match self.arrival.take().at_least(message.encoded_len()) {
                 Ok(charge) => Ok((message, charge)),
