@@ -218,7 +218,7 @@ impl Asker {
             };
             let pieces: Vec<_> = pieces.into_iter().map(piece).collect();
             let restore = async |request: tonic::Request<Vec<_>>| {
-                let request = request.map(|pieces| tokio_stream::iter(pieces));
+                let request = request.map(tokio_stream::iter);
                 self.calls.grpc.maps().restore_map(request).await
             };
             self.calls.call(&format!("restore {map}"), pieces, restore).await;
