@@ -75,7 +75,7 @@ fn fail_on_deadlock() {
     let circles = parking_lot::deadlock::check_deadlock();
     for (i, circle) in circles.iter().enumerate() {
         for thread in circle {
-            eprintln!("deadlock {i}: thread {}\n{:?}", thread.thread_id(), thread.backtrace());
+            eprintln!("deadlock {i}: {:?}\n{:?}", thread.thread_id(), thread.backtrace());
         }
     }
     if !circles.is_empty() {
