@@ -16,7 +16,7 @@ use crate::watchdog::{Beat, Watchdog};
 use crate::{MAP, STILL_MAX, seconds};
 
 /// Scans before it begins: whoever looks for a robot's poses looks through all of these.
-const BEFORE: usize = 400;
+const BEFORE: usize = 100;
 
 fn map() -> MapName {
     MapName::new(MAP).unwrap()

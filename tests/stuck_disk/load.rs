@@ -102,15 +102,18 @@ impl Asker {
     }
 
     async fn queries(self, points: usize) {
-        let mut i = 0;
+        let (mut i, points_sent) = (0, row(points));
+        let messages = MAPS.map(|map| query_pb(map, &points_sent));
+        let body = bytes::Bytes::from(bytes_of(&points_sent));
         while let Some(map) = self.next(&mut i).await {
             let kind = format!("query {points} {map}");
             let query = async |query| Ok(self.calls.grpc.occupancy().query_points(query).await?.into_inner());
-            self.calls.call_within(&kind, Bound::Answer, query_pb(map, &row(points)), query).await;
+            let message = messages[i as usize % MAPS.len()].clone();
+            self.calls.call_within(&kind, Bound::Answer, message, query).await;
             let post = |http: &reqwest::Client, url: &str| {
                 http.post(format!("{url}/v1/maps/{map}/occupancy"))
                     .header("content-type", "application/octet-stream")
-                    .body(bytes_of(&row(points)))
+                    .body(body.clone())
             };
             self.calls.request(&format!("HTTP {kind}"), Bound::Answer, post).await;
         }
@@ -215,7 +218,7 @@ impl Asker {
             };
             let pieces: Vec<_> = pieces.into_iter().map(piece).collect();
             let restore = async |request: tonic::Request<Vec<_>>| {
-                let request = request.map(|pieces| tokio_stream::iter(pieces));
+                let request = request.map(tokio_stream::iter);
                 self.calls.grpc.maps().restore_map(request).await
             };
             self.calls.call(&format!("restore {map}"), pieces, restore).await;

@@ -15,6 +15,7 @@ mod calls;
 mod common;
 mod disk;
 mod load;
+mod made_again;
 mod pace;
 mod plain;
 mod prober;

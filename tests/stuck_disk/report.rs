@@ -5,6 +5,9 @@ use std::fmt::{self, Display, Formatter};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+/// Of so many requests one succeeds at least: fewer may all have come while the disk hung.
+const ANSWERS_MIN: usize = 20;
+
 /// Of all kinds of requests.
 #[derive(Default)]
 pub(crate) struct Report(Mutex<BTreeMap<String, Kind>>);
@@ -62,7 +65,7 @@ impl Report {
             if kind.bound == Bound::Answer && kind.outcomes.keys().any(|outcome| outcome != "ok") {
                 broken.push(format!("{name} was refused: {:?}", kind.outcomes));
             }
-            if !kind.outcomes.contains_key("ok") {
+            if kind.times_ms.len() >= ANSWERS_MIN && !kind.outcomes.contains_key("ok") {
                 broken.push(format!("{name} never succeeded: {:?}", kind.outcomes));
             }
         }

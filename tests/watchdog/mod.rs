@@ -75,7 +75,7 @@ fn fail_on_deadlock() {
     let circles = parking_lot::deadlock::check_deadlock();
     for (i, circle) in circles.iter().enumerate() {
         for thread in circle {
-            eprintln!("deadlock {i}: thread {}\n{:?}", thread.thread_id(), thread.backtrace());
+            eprintln!("deadlock {i}: {:?}\n{:?}", thread.thread_id(), thread.backtrace());
         }
     }
     if !circles.is_empty() {
@@ -100,10 +100,12 @@ pub fn threads_of(process: u32) -> String {
 }
 
 fn by_debugger(process: u32) -> Option<String> {
+    // Into a file: whoever is debugged stands still, and this process may be the one, so that it reads no pipe.
+    let file = tempfile::NamedTempFile::new().ok()?;
     let mut debugger = Command::new("gdb");
     debugger.args(["-p", &process.to_string(), "-batch", "-ex", "thread apply all bt 25"]);
-    let output = debugger.stdin(Stdio::null()).output().ok()?;
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    debugger.stdin(Stdio::null()).stdout(file.reopen().ok()?).stderr(Stdio::null()).status().ok()?;
+    let text = String::from_utf8_lossy(&fs::read(file.path()).ok()?).into_owned();
     text.contains("Thread ").then_some(text)
 }
 
