@@ -42,6 +42,10 @@ fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
+fn put_file(daemon: &Daemon, path: &str, file: Vec<u8>) -> reqwest::RequestBuilder {
+    client().put(daemon.url(path)).header("content-type", "application/octet-stream").body(file)
+}
+
 #[tokio::test]
 async fn a_map_whose_journal_fails_is_read_only_and_says_so() {
     let daemon = Daemon::start().await;
@@ -330,9 +334,7 @@ async fn a_map_is_replaced_and_the_one_that_was_there_is_kept() {
     daemon.put_in("a", &row(3)).await;
     let file = daemon.get("/v1/maps/a/snapshot").await.bytes().await.unwrap();
     daemon.put_in("a", &row(7)).await;
-    let put = async |daemon: &Daemon, path: &str| {
-        client().put(daemon.url(path)).body(file.clone()).send().await.unwrap()
-    };
+    let put = async |daemon: &Daemon, path: &str| put_file(daemon, path, file.to_vec()).send().await.unwrap();
     let refused = put(&daemon, "/v1/maps/a/snapshot").await;
     assert_eq!(json_of(refused).await["error"]["reason"], "map_exists");
     assert_eq!(put(&daemon, "/v1/maps/a/snapshot?replace=true").await.status(), StatusCode::CREATED);
@@ -362,7 +364,7 @@ async fn the_last_revision_is_refused_and_so_is_what_would_come_after_it() {
     let at = |revision| {
         let contents = MapContents::at(revision, VoxelSet::clone(&voxels));
         let snapshot = Snapshot { uuid: Uuid::new_v4(), settings: MapSettings::new(0.1, 3), contents };
-        client().put(daemon.url(&format!("/v1/maps/m{revision}/snapshot"))).body(snapshot.encode().unwrap())
+        put_file(&daemon, &format!("/v1/maps/m{revision}/snapshot"), snapshot.encode().unwrap())
     };
     let refused = at(REVISION_MAX + 1).send().await.unwrap();
     assert_eq!(refused.status(), StatusCode::BAD_REQUEST);

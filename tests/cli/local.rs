@@ -49,7 +49,7 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
         let (metres, degrees) = pose_difference(&found.map_from_sensor, truth);
         assert!(metres < 0.02 && degrees < 0.3, "{metres} m {degrees} degrees");
     }
-    let snapshot = Snapshot::read(&Disk, map.as_ref()).unwrap().contents;
+    let snapshot = Snapshot::read(&Disk::default(), map.as_ref()).unwrap().contents;
     assert_eq!((snapshot.voxels.len() as u64, snapshot.trajectory.len()), (added, SCANS));
 }
 

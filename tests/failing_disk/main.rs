@@ -11,7 +11,6 @@ mod simulated;
 mod workload;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use mrol::store::{FileSystem, OpenedMap, StoreError};
 use simulated::{Fault, SimulatedDisk};
@@ -137,9 +136,9 @@ fn a_folder_of_another_map_is_not_mixed_in() {
     let (disk, other) = (SimulatedDisk::default(), SimulatedDisk::default());
     run(&disk);
     run(&other);
-    let last = files(&disk).into_iter().rfind(|path| !is_snapshot(path)).unwrap();
-    let files: Arc<dyn FileSystem> = Arc::new(disk.clone());
-    files.create(&last).unwrap().append(&other.read(&last).unwrap()).unwrap();
+    let last = |disk| files(disk).into_iter().rfind(|path| !is_snapshot(path)).unwrap();
+    let foreign = other.read(&last(&other)).unwrap();
+    disk.create(&last(&disk)).unwrap().append(&foreign).unwrap();
     let message = open(&disk).unwrap_err().to_string();
     assert!(message.contains("another map's"), "{message}");
 }

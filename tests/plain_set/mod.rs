@@ -20,11 +20,11 @@ pub fn assert_equal(map: &MultiResolutionMap, model: &PlainSet) {
     // Before the view, which holds the locks that these take.
     let counts: Vec<usize> = (0..map.settings().levels).map(|level| map.voxels(level)).collect();
     let view = map.view();
-    for level in 0..map.settings().levels {
+    for (level, count) in (0..).zip(counts) {
         let expected: PlainSet = model.iter().map(|&i| up(i, level)).collect();
         let found: PlainSet = view.lists(level).flat_map(|list| list.iter()).map(VoxelKey::index).collect();
         assert_eq!(found, expected, "level {level}");
-        assert_eq!(counts[level as usize], expected.len());
+        assert_eq!(count, expected.len());
         for list in view.lists(level) {
             assert!(
                 list.iter().all(|voxel| list.contains(voxel)),
