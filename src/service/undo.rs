@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::committing::{Proposal, Refusal, Step};
+use super::committing::{Proposal, Refusal, Step, Stop};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
@@ -37,7 +37,7 @@ impl HostedMap {
         }
         // The map's content as it was before the first of them.
         let lent = room.lend(self.snapshot_bytes(), "an undo")?;
-        let observed = folder.observations(&scans, &withdrawn, stop).map_err(unreadable)?;
+        let observed = folder.observations(&scans, &withdrawn, stop).map_err(|e| self.unreadable(&e))?;
         check_not_stopped(stop)?;
         let mut observed = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
@@ -48,7 +48,7 @@ impl HostedMap {
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
-            folder.observe(&mut observed, StopSignal::NEVER).map_err(unreadable)?;
+            folder.observe(&mut observed, StopSignal::NEVER).map_err(|e| map.unreadable(&e))?;
             let voxels = observed.observations.held_by_targets_alone();
             let moments = observed.observations.moments_without_targets();
             Ok(Some(Change::Undo(UndoRecord { scans, voxels, moments, request })))
@@ -89,6 +89,14 @@ impl HostedMap {
         Ok((scans, trajectory.withdrawn().to_vec()))
     }
 
+    /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
+    fn unreadable(&self, error: &StoreError) -> ServiceError {
+        match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
+            true => Stop::Deleted.refusal(&self.name),
+            false => ServiceError::new(ErrorCode::Internal, "journal_unreadable", error.to_string()),
+        }
+    }
+
     fn no_observations(&self) -> ServiceError {
         let message =
             format!("map {} is kept in memory only: undo needs the journal of a data folder", self.name);
@@ -106,10 +114,6 @@ impl HostedMap {
         );
         ServiceError::new(ErrorCode::FailedPrecondition, "undo_out_of_reach", message)
     }
-}
-
-fn unreadable(error: StoreError) -> ServiceError {
-    ServiceError::new(ErrorCode::Internal, "journal_unreadable", error.to_string())
 }
 
 /// Tells one request from another under the same id.
