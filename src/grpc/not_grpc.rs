@@ -48,7 +48,9 @@ mod tests {
         let is_call = |types: &[&'static str]| {
             let types = types.iter().map(|value| (CONTENT_TYPE, HeaderValue::from_static(value)));
             let mut headers = HeaderMap::new();
-            types.for_each(|(name, value)| drop(headers.append(name, value)));
+            for (name, value) in types {
+                headers.append(name, value);
+            }
             super::is_call(&headers)
         };
         for call in ["application/grpc", "application/grpc+proto", "Application/gRPC; charset=utf-8"] {

@@ -1,23 +1,22 @@
 //! The maps by name, in memory and on disk.
 
+mod opening;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
 use super::reach::Reachable;
-use super::trajectory::thin;
 use super::{ErrorCode, MapReach, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
-use crate::store::{
-    Cut, DataDir, MapFolder, OpenedMap, OpeningProgress, Snapshot, StoreError, StoreSettings,
-};
+use crate::store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Rank, RwLock};
+use opening::open_all;
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
@@ -267,72 +266,6 @@ impl Catalogue {
         };
         blocking(move || job(&data_dir).map(Some).map_err(not_stored)).await
     }
-}
-
-/// Opens what can be opened.
-fn open_all(
-    data_dir: &DataDir,
-    settings: &StoreSettings,
-    progress: &OpeningProgress,
-) -> Result<Named, ServiceError> {
-    let stock = data_dir.take_stock().map_err(not_stored)?;
-    for path in stock.not_understood {
-        tracing::warn!(path = %path.display(), "not understood, and left alone: no map");
-    }
-    data_dir.expect(&stock.maps, progress);
-    let mut maps = Named::default();
-    for name in stock.maps {
-        tracing::info!(map = %name, "opening");
-        let start = Instant::now();
-        match data_dir.map(&name, progress) {
-            Ok(opened) => {
-                report(&name, &opened, start);
-                // The snapshot was written before what went when it was there.
-                thin(&opened.map, &opened.folder);
-                let map =
-                    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder), settings)?;
-                maps.open.insert(name, Arc::new(map));
-            }
-            Err(error @ StoreError::Cancelled) => return Err(not_stored(error)),
-            Err(error) => maps.set_unavailable(name, &error),
-        }
-    }
-    for (name, error) in stock.refused {
-        // The map that is there is served; the file waits for somebody.
-        if maps.open.contains_key(&name) || maps.unavailable.contains_key(&name) {
-            tracing::error!(map = %name, %error, "a map file is not taken in");
-        } else {
-            maps.set_unavailable(name, &error);
-        }
-    }
-    Ok(maps)
-}
-
-impl Named {
-    fn set_unavailable(&mut self, name: MapName, error: &StoreError) {
-        tracing::error!(map = %name, %error, "cannot be opened: the map is unavailable, the others are served");
-        self.unavailable.insert(name, error.to_string());
-    }
-}
-
-/// Says what was found of a map.
-fn report(name: &MapName, opened: &OpenedMap, start: Instant) {
-    for damaged in &opened.damaged {
-        tracing::warn!(map = %name, %damaged, "a snapshot is damaged: set aside, an older one and more journal are used");
-    }
-    for file in &opened.not_understood {
-        tracing::warn!(map = %name, file, "a file in the map's folder is not understood, and left alone");
-    }
-    if let Some(Cut { path, offset, bytes, reason }) = &opened.recovered.cut {
-        let file = path.display();
-        tracing::warn!(map = %name, %file, offset, bytes, reason, "cut off an end that was never acknowledged");
-    }
-    if let Some(harmless) = &opened.recovered.harmless {
-        tracing::warn!(map = %name, harmless, "the journal is damaged where the snapshot holds what was there");
-    }
-    let (revision, replayed, snapshot) = (opened.map.revision(), opened.recovered.replayed, opened.snapshot);
-    let (voxels, elapsed) = (opened.map.voxels(0), start.elapsed());
-    tracing::info!(map = %name, revision, snapshot, replayed, voxels, ?elapsed, "opened");
 }
 
 fn unavailable(name: &MapName, reason: &str) -> ServiceError {

@@ -11,6 +11,7 @@ use crate::align::Guess;
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::store::StoreSettings;
 use crate::util::StopSignal;
 
 fn wall(count: usize) -> Vec<Point> {
@@ -25,7 +26,7 @@ fn hosted() -> HostedMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
     let pose = TrajectoryPose::new(robot(), Pose::identity());
     map.committer().insert_scan(ScanRecord::of_points(pose, &wall(10_000), map.lattice()));
-    HostedMap::new(MapName::new("a").unwrap(), Uuid::nil(), map, None).unwrap()
+    HostedMap::new(MapName::new("a").unwrap(), Uuid::nil(), map, None, &StoreSettings::default()).unwrap()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::committing::{Decided, Proposal, Refusal, Step};
+use super::committing::{Decided, Proposal, Refusal, Step, Stop};
 use super::digest::Digest;
 use super::hosted_map::HostedMap;
 use super::room::Room;
@@ -44,7 +44,7 @@ impl HostedMap {
         }
         // The map's content as it was before the first of them.
         let lent = room.lend(self.undo_bytes(), "an undo")?;
-        let observed = folder.observations(&scans, &withdrawn, stop).map_err(unreadable)?;
+        let observed = folder.observations(&scans, &withdrawn, stop).map_err(|e| self.unreadable(&e))?;
         check_not_stopped(stop)?;
         let mut observed = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
 
@@ -56,7 +56,7 @@ impl HostedMap {
             }
             // What came meanwhile is shown while the map waits: that ends with the request's time as well.
             limit.run(StopSignal::NEVER, |stop| {
-                folder.observe(&mut observed, stop).map_err(unreadable)?;
+                folder.observe(&mut observed, stop).map_err(|e| map.unreadable(&e))?;
                 check_not_stopped(stop)
             })?;
             let voxels = observed.observations.held_by_targets_alone();
@@ -116,6 +116,14 @@ impl HostedMap {
         out_of_reach.map_or(Ok(()), |folder| Err(self.out_of_reach(folder, revision)))
     }
 
+    /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
+    fn unreadable(&self, error: &StoreError) -> ServiceError {
+        match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
+            true => Stop::Deleted.refusal(&self.name),
+            false => ServiceError::new(ErrorCode::Internal, "journal_unreadable", error.to_string()),
+        }
+    }
+
     fn no_observations(&self) -> ServiceError {
         let message =
             format!("map {} is kept in memory only: undo needs the journal of a data folder", self.name);
@@ -133,10 +141,6 @@ impl HostedMap {
         );
         ServiceError::new(ErrorCode::FailedPrecondition, "undo_out_of_reach", message)
     }
-}
-
-fn unreadable(error: StoreError) -> ServiceError {
-    ServiceError::new(ErrorCode::Internal, "journal_unreadable", error.to_string())
 }
 
 /// Tells one request from another under the same id.

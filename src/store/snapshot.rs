@@ -232,8 +232,8 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 mod tests {
     use super::*;
     use crate::geometry;
-    use crate::map::{RequestId, RobotName, WithdrawnScan};
-    use crate::voxel::{Moments, VoxelKey};
+    use crate::map::{AnsweredRequest, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan};
+    use crate::voxel::{MomentSet, Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
         let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
@@ -311,7 +311,9 @@ mod tests {
     fn a_file_without_moments_is_restored_with_those_of_voxel_centres() {
         let mut message = snapshot().to_message();
         message.moments = None;
-        let old = Snapshot::from_message(message).unwrap().contents;
+        let body = message.encode_to_vec();
+        let memory = &mut Memory(|_| Ok::<_, Infallible>(()));
+        let old = Body::of(&body).unwrap().read(&MapFileLimits::OWN, memory).unwrap().contents;
         assert_eq!(old.moments, MomentSet::of_centers(&old.voxels));
         let points: i64 = old.moments.as_slice().iter().map(|(_, moments)| moments.count()).sum();
         assert_eq!(points, 5000);
