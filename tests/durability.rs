@@ -134,7 +134,9 @@ async fn a_server_that_is_starting_says_how_far_it_is() {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     let progress = Arc::new(OpeningProgress::default());
-    tokio::spawn(async move { axum::serve(listener, http::starting(progress)).await });
+    tokio::spawn(async move {
+        axum::serve(listener, http::starting(progress, mrol::access::Access::open())).await
+    });
     let get = async |path: &str| client().get(format!("http://{address}{path}")).send().await.unwrap();
     assert_eq!(get("/livez").await.status(), StatusCode::OK);
     let ready = get("/readyz").await;

@@ -158,8 +158,7 @@ fn memory_is_asked_for_before_it_is_taken_and_what_is_refused_ends_the_search() 
     let all = search(&map, &corner(), &downward(), u64::MAX, usize::MAX);
     assert!(all.found.is_ok());
     let view = map.view();
-    let blocks =
-        size_of_val(view.voxels().blocks());
+    let blocks = size_of_val(view.voxels().blocks());
     drop(view);
     let points = size_of_val(&*corner());
     assert!(all.reserved > blocks + points, "{} bytes", all.reserved);
