@@ -35,6 +35,10 @@
 //! # }
 //! ```
 
+// The simulated disk of the tests names the crate.
+#[cfg(all(test, feature = "shuttle"))]
+extern crate self as mrol;
+
 #[cfg(feature = "server")]
 pub mod access;
 #[cfg(feature = "server")]

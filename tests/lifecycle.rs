@@ -352,7 +352,7 @@ fn make_hang(path: &Path) {
 /// The exit code of a process that must end by itself.
 async fn code_at_end(server: Process) -> Option<i32> {
     let ended = tokio::time::timeout(PATIENCE, tokio::task::spawn_blocking(|| server.ended())).await;
-    ended.expect("its end").unwrap()
+    ended.expect("its end").expect("no panic")
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -135,7 +135,7 @@ async fn service(size: &Size, data: &tempfile::TempDir) -> MapService {
     };
     let open = move || MapService::open(settings, &OpeningProgress::default()).unwrap();
     let service = tokio::task::spawn_blocking(open).await.unwrap();
-    service.restore_map(map(), file.into()).await.unwrap();
+    service.restore_map(map(), file.into(), false).await.unwrap();
     service
 }
 

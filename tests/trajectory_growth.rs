@@ -3,7 +3,6 @@
 //!
 //! `MROL_GROWTH_SCANS=1000000` sets the number of scans; without, 64,000.
 
-
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose, TrajectorySpacing};
 use rand::{RngExt, SeedableRng};

@@ -15,7 +15,6 @@
 
 mod worker;
 
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 
 use tokio::sync::{OwnedMutexGuard, oneshot, watch};
@@ -24,6 +23,8 @@ use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::store::{MapFolder, Record, StoreError, StoreSettings};
+use crate::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use crate::sync::thread;
 use crate::util::{Durations, SharedDurations};
 use worker::Worker;
 
@@ -119,7 +120,7 @@ impl Committing {
     ) -> Result<Self, ServiceError> {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
-        let thread = std::thread::Builder::new().name(format!("mrol-commit-{name}"));
+        let thread = thread::Builder::new().name(format!("mrol-commit-{name}"));
         let durations = Arc::<SharedDurations>::default();
         let worker =
             Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations), settings);

@@ -17,6 +17,8 @@ mod looks;
 mod map_file;
 mod mapping;
 mod maps;
+#[cfg(all(test, feature = "shuttle"))]
+mod modelled;
 mod pool;
 mod reach;
 mod request;

@@ -13,18 +13,24 @@
 //! locks are `parking_lot`'s and cost nothing more. With the feature `shuttle`, which is for one test alone
 //! (`tests/commit_protocol.rs`), they are those of a model checker: it runs a test's threads one at a time, and at
 //! every lock chooses who goes on.
+#![cfg_attr(not(feature = "client"), expect(dead_code, reason = "what store and service lock is not there"))]
 
 mod checks;
 mod locks;
 #[cfg(feature = "shuttle")]
 mod modelled;
 
+#[cfg(feature = "client")]
 pub(crate) use checks::before_file_operation;
 pub(crate) use locks::{Mutex, MutexGuard, RwLock, RwLockReadGuard, RwLockWriteGuard};
 #[cfg(feature = "shuttle")]
 pub(crate) use shuttle::sync::atomic::AtomicU64;
+#[cfg(all(feature = "client", feature = "shuttle"))]
+pub(crate) use shuttle::{sync::mpsc, thread};
 #[cfg(not(feature = "shuttle"))]
 pub(crate) use std::sync::atomic::AtomicU64;
+#[cfg(all(feature = "client", not(feature = "shuttle")))]
+pub(crate) use std::{sync::mpsc, thread};
 
 #[cfg(feature = "client")]
 pub(crate) use checks::polled_by_runtime;

@@ -35,6 +35,7 @@ fn body(operation: Operation) -> Body {
         | Operation::DeleteMap
         | Operation::ListVoxels
         | Operation::GetTrajectory
+        | Operation::StreamTrajectory
         | Operation::SnapshotMap
         | Operation::QueryPointsStream
         | Operation::InsertScanStream

@@ -214,13 +214,10 @@ impl Model {
 
 /// The newest of two or more snapshots.
 fn newest_snapshot(data: &Path) -> Option<PathBuf> {
-    let entries = |folder: &Path| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    // A map's folder bears its name, with or without the uuid after it.
-    let folder =
-        entries(&data.join("maps")).find(|path| path.file_stem().is_some_and(|stem| stem == "office"))?;
-    let mut snapshots: Vec<PathBuf> = entries(&folder)
-        .filter(|path| path.extension().is_some_and(|extension| extension == "mrol"))
-        .collect();
+    let entries = std::fs::read_dir(folder_of(data, "office")).unwrap();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let mut snapshots: Vec<PathBuf> =
+        paths.filter(|path| path.extension().is_some_and(|extension| extension == "mrol")).collect();
     snapshots.sort_unstable();
     (snapshots.len() > 1).then(|| snapshots.pop()).flatten()
 }

@@ -213,6 +213,7 @@ impl Asker {
             };
             let copy = format!("{map}-restored");
             let piece = |piece: pb::SnapshotMapResponse| pb::RestoreMapRequest {
+                replace: false,
                 map: copy.clone(),
                 data: piece.data,
             };

@@ -1,6 +1,5 @@
 //! The thread of a map: durable, then visible, then acknowledged.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -14,6 +13,7 @@ use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
 use crate::store::{Durability, MapFolder, Record, StoreError, StoreSettings};
+use crate::sync::mpsc::{Receiver, RecvTimeoutError};
 use crate::util::SharedDurations;
 
 /// Revisions between two thinnings of the trajectory of a map in memory.

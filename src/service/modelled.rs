@@ -1,0 +1,108 @@
+//! The steps of the service that lock, under a model checker: guess, describe, save, delete and commit, of a map that
+//! is kept on a simulated disk. In every order of steps that it tries nobody waits for ever, and what was acknowledged
+//! is there when the folder is opened again.
+//!
+//!     cargo test --no-default-features --features shuttle --lib service::modelled
+
+use std::path::Path;
+use std::sync::Arc;
+
+use shuttle::future::block_on;
+use shuttle::thread;
+use uuid::Uuid;
+
+use super::committing::Step;
+use super::hosted_map::{HostedMap, Saving};
+use super::room::Room;
+use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
+use crate::align::Guess;
+use crate::geometry::{Point, Pose};
+use crate::map::{MapName, MapSettings, MultiResolutionMap, Region, RobotName};
+use crate::store::{DataDir, OpeningProgress, Snapshot, StoreSettings};
+use crate::util::StopSignal;
+
+#[path = "../../tests/failing_disk/simulated.rs"]
+#[expect(dead_code, reason = "nothing fails here")]
+mod simulated;
+
+fn name() -> MapName {
+    MapName::new("office").unwrap()
+}
+
+fn data_dir(disk: &simulated::SimulatedDisk) -> DataDir {
+    DataDir::on(Arc::new(disk.clone()), Path::new("data"), StoreSettings::default()).unwrap()
+}
+
+/// Three scans of a robot, at their guesses; the last one guesses by constant velocity. The newest revision that it was
+/// told.
+fn insert_three(map: &Arc<HostedMap>, room: &Arc<Room>, robot: &str, x: f32) -> u64 {
+    let mut newest = 0;
+    for (scan_id, guess) in (0..).zip([Guess::Pose(Pose::identity()), Guess::Last, Guess::ConstantVelocity]) {
+        let points = vec![Point::new(x, scan_id as f32, 0.5)].into();
+        let request = ScanRequest {
+            scan_id: Some(scan_id),
+            guess,
+            at_guess: true,
+            ..ScanRequest::new(RobotName::new(robot).unwrap(), points)
+        };
+        let turn = Arc::new(block_on(map.turn_of(&request.robot)));
+        let settings = ServiceSettings::default();
+        let step = map.propose_scan(&request, turn, &settings, room, StopSignal::NEVER);
+        if let Ok(answer) = outcome(step) {
+            newest = answer.state.revision;
+        }
+    }
+    newest
+}
+
+/// What becomes of a change, when it is visible.
+fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
+    match step? {
+        Step::Answered(answer) => Ok(answer),
+        Step::Proposed(outcome, answer) => match block_on(outcome) {
+            Ok(Ok(committed)) => Ok(answer(committed)),
+            Ok(Err(_)) | Err(_) => Err(ServiceError::overloaded("refused".into())),
+        },
+    }
+}
+
+fn delete_everything(map: &Arc<HostedMap>, room: &Arc<Room>) -> u64 {
+    let region = Region::ball([0.0; 3], 100.0).unwrap();
+    let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
+    outcome(map.propose_deletion(&Arc::new(deletion), room)).map_or(0, |answer| answer.state.revision)
+}
+
+fn crowd() {
+    let disk = simulated::SimulatedDisk::default();
+    let (uuid, core) = (Uuid::from_u128(7), MultiResolutionMap::new(MapSettings::new(1.0, 4)).unwrap());
+    let folder = data_dir(&disk).create(&name(), &Snapshot::of(&core, uuid)).unwrap();
+    let map = HostedMap::new(name(), uuid, core, Some(folder), &StoreSettings::default()).unwrap();
+    let (map, room) = (Arc::new(map), Arc::new(Room::new(None, Marks::default())));
+    let spawn = |work: fn(&Arc<HostedMap>, &Arc<Room>) -> u64| {
+        let (map, room) = (Arc::clone(&map), Arc::clone(&room));
+        thread::spawn(move || work(&map, &room))
+    };
+    let threads = [
+        spawn(|map, room| insert_three(map, room, "one", 0.5)),
+        spawn(|map, room| insert_three(map, room, "two", 70.5)),
+        spawn(delete_everything),
+        spawn(|map, room| {
+            let revision = map.describe(8).state.revision;
+            map.save(Saving::Changed, room).unwrap();
+            map.describe(8).state.revision.max(revision)
+        }),
+    ];
+    let newest = threads.into_iter().map(|thread| thread.join().unwrap()).max().unwrap_or_default();
+    let contents = map.map.contents();
+    assert!(contents.revision >= newest, "{} after {newest} was acknowledged", contents.revision);
+    drop(map);
+    let opened = data_dir(&disk).map(&name(), &OpeningProgress::default()).unwrap();
+    assert!(opened.map.contents() == contents, "what was acknowledged is not there");
+}
+
+#[test]
+fn nobody_waits_for_ever_and_nothing_acknowledged_is_lost() {
+    let schedules = std::env::var("MROL_SCHEDULES").map_or(200, |text| text.parse().unwrap());
+    shuttle::check_random(crowd, schedules);
+    shuttle::check_pct(crowd, schedules, 3);
+}
