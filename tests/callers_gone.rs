@@ -69,7 +69,7 @@ async fn until(daemon: &Daemon, what: &str, count: u64) {
 #[tokio::test(flavor = "multi_thread")]
 async fn jobs_whose_callers_have_gone_are_not_begun_and_one_in_hand_stops() {
     let daemon = daemon().await;
-    let begun = jobs(&daemon, "begun").await;
+    let begun = jobs(&daemon, "begun_total").await;
     let in_hand = align(&daemon).await;
     until(&daemon, "running", 1).await;
     let mut waiting = Vec::new();
@@ -86,7 +86,7 @@ async fn jobs_whose_callers_have_gone_are_not_begun_and_one_in_hand_stops() {
     in_hand.abort();
     until(&daemon, "cancelled_total", 5).await;
     until(&daemon, "running", 0).await;
-    assert_eq!(jobs(&daemon, "begun").await, begun + 1);
+    assert_eq!(jobs(&daemon, "begun_total").await, begun + 1);
     // There is room again.
     daemon.mapping().await.insert_scan(scan_pb("a", "r2", &row(10))).await.unwrap();
 }

@@ -257,7 +257,7 @@ async fn metrics_count_what_was_done_and_forget_maps_that_are_gone() {
     daemon.delete("/v1/maps/a").await;
     let text = daemon.get("/metrics").await.text().await.unwrap();
     assert!(!text.contains("mrol_map_voxels{map=\"a\""), "{text}");
-    assert!(text.contains("mrol_voxels_removed_total{map=\"a\"} 3"));
+    assert!(!text.contains("mrol_voxels_removed_total{map=\"a\"}"), "{text}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -339,7 +339,7 @@ fn with_few_open_files_it_keeps_fewer_connections_and_says_so() {
     serve.stderr(File::create(&log).expect("a log"));
     Process::of(serve).stop();
     let said = fs::read_to_string(&log).expect("a log");
-    for part in ["fewer open files", "open_files=512", "needed=4608", "connections_max=128"] {
+    for part in ["fewer open files", "open_files=512", "needed=4640", "connections_max=128"] {
         assert!(said.contains(part), "{part} is not in {said}");
     }
 }

@@ -5,8 +5,8 @@ use std::hint::black_box;
 use super::stopwatch::Runs;
 use super::structures::{Dense, DenseTooLarge, HashSet, Kernel, Structure, bits};
 use super::workload::Queries;
+use crate::map::MultiResolutionMap;
 use crate::map::lookup::{Lookup, stages};
-use crate::map::{MapView, MultiResolutionMap};
 use crate::voxel::LatticeFromPoints;
 
 /// A stage and how long it took, nanoseconds a point, run by run.
@@ -55,7 +55,7 @@ pub fn measure(
 struct Bench<'a> {
     queries: &'a Queries,
     quantise: LatticeFromPoints,
-    view: MapView<'a>,
+    map: &'a MultiResolutionMap,
     filter: Kernel<'a>,
     dense: Dense,
     set: HashSet,
@@ -75,7 +75,7 @@ impl<'a> Bench<'a> {
         Ok(Self {
             queries,
             quantise,
-            view: map.view(),
+            map,
             filter: Kernel::new(map, 0, Lookup::Bloom),
             dense,
             set: HashSet::of(map, 0),
@@ -89,7 +89,7 @@ impl<'a> Bench<'a> {
     fn run(&mut self, stage: usize, runs: &mut Runs) {
         let points = self.queries.points.len();
         runs.time(points, || match stage {
-            0 => stages::filter_contains(&self.keys, &self.view.level_view(0), &mut self.occupied),
+            0 => stages::filter_contains(&self.keys, &self.map.view().level_view(0), &mut self.occupied),
             1 => self.dense.contains(&self.offsets, &mut self.occupied),
             2 => bits(&self.keys, &mut self.occupied, |key| self.set.keys().contains(key)),
             3 => drop(black_box(self.intersection())),

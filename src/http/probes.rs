@@ -55,6 +55,7 @@ pub(super) async fn ready(
 /// `GET /metrics`: Prometheus' text form. One text answers all scrapes of a second.
 pub(super) async fn metrics(
     State(adapter): State<Adapter>,
+    NoParameters: NoParameters,
     request: Request,
 ) -> Result<impl IntoResponse, HttpError> {
     let Authorized { caller, service } = Authorized::of(request.extensions())?;

@@ -230,8 +230,13 @@ impl Remaker {
         let planes = |incarnation: &Incarnation| -> BTreeSet<i32> {
             incarnation.voxels.iter().map(|key| key.index()[2]).collect()
         };
+        // Of poses so near to each other that undo reaches no more, those of a map file, some are thinned.
+        let mut kept = found.scan_ids.iter();
+        let thinned = there.scan_ids.last() == found.scan_ids.last()
+            && kept.all(|scan_id| there.scan_ids.contains(scan_id));
+        let expected = Incarnation { scan_ids: found.scan_ids.clone(), ..there.clone() };
         assert!(
-            found == *there,
+            thinned && found == expected,
             "round {round}: {} revision {} scans {:?} planes {:?}, not {} {} {:?} {:?}",
             found.uuid,
             found.revision,

@@ -14,12 +14,13 @@ fn record(points: &[Point], map: &MultiResolutionMap) -> ScanRecord {
     ScanRecord::of_points(pose, points, map.lattice())
 }
 
-/// Two walls and a floor that meet in a corner, a point at the centre of each voxel.
+/// Two walls and a floor below the sensor that meet in a corner, a point at the center of each voxel.
 fn corner() -> Vec<Point> {
     let at = |i: i32| i as f32 * 0.05 + 0.025;
     let spans = move |n: i32| (0..n).flat_map(move |i| (0..n).map(move |j| (at(i), at(j))));
-    let walls =
-        spans(60).flat_map(|(a, b)| [[2.025, a - 1.0, b], [a - 1.0, 2.025, b], [a - 1.0, b - 1.0, 0.025]]);
+    let walls = spans(60).flat_map(|(a, b)| {
+        [[2.025, a - 1.0, b - 0.5], [a - 1.0, 2.025, b - 0.5], [a - 1.0, b - 1.0, -0.475]]
+    });
     walls.map(Point::from).collect()
 }
 

@@ -2,8 +2,8 @@
 
 use super::Structure;
 use crate::geometry::{Point, Pose};
+use crate::map::MultiResolutionMap;
 use crate::map::lookup::{self, Lookup};
-use crate::map::{MapView, MultiResolutionMap};
 
 /// A level of a map as its users ask it: through the sharded map and its locks.
 #[derive(Debug)]
@@ -38,26 +38,26 @@ impl Structure for ThroughMap<'_> {
     }
 }
 
-/// A level of a map that is locked already: the bare kernel.
+/// A level of a map that is locked once for all points of a question: the bare kernel.
 #[derive(Debug)]
 pub struct Kernel<'a> {
     map: &'a MultiResolutionMap,
-    view: MapView<'a>,
     level: u32,
     lookup: Lookup,
 }
 
 impl<'a> Kernel<'a> {
-    /// `level` of `map`, asked by `lookup`; the map cannot be changed while it lives.
+    /// `level` of `map`, asked by `lookup`.
     pub fn new(map: &'a MultiResolutionMap, level: u32, lookup: Lookup) -> Self {
-        Self { map, view: map.view(), level, lookup }
+        Self { map, level, lookup }
     }
 }
 
 impl Structure for Kernel<'_> {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
         let quantise = self.map.lattice().from_points(map_from_points);
-        lookup::occupied(points, &quantise, &self.view.level_view(self.level), self.lookup, occupied);
+        let view = self.map.view();
+        lookup::occupied(points, &quantise, &view.level_view(self.level), self.lookup, occupied);
     }
 
     fn bytes(&self) -> usize {

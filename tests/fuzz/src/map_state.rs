@@ -20,11 +20,13 @@ pub(super) fn check(map: &MultiResolutionMap, input: &[u8]) {
 
 /// A coarse voxel is there exactly as long as it has a child, in the sets and in the filters.
 fn levels_agree(map: &MultiResolutionMap) {
+    // Before the view, which holds the locks that these take.
+    let counts: Vec<usize> = (0..map.settings().levels).map(|level| map.voxels(level)).collect();
     let view = map.view();
     let finest = view.voxels();
-    for level in 0..map.settings().levels {
+    for (level, count) in (0..).zip(counts) {
         let parents: BTreeSet<_> = finest.iter().map(|voxel| voxel.ancestor(level)).collect();
-        assert_eq!(map.voxels(level), parents.len(), "voxels of level {level}");
+        assert_eq!(count, parents.len(), "voxels of level {level}");
         for &voxel in &parents {
             assert!(
                 view.contains(voxel, level) && view.may_contain(voxel, level),
