@@ -101,6 +101,7 @@ mod state {
     }
 }
 
+#[cfg(feature = "client")]
 pub(crate) use state::before_file_operation;
 pub(super) use state::{hold, may_wait};
 
