@@ -1,6 +1,7 @@
 //! `GET /v1/maps/{map}/trajectory?robot=&since_revision=&limit=`: the poses of the accepted scans, of all robots or of
 //! one. With a `limit`, a page of them, which says where the next one begins; without, all.
 
+use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::header;
@@ -36,6 +37,14 @@ struct End {
     next_since_revision: Option<u64>,
 }
 
+/// A page, which is there as a whole.
+#[derive(Serialize)]
+struct Page {
+    poses: Vec<PoseOut>,
+    #[serde(flatten)]
+    end: End,
+}
+
 #[derive(Serialize)]
 struct PoseOut {
     robot: String,
@@ -56,6 +65,13 @@ pub(super) async fn get(
     let TrajectoryParameters { robot, since_revision, limit } = query;
     let robot = robot.map(|name| RobotName::new(&name)).transpose().map_err(ServiceError::from)?;
     let query = TrajectoryQuery { robot, since_revision, limit };
+    if query.limit.is_some() {
+        let TrajectoryAnswer { poses, next_since_revision, state } =
+            service.maps().trajectory(&map, query).await?;
+        let end = End { state: state.into(), next_since_revision };
+        let poses = poses.iter().map(PoseOut::from).collect();
+        return Ok(Json(Page { poses, end }).into_response());
+    }
     let mut pieces = service.maps().trajectory_pieces(&map, query).await?;
     let kept = adapter.admission.keep(pieces.memory_bytes())?;
     // What fails at once is answered as such.
@@ -69,7 +85,7 @@ pub(super) async fn get(
     Ok(([(header::CONTENT_TYPE, "application/json")], Body::from_stream(text)).into_response())
 }
 
-/// Sends `{"poses":[...],<state>,"next_since_revision":n}` in pieces, the last field where there is more. What fails on
+/// Sends `{"poses":[...],<state>}` in pieces. What fails on
 /// the way breaks the answer off.
 async fn write(
     first: Option<TrajectoryAnswer>,

@@ -36,7 +36,7 @@ pub use name::{MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
 pub use observations::Observations;
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError, SPHERE_M_MAX};
-pub use requests::{AnsweredRequest, REQUESTS_KEPT, Requests};
+pub use requests::{AnsweredRequest, REQUESTS_KEPT, RequestKind, Requests};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{

@@ -26,13 +26,29 @@ pub struct AnsweredRequest {
 #[derive(Debug, Clone, Default)]
 pub struct Requests {
     answered: VecDeque<AnsweredRequest>,
-    by_id: HashMap<RequestId, u64>,
+    by_id: HashMap<(RequestId, RequestKind), u64>,
+}
+
+/// What was asked for. Ids of one kind say nothing of those of the other: who may undo scans is not always who may delete.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RequestKind {
+    /// Voxels taken out.
+    Deletion,
+    /// Scans taken out again.
+    Undo,
+}
+
+impl AnsweredRequest {
+    /// Its kind: an undo takes out a scan at least, a deletion none.
+    pub fn kind(&self) -> RequestKind {
+        if self.scans > 0 { RequestKind::Undo } else { RequestKind::Deletion }
+    }
 }
 
 impl Requests {
-    /// What came of the request of that id.
-    pub fn find(&self, id: &RequestId) -> Option<&AnsweredRequest> {
-        let revision = self.by_id.get(id)?;
+    /// What came of the request of that kind and id.
+    pub fn find(&self, kind: RequestKind, id: &RequestId) -> Option<&AnsweredRequest> {
+        let revision = self.by_id.get(&(id.clone(), kind))?;
         let place = self.answered.binary_search_by_key(revision, |request| request.revision).ok()?;
         self.answered.get(place)
     }
@@ -46,9 +62,10 @@ impl Requests {
         if self.answered.len() == REQUESTS_KEPT
             && let Some(oldest) = self.answered.pop_front()
         {
-            self.by_id.remove(&oldest.id);
+            let kind = oldest.kind();
+            self.by_id.remove(&(oldest.id, kind));
         }
-        self.by_id.insert(request.id.clone(), request.revision);
+        self.by_id.insert((request.id.clone(), request.kind()), request.revision);
         self.answered.push_back(request);
     }
 }
@@ -77,12 +94,21 @@ mod tests {
     }
 
     #[test]
+    fn an_undo_answers_for_no_deletion_of_the_same_id() {
+        let undo = AnsweredRequest { scans: 1, ..request(1) };
+        let requests: Requests = [undo.clone()].into_iter().collect();
+        assert_eq!(requests.find(RequestKind::Deletion, &undo.id), None);
+        assert_eq!(requests.find(RequestKind::Undo, &undo.id), Some(&undo));
+    }
+
+    #[test]
     fn the_oldest_request_is_forgotten_first() {
         let kept = REQUESTS_KEPT as u64;
         let requests: Requests = (0..kept + 2).map(request).collect();
-        assert_eq!(requests.find(&request(1).id), None);
-        assert_eq!(requests.find(&request(2).id), Some(&request(2)));
-        assert_eq!(requests.find(&request(kept + 1).id), Some(&request(kept + 1)));
+        let find = |n: u64| requests.find(RequestKind::Deletion, &request(n).id);
+        assert_eq!(find(1), None);
+        assert_eq!(find(2), Some(&request(2)));
+        assert_eq!(find(kept + 1), Some(&request(kept + 1)));
         assert_eq!(requests.iter().count(), REQUESTS_KEPT);
     }
 }

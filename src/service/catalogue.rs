@@ -5,9 +5,11 @@ mod opening;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use uuid::Uuid;
 
+use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
 use super::reach::Reachable;
@@ -17,6 +19,9 @@ use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
 use crate::store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Rank, RwLock};
 use opening::open_all;
+
+/// How long who makes, replaces or deletes a map waits for the one before: as long as a disk may reasonably take.
+const TURN_MAX: Duration = Duration::from_secs(10);
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
@@ -96,7 +101,12 @@ impl Catalogue {
         settings: MapSettings,
         maps_max: usize,
     ) -> Result<(Arc<HostedMap>, bool), ServiceError> {
-        let _writing = self.writing.lock().await;
+        // One that is there already waits for nobody's disk.
+        let found = self.find(&name)?;
+        if let Some(map) = found {
+            return same_settings(map, settings).map(|map| (map, false));
+        }
+        let _writing = self.turn_to_write().await?;
         let found = self.find(&name)?;
         if let Some(map) = found {
             return same_settings(map, settings).map(|map| (map, false));
@@ -115,16 +125,9 @@ impl Catalogue {
         maps_max: usize,
         replace: bool,
     ) -> Result<Arc<HostedMap>, ServiceError> {
-        let _writing = self.writing.lock().await;
+        let _writing = self.turn_to_write().await?;
+        self.check_free(&name, maps_max, replace)?;
         let old = self.find(&name)?;
-        if old.is_some() && !replace {
-            let message = format!(
-                "map {} exists: delete it first, restore under another name, or replace it",
-                name.name()
-            );
-            return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
-        }
-        self.check_room(maps_max)?;
         // `saving` is held until its snapshot is written.
         let BuiltMap { uuid, map, saving: _saving } = built;
         let build = move || Ok(map);
@@ -132,6 +135,34 @@ impl Catalogue {
             None => self.add(name.name(), uuid, build).await,
             Some(old) => self.replace(old, uuid, build).await,
         }
+    }
+
+    /// Refuses a map file for which there is no place, before any work is done for it.
+    pub(super) fn check_free(
+        &self,
+        name: &Reachable,
+        maps_max: usize,
+        replace: bool,
+    ) -> Result<(), ServiceError> {
+        if self.find(name)?.is_some() && !replace {
+            let name = name.name();
+            let message =
+                format!("map {name} exists: delete it first, restore under another name, or replace it");
+            return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
+        }
+        self.check_room(maps_max)
+    }
+
+    /// Waits for the turn to make, replace or delete a map, not for ever: a disk that hangs may hold up who has it.
+    async fn turn_to_write(&self) -> Result<tokio::sync::MutexGuard<'_, ()>, ServiceError> {
+        let turn = tokio::time::timeout(TURN_MAX, self.writing.lock()).await;
+        turn.map_err(|_| {
+            let message = format!(
+                "another map has been made, replaced or deleted for {TURN_MAX:?} and more: its disk hangs, or is slow; \
+                 try again"
+            );
+            ServiceError::new(ErrorCode::Unavailable, "catalogue_busy", message).retry_after(TURN_MAX)
+        })
     }
 
     fn check_room(&self, maps_max: usize) -> Result<(), ServiceError> {
@@ -154,10 +185,10 @@ impl Catalogue {
     ) -> Result<Arc<HostedMap>, ServiceError> {
         let (data_dir, of, settings) = (self.data_dir.clone(), name.clone(), self.settings.clone());
         let map = blocking(move || {
-            let map = build()?;
+            let (map, thread) = (build()?, CommitThread::start(&of)?);
             let create = |data_dir: Arc<DataDir>| data_dir.create(&of, &Snapshot::of(&map, uuid));
             let folder = data_dir.map(create).transpose().map_err(not_stored)?;
-            HostedMap::new(of, uuid, map, folder, &settings).map(Arc::new)
+            Ok(Arc::new(HostedMap::new(thread, of, uuid, map, folder, &settings)))
         })
         .await?;
         self.maps.write().open.insert(name.clone(), Arc::clone(&map));
@@ -178,11 +209,13 @@ impl Catalogue {
         };
         let exchanged = blocking(move || {
             let map = build()?;
+            let [thread, thread_of_old] = [CommitThread::start(&old.name)?, CommitThread::start(&old.name)?];
             // Its revision, and so its new name, is known from now on.
             old.committing.end_replaced();
+            let synced = old.folder.as_ref().map_or(Ok(()), |folder| folder.sync()).map_err(not_stored);
             let kept = name_of_replaced(&old.name, old.map.revision(), &taken);
             let exchange = || {
-                let kept = kept?;
+                let kept = synced.and(kept)?;
                 let replace = |data_dir: Arc<DataDir>| match &old.folder {
                     Some(folder) => {
                         let first = Snapshot::of(&map, uuid);
@@ -190,14 +223,16 @@ impl Catalogue {
                     }
                     None => Ok(None),
                 };
-                let folder = data_dir.map_or(Ok(None), replace)?;
-                let new = HostedMap::new(old.name.clone(), uuid, map, folder, &settings)?;
-                Ok((kept, new))
+                data_dir.map_or(Ok(None), replace).map(|folder| (kept, folder))
             };
             match exchange() {
-                Ok((kept, new)) => Ok((Arc::new(new), Arc::new(old.again_as(kept, &settings)?), None)),
+                Ok((kept, folder)) => {
+                    let kept = old.again_as(thread_of_old, kept, &settings);
+                    let new = HostedMap::new(thread, old.name.clone(), uuid, map, folder, &settings);
+                    Ok((Arc::new(new), Arc::new(kept), None))
+                }
                 Err(error) => {
-                    let old = Arc::new(old.again_as(old.name.clone(), &settings)?);
+                    let old = Arc::new(old.again_as(thread_of_old, old.name.clone(), &settings));
                     Ok((Arc::clone(&old), old, Some(error)))
                 }
             }
@@ -215,7 +250,7 @@ impl Catalogue {
     }
 
     pub(super) async fn delete(&self, name: &Reachable) -> Result<(), ServiceError> {
-        let _writing = self.writing.lock().await;
+        let _writing = self.turn_to_write().await?;
         let map = self.get(name)?;
         let folder = map.folder.clone();
         let removed =

@@ -23,7 +23,7 @@ use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::store::{MapFolder, Record, StoreError, StoreSettings};
-use crate::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use crate::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use crate::sync::thread;
 use crate::util::{Durations, SharedDurations};
 use worker::Worker;
@@ -109,24 +109,47 @@ impl std::fmt::Debug for Waiting {
     }
 }
 
+/// The thread of a map that is not there yet. It is started before anything is done on the disk, so that what was done
+/// there never lacks a thread; dropped, it ends.
+pub(super) struct CommitThread(SyncSender<(Worker, Receiver<Waiting>)>);
+
+impl CommitThread {
+    /// Starts the thread of a map of that name.
+    ///
+    /// # Errors
+    /// When the system has no thread left.
+    pub(super) fn start(name: &MapName) -> Result<Self, ServiceError> {
+        let (begin, begun) = sync_channel::<(Worker, Receiver<Waiting>)>(1);
+        let thread = thread::Builder::new().name(format!("mrol-commit-{name}"));
+        let started = thread.spawn(move || {
+            if let Ok((worker, waiting)) = begun.recv() {
+                worker.run(&waiting);
+            }
+        });
+        let no_threads =
+            |e: std::io::Error| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string());
+        started.map_err(no_threads).map(|_| Self(begin))
+    }
+}
+
 impl Committing {
-    /// Starts the thread of a map. `announced` is told of each revision.
-    pub(super) fn start(
+    /// Gives `thread` a map. `announced` is told of each revision.
+    pub(super) fn begin(
+        thread: CommitThread,
         name: MapName,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
         announced: watch::Sender<u64>,
         settings: &StoreSettings,
-    ) -> Result<Self, ServiceError> {
+    ) -> Self {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
-        let thread = thread::Builder::new().name(format!("mrol-commit-{name}"));
         let durations = Arc::<SharedDurations>::default();
         let worker =
             Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations), settings);
-        let started = thread.spawn(move || worker.run(&waiting));
-        started.map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
-        Ok(Self { inbox, stopped, durations })
+        // It waits for just this.
+        drop(thread.0.send((worker, waiting)));
+        Self { inbox, stopped, durations }
     }
 
     /// Hands a change over; its outcome comes when it is visible, and with [`Durability::Always`] durable. Does not

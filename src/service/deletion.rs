@@ -9,7 +9,8 @@ use super::room::Room;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
 use crate::geometry::Point;
 use crate::map::{
-    AnsweredRequest, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request, SHARDS,
+    AnsweredRequest, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request, RequestKind,
+    SHARDS,
 };
 use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
 
@@ -22,7 +23,7 @@ impl HostedMap {
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request { id, digest: digest(deletion) });
-        if let Some(answered) = self.answered(request.as_ref())? {
+        if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref())? {
             let state = self.state(answered.revision);
             return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, state, replayed: true }));
         }
@@ -30,7 +31,7 @@ impl HostedMap {
         let (map, deletion, room) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(room));
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |core: &MultiResolutionMap| {
-            map.still_unanswered(request.as_ref())?;
+            map.still_unanswered(RequestKind::Deletion, request.as_ref())?;
             let lent = room.lend(search_bytes(core, &deletion), "a deletion")?;
             let voxels = map.targets_of(&deletion)?;
             if voxels.is_empty() {
@@ -53,12 +54,13 @@ impl HostedMap {
     /// What came of a request the first time.
     pub(super) fn answered(
         &self,
+        kind: RequestKind,
         request: Option<&Request>,
     ) -> Result<Option<AnsweredRequest>, ServiceError> {
         let Some(request) = request else {
             return Ok(None);
         };
-        match self.map.requests().find(&request.id) {
+        match self.map.requests().find(kind, &request.id) {
             Some(answered) if answered.digest != request.digest => {
                 let message = format!(
                     "request_id {} was accepted at revision {} with other content: name new requests anew",
@@ -71,8 +73,12 @@ impl HostedMap {
     }
 
     /// The same request may have come twice, and the other one first.
-    pub(super) fn still_unanswered(&self, request: Option<&Request>) -> Result<(), Refusal> {
-        if self.answered(request)?.is_some() { Err(Refusal::Stale) } else { Ok(()) }
+    pub(super) fn still_unanswered(
+        &self,
+        kind: RequestKind,
+        request: Option<&Request>,
+    ) -> Result<(), Refusal> {
+        if self.answered(kind, request)?.is_some() { Err(Refusal::Stale) } else { Ok(()) }
     }
 
     fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
@@ -136,15 +142,20 @@ fn in_range(key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
 
 /// Tells one request from another under the same id.
 fn digest(deletion: &Deletion) -> u64 {
-    let digest = Digest::default().number(u64::from(deletion.level));
+    let digest = Digest::new("deletion").number(u64::from(deletion.level));
     match &deletion.target {
-        DeletionTarget::Points(points) => digest.bytes(bytemuck::cast_slice(points.as_slice())),
-        DeletionTarget::Keys(keys) => {
-            keys.iter().fold(digest.number(1), |digest, key| digest.number(key.to_bits()))
+        DeletionTarget::Points(points) => {
+            digest.bytes(b"points").bytes(bytemuck::cast_slice(points.as_slice()))
         }
-        DeletionTarget::Region(Region::Box { min_m, max_m }) => digest.numbers(min_m).numbers(max_m),
+        DeletionTarget::Keys(keys) => {
+            let bits: Vec<u64> = keys.iter().map(|key| key.to_bits()).collect();
+            digest.bytes(b"keys").bytes(bytemuck::cast_slice(&bits))
+        }
+        DeletionTarget::Region(Region::Box { min_m, max_m }) => {
+            digest.bytes(b"box").numbers(min_m).numbers(max_m)
+        }
         DeletionTarget::Region(Region::Sphere { center_m, radius_m }) => {
-            digest.numbers(center_m).numbers(&[*radius_m])
+            digest.bytes(b"sphere").numbers(center_m).numbers(&[*radius_m])
         }
     }
     .finish()

@@ -9,7 +9,7 @@ use bytes::Bytes;
 use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
-use super::committing::{Committing, Stop};
+use super::committing::{CommitThread, Committing, Stop};
 use super::map_file::snapshot_bytes;
 use super::room::Room;
 use super::trajectory::thin;
@@ -59,39 +59,35 @@ const POINTS_PER_STEP: usize = 64 << 10;
 const RATE_SEED: u64 = 1;
 
 impl HostedMap {
-    /// Takes a map into service.
-    ///
-    /// # Errors
-    /// When no thread can be started for its changes.
+    /// Takes a map into service; `thread` makes its changes.
     pub(super) fn new(
+        thread: CommitThread,
         name: MapName,
         uuid: Uuid,
         map: impl Into<Arc<MultiResolutionMap>>,
         folder: Option<MapFolder>,
         settings: &StoreSettings,
-    ) -> Result<Self, ServiceError> {
-        Self::of_shared(name, uuid, map.into(), folder.map(Arc::new), settings)
+    ) -> Self {
+        Self::of_shared(thread, name, uuid, map.into(), folder.map(Arc::new), settings)
     }
 
     /// The same map under the name `name`, once this one has ended.
-    ///
-    /// # Errors
-    /// As there.
-    pub(super) fn again_as(&self, name: MapName, settings: &StoreSettings) -> Result<Self, ServiceError> {
-        Self::of_shared(name, self.uuid, Arc::clone(&self.map), self.folder.clone(), settings)
+    pub(super) fn again_as(&self, thread: CommitThread, name: MapName, settings: &StoreSettings) -> Self {
+        Self::of_shared(thread, name, self.uuid, Arc::clone(&self.map), self.folder.clone(), settings)
     }
 
     fn of_shared(
+        thread: CommitThread,
         name: MapName,
         uuid: Uuid,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
         settings: &StoreSettings,
-    ) -> Result<Self, ServiceError> {
+    ) -> Self {
         let (announcing, announced) = watch::channel(map.revision());
         let committing =
-            Committing::start(name.clone(), Arc::clone(&map), folder.clone(), announcing, settings)?;
-        Ok(Self {
+            Committing::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), announcing, settings);
+        Self {
             name,
             uuid,
             map,
@@ -100,7 +96,7 @@ impl HostedMap {
             announced,
             turns: Mutex::new(Rank::Brief, HashMap::new()),
             is_put_off: AtomicBool::default(),
-        })
+        }
     }
 
     /// Writes a snapshot where there is need and room for one; true when it did. A map whose journal failed is left as
@@ -188,6 +184,9 @@ impl HostedMap {
         match tokio::time::timeout(wait_max, reached).await {
             Ok(Ok(_)) => Ok(()),
             Ok(Err(_)) | Err(_) => {
+                if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.committing.stopped() {
+                    return Err(stop.refusal(&self.name));
+                }
                 let message = format!(
                     "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
                     self.name,

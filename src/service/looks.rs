@@ -4,6 +4,7 @@ use std::cell::Cell;
 
 use uuid::Uuid;
 
+use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::room::Room;
 use super::{ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceSettings};
@@ -26,7 +27,11 @@ fn hosted() -> HostedMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
     let pose = TrajectoryPose::new(robot(), Pose::identity());
     map.committer().insert_scan(ScanRecord::of_points(pose, &wall(10_000), map.lattice()));
-    HostedMap::new(MapName::new("a").unwrap(), Uuid::nil(), map, None, &StoreSettings::default()).unwrap()
+    {
+        let name = MapName::new("a").unwrap();
+        let thread = CommitThread::start(&name).unwrap();
+        HostedMap::new(thread, name, Uuid::nil(), map, None, &StoreSettings::default())
+    }
 }
 
 #[test]

@@ -66,6 +66,11 @@ pub(super) fn from_file(file: &[u8], limits: &Limits, room: &Room) -> Result<Bui
     };
     let Snapshot { settings, contents, .. } =
         Snapshot::decode_within(file, &bounds, &mut reserve).map_err(not_read)?;
+    let (robots, most) = (contents.trajectory.robots_known(), limits.robots_per_map_max);
+    if robots > most {
+        let message = format!("the map file has scans of {robots} robots, robots_per_map_max is {most}");
+        return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message));
+    }
     let moments = contents.moments.as_slice().len();
     reserve(settings.empty_filter_bytes() + growth_bytes(&settings, &contents.voxels, moments))?;
     let map = MultiResolutionMap::restore(settings, contents)?;

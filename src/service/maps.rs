@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
-use super::{ErrorCode, MapFile, MapInfo, MapService, ServiceError, UnavailableMap};
+use super::{ErrorCode, MapFile, MapInfo, MapReach, MapService, ServiceError, UnavailableMap};
 use crate::map::{MapName, MapSettings};
 use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
@@ -91,7 +91,7 @@ impl MapService {
     /// would be larger than `map_file_bytes_max`, so that nobody could restore it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
         let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
-        self.inner.queries.run(move |stop| map.to_file(&inner.room, &inner.settings.limits, stop)).await?
+        self.inner.map_files.run(move |stop| map.to_file(&inner.room, &inner.settings.limits, stop)).await?
     }
 
     /// Makes a map from a map file, under a uuid of its own. With `replace` it takes the place of the map of that name,
@@ -109,10 +109,16 @@ impl MapService {
         replace: bool,
     ) -> Result<MapInfo, ServiceError> {
         let name = self.reach.check(&name)?;
+        if replace && self.reach != MapReach::Every {
+            let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
+                           delete the map first, or ask with such a key";
+            return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));
+        }
         self.inner.room.check_to_grow()?;
+        self.inner.catalogue.check_free(&name, self.limits().maps_max, replace)?;
         let inner = Arc::clone(&self.inner);
         let build = move |_: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room);
-        let built = self.inner.mapping.run(build).await??;
+        let built = self.inner.map_files.run(build).await??;
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
         let restore = async move { inner.catalogue.restore(name, built, maps_max, replace).await };
@@ -135,8 +141,11 @@ impl MapService {
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        self.inner.catalogue.save(move |map| map.make_room(&inner.room).map(|()| false)).await?;
-        self.save_maps(Saving::Due).await
+        let made_room =
+            self.inner.catalogue.save(move |map| map.make_room(&inner.room).map(|()| false)).await;
+        // The others are saved all the same: their journals grow just where there is no room.
+        let saved = self.save_maps(Saving::Due).await;
+        made_room.and(saved)
     }
 
     async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {

@@ -76,6 +76,8 @@ pub struct MapService {
 
 /// See [`Inner::undo`].
 const UNDO_THREADS: usize = 1;
+/// Threads for map files.
+const MAP_FILE_THREADS: usize = 1;
 
 #[derive(Debug)]
 struct Inner {
@@ -90,6 +92,9 @@ struct Inner {
     /// For finding out what an undo takes back, which reads a snapshot and the journal behind it: one at a time, since two
     /// of one map cannot both be made as they were prepared, and each takes memory as the map does.
     undo: Pool,
+    /// For map files, out of the server and in, which take seconds and much memory each: one at a time, and no query
+    /// or scan waits for them.
+    map_files: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
     room: Arc<Room>,
@@ -111,6 +116,7 @@ impl MapService {
             mapping: Pool::new("mapping", settings.mapping_threads, waiting)?,
             alignment: Pool::new("alignment", settings.alignment_threads, waiting)?,
             undo: Pool::new("undo", UNDO_THREADS, waiting)?,
+            map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
             localization: Pool::new("localization", settings.localization_threads, waiting)?,
             room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
             settings,
@@ -145,9 +151,9 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 5] {
-        let Inner { queries, mapping, alignment, localization, undo, .. } = &*self.inner;
-        [queries, mapping, alignment, localization, undo].map(Pool::in_use)
+    pub fn pools(&self) -> [PoolUse; 6] {
+        let Inner { queries, mapping, alignment, localization, undo, map_files, .. } = &*self.inner;
+        [queries, mapping, alignment, localization, undo, map_files].map(Pool::in_use)
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.

@@ -11,7 +11,7 @@ use shuttle::future::block_on;
 use shuttle::thread;
 use uuid::Uuid;
 
-use super::committing::Step;
+use super::committing::{CommitThread, Step};
 use super::hosted_map::{HostedMap, Saving};
 use super::room::Room;
 use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
@@ -61,7 +61,7 @@ fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
         Step::Answered(answer) => Ok(answer),
         Step::Proposed(outcome, answer) => match block_on(outcome) {
             Ok(Ok(committed)) => Ok(answer(committed)),
-            Ok(Err(_)) | Err(_) => Err(ServiceError::overloaded("refused".into())),
+            Ok(Err(_)) | Err(_) => Err(ServiceError::overloaded("refused")),
         },
     }
 }
@@ -76,7 +76,8 @@ fn crowd() {
     let disk = simulated::SimulatedDisk::default();
     let (uuid, core) = (Uuid::from_u128(7), MultiResolutionMap::new(MapSettings::new(1.0, 4)).unwrap());
     let folder = data_dir(&disk).create(&name(), &Snapshot::of(&core, uuid)).unwrap();
-    let map = HostedMap::new(name(), uuid, core, Some(folder), &StoreSettings::default()).unwrap();
+    let thread = CommitThread::start(&name()).unwrap();
+    let map = HostedMap::new(thread, name(), uuid, core, Some(folder), &StoreSettings::default());
     let (map, room) = (Arc::new(map), Arc::new(Room::new(None, Marks::default())));
     let spawn = |work: fn(&Arc<HostedMap>, &Arc<Room>) -> u64| {
         let (map, room) = (Arc::clone(&map), Arc::clone(&room));

@@ -10,8 +10,8 @@ use super::time_limit::TimeLimit;
 use super::trajectory::check_not_forgotten;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
 use crate::map::{
-    Change, Committed, MultiResolutionMap, Observations, Request, Trajectory, TrajectoryPose, UndoRecord,
-    WithdrawnScan,
+    Change, Committed, MultiResolutionMap, Observations, Request, RequestKind, Trajectory, TrajectoryPose,
+    UndoRecord, WithdrawnScan,
 };
 use crate::store::{MapFolder, StoreError};
 use crate::util::StopSignal;
@@ -31,7 +31,7 @@ impl HostedMap {
     ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
         let request = undo.request_id.clone().map(|id| Request { id, digest: digest(&undo.target) });
-        if let Some(answered) = self.answered(request.as_ref())? {
+        if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref())? {
             let (scans, removed, state) = (answered.scans, answered.voxels, self.state(answered.revision));
             return Ok(Step::Answered(UndoAnswer { scans, removed, state, replayed: true }));
         }
@@ -50,7 +50,7 @@ impl HostedMap {
 
         let (map, count, limit) = (Arc::clone(self), scans.len(), limit.clone());
         let decide = move |core: &MultiResolutionMap| {
-            map.still_unanswered(request.as_ref())?;
+            map.still_unanswered(RequestKind::Undo, request.as_ref())?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
@@ -145,10 +145,12 @@ impl HostedMap {
 
 /// Tells one request from another under the same id.
 fn digest(target: &UndoTarget) -> u64 {
-    let digest = Digest::default().bytes(b"undo");
+    let digest = Digest::new("undo");
     match target {
-        UndoTarget::Scan { robot, scan_id } => digest.bytes(robot.as_str().as_bytes()).number(*scan_id),
-        UndoTarget::Revision(revision) => digest.number(*revision),
+        UndoTarget::Scan { robot, scan_id } => {
+            digest.bytes(b"scan").bytes(robot.as_str().as_bytes()).number(*scan_id)
+        }
+        UndoTarget::Revision(revision) => digest.bytes(b"revision").number(*revision),
         UndoTarget::RobotSince { robot, revision } => {
             digest.bytes(b"since").bytes(robot.as_str().as_bytes()).number(*revision)
         }

@@ -231,10 +231,13 @@ impl DataDir {
         self.files.list(&self.maps).map_err(StoreError::io(&self.maps))
     }
 
-    /// The names of the folders that claim to be that map.
+    /// The names of the folders that claim to be that map. What a failed operation left is none: it goes before the
+    /// next map is made, and must not be served until then.
     fn folders_of(&self, name: &MapName) -> Result<Vec<String>, StoreError> {
         let mut entries = self.entries()?;
-        entries.retain(|entry| Entry::of(entry).into_map().as_ref() == Some(name));
+        let leftovers = self.leftovers.lock();
+        entries
+            .retain(|entry| Entry::of(entry).into_map().as_ref() == Some(name) && !leftovers.contains(entry));
         Ok(entries)
     }
 

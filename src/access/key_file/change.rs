@@ -112,6 +112,11 @@ fn lock(path: &Path) -> io::Result<File> {
     name.push(".lock");
     let file =
         OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(PathBuf::from(name))?;
+    // Who may change the keys may wait for the lock. Where that cannot be said, only its maker may.
+    if let Ok(keys) = fs::metadata(path) {
+        let _ = file.set_permissions(keys.permissions());
+        let _ = fchown(&file, None, Some(keys.gid()));
+    }
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => file.lock()?,
@@ -127,8 +132,24 @@ fn replace(path: &Path, text: &str) -> io::Result<()> {
     new.write_all(text.as_bytes())?;
     if let Ok(there) = fs::metadata(path) {
         new.as_file().set_permissions(there.permissions())?;
-        // The administrator may give a file away to the server's user; others may not, and keep it for themselves.
-        let _ = fchown(new.as_file(), Some(there.uid()), Some(there.gid()));
+        // Who may do the one and not the other does what he may.
+        let _ = fchown(new.as_file(), None, Some(there.gid()));
+        let _ = fchown(new.as_file(), Some(there.uid()), None);
+        let made = new.as_file().metadata()?;
+        // The server might not be able to read it, and would go on with the keys of before.
+        if (made.uid(), made.gid()) != (there.uid(), there.gid()) {
+            return Err(io::Error::new(
+                io::ErrorKind::PermissionDenied,
+                format!(
+                    "the file belongs to user {} and group {}, and a new one would belong to {} and {}: nothing was \
+                     changed; run this as that user, or as root",
+                    there.uid(),
+                    there.gid(),
+                    made.uid(),
+                    made.gid()
+                ),
+            ));
+        }
     }
     new.as_file().sync_all()?;
     new.persist(path)?;

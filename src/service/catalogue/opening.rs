@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::{Named, not_stored};
 use crate::map::MapName;
 use crate::service::ServiceError;
+use crate::service::committing::CommitThread;
 use crate::service::hosted_map::HostedMap;
 use crate::service::trajectory::thin;
 use crate::store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError, StoreSettings};
@@ -30,8 +31,9 @@ pub(super) fn open_all(
                 report(&name, &opened, start);
                 // The snapshot was written before what went when it was there.
                 thin(&opened.map, &opened.folder);
-                let map =
-                    HostedMap::new(name.clone(), opened.uuid, opened.map, Some(opened.folder), settings)?;
+                let thread = CommitThread::start(&name)?;
+                let OpenedMap { uuid, map, folder, .. } = opened;
+                let map = HostedMap::new(thread, name.clone(), uuid, map, Some(folder), settings);
                 maps.open.insert(name, Arc::new(map));
             }
             Err(error @ StoreError::Cancelled) => return Err(not_stored(error)),

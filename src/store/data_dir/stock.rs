@@ -77,6 +77,13 @@ impl DataDir {
         Ok(())
     }
 
+    /// True of a folder that holds one snapshot, of that revision, and no journal: what taking in a map file leaves.
+    fn holds_only(&self, entry: &str, revision: u64) -> Result<bool, StoreError> {
+        let path = self.maps.join(entry);
+        let names = self.files.list(&path).map_err(StoreError::io(&path))?;
+        Ok(names == [snapshot_files::snapshot_name(revision)])
+    }
+
     /// Makes a map's folder of a map file.
     fn take_in(&self, name: &MapName) -> Result<(), StoreError> {
         let file = self.maps.join(Entry::file_name(name));
@@ -85,11 +92,13 @@ impl DataDir {
         let folders: BTreeSet<String> = self.folders_of(name)?.into_iter().collect();
         if folders.is_empty() {
             self.make(&taken, &snapshot, None)?;
-        } else if !folders.contains(&taken) {
-            let reason = format!("map {name} exists already: rename the file, or move it away");
+        } else if !folders.contains(&taken) || !self.holds_only(&taken, snapshot.contents.revision)? {
+            let reason = format!(
+                "map {name} exists already: rename the file, move it away, or `mrol restore --replace` it"
+            );
             return Err(StoreError::damaged(&file, reason));
         }
-        // Where a crash came between the two, the folder is there and only the file has to go.
+        // Where a crash came between the two, the folder holds what the file does, and only the file has to go.
         let removed = self.files.remove(&file).and_then(|()| self.files.sync(&self.maps));
         removed.map_err(StoreError::io(&file))
     }

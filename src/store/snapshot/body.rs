@@ -1,5 +1,7 @@
 //! The body of a map file. What it holds is counted first: of each part memory is asked for before it is built.
 
+use std::collections::HashSet;
+
 use prost::Message;
 use uuid::Uuid;
 
@@ -7,7 +9,9 @@ use super::Snapshot;
 use super::fields::{Fields, Value, count_bytes, count_varints};
 use super::limits::{MapFileError, MapFileLimits, Memory};
 use crate::bloom::FilterSettings;
-use crate::map::{AnsweredRequest, MapContents, MapSettings, REQUESTS_KEPT, Trajectory, TrajectoryPose};
+use crate::map::{
+    AnsweredRequest, MapContents, MapSettings, REQUESTS_KEPT, Requests, Trajectory, TrajectoryPose,
+};
 use crate::store::codec::{Unreadable, moments, with_forgotten};
 use crate::store::pb;
 use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
@@ -31,9 +35,12 @@ mod number {
 
     /// In `Voxels` and `Moments`.
     pub(super) const KEY_GAPS: u64 = 1;
+    /// In `Voxels`.
+    pub(super) const OCTREES: u64 = 2;
     /// In `Moments`.
     pub(super) const NUMBERS: u64 = 2;
     pub(super) const FORMS: u64 = 3;
+    pub(super) const POINTS: u64 = 4;
 
     /// In `ForgottenScans`.
     pub(super) const ID_GAPS: u64 = 2;
@@ -141,7 +148,7 @@ impl<'a> Body<'a> {
             voxels,
             moments,
             trajectory: self.trajectory(memory)?,
-            requests: self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?,
+            requests: self.requests()?,
         };
         let contents = contents.checked().map_err(|e| e.to_string())?;
         Ok(Snapshot { uuid, settings, contents })
@@ -191,7 +198,9 @@ impl<'a> Body<'a> {
         let blocks = self.voxels.map_or(Ok(of_version_1), |it| count_varints(it, number::KEY_GAPS))?;
         // None of them is empty.
         within("blocks of voxels", blocks)?;
-        memory.reserve(blocks * BLOCK_BYTES)?;
+        // Decoding copies the octrees out of the body.
+        let octrees = self.voxels.map_or(Ok(0), |voxels| count_bytes(voxels, number::OCTREES))?;
+        memory.reserve(blocks * BLOCK_BYTES + octrees)?;
         let voxels = match self.voxels {
             Some(message) => decoded::<pb::Voxels>(message, "voxels")?.try_into()?,
             None => voxels_of_version_1(self.block_keys, self.block_masks)?,
@@ -213,8 +222,10 @@ impl<'a> Body<'a> {
         let count = |field| count_varints(message, field);
         let (gaps, numbers) = (count(number::KEY_GAPS)?, count(number::NUMBERS)?);
         let forms = count_bytes(message, number::FORMS)?;
+        let points = count_bytes(message, number::POINTS)?;
         let keys = if gaps == 0 && forms > 0 { beside() } else { gaps };
-        memory.reserve((gaps + numbers) * NUMBER_BYTES + keys.max(forms) * MOMENT_BYTES)?;
+        let copied = forms + points;
+        memory.reserve((gaps + numbers) * NUMBER_BYTES + keys.max(forms) * MOMENT_BYTES + copied)?;
         Ok(moments::read(&decoded(message, "moments")?, voxels)?)
     }
 
@@ -237,9 +248,26 @@ impl<'a> Body<'a> {
     fn scans(&self) -> Result<Vec<TrajectoryPose>, Unreadable> {
         let mut scans = Vec::with_capacity(self.scans);
         for record in self.records(number::TRAJECTORY) {
-            scans.push(decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?);
+            let scan: TrajectoryPose = decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?;
+            let (overlaps, levels) = (scan.level_overlaps.len(), self.levels as usize);
+            if overlaps > levels {
+                return Err(format!("a scan with {overlaps} overlaps, of a map of {levels} levels"));
+            }
+            scans.push(scan);
         }
         Ok(scans)
+    }
+
+    /// Each of its own revision, and each id once a kind: which answer is whose is told by them.
+    fn requests(&self) -> Result<Requests, Unreadable> {
+        let requests: Vec<AnsweredRequest> =
+            self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?;
+        let ascend = requests.is_sorted_by(|one, next| one.revision < next.revision);
+        let ids: HashSet<_> = requests.iter().map(|request| (&request.id, request.kind())).collect();
+        if !ascend || ids.len() != requests.len() {
+            return Err("the revisions of its requests must ascend, and their ids must differ".into());
+        }
+        Ok(requests.into_iter().collect())
     }
 
     fn withdrawn(&self) -> Result<Vec<crate::map::WithdrawnScan>, Unreadable> {
