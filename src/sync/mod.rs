@@ -58,6 +58,7 @@ pub(crate) enum Rank {
     Brief,
 }
 
+#[cfg(debug_assertions)]
 impl Rank {
     /// True of a lock of a map's content: nobody who holds it may wait for a disk.
     fn forbids_file_operations(self) -> bool {
