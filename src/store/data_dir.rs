@@ -4,7 +4,8 @@
 //! DATA_DIR/lock                   held by the one process that uses the folder
 //! DATA_DIR/maps/NAME.UUID/        a map, see `map_folder.rs`
 //! DATA_DIR/maps/NAME/             a map of a former release: gets its uuid when it is opened
-//! DATA_DIR/maps/NAME.mrol         a map file (of version 1, a backup, of `mrol map --out`): taken in when it is found
+//! DATA_DIR/maps/NAME.mrol         a map file (of version 1, a backup, of `mrol map --out`): taken in at a start where
+//!                                 there is no map of the name; where there is one, it stays and is reported
 //! DATA_DIR/maps/.unfinished-...   what a crash left: swept away
 //! ```
 //!
