@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::committing::{Decided, Proposal, Refusal, Step};
-use super::digest::Digest;
+use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::room::Room;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
@@ -23,7 +23,8 @@ impl HostedMap {
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request { id, digest: digest(deletion) });
-        if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref())? {
+        let former = former_digest(deletion);
+        if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref(), former)? {
             let state = self.state(answered.revision);
             return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, state, replayed: true }));
         }
@@ -31,7 +32,7 @@ impl HostedMap {
         let (map, deletion, room) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(room));
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |core: &MultiResolutionMap| {
-            map.still_unanswered(RequestKind::Deletion, request.as_ref())?;
+            map.still_unanswered(RequestKind::Deletion, request.as_ref(), former)?;
             let lent = room.lend(search_bytes(core, &deletion), "a deletion")?;
             let voxels = map.targets_of(&deletion)?;
             if voxels.is_empty() {
@@ -56,12 +57,13 @@ impl HostedMap {
         &self,
         kind: RequestKind,
         request: Option<&Request>,
+        former_digest: u64,
     ) -> Result<Option<AnsweredRequest>, ServiceError> {
         let Some(request) = request else {
             return Ok(None);
         };
         match self.map.requests().find(kind, &request.id) {
-            Some(answered) if answered.digest != request.digest => {
+            Some(answered) if ![request.digest, former_digest].contains(&answered.digest) => {
                 let message = format!(
                     "request_id {} was accepted at revision {} with other content: name new requests anew",
                     request.id, answered.revision
@@ -77,8 +79,9 @@ impl HostedMap {
         &self,
         kind: RequestKind,
         request: Option<&Request>,
+        former_digest: u64,
     ) -> Result<(), Refusal> {
-        if self.answered(kind, request)?.is_some() { Err(Refusal::Stale) } else { Ok(()) }
+        if self.answered(kind, request, former_digest)?.is_some() { Err(Refusal::Stale) } else { Ok(()) }
     }
 
     fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
@@ -156,6 +159,22 @@ fn digest(deletion: &Deletion) -> u64 {
         }
         DeletionTarget::Region(Region::Sphere { center_m, radius_m }) => {
             digest.bytes(b"sphere").numbers(center_m).numbers(&[*radius_m])
+        }
+    }
+    .finish()
+}
+
+/// The digest of the same request in data folders of version 3 and before.
+fn former_digest(deletion: &Deletion) -> u64 {
+    let digest = FormerDigest::default().number(u64::from(deletion.level));
+    match &deletion.target {
+        DeletionTarget::Points(points) => digest.bytes(bytemuck::cast_slice(points.as_slice())),
+        DeletionTarget::Keys(keys) => {
+            keys.iter().fold(digest.number(1), |digest, key| digest.number(key.to_bits()))
+        }
+        DeletionTarget::Region(Region::Box { min_m, max_m }) => digest.numbers(min_m).numbers(max_m),
+        DeletionTarget::Region(Region::Sphere { center_m, radius_m }) => {
+            digest.numbers(center_m).numbers(&[*radius_m])
         }
     }
     .finish()

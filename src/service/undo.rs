@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::committing::{Decided, Proposal, Refusal, Step, Stop};
-use super::digest::Digest;
+use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::room::Room;
 use super::time_limit::TimeLimit;
@@ -31,7 +31,8 @@ impl HostedMap {
     ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
         let request = undo.request_id.clone().map(|id| Request { id, digest: digest(&undo.target) });
-        if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref())? {
+        let former = former_digest(&undo.target);
+        if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref(), former)? {
             let (scans, removed, state) = (answered.scans, answered.voxels, self.state(answered.revision));
             return Ok(Step::Answered(UndoAnswer { scans, removed, state, replayed: true }));
         }
@@ -50,7 +51,7 @@ impl HostedMap {
 
         let (map, count, limit) = (Arc::clone(self), scans.len(), limit.clone());
         let decide = move |core: &MultiResolutionMap| {
-            map.still_unanswered(RequestKind::Undo, request.as_ref())?;
+            map.still_unanswered(RequestKind::Undo, request.as_ref(), former)?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
@@ -151,6 +152,19 @@ fn digest(target: &UndoTarget) -> u64 {
             digest.bytes(b"scan").bytes(robot.as_str().as_bytes()).number(*scan_id)
         }
         UndoTarget::Revision(revision) => digest.bytes(b"revision").number(*revision),
+        UndoTarget::RobotSince { robot, revision } => {
+            digest.bytes(b"since").bytes(robot.as_str().as_bytes()).number(*revision)
+        }
+    }
+    .finish()
+}
+
+/// The digest of the same request in data folders of version 3 and before.
+fn former_digest(target: &UndoTarget) -> u64 {
+    let digest = FormerDigest::default().bytes(b"undo");
+    match target {
+        UndoTarget::Scan { robot, scan_id } => digest.bytes(robot.as_str().as_bytes()).number(*scan_id),
+        UndoTarget::Revision(revision) => digest.number(*revision),
         UndoTarget::RobotSince { robot, revision } => {
             digest.bytes(b"since").bytes(robot.as_str().as_bytes()).number(*revision)
         }
