@@ -8,7 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use shuttle::future::block_on;
-use shuttle::thread;
+use shuttle::scheduler::{PctScheduler, RandomScheduler};
+use shuttle::{Config, Runner, thread};
 use uuid::Uuid;
 
 use super::committing::{CommitThread, Step};
@@ -24,6 +25,9 @@ use crate::util::StopSignal;
 #[path = "../../tests/failing_disk/simulated.rs"]
 #[expect(dead_code, reason = "nothing fails here")]
 mod simulated;
+
+/// Of each modelled thread: what a change plans and a snapshot encodes takes more than the checker gives by itself.
+const STACK_BYTES: usize = 2 << 20;
 
 fn name() -> MapName {
     MapName::new("office").unwrap()
@@ -104,6 +108,8 @@ fn crowd() {
 #[test]
 fn nobody_waits_for_ever_and_nothing_acknowledged_is_lost() {
     let schedules = std::env::var("MROL_SCHEDULES").map_or(200, |text| text.parse().unwrap());
-    shuttle::check_random(crowd, schedules);
-    shuttle::check_pct(crowd, schedules, 3);
+    let mut config = Config::new();
+    config.stack_size = STACK_BYTES;
+    Runner::new(RandomScheduler::new(schedules), config.clone()).run(crowd);
+    Runner::new(PctScheduler::new(3, schedules), config).run(crowd);
 }
