@@ -185,6 +185,7 @@ fn open(disk: &SimulatedDisk) -> Result<OpenedMap, StoreError> {
             StoreError::Damaged { .. }
                 | StoreError::JournalDamaged { .. }
                 | StoreError::RevisionsMissing { .. }
+                | StoreError::Foreign { .. }
         );
         assert!(clear, "{error}");
     })
