@@ -10,7 +10,7 @@ use serde_json::json;
 use tempfile::NamedTempFile;
 
 /// Characters of a message about keys, besides the file's name, at most: it repeats nothing that may be a secret.
-const MESSAGE_MAX: usize = 150;
+const MESSAGE_MAX: usize = 220;
 
 /// The daemon's settings: what is accepted can be used, and reads the same when it was printed.
 pub(super) fn config(bytes: &[u8]) {
