@@ -45,7 +45,7 @@ pub struct AlignmentSettings {
     /// Steps at each level, at most. 20.
     pub iterations_per_level_max: u32,
     /// First translation step of the sub-voxel stage, as a fraction of r_0. 0.5. The original takes 0.25; from
-    /// there, scans that the finest level left half a degree off stay there (README, "Alignment").
+    /// there, scans that the finest level left half a degree off stay there (docs/lab-notes.md, "Alignment").
     pub sub_voxel_translation_step: f64,
     /// First rotation step of the sub-voxel stage, degrees. 0.25; the original takes 0.125.
     pub sub_voxel_rotation_step_deg: f64,

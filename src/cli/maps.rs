@@ -78,7 +78,7 @@ pub(super) struct NewMapOptions {
 /// What the server has defaults for.
 #[derive(Debug, clap::Args)]
 pub(super) struct OptionalSettings {
-    /// Number of levels, each twice as coarse as the one before: 1 to 12 [default: 4]
+    /// Number of levels, each twice as coarse as the one before: 1 to 12 [default: 6]
     #[arg(long)]
     levels: Option<u32>,
     /// Hash functions of the counting Bloom filters, k of eq. (1): 1 to 10

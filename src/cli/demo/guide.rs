@@ -19,6 +19,6 @@ pub(super) fn text(serving: &Serving, once: bool) -> String {
   mrol maps show demo --server http://{grpc}
   cargo run --release --example planner -- http://{grpc} demo
   mrol delete --map demo --sphere "4.6 9 1 0.5" --server http://{grpc}
-Then: README.md, "A tour of the API"; `mrol serve --help`; your own scans with `mrol map --help`."#
+Then: README.md, "Five-minute tour"; `mrol serve --help`; your own scans with `mrol map --help`."#
     )
 }
