@@ -32,21 +32,27 @@ pub(super) fn verdict_on(
     if cut_short {
         return (Verdict::Ambiguous, "the search was cut short: other places are not ruled out".into());
     }
-    match others.iter().find(|other| rivals(other, best, settings)) {
-        Some(rival) => {
-            let (a, b) = (rival.fit(), best.fit());
-            let reason = format!("another place fits about as well: {a:.3} against {b:.3}");
-            (Verdict::Ambiguous, reason)
+    match others.iter().find_map(|other| rivals(other, best, settings)) {
+        Some((measure, a, b)) => {
+            (Verdict::Ambiguous, format!("another place fits about as well: {measure} {a:.3} against {b:.3}"))
         }
         None => (Verdict::Accepted, format!("overlap {overlap:.3}, and no other place is as good")),
     }
 }
 
-/// True when nothing tells `other` from `best`: the finest voxels, or the dilated map that both were found on. In a
-/// map where the scan does not belong many places are alike on the latter, and one of them is the best by chance.
-fn rivals(other: &Candidate, best: &Candidate, settings: &LocalizationSettings) -> bool {
-    let share = settings.ambiguous_share;
-    other.fit() >= share * best.fit() || other.search_overlap >= share * best.search_overlap
+/// By what nothing tells `other` from `best`, with both figures: the finest voxels, or the dilated map that both were
+/// found on. In a map where the scan does not belong many places are alike on the latter, and one of them is the best by
+/// chance.
+fn rivals(
+    other: &Candidate,
+    best: &Candidate,
+    settings: &LocalizationSettings,
+) -> Option<(&'static str, f64, f64)> {
+    let measures = [
+        ("fit", other.fit(), best.fit()),
+        ("overlap with the dilated map", other.search_overlap, best.search_overlap),
+    ];
+    measures.into_iter().find(|(_, other, best)| *other >= settings.ambiguous_share * best)
 }
 
 #[cfg(test)]
@@ -76,8 +82,13 @@ mod tests {
     #[test]
     fn a_rival_on_the_finest_voxels_or_on_the_dilated_map_makes_it_ambiguous() {
         let best = candidate(0.8, 0.95, 0.1);
-        for rival in [candidate(0.78, 0.7, 0.1), candidate(0.3, 0.94, 0.1)] {
-            assert_eq!(verdict(&[best.clone(), candidate(0.1, 0.1, 0.0), rival], false), Verdict::Ambiguous);
+        let of_fit = (candidate(0.78, 0.7, 0.1), "fit 0.");
+        let of_search = (candidate(0.3, 0.94, 0.1), "overlap with the dilated map 0.940 against 0.950");
+        for (rival, words) in [of_fit, of_search] {
+            let ranked = [best.clone(), candidate(0.1, 0.1, 0.0), rival];
+            let (verdict, reason) = verdict_on(&ranked, false, &LocalizationSettings::default());
+            assert_eq!(verdict, Verdict::Ambiguous);
+            assert!(reason.contains(words), "{reason}");
         }
     }
 
