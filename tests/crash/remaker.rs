@@ -1,8 +1,9 @@
 //! Who deletes a map, makes it again under its name, empty or of a map file, and puts scans in, until the server is
-//! killed. After each restart the map is the incarnation that was acknowledged last, with all that was put into it and
+//! killed. At times the disk fails while the map is made: then there is none. After each restart the map is the incarnation that was acknowledged last, with all that was put into it and
 //! nothing of any other.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use mrol::align::Guess;
@@ -16,6 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use crate::disk::Disk;
 use crate::{LEVELS, RESOLUTION_M};
 
 /// An incarnation that has seen so many scans is deleted, at the latest.
@@ -50,6 +52,8 @@ pub(crate) struct Counts {
     pub restored: usize,
     pub deleted: usize,
     pub inserted: usize,
+    /// Creations and restores that a failing disk kept from happening.
+    pub failed: usize,
 }
 
 pub(crate) struct Remaker {
@@ -63,8 +67,13 @@ pub(crate) struct Remaker {
     file: Option<(Bytes, Incarnation)>,
     /// Of every incarnation there ever was.
     uuids: BTreeSet<Uuid>,
+    /// Fails while the map is made; none where it cannot.
+    disk: Option<Arc<Disk>>,
     pub counts: Counts,
 }
+
+/// In the paths of the map's files.
+const FOLDER: &str = "/depot";
 
 fn depot() -> MapName {
     MapName::new("depot").unwrap()
@@ -75,7 +84,7 @@ fn is_not_found(error: &ClientError) -> bool {
 }
 
 impl Remaker {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(disk: Option<Arc<Disk>>) -> Self {
         Self {
             rng: ChaCha8Rng::seed_from_u64(99),
             plane: 0,
@@ -83,6 +92,7 @@ impl Remaker {
             pending: None,
             file: None,
             uuids: BTreeSet::new(),
+            disk,
             counts: Counts::default(),
         }
     }
@@ -182,11 +192,35 @@ impl Remaker {
 
     async fn step(&mut self, client: &Client) -> Result<(), ClientError> {
         let wish = self.wish();
-        self.grant(client, wish).await?;
+        let makes = matches!(wish, Wish::Create | Wish::Restore);
+        match self.disk.clone().filter(|_| makes && self.rng.random_bool(0.5)) {
+            Some(disk) => self.grant_on_failing_disk(client, wish, &disk).await?,
+            None => self.grant(client, wish).await?,
+        }
         if let Some(there) = self.there.clone().filter(|_| self.rng.random_bool(0.4)) {
             self.file = Some((client.snapshot_map(&depot()).await?, there));
         }
         Ok(())
+    }
+
+    /// Where an operation on the map's folder fails there is no map afterwards, and never will be.
+    async fn grant_on_failing_disk(
+        &mut self,
+        client: &Client,
+        wish: Wish,
+        disk: &Disk,
+    ) -> Result<(), ClientError> {
+        disk.fail(FOLDER);
+        let granted = self.grant(client, wish).await;
+        disk.go_on();
+        match granted {
+            Err(error) if error.reason() == Some("not_stored") => {
+                self.pending = None;
+                self.counts.failed += 1;
+                Ok(())
+            }
+            other => other,
+        }
     }
 
     /// After a restart: what was asked for and not answered happened as a whole or not at all, and is granted now. Then

@@ -13,6 +13,7 @@
 mod calls;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../disk/mod.rs"]
 mod disk;
 mod load;
 mod made_again;

@@ -1,15 +1,18 @@
-//! A disk that hangs on demand: a library that is preloaded into the server, built of `disk.c`.
+//! A disk that hangs or fails on demand: a library that is preloaded into the server, built of `disk.c`.
+
+#![allow(dead_code, clippy::allow_attributes, reason = "each test takes what it needs")]
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use tempfile::TempDir;
 
-/// A folder for the server's data, and what makes writing in it hang.
+/// A folder for the server's data, and what makes writing in it hang or fail.
 pub(crate) struct Disk {
     folder: TempDir,
-    /// Beside the data: the library, and the file that is there while the disk hangs.
+    /// Beside the data: the library, and the file that is there while the disk hangs or fails.
     tools: TempDir,
 }
 
@@ -17,7 +20,7 @@ impl Disk {
     /// None where there is no compiler.
     pub(crate) fn build() -> Option<Self> {
         let (folder, tools) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/stuck_disk/disk.c");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/disk/disk.c");
         let mut compiler = Command::new("cc");
         compiler.args(["-shared", "-fPIC", "-O1", "-w", "-o"]).arg(tools.path().join("disk.so"));
         let built = compiler.arg(source).arg("-ldl").status().ok()?;
@@ -39,14 +42,26 @@ impl Disk {
 
     /// From now on every change of a file hangs whose path, below the folder, has `part` in it.
     pub(crate) fn hang(&self, part: &str) {
+        self.tell(part);
+    }
+
+    /// From now on every third change of a file fails whose path, below the folder, has `part` in it.
+    pub(crate) fn fail(&self, part: &str) {
+        self.tell(&format!("!{part}"));
+    }
+
+    fn tell(&self, text: &str) {
         let aside = self.tools.path().join("control.new");
-        fs::write(&aside, part).unwrap();
+        fs::write(&aside, text).unwrap();
         fs::rename(aside, self.control()).unwrap();
     }
 
-    /// What hangs goes on.
+    /// What hangs goes on, and nothing fails any more.
     pub(crate) fn go_on(&self) {
-        fs::remove_file(self.control()).unwrap();
+        match fs::remove_file(self.control()) {
+            Err(error) if error.kind() != ErrorKind::NotFound => panic!("{error}"),
+            _ => {}
+        }
     }
 
     /// True once something hung.

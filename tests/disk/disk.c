@@ -1,8 +1,11 @@
-/* A disk that hangs: preloaded into the server, it makes what changes files wait for as long as a control file is
- * there. The file says which paths are meant: those that hold its text. Reading goes on, as from a cache. */
+/* A disk that hangs or fails: preloaded into the server, it makes what changes files wait for as long as a control file
+ * is there. The file says which paths are meant: those that hold its text. Where the text begins with an exclamation
+ * mark, every third operation on such a path fails at once instead. Reading goes on, as from a cache. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <errno.h>
 #include <fcntl.h>
+#include <stdatomic.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,50 +17,60 @@
 #include <time.h>
 #include <unistd.h>
 
-static int is_meant(const char *path) {
+enum hindrance { NONE, WAIT, FAIL };
+
+static enum hindrance hindrance_of(const char *path) {
     char text[512];
     const char *control = getenv("STUCK_DISK_CONTROL"), *folder = getenv("STUCK_DISK_FOLDER");
-    if (control == NULL || folder == NULL || strncmp(path, folder, strlen(folder)) != 0) return 0;
+    if (control == NULL || folder == NULL || strncmp(path, folder, strlen(folder)) != 0) return NONE;
     int fd = (int)syscall(SYS_openat, AT_FDCWD, control, O_RDONLY | O_CLOEXEC, 0);
-    if (fd < 0) return 0;
+    if (fd < 0) return NONE;
     ssize_t bytes = syscall(SYS_read, fd, text, sizeof text - 1);
     syscall(SYS_close, fd);
-    if (bytes < 0) return 0;
+    if (bytes < 0) return NONE;
     text[bytes] = 0;
-    return strstr(path + strlen(folder), text) != NULL;
+    int fails = text[0] == '!';
+    if (strstr(path + strlen(folder), text + fails) == NULL) return NONE;
+    return fails ? FAIL : WAIT;
 }
 
-/* Says so by a file beside the control file. */
-static void wait_for_path(const char *path) {
+/* Waits, and says so by a file beside the control file; or tells that the operation is to fail. */
+static int path_fails(const char *path) {
+    static atomic_uint operations;
     struct timespec moment = {0, 5000000};
-    if (!is_meant(path)) return;
+    enum hindrance hindrance = hindrance_of(path);
+    if (hindrance == FAIL && atomic_fetch_add(&operations, 1) % 3 == 2) {
+        errno = EIO;
+        return 1;
+    }
+    if (hindrance != WAIT) return 0;
     char waits[4096];
     snprintf(waits, sizeof waits, "%s.waits", getenv("STUCK_DISK_CONTROL"));
     int fd = (int)syscall(SYS_openat, AT_FDCWD, waits, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     if (fd >= 0) syscall(SYS_close, fd);
-    while (is_meant(path)) nanosleep(&moment, NULL);
+    while (hindrance_of(path) == WAIT) nanosleep(&moment, NULL);
+    return 0;
 }
 
-static void wait_for_file(int fd) {
+static int file_fails(int fd) {
     char link[64], path[4096];
     snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
     ssize_t bytes = syscall(SYS_readlinkat, AT_FDCWD, link, path, sizeof path - 1);
-    if (bytes <= 0) return;
+    if (bytes <= 0) return 0;
     path[bytes] = 0;
-    if (path[0] == '/') wait_for_path(path);
+    return path[0] == '/' && path_fails(path);
 }
 
-/* The path of `path` below the folder that `dirfd` is. */
-static void wait_for_entry(int dirfd, const char *path) {
-    if (dirfd == AT_FDCWD || path[0] == '/') wait_for_path(path);
-    else wait_for_file(dirfd);
+/* That of `path` below the folder that `dirfd` is. */
+static int entry_fails(int dirfd, const char *path) {
+    return dirfd == AT_FDCWD || path[0] == '/' ? path_fails(path) : file_fails(dirfd);
 }
 
 #define REAL(type, name) static type (*real)(); if (real == NULL) real = (type (*)())dlsym(RTLD_NEXT, name)
 #define OF_FILE(type, name, parameters, arguments) \
-    type name parameters { REAL(type, #name); wait_for_file(fd); return real arguments; }
+    type name parameters { REAL(type, #name); return file_fails(fd) ? -1 : real arguments; }
 #define OF_PATH(type, name, parameters, arguments) \
-    type name parameters { REAL(type, #name); wait_for_path(path); return real arguments; }
+    type name parameters { REAL(type, #name); return path_fails(path) ? -1 : real arguments; }
 
 OF_FILE(ssize_t, write, (int fd, const void *bytes, size_t count), (fd, bytes, count))
 OF_FILE(ssize_t, writev, (int fd, const struct iovec *parts, int count), (fd, parts, count))
@@ -74,14 +87,12 @@ OF_PATH(int, mkdir, (const char *path, mode_t mode), (path, mode))
 
 int renameat(int dirfd, const char *path, int to_dirfd, const char *to) {
     REAL(int, "renameat");
-    wait_for_entry(dirfd, path);
-    return real(dirfd, path, to_dirfd, to);
+    return entry_fails(dirfd, path) ? -1 : real(dirfd, path, to_dirfd, to);
 }
 
 int unlinkat(int dirfd, const char *path, int flags) {
     REAL(int, "unlinkat");
-    wait_for_entry(dirfd, path);
-    return real(dirfd, path, flags);
+    return entry_fails(dirfd, path) ? -1 : real(dirfd, path, flags);
 }
 
 #define OPEN(name, before, names, dirfd) \
@@ -94,7 +105,7 @@ int unlinkat(int dirfd, const char *path, int flags) {
             mode = va_arg(more, mode_t); \
             va_end(more); \
         } \
-        if (flags & (O_CREAT | O_TRUNC)) wait_for_entry(dirfd, path); \
+        if ((flags & (O_CREAT | O_TRUNC)) && entry_fails(dirfd, path)) return -1; \
         return real(names path, flags, mode); \
     }
 #define NOTHING
