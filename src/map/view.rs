@@ -7,6 +7,7 @@ use super::sharding::{SHARDS, ShardsTouched};
 use super::{MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
+use crate::util::StopSignal;
 use crate::voxel::{
     BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
 };
@@ -162,17 +163,12 @@ impl<'a> MapView<'a> {
     ///
     /// Takes some 72 bytes a block of finest voxels, and no more for a voxel.
     pub fn finest_in(&self, region: &Region, level: u32) -> VoxelSet {
-        let (tier, up) = tier_of(level);
+        let (tier, _) = tier_of(level);
         let mut found = Vec::new();
         for shard in self.shards() {
             let mut blocks = Vec::new();
             self.for_each_block(&shard.level(level), region, |block, mask| {
-                let inside = |cell: &Cell| {
-                    let center_m = self.map.lattice.center_m(cell.voxel(block).ancestor(up), level);
-                    region.contains(center_m)
-                };
-                let mut wanted = BlockMask::EMPTY;
-                mask.cells(up).filter(inside).for_each(|cell| wanted.fill(cell, up));
+                let wanted = self.part_in(region, level, block, mask);
                 if !wanted.is_empty() {
                     blocks.push((block, wanted));
                 }
@@ -182,29 +178,36 @@ impl<'a> MapView<'a> {
         found.into_iter().collect()
     }
 
-    /// The voxels of `level` whose centres lie in `region`.
+    /// The voxels of `level` whose centers lie in `region`.
     pub fn voxels_in(&self, region: &Region, level: u32) -> Vec<VoxelKey> {
-        self.voxels_by_shard(region, level).flatten().collect()
+        let mut voxels = Vec::new();
+        let copy = self.level_voxels(level, Some(region), usize::MAX, StopSignal::NEVER);
+        copy.for_some(|some| voxels.extend_from_slice(some));
+        voxels
     }
 
-    /// The voxels of `level` whose centers lie in `region`, shard by shard, each when it is asked for.
-    pub fn voxels_by_shard(&self, region: &Region, level: u32) -> impl Iterator<Item = Vec<VoxelKey>> {
+    /// The part of a block whose voxels of `level` have their centers in `region`, each of them filled.
+    pub(super) fn part_in(
+        &self,
+        region: &Region,
+        level: u32,
+        block: VoxelKey,
+        mask: &BlockMask,
+    ) -> BlockMask {
         let (_, up) = tier_of(level);
-        self.lists(level).map(move |list| {
-            let mut found = Vec::new();
-            self.for_each_block(&list, region, |block, mask| {
-                let voxels = mask.cells(up).map(|cell| cell.voxel(block).ancestor(up));
-                let inside = |voxel: &VoxelKey| region.contains(self.map.lattice.center_m(*voxel, level));
-                found.extend(voxels.filter(inside));
-            });
-            found
-        })
+        let mut part = BlockMask::EMPTY;
+        for cell in mask.cells(up) {
+            if region.contains(self.map.lattice.center_m(cell.voxel(block).ancestor(up), level)) {
+                part.fill(cell, up);
+            }
+        }
+        part
     }
 
     /// Calls `f` with each block of a list that can hold a voxel of `region`.
     ///
     /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer.
-    fn for_each_block(
+    pub(super) fn for_each_block(
         &self,
         list: &OccupiedVoxelList<'_>,
         region: &Region,

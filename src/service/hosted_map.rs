@@ -22,7 +22,7 @@ use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
-use crate::voxel::{LatticeFromPoints, VoxelKey};
+use crate::voxel::LatticeFromPoints;
 
 /// Which maps to write snapshots of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -284,20 +284,17 @@ impl HostedMap {
     ) -> Result<VoxelListing, ServiceError> {
         let long_read = self.map.long_read();
         let view = long_read.view();
-        let by_shard: Box<dyn Iterator<Item = Vec<VoxelKey>>> = match region {
-            Some(region) => Box::new(view.voxels_by_shard(region, level)),
-            None => Box::new(view.lists(level).map(|list| list.iter().collect())),
-        };
-        let mut keys = Vec::new();
-        for more in by_shard {
-            check_not_stopped(stop)?;
-            keys.extend(more);
-            if keys.len() > most {
-                return Err(listing_too_large(level, keys.len(), most));
-            }
+        let (copy, revision) = (view.level_voxels(level, region, most, stop), view.revision());
+        drop(view);
+        drop(long_read);
+        if copy.len() > most {
+            return Err(listing_too_large(level, copy.len(), most));
         }
+        check_not_stopped(stop)?;
+        let mut keys = Vec::with_capacity(copy.len());
+        copy.for_some(|some| keys.extend_from_slice(some));
         let resolution_m = self.map.lattice().resolution_m(level);
-        Ok(VoxelListing { resolution_m, keys, state: self.state(view.revision()) })
+        Ok(VoxelListing { resolution_m, keys, state: self.state(revision) })
     }
 
     pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {

@@ -1,0 +1,88 @@
+//! The voxels of one level, copied out of the map.
+
+use super::occupied_voxel_list::tier_of;
+use super::{MapView, Region};
+use crate::util::StopSignal;
+use crate::voxel::{BlockMask, VoxelKey};
+
+/// A block with at least so many voxels is copied as it is stored, one with fewer voxel by voxel: whichever is smaller.
+const VOXELS_OF_BLOCK_MIN: usize = size_of::<(VoxelKey, BlockMask)>() / size_of::<VoxelKey>();
+
+/// The occupied voxels of one level, of a region or of the whole map, at one revision.
+///
+/// It is a copy of the map's blocks, 8 bytes a voxel at most and some 1 byte of a surface: taking it is short, so that
+/// changes need not wait for a long listing that is made of it.
+#[derive(Debug)]
+pub struct LevelVoxels {
+    /// Levels up in the blocks.
+    up: u32,
+    blocks: Vec<(VoxelKey, BlockMask)>,
+    /// Of blocks with a few voxels.
+    voxels: Vec<VoxelKey>,
+    len: usize,
+}
+
+impl LevelVoxels {
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True without a voxel.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Hands out the voxels, in no order, some at a time.
+    pub fn for_some(self, mut f: impl FnMut(&[VoxelKey])) {
+        const SOME: usize = 4096;
+        self.voxels.chunks(SOME).for_each(&mut f);
+        let mut some = Vec::with_capacity(2 * SOME);
+        for (block, mask) in &self.blocks {
+            some.extend(mask.cells(self.up).map(|cell| cell.voxel(*block).ancestor(self.up)));
+            if some.len() >= SOME {
+                f(&some);
+                some.clear();
+            }
+        }
+        f(&some);
+    }
+
+    fn push(&mut self, block: VoxelKey, mask: &BlockMask) {
+        let voxels = mask.count(self.up);
+        self.len += voxels;
+        if voxels >= VOXELS_OF_BLOCK_MIN {
+            self.blocks.push((block, *mask));
+        } else {
+            self.voxels.extend(mask.cells(self.up).map(|cell| cell.voxel(block).ancestor(self.up)));
+        }
+    }
+}
+
+impl MapView<'_> {
+    /// Copies the voxels of `level`, those whose centers lie in `region` where there is one. Looks at `stop` and at
+    /// `most` shard by shard: where it ends early for one of them the copy is not whole, and longer than `most` for the
+    /// latter.
+    pub fn level_voxels(
+        &self,
+        level: u32,
+        region: Option<&Region>,
+        most: usize,
+        stop: StopSignal<'_>,
+    ) -> LevelVoxels {
+        let (_, up) = tier_of(level);
+        let mut copy = LevelVoxels { up, blocks: Vec::new(), voxels: Vec::new(), len: 0 };
+        for list in self.lists(level) {
+            if stop.is_stopped() || copy.len > most {
+                break;
+            }
+            match region {
+                Some(region) => self.for_each_block(&list, region, |block, mask| {
+                    copy.push(block, &self.part_in(region, level, block, mask));
+                }),
+                None => list.blocks().iter().for_each(|(block, mask)| copy.push(block, mask)),
+            }
+        }
+        copy
+    }
+}
