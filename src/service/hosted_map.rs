@@ -288,7 +288,12 @@ impl HostedMap {
             Some(region) => Box::new(view.voxels_by_shard(region, level)),
             None => Box::new(view.lists(level).map(|list| list.iter().collect())),
         };
-        let mut keys = Vec::new();
+        // How many there are of a whole level is known: no room is taken but for them.
+        let whole = if region.is_none() { view.lists(level).map(|list| list.len()).sum() } else { 0 };
+        if whole > most {
+            return Err(listing_too_large(level, whole, most));
+        }
+        let mut keys = Vec::with_capacity(whole);
         for more in by_shard {
             check_not_stopped(stop)?;
             keys.extend(more);
