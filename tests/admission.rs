@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use common::{Daemon, PATIENCE, bytes_of, client, json_of, query_pb, row};
 use mrol::config::Config;
 use mrol::wire::pb;
+use mrol::wire::pb::occupancy_client::OccupancyClient;
 use reqwest::{Response, StatusCode};
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -130,6 +131,24 @@ async fn more_streams_than_streams_max_are_shed() {
         daemon.occupancy().await.query_points_stream(again).await.is_ok()
     })
     .await;
+}
+
+#[tokio::test]
+async fn answers_of_a_stream_count_until_they_are_read() {
+    let daemon = daemon(|_| {}).await;
+    let server =
+        tonic::transport::Endpoint::from_shared(format!("http://{}", daemon.grpc)).expect("an address");
+    // With room for a byte of the answers.
+    let channel = server.initial_stream_window_size(1).connect().await.expect("a connection");
+    let questions = vec![query_pb("a", &vec![[0.05; 3]; 200_000]); 6];
+    let mut planner = OccupancyClient::new(channel);
+    let unread = planner.query_points_stream(tokio_stream::iter(questions)).await.expect("a stream");
+    let answered = r#"mrol_requests_total{protocol="grpc",operation="QueryPointsStream",code="ok"}"#;
+    wait_until(async || daemon.metric(answered).await == Some(6.0)).await;
+    let bytes = daemon.metric("mrol_body_bytes").await.expect("a number");
+    assert!((6.0 * 25_000.0..7.0 * 25_000.0).contains(&bytes), "{bytes} bytes count");
+    drop(unread);
+    wait_until(async || daemon.metric("mrol_body_bytes").await == Some(0.0)).await;
 }
 
 #[tokio::test]

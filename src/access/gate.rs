@@ -4,6 +4,7 @@ use axum::http::header::AUTHORIZATION;
 use axum::http::{Extensions, HeaderMap, Request};
 
 use super::{Access, Caller, Operation, Secret};
+use crate::map::CallerName;
 use crate::service::{ErrorCode, ServiceError};
 use crate::telemetry::{MeteredService, Metrics};
 
@@ -55,7 +56,8 @@ impl Gate {
         let secret = taken_from(request.headers_mut());
         self.access.check_site(operation, request)?;
         let caller = self.access.authorize(operation, secret.as_ref())?;
-        let service = self.service.limited_to(caller.reach().clone(), caller.scans());
+        let name = caller.name().map(CallerName::new).transpose()?;
+        let service = self.service.limited_to(name, caller.reach().clone(), caller.scans());
         Ok(Authorized { caller, service })
     }
 

@@ -60,7 +60,8 @@ struct Inner {
     probes: Probes,
 }
 
-/// An answer of no more bytes than this is not counted: `requests_max` bounds how many there are.
+/// An answer of no more bytes than this is not counted: `requests_max` bounds how many there are, and `streams_max` with what
+/// a stream keeps ahead of its reader.
 const SMALL_ANSWER_BYTES: usize = 16 << 10;
 
 /// Bytes of memory that an answer takes besides those of its body that are there already: to be put among its extensions
@@ -168,6 +169,15 @@ impl Admission {
     /// `ResourceExhausted` when there is no room.
     pub fn keep(&self, bytes: usize) -> Result<Charge, ServiceError> {
         self.0.bodies.charge(bytes)
+    }
+
+    /// Memory that an answer of a stream takes until it is sent; none of a small one, of which `streams_max` bounds how many
+    /// there are.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` when there is no room.
+    pub fn keep_answer(&self, bytes: usize) -> Result<Option<Charge>, ServiceError> {
+        (bytes > SMALL_ANSWER_BYTES).then(|| self.keep(bytes)).transpose()
     }
 
     /// How long the text of a scrape answers those that follow.

@@ -21,17 +21,19 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol key new --name planner --scope read --file keys.toml
   mrol key new --name r1 --scope insert --maps hall,office --robots r1 --expires 2027-01-31 --file keys.toml
-  mrol key list --file keys.toml                 every key, without its secret, which nobody knows any more
+  mrol key list --file keys.toml                 every key: scope, maps, robots and end; secrets are kept nowhere
   mrol key rotate --name r1 --file keys.toml     another secret; the former one counts for 24 hours more
   mrol key revoke --name r1 --file keys.toml     what was begun with it ends
   mrol serve --keys-file keys.toml               asks for keys, and reads the file again when it changes
   MROL_KEY=mrol_... mrol maps list               shows one; or --key-file FILE, --key SECRET
 
-read: everything that changes nothing. insert: scans, and undo of the scans of its robots as well. write: deletions and
-undo of anything as well. admin: makes, restores and deletes maps as well.
+read: everything that changes nothing, downloads of whole maps and metrics among it. insert: scans as well, and undo of
+those of its robots. write: deletions and undo of anything as well. admin: makes, restores and deletes maps as well. Without
+--maps and --robots a key is for all of them.
 
-The secret is printed once and kept nowhere: the file holds its hash. A file is changed as a whole and by one command at a
-time; comments in it stay.";
+The secret is printed once, on the first line, and kept nowhere: the file holds its hash. A file that is not there is made;
+it is changed as a whole and by one command at a time, and comments in it stay. A server that runs reads it again by
+itself. Without --file, `mrol key new` changes nothing: behind the secret it prints the entry to put into a file.";
 
 /// Make, list, rotate and revoke the keys of callers of the server
 #[derive(Debug, clap::Args)]
@@ -67,19 +69,19 @@ struct NewKey {
     /// The robots whose scans it sends and undoes, separated by commas [default: every robot]
     #[arg(long, value_name = "ROBOTS", value_delimiter = ',', value_parser = parse::robot_name)]
     robots: Option<Vec<RobotName>>,
-    /// Until when it counts: 2027-01-31 or 2027-01-31T12:00:00Z [default: for ever]
+    /// When it ends: 2027-01-31T12:00:00Z, or 2027-01-31 for the first moment of that day, UTC [default: never]
     #[arg(long, value_name = "TIME", value_parser = expiry)]
     expires: Option<Expiry>,
     /// Requests a second of its holder [default: limits.caller_requests_per_s_max of the server]
     #[arg(long, value_name = "N")]
     requests_per_s_max: Option<NonZeroU32>,
-    /// As many may come at once [default: 100]
+    /// As many may come at once, where they are limited to some a second [default: 100]
     #[arg(long, value_name = "N", requires = "requests_per_s_max")]
     burst_max: Option<NonZeroU32>,
     /// Requests of its holder in work at a time [default: any number]
     #[arg(long, value_name = "N")]
     requests_at_once_max: Option<NonZeroU32>,
-    /// The file of keys to add it to [default: it is printed]
+    /// The file of keys to add it to, made where it is not there [default: the entry is printed for you to add]
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
 }

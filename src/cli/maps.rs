@@ -12,6 +12,7 @@ use super::parse;
 use super::remote::ServerOptions;
 use crate::client::NewMap;
 use crate::map::MapName;
+use crate::service::{MapList, UnavailableMap};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -32,7 +33,7 @@ pub(super) struct Maps {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List all maps
+    /// List all maps, those that could not be opened with the reason and what helps
     List {
         #[command(flatten)]
         server: ServerOptions,
@@ -123,8 +124,8 @@ impl Maps {
 }
 
 async fn list(server: ServerOptions, output: Output) -> Result<(), CliError> {
-    let maps = server.connect().await?.list_maps().await?;
-    if maps.is_empty() {
+    let MapList { maps, unavailable } = server.connect().await?.list_maps().await?;
+    if maps.is_empty() && unavailable.is_empty() {
         output.say("no maps yet: `mrol maps create NAME --resolution 0.05` makes one")?;
     }
     maps.iter().try_for_each(|info| {
@@ -133,7 +134,27 @@ async fn list(server: ServerOptions, output: Output) -> Result<(), CliError> {
         } else {
             output.say(MapReport::line(info))
         }
-    })
+    })?;
+    unavailable.into_iter().try_for_each(|map| output.print(&Unavailable::from(map)))
+}
+
+/// A map that could not be opened.
+#[derive(Serialize)]
+struct Unavailable {
+    map: String,
+    unavailable: String,
+}
+
+impl From<UnavailableMap> for Unavailable {
+    fn from(UnavailableMap { name, reason }: UnavailableMap) -> Self {
+        Self { map: name.to_string(), unavailable: reason }
+    }
+}
+
+impl Display for Unavailable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<24} UNAVAILABLE: {}; then restart the server", self.map, self.unavailable)
+    }
 }
 
 async fn create(map: Named, settings: NewMapOptions, output: Output) -> Result<(), CliError> {

@@ -145,6 +145,48 @@ mod tests {
         assert_eq!(found, known.collect());
     }
 
+    /// The words of an example, as a shell takes them apart.
+    fn words_of(example: &str) -> Vec<String> {
+        let parts = example.split('"').enumerate();
+        parts
+            .flat_map(|(i, part)| match i % 2 {
+                0 => part.split_whitespace().map(str::to_owned).collect(),
+                _ => vec![part.to_owned()],
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_example_is_a_command_line() {
+        for command in CommandLine::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let examples =
+                help.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| line.contains("mrol "));
+            for example in examples.filter(|line| line.starts_with("mrol ") || line.starts_with("MROL_")) {
+                // Behind it stands what it does, or another program.
+                let alone =
+                    example.split("  ").next().and_then(|line| line.split(" | ").next()).unwrap_or_default();
+                let alone =
+                    alone.split(" > ").next().and_then(|line| line.split(" && ").next()).unwrap_or_default();
+                let words = words_of(&alone[alone.find("mrol ").unwrap()..]);
+                let parsed = CommandLine::try_parse_from(words);
+                assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
+            }
+        }
+    }
+
+    #[test]
+    fn no_option_goes_without_a_sentence() {
+        fn look(command: &clap::Command) {
+            for argument in command.get_arguments() {
+                let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
+                assert!(help.split_whitespace().count() > 1, "{} {argument}: {help:?}", command.get_name());
+            }
+            command.get_subcommands().for_each(look);
+        }
+        look(&CommandLine::command());
+    }
+
     #[test]
     fn every_command_says_what_it_does_and_shows_examples() {
         for command in CommandLine::command().get_subcommands() {

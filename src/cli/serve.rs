@@ -19,18 +19,20 @@ EXAMPLES:
   mrol serve                                     maps are kept in ./mrol-data
   mrol serve --data-dir /var/lib/mrol --keys-file keys.toml --http-listen 0.0.0.0:7333 --grpc-listen 0.0.0.0:7334
                                                  for other machines, which need keys (`mrol key new`)
-  mrol serve --keys-file keys.toml --tls-certificate server.pem --tls-key server.key --grpc-listen 0.0.0.0:7334
-                                                 the same over TLS
+  mrol serve --config mrol.toml --tls-certificate server.pem --tls-key server.key
+                                                 over TLS, which keeps keys from being read on their way; the rest of
+                                                 the settings from a file that `mrol config print > mrol.toml` began
   mrol serve --data-dir \"\"                       keep maps in memory only
   mrol serve --http-listen 127.0.0.1:0 --grpc-listen 127.0.0.1:0 --json
                                                  take free ports and print them as JSON
   mrol serve --grpc-socket /run/mrol/grpc.sock   clients on this machine connect to unix:/run/mrol/grpc.sock
-  MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable
+  MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable: limits.maps_max, with two underscores
 
 The first line on standard output says where it serves; the log goes to standard error. Settings come from
 defaults, then the file of --config (TOML), then MROL_... variables, then the options here. SIGTERM and Ctrl-C
 end it: requests in flight are finished, maps are saved, within a bound even where a disk hangs; the second time at
-once. SIGHUP reads keys and certificates again. Whatever ends it, nothing acknowledged is lost.";
+once. SIGHUP reads keys and certificates again. Whatever ends it, nothing acknowledged is lost, as long as there is a data
+folder and --durability is \"always\": with an interval, a loss of power takes what came in the last one.";
 
 /// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
 #[derive(Debug, clap::Args)]
@@ -43,7 +45,7 @@ pub(super) struct Serve {
 /// What the settings of the daemon are made from.
 #[derive(Debug, clap::Args)]
 pub(super) struct ServeOptions {
-    /// Settings to start from, TOML
+    /// Settings to start from, TOML; variables and options override them
     #[arg(long, env = "MROL_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
     /// Where maps are kept across restarts; "" keeps them in memory only [default: ./mrol-data]
@@ -67,13 +69,13 @@ pub(super) struct ServeOptions {
     /// The server's certificate (PEM) for TLS, its signers after it; read again when it changes
     #[arg(long, value_name = "FILE")]
     tls_certificate: Option<PathBuf>,
-    /// Its private key (PEM)
+    /// The private key (PEM) of the server's certificate
     #[arg(long, value_name = "FILE")]
     tls_key: Option<PathBuf>,
     /// Certificates (PEM) of who may sign those of clients, which then need one to connect
     #[arg(long, value_name = "FILE")]
     tls_client_ca: Option<PathBuf>,
-    /// Listen off this machine's loopback without keys: whoever reaches the ports may do everything
+    /// Listen off this machine's loopback without keys: whoever reaches the ports may do everything. Not with --keys-file
     #[arg(long)]
     insecure_open: bool,
     /// How log lines are written: text or json [default: text]

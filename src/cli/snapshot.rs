@@ -12,16 +12,18 @@ use super::parse;
 use super::remote::ServerOptions;
 use crate::client::Client;
 use crate::map::MapName;
+use crate::service::{MapList, UnavailableMap};
 use crate::store::{Disk, Snapshot};
 
 const SNAPSHOT_EXAMPLES: &str = "\
 EXAMPLES:
-  mrol snapshot --all backup/                    every map of the server, as backup/NAME.mrol; so does no --map
+  mrol snapshot --all backup/                    every map of the server, as backup/NAME.mrol; the same as without --all
   mrol snapshot backup/ --map office --map lab
   mrol snapshot backup/ --server http://robot-7:7334
 
 Each file is a map at one revision, with its trajectory and the ids that it has accepted; the server goes on working.
-A file is checked before it takes the place of an older one. `mrol restore` brings maps back, on this server or
+A file is checked before it takes the place of an older one. Where the server has maps that it could not open, the others
+are saved, and the command fails and names them. A key of scope read is enough. `mrol restore` brings maps back, on this server or
 another; so does putting a file into DATA_DIR/maps of a server that is down.";
 
 const RESTORE_EXAMPLES: &str = "\
@@ -29,11 +31,15 @@ EXAMPLES:
   mrol restore backup/office.mrol                as map office
   mrol restore backup/*.mrol --server http://robot-8:7334
   mrol restore backup/office.mrol --map office-before
-  mrol restore backup/office.mrol --replace      in the place of map office, which is kept
+  mrol restore backup/office.mrol --replace      in the place of map office, which is kept under another name
 
 A restored map has a uuid of its own, since its history may go on otherwise. There must be no map of that name, but with
 --replace: the map that was there is kept as NAME-replaced-REVISION until somebody deletes it, and at every moment, also
-of a crash, there is one map of the name.";
+of a crash, there is one map of the name. Several files are restored one after another; the first that fails ends it, and
+those before it stay restored.
+
+A map has the name of its file, without .mrol, unless --map says otherwise. It takes a key of scope admin, with --replace one
+for all maps.";
 
 /// Back maps of a running server up, as files
 #[derive(Debug, clap::Args)]
@@ -56,13 +62,13 @@ pub(super) struct TakeSnapshots {
 #[derive(Debug, clap::Args)]
 #[command(after_help = RESTORE_EXAMPLES)]
 pub(super) struct Restore {
-    /// Map files, NAME.mrol
+    /// Map files, as `mrol snapshot` and `mrol map` write them; NAME.mrol becomes map NAME
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Another name for the map; of one file
+    /// Another name for the map than its file's; with one file only
     #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
     map: Option<MapName>,
-    /// Take the place of a map of that name, which is kept as NAME-replaced-REVISION
+    /// Take the place of the map of that name, if there is one, which is kept as NAME-replaced-REVISION until it is deleted
     #[arg(long)]
     replace: bool,
     #[command(flatten)]
@@ -72,9 +78,12 @@ pub(super) struct Restore {
 impl TakeSnapshots {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let client = self.server.connect().await?;
-        let names = match self.all || self.maps.is_empty() {
-            true => client.list_maps().await?.into_iter().map(|info| info.name).collect(),
-            false => self.maps,
+        let (names, unavailable) = match self.all || self.maps.is_empty() {
+            true => {
+                let MapList { maps, unavailable } = client.list_maps().await?;
+                (maps.into_iter().map(|info| info.name).collect(), unavailable)
+            }
+            false => (self.maps, Vec::new()),
         };
         std::fs::create_dir_all(&self.folder).map_err(CliError::writing(&self.folder))?;
         let output = output.with_bar_of(names.len(), "maps");
@@ -83,8 +92,19 @@ impl TakeSnapshots {
             output.step();
         }
         output.clear_bar();
-        Ok(())
+        not_all(&unavailable)
     }
+}
+
+/// Says that maps are missing that were asked for with all others: a backup without them is none of the server.
+fn not_all(unavailable: &[UnavailableMap]) -> Result<(), CliError> {
+    if unavailable.is_empty() {
+        return Ok(());
+    }
+    let missing = unavailable.iter().map(|UnavailableMap { name, reason }| format!("map {name}: {reason}"));
+    let missing: Vec<String> = missing.collect();
+    let message = format!("the backup lacks what the server could not open: {}", missing.join("; "));
+    Err(CliError::failed(message))
 }
 
 async fn take(client: &Client, name: &MapName, folder: &Path) -> Result<Saved, CliError> {

@@ -44,8 +44,9 @@ use tonic::{Request, Response, Status};
 
 use crate::map::{MapName, Region, RobotName};
 use crate::service::{
-    Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, PointAnswer, PointQuery,
-    ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo, UndoAnswer, VoxelListing,
+    Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, MapList, PointAnswer,
+    PointQuery, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo, UndoAnswer,
+    VoxelListing,
 };
 use crate::wire::{pb, restore_pieces};
 use connection::Connection;
@@ -104,11 +105,11 @@ impl Client {
         self.domain(self.connection.maps().get_map(request).await)
     }
 
-    /// Describes all maps, by name.
+    /// Describes all maps, by name, and says why some could not be opened and what helps.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
-    pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ClientError> {
+    pub async fn list_maps(&self) -> Result<MapList, ClientError> {
         let request = self.request(pb::ListMapsRequest {});
         self.domain(self.connection.maps().list_maps(request).await)
     }

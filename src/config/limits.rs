@@ -17,8 +17,9 @@ pub struct LimitsConfig {
     /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle, it
     /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
     pub connections_max: usize,
-    /// Connections of each protocol besides, where all of those are in use: for health checks alone, and for
-    /// `probe_time_max_s` at most. Where all of these are taken too, the oldest gives way. 16.
+    /// Connections of each protocol besides, where all of those are in use: for one health check each, and for
+    /// `probe_time_max_s` at most. Where all of these are taken too, the oldest gives way that came half a second ago or more,
+    /// or asked for something else. 16.
     pub connections_reserved: usize,
     /// Seconds until a connection has to be secure and to begin to speak. 10.
     pub connection_opening_max_s: f64,

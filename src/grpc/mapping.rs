@@ -1,14 +1,12 @@
 //! The Mapping service: what robots do.
 
-use prost::Message as _;
 use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::stream::{Answers, Message};
-use super::{Adapter, service_of};
+use super::{Adapter, answered, service_of};
 use crate::access::Operation;
-use crate::admission::{AnswerBytes, Arrival};
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
 
@@ -24,7 +22,7 @@ impl Mapping for Adapter {
         let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
         let answer = service.insert_scan(&map, scan).await?;
-        Ok(Response::new(answer.into()))
+        Ok(answered(answer.into()))
     }
 
     async fn insert_scan_stream(
@@ -47,10 +45,7 @@ impl Mapping for Adapter {
         let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
         let answer = service.maps().align_scan(&map, scan).await?;
-        let bytes = answer.foreground.as_ref().map_or(0, |foreground| foreground.bitmap.len());
-        let mut response = Response::new(answer.into());
-        response.extensions_mut().insert(AnswerBytes(bytes));
-        Ok(response)
+        Ok(answered(answer.into()))
     }
 
     async fn localize(
@@ -60,7 +55,7 @@ impl Mapping for Adapter {
         let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
         let answer = service.maps().localize(&map, scan).await?;
-        Ok(Response::new(answer.into()))
+        Ok(answered(answer.into()))
     }
 
     async fn delete_voxels(
@@ -70,7 +65,7 @@ impl Mapping for Adapter {
         let service = service_of(&request)?;
         let (map, deletion) = request.into_inner().try_into()?;
         let answer = service.delete_voxels(&map, deletion).await?;
-        Ok(Response::new(answer.into()))
+        Ok(answered(answer.into()))
     }
 
     async fn undo_scans(
@@ -80,7 +75,7 @@ impl Mapping for Adapter {
         let service = service_of(&request)?;
         let (map, undo) = request.into_inner().try_into()?;
         let answer = service.undo_scans(&map, undo).await?;
-        Ok(Response::new(answer.into()))
+        Ok(answered(answer.into()))
     }
 
     async fn get_trajectory(
@@ -88,12 +83,9 @@ impl Mapping for Adapter {
         request: Request<pb::GetTrajectoryRequest>,
     ) -> Result<Response<pb::GetTrajectoryResponse>, Status> {
         let service = service_of(&request)?;
-        let arrival = Arrival::of(request.extensions())?.clone();
         let (map, query) = request.into_inner().try_into()?;
         let answer = service.maps().trajectory(&map, query).await?;
-        let answer = pb::GetTrajectoryResponse::from(answer);
-        arrival.at_least(answer.encoded_len())?;
-        Ok(Response::new(answer))
+        Ok(answered(answer.into()))
     }
 
     async fn stream_trajectory(

@@ -4,12 +4,12 @@ use bytes::{Bytes, BytesMut};
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{Adapter, service_of};
+use super::{Adapter, answered, service_of};
 use crate::access::Authorized;
 use crate::admission::Arrival;
 use crate::map::MapName;
-use crate::service::{MapReach, ServiceError};
-use crate::wire::{self, pb, snapshot_pieces};
+use crate::service::{MapList, MapReach, ServiceError};
+use crate::wire::{self, pb, snapshot_bytes, snapshot_pieces};
 use pb::maps_server::Maps;
 
 #[tonic::async_trait]
@@ -24,7 +24,7 @@ impl Maps for Adapter {
         let service = service.maps();
         let (name, settings) = wire::create_map(request.into_inner(), service.default_filter())?;
         let answer = service.create_map(name, settings).await?;
-        Ok(Response::new(answer.into()))
+        Ok(answered(answer.into()))
     }
 
     async fn get_map(
@@ -34,7 +34,7 @@ impl Maps for Adapter {
         let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
         let info = service.maps().map_info(&name).await?;
-        Ok(Response::new(info.into()))
+        Ok(answered(info.into()))
     }
 
     async fn list_maps(
@@ -43,8 +43,8 @@ impl Maps for Adapter {
     ) -> Result<Response<pb::ListMapsResponse>, Status> {
         let service = service_of(&request)?;
         let service = service.maps();
-        let maps = service.list_maps().await?;
-        Ok(Response::new((maps, service.unavailable_maps()).into()))
+        let (maps, unavailable) = (service.list_maps().await?, service.unavailable_maps());
+        Ok(answered(MapList { maps, unavailable }.into()))
     }
 
     async fn delete_map(
@@ -64,7 +64,7 @@ impl Maps for Adapter {
         let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
         let file = service.maps().snapshot_map(&name).await?;
-        let kept = self.admission.keep(file.bytes.len())?;
+        let kept = self.admission.keep(snapshot_bytes(file.bytes.len()))?;
         let pieces = snapshot_pieces(file).map(move |piece| {
             let _until_sent = &kept;
             Ok(piece)
@@ -82,7 +82,7 @@ impl Maps for Adapter {
         let arrival = Arrival::of(pieces.extensions())?.clone();
         let (name, replace, file) = gather(pieces.into_inner(), &arrival, caller.reach(), most).await?;
         let info = service.restore_map(name, file, replace).await?;
-        Ok(Response::new(pb::RestoreMapResponse { map: Some(info.into()) }))
+        Ok(answered(pb::RestoreMapResponse { map: Some(info.into()) }))
     }
 }
 

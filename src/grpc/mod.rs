@@ -13,14 +13,14 @@ mod timely_body;
 mod whole_messages;
 
 use prost::Message;
-use tonic::Request;
 use tonic::codec::CompressionEncoding;
 use tonic::service::Routes;
+use tonic::{Request, Response};
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
 use crate::access::{Authorized, Gate};
-use crate::admission::{Admission, Arrival};
+use crate::admission::{Admission, AnswerBytes, Arrival};
 use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 use crate::wire::pb;
@@ -42,6 +42,14 @@ struct Adapter {
 fn service_of<T: Message>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
     Arrival::of(request.extensions())?.at_least(request.get_ref().encoded_len())?;
     Ok(Authorized::of(request.extensions())?.service.clone())
+}
+
+/// An answer, which counts by its size until it is sent.
+fn answered<T: Message>(answer: T) -> Response<T> {
+    let bytes = AnswerBytes(answer.encoded_len());
+    let mut response = Response::new(answer);
+    response.extensions_mut().insert(bytes);
+    response
 }
 
 /// The three services, health and reflection. Messages of more than `message_bytes_max` are refused.

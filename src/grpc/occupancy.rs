@@ -4,10 +4,9 @@ use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::stream::{Answers, Message};
-use super::{Adapter, service_of};
+use super::{Adapter, answered, service_of};
 use crate::access::Operation;
-use crate::admission::AnswerBytes;
-use crate::wire::{pb, voxel_chunks};
+use crate::wire::{listing_bytes, pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
 
 #[tonic::async_trait]
@@ -22,10 +21,7 @@ impl Occupancy for Adapter {
         let service = service_of(&request)?;
         let (map, query) = request.into_inner().try_into()?;
         let answer = service.query_points(&map, query).await?;
-        let bytes = answer.occupied.len();
-        let mut response = Response::new(answer.into());
-        response.extensions_mut().insert(AnswerBytes(bytes));
-        Ok(response)
+        Ok(answered(answer.into()))
     }
 
     async fn query_points_stream(
@@ -48,7 +44,7 @@ impl Occupancy for Adapter {
         let service = service_of(&request)?;
         let (map, level, region) = request.into_inner().try_into()?;
         let listing = service.maps().list_voxels(&map, level, region).await?;
-        let kept = self.admission.keep(size_of_val(listing.keys.as_slice()))?;
+        let kept = self.admission.keep(listing_bytes(listing.keys.len()))?;
         let chunks = voxel_chunks(listing).map(move |chunk| {
             let _until_sent = &kept;
             Ok(chunk)

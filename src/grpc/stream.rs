@@ -1,9 +1,11 @@
 //! Streams of requests, answered in order.
 
+use std::pin::Pin;
+use std::task::{Context, Poll, ready};
 use std::time::Instant;
 
 use tokio::sync::mpsc::{self, Receiver, Sender};
-use tokio_stream::wrappers::ReceiverStream;
+use tokio_stream::Stream;
 use tonic::{Code, Request, Status, Streaming};
 
 use super::inflation::{Compressed, Inflation};
@@ -18,8 +20,37 @@ use crate::telemetry::MeteredService;
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
 const MESSAGES_AHEAD_MAX: usize = 4;
 
-/// The answers to a stream of requests.
-pub(super) type Answers<T> = ReceiverStream<Result<T, Status>>;
+/// The answers to a stream of requests. Each counts by its size from when it is made until it is sent: the next one is asked
+/// for when there is room for it on the way to the client.
+#[derive(Debug)]
+pub(super) struct Answers<T> {
+    made: Receiver<Made<T>>,
+    /// Held for the one on its way.
+    _unsent: Option<Charge>,
+}
+
+/// An answer, with the memory that it takes until it is sent.
+type Made<T> = Result<(T, Option<Charge>), Status>;
+
+impl<T> Answers<T> {
+    fn new(made: Receiver<Made<T>>) -> Self {
+        Self { made, _unsent: None }
+    }
+}
+
+impl<T> Stream for Answers<T> {
+    type Item = Result<T, Status>;
+
+    fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        self._unsent = None;
+        let made = ready!(self.made.poll_recv(context));
+        Poll::Ready(made.map(|made| {
+            let (answer, unsent) = made?;
+            self._unsent = unsent;
+            Ok(answer)
+        }))
+    }
+}
 
 /// A request of a stream.
 pub(super) trait Message: prost::Message + 'static {
@@ -39,7 +70,7 @@ impl Adapter {
     ) -> Result<Answers<A>, Status>
     where
         M: Message,
-        A: Send + 'static,
+        A: prost::Message + 'static,
         H: Fn(MeteredService, M) -> F + Send + 'static,
         F: Future<Output = Result<A, ServiceError>> + Send,
     {
@@ -67,7 +98,7 @@ impl Adapter {
                 () = reader.run(inbox) => {}
             }
         }));
-        Ok(ReceiverStream::new(answers))
+        Ok(Answers::new(answers))
     }
 }
 
@@ -122,9 +153,10 @@ struct Worker<H> {
 }
 
 impl<H> Worker<H> {
-    async fn run<M, A, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Result<A, Status>>)
+    async fn run<M, A, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Made<A>>)
     where
         M: Message,
+        A: prost::Message,
         H: Fn(MeteredService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
@@ -146,15 +178,16 @@ impl<H> Worker<H> {
     }
 
     /// Answers one request, timed and counted as a request of its own.
-    async fn answer<M, A, F>(&mut self, request: Read<M>) -> Result<A, Status>
+    async fn answer<M, A, F>(&mut self, request: Read<M>) -> Made<A>
     where
         M: Message,
+        A: prost::Message,
         H: Fn(MeteredService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         let start = Instant::now();
         let answer = match request {
-            Ok((request, _until_answered)) => self.handled(request).await.map_err(Status::from),
+            Ok((request, _until_answered)) => self.kept(request).await.map_err(Status::from),
             Err(unreadable) => Err(unreadable),
         };
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
@@ -163,6 +196,19 @@ impl<H> Worker<H> {
         let reason = answer.as_ref().err().and_then(|status| status.metadata().get(status::REASON));
         status::count_denial(metrics, code, reason.map(|reason| reason.as_bytes()));
         answer
+    }
+
+    /// The answer, with room for it.
+    async fn kept<M, A, F>(&mut self, request: M) -> Result<(A, Option<Charge>), ServiceError>
+    where
+        M: Message,
+        A: prost::Message,
+        H: Fn(MeteredService, M) -> F,
+        F: Future<Output = Result<A, ServiceError>>,
+    {
+        let answer = self.handled(request).await?;
+        let unsent = self.admission.keep_answer(answer.encoded_len())?;
+        Ok((answer, unsent))
     }
 
     async fn handled<M, A, F>(&mut self, mut request: M) -> Result<A, ServiceError>
@@ -178,5 +224,38 @@ impl<H> Worker<H> {
         self.admission.check_rate(&self.asking)?;
         let handled = (self.handle)(self.authorized.service.clone(), request);
         self.admission.lifecycle().admit(handled).await?
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio_stream::StreamExt;
+
+    use super::*;
+    use crate::admission::AdmissionLimits;
+    use crate::lifecycle::Lifecycle;
+
+    const BYTES: usize = 100_000;
+
+    #[tokio::test]
+    async fn an_answer_counts_until_the_next_one_is_asked_for() {
+        let limits = AdmissionLimits { body_bytes_max: 2 * BYTES, ..AdmissionLimits::default() };
+        let admission = Admission::new(&limits, Lifecycle::default());
+        let (outbox, made) = mpsc::channel(MESSAGES_AHEAD_MAX);
+        let mut answers = Answers::new(made);
+        for answer in 1..=2 {
+            outbox.send(Ok((answer, admission.keep_answer(BYTES).unwrap()))).await.unwrap();
+        }
+        let refused = admission.keep_answer(BYTES).unwrap_err();
+        assert!(refused.message.contains("body_bytes_max is 200000"), "{refused}");
+        // A small one always has room.
+        assert!(admission.keep_answer(16 << 10).unwrap().is_none());
+        for (answer, bytes) in [(1, 2 * BYTES), (2, BYTES)] {
+            assert_eq!(answers.next().await.unwrap().unwrap(), answer);
+            assert_eq!(admission.in_use().bytes, bytes);
+        }
+        drop(outbox);
+        assert!(answers.next().await.is_none());
+        assert_eq!(admission.in_use().bytes, 0);
     }
 }

@@ -30,6 +30,15 @@ pub(super) struct VoxelsQuery {
     max: Option<String>,
 }
 
+/// Bytes of a voxel in JSON, at most: three numbers of eight characters, and what stands between them.
+const VOXEL_BYTES_MAX: usize = 28;
+
+/// Bytes of memory that a listing of so many voxels takes until it is sent: its keys, and two pieces of text, one that is made
+/// and one that is sent, either in twice the room where the first guess at it was too small.
+fn listing_bytes(voxels: usize) -> usize {
+    voxels * size_of::<VoxelKey>() + 4 * voxels.min(VOXELS_PER_CHUNK) * VOXEL_BYTES_MAX
+}
+
 /// What stands before the voxels.
 #[derive(Serialize)]
 struct Head {
@@ -48,7 +57,7 @@ pub(super) async fn list(
     let (level, region) = (query.level, query.region()?);
     let listing = service.maps().list_voxels(&map, level, region).await?;
     let head = Head { level, resolution_m: listing.resolution_m, state: listing.state.into() };
-    let kept = adapter.admission.keep(size_of_val(listing.keys.as_slice()))?;
+    let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;
     let chunks = chunks(head, listing.keys)?.map(move |chunk| {
         let _until_sent = &kept;
         Ok::<_, Infallible>(Bytes::from(chunk))

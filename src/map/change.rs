@@ -1,7 +1,7 @@
 //! What one revision did to a map: everything that doing it again needs, and nothing that would have to be computed
 //! again in floating point.
 
-use super::{RequestId, ScanRecord};
+use super::{CallerName, RequestId, ScanRecord};
 use crate::voxel::{MomentSet, VoxelSet};
 
 /// One committed change. A map is what its changes made of it, in the order of revisions: the same changes make
@@ -46,6 +46,8 @@ pub struct Request {
     pub id: RequestId,
     /// Of what was asked for, so that the same request sent again is told from another under its id.
     pub digest: u64,
+    /// Who asked for it; none without a key, and in what was written before this was noted.
+    pub caller: Option<CallerName>,
 }
 
 impl Change {

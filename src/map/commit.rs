@@ -117,8 +117,8 @@ impl<'a> Committer<'a> {
     }
 
     fn remember(&self, request: Option<&Request>, Committed { revision, voxels }: Committed, scans: usize) {
-        if let Some(Request { id, digest }) = request.cloned() {
-            self.map.requests.write().push(AnsweredRequest { id, digest, revision, voxels, scans });
+        if let Some(Request { id, digest, caller }) = request.cloned() {
+            self.map.requests.write().push(AnsweredRequest { id, digest, caller, revision, voxels, scans });
         }
     }
 

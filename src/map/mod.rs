@@ -34,11 +34,11 @@ pub use info::{LevelInfo, MapDescription};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;
-pub use name::{MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
+pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
 pub use observations::Observations;
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError, SPHERE_M_MAX};
-pub use requests::{AnsweredRequest, REQUESTS_KEPT, RequestKind, Requests};
+pub use requests::{AnsweredRequest, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind, Requests};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{

@@ -14,6 +14,9 @@ pub enum NameError {
     /// Not a robot's name.
     #[error("robot must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
     Robot(String),
+    /// Not a caller's name.
+    #[error("caller must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
+    Caller(String),
     /// Not a request's id.
     #[error("request_id must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
     Request(String),
@@ -74,6 +77,25 @@ impl RequestId {
     /// Names the text and what an id looks like.
     pub fn new(text: &str) -> Result<Self, NameError> {
         word(text).map(Self).ok_or_else(|| NameError::Request(excerpt(text)))
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// Who asks for changes, by the name of a key: 1 to 64 of `[A-Za-z0-9_.-]`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CallerName(Arc<str>);
+
+impl CallerName {
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// Names the text and what a name looks like.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        word(text).map(Self).ok_or_else(|| NameError::Caller(excerpt(text)))
     }
 
     /// The text.

@@ -1,11 +1,15 @@
 //! Changes that were asked for under an id, so that asking twice does them once.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use super::RequestId;
+use super::{CallerName, RequestId};
 
-/// Requests that a map remembers; the oldest are forgotten first.
+/// Requests that a map remembers, those of all callers together.
 pub const REQUESTS_KEPT: usize = 65_536;
+
+/// Requests of one caller that a map remembers, and as many of those without a name: one more displaces the caller's own
+/// oldest.
+pub const REQUESTS_PER_CALLER_KEPT: usize = 8_192;
 
 /// A change that was asked for under an id, and what came of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,6 +18,8 @@ pub struct AnsweredRequest {
     pub id: RequestId,
     /// Of what was asked for.
     pub digest: u64,
+    /// Who asked for it, where that is known.
+    pub caller: Option<CallerName>,
     /// The revision that it made.
     pub revision: u64,
     /// Finest voxels that it took out.
@@ -22,11 +28,18 @@ pub struct AnsweredRequest {
     pub scans: usize,
 }
 
-/// The last [`REQUESTS_KEPT`] answered requests, in the order of their revisions.
+/// The last answered requests of each caller, in the order of their revisions.
+///
+/// A caller has [`REQUESTS_PER_CALLER_KEPT`] at most, so that nobody's requests displace those of others. Where
+/// [`REQUESTS_KEPT`] are remembered all the same, the oldest goes of the caller that has most: who asks for little keeps
+/// all of it.
 #[derive(Debug, Clone, Default)]
 pub struct Requests {
-    answered: VecDeque<AnsweredRequest>,
+    /// By the revision that each made.
+    answered: BTreeMap<u64, AnsweredRequest>,
     by_id: HashMap<(RequestId, RequestKind), u64>,
+    /// The revisions of each caller's, ascending.
+    by_caller: BTreeMap<Option<CallerName>, VecDeque<u64>>,
 }
 
 /// What was asked for. Ids of one kind say nothing of those of the other: who may undo scans is not always who may delete.
@@ -48,25 +61,43 @@ impl AnsweredRequest {
 impl Requests {
     /// What came of the request of that kind and id.
     pub fn find(&self, kind: RequestKind, id: &RequestId) -> Option<&AnsweredRequest> {
-        let revision = self.by_id.get(&(id.clone(), kind))?;
-        let place = self.answered.binary_search_by_key(revision, |request| request.revision).ok()?;
-        self.answered.get(place)
+        self.answered.get(self.by_id.get(&(id.clone(), kind))?)
     }
 
     /// All of them, in the order of their revisions.
     pub fn iter(&self) -> impl Iterator<Item = &AnsweredRequest> {
-        self.answered.iter()
+        self.answered.values()
     }
 
     pub(super) fn push(&mut self, request: AnsweredRequest) {
-        if self.answered.len() == REQUESTS_KEPT
-            && let Some(oldest) = self.answered.pop_front()
-        {
-            let kind = oldest.kind();
-            self.by_id.remove(&(oldest.id, kind));
+        let (caller, revision) = (request.caller.clone(), request.revision);
+        self.by_id.insert((request.id.clone(), request.kind()), revision);
+        self.by_caller.entry(caller.clone()).or_default().push_back(revision);
+        self.answered.insert(revision, request);
+        if self.of(&caller) > REQUESTS_PER_CALLER_KEPT {
+            self.forget_oldest_of(&caller);
+        } else if self.answered.len() > REQUESTS_KEPT {
+            let most = self.by_caller.iter().max_by_key(|(other, of)| (of.len(), **other == caller));
+            if let Some(most) = most.map(|(most, _)| most.clone()) {
+                self.forget_oldest_of(&most);
+            }
         }
-        self.by_id.insert((request.id.clone(), request.kind()), request.revision);
-        self.answered.push_back(request);
+    }
+
+    /// How many of a caller's are remembered.
+    fn of(&self, caller: &Option<CallerName>) -> usize {
+        self.by_caller.get(caller).map_or(0, VecDeque::len)
+    }
+
+    fn forget_oldest_of(&mut self, caller: &Option<CallerName>) {
+        let oldest = self.by_caller.get_mut(caller).and_then(VecDeque::pop_front);
+        if let Some(gone) = oldest.and_then(|revision| self.answered.remove(&revision)) {
+            let kind = gone.kind();
+            self.by_id.remove(&(gone.id, kind));
+        }
+        if self.of(caller) == 0 {
+            self.by_caller.remove(caller);
+        }
     }
 }
 
@@ -90,7 +121,15 @@ mod tests {
 
     fn request(n: u64) -> AnsweredRequest {
         let id = RequestId::new(&format!("r{n}")).unwrap();
-        AnsweredRequest { id, digest: n, revision: n * 3, voxels: 1, scans: 0 }
+        AnsweredRequest { id, digest: n, caller: None, revision: n * 3, voxels: 1, scans: 0 }
+    }
+
+    fn of_caller(caller: &str, n: u64) -> AnsweredRequest {
+        AnsweredRequest { caller: Some(CallerName::new(caller).unwrap()), ..request(n) }
+    }
+
+    fn remembers(requests: &Requests, n: u64) -> bool {
+        requests.find(RequestKind::Deletion, &request(n).id).is_some()
     }
 
     #[test]
@@ -102,13 +141,45 @@ mod tests {
     }
 
     #[test]
-    fn the_oldest_request_is_forgotten_first() {
-        let kept = REQUESTS_KEPT as u64;
+    fn the_oldest_request_of_a_caller_is_forgotten_first() {
+        let kept = REQUESTS_PER_CALLER_KEPT as u64;
         let requests: Requests = (0..kept + 2).map(request).collect();
         let find = |n: u64| requests.find(RequestKind::Deletion, &request(n).id);
         assert_eq!(find(1), None);
         assert_eq!(find(2), Some(&request(2)));
         assert_eq!(find(kept + 1), Some(&request(kept + 1)));
+        assert_eq!(requests.iter().count(), REQUESTS_PER_CALLER_KEPT);
+    }
+
+    #[test]
+    fn one_callers_flood_displaces_none_of_anothers_requests() {
+        let flood = (10..10 + REQUESTS_KEPT as u64).map(|n| of_caller("flooder", n));
+        let requests: Requests = [request(1), of_caller("quiet", 2)].into_iter().chain(flood).collect();
+        assert!(remembers(&requests, 1) && remembers(&requests, 2));
+        // The same after they were written and read.
+        let again: Requests = requests.iter().cloned().collect();
+        assert_eq!(again, requests);
+        assert!(remembers(&again, 2) && !remembers(&again, 10));
+    }
+
+    #[test]
+    fn of_many_callers_the_one_that_has_most_gives_way() {
+        let full = (REQUESTS_KEPT / REQUESTS_PER_CALLER_KEPT) as u64;
+        let greedy = |caller: u64| {
+            let name = format!("c{caller}");
+            let first = 100_000 * (caller + 1);
+            (first..first + REQUESTS_PER_CALLER_KEPT as u64).map(move |n| of_caller(&name, n))
+        };
+        let mut requests: Requests = (0..full).flat_map(greedy).collect();
         assert_eq!(requests.iter().count(), REQUESTS_KEPT);
+        for n in 0..100 {
+            requests.push(of_caller("quiet", 90_000_000 + n));
+        }
+        assert_eq!(requests.iter().count(), REQUESTS_KEPT);
+        assert!((0..100).all(|n| remembers(&requests, 90_000_000 + n)));
+        let left = |caller: u64| requests.of(&Some(CallerName::new(&format!("c{caller}")).unwrap()));
+        assert!((0..full).all(|caller| left(caller) >= REQUESTS_PER_CALLER_KEPT - 13));
+        let again: Requests = requests.iter().cloned().collect();
+        assert_eq!(again, requests);
     }
 }

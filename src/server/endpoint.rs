@@ -82,7 +82,12 @@ impl Endpoint {
                 () = self.closing.cancelled() => return,
                 stream = sockets.next() => stream,
             };
-            match self.places.take() {
+            let place = tokio::select! {
+                biased;
+                () = self.closing.cancelled() => return,
+                place = self.places.take() => place,
+            };
+            match place {
                 Some(place) => {
                     let tls = self.tls_at(&sockets);
                     let open = self.metrics.connection_opened(listener);

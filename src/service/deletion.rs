@@ -9,8 +9,8 @@ use super::room::Room;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
 use crate::geometry::Point;
 use crate::map::{
-    AnsweredRequest, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request, RequestKind,
-    SHARDS,
+    AnsweredRequest, CallerName, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request,
+    RequestKind, SHARDS,
 };
 use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
 
@@ -19,10 +19,15 @@ impl HostedMap {
     pub(super) fn propose_deletion(
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
+        caller: Option<&CallerName>,
         room: &Arc<Room>,
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
-        let request = deletion.request_id.clone().map(|id| Request { id, digest: digest(deletion) });
+        let request = deletion.request_id.clone().map(|id| Request {
+            id,
+            digest: digest(deletion),
+            caller: caller.cloned(),
+        });
         let former = former_digest(deletion);
         if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref(), former)? {
             let state = self.state(answered.revision);

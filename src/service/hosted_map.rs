@@ -284,6 +284,11 @@ impl HostedMap {
     ) -> Result<VoxelListing, ServiceError> {
         let long_read = self.map.long_read();
         let view = long_read.view();
+        // How many there are of a whole level is known: nothing is copied of more than may be listed.
+        let whole = if region.is_none() { view.lists(level).map(|list| list.len()).sum() } else { 0 };
+        if whole > most {
+            return Err(listing_too_large(level, whole, most));
+        }
         let (copy, revision) = (view.level_voxels(level, region, most, stop), view.revision());
         drop(view);
         drop(long_read);

@@ -42,7 +42,7 @@ pub use localization::{
 pub use pool::PoolUse;
 pub use reach::MapReach;
 pub use request::{
-    Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapState, MapStorage,
+    Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapState, MapStorage,
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery,
     UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
@@ -54,7 +54,7 @@ pub use watermarks::Marks;
 
 use std::sync::Arc;
 
-use crate::map::{MapName, Region};
+use crate::map::{CallerName, MapName, Region};
 use crate::store::OpeningProgress;
 use crate::util::StopSignal;
 use catalogue::Catalogue;
@@ -72,6 +72,8 @@ pub struct MapService {
     inner: Arc<Inner>,
     reach: MapReach,
     scans: ScanReach,
+    /// Whose requests a map remembers under this name.
+    caller: Option<CallerName>,
 }
 
 /// See [`Inner::undo`].
@@ -121,13 +123,13 @@ impl MapService {
             room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
             settings,
         };
-        Ok(Self { inner: Arc::new(inner), reach: MapReach::Every, scans: ScanReach::default() })
+        Ok(Self { inner: Arc::new(inner), reach: MapReach::Every, scans: ScanReach::default(), caller: None })
     }
 
-    /// The same maps for a caller who may name no others than those of `reach`, and send and undo no others than the
-    /// scans of `scans`.
-    pub fn limited_to(&self, reach: MapReach, scans: ScanReach) -> Self {
-        Self { inner: Arc::clone(&self.inner), reach, scans }
+    /// The same maps for a caller of a name, who may name no others than those of `reach`, and send and undo no others than
+    /// the scans of `scans`.
+    pub fn limited_to(&self, caller: Option<CallerName>, reach: MapReach, scans: ScanReach) -> Self {
+        Self { inner: Arc::clone(&self.inner), reach, scans, caller }
     }
 
     /// The bounds on what callers may ask.
@@ -253,8 +255,9 @@ impl MapService {
             DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
             DeletionTarget::Region(_) => {}
         }
-        let (inner, deletion) = (Arc::clone(&self.inner), Arc::new(deletion));
-        self.carry_through(&self.inner.mapping, move |_| map.propose_deletion(&deletion, &inner.room)).await
+        let (inner, deletion, caller) = (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
+        let propose = move |_: StopSignal<'_>| map.propose_deletion(&deletion, caller.as_ref(), &inner.room);
+        self.carry_through(&self.inner.mapping, propose).await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -267,10 +270,10 @@ impl MapService {
     pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         self.scans.permit_undo(&undo.target)?;
         let (map, undo) = (self.map(map)?, Arc::new(undo));
-        let inner = Arc::clone(&self.inner);
+        let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
         let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
         self.carry_through(&self.inner.undo, move |stop| {
-            limit.run(stop, |stop| map.propose_undo(&undo, &inner.room, &limit, stop))
+            limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
         })
         .await
     }

@@ -71,7 +71,7 @@ fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
 fn delete_everything(map: &Arc<HostedMap>, room: &Arc<Room>) -> u64 {
     let region = Region::ball([0.0; 3], 100.0).unwrap();
     let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
-    outcome(map.propose_deletion(&Arc::new(deletion), room)).unwrap().state.revision
+    outcome(map.propose_deletion(&Arc::new(deletion), None, room)).unwrap().state.revision
 }
 
 fn crowd() {

@@ -381,6 +381,15 @@ pub struct MapStorage {
     pub failure: Option<String>,
 }
 
+/// The maps that a caller may name, by name.
+#[derive(Debug, Clone, Default)]
+pub struct MapList {
+    /// Those that are served.
+    pub maps: Vec<MapInfo>,
+    /// Those that could not be opened.
+    pub unavailable: Vec<UnavailableMap>,
+}
+
 /// A map that could not be opened. Nothing can be done with it but to put its files right, and to start again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnavailableMap {

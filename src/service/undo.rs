@@ -10,8 +10,8 @@ use super::time_limit::TimeLimit;
 use super::trajectory::check_not_forgotten;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
 use crate::map::{
-    Change, Committed, MultiResolutionMap, Observations, Request, RequestKind, Trajectory, TrajectoryPose,
-    UndoRecord, WithdrawnScan,
+    CallerName, Change, Committed, MultiResolutionMap, Observations, Request, RequestKind, Trajectory,
+    TrajectoryPose, UndoRecord, WithdrawnScan,
 };
 use crate::store::{MapFolder, StoreError};
 use crate::util::StopSignal;
@@ -25,12 +25,17 @@ impl HostedMap {
     pub(super) fn propose_undo(
         self: &Arc<Self>,
         undo: &Undo,
+        caller: Option<&CallerName>,
         room: &Room,
         limit: &TimeLimit,
         stop: StopSignal<'_>,
     ) -> Result<Step<UndoAnswer>, ServiceError> {
         self.check_writable()?;
-        let request = undo.request_id.clone().map(|id| Request { id, digest: digest(&undo.target) });
+        let request = undo.request_id.clone().map(|id| Request {
+            id,
+            digest: digest(&undo.target),
+            caller: caller.cloned(),
+        });
         let former = former_digest(&undo.target);
         if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref(), former)? {
             let (scans, removed, state) = (answered.scans, answered.voxels, self.state(answered.revision));

@@ -232,7 +232,9 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 mod tests {
     use super::*;
     use crate::geometry;
-    use crate::map::{AnsweredRequest, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan};
+    use crate::map::{
+        AnsweredRequest, CallerName, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan,
+    };
     use crate::voxel::{MomentSet, Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
@@ -252,7 +254,8 @@ mod tests {
         let mut moments = Moments::of_offset([3, -4, 5]);
         moments += Moments::of_offset([-2048, 2048, 0]);
         let id = RequestId::new("undo-1").unwrap();
-        let request = AnsweredRequest { id, digest: 9, revision: 42, voxels: 0, scans: 1 };
+        let caller = Some(CallerName::new("r1").unwrap());
+        let request = AnsweredRequest { id, digest: 9, caller, revision: 42, voxels: 0, scans: 1 };
         Snapshot {
             uuid: Uuid::from_bytes([7; 16]),
             settings: MapSettings::new(0.05, 4),

@@ -1,7 +1,7 @@
 //! The service with its work counted, once for every protocol.
 
 use super::Metrics;
-use crate::map::MapName;
+use crate::map::{CallerName, MapName};
 use crate::service::{
     Deletion, DeletionAnswer, MapInfo, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer, ScanReach,
     ScanRequest, ServiceError, Undo, UndoAnswer,
@@ -21,9 +21,9 @@ impl MeteredService {
         Self { service, metrics }
     }
 
-    /// The same for a caller who may name no others than the maps of `reach`, nor send others than the scans of `scans`.
-    pub fn limited_to(&self, reach: MapReach, scans: ScanReach) -> Self {
-        Self { service: self.service.limited_to(reach, scans), metrics: self.metrics.clone() }
+    /// The same for a caller of a name, who may name no others than the maps of `reach`, nor send others than the scans of `scans`.
+    pub fn limited_to(&self, caller: Option<CallerName>, reach: MapReach, scans: ScanReach) -> Self {
+        Self { service: self.service.limited_to(caller, reach, scans), metrics: self.metrics.clone() }
     }
 
     /// The service itself.

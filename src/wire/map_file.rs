@@ -9,6 +9,12 @@ use crate::service::MapFile;
 /// Bytes of a piece.
 const PIECE_BYTES: usize = 1 << 20;
 
+/// Bytes of memory that a file of so many bytes takes until its last message is sent: itself, and a message, written with
+/// room for twice as much.
+pub fn snapshot_bytes(file_bytes: usize) -> usize {
+    file_bytes + 2 * file_bytes.min(PIECE_BYTES)
+}
+
 /// A file as messages.
 pub fn snapshot_pieces(file: MapFile) -> impl Iterator<Item = pb::SnapshotMapResponse> + Send {
     let MapFile { bytes, state } = file;

@@ -6,7 +6,7 @@ use super::types::count_from;
 use super::{InField, pb, required};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
-use crate::service::{MapInfo, MapStorage, ServiceError, UnavailableMap};
+use crate::service::{MapInfo, MapList, MapStorage, ServiceError, UnavailableMap};
 use crate::store::JournalUse;
 use crate::util::Durations;
 
@@ -86,8 +86,8 @@ impl TryFrom<pb::RestoreMapResponse> for MapInfo {
     }
 }
 
-impl From<(Vec<MapInfo>, Vec<UnavailableMap>)> for pb::ListMapsResponse {
-    fn from((maps, unavailable): (Vec<MapInfo>, Vec<UnavailableMap>)) -> Self {
+impl From<MapList> for pb::ListMapsResponse {
+    fn from(MapList { maps, unavailable }: MapList) -> Self {
         let message = |UnavailableMap { name, reason }| pb::UnavailableMap { map: name.to_string(), reason };
         Self {
             maps: maps.into_iter().map(Into::into).collect(),
@@ -96,11 +96,23 @@ impl From<(Vec<MapInfo>, Vec<UnavailableMap>)> for pb::ListMapsResponse {
     }
 }
 
-impl TryFrom<pb::ListMapsResponse> for Vec<MapInfo> {
+impl TryFrom<pb::ListMapsResponse> for MapList {
     type Error = ServiceError;
 
     fn try_from(answer: pb::ListMapsResponse) -> Result<Self, ServiceError> {
-        answer.maps.into_iter().map(TryInto::try_into).collect()
+        let pb::ListMapsResponse { maps, unavailable } = answer;
+        Ok(Self {
+            maps: maps.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+            unavailable: unavailable.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl TryFrom<pb::UnavailableMap> for UnavailableMap {
+    type Error = ServiceError;
+
+    fn try_from(pb::UnavailableMap { map, reason }: pb::UnavailableMap) -> Result<Self, ServiceError> {
+        Ok(Self { name: MapName::new(&map)?, reason })
     }
 }
 

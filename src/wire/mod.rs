@@ -18,7 +18,7 @@ mod types;
 mod undo;
 
 pub(crate) use field::{InField, required};
-pub use map_file::{restore_pieces, snapshot_pieces};
+pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::create_map;
-pub use occupancy::{KEYS_PER_CHUNK, voxel_chunks};
+pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};
 pub(crate) use types::uuid_from;

@@ -81,6 +81,12 @@ impl From<(&MapName, u32, Option<Region>)> for pb::ListVoxelsRequest {
     }
 }
 
+/// Bytes of memory that a listing of so many voxels takes until its last message is sent: its keys, and three messages, one
+/// that is made and one that is sent, written with room for twice as much.
+pub fn listing_bytes(voxels: usize) -> usize {
+    size_of::<VoxelKey>() * (voxels + 3 * voxels.min(KEYS_PER_CHUNK))
+}
+
 /// A listing as messages of at most [`KEYS_PER_CHUNK`] keys, each made when it is asked for; one without keys
 /// where there is no voxel, so that the state is told.
 pub fn voxel_chunks(listing: VoxelListing) -> impl Iterator<Item = pb::ListVoxelsResponse> + Send {

@@ -75,6 +75,15 @@ fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
     let refused = complaint(&["maps", "show", "office", "--server", &server.grpc], 1);
     assert!(refused.contains("journal-00000000000000000001.log: damaged at offset"), "{refused}");
     assert!(refused.contains("--set-aside office`"), "{refused}");
+    let listed = mrol(&["maps", "list", "--server", &server.grpc]).assert().success().get_output().clone();
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    assert!(listed.contains("office") && listed.contains("--set-aside office`"), "{listed}");
+    let listed = &objects(&["maps", "list", "--server", &server.grpc])[0];
+    assert_eq!(listed["map"], json!("office"), "{listed}");
+    assert!(listed["unavailable"].as_str().unwrap().contains("--set-aside office`"), "{listed}");
+    let backup = sequence.path("backup");
+    let incomplete = complaint(&["snapshot", "--all", &backup, "--server", &server.grpc], 1);
+    assert!(incomplete.contains("office") && incomplete.contains("--set-aside office`"), "{incomplete}");
     assert_eq!(server.stop(), Some(0));
 
     let opens = &objects(&["doctor", &data, "--set-aside", "office"])[0];

@@ -2,8 +2,25 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 9] =
-    ["serve", "demo", "map", "insert", "query", "delete", "maps", "bench", "experiment"];
+const COMMANDS: [&str; 17] = [
+    "serve",
+    "demo",
+    "map",
+    "insert",
+    "localize",
+    "query",
+    "delete",
+    "undo",
+    "maps",
+    "bench",
+    "experiment",
+    "health",
+    "key",
+    "snapshot",
+    "restore",
+    "doctor",
+    "config",
+];
 
 #[test]
 fn every_command_explains_itself_with_examples() {

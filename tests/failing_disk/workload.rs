@@ -117,7 +117,7 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
         let voxels: VoxelSet = model.view().voxels().iter().filter(|_| rng.random_bool(0.2)).collect();
         if !voxels.is_empty() {
             let id = RequestId::new(&format!("d{revision}")).unwrap();
-            let request = Some(Request { id, digest: revision });
+            let request = Some(Request { id, digest: revision, caller: None });
             return Change::Deletion(DeletionRecord { voxels, request });
         }
     }

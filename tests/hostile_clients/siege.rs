@@ -16,7 +16,7 @@ pub(crate) const MIB: usize = 1 << 20;
 
 /// What the daemon is started with; the names below are those of the settings.
 pub(crate) const MESSAGE_BYTES_MAX: usize = 32 * MIB;
-const BODY_BYTES_MAX: usize = 64 * MIB;
+pub(crate) const BODY_BYTES_MAX: usize = 64 * MIB;
 const REQUESTS_MAX: usize = 256;
 const STREAMS_MAX: usize = 16;
 const CONNECTIONS_MAX: usize = 600;

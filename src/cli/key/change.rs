@@ -13,20 +13,20 @@ use crate::cli::output::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct RevokeKey {
-    /// Whose
+    /// The name of the key, as `mrol key list` prints it
     #[arg(long, value_parser = name)]
     name: KeyName,
-    /// The file of keys
+    /// The file of keys, which is changed
     #[arg(long, value_name = "FILE")]
     file: PathBuf,
 }
 
 #[derive(Debug, clap::Args)]
 pub(super) struct RotateKey {
-    /// Whose
+    /// The name of the key, as `mrol key list` prints it
     #[arg(long, value_parser = name)]
     name: KeyName,
-    /// The file of keys
+    /// The file of keys, which is changed
     #[arg(long, value_name = "FILE")]
     file: PathBuf,
     /// Hours for which the former secret counts beside the new one, so that no holder is shut out

@@ -12,7 +12,7 @@ use crate::cli::output::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ListKeys {
-    /// The file of keys
+    /// The file of keys, which stays as it is
     #[arg(long, value_name = "FILE")]
     file: PathBuf,
 }

@@ -1,7 +1,7 @@
 //! Changes, and the requests behind them.
 
 use super::{Unreadable, count, required};
-use crate::map::{AnsweredRequest, Change, DeletionRecord, Request, RequestId, UndoRecord};
+use crate::map::{AnsweredRequest, CallerName, Change, DeletionRecord, Request, RequestId, UndoRecord};
 use crate::store::pb;
 
 impl From<&Change> for pb::Change {
@@ -75,7 +75,12 @@ impl TryFrom<pb::Undo> for UndoRecord {
 
 impl From<&Request> for pb::Request {
     fn from(request: &Request) -> Self {
-        Self { id: request.id.as_str().to_owned(), digest: request.digest }
+        let caller = request.caller.as_ref().map(|caller| caller.as_str().to_owned());
+        Self {
+            id: request.id.as_str().to_owned(),
+            digest: request.digest,
+            caller: caller.unwrap_or_default(),
+        }
     }
 }
 
@@ -84,13 +89,16 @@ impl TryFrom<pb::Request> for Request {
 
     fn try_from(message: pb::Request) -> Result<Self, Unreadable> {
         let id = RequestId::new(&message.id).map_err(|e| e.to_string())?;
-        Ok(Self { id, digest: message.digest })
+        let caller = Some(&message.caller).filter(|caller| !caller.is_empty());
+        let caller = caller.map(|caller| CallerName::new(caller)).transpose().map_err(|e| e.to_string())?;
+        Ok(Self { id, digest: message.digest, caller })
     }
 }
 
 impl From<&AnsweredRequest> for pb::AnsweredRequest {
     fn from(answered: &AnsweredRequest) -> Self {
-        let request = Request { id: answered.id.clone(), digest: answered.digest };
+        let AnsweredRequest { id, digest, caller, .. } = answered.clone();
+        let request = Request { id, digest, caller };
         Self {
             request: Some((&request).into()),
             revision: answered.revision,
@@ -104,10 +112,11 @@ impl TryFrom<pb::AnsweredRequest> for AnsweredRequest {
     type Error = Unreadable;
 
     fn try_from(message: pb::AnsweredRequest) -> Result<Self, Unreadable> {
-        let Request { id, digest } = required(message.request, "requests.request")?.try_into()?;
+        let Request { id, digest, caller } = required(message.request, "requests.request")?.try_into()?;
         Ok(Self {
             id,
             digest,
+            caller,
             revision: message.revision,
             voxels: count(message.voxels),
             scans: count(message.scans),

@@ -62,7 +62,9 @@ pub(super) fn change_of(payload: &[u8], bytes: u32) -> Result<Change, Unreadable
 mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{DeletionRecord, Request, RequestId, RobotName, ScanRecord, TrajectoryPose, UndoRecord};
+    use crate::map::{
+        CallerName, DeletionRecord, Request, RequestId, RobotName, ScanRecord, TrajectoryPose, UndoRecord,
+    };
     use crate::voxel::{Lattice, MomentSet, VoxelKey, VoxelSet};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -86,7 +88,11 @@ mod tests {
             digest: u64::MAX,
             ..TrajectoryPose::new(RobotName::new("r1").unwrap(), Pose::translation(0.1, -2.0, 1.0 / 3.0))
         };
-        let request = Some(Request { id: RequestId::new("x-1").unwrap(), digest: 3 });
+        let request = Some(Request {
+            id: RequestId::new("x-1").unwrap(),
+            digest: 3,
+            caller: Some(CallerName::new("r1").unwrap()),
+        });
         for change in [
             Change::Insertion(ScanRecord { pose, voxels: voxels(5000), moments: moments() }),
             Change::Deletion(DeletionRecord { voxels: voxels(10), request: None }),

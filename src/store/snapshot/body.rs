@@ -53,8 +53,8 @@ const NUMBER_BYTES: usize = 3 * size_of::<u64>();
 /// Of a scan in the trajectory: itself as it was read and in a list that doubles its room, its overlaps and name, and its
 /// places by robot and id.
 const SCAN_BYTES: usize = 3 * size_of::<TrajectoryPose>() + 12 * size_of::<f64>() + 240;
-/// Of a request, which is found by its id.
-const REQUEST_BYTES: usize = 2 * size_of::<AnsweredRequest>() + 160;
+/// Of a request, which is found by its id, its revision and its caller, each with a text of its own.
+const REQUEST_BYTES: usize = 3 * size_of::<AnsweredRequest>() + 320;
 /// Robots whose forgotten scans a file may list.
 const ROBOTS_MAX: usize = 1 << 20;
 /// Of a robot whose scans were forgotten, besides their ids: its name, and its place by name.

@@ -134,7 +134,8 @@ fn change(revision: u64) -> Change {
     let voxels = |from: i32, count: i32| {
         (from..from + count).filter_map(|i| VoxelKey::new([i % 9, i / 9 % 9, -(i / 81)])).collect()
     };
-    let request = |id: &str| Some(Request { id: RequestId::new(id).expect("an id"), digest: revision });
+    let request =
+        |id: &str| Some(Request { id: RequestId::new(id).expect("an id"), digest: revision, caller: None });
     match revision {
         3 => Change::Deletion(DeletionRecord { voxels: voxels(40, 5), request: request("d") }),
         6 => Change::Undo(UndoRecord {
