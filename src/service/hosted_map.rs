@@ -15,7 +15,7 @@ use super::room::Room;
 use super::trajectory::thin;
 use super::{
     ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, VoxelListing,
-    check_not_stopped,
+    check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
@@ -285,8 +285,10 @@ impl HostedMap {
         let long_read = self.map.long_read();
         let view = long_read.view();
         let by_shard: Box<dyn Iterator<Item = Vec<VoxelKey>>> = match region {
-            Some(region) => Box::new(view.voxels_by_shard(region, level)),
-            None => Box::new(view.lists(level).map(|list| list.iter().collect())),
+            Some(region) => Box::new(view.voxels_by_shard(region, level, stop)),
+            None => {
+                Box::new(view.lists(level).map(|list| stop.paced(list.iter(), POINTS_PER_STEP).collect()))
+            }
         };
         let mut keys = Vec::new();
         for more in by_shard {
@@ -296,14 +298,21 @@ impl HostedMap {
                 return Err(listing_too_large(level, keys.len(), most));
             }
         }
+        check_not_stopped(stop)?;
         let resolution_m = self.map.lattice().resolution_m(level);
         Ok(VoxelListing { resolution_m, keys, state: self.state(view.revision()) })
     }
 
-    pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
-        let (described, storage) = (self.map.describe(rate_samples, RATE_SEED), self.storage());
-        let trajectory = self.map.trajectory();
-        MapInfo {
+    pub(super) fn describe(
+        &self,
+        rate_samples: usize,
+        stop: StopSignal<'_>,
+    ) -> Result<MapInfo, ServiceError> {
+        let Some(described) = self.map.describe_until(rate_samples, RATE_SEED, stop) else {
+            return Err(ended_early(stop));
+        };
+        let (storage, trajectory) = (self.storage(), self.map.trajectory());
+        Ok(MapInfo {
             name: self.name.clone(),
             state: self.state(described.revision),
             settings: *self.map.settings(),
@@ -315,7 +324,7 @@ impl HostedMap {
             commits: self.committing.durations(),
             trajectory_bytes: described.trajectory_bytes,
             storage,
-        }
+        })
     }
 
     /// Why the map takes no changes.
