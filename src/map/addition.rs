@@ -4,7 +4,11 @@ use super::bulk::{count_each, find_each, show_each};
 use super::room::Room;
 use super::shard::{Block, Shard, levels_of};
 use crate::bloom::{CountingBloomFilter, Probe};
-use crate::voxel::{Renewal, VoxelKey, VoxelSet};
+use crate::util::StopSignal;
+use crate::voxel::{BLOCKS_PER_LOOK, Renewal, VoxelKey, VoxelSet};
+
+/// Keys that a filter is built of between two looks at the stop signal: some milliseconds.
+const KEYS_PER_LOOK: usize = 64 << 10;
 
 /// What is to be done to a shard to add voxels at every level, found out and built while readers go on: under the write
 /// lock clusters and filters are exchanged, and bits set; nothing is counted, and nothing is rebuilt. It holds for the
@@ -26,35 +30,38 @@ enum OfLevel {
 }
 
 impl Addition {
-    /// Finds out what adding `blocks` of finest voxels to `shard` comes to, and counts them.
-    pub(super) fn plan(shard: &Shard, blocks: &[&Block]) -> Self {
+    /// Finds out what adding `blocks` of finest voxels to `shard` comes to, and counts them. Once stopped, what comes of it
+    /// is not to be applied, and the shard of no use.
+    pub(super) fn plan(shard: &Shard, blocks: &[&Block], stop: StopSignal<'_>) -> Self {
         let mut plan = Self { tiers: Vec::new(), levels: Vec::new() };
-        let mut created = plan.tier(shard, 0, blocks);
+        let mut created = plan.tier(shard, 0, blocks, stop);
         for tier in 1..shard.tiers.len() {
             let blocks: VoxelSet = created.into_iter().collect();
-            created = plan.tier(shard, tier, &blocks.blocks().iter().collect::<Vec<_>>());
+            created = plan.tier(shard, tier, &blocks.blocks().iter().collect::<Vec<_>>(), stop);
         }
         plan
     }
 
     /// Plans for one tier; the blocks that are absent so far.
-    fn tier(&mut self, shard: &Shard, tier: usize, blocks: &[&Block]) -> Vec<VoxelKey> {
+    fn tier(&mut self, shard: &Shard, tier: usize, blocks: &[&Block], stop: StopSignal<'_>) -> Vec<VoxelKey> {
         let table = &shard.tiers[tier];
         let levels = levels_of(tier, shard.filters.len());
         let (mut gains, mut created) = (Vec::with_capacity(blocks.len()), Vec::new());
         let mut keys = vec![Vec::new(); levels.len()];
-        find_each(table, blocks, |&(block, ref voxels), before| {
-            if voxels.difference(before).is_empty() {
-                return;
-            }
-            if before.is_empty() {
-                created.push(block);
-            }
-            gains.push((block, before.union(voxels)));
-            (0..).zip(&mut keys).for_each(|(up, keys)| before.keys_gained(voxels, block, up, keys));
-        });
-        self.tiers.push(Renewal::plan(table, &gains));
-        self.levels.extend(levels.zip(keys).map(|(level, keys)| OfLevel::plan(shard, level, keys)));
+        for blocks in stop.pieces(blocks, BLOCKS_PER_LOOK) {
+            find_each(table, blocks, |&(block, ref voxels), before| {
+                if voxels.difference(before).is_empty() {
+                    return;
+                }
+                if before.is_empty() {
+                    created.push(block);
+                }
+                gains.push((block, before.union(voxels)));
+                (0..).zip(&mut keys).for_each(|(up, keys)| before.keys_gained(voxels, block, up, keys));
+            });
+        }
+        self.tiers.push(Renewal::plan(table, &gains, stop));
+        self.levels.extend(levels.zip(keys).map(|(level, keys)| OfLevel::plan(shard, level, keys, stop)));
         created
     }
 
@@ -76,7 +83,7 @@ impl Addition {
 
 impl OfLevel {
     /// A larger filter also forgets saturated counters.
-    fn plan(shard: &Shard, level: usize, keys: Vec<u64>) -> Self {
+    fn plan(shard: &Shard, level: usize, keys: Vec<u64>, stop: StopSignal<'_>) -> Self {
         let filter = &shard.filters[level];
         let need = filter.len() + keys.len();
         if need <= filter.capacity() {
@@ -84,7 +91,7 @@ impl OfLevel {
         }
         let capacity = Room::of(shard.number, level).for_items(need);
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
-        larger.insert_each(&keys);
+        stop.pieces(&keys, KEYS_PER_LOOK).for_each(|keys| larger.insert_each(keys));
         shard.level(level as u32).for_some_keys(|keys| larger.insert_each(keys));
         Self::Grown(larger)
     }

@@ -17,6 +17,7 @@ use super::{
     UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
+use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
@@ -47,63 +48,89 @@ impl<'a> Committer<'a> {
 
     /// Makes `change`, for the first time or again.
     pub fn apply(self, change: &Change) -> Committed {
+        let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
+        // It is always made: nobody stops it.
+        self.apply_until(change, StopSignal::NEVER).unwrap_or(unchanged)
+    }
+
+    /// The same; none once stopped, and the map is of no use then.
+    pub fn apply_until(self, change: &Change, stop: StopSignal<'_>) -> Option<Committed> {
         match change {
-            Change::Insertion(scan) => self.insert(scan),
-            Change::Deletion(deletion) => self.delete(&deletion.voxels, deletion.request.as_ref()),
-            Change::Undo(undo) => self.undo(undo),
+            Change::Insertion(scan) => self.insert(scan, stop),
+            Change::Deletion(deletion) => self.delete(&deletion.voxels, deletion.request.as_ref(), stop),
+            Change::Undo(undo) => self.undo(undo, stop),
         }
     }
 
     /// Adds a scan's voxels at every level and its pose to the trajectory; always makes a revision.
     pub fn insert_scan(self, scan: ScanRecord) -> Committed {
-        self.insert(&scan)
+        self.apply(&Change::Insertion(scan))
     }
 
-    fn insert(self, scan: &ScanRecord) -> Committed {
-        let (_locks, voxels) = self.add_to_shards(&scan.voxels, &scan.moments);
+    fn insert(self, scan: &ScanRecord, stop: StopSignal<'_>) -> Option<Committed> {
+        let planned = self.plan_addition(&scan.voxels, &scan.moments, stop);
+        if stop.is_stopped() {
+            return None;
+        }
+        let (_locks, voxels) = self.add_to_shards(planned, stop);
+        if stop.is_stopped() {
+            return None;
+        }
         let mut trajectory = self.map.trajectory.write();
         let revision = self.map.revision() + 1;
         trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose.clone() });
-        self.publish(revision, voxels)
+        Some(self.publish(revision, voxels))
     }
 
     /// Adds finest voxels and moments, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins
-    /// with.
-    pub(super) fn add(self, voxels: &VoxelSet, moments: &MomentSet) {
-        self.add_to_shards(voxels, moments);
+    /// with. False once stopped: the map is of no use then.
+    pub(super) fn add(self, voxels: &VoxelSet, moments: &MomentSet, stop: StopSignal<'_>) -> bool {
+        let planned = self.plan_addition(voxels, moments, stop);
+        if stop.is_stopped() {
+            return false;
+        }
+        self.add_to_shards(planned, stop);
+        !stop.is_stopped()
     }
 
     /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
     /// passed over; removing none makes no revision.
     pub fn remove(self, voxels: &VoxelSet) -> Committed {
-        self.delete(voxels, None)
+        let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
+        self.delete(voxels, None, StopSignal::NEVER).unwrap_or(unchanged)
     }
 
-    fn delete(self, voxels: &VoxelSet, request: Option<&Request>) -> Committed {
+    fn delete(self, voxels: &VoxelSet, request: Option<&Request>, stop: StopSignal<'_>) -> Option<Committed> {
         let by_shard = self.group(voxels);
-        let planned = self.plan(touched(&by_shard), |i, shard| Removal::plan(shard, &by_shard[i]));
+        let planned = self.plan(touched(&by_shard), |i, shard| Removal::plan(shard, &by_shard[i], stop));
+        if stop.is_stopped() {
+            return None;
+        }
         let removed = removed_by(&planned);
         if removed == 0 {
-            return Committed { revision: self.map.revision(), voxels: 0 };
+            return Some(Committed { revision: self.map.revision(), voxels: 0 });
         }
         let _locks = self.take_out(planned, &Default::default());
         let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         self.remember(request, committed, 0);
-        self.publish(committed.revision, committed.voxels)
+        Some(self.publish(committed.revision, committed.voxels))
     }
 
     /// Takes scans out of the trajectory, and the voxels that they alone held; always makes a revision.
-    fn undo(self, undo: &UndoRecord) -> Committed {
+    fn undo(self, undo: &UndoRecord, stop: StopSignal<'_>) -> Option<Committed> {
         let by_shard = self.group(&undo.voxels);
         // All of them, so that nobody who has a view of the whole map sees the trajectory change.
-        let planned = self.plan(0..SHARDS, |i, shard| Removal::plan(shard, &by_shard[i]));
+        let planned = self.plan(0..SHARDS, |i, shard| Removal::plan(shard, &by_shard[i], stop));
+        if stop.is_stopped() {
+            return None;
+        }
         let removed = removed_by(&planned);
         let _locks = self.take_out(planned, &self.map.moments.group(&undo.moments));
         let mut trajectory = self.map.trajectory.write();
         let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         trajectory.withdraw(&undo.scans, committed.revision);
         self.remember(undo.request.as_ref(), committed, undo.scans.len());
-        self.publish(committed.revision, committed.voxels)
+        Some(self.publish(committed.revision, committed.voxels))
     }
 
     /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](super::Trajectory::thin); the number
@@ -138,13 +165,18 @@ impl<'a> Committer<'a> {
         by_shard
     }
 
-    /// Adds voxels and the moments of points in them; the number of voxels that were absent.
-    fn add_to_shards(&self, voxels: &VoxelSet, moments: &MomentSet) -> (Locks<'a>, usize) {
+    /// Finds out what adding voxels and the moments of points in them comes to.
+    fn plan_addition(&self, voxels: &VoxelSet, moments: &MomentSet, stop: StopSignal<'_>) -> PlannedAddition {
         let (by_shard, moments) = (self.group(voxels), self.map.moments.group(moments));
-        let planned = self.plan(touched(&by_shard), |i, shard| Addition::plan(shard, &by_shard[i]));
+        let planned = self.plan(touched(&by_shard), |i, shard| Addition::plan(shard, &by_shard[i], stop));
+        (planned, moments)
+    }
+
+    /// Adds what is planned, or some of it once stopped; the number of voxels that were absent.
+    fn add_to_shards(&self, (planned, moments): PlannedAddition, stop: StopSignal<'_>) -> (Locks<'a>, usize) {
         let no_long_read = self.map.long_reads.write();
         let added_moments = moments.iter().enumerate().filter(|(_, moments)| !moments.is_empty());
-        let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments));
+        let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments, stop));
         let mut added = 0;
         let shards = self.carry_out(planned, |shard, addition| added += addition.apply(shard));
         (
@@ -196,6 +228,9 @@ impl<'a> Committer<'a> {
 /// Parts of a change, each with the number of its shard, ascending. A shard is as it was planned for until the change
 /// is carried out, since the turn to change the map is held meanwhile.
 type Plans<P> = Vec<(usize, P)>;
+
+/// An addition shard by shard, and the moments that it adds.
+type PlannedAddition = (Plans<Addition>, [MomentsOfShard; SHARDS]);
 
 /// Keeps readers of what changed waiting until the change is published.
 struct Locks<'a> {

@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::{MapSettings, MapSettingsError, MultiResolutionMap, Requests, Trajectory};
+use crate::util::StopSignal;
 use crate::voxel::{MomentSet, VoxelSet};
 
 /// The largest revision, 2^53: the last whole number up to which every program that reads JSON counts exactly. A map
@@ -75,12 +76,22 @@ impl MapContents {
 impl MultiResolutionMap {
     /// Takes the picture of this map. Changes wait while it is taken, readers do not.
     pub fn contents(&self) -> MapContents {
+        self.taken_until(StopSignal::NEVER)
+    }
+
+    /// The same; none once stopped.
+    pub fn contents_until(&self, stop: StopSignal<'_>) -> Option<MapContents> {
+        Some(self.taken_until(stop)).filter(|_| !stop.is_stopped())
+    }
+
+    /// Some of it, once stopped.
+    fn taken_until(&self, stop: StopSignal<'_>) -> MapContents {
         // Every change of the trajectory or the requests holds a shard meanwhile, so that the view keeps both as they
         // are.
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
         let (trajectory, requests) = (self.trajectory(), self.requests().clone());
-        let (voxels, moments) = (view.voxels(), moments.to_set());
+        let (voxels, moments) = (view.voxels_until(stop), moments.to_set_until(stop));
         MapContents { revision: view.revision(), voxels, moments, trajectory, requests }
     }
 
@@ -90,10 +101,31 @@ impl MultiResolutionMap {
     /// When a setting is out of range.
     pub fn restore(settings: MapSettings, contents: MapContents) -> Result<Self, MapSettingsError> {
         let map = Self::new(settings)?;
-        map.committer().add(&contents.voxels, &contents.moments);
-        *map.trajectory.write() = contents.trajectory;
-        *map.requests.write() = contents.requests;
-        map.revision.store(contents.revision, Ordering::Release);
+        map.fill_until(contents, StopSignal::NEVER);
         Ok(map)
+    }
+
+    /// The same; none once stopped.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn restore_until(
+        settings: MapSettings,
+        contents: MapContents,
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Self>, MapSettingsError> {
+        let map = Self::new(settings)?;
+        Ok(map.fill_until(contents, stop).then_some(map))
+    }
+
+    /// Fills an empty map; false once stopped.
+    fn fill_until(&self, contents: MapContents, stop: StopSignal<'_>) -> bool {
+        if !self.committer().add(&contents.voxels, &contents.moments, stop) {
+            return false;
+        }
+        *self.trajectory.write() = contents.trajectory;
+        *self.requests.write() = contents.requests;
+        self.revision.store(contents.revision, Ordering::Release);
+        true
     }
 }

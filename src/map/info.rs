@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::shard::Shard;
 use super::{MapView, MultiResolutionMap};
+use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
 /// Size and filter of one level.
@@ -48,9 +49,20 @@ impl MultiResolutionMap {
     ///
     /// False positives are measured on `samples` absent neighbours of occupied voxels a level, drawn from `seed`.
     pub fn describe(&self, samples: usize, seed: u64) -> MapDescription {
+        self.described_until(samples, seed, StopSignal::NEVER)
+    }
+
+    /// The same, with a look at the stop signal before each shard of each level; none once stopped.
+    pub fn describe_until(&self, samples: usize, seed: u64, stop: StopSignal<'_>) -> Option<MapDescription> {
+        Some(self.described_until(samples, seed, stop)).filter(|_| !stop.is_stopped())
+    }
+
+    /// Of no use once stopped.
+    fn described_until(&self, samples: usize, seed: u64, stop: StopSignal<'_>) -> MapDescription {
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
-        let levels = (0..self.settings.levels).map(|level| self.describe_level(&view, level, samples, seed));
+        let describe_level = |level| self.describe_level(&view, level, samples, seed, stop);
+        let levels = (0..self.settings.levels).map(describe_level);
         MapDescription {
             revision: view.revision(),
             levels: levels.collect(),
@@ -81,7 +93,14 @@ impl MultiResolutionMap {
         (0..self.settings.levels).map(of_level).sum()
     }
 
-    fn describe_level(&self, view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> LevelInfo {
+    fn describe_level(
+        &self,
+        view: &MapView<'_>,
+        level: u32,
+        samples: usize,
+        seed: u64,
+        stop: StopSignal<'_>,
+    ) -> LevelInfo {
         let mut info = LevelInfo {
             level,
             resolution_m: self.lattice.resolution_m(level),
@@ -90,7 +109,7 @@ impl MultiResolutionMap {
             counter_bytes: 0,
             expected_rate: 0.0,
             unblocked_rate: 0.0,
-            measured_rate: measured_rate(view, level, samples, seed),
+            measured_rate: measured_rate(view, level, samples, seed, stop),
         };
         for list in view.lists(level) {
             let filter = list.filter();
@@ -112,11 +131,17 @@ impl MultiResolutionMap {
 ///
 /// Queries near surfaces are what planners and alignments ask, so this is the rate they meet. Occupied voxels are
 /// drawn from every n-th block of each shard, so that the cost does not grow with the map.
-fn measured_rate(view: &MapView<'_>, level: u32, samples: usize, seed: u64) -> Option<f64> {
+fn measured_rate(
+    view: &MapView<'_>,
+    level: u32,
+    samples: usize,
+    seed: u64,
+    stop: StopSignal<'_>,
+) -> Option<f64> {
     let total: usize = view.lists(level).map(|list| list.len()).sum();
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ u64::from(level));
     let (mut absent, mut let_through) = (0usize, 0usize);
-    for list in view.lists(level).filter(|list| !list.is_empty()) {
+    for list in stop.paced(view.lists(level).filter(|list| !list.is_empty()), 1) {
         let wish = (samples * list.len()).div_ceil(total);
         for voxel in list.sample(wish, &mut random) {
             let Some(neighbour) = random_neighbour(voxel, &mut random) else {

@@ -3,7 +3,7 @@
 use super::occupied_voxel_list::tier_of;
 use super::{MapView, Region};
 use crate::util::StopSignal;
-use crate::voxel::{BlockMask, VoxelKey};
+use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelKey};
 
 /// A block with at least so many voxels is copied as it is stored, one with fewer voxel by voxel: whichever is smaller.
 const VOXELS_OF_BLOCK_MIN: usize = size_of::<(VoxelKey, BlockMask)>() / size_of::<VoxelKey>();
@@ -33,12 +33,12 @@ impl LevelVoxels {
         self.len == 0
     }
 
-    /// Hands out the voxels, in no order, some at a time.
-    pub fn for_some(self, mut f: impl FnMut(&[VoxelKey])) {
+    /// Hands out the voxels, in no order, some at a time; once stopped, some of them.
+    pub fn for_some(self, stop: StopSignal<'_>, mut f: impl FnMut(&[VoxelKey])) {
         const SOME: usize = 4096;
         self.voxels.chunks(SOME).for_each(&mut f);
         let mut some = Vec::with_capacity(2 * SOME);
-        for (block, mask) in &self.blocks {
+        for (block, mask) in stop.paced(self.blocks.iter(), BLOCKS_PER_LOOK) {
             some.extend(mask.cells(self.up).map(|cell| cell.voxel(*block).ancestor(self.up)));
             if some.len() >= SOME {
                 f(&some);
@@ -77,10 +77,12 @@ impl MapView<'_> {
                 break;
             }
             match region {
-                Some(region) => self.for_each_block(&list, region, |block, mask| {
+                Some(region) => self.for_each_block(&list, region, stop, |block, mask| {
                     copy.push(block, &self.part_in(region, level, block, mask));
                 }),
-                None => list.blocks().iter().for_each(|(block, mask)| copy.push(block, mask)),
+                None => stop
+                    .paced(list.blocks().iter(), BLOCKS_PER_LOOK)
+                    .for_each(|(block, mask)| copy.push(block, mask)),
             }
         }
         copy

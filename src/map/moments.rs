@@ -4,7 +4,11 @@ use hashbrown::HashMap;
 
 use super::sharding::{SHARDS, Sharding};
 use crate::sync::{Rank, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use crate::util::StopSignal;
 use crate::voxel::{MOMENT_LEVEL, MomentSet, Moments, VoxelKey};
+
+/// Voxels whose moments are copied or added between two looks at the stop signal: a millisecond or so.
+const VOXELS_PER_LOOK: usize = 16 << 10;
 
 /// The moments of the points in each voxel of [`MOMENT_LEVEL`], in shards like the voxels themselves.
 ///
@@ -99,9 +103,9 @@ impl ShardedMoments {
 }
 
 impl MomentShard {
-    /// Adds the moments of points whose voxels are, or are about to be, occupied.
-    pub(super) fn add(&mut self, moments: &[(VoxelKey, Moments)]) {
-        for &(voxel, added) in moments {
+    /// Adds the moments of points whose voxels are, or are about to be, occupied; some of them once stopped.
+    pub(super) fn add(&mut self, moments: &[(VoxelKey, Moments)], stop: StopSignal<'_>) {
+        for &(voxel, added) in stop.pieces(moments, VOXELS_PER_LOOK).flatten() {
             *self.0.entry(voxel).or_default() += added;
         }
     }
@@ -145,8 +149,15 @@ impl MomentsView<'_> {
 
     /// All of them.
     pub fn to_set(&self) -> MomentSet {
-        let all = self.shards.iter().flat_map(|shard| &shard.0);
-        all.map(|(&voxel, &moments)| (voxel, moments)).collect()
+        self.to_set_until(StopSignal::NEVER)
+    }
+
+    /// The same; once stopped, some of them.
+    pub(super) fn to_set_until(&self, stop: StopSignal<'_>) -> MomentSet {
+        let mut all = Vec::with_capacity(self.shards.iter().map(|shard| shard.0.len()).sum());
+        let entries = stop.paced(self.shards.iter().flat_map(|shard| &shard.0), VOXELS_PER_LOOK);
+        all.extend(entries.map(|(&voxel, &moments)| (voxel, moments)));
+        MomentSet::of_voxels_until(all, stop)
     }
 
     /// Bytes of memory held.

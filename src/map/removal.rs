@@ -4,7 +4,8 @@ use super::bulk::{count_each, find_each, show_each};
 use super::shard::{Block, Shard, levels_of};
 use super::{MapSettings, moments::MomentsLost};
 use crate::bloom::{CountingBloomFilter, Probe};
-use crate::voxel::{Renewal, VoxelKey, VoxelSet};
+use crate::util::StopSignal;
+use crate::voxel::{BLOCKS_PER_LOOK, Renewal, VoxelKey, VoxelSet};
 
 /// What is to be done to a shard to take voxels out at every level, found out while readers go on. Under the write lock
 /// pointers are exchanged, and at most [`CLEARED_IN_PLACE`] bits a level cleared, however much goes. It holds for the
@@ -44,18 +45,19 @@ const CLEARED_IN_PLACE: usize = 2048;
 
 impl Removal {
     /// Finds out what taking `blocks` of finest voxels out of `shard` comes to, and counts them out: those that are
-    /// not there are passed over, and so the set says which ones the filter is told to forget (paper II-A).
-    pub(super) fn plan(shard: &Shard, blocks: &[&Block]) -> Self {
+    /// not there are passed over, and so the set says which ones the filter is told to forget (paper II-A). Once stopped,
+    /// what comes of it is not to be applied, and the shard of no use.
+    pub(super) fn plan(shard: &Shard, blocks: &[&Block], stop: StopSignal<'_>) -> Self {
         let voxels = voxels_there(shard, blocks);
         if voxels > 0 && voxels == shard.level(0).len() {
             return Self { voxels, left: Left::Nothing, moments: MomentsLost::Everything };
         }
         let (mut tiers, mut levels, mut moments) = (Vec::new(), Vec::new(), MomentsLost::default());
-        let mut emptied = Tier::of(shard, 0, blocks, &mut moments).plan(&mut tiers, &mut levels);
+        let mut emptied = Tier::of(shard, 0, blocks, &mut moments, stop).plan(&mut tiers, &mut levels, stop);
         for tier in 1..shard.tiers.len() {
             let blocks: VoxelSet = emptied.into_iter().collect();
             let blocks: Vec<_> = blocks.blocks().iter().collect();
-            emptied = Tier::of(shard, tier, &blocks, &mut moments).plan(&mut tiers, &mut levels);
+            emptied = Tier::of(shard, tier, &blocks, &mut moments, stop).plan(&mut tiers, &mut levels, stop);
         }
         Self { voxels, left: Left::Voxels { tiers, levels }, moments }
     }
@@ -110,45 +112,58 @@ struct Tier<'a> {
 }
 
 impl<'a> Tier<'a> {
-    fn of(shard: &'a Shard, tier: usize, blocks: &[&Block], moments: &mut MomentsLost) -> Self {
+    fn of(
+        shard: &'a Shard,
+        tier: usize,
+        blocks: &[&Block],
+        moments: &mut MomentsLost,
+        stop: StopSignal<'_>,
+    ) -> Self {
         let levels = levels_of(tier, shard.filters.len()).len();
         let (mut losses, mut emptied, mut keys) = (Vec::new(), Vec::new(), vec![Vec::new(); levels]);
-        find_each(&shard.tiers[tier], blocks, |&(block, ref voxels), before| {
-            if before.intersection(voxels).is_empty() {
-                return;
-            }
-            let left = before.difference(voxels);
-            losses.push((block, left));
-            if left.is_empty() {
-                emptied.push(block);
-            }
-            // What is gone is what would be gained if all came back.
-            (0..).zip(&mut keys).for_each(|(up, keys)| left.keys_gained(before, block, up, keys));
-            if tier == 0 {
-                moments.extend(left.rebuilt_moments(before, block));
-            }
-        });
+        for blocks in stop.pieces(blocks, BLOCKS_PER_LOOK) {
+            find_each(&shard.tiers[tier], blocks, |&(block, ref voxels), before| {
+                if before.intersection(voxels).is_empty() {
+                    return;
+                }
+                let left = before.difference(voxels);
+                losses.push((block, left));
+                if left.is_empty() {
+                    emptied.push(block);
+                }
+                // What is gone is what would be gained if all came back.
+                (0..).zip(&mut keys).for_each(|(up, keys)| left.keys_gained(before, block, up, keys));
+                if tier == 0 {
+                    moments.extend(left.rebuilt_moments(before, block));
+                }
+            });
+        }
         Self { shard, tier, losses, emptied, keys }
     }
 
     /// Plans for the tier; the blocks that lose their last voxel.
-    fn plan(self, tiers: &mut Vec<Renewal>, levels: &mut Vec<OfLevel>) -> Vec<VoxelKey> {
+    fn plan(
+        self,
+        tiers: &mut Vec<Renewal>,
+        levels: &mut Vec<OfLevel>,
+        stop: StopSignal<'_>,
+    ) -> Vec<VoxelKey> {
         let Self { shard, tier, losses, emptied, keys } = self;
-        tiers.push(Renewal::plan(&shard.tiers[tier], &losses));
+        tiers.push(Renewal::plan(&shard.tiers[tier], &losses, stop));
         drop(losses);
-        let of_level = |(level, keys): (usize, Vec<u64>)| OfLevel::plan(&shard.filters[level], keys);
+        let of_level = |(level, keys): (usize, Vec<u64>)| OfLevel::plan(&shard.filters[level], keys, stop);
         levels.extend(levels_of(tier, shard.filters.len()).zip(keys).map(of_level));
         emptied
     }
 }
 
 impl OfLevel {
-    fn plan(filter: &CountingBloomFilter, keys: Vec<u64>) -> Self {
+    fn plan(filter: &CountingBloomFilter, keys: Vec<u64>, stop: StopSignal<'_>) -> Self {
         if keys.len() <= CLEARED_IN_PLACE {
             return Self::Loses(count_each(filter, &keys, CountingBloomFilter::count_out));
         }
         let mut plane = filter.plane().to_vec();
-        for keys in keys.chunks(CLEARED_IN_PLACE) {
+        for keys in stop.pieces(&keys, CLEARED_IN_PLACE) {
             for cleared in count_each(filter, keys, CountingBloomFilter::count_out) {
                 plane[cleared.word] &= !cleared.mask;
             }

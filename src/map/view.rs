@@ -9,7 +9,8 @@ use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
 use crate::voxel::{
-    BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
+    BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints,
+    VoxelKey, VoxelSet,
 };
 
 /// Read locks on some or all shards of a map. While it lives, what it covers does not change.
@@ -129,7 +130,16 @@ impl<'a> MapView<'a> {
 
     /// All finest voxels that the view covers.
     pub fn voxels(&self) -> VoxelSet {
-        self.shards.iter().flatten().flat_map(|shard| shard.blocks()).collect()
+        self.voxels_until(StopSignal::NEVER)
+    }
+
+    /// The same; once stopped, some of them.
+    pub(super) fn voxels_until(&self, stop: StopSignal<'_>) -> VoxelSet {
+        let mut all = Vec::with_capacity(self.lists(0).map(|list| list.blocks().len()).sum());
+        all.extend(
+            stop.paced(self.shards.iter().flatten().flat_map(|shard| shard.blocks()), BLOCKS_PER_LOOK),
+        );
+        VoxelSet::of_blocks_until(all, stop)
     }
 
     /// The finest voxels at and below the voxels `keys` of `level`, of those that are there.
@@ -163,26 +173,34 @@ impl<'a> MapView<'a> {
     ///
     /// Takes some 72 bytes a block of finest voxels, and no more for a voxel.
     pub fn finest_in(&self, region: &Region, level: u32) -> VoxelSet {
+        self.finest_in_until(region, level, StopSignal::NEVER)
+    }
+
+    /// The same; once stopped, some of them.
+    pub fn finest_in_until(&self, region: &Region, level: u32, stop: StopSignal<'_>) -> VoxelSet {
         let (tier, _) = tier_of(level);
         let mut found = Vec::new();
         for shard in self.shards() {
             let mut blocks = Vec::new();
-            self.for_each_block(&shard.level(level), region, |block, mask| {
+            self.for_each_block(&shard.level(level), region, stop, |block, mask| {
                 let wanted = self.part_in(region, level, block, mask);
                 if !wanted.is_empty() {
                     blocks.push((block, wanted));
                 }
             });
+            if stop.is_stopped() {
+                break;
+            }
             found.extend_from_slice(shard.descendants(tier, &blocks).blocks());
         }
-        found.into_iter().collect()
+        VoxelSet::of_blocks_until(found, stop)
     }
 
     /// The voxels of `level` whose centers lie in `region`.
     pub fn voxels_in(&self, region: &Region, level: u32) -> Vec<VoxelKey> {
         let mut voxels = Vec::new();
         let copy = self.level_voxels(level, Some(region), usize::MAX, StopSignal::NEVER);
-        copy.for_some(|some| voxels.extend_from_slice(some));
+        copy.for_some(StopSignal::NEVER, |some| voxels.extend_from_slice(some));
         voxels
     }
 
@@ -206,11 +224,13 @@ impl<'a> MapView<'a> {
 
     /// Calls `f` with each block of a list that can hold a voxel of `region`.
     ///
-    /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer.
+    /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer; some of them once
+    /// stopped.
     pub(super) fn for_each_block(
         &self,
         list: &OccupiedVoxelList<'_>,
         region: &Region,
+        stop: StopSignal<'_>,
         mut f: impl FnMut(VoxelKey, &BlockMask),
     ) {
         let (level, blocks) = (list.level(), list.blocks());
@@ -221,9 +241,9 @@ impl<'a> MapView<'a> {
             .map(|(low, high)| (f64::from(*high) - f64::from(*low) + 1.0).max(0.0))
             .product();
         if volume < blocks.len() as f64 {
-            grid(candidates).for_each(|block| f(block, blocks.get(block)));
+            stop.paced(grid(candidates), BLOCKS_PER_LOOK).for_each(|block| f(block, blocks.get(block)));
         } else {
-            blocks.iter().for_each(|(block, mask)| f(block, mask));
+            stop.paced(blocks.iter(), BLOCKS_PER_LOOK).for_each(|(block, mask)| f(block, mask));
         }
     }
 }

@@ -25,7 +25,7 @@ use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::store::{MapFolder, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use crate::sync::thread;
-use crate::util::{Durations, SharedDurations};
+use crate::util::{Durations, SharedDurations, StopSignal};
 use worker::Worker;
 
 /// Changes that share one sync, and as many that wait meanwhile; one more is refused.
@@ -33,9 +33,10 @@ const GROUP_MAX: usize = 256;
 
 /// Keeps one robot's scans in order; held until its change is visible.
 pub(super) type Turn = Arc<OwnedMutexGuard<()>>;
-/// Decides on a change when everything before it is applied; none where there is nothing to change.
+/// Decides on a change when everything before it is applied; none where there is nothing to change. While it does, all
+/// other changes of the map wait: it gives up where nobody waits for the answer any more.
 pub(super) type Decision =
-    Box<dyn FnOnce(&MultiResolutionMap) -> Result<Option<Decided>, Refusal> + Send + 'static>;
+    Box<dyn FnOnce(&MultiResolutionMap, StopSignal<'_>) -> Result<Option<Decided>, Refusal> + Send + 'static>;
 
 /// A change that was decided on in its turn, with the memory that making it takes.
 pub(super) struct Decided {
@@ -188,7 +189,7 @@ impl Committing {
     pub(super) fn end_replaced(&self) {
         self.stopped.get_or_init(|| Stop::Replaced);
         let (answer, behind_all) = oneshot::channel();
-        let proposal = Proposal::Undecided(Box::new(|_| Ok(None)));
+        let proposal = Proposal::Undecided(Box::new(|_, _| Ok(None)));
         // Waits for a place in the queue; where the thread is gone, so are its changes.
         if self.inbox.send(Waiting { proposal, answer }).is_ok() {
             drop(behind_all.blocking_recv());

@@ -6,12 +6,13 @@ use super::committing::{Decided, Proposal, Refusal, Step};
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::room::Room;
-use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError};
+use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError, check_not_stopped};
 use crate::geometry::Point;
 use crate::map::{
     AnsweredRequest, CallerName, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request,
     RequestKind, SHARDS,
 };
+use crate::util::StopSignal;
 use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
 
 impl HostedMap {
@@ -36,10 +37,10 @@ impl HostedMap {
         room.check_to_shrink()?;
         let (map, deletion, room) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(room));
         // Which voxels are meant is decided when nobody else can change the map.
-        let decide = move |core: &MultiResolutionMap| {
+        let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Deletion, request.as_ref(), former)?;
             let lent = room.lend(search_bytes(core, &deletion), "a deletion")?;
-            let voxels = map.targets_of(&deletion)?;
+            let voxels = map.targets_of(&deletion, stop)?;
             if voxels.is_empty() {
                 return Ok(None);
             }
@@ -89,7 +90,7 @@ impl HostedMap {
         if self.answered(kind, request, former_digest)?.is_some() { Err(Refusal::Stale) } else { Ok(()) }
     }
 
-    fn targets_of(&self, deletion: &Deletion) -> Result<VoxelSet, ServiceError> {
+    fn targets_of(&self, deletion: &Deletion, stop: StopSignal<'_>) -> Result<VoxelSet, ServiceError> {
         let level = deletion.level;
         let keys: Vec<VoxelKey> = match &deletion.target {
             DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
@@ -97,7 +98,8 @@ impl HostedMap {
                 keys.iter().map(|&key| in_range(key, level)).collect::<Result<_, _>>()?
             }
             DeletionTarget::Region(region) => {
-                return Ok(self.map.long_read().view().finest_in(region, level));
+                let found = self.map.long_read().view().finest_in_until(region, level, stop);
+                return check_not_stopped(stop).map(|()| found);
             }
         };
         Ok(self.map.long_read().view().descendants_of(keys, level))

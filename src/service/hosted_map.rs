@@ -15,7 +15,7 @@ use super::room::Room;
 use super::trajectory::thin;
 use super::{
     ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, VoxelListing,
-    check_not_stopped,
+    check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
@@ -295,17 +295,23 @@ impl HostedMap {
         if copy.len() > most {
             return Err(listing_too_large(level, copy.len(), most));
         }
-        check_not_stopped(stop)?;
         let mut keys = Vec::with_capacity(copy.len());
-        copy.for_some(|some| keys.extend_from_slice(some));
+        copy.for_some(stop, |some| keys.extend_from_slice(some));
+        check_not_stopped(stop)?;
         let resolution_m = self.map.lattice().resolution_m(level);
         Ok(VoxelListing { resolution_m, keys, state: self.state(revision) })
     }
 
-    pub(super) fn describe(&self, rate_samples: usize) -> MapInfo {
-        let (described, storage) = (self.map.describe(rate_samples, RATE_SEED), self.storage());
-        let trajectory = self.map.trajectory();
-        MapInfo {
+    pub(super) fn describe(
+        &self,
+        rate_samples: usize,
+        stop: StopSignal<'_>,
+    ) -> Result<MapInfo, ServiceError> {
+        let Some(described) = self.map.describe_until(rate_samples, RATE_SEED, stop) else {
+            return Err(ended_early(stop));
+        };
+        let (storage, trajectory) = (self.storage(), self.map.trajectory());
+        Ok(MapInfo {
             name: self.name.clone(),
             state: self.state(described.revision),
             settings: *self.map.settings(),
@@ -317,7 +323,7 @@ impl HostedMap {
             commits: self.committing.durations(),
             trajectory_bytes: described.trajectory_bytes,
             storage,
-        }
+        })
     }
 
     /// Why the map takes no changes.

@@ -6,14 +6,21 @@ use uuid::Uuid;
 
 use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
+use super::map_file::from_file;
 use super::room::Room;
-use super::{ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceSettings};
+use super::{
+    ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceError, ServiceSettings,
+};
 use crate::align::Guess;
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
-use crate::map::{Lookup, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{
+    Lookup, MapContents, MapName, MapSettings, MultiResolutionMap, Region, RobotName, ScanRecord,
+    TrajectoryPose,
+};
 use crate::store::StoreSettings;
 use crate::util::StopSignal;
+use crate::voxel::VoxelKey;
 
 fn wall(count: usize) -> Vec<Point> {
     (0..count).map(|i| Point::new((i % 97) as f32 * 0.05, 2.0, (i / 97 % 89) as f32 * 0.05)).collect()
@@ -32,6 +39,17 @@ fn hosted() -> HostedMap {
         let thread = CommitThread::start(&name).unwrap();
         HostedMap::new(thread, name, Uuid::nil(), map, None, &StoreSettings::default())
     }
+}
+
+/// A map of a block of voxels every eight, so many squared, and the bytes that it takes.
+fn sheet(side: i32) -> (HostedMap, u64) {
+    let square = (0..side).flat_map(|x| (0..side).map(move |y| [x * 8, y * 8, 0]));
+    let contents = MapContents::at(1, square.filter_map(VoxelKey::new).collect());
+    let map = MultiResolutionMap::restore(MapSettings::new(0.05, 4), contents).unwrap();
+    let bytes = map.memory_bytes() as u64;
+    let name = MapName::new("sheet").unwrap();
+    let thread = CommitThread::start(&name).unwrap();
+    (HostedMap::new(thread, name, Uuid::nil(), map, None, &StoreSettings::default()), bytes)
 }
 
 #[test]
@@ -85,4 +103,60 @@ fn a_search_whose_caller_has_gone_is_no_answer_and_one_whose_time_is_up_is() {
     let gone = || true;
     let gone = map.localize(&request, &settings, &room, StopSignal::when(&gone)).unwrap_err();
     assert_eq!(gone.reason, "caller_gone");
+}
+
+#[test]
+fn a_map_file_is_made_and_read_and_a_map_described_with_looks_in_proportion_to_its_size() {
+    let (room, limits) = (Room::new(None, Marks::default()), ServiceSettings::default().limits);
+    for side in [40, 160, 320] {
+        let (map, bytes) = sheet(side);
+        let looks = Cell::new(0);
+        let count_look = || looks.replace(looks.get() + 1) == u64::MAX;
+        let stop = StopSignal::when(&count_look);
+        let file = map.to_file(&room, &limits, stop).unwrap();
+        let at_file = looks.replace(0);
+        assert!(bytes / at_file <= 4 << 20, "{bytes} bytes of map, {at_file} looks");
+        assert!(from_file(&file.bytes, &limits, &room, stop).is_ok());
+        let at_map = looks.replace(0);
+        assert!(bytes / at_map <= 4 << 20, "{bytes} bytes of map, {at_map} looks");
+        map.describe(100, stop).unwrap();
+        assert!(bytes / looks.get() <= 4 << 20, "{bytes} bytes of map, {} looks", looks.get());
+    }
+}
+
+#[test]
+fn a_map_file_or_a_description_that_nobody_waits_for_is_given_up_at_the_next_look() {
+    let (room, limits) = (Room::new(None, Marks::default()), ServiceSettings::default().limits);
+    let (map, _) = sheet(100);
+    let file = map.to_file(&room, &limits, StopSignal::NEVER).unwrap().bytes;
+    for looks_max in (0..20).chain([50, 100]) {
+        let looks = Cell::new(0u64);
+        let is_gone = || looks.replace(looks.get() + 1) >= looks_max;
+        let stop = StopSignal::when(&is_gone);
+        let caller_gone = |error: Option<ServiceError>| {
+            let taken = looks.replace(0);
+            assert!(taken <= looks_max + 300, "{taken} looks after {looks_max}");
+            assert_eq!(error.map(|error| error.reason), (taken > looks_max).then_some("caller_gone"));
+        };
+        caller_gone(map.to_file(&room, &limits, stop).err());
+        caller_gone(from_file(&file, &limits, &room, stop).err());
+        caller_gone(map.describe(100, stop).err());
+    }
+}
+
+#[test]
+fn a_deletion_finds_what_it_means_with_looks_in_proportion_to_the_map() {
+    let everywhere = Region::cuboid([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]).unwrap();
+    for side in [40, 160, 320] {
+        let (map, _) = sheet(side);
+        let looks = Cell::new(0);
+        let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
+        let stop = StopSignal::when(&count_look);
+        let blocks = map.map.view().finest_in_until(&everywhere, 0, stop).blocks().len();
+        assert_eq!(blocks, (side * side) as usize);
+        assert!(blocks / looks.get() <= 16 << 10, "{blocks} blocks, {} looks", looks.get());
+        let gone = || true;
+        let listed = map.list(0, Some(&everywhere), usize::MAX, StopSignal::when(&gone));
+        assert_eq!(listed.unwrap_err().reason, "caller_gone");
+    }
 }

@@ -6,7 +6,7 @@ use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
 use super::room::Promise;
 use super::room::Room;
-use super::{ErrorCode, Limits, MapFile, ServiceError, check_not_stopped};
+use super::{ErrorCode, Limits, MapFile, ServiceError, ended_early};
 use crate::map::MultiResolutionMap;
 use crate::store::{MapFileError, MapFileLimits, Snapshot, body_bytes};
 use crate::util::StopSignal;
@@ -23,11 +23,12 @@ impl HostedMap {
         stop: StopSignal<'_>,
     ) -> Result<MapFile, ServiceError> {
         let _lent = room.lend(self.snapshot_bytes(), "a map file")?;
-        let snapshot = Snapshot::of(&self.map, self.uuid);
-        check_not_stopped(stop)?;
-        let encoded = snapshot.encode();
-        let bytes =
+        let ended = || ended_early(stop);
+        let snapshot = Snapshot::of_until(&self.map, self.uuid, stop).ok_or_else(ended)?;
+        let encoded = snapshot.encode_until(stop);
+        let encoded =
             encoded.map_err(|e| ServiceError::new(ErrorCode::Internal, "not_encoded", e.to_string()))?;
+        let bytes = encoded.ok_or_else(ended)?;
         let (size, most) = (body_bytes(&bytes).max(bytes.len() as u64), limits.map_file_bytes_max as u64);
         if size > most {
             let message = format!(
@@ -51,7 +52,12 @@ pub(super) struct BuiltMap {
 
 /// What a file holds, as a map of its own. Memory is reserved for each part before it is built, so that a file which is
 /// small and becomes much is refused and not built.
-pub(super) fn from_file(file: &[u8], limits: &Limits, room: &Room) -> Result<BuiltMap, ServiceError> {
+pub(super) fn from_file(
+    file: &[u8],
+    limits: &Limits,
+    room: &Room,
+    stop: StopSignal<'_>,
+) -> Result<BuiltMap, ServiceError> {
     let bounds = MapFileLimits {
         body_bytes_max: limits.map_file_bytes_max as u64,
         voxels_max: limits.voxels_per_map_max,
@@ -64,8 +70,8 @@ pub(super) fn from_file(file: &[u8], limits: &Limits, room: &Room) -> Result<Bui
         part = Some(room.reserve(bytes)?);
         Ok(())
     };
-    let Snapshot { settings, contents, .. } =
-        Snapshot::decode_within(file, &bounds, &mut reserve).map_err(not_read)?;
+    let decoded = Snapshot::decode_until(file, &bounds, &mut reserve, stop);
+    let Snapshot { settings, contents, .. } = decoded.map_err(|refusal| not_read(refusal, stop))?;
     let (robots, most) = (contents.trajectory.robots_known(), limits.robots_per_map_max);
     if robots > most {
         let message = format!("the map file has scans of {robots} robots, robots_per_map_max is {most}");
@@ -73,15 +79,17 @@ pub(super) fn from_file(file: &[u8], limits: &Limits, room: &Room) -> Result<Bui
     }
     let moments = contents.moments.as_slice().len();
     reserve(settings.empty_filter_bytes() + growth_bytes(&settings, &contents.voxels, moments))?;
-    let map = MultiResolutionMap::restore(settings, contents)?;
+    let map =
+        MultiResolutionMap::restore_until(settings, contents, stop)?.ok_or_else(|| ended_early(stop))?;
     drop(part.take());
     let saving = room.reserve(snapshot_bytes(&map))?;
     Ok(BuiltMap { uuid: Uuid::new_v4(), map, saving })
 }
 
-fn not_read(refusal: MapFileError<ServiceError>) -> ServiceError {
+fn not_read(refusal: MapFileError<ServiceError>, stop: StopSignal<'_>) -> ServiceError {
     match refusal {
         MapFileError::NoMemory(refusal) => refusal,
+        MapFileError::Stopped => ended_early(stop),
         MapFileError::Bad(reason) => ServiceError::invalid("bad_map_file", format!("map file: {reason}")),
         MapFileError::TooLarge { .. } => {
             ServiceError::new(ErrorCode::ResourceExhausted, "map_full", refusal.to_string())

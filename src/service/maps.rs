@@ -54,8 +54,9 @@ impl MapService {
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
         let maps = self.inner.catalogue.within(&self.reach);
-        let describe = move |_: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES)).collect();
-        self.inner.queries.run(describe).await
+        let describe =
+            move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
+        self.inner.queries.run(describe).await?
     }
 
     /// The names of the maps that the caller may name.
@@ -117,7 +118,7 @@ impl MapService {
         self.inner.room.check_to_grow()?;
         self.inner.catalogue.check_free(&name, self.limits().maps_max, replace)?;
         let inner = Arc::clone(&self.inner);
-        let build = move |_: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room);
+        let build = move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room, stop);
         let built = self.inner.map_files.run(build).await??;
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
@@ -154,7 +155,7 @@ impl MapService {
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
-        self.inner.queries.run(move |_| map.describe(RATE_SAMPLES)).await
+        self.inner.queries.run(move |stop| map.describe(RATE_SAMPLES, stop)).await?
     }
 }
 

@@ -62,7 +62,7 @@ use committing::{Refusal, Step};
 use hosted_map::HostedMap;
 use pool::Pool;
 use room::Room;
-use time_limit::{TimeLimit, check_not_stopped};
+use time_limit::{TimeLimit, check_not_stopped, ended_early};
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
 ///
@@ -295,8 +295,8 @@ impl MapService {
         self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
     }
 
-    /// Prepares a change on a thread of `pool`, waits until it is made, and prepares it again where the map has moved on meanwhile. Whoever goes
-    /// before it is proposed takes it along; after that it is made.
+    /// Prepares a change on a thread of `pool`, waits until it is made, and prepares it again where the map has moved on
+    /// meanwhile. Whoever goes before it is decided on takes it along; after that it is made.
     async fn carry_through<A: Send + 'static>(
         &self,
         pool: &Pool,

@@ -90,9 +90,9 @@ fn crowd() {
         spawn(|map, room| insert_three(map, room, "two", 70.5)),
         spawn(delete_everything),
         spawn(|map, room| {
-            let revision = map.describe(8).state.revision;
+            let revision = map.describe(8, StopSignal::NEVER).unwrap().state.revision;
             map.save(Saving::Changed, room).unwrap();
-            map.describe(8).state.revision.max(revision)
+            map.describe(8, StopSignal::NEVER).unwrap().state.revision.max(revision)
         }),
     ];
     let newest = threads.into_iter().map(|thread| thread.join().unwrap()).max().unwrap_or_default();

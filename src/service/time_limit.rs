@@ -48,14 +48,16 @@ impl TimeLimit {
 /// # Errors
 /// `caller_gone` when the caller has gone, who is therefore not told; `time_limit` when the time is up.
 pub(super) fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError> {
-    let ended = |reason, message: &str| Err(ServiceError::new(ErrorCode::DeadlineExceeded, reason, message));
-    if stop.is_cancelled() {
-        return ended("caller_gone", "nobody waits for the answer");
-    }
-    if stop.is_time_up() {
-        return ended(TIME_LIMIT, "the request took too long");
-    }
-    Ok(())
+    if stop.is_stopped() { Err(ended_early(stop)) } else { Ok(()) }
+}
+
+/// Why work ended that was stopped.
+pub(super) fn ended_early(stop: StopSignal<'_>) -> ServiceError {
+    let (reason, message) = match stop.is_cancelled() {
+        true => ("caller_gone", "nobody waits for the answer"),
+        false => (TIME_LIMIT, "the request took too long"),
+    };
+    ServiceError::new(ErrorCode::DeadlineExceeded, reason, message)
 }
 
 #[cfg(test)]

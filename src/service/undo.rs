@@ -53,15 +53,19 @@ impl HostedMap {
         let observed = folder.observations(&scans, &withdrawn, stop).map_err(|e| self.unreadable(&e))?;
         check_not_stopped(stop)?;
         let mut observed = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
+        // What takes long is done here; what comes meanwhile is little, and changes the plan by as much.
+        observed.observations.plan(stop);
+        folder.observe(&mut observed, stop).map_err(|e| self.unreadable(&e))?;
+        check_not_stopped(stop)?;
 
         let (map, count, limit) = (Arc::clone(self), scans.len(), limit.clone());
-        let decide = move |core: &MultiResolutionMap| {
+        let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Undo, request.as_ref(), former)?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
             // What came meanwhile is shown while the map waits: that ends with the request's time as well.
-            limit.run(StopSignal::NEVER, |stop| {
+            limit.run(stop, |stop| {
                 folder.observe(&mut observed, stop).map_err(|e| map.unreadable(&e))?;
                 check_not_stopped(stop)
             })?;

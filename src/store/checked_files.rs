@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::{Appending, FileSystem};
 use crate::sync::before_file_operation;
+use crate::util::StopSignal;
 
 /// Another file system whose operations never start while the lock of a map's content is held, nor on a thread that polls
 /// async tasks; see [`crate::sync`].
@@ -35,6 +36,10 @@ impl FileSystem for CheckedFiles {
 
     fn read(&self, file: &Path) -> io::Result<Vec<u8>> {
         self.files().read(file)
+    }
+
+    fn read_until(&self, file: &Path, stop: StopSignal<'_>) -> io::Result<Option<Vec<u8>>> {
+        self.files().read_until(file, stop)
     }
 
     fn read_start(&self, file: &Path, bytes: usize) -> io::Result<Vec<u8>> {

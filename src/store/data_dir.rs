@@ -37,6 +37,7 @@ use super::snapshot_files::newest_good;
 use super::{Disk, FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder, snapshot_files};
 use crate::map::MapName;
 use crate::sync::{Mutex, Rank};
+use crate::util::StopSignal;
 
 const MAPS: &str = "maps";
 const LOCK_FILE: &str = "lock";
@@ -96,7 +97,7 @@ impl DataDir {
     /// # Errors
     /// When its files cannot be read, or miss something that may have been acknowledged; when two folders claim to be it.
     pub fn map(&self, name: &MapName, progress: &OpeningProgress) -> Result<OpenedMap, StoreError> {
-        let (path, uuid) = self.adopted(name)?;
+        let (path, uuid) = self.adopted(name, progress)?;
         let files = Arc::clone(&self.files);
         let opened = MapFolder::open(files, path, uuid, self.settings.clone(), progress)?;
         progress.map_is_open();
@@ -106,8 +107,8 @@ impl DataDir {
     /// Opens a map without the revisions of which there is no trace but that they had been acknowledged, and writes a
     /// snapshot that expects them no more; the map's revision.
     pub(super) fn go_on_without(&self, name: &MapName) -> Result<u64, StoreError> {
-        let (path, uuid) = self.adopted(name)?;
         let (files, progress) = (Arc::clone(&self.files), OpeningProgress::default());
+        let (path, uuid) = self.adopted(name, &progress)?;
         let opened = MapFolder::open_at(files, path, uuid, self.settings.clone(), &progress, false)?;
         let snapshot = Snapshot::of(&opened.map, uuid);
         opened.folder.save(&snapshot, u64::MAX)?;
@@ -124,7 +125,7 @@ impl DataDir {
             return Err(StoreError::damaged(&self.maps.join(entry), format!("map {name} exists")));
         }
         let entry = Entry::folder_name(name, first.uuid);
-        self.make(&entry, first, None)?;
+        self.make(&entry, first, None, StopSignal::NEVER)?;
         self.folder(&entry, first)
     }
 
@@ -144,7 +145,7 @@ impl DataDir {
         let new = Entry::folder_name(name, first.uuid);
         let old_entry = old.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
         let replacement = Replacement { old: old_entry, kept: Entry::folder_name(kept, old.uuid()) };
-        self.make(&new, first, Some(&replacement))?;
+        self.make(&new, first, Some(&replacement), StopSignal::NEVER)?;
         // Nobody uses it before it is known to stay.
         let exchange = || {
             let folder = self.folder(&new, first)?;
@@ -177,7 +178,13 @@ impl DataDir {
     }
 
     /// A map's folder with its first snapshot, whole and under its name, or not there.
-    fn make(&self, entry: &str, first: &Snapshot, replaces: Option<&Replacement>) -> Result<(), StoreError> {
+    fn make(
+        &self,
+        entry: &str,
+        first: &Snapshot,
+        replaces: Option<&Replacement>,
+        stop: StopSignal<'_>,
+    ) -> Result<(), StoreError> {
         let path = self.maps.join(entry);
         let aside = folder::unfinished(&path);
         let make = || {
@@ -186,7 +193,7 @@ impl DataDir {
                 folder::replace(&*self.files, &aside.join(REPLACES), &replaces.encode())?;
             }
             let snapshot = snapshot_files::snapshot_name(first.contents.revision);
-            first.write(&*self.files, &aside.join(snapshot))?;
+            first.write_until(&*self.files, &aside.join(snapshot), stop)?;
             let renamed = self.files.rename(&aside, &path).and_then(|()| self.files.sync(&self.maps));
             renamed.map_err(StoreError::io(&path))
         };
@@ -258,13 +265,13 @@ impl DataDir {
     }
 
     /// The folder of a map with the uuid in its name; one of a former release gets it now.
-    fn adopted(&self, name: &MapName) -> Result<(PathBuf, Uuid), StoreError> {
+    fn adopted(&self, name: &MapName, progress: &OpeningProgress) -> Result<(PathBuf, Uuid), StoreError> {
         let path = self.path(name)?;
         if let Entry::Map { uuid, .. } = Entry::of_path(&path) {
             return Ok((path, uuid));
         }
         let mut revisions = snapshot_files::snapshot_revisions(&*self.files, &path)?;
-        let newest = newest_good(&*self.files, &path, &mut revisions, &OpeningProgress::default())?;
+        let newest = newest_good(&*self.files, &path, &mut revisions, progress)?;
         let uuid = newest.snapshot.uuid;
         let adopted = self.maps.join(Entry::folder_name(name, uuid));
         let renamed = self.files.rename(&path, &adopted).and_then(|()| self.files.sync(&self.maps));

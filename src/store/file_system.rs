@@ -6,6 +6,10 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::StoreMode;
+use crate::util::StopSignal;
+
+/// Bytes that are read between two looks at the stop signal: some ten milliseconds of a slow disk.
+const BYTES_PER_LOOK: u64 = 4 << 20;
 
 /// The operations that maps are kept with.
 ///
@@ -29,6 +33,14 @@ pub trait FileSystem: Debug + Send + Sync {
     /// # Errors
     /// See above.
     fn read(&self, file: &Path) -> io::Result<Vec<u8>>;
+
+    /// A file's bytes, for as long as somebody wants them; none once stopped.
+    ///
+    /// # Errors
+    /// See above.
+    fn read_until(&self, file: &Path, stop: StopSignal<'_>) -> io::Result<Option<Vec<u8>>> {
+        self.read(file).map(|bytes| Some(bytes).filter(|_| !stop.is_stopped()))
+    }
 
     /// The first bytes of a file: so many, or all where there are fewer.
     ///
@@ -143,6 +155,17 @@ impl FileSystem for Disk {
 
     fn read(&self, file: &Path) -> io::Result<Vec<u8>> {
         fs::read(file)
+    }
+
+    fn read_until(&self, file: &Path, stop: StopSignal<'_>) -> io::Result<Option<Vec<u8>>> {
+        let mut file = File::open(file)?;
+        let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
+        while !stop.is_stopped() {
+            if Read::by_ref(&mut file).take(BYTES_PER_LOOK).read_to_end(&mut bytes)? == 0 {
+                return Ok(Some(bytes));
+            }
+        }
+        Ok(None)
     }
 
     fn read_start(&self, file: &Path, bytes: usize) -> io::Result<Vec<u8>> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::{FileSystem, StoreError};
 use crate::sync::{Mutex, Rank};
+use crate::util::StopSignal;
 
 /// Where a folder is, for all who use it: a map may get another name while it is open.
 #[derive(Debug, Clone)]
@@ -57,6 +58,18 @@ pub(super) fn replace(files: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Resu
     // What is left of it takes the room that is missing.
     let left = |_: &std::io::Error| drop(files.remove(&aside));
     write().inspect_err(left).map_err(StoreError::io(path))
+}
+
+/// The bytes of the file at `path`, for as long as somebody wants them.
+///
+/// # Errors
+/// When the system refuses; `Cancelled` once stopped.
+pub(super) fn read_until(
+    files: &dyn FileSystem,
+    path: &Path,
+    stop: StopSignal<'_>,
+) -> Result<Vec<u8>, StoreError> {
+    files.read_until(path, stop).map_err(StoreError::io(path))?.ok_or(StoreError::Cancelled)
 }
 
 /// Removes what a crash left unfinished in `folder`.

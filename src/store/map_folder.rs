@@ -166,16 +166,23 @@ impl MapFolder {
         self.facts.snapshot_is_due(&self.settings)
     }
 
-    /// Forgets what is kept for undo alone, for want of room on the disk; true where there was something.
+    /// Forgets what is kept for undo alone, for want of room on the disk; true where there was something. Where there is
+    /// nothing, and for a while after it failed, nothing is done on the disk: this is asked again and again.
     ///
     /// # Errors
     /// When the system refuses.
     pub fn give_up_undo(&self) -> Result<bool, StoreError> {
+        if !self.facts.may_give_up() {
+            return Ok(false);
+        }
         let before = self.used().undo_from;
         let _writing = self.snapshots.lock();
         self.check_there()?;
-        self.forget(UndoReach { bytes_max: 0, ..self.undo_reach() }, &[])?;
-        Ok(self.used().undo_from != before)
+        let given_up = self.forget(UndoReach { bytes_max: 0, ..self.undo_reach() }, &[]);
+        let gave_up = given_up.is_ok() && self.used().undo_from != before;
+        self.facts.tell_given_up(gave_up);
+        self.count_bytes();
+        given_up.map(|()| gave_up)
     }
 
     fn undo_reach(&self) -> UndoReach {
@@ -214,7 +221,11 @@ impl MapFolder {
             return Ok(None);
         };
         let base = pin.snapshot;
-        let base_contents = Snapshot::read(&*self.files, &self.path.file(&snapshot_name(base)))?.contents;
+        let path = self.path.file(&snapshot_name(base));
+        let base_contents = match Snapshot::read_until(&*self.files, &path, stop) {
+            Err(StoreError::Cancelled) => return Ok(None),
+            snapshot => snapshot?.contents,
+        };
         let Some(observations) = Observations::new(scans.to_vec(), withdrawn, &base_contents, stop) else {
             return Ok(None);
         };

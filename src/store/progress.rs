@@ -43,10 +43,15 @@ impl OpeningProgress {
         self.cancelled.store(true, Relaxed);
     }
 
+    /// True where nobody wants the maps any more: what long work of an opening asks.
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Relaxed)
+    }
+
     /// # Errors
     /// Where nobody wants the maps any more.
     pub(super) fn check_wanted(&self) -> Result<(), StoreError> {
-        if self.cancelled.load(Relaxed) { Err(StoreError::Cancelled) } else { Ok(()) }
+        if self.is_cancelled() { Err(StoreError::Cancelled) } else { Ok(()) }
     }
 
     /// One more map of so many bytes will be opened.

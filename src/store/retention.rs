@@ -14,7 +14,7 @@ use super::snapshot_files::Sizes;
 use crate::map::WithdrawnScan;
 
 /// The newest snapshot, and one in case that is damaged.
-const FOR_RECOVERY: usize = 2;
+pub(super) const FOR_RECOVERY: usize = 2;
 
 /// The revisions of the snapshots to keep, of `snapshots`, ascending. The journal is kept from the first of them on.
 pub(super) fn kept(

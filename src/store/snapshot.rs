@@ -14,22 +14,26 @@
 //! ```
 
 mod body;
+mod compression;
 mod fields;
 mod limits;
+mod writing;
 
 pub use limits::{MapFileError, MapFileLimits};
 
 use std::convert::Infallible;
 use std::path::Path;
 
-use prost::Message;
 use uuid::Uuid;
 
-use super::codec::{Unreadable, moments};
-use super::{FileSystem, StoreError, folder, pb};
+use super::codec::Unreadable;
+use super::{FileSystem, StoreError, folder};
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+use crate::util::StopSignal;
 use body::Body;
+use compression::{WINDOW_BYTES, checksum_after, compress_onto, decompress};
 use limits::Memory;
+use writing::body_of;
 
 /// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
 /// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms, up to version 3 a header neither
@@ -44,7 +48,6 @@ const HEAD_AT: usize = 24;
 const UUID_AT: usize = 32;
 const VERSION: std::ops::Range<usize> = 8..12;
 const CHECKED_FROM: usize = 16;
-const ZSTD_LEVEL: i32 = 1;
 
 /// A map at one revision.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +66,11 @@ impl Snapshot {
         Self { uuid, settings: *map.settings(), contents: map.contents() }
     }
 
+    /// The same; none once stopped.
+    pub fn of_until(map: &MultiResolutionMap, uuid: Uuid, stop: StopSignal<'_>) -> Option<Self> {
+        Some(Self { uuid, settings: *map.settings(), contents: map.contents_until(stop)? })
+    }
+
     /// The map again.
     ///
     /// # Errors
@@ -76,7 +84,20 @@ impl Snapshot {
     /// # Errors
     /// When the system refuses.
     pub fn write(&self, files: &dyn FileSystem, path: &Path) -> Result<(), StoreError> {
-        let bytes = self.encode().map_err(StoreError::io(path))?;
+        self.write_until(files, path, StopSignal::NEVER)
+    }
+
+    /// The same, unless it is stopped before there is anything on the disk.
+    ///
+    /// # Errors
+    /// As there; `Cancelled` once stopped.
+    pub(super) fn write_until(
+        &self,
+        files: &dyn FileSystem,
+        path: &Path,
+        stop: StopSignal<'_>,
+    ) -> Result<(), StoreError> {
+        let bytes = self.encode_until(stop).map_err(StoreError::io(path))?.ok_or(StoreError::Cancelled)?;
         folder::replace(files, path, &bytes)
     }
 
@@ -85,8 +106,16 @@ impl Snapshot {
     /// # Errors
     /// When it cannot be read, is no map, is damaged, or was written by a newer version.
     pub fn read(files: &dyn FileSystem, path: &Path) -> Result<Self, StoreError> {
-        let bytes = files.read(path).map_err(StoreError::io(path))?;
-        Self::decode(&bytes).map_err(|reason| StoreError::damaged(path, reason))
+        Self::read_until(files, path, StopSignal::NEVER)
+    }
+
+    /// The same, for as long as somebody wants it.
+    ///
+    /// # Errors
+    /// As there; `Cancelled` once stopped.
+    pub fn read_until(files: &dyn FileSystem, path: &Path, stop: StopSignal<'_>) -> Result<Self, StoreError> {
+        let bytes = folder::read_until(files, path, stop)?;
+        Self::decode_own(&bytes, stop)?.map_err(|reason| StoreError::damaged(path, reason))
     }
 
     /// The file's bytes.
@@ -94,7 +123,19 @@ impl Snapshot {
     /// # Errors
     /// When compression fails, for want of memory.
     pub fn encode(&self) -> std::io::Result<Vec<u8>> {
-        let body = self.to_message().encode_to_vec();
+        // It is never stopped.
+        self.encode_until(StopSignal::NEVER).map(Option::unwrap_or_default)
+    }
+
+    /// The same; none once stopped.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn encode_until(&self, stop: StopSignal<'_>) -> std::io::Result<Option<Vec<u8>>> {
+        let body = body_of(self, stop);
+        if stop.is_stopped() {
+            return Ok(None);
+        }
         let mut bytes = Vec::with_capacity(HEADER_BYTES + body.len() / 2);
         bytes.extend_from_slice(MAGIC);
         bytes.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
@@ -102,9 +143,12 @@ impl Snapshot {
         bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
         bytes.extend_from_slice(&self.contents.revision.to_le_bytes());
         bytes.extend_from_slice(self.uuid.as_bytes());
-        bytes.extend(zstd::bulk::compress(&body, ZSTD_LEVEL)?);
-        set_checksum(&mut bytes);
-        Ok(bytes)
+        let mut bytes = compress_onto(bytes, &body, stop)?;
+        if stop.is_stopped() {
+            return Ok(None);
+        }
+        set_checksum(&mut bytes, stop);
+        Ok(Some(bytes).filter(|_| !stop.is_stopped()))
     }
 
     /// The inverse of [`Snapshot::encode`], of a file of one's own.
@@ -126,21 +170,58 @@ impl Snapshot {
         limits: &MapFileLimits,
         reserve: impl FnMut(u64) -> Result<(), E>,
     ) -> Result<Self, MapFileError<E>> {
-        let mut memory = Memory(reserve);
-        let (compressed, length) = Self::checked_frame(bytes)?;
+        Self::decode_until(bytes, limits, reserve, StopSignal::NEVER)
+    }
+
+    /// The same, for as long as somebody wants it.
+    ///
+    /// # Errors
+    /// As there; `Stopped` once stopped.
+    pub fn decode_until<E>(
+        bytes: &[u8],
+        limits: &MapFileLimits,
+        reserve: impl FnMut(u64) -> Result<(), E>,
+        stop: StopSignal<'_>,
+    ) -> Result<Self, MapFileError<E>> {
+        let decoded = Self::decode_paced(bytes, limits, &mut Memory(reserve), stop);
+        // What was read of a part looks like damage.
+        if stop.is_stopped() { Err(MapFileError::Stopped) } else { decoded }
+    }
+
+    /// One of a server's own.
+    ///
+    /// # Errors
+    /// `Cancelled` once stopped; else what is wrong with the bytes.
+    pub(super) fn decode_own(
+        bytes: &[u8],
+        stop: StopSignal<'_>,
+    ) -> Result<Result<Self, Unreadable>, StoreError> {
+        match Self::decode_until(bytes, &MapFileLimits::OWN, |_| Ok::<_, Infallible>(()), stop) {
+            Err(MapFileError::Stopped) => Err(StoreError::Cancelled),
+            decoded => Ok(decoded.map_err(|refusal| refusal.to_string())),
+        }
+    }
+
+    fn decode_paced<E>(
+        bytes: &[u8],
+        limits: &MapFileLimits,
+        memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
+        stop: StopSignal<'_>,
+    ) -> Result<Self, MapFileError<E>> {
+        let (compressed, length) = Self::checked_frame(bytes, stop)?;
         let most = limits.body_bytes_max;
         if length > most {
             return Err(format!("a body of {length} bytes, at most {most} are read").into());
         }
         // A frame of less would be of less than its header says, and is refused all the same.
-        memory.reserve(length as usize)?;
-        let body = zstd::bulk::decompress(compressed, length as usize)
+        memory.reserve(length as usize + WINDOW_BYTES.min(length as usize))?;
+        let body = decompress(compressed, length as usize, stop)
             .map_err(|e| format!("the body from offset {} on: {e}", bytes.len() - compressed.len()))?;
-        Body::of(&body).map_err(|e| format!("the body: {e}"))?.read(limits, &mut memory)
+        Body::of(&body, stop).map_err(|e| format!("the body: {e}"))?.read(limits, memory)
     }
 
     /// The compressed body of a file whose header is right, and the bytes that it says it is of.
-    fn checked_frame(bytes: &[u8]) -> Result<(&[u8], u64), Unreadable> {
+    fn checked_frame<'b>(bytes: &'b [u8], stop: StopSignal<'_>) -> Result<(&'b [u8], u64), Unreadable> {
         let header = bytes.get(..OLD_HEADER_BYTES).ok_or_else(|| too_short(bytes))?;
         if &header[..8] != MAGIC {
             return Err("not a map file: it does not begin with MROL-MAP".into());
@@ -153,33 +234,13 @@ impl Snapshot {
         }
         let header_bytes = if version < 4 { OLD_HEADER_BYTES } else { HEADER_BYTES };
         let compressed = bytes.get(header_bytes..).ok_or_else(|| too_short(bytes))?;
-        let (stored, computed) = (u32_at(header, 12), checksum(bytes, version));
+        let (stored, computed) = (u32_at(header, 12), checksum(bytes, version, stop));
         if stored != computed {
             return Err(format!(
                 "checksum {computed:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
             ));
         }
         Ok((compressed, u64_at(header, BODY_BYTES_AT)))
-    }
-
-    fn to_message(&self) -> pb::Snapshot {
-        let MapContents { revision, voxels, moments, trajectory, requests } = &self.contents;
-        pb::Snapshot {
-            uuid: self.uuid.as_bytes().to_vec().into(),
-            resolution_m: self.settings.resolution_m,
-            levels: self.settings.levels,
-            filter_hashes: self.settings.filter.hashes,
-            filter_bits_per_voxel: self.settings.filter.bits_per_key,
-            revision: *revision,
-            block_keys: Vec::new(),
-            block_masks: Vec::new().into(),
-            trajectory: trajectory.poses().map(Into::into).collect(),
-            voxels: Some(voxels.into()),
-            withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
-            requests: requests.iter().map(Into::into).collect(),
-            moments: Some(moments::beside(voxels, moments)),
-            forgotten: trajectory.forgotten().map(Into::into).collect(),
-        }
     }
 }
 
@@ -196,7 +257,7 @@ pub(super) fn head_of(bytes: &[u8]) -> Option<u64> {
 /// Writes the head of the journal into the map file `bytes`.
 pub(super) fn set_head(bytes: &mut [u8], head: u64) {
     bytes[HEAD_AT..UUID_AT].copy_from_slice(&head.to_le_bytes());
-    set_checksum(bytes);
+    set_checksum(bytes, StopSignal::NEVER);
 }
 
 /// The uuid in the header of a map file, which may be damaged; none up to version 3.
@@ -210,8 +271,8 @@ pub(crate) fn body_bytes(bytes: &[u8]) -> u64 {
     bytes.get(..OLD_HEADER_BYTES).map_or(0, |header| u64_at(header, BODY_BYTES_AT))
 }
 
-fn set_checksum(bytes: &mut [u8]) {
-    let checksum = checksum(bytes, FORMAT_VERSION);
+fn set_checksum(bytes: &mut [u8], stop: StopSignal<'_>) {
+    let checksum = checksum(bytes, FORMAT_VERSION, stop);
     bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
 }
 
@@ -219,9 +280,9 @@ fn u64_at(bytes: &[u8], offset: usize) -> u64 {
     u64::from(u32_at(bytes, offset)) | u64::from(u32_at(bytes, offset + 4)) << 32
 }
 
-fn checksum(bytes: &[u8], version: u32) -> u32 {
+fn checksum(bytes: &[u8], version: u32, stop: StopSignal<'_>) -> u32 {
     let of_version = if version < 3 { 0 } else { crc32c::crc32c(&bytes[VERSION]) };
-    crc32c::crc32c_append(of_version, &bytes[CHECKED_FROM..])
+    checksum_after(of_version, &bytes[CHECKED_FROM..], stop)
 }
 
 fn u32_at(bytes: &[u8], offset: usize) -> u32 {
@@ -230,11 +291,15 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use prost::Message;
+
     use super::*;
     use crate::geometry;
     use crate::map::{
         AnsweredRequest, CallerName, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan,
     };
+    use crate::store::codec::moments;
+    use crate::store::pb;
     use crate::voxel::{MomentSet, Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
@@ -267,6 +332,83 @@ mod tests {
                     .with_forgotten(&RobotName::new("r0").unwrap(), [(0, 6), (9, 9), (u64::MAX, u64::MAX)]),
                 requests: [request].into_iter().collect(),
             },
+        }
+    }
+
+    /// All of it in one message.
+    fn message(snapshot: &Snapshot) -> pb::Snapshot {
+        let MapContents { revision, voxels, moments, trajectory, requests } = &snapshot.contents;
+        pb::Snapshot {
+            uuid: snapshot.uuid.as_bytes().to_vec().into(),
+            resolution_m: snapshot.settings.resolution_m,
+            levels: snapshot.settings.levels,
+            filter_hashes: snapshot.settings.filter.hashes,
+            filter_bits_per_voxel: snapshot.settings.filter.bits_per_key,
+            revision: *revision,
+            block_keys: Vec::new(),
+            block_masks: Vec::new().into(),
+            trajectory: trajectory.poses().map(Into::into).collect(),
+            voxels: Some(voxels.into()),
+            withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
+            requests: requests.iter().map(Into::into).collect(),
+            moments: Some(moments::beside(voxels, moments, StopSignal::NEVER)),
+            forgotten: trajectory.forgotten().map(Into::into).collect(),
+        }
+    }
+
+    #[test]
+    fn a_body_is_written_as_the_message_that_it_is() {
+        assert!(body_of(&snapshot(), StopSignal::NEVER) == message(&snapshot()).encode_to_vec());
+        let contents = MapContents::default();
+        let empty = Snapshot { contents, ..snapshot() };
+        assert!(body_of(&empty, StopSignal::NEVER) == message(&empty).encode_to_vec());
+    }
+
+    #[test]
+    fn a_file_is_written_and_read_with_looks_at_the_signal_in_proportion_to_its_size() {
+        for side in [20, 200, 800] {
+            let square = (0..side).flat_map(|x| (0..side).map(move |y| [x * 8, y * 8, 0]));
+            let contents = MapContents::at(1, square.filter_map(VoxelKey::new).collect());
+            let entries = contents.voxels.blocks().len() + contents.moments.as_slice().len();
+            let snapshot = Snapshot { contents, ..snapshot() };
+            let looks = std::cell::Cell::new(0);
+            let count = || looks.replace(looks.get() + 1) == usize::MAX;
+            let stop = StopSignal::when(&count);
+            let bytes = snapshot.encode_until(stop).unwrap().unwrap();
+            assert!(entries / looks.replace(0) <= 16 << 10);
+            assert!(Snapshot::decode_own(&bytes, stop).unwrap().unwrap() == snapshot);
+            assert!(entries / looks.replace(0) <= 16 << 10);
+            let map = MultiResolutionMap::restore_until(snapshot.settings, snapshot.contents, stop)
+                .unwrap()
+                .unwrap();
+            assert!(entries / looks.replace(0) <= 16 << 10);
+            assert!(map.contents_until(stop).is_some());
+            assert!(entries / looks.get() <= 16 << 10);
+        }
+    }
+
+    #[test]
+    fn work_that_is_stopped_at_any_look_comes_to_nothing_and_soon_to_its_end() {
+        let bytes = snapshot().encode().unwrap();
+        let map = snapshot().restore().unwrap();
+        let looks = std::cell::Cell::new(0);
+        for most in 0..200 {
+            let stops = || looks.replace(looks.get() + 1) >= most;
+            let stop = StopSignal::when(&stops);
+            let is_stopped = |what: &str| {
+                let taken = looks.replace(0);
+                assert!(taken <= most + 300, "{what}: {taken} looks after {most}");
+                taken > most
+            };
+            let encoded = snapshot().encode_until(stop).unwrap();
+            assert_eq!(encoded.is_none(), is_stopped("encode"));
+            let decoded = Snapshot::decode_own(&bytes, stop);
+            assert_eq!(matches!(decoded, Err(StoreError::Cancelled)), is_stopped("decode"));
+            let Snapshot { settings, contents, .. } = snapshot();
+            let restored = MultiResolutionMap::restore_until(settings, contents, stop).unwrap();
+            assert_eq!(restored.is_none(), is_stopped("restore"));
+            assert_eq!(map.contents_until(stop).is_none(), is_stopped("contents"));
+            assert_eq!(map.describe_until(100, 1, stop).is_none(), is_stopped("describe"));
         }
     }
 
@@ -312,11 +454,12 @@ mod tests {
 
     #[test]
     fn a_file_without_moments_is_restored_with_those_of_voxel_centres() {
-        let mut message = snapshot().to_message();
+        let mut message = message(&snapshot());
         message.moments = None;
         let body = message.encode_to_vec();
         let memory = &mut Memory(|_| Ok::<_, Infallible>(()));
-        let old = Body::of(&body).unwrap().read(&MapFileLimits::OWN, memory).unwrap().contents;
+        let old =
+            Body::of(&body, StopSignal::NEVER).unwrap().read(&MapFileLimits::OWN, memory).unwrap().contents;
         assert_eq!(old.moments, MomentSet::of_centers(&old.voxels));
         let points: i64 = old.moments.as_slice().iter().map(|(_, moments)| moments.count()).sum();
         assert_eq!(points, 5000);

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use uuid::Uuid;
 
-use super::folder::UNFINISHED;
+use super::folder::{UNFINISHED, read_until};
 use super::journal::{SEGMENT_HEADER_BYTES, first_revision, owner_of_segment};
 use super::replacement::REPLACES;
 use super::{FileSystem, OpeningProgress, Snapshot, StoreError, snapshot};
 use crate::map::REVISION_MAX;
+use crate::util::StopSignal;
 
 /// Bytes that opening the map in `folder` has to read: its newest snapshot, and the journal from there on.
 pub(super) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
@@ -58,13 +59,13 @@ pub(super) fn newest_good(
     revisions: &mut Vec<u64>,
     progress: &OpeningProgress,
 ) -> Result<Newest, StoreError> {
-    let mut damaged = Vec::new();
+    let is_cancelled = || progress.is_cancelled();
+    let (stop, mut damaged) = (StopSignal::when(&is_cancelled), Vec::new());
     while let Some(&revision) = revisions.last() {
-        progress.check_wanted()?;
         let path = folder.join(snapshot_name(revision));
-        let bytes = files.read(&path).map_err(StoreError::io(&path))?;
+        let bytes = read_until(files, &path, stop)?;
         progress.read(bytes.len() as u64);
-        match Snapshot::decode(&bytes) {
+        match Snapshot::decode_own(&bytes, stop)? {
             Ok(snapshot) if snapshot.contents.revision == revision => {
                 let head = snapshot::head_of(&bytes).unwrap_or_default().max(revision);
                 return Ok(Newest { snapshot, head, damaged });
@@ -91,6 +92,7 @@ pub(super) fn check_owner(
     folder: &Path,
     uuid: Uuid,
     read: &[u64],
+    progress: &OpeningProgress,
 ) -> Result<(), StoreError> {
     for name in files.list(folder).map_err(StoreError::io(folder))? {
         let path = folder.join(&name);
@@ -98,7 +100,7 @@ pub(super) fn check_owner(
             let header = files.read_start(&path, SEGMENT_HEADER_BYTES).map_err(StoreError::io(&path))?;
             owner_of_segment(&header)
         } else if snapshot_revision(&name).is_some_and(|revision| !read.contains(&revision)) {
-            owner_of_snapshot(files, &path, uuid)?
+            owner_of_snapshot(files, &path, uuid, progress)?
         } else {
             None
         };
@@ -115,13 +117,16 @@ fn owner_of_snapshot(
     files: &dyn FileSystem,
     path: &Path,
     expected: Uuid,
+    progress: &OpeningProgress,
 ) -> Result<Option<Uuid>, StoreError> {
     let header = files.read_start(path, snapshot::HEADER_BYTES).map_err(StoreError::io(path))?;
     if snapshot::uuid_in(&header) == Some(expected) {
         return Ok(Some(expected));
     }
-    let bytes = files.read(path).map_err(StoreError::io(path))?;
-    Ok(Snapshot::decode(&bytes).ok().map(|snapshot| snapshot.uuid))
+    let is_cancelled = || progress.is_cancelled();
+    let stop = StopSignal::when(&is_cancelled);
+    let snapshot = Snapshot::decode_own(&read_until(files, path, stop)?, stop)?;
+    Ok(snapshot.ok().map(|snapshot| snapshot.uuid))
 }
 
 /// The names in `folder` that nobody understands: neither snapshot nor segment, nor set aside.

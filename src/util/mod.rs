@@ -4,8 +4,10 @@
 pub(crate) mod bits;
 mod durations;
 mod prefetch;
+mod sorting;
 mod stop_signal;
 
 pub use durations::{Durations, SharedDurations};
 pub(crate) use prefetch::prefetch;
+pub(crate) use sorting::sort_by_key_until;
 pub use stop_signal::StopSignal;

@@ -40,6 +40,26 @@ impl<'a> StopSignal<'a> {
     pub fn is_stopped(self) -> bool {
         self.is_cancelled() || self.is_time_up()
     }
+
+    /// The items, with a look before the first and before every so many more. Once stopped there are no more of them, so
+    /// that who needs them all asks again at the end.
+    pub fn paced<I: IntoIterator>(
+        self,
+        items: I,
+        items_per_look: usize,
+    ) -> impl Iterator<Item = I::Item> + use<'a, I> {
+        let goes_on = move |at: usize| !at.is_multiple_of(items_per_look) || !self.is_stopped();
+        items.into_iter().enumerate().take_while(move |(at, _)| goes_on(*at)).map(|(_, item)| item)
+    }
+
+    /// The same of the pieces of a slice, with a look before each.
+    pub fn pieces<T>(
+        self,
+        items: &[T],
+        items_per_look: usize,
+    ) -> impl Iterator<Item = &[T]> + use<'_, 'a, T> {
+        items.chunks(items_per_look).take_while(move |_| !self.is_stopped())
+    }
 }
 
 /// Prints the deadline; closures have no form to print.
@@ -54,6 +74,21 @@ mod tests {
     use super::*;
     use std::cell::Cell;
     use std::time::Duration;
+
+    #[test]
+    fn paced_work_looks_once_for_so_many_items_and_ends_when_stopped() {
+        let looks = Cell::new(0);
+        let stops_at = |most: usize| move |looks: &Cell<usize>| looks.replace(looks.get() + 1) >= most;
+        for (most, items, expected) in [(usize::MAX, 100, 10), (3, 30, 4), (0, 0, 1)] {
+            looks.set(0);
+            let stops = || stops_at(most)(&looks);
+            assert_eq!(StopSignal::when(&stops).paced(0..100, 10).count(), items);
+            assert_eq!(looks.get(), expected);
+            looks.set(0);
+            assert_eq!(StopSignal::when(&stops).pieces(&[0; 100], 10).flatten().count(), items);
+            assert_eq!(looks.get(), expected);
+        }
+    }
 
     #[test]
     fn work_is_stopped_by_its_caller_or_by_the_clock() {

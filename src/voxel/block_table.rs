@@ -232,6 +232,7 @@ fn vacant(buckets: usize) -> Vec<Cluster> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::util::StopSignal;
     use crate::voxel::{Place, Renewal};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
@@ -266,7 +267,7 @@ mod tests {
                     }
                     blocks.push((block, mask));
                 }
-                Renewal::plan(&table, &blocks).apply(&mut table);
+                Renewal::plan(&table, &blocks, StopSignal::NEVER).apply(&mut table);
                 prop_assert_eq!(table.len(), model.len());
             }
             let mut found: Vec<_> = table.iter().collect();

@@ -22,5 +22,6 @@ pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESO
 pub use moments::{MOMENT_LEVEL, MomentSet, Moments};
 pub(crate) use renewal::Renewal;
 pub use sample::{VolumetricSample, sample_bytes_max, volumetric_sample, volumetric_sample_until};
+pub(crate) use set::BLOCKS_PER_LOOK;
 pub use set::VoxelSet;
 pub(crate) use slots::{BUCKET, Bucket, Slots};

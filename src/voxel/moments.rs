@@ -4,8 +4,9 @@ use std::ops::AddAssign;
 
 use hashbrown::HashMap;
 
-use super::{INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
+use super::{BLOCKS_PER_LOOK, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet};
 use crate::geometry::Point;
+use crate::util::{StopSignal, sort_by_key_until};
 
 /// The level whose voxels keep moments: 4 r_0 wide, large enough for a plane to show, small enough to follow a
 /// room's furniture. Coarser ones are sums of these.
@@ -151,7 +152,19 @@ impl MomentSet {
 
     /// Of the centres of `voxels`, where points are not known.
     pub fn of_centers(voxels: &VoxelSet) -> Self {
-        voxels.blocks().iter().flat_map(|(block, mask)| mask.moments(*block)).collect()
+        Self::of_centers_until(voxels, StopSignal::NEVER)
+    }
+
+    /// The same; once stopped, some of them.
+    pub(crate) fn of_centers_until(voxels: &VoxelSet, stop: StopSignal<'_>) -> Self {
+        let blocks = stop.pieces(voxels.blocks(), BLOCKS_PER_LOOK).flatten();
+        Self::of_voxels_until(blocks.flat_map(|(block, mask)| mask.moments(*block)).collect(), stop)
+    }
+
+    /// Of distinct voxels, in any order; once stopped, in any order.
+    pub(crate) fn of_voxels_until(mut moments: Vec<(VoxelKey, Moments)>, stop: StopSignal<'_>) -> Self {
+        sort_by_key_until(&mut moments, |(key, _)| *key, stop);
+        Self(moments)
     }
 
     /// The key of a voxel of [`MOMENT_LEVEL`] from its packed form; none when no finest voxel can lie in it.
@@ -169,9 +182,7 @@ impl MomentSet {
 impl FromIterator<(VoxelKey, Moments)> for MomentSet {
     /// Of distinct voxels, in any order.
     fn from_iter<I: IntoIterator<Item = (VoxelKey, Moments)>>(moments: I) -> Self {
-        let mut moments: Vec<_> = moments.into_iter().collect();
-        moments.sort_unstable_by_key(|(key, _)| *key);
-        Self(moments)
+        Self::of_voxels_until(moments.into_iter().collect(), StopSignal::NEVER)
     }
 }
 

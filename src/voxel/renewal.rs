@@ -3,7 +3,8 @@
 use hashbrown::HashMap;
 
 use super::cluster::{Cluster, Place};
-use super::{BlockMask, BlockTable, VoxelKey};
+use super::{BLOCKS_PER_LOOK, BlockMask, BlockTable, VoxelKey};
+use crate::util::StopSignal;
 
 /// Clusters as a change leaves them, made beside those that they are to replace: so readers go on meanwhile, and are
 /// kept waiting for no more than an exchange of pointers.
@@ -13,19 +14,26 @@ pub(crate) struct Renewal(Vec<(VoxelKey, Cluster)>);
 
 impl Renewal {
     /// Of the clusters of `table`, once each of `blocks`, none of which comes twice, has got these voxels: none takes
-    /// the block out.
-    pub(crate) fn plan(table: &BlockTable, blocks: &[(VoxelKey, BlockMask)]) -> Self {
+    /// the block out. Once stopped, what comes of it is not to be applied.
+    pub(crate) fn plan(table: &BlockTable, blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Self {
         let mut touched = Touched::default();
         let mut numbers = Vec::with_capacity(blocks.len());
-        for (block, mask) in blocks {
+        for (block, mask) in stop.pieces(blocks, BLOCKS_PER_LOOK).flatten() {
             let (key, place) = Place::of(*block);
             let number = touched.number(table, key);
             let present = &mut touched.clusters[number].present;
             *present = if mask.is_empty() { *present & !place.bit() } else { *present | place.bit() };
             numbers.push(number);
         }
-        let mut clusters: Vec<_> = touched.clusters.iter().map(TouchedCluster::renewed).collect();
-        for ((block, mask), number) in blocks.iter().zip(numbers).filter(|((_, mask), _)| !mask.is_empty()) {
+        let mut clusters = Vec::with_capacity(touched.clusters.len());
+        for touched in stop.pieces(&touched.clusters, BLOCKS_PER_LOOK) {
+            clusters.extend(touched.iter().map(TouchedCluster::renewed));
+        }
+        if stop.is_stopped() {
+            return Self(clusters);
+        }
+        let new = stop.paced(blocks.iter().zip(numbers), BLOCKS_PER_LOOK);
+        for ((block, mask), number) in new.filter(|((_, mask), _)| !mask.is_empty()) {
             clusters[number].1.set(Place::of(*block).1, *mask);
         }
         Self(clusters)

@@ -2,6 +2,10 @@
 
 use super::grouping::blocks_of;
 use super::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, MOMENT_LEVEL, VoxelKey};
+use crate::util::{StopSignal, sort_by_key_until};
+
+/// Blocks that are worked on between two looks at the stop signal: some milliseconds.
+pub(crate) const BLOCKS_PER_LOOK: usize = 16 << 10;
 
 /// Distinct finest voxels, as blocks in ascending order of their keys; no block is empty.
 ///
@@ -48,21 +52,25 @@ impl VoxelSet {
     /// The voxels of [`MOMENT_LEVEL`] that hold one of these, ascending: those with moments of points, where every voxel
     /// has a point.
     pub fn moment_voxels(&self) -> Vec<VoxelKey> {
+        self.moment_voxels_until(StopSignal::NEVER)
+    }
+
+    /// The same; once stopped, some of them.
+    pub(crate) fn moment_voxels_until(&self, stop: StopSignal<'_>) -> Vec<VoxelKey> {
         let of_block = |(block, mask): &(VoxelKey, BlockMask)| {
             let block = *block;
             mask.cells(MOMENT_LEVEL).map(move |cell| cell.voxel(block).ancestor(MOMENT_LEVEL))
         };
-        let mut voxels: Vec<VoxelKey> = self.blocks.iter().flat_map(of_block).collect();
-        voxels.sort_unstable();
+        let blocks = stop.pieces(&self.blocks, BLOCKS_PER_LOOK).flatten();
+        let mut voxels: Vec<VoxelKey> = blocks.flat_map(of_block).collect();
+        sort_by_key_until(&mut voxels, |voxel| *voxel, stop);
         voxels
     }
-}
 
-impl FromIterator<(VoxelKey, BlockMask)> for VoxelSet {
-    /// The union of `blocks`, in any order.
-    fn from_iter<I: IntoIterator<Item = (VoxelKey, BlockMask)>>(blocks: I) -> Self {
-        let mut blocks: Vec<_> = blocks.into_iter().filter(|(_, mask)| !mask.is_empty()).collect();
-        blocks.sort_unstable_by_key(|(key, _)| *key);
+    /// The union of `blocks`, in any order; once stopped, some of it.
+    pub(crate) fn of_blocks_until(mut blocks: Vec<(VoxelKey, BlockMask)>, stop: StopSignal<'_>) -> Self {
+        blocks.retain(|(_, mask)| !mask.is_empty());
+        sort_by_key_until(&mut blocks, |(key, _)| *key, stop);
         blocks.dedup_by(|later, kept| {
             let same = later.0 == kept.0;
             if same {
@@ -71,6 +79,14 @@ impl FromIterator<(VoxelKey, BlockMask)> for VoxelSet {
             same
         });
         Self { blocks }
+    }
+}
+
+impl FromIterator<(VoxelKey, BlockMask)> for VoxelSet {
+    /// The union of `blocks`, in any order.
+    fn from_iter<I: IntoIterator<Item = (VoxelKey, BlockMask)>>(blocks: I) -> Self {
+        let blocks = blocks.into_iter().filter(|(_, mask)| !mask.is_empty()).collect();
+        Self::of_blocks_until(blocks, StopSignal::NEVER)
     }
 }
 

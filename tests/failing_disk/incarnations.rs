@@ -1,5 +1,6 @@
 //! Maps that are deleted and made again under one name: nothing of one is ever found in another.
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,7 +10,8 @@ use mrol::map::{
     TrajectoryPose,
 };
 use mrol::store::{
-    DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
+    Appending, DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError,
+    StoreSettings,
 };
 use mrol::util::StopSignal;
 use mrol::voxel::{VoxelKey, VoxelSet};
@@ -338,4 +340,94 @@ fn an_opening_that_nobody_wants_any_more_ends() {
     let progress = OpeningProgress::default();
     progress.cancel();
     assert!(matches!(data.map(&office(), &progress), Err(StoreError::Cancelled)));
+}
+
+/// A disk on which nobody wants the maps any more once a map's snapshot was read.
+#[derive(Debug)]
+struct Unwanted {
+    disk: SimulatedDisk,
+    progress: Arc<OpeningProgress>,
+}
+
+impl FileSystem for Unwanted {
+    fn read(&self, file: &Path) -> io::Result<Vec<u8>> {
+        let bytes = self.disk.read(file);
+        self.progress.cancel();
+        bytes
+    }
+
+    fn create_folder(&self, folder: &Path) -> io::Result<()> {
+        self.disk.create_folder(folder)
+    }
+
+    fn list(&self, folder: &Path) -> io::Result<Vec<String>> {
+        self.disk.list(folder)
+    }
+
+    fn size(&self, file: &Path) -> io::Result<u64> {
+        self.disk.size(file)
+    }
+
+    fn create(&self, file: &Path) -> io::Result<Box<dyn Appending>> {
+        self.disk.create(file)
+    }
+
+    fn truncate(&self, file: &Path, bytes: u64) -> io::Result<()> {
+        self.disk.truncate(file, bytes)
+    }
+
+    fn sync(&self, path: &Path) -> io::Result<()> {
+        self.disk.sync(path)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.disk.rename(from, to)
+    }
+
+    fn remove(&self, file: &Path) -> io::Result<()> {
+        self.disk.remove(file)
+    }
+
+    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+        self.disk.remove_folder(folder)
+    }
+}
+
+#[test]
+fn an_opening_ends_inside_a_snapshot_which_nobody_takes_for_damaged() {
+    let disk = SimulatedDisk::default();
+    let data = data_dir(&disk);
+    let (map, uuid) = (empty(), Uuid::new_v4());
+    let folder = data.create(&office(), &Snapshot::of(&map, uuid)).unwrap();
+    (0..3).for_each(|i| commit(&folder, &map, i));
+    folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+    drop((folder, data));
+    let progress = Arc::new(OpeningProgress::default());
+    let unwanted = Unwanted { disk: disk.clone(), progress: Arc::clone(&progress) };
+    let data = DataDir::on(Arc::new(unwanted), Path::new("data"), StoreSettings::default()).unwrap();
+    let opened = data.map(&office(), &progress);
+    assert!(matches!(opened, Err(StoreError::Cancelled)), "{:?}", opened.map(|opened| opened.uuid));
+    let opened = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();
+    assert!(opened.damaged.is_empty() && opened.map.contents() == map.contents());
+}
+
+#[test]
+fn where_nothing_is_left_to_give_up_nothing_is_written_or_synced() {
+    let disk = SimulatedDisk::default();
+    let data = data_dir(&disk);
+    let (map, uuid) = (empty(), Uuid::new_v4());
+    let folder = data.create(&office(), &Snapshot::of(&map, uuid)).unwrap();
+    let grow = |from: i32| {
+        (from..from + 10).for_each(|i| commit(&folder, &map, i));
+        folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+    };
+    (0..5).for_each(|i| grow(i * 10));
+    assert!(folder.give_up_undo().unwrap());
+    let before = disk.operations();
+    for _ in 0..20 {
+        assert!(!folder.give_up_undo().unwrap());
+    }
+    assert_eq!(disk.operations() - before, 0, "a scarce disk is written to");
+    (5..8).for_each(|i| grow(i * 10));
+    assert!(folder.give_up_undo().unwrap(), "what has come since is given up too");
 }

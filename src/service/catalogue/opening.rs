@@ -17,7 +17,7 @@ pub(super) fn open_all(
     settings: &StoreSettings,
     progress: &OpeningProgress,
 ) -> Result<Named, ServiceError> {
-    let stock = data_dir.take_stock().map_err(not_stored)?;
+    let stock = data_dir.take_stock_until(progress).map_err(not_stored)?;
     for path in stock.not_understood {
         tracing::warn!(path = %path.display(), "not understood, and left alone: no map");
     }

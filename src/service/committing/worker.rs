@@ -14,7 +14,7 @@ use crate::service::ServiceError;
 use crate::service::room::Promise;
 use crate::store::{Durability, MapFolder, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, RecvTimeoutError};
-use crate::util::SharedDurations;
+use crate::util::{SharedDurations, StopSignal};
 
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
@@ -111,7 +111,8 @@ impl Worker {
 
     fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {
         let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
-        let decided = || match decide(&self.map)? {
+        let caller_gone = || answer.is_closed();
+        let decided = || match decide(&self.map, StopSignal::when(&caller_gone))? {
             Some(decided) => {
                 let record = self.folder.as_ref().map(|_| record_of(&decided.change)).transpose()?;
                 Ok(Some((decided, record)))

@@ -5,11 +5,11 @@
 mod change;
 pub(super) mod moments;
 mod scan;
-mod voxels;
+pub(super) mod voxels;
 
 pub(super) use scan::with_forgotten;
 
-/// What is wrong with a message.
+/// What is wrong with a message; of no meaning once its reading was stopped.
 pub(super) type Unreadable = String;
 
 /// The value of a field that must be there.

@@ -4,6 +4,7 @@ use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
 use crate::map::{ID_RANGES_PER_ROBOT_MAX, RobotName, ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
 use crate::store::pb;
+use crate::util::StopSignal;
 
 impl From<&TrajectoryPose> for pb::ScanPose {
     fn from(pose: &TrajectoryPose) -> Self {
@@ -51,7 +52,7 @@ impl From<&ScanRecord> for pb::Insertion {
         Self {
             pose: Some((&scan.pose).into()),
             voxels: Some((&scan.voxels).into()),
-            moments: Some(moments::beside(&scan.voxels, &scan.moments)),
+            moments: Some(moments::beside(&scan.voxels, &scan.moments, StopSignal::NEVER)),
         }
     }
 }
@@ -63,7 +64,7 @@ impl TryFrom<pb::Insertion> for ScanRecord {
         let voxels = required(message.voxels, "insertion.voxels")?.try_into()?;
         Ok(Self {
             pose: required(message.pose, "insertion.pose")?.try_into()?,
-            moments: moments::read(&message.moments.unwrap_or_default(), &voxels)?,
+            moments: moments::read(&message.moments.unwrap_or_default(), &voxels, StopSignal::NEVER)?,
             voxels,
         })
     }
@@ -92,12 +93,16 @@ impl From<(&RobotName, &[(u64, u64)])> for pb::ForgottenScans {
     }
 }
 
+/// Robots whose ranges of ids are taken over between two looks at the stop signal.
+const ROBOTS_PER_LOOK: usize = 16;
+
 /// The trajectory where, besides, these scans are known whose poses are not kept.
 pub(in crate::store) fn with_forgotten(
     mut trajectory: Trajectory,
     forgotten: &[pb::ForgottenScans],
+    stop: StopSignal<'_>,
 ) -> Result<Trajectory, Unreadable> {
-    for pb::ForgottenScans { robot, id_gaps } in forgotten {
+    for pb::ForgottenScans { robot, id_gaps } in stop.paced(forgotten, ROBOTS_PER_LOOK) {
         let robot = RobotName::new(robot).map_err(|e| e.to_string())?;
         let (ranges, rest) = id_gaps.as_chunks();
         if !rest.is_empty() || ranges.len() > ID_RANGES_PER_ROBOT_MAX {

@@ -2,19 +2,12 @@
 
 use super::Unreadable;
 use crate::store::pb;
-use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
+use crate::util::StopSignal;
+use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelSet};
 
 impl From<&VoxelSet> for pb::Voxels {
     fn from(voxels: &VoxelSet) -> Self {
-        let mut before = 0;
-        let gap = |&(key, _): &(VoxelKey, BlockMask)| {
-            let bits = key.to_bits();
-            bits - std::mem::replace(&mut before, bits)
-        };
-        let key_gaps = voxels.blocks().iter().map(gap).collect();
-        let mut octrees = Vec::with_capacity(voxels.blocks().len() * 16);
-        voxels.blocks().iter().for_each(|(_, mask)| write_octree(mask, &mut octrees));
-        Self { key_gaps, octrees: octrees.into() }
+        write(voxels, StopSignal::NEVER)
     }
 }
 
@@ -22,24 +15,40 @@ impl TryFrom<pb::Voxels> for VoxelSet {
     type Error = Unreadable;
 
     fn try_from(voxels: pb::Voxels) -> Result<Self, Unreadable> {
-        let (mut key, mut octrees) = (0u64, &voxels.octrees[..]);
-        let mut blocks = Vec::with_capacity(voxels.key_gaps.len());
-        for (i, &gap) in voxels.key_gaps.iter().enumerate() {
-            if gap == 0 && i > 0 {
-                return Err(format!("voxels.key_gaps[{i}] is 0: a block comes twice"));
-            }
-            key = key.checked_add(gap).ok_or_else(|| format!("voxels.key_gaps[{i}] is too large: {gap}"))?;
-            let block = Self::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
-            let mask = read_octree(&mut octrees).ok_or_else(|| {
-                format!("voxels.octrees: that of block {i} is cut short or has an empty child")
-            })?;
-            blocks.push((block, mask));
-        }
-        if !octrees.is_empty() {
-            return Err(format!("voxels.octrees has {} bytes too many", octrees.len()));
-        }
-        Ok(blocks.into_iter().collect())
+        read(&voxels, StopSignal::NEVER)
     }
+}
+
+/// The message of a set; of a part of it once stopped.
+pub(in crate::store) fn write(voxels: &VoxelSet, stop: StopSignal<'_>) -> pb::Voxels {
+    let (mut before, count) = (0, voxels.blocks().len());
+    let (mut key_gaps, mut octrees) = (Vec::with_capacity(count), Vec::with_capacity(count * 16));
+    for (key, mask) in stop.pieces(voxels.blocks(), BLOCKS_PER_LOOK).flatten() {
+        let bits = key.to_bits();
+        key_gaps.push(bits - std::mem::replace(&mut before, bits));
+        write_octree(mask, &mut octrees);
+    }
+    pb::Voxels { key_gaps, octrees: octrees.into() }
+}
+
+/// The inverse of [`write`].
+pub(in crate::store) fn read(voxels: &pb::Voxels, stop: StopSignal<'_>) -> Result<VoxelSet, Unreadable> {
+    let (mut key, mut octrees) = (0u64, &voxels.octrees[..]);
+    let mut blocks = Vec::with_capacity(voxels.key_gaps.len());
+    for (i, &gap) in stop.paced(voxels.key_gaps.iter().enumerate(), BLOCKS_PER_LOOK) {
+        if gap == 0 && i > 0 {
+            return Err(format!("voxels.key_gaps[{i}] is 0: a block comes twice"));
+        }
+        key = key.checked_add(gap).ok_or_else(|| format!("voxels.key_gaps[{i}] is too large: {gap}"))?;
+        let block = VoxelSet::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
+        let mask = read_octree(&mut octrees)
+            .ok_or_else(|| format!("voxels.octrees: that of block {i} is cut short or has an empty child"))?;
+        blocks.push((block, mask));
+    }
+    if !octrees.is_empty() {
+        return Err(format!("voxels.octrees has {} bytes too many", octrees.len()));
+    }
+    Ok(VoxelSet::of_blocks_until(blocks, stop))
 }
 
 /// Appends the tree of a block that is not empty.
@@ -83,6 +92,7 @@ fn present<T>(children: &mut [T], bits: u8) -> impl Iterator<Item = &mut T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::voxel::VoxelKey;
     use proptest::prelude::*;
 
     proptest! {

@@ -7,6 +7,7 @@ use super::{DataDir, Entry};
 use crate::map::MapName;
 use crate::store::replacement::{self, Replacement};
 use crate::store::{OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
+use crate::util::StopSignal;
 
 /// What a data folder holds.
 #[derive(Debug, Default)]
@@ -27,16 +28,24 @@ impl DataDir {
     /// When the folder cannot be read, or the system refuses. What is wrong with one map keeps no other from being
     /// opened.
     pub fn take_stock(&self) -> Result<Stock, StoreError> {
+        self.take_stock_until(&OpeningProgress::default())
+    }
+
+    /// The same, for as long as somebody wants the maps.
+    ///
+    /// # Errors
+    /// As there; `Cancelled` where nobody wants them any more.
+    pub fn take_stock_until(&self, progress: &OpeningProgress) -> Result<Stock, StoreError> {
         folder::sweep(&*self.files, &self.maps)?;
         self.end_replacements()?;
         let mut stock = Stock::default();
         for entry in self.entries()? {
             match Entry::of(&entry) {
-                Entry::MapFile(name) => {
-                    if let Err(error) = self.take_in(&name) {
-                        stock.refused.push((name, error));
-                    }
-                }
+                Entry::MapFile(name) => match self.take_in(&name, progress) {
+                    Ok(()) => {}
+                    Err(StoreError::Cancelled) => return Err(StoreError::Cancelled),
+                    Err(error) => stock.refused.push((name, error)),
+                },
                 Entry::Unknown => stock.not_understood.push(self.maps.join(entry)),
                 Entry::Map { .. } | Entry::OldMap(_) | Entry::Unfinished => {}
             }
@@ -85,13 +94,14 @@ impl DataDir {
     }
 
     /// Makes a map's folder of a map file.
-    fn take_in(&self, name: &MapName) -> Result<(), StoreError> {
-        let file = self.maps.join(Entry::file_name(name));
-        let snapshot = Snapshot::read(&*self.files, &file)?;
+    fn take_in(&self, name: &MapName, progress: &OpeningProgress) -> Result<(), StoreError> {
+        let is_cancelled = || progress.is_cancelled();
+        let (file, stop) = (self.maps.join(Entry::file_name(name)), StopSignal::when(&is_cancelled));
+        let snapshot = Snapshot::read_until(&*self.files, &file, stop)?;
         let taken = Entry::folder_name(name, snapshot.uuid);
         let folders: BTreeSet<String> = self.folders_of(name)?.into_iter().collect();
         if folders.is_empty() {
-            self.make(&taken, &snapshot, None)?;
+            self.make(&taken, &snapshot, None, stop)?;
         } else if !folders.contains(&taken) || !self.holds_only(&taken, snapshot.contents.revision)? {
             let reason = format!(
                 "map {name} exists already: rename the file, move it away, or `mrol restore --replace` it"

@@ -79,7 +79,7 @@ impl SegmentedJournal {
             if first != expected && first > known.snapshot + 1 {
                 return Err(missing(&path, expected, first));
             }
-            let bytes = journal.place.read(&path)?;
+            let bytes = journal.place.read_until(&path, progress)?;
             progress.read(bytes.len() as u64);
             let mut segment = Segment { path: &path, bytes: &bytes, first, last: i + 1 == needed.len() };
             expected = segment.replay(&journal.place, known, progress, &mut recovered, &mut replay)?;
@@ -128,9 +128,11 @@ impl Segment<'_> {
                 Ok(None) => break,
                 Err(broken) => return self.ends_with(broken, place, known, recovered),
             };
+            progress.check_wanted()?;
             if frame.revision > known.snapshot {
-                progress.check_wanted()?;
                 let made = frame.change().and_then(|change| replay(frame.revision, change));
+                // One that was stopped is not damaged.
+                progress.check_wanted()?;
                 made.map_err(|reason| StoreError::at(self.path, at, frame.revision, reason))?;
                 recovered.replayed += 1;
                 recovered.bytes += frame.len() as u64;

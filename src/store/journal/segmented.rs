@@ -10,9 +10,9 @@ use uuid::Uuid;
 use super::segment::{self, Frames};
 use super::{Changes, Journal, Record, Revised, frame};
 use crate::map::REVISION_MAX;
-use crate::store::folder::FolderPath;
-use crate::store::{Appending, FileSystem, StoreError};
-use crate::util::Durations;
+use crate::store::folder::{self, FolderPath};
+use crate::store::{Appending, FileSystem, OpeningProgress, StoreError};
+use crate::util::{Durations, StopSignal};
 
 /// A journal as segments in a map's folder. It appends to segments that it began itself, never to one it found.
 #[derive(Debug)]
@@ -216,6 +216,11 @@ impl Place {
 
     pub(super) fn read(&self, path: &Path) -> Result<Vec<u8>, StoreError> {
         self.files.read(path).map_err(StoreError::io(path))
+    }
+
+    /// The same, for as long as somebody wants the maps.
+    pub(super) fn read_until(&self, path: &Path, progress: &OpeningProgress) -> Result<Vec<u8>, StoreError> {
+        folder::read_until(&*self.files, path, StopSignal::when(&|| progress.is_cancelled()))
     }
 }
 

@@ -10,8 +10,9 @@ use crate::store::retention::{self, UndoReach};
 use crate::store::snapshot_files::Sizes;
 use crate::sync::{Mutex, MutexGuard, Rank};
 
-/// How long after one that could not be written the next snapshot is due at the earliest: to make one takes a while of
-/// a thread, and a disk that is full does not empty at once.
+/// How long after one that could not be written the next snapshot is due at the earliest, and what is kept for undo is
+/// given up again after that failed: to make a snapshot takes a while of a thread, and a disk that is full does not empty
+/// at once.
 const AGAIN_AFTER: Duration = Duration::from_secs(5);
 
 /// How much is kept of a map, and how.
@@ -49,6 +50,8 @@ struct Known {
     /// Those that somebody reads the journal from just now.
     pinned: Vec<u64>,
     saved: Saved,
+    /// When nothing could be given up though there was something.
+    gave_up_in_vain: Option<Instant>,
     /// Bytes of the folder when they were last counted, less those appended to the journal until then; wrapping.
     counted_bytes: u64,
 }
@@ -94,6 +97,7 @@ impl Facts {
             snapshots,
             pinned: Vec::new(),
             saved,
+            gave_up_in_vain: None,
             counted_bytes: 0,
         };
         Self(Arc::new(Mutex::new(Rank::Brief, known)))
@@ -127,6 +131,24 @@ impl Facts {
         let mut known = self.lock();
         known.saved.failed = Some(Instant::now());
         known.saved.failures += 1;
+    }
+
+    /// True where something is kept for undo alone that nobody reads; not just after it could not be given up.
+    pub(super) fn may_give_up(&self) -> bool {
+        let known = self.lock();
+        if known.gave_up_in_vain.is_some_and(|then| then.elapsed() < AGAIN_AFTER) {
+            return false;
+        }
+        let for_undo = known.snapshots.len().saturating_sub(retention::FOR_RECOVERY);
+        let can_go = |snapshot: &&u64| !known.pinned.contains(snapshot);
+        let kept = known.snapshots[for_undo..].iter().chain(&known.pinned).min();
+        known.snapshots[..for_undo].iter().any(|snapshot| can_go(&snapshot))
+            || kept.is_some_and(|base| known.segments.partition_point(|first| *first <= base + 1) > 1)
+    }
+
+    /// It was tried to give up what is kept for undo alone.
+    pub(super) fn tell_given_up(&self, gave_up: bool) {
+        self.lock().gave_up_in_vain = (!gave_up).then(Instant::now);
     }
 
     /// The files of the folder were counted.

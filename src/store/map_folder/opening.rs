@@ -12,6 +12,7 @@ use crate::store::snapshot_files::{
     Newest, check_owner, newest_good, not_understood, set_aside, snapshot_name, snapshot_revisions,
 };
 use crate::store::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder};
+use crate::util::StopSignal;
 
 /// A map as it was found.
 #[derive(Debug)]
@@ -90,11 +91,14 @@ impl MapFolder {
             return Err(StoreError::Foreign { path, found: snapshot.uuid, expected: uuid });
         }
         let read: Vec<u64> = damaged.iter().map(|(revision, _)| *revision).chain([revision]).collect();
-        check_owner(&*files, &path, uuid, &read)?;
-        let map = MultiResolutionMap::restore(snapshot.settings, snapshot.contents)
-            .map_err(|e| StoreError::damaged(&path, e.to_string()))?;
+        check_owner(&*files, &path, uuid, &read, progress)?;
+        let is_cancelled = || progress.is_cancelled();
+        let stop = StopSignal::when(&is_cancelled);
+        let map = MultiResolutionMap::restore_until(snapshot.settings, snapshot.contents, stop)
+            .map_err(|e| StoreError::damaged(&path, e.to_string()))?
+            .ok_or(StoreError::Cancelled)?;
         let replay = |revision, change| {
-            let committed = map.committer().apply(&change);
+            let committed = map.committer().apply_until(&change, stop).ok_or("it was stopped")?;
             let made = format!("replayed, it makes revision {}", committed.revision);
             (committed.revision == revision).then_some(()).ok_or(made)
         };

@@ -6,46 +6,53 @@ use prost::Message;
 use uuid::Uuid;
 
 use super::Snapshot;
-use super::fields::{Fields, Value, count_bytes, count_varints};
+use super::fields::{
+    FIELDS_PER_LOOK, Fields, Value, bytes_of, count_bytes, count_varints, unzigzag, varints,
+};
 use super::limits::{MapFileError, MapFileLimits, Memory};
 use crate::bloom::FilterSettings;
 use crate::map::{
     AnsweredRequest, MapContents, MapSettings, REQUESTS_KEPT, Requests, Trajectory, TrajectoryPose,
 };
-use crate::store::codec::{Unreadable, moments, with_forgotten};
+use crate::store::codec::{Unreadable, moments, voxels, with_forgotten};
 use crate::store::pb;
-use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
+use crate::util::StopSignal;
+use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
 
 /// The numbers of the fields, as `proto/mrol/store/v1` has them.
-mod number {
-    pub(super) const UUID: u64 = 1;
-    pub(super) const RESOLUTION_M: u64 = 2;
-    pub(super) const LEVELS: u64 = 3;
-    pub(super) const FILTER_HASHES: u64 = 4;
-    pub(super) const FILTER_BITS_PER_VOXEL: u64 = 5;
-    pub(super) const REVISION: u64 = 6;
-    pub(super) const BLOCK_KEYS: u64 = 7;
-    pub(super) const BLOCK_MASKS: u64 = 8;
-    pub(super) const TRAJECTORY: u64 = 9;
-    pub(super) const VOXELS: u64 = 10;
-    pub(super) const WITHDRAWN: u64 = 11;
-    pub(super) const REQUESTS: u64 = 12;
-    pub(super) const MOMENTS: u64 = 13;
-    pub(super) const FORGOTTEN: u64 = 14;
+pub(super) mod number {
+    pub(in crate::store::snapshot) const UUID: u64 = 1;
+    pub(in crate::store::snapshot) const RESOLUTION_M: u64 = 2;
+    pub(in crate::store::snapshot) const LEVELS: u64 = 3;
+    pub(in crate::store::snapshot) const FILTER_HASHES: u64 = 4;
+    pub(in crate::store::snapshot) const FILTER_BITS_PER_VOXEL: u64 = 5;
+    pub(in crate::store::snapshot) const REVISION: u64 = 6;
+    pub(in crate::store::snapshot) const BLOCK_KEYS: u64 = 7;
+    pub(in crate::store::snapshot) const BLOCK_MASKS: u64 = 8;
+    pub(in crate::store::snapshot) const TRAJECTORY: u64 = 9;
+    pub(in crate::store::snapshot) const VOXELS: u64 = 10;
+    pub(in crate::store::snapshot) const WITHDRAWN: u64 = 11;
+    pub(in crate::store::snapshot) const REQUESTS: u64 = 12;
+    pub(in crate::store::snapshot) const MOMENTS: u64 = 13;
+    pub(in crate::store::snapshot) const FORGOTTEN: u64 = 14;
 
     /// In `Voxels` and `Moments`.
-    pub(super) const KEY_GAPS: u64 = 1;
+    pub(in crate::store::snapshot) const KEY_GAPS: u64 = 1;
     /// In `Voxels`.
-    pub(super) const OCTREES: u64 = 2;
+    pub(in crate::store::snapshot) const OCTREES: u64 = 2;
     /// In `Moments`.
-    pub(super) const NUMBERS: u64 = 2;
-    pub(super) const FORMS: u64 = 3;
-    pub(super) const POINTS: u64 = 4;
+    pub(in crate::store::snapshot) const NUMBERS: u64 = 2;
+    pub(in crate::store::snapshot) const FORMS: u64 = 3;
+    pub(in crate::store::snapshot) const POINTS: u64 = 4;
 
     /// In `ForgottenScans`.
-    pub(super) const ID_GAPS: u64 = 2;
+    pub(in crate::store::snapshot) const ID_GAPS: u64 = 2;
 }
 
+/// Scans that become a trajectory between two looks at the stop signal: a few milliseconds.
+const SCANS_PER_LOOK: usize = 4096;
+/// Robots whose forgotten scans are read between two looks, each up to some thousand ranges.
+const ROBOTS_PER_LOOK: usize = 16;
 /// Bytes of one scan or request: a name, an overlap for each level and some numbers are a few hundred.
 const RECORD_BYTES_MAX: usize = 4096;
 /// Bytes of memory of a number that is read one by one into a list, which doubles its room: the old and the new one.
@@ -65,9 +72,10 @@ const MOMENT_BYTES: usize =
     2 * size_of::<VoxelKey>() + size_of::<Moments>() + size_of::<(VoxelKey, Moments)>();
 
 /// A body whose fields were found, and nothing built of them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Body<'a> {
     all: &'a [u8],
+    stop: StopSignal<'a>,
     uuid: &'a [u8],
     settings: [f64; 2],
     levels: u32,
@@ -84,13 +92,29 @@ pub(super) struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// Finds the fields of a body.
+    /// Finds the fields of a body. Once stopped, neither this nor what is read of it means anything.
     ///
     /// # Errors
     /// When it is no message, or has a part twice that there is one of.
-    pub(super) fn of(all: &'a [u8]) -> Result<Self, Unreadable> {
-        let mut body = Self { all, ..Self::default() };
-        for field in Fields::of(all) {
+    pub(super) fn of(all: &'a [u8], stop: StopSignal<'a>) -> Result<Self, Unreadable> {
+        let mut body = Self {
+            all,
+            stop,
+            uuid: &[],
+            settings: [0.0; 2],
+            levels: 0,
+            hashes: 0,
+            revision: 0,
+            block_keys: &[],
+            block_masks: &[],
+            voxels: None,
+            moments: None,
+            scans: 0,
+            withdrawn: 0,
+            requests: 0,
+            forgotten: Vec::new(),
+        };
+        for field in stop.paced(Fields::of(all), FIELDS_PER_LOOK) {
             body.take(field?)?;
         }
         Ok(body)
@@ -195,15 +219,16 @@ impl<'a> Body<'a> {
             false => Ok(()),
         };
         let of_version_1 = self.block_keys.len() / size_of::<u64>();
-        let blocks = self.voxels.map_or(Ok(of_version_1), |it| count_varints(it, number::KEY_GAPS))?;
+        let count_gaps = |voxels| count_varints(voxels, number::KEY_GAPS, self.stop);
+        let blocks = self.voxels.map_or(Ok(of_version_1), count_gaps)?;
         // None of them is empty.
         within("blocks of voxels", blocks)?;
         // Decoding copies the octrees out of the body.
-        let octrees = self.voxels.map_or(Ok(0), |voxels| count_bytes(voxels, number::OCTREES))?;
+        let octrees = self.voxels.map_or(Ok(0), |voxels| count_bytes(voxels, number::OCTREES, self.stop))?;
         memory.reserve(blocks * BLOCK_BYTES + octrees)?;
         let voxels = match self.voxels {
-            Some(message) => decoded::<pb::Voxels>(message, "voxels")?.try_into()?,
-            None => voxels_of_version_1(self.block_keys, self.block_masks)?,
+            Some(message) => voxels::read(&self.voxels_message(message, blocks)?, self.stop)?,
+            None => voxels_of_version_1(self.block_keys, self.block_masks, self.stop)?,
         };
         within("voxels", voxels.len())?;
         Ok(voxels)
@@ -217,16 +242,29 @@ impl<'a> Body<'a> {
         let beside = || voxels.blocks().iter().map(|(_, mask)| mask.count(MOMENT_LEVEL)).sum::<usize>();
         let Some(message) = self.moments else {
             memory.reserve(beside() * MOMENT_BYTES)?;
-            return Ok(MomentSet::of_centers(voxels));
+            return Ok(MomentSet::of_centers_until(voxels, self.stop));
         };
-        let count = |field| count_varints(message, field);
+        let count = |field| count_varints(message, field, self.stop);
         let (gaps, numbers) = (count(number::KEY_GAPS)?, count(number::NUMBERS)?);
-        let forms = count_bytes(message, number::FORMS)?;
-        let points = count_bytes(message, number::POINTS)?;
+        let forms = count_bytes(message, number::FORMS, self.stop)?;
+        let points = count_bytes(message, number::POINTS, self.stop)?;
         let keys = if gaps == 0 && forms > 0 { beside() } else { gaps };
         let copied = forms + points;
         memory.reserve((gaps + numbers) * NUMBER_BYTES + keys.max(forms) * MOMENT_BYTES + copied)?;
-        Ok(moments::read(&decoded(message, "moments")?, voxels)?)
+        let message = pb::Moments {
+            key_gaps: varints(message, number::KEY_GAPS, gaps, |gap| gap, self.stop)?,
+            numbers: varints(message, number::NUMBERS, numbers, unzigzag, self.stop)?,
+            forms: bytes_of(message, number::FORMS, self.stop)?.to_vec().into(),
+            points: bytes_of(message, number::POINTS, self.stop)?.to_vec().into(),
+        };
+        Ok(moments::read(&message, voxels, self.stop)?)
+    }
+
+    fn voxels_message(&self, message: &[u8], blocks: usize) -> Result<pb::Voxels, Unreadable> {
+        Ok(pb::Voxels {
+            key_gaps: varints(message, number::KEY_GAPS, blocks, |gap| gap, self.stop)?,
+            octrees: bytes_of(message, number::OCTREES, self.stop)?.to_vec().into(),
+        })
     }
 
     fn trajectory<E>(
@@ -238,11 +276,13 @@ impl<'a> Body<'a> {
             return Err("the revisions of its scans must ascend".to_owned().into());
         }
         let mut forgotten = Vec::with_capacity(self.forgotten.len());
-        for robot in &self.forgotten {
-            memory.reserve(count_varints(robot, number::ID_GAPS)? * NUMBER_BYTES + FORGOTTEN_BYTES)?;
+        for robot in self.stop.paced(&self.forgotten, ROBOTS_PER_LOOK) {
+            let ids = count_varints(robot, number::ID_GAPS, self.stop)?;
+            memory.reserve(ids * NUMBER_BYTES + FORGOTTEN_BYTES)?;
             forgotten.push(decoded::<pb::ForgottenScans>(robot, "forgotten scans")?);
         }
-        Ok(with_forgotten(Trajectory::new(scans, withdrawn), &forgotten)?)
+        let trajectory = Trajectory::new(self.stop.paced(scans, SCANS_PER_LOOK), withdrawn);
+        Ok(with_forgotten(trajectory, &forgotten, self.stop)?)
     }
 
     fn scans(&self) -> Result<Vec<TrajectoryPose>, Unreadable> {
@@ -290,7 +330,7 @@ impl<'a> Body<'a> {
             Ok(_) => None,
             Err(unreadable) => Some(Err(unreadable)),
         };
-        Fields::of(self.all).filter_map(of_number)
+        self.stop.paced(Fields::of(self.all), FIELDS_PER_LOOK).filter_map(of_number)
     }
 }
 
@@ -302,7 +342,7 @@ fn decoded<M: Message + Default>(bytes: &[u8], what: &str) -> Result<M, Unreadab
     M::decode(bytes).map_err(|e| format!("{what}: {e}"))
 }
 
-fn voxels_of_version_1(keys: &[u8], masks: &[u8]) -> Result<VoxelSet, Unreadable> {
+fn voxels_of_version_1(keys: &[u8], masks: &[u8], stop: StopSignal<'_>) -> Result<VoxelSet, Unreadable> {
     let ((keys, odd), (masks, rest)) = (keys.as_chunks(), masks.as_chunks::<{ BlockMask::BYTES }>());
     if masks.len() != keys.len() || !odd.is_empty() || !rest.is_empty() {
         return Err(format!(
@@ -314,7 +354,11 @@ fn voxels_of_version_1(keys: &[u8], masks: &[u8]) -> Result<VoxelSet, Unreadable
     let block = |(&key, mask): (&[u8; 8], &[u8; BlockMask::BYTES])| {
         let key = u64::from_le_bytes(key);
         let key = VoxelSet::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
-        Ok((key, BlockMask::from_le_bytes(mask)))
+        Ok::<_, Unreadable>((key, BlockMask::from_le_bytes(mask)))
     };
-    keys.iter().zip(masks).map(block).collect()
+    let mut blocks = Vec::with_capacity(keys.len());
+    for key_and_mask in stop.paced(keys.iter().zip(masks), BLOCKS_PER_LOOK) {
+        blocks.push(block(key_and_mask)?);
+    }
+    Ok(VoxelSet::of_blocks_until(blocks, stop))
 }

@@ -2,6 +2,12 @@
 //! before memory is taken.
 
 use crate::store::codec::Unreadable;
+use crate::util::StopSignal;
+
+/// Fields, or numbers, that are read between two looks at the stop signal: a millisecond or so.
+pub(super) const FIELDS_PER_LOOK: usize = 4096;
+/// Bytes in which ends of numbers are counted between two looks at the stop signal.
+const BYTES_PER_LOOK: usize = 1 << 20;
 
 /// The value of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,12 +67,66 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
+/// The numbers that a message holds in the repeated field `number`, packed or one by one, each as `value_of` makes it; some
+/// of them once stopped. There is room for `count`.
+pub(super) fn varints<T>(
+    message: &[u8],
+    number: u64,
+    count: usize,
+    value_of: impl Fn(u64) -> T,
+    stop: StopSignal<'_>,
+) -> Result<Vec<T>, Unreadable> {
+    let mut values = Vec::with_capacity(count);
+    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
+        match field? {
+            (n, Value::Bytes(mut packed)) if n == number => {
+                while !packed.is_empty() && !stop.is_stopped() {
+                    for _ in 0..FIELDS_PER_LOOK {
+                        if packed.is_empty() {
+                            break;
+                        }
+                        let value = varint(&mut packed);
+                        values.push(value_of(value.ok_or_else(|| format!("field {number} is cut short"))?));
+                    }
+                }
+            }
+            (n, Value::Varint(value)) if n == number => values.push(value_of(value)),
+            (n, _) if n == number => return Err(format!("field {number} is of another kind")),
+            _ => {}
+        }
+    }
+    Ok(values)
+}
+
+/// The bytes of the field `number` of a message; of several, the last.
+pub(super) fn bytes_of<'b>(
+    message: &'b [u8],
+    number: u64,
+    stop: StopSignal<'_>,
+) -> Result<&'b [u8], Unreadable> {
+    let mut last = &[][..];
+    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
+        match field? {
+            (n, Value::Bytes(bytes)) if n == number => last = bytes,
+            (n, _) if n == number => return Err(format!("field {number} is of another kind")),
+            _ => {}
+        }
+    }
+    Ok(last)
+}
+
+/// The number that stands as `zigzag`, which small ones of both signs are short as.
+pub(super) fn unzigzag(zigzag: u64) -> i64 {
+    (zigzag >> 1) as i64 ^ -((zigzag & 1) as i64)
+}
+
 /// How many numbers a message holds in the repeated field `number`, packed or one by one.
-pub(super) fn count_varints(message: &[u8], number: u64) -> Result<usize, Unreadable> {
+pub(super) fn count_varints(message: &[u8], number: u64, stop: StopSignal<'_>) -> Result<usize, Unreadable> {
+    let ends = |packed: &[u8]| packed.iter().filter(|&&byte| byte < 128).count();
     let mut count = 0;
-    for field in Fields::of(message) {
+    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
         count += match field? {
-            (n, Value::Bytes(packed)) if n == number => packed.iter().filter(|&&byte| byte < 128).count(),
+            (n, Value::Bytes(packed)) if n == number => stop.pieces(packed, BYTES_PER_LOOK).map(ends).sum(),
             (n, Value::Varint(_)) if n == number => 1,
             _ => 0,
         };
@@ -75,9 +135,9 @@ pub(super) fn count_varints(message: &[u8], number: u64) -> Result<usize, Unread
 }
 
 /// Bytes of the field `number` of a message, all its occurrences together.
-pub(super) fn count_bytes(message: &[u8], number: u64) -> Result<usize, Unreadable> {
+pub(super) fn count_bytes(message: &[u8], number: u64, stop: StopSignal<'_>) -> Result<usize, Unreadable> {
     let mut count = 0;
-    for field in Fields::of(message) {
+    for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
         if let (n, Value::Bytes(bytes)) = field?
             && n == number
         {
@@ -92,7 +152,10 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0u64;
     for shift in (0..64).step_by(7) {
         let byte = *bytes.split_off_first()?;
-        value |= u64::from(byte & 127).checked_shl(shift)?;
+        if shift == 63 && byte > 1 {
+            return None;
+        }
+        value |= u64::from(byte & 127) << shift;
         if byte < 128 {
             return Some(value);
         }
@@ -132,9 +195,30 @@ mod tests {
     fn numbers_are_counted_packed_and_one_by_one() {
         let message = pb::Voxels { key_gaps: vec![1, 300, 1 << 40], octrees: vec![1; 9].into() };
         let bytes = message.encode_to_vec();
-        assert_eq!(count_varints(&bytes, 1), Ok(3));
+        let count_varints = |message: &[u8]| count_varints(message, 1, StopSignal::NEVER);
+        let count_bytes = |message: &[u8], number| count_bytes(message, number, StopSignal::NEVER);
+        assert_eq!(count_varints(&bytes), Ok(3));
         assert_eq!(count_bytes(&bytes, 2), Ok(9));
-        assert_eq!(count_varints(&[8, 1, 8, 2, 8, 3], 1), Ok(3));
-        assert!(count_varints(&[8], 1).is_err() && count_bytes(&[10, 200], 1).is_err());
+        assert_eq!(count_varints(&[8, 1, 8, 2, 8, 3]), Ok(3));
+        assert!(count_varints(&[8]).is_err() && count_bytes(&[10, 200], 1).is_err());
+    }
+
+    #[test]
+    fn numbers_are_read_packed_and_one_by_one() {
+        let numbers = vec![0, -1, 1, i64::MIN, i64::MAX, 1 << 40];
+        let message =
+            pb::Moments { numbers: numbers.clone(), forms: vec![5; 3].into(), ..Default::default() };
+        let bytes = message.encode_to_vec();
+        let read = |bytes: &[u8], number| varints(bytes, number, 0, unzigzag, StopSignal::NEVER);
+        assert_eq!(read(&bytes, 2), Ok(numbers));
+        assert_eq!(bytes_of(&bytes, 3, StopSignal::NEVER), Ok(&[5; 3][..]));
+        assert_eq!(read(&[16, 1, 16, 2, 18, 1, 3], 2), Ok(vec![-1, 1, -2]));
+        let too_large = [18, 10, 255, 255, 255, 255, 255, 255, 255, 255, 255, 2];
+        assert!(
+            read(&too_large, 2).is_err()
+                && read(&[18, 1, 200], 2).is_err()
+                && read(&[21, 0, 0, 0, 0], 2).is_err()
+        );
+        assert!(bytes_of(&[24, 1], 3, StopSignal::NEVER).is_err());
     }
 }

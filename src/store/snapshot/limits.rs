@@ -39,6 +39,9 @@ pub enum MapFileError<E> {
     /// There is no memory for what it holds.
     #[error("{0}")]
     NoMemory(E),
+    /// Nobody waits for it any more, or its time is up.
+    #[error("the reading of the map file was stopped")]
+    Stopped,
 }
 
 impl<E> From<Unreadable> for MapFileError<E> {

@@ -1,9 +1,10 @@
 //! The moments of voxels without their keys: each in the shortest form that says all.
 
 use super::few_points::FewPoints;
-use super::{Numbers, steps};
+use super::{Numbers, VOXELS_PER_LOOK, steps};
 use crate::store::codec::Unreadable;
 use crate::store::pb;
+use crate::util::StopSignal;
 use crate::voxel::{MomentSet, Moments};
 
 /// Ten numbers in steps. A smaller form is the number of points.
@@ -11,11 +12,11 @@ const STEPS: u8 = FewPoints::MOST + 1;
 /// Ten numbers in units.
 const UNITS: u8 = STEPS + 1;
 
-/// The message of a set, but for its keys.
-pub(super) fn write(set: &MomentSet) -> pb::Moments {
+/// The message of a set, but for its keys; of a part of it once stopped.
+pub(super) fn write(set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
     let mut forms = Vec::with_capacity(set.as_slice().len());
     let (mut points, mut numbers) = (Vec::new(), Vec::new());
-    for (_, moments) in set.as_slice() {
+    for (_, moments) in stop.pieces(set.as_slice(), VOXELS_PER_LOOK).flatten() {
         let in_units = moments.to_numbers();
         let in_steps = steps::of_units(&in_units);
         match (in_steps.as_ref().and_then(FewPoints::of), in_steps) {
@@ -37,7 +38,11 @@ pub(super) fn write(set: &MomentSet) -> pb::Moments {
 }
 
 /// The inverse of [`write`], of so many voxels. Before there were forms, all were in units.
-pub(super) fn read(message: &pb::Moments, voxels: usize) -> Result<Vec<Moments>, Unreadable> {
+pub(super) fn read(
+    message: &pb::Moments,
+    voxels: usize,
+    stop: StopSignal<'_>,
+) -> Result<Vec<Moments>, Unreadable> {
     let forms = match message.forms.is_empty() {
         true => &vec![UNITS; voxels],
         false => &message.forms[..],
@@ -53,7 +58,7 @@ pub(super) fn read(message: &pb::Moments, voxels: usize) -> Result<Vec<Moments>,
             .ok_or_else(|| format!("moments of voxel {i} are those of no points"))
     };
     let mut moments = Vec::with_capacity(voxels);
-    for moments_of_voxel in forms.iter().enumerate().map(voxel) {
+    for moments_of_voxel in stop.paced(forms.iter().enumerate(), VOXELS_PER_LOOK).map(voxel) {
         moments.push(moments_of_voxel?);
     }
     match unread {
@@ -122,20 +127,20 @@ mod tests {
 
     #[test]
     fn each_voxel_has_its_shortest_form() {
-        let message = write(&set());
+        let message = write(&set(), StopSignal::NEVER);
         assert_eq!(&message.forms[..], [0, 1, 2, STEPS, UNITS]);
         assert_eq!((message.points.len(), message.numbers.len()), (3 * 3, 2 * 10));
         assert_eq!(message.numbers[..4], [3, -255, -2, 133]);
         let moments: Vec<_> = set().as_slice().iter().map(|(_, moments)| *moments).collect();
-        assert_eq!(read(&message, 5).unwrap(), moments);
+        assert_eq!(read(&message, 5, StopSignal::NEVER).unwrap(), moments);
     }
 
     #[test]
     fn what_does_not_go_with_its_forms_is_an_error() {
         let damaged = |damage: fn(&mut pb::Moments)| {
-            let mut message = write(&set());
+            let mut message = write(&set(), StopSignal::NEVER);
             damage(&mut message);
-            read(&message, 5).unwrap_err()
+            read(&message, 5, StopSignal::NEVER).unwrap_err()
         };
         assert!(damaged(|m| m.forms = vec![1, 1].into()).contains("2 forms for 5 voxels"));
         assert!(damaged(|m| m.forms = vec![5; 5].into()).contains("form 5"));

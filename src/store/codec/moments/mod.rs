@@ -6,59 +6,76 @@ mod steps;
 
 use super::Unreadable;
 use crate::store::pb;
+use crate::util::StopSignal;
 use crate::voxel::{MomentSet, Moments, VoxelKey, VoxelSet};
+
+/// Voxels whose moments are written or read between two looks at the stop signal: some milliseconds.
+const VOXELS_PER_LOOK: usize = 16 << 10;
 
 /// As [`Moments::to_numbers`] has them, in units or in steps.
 type Numbers = [i64; Moments::NUMBERS];
 
 impl From<&MomentSet> for pb::Moments {
     fn from(set: &MomentSet) -> Self {
-        let mut before = 0;
-        let key_gaps = set.as_slice().iter().map(|(key, _)| {
-            let bits = key.to_bits();
-            bits - std::mem::replace(&mut before, bits)
-        });
-        Self { key_gaps: key_gaps.collect(), ..forms::write(set) }
+        with_keys(set, StopSignal::NEVER)
     }
+}
+
+fn with_keys(set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
+    let mut before = 0;
+    let key_gaps = set.as_slice().iter().map(|(key, _)| {
+        let bits = key.to_bits();
+        bits - std::mem::replace(&mut before, bits)
+    });
+    pb::Moments { key_gaps: key_gaps.collect(), ..forms::write(set, stop) }
 }
 
 impl TryFrom<pb::Moments> for MomentSet {
     type Error = Unreadable;
 
     fn try_from(message: pb::Moments) -> Result<Self, Unreadable> {
-        read(&message, &VoxelSet::default())
+        read(&message, &VoxelSet::default(), StopSignal::NEVER)
     }
 }
 
-/// The message of the moments of points in `voxels`: it leaves out the keys where they follow from those.
-pub(in crate::store) fn beside(voxels: &VoxelSet, set: &MomentSet) -> pb::Moments {
+/// The message of the moments of points in `voxels`: it leaves out the keys where they follow from those. Of a part of
+/// them once stopped.
+pub(in crate::store) fn beside(voxels: &VoxelSet, set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
     let keys = set.as_slice().iter().map(|(key, _)| *key);
-    match keys.eq(voxels.moment_voxels()) {
-        true => forms::write(set),
-        false => set.into(),
+    match keys.eq(voxels.moment_voxels_until(stop)) || stop.is_stopped() {
+        true => forms::write(set, stop),
+        false => with_keys(set, stop),
     }
 }
 
 /// The inverse of [`beside`].
-pub(in crate::store) fn read(message: &pb::Moments, voxels: &VoxelSet) -> Result<MomentSet, Unreadable> {
+pub(in crate::store) fn read(
+    message: &pb::Moments,
+    voxels: &VoxelSet,
+    stop: StopSignal<'_>,
+) -> Result<MomentSet, Unreadable> {
     let keys = match message.key_gaps.is_empty() && !message.forms.is_empty() {
-        true => voxels.moment_voxels(),
-        false => keys_of(&message.key_gaps)?,
+        true => voxels.moment_voxels_until(stop),
+        false => keys_of(&message.key_gaps, stop)?,
     };
-    let moments = forms::read(message, keys.len())?;
-    Ok(keys.into_iter().zip(moments).collect())
+    let moments = forms::read(message, keys.len(), stop)?;
+    Ok(MomentSet::of_voxels_until(keys.into_iter().zip(moments).collect(), stop))
 }
 
-fn keys_of(key_gaps: &[u64]) -> Result<Vec<VoxelKey>, Unreadable> {
+fn keys_of(key_gaps: &[u64], stop: StopSignal<'_>) -> Result<Vec<VoxelKey>, Unreadable> {
     let mut bits = 0u64;
-    let key = |(i, &gap): (usize, &u64)| {
+    let mut key = |(i, &gap): (usize, &u64)| {
         if gap == 0 && i > 0 {
             return Err(format!("moments.key_gaps[{i}] is 0: a voxel comes twice"));
         }
         bits = bits.checked_add(gap).ok_or_else(|| format!("moments.key_gaps[{i}] is too large: {gap}"))?;
         MomentSet::key(bits).ok_or_else(|| format!("voxel key {bits:#x} is out of range"))
     };
-    key_gaps.iter().enumerate().map(key).collect()
+    let mut keys = Vec::with_capacity(key_gaps.len());
+    for gap in stop.paced(key_gaps.iter().enumerate(), VOXELS_PER_LOOK) {
+        keys.push(key(gap)?);
+    }
+    Ok(keys)
 }
 
 #[cfg(test)]
@@ -101,9 +118,9 @@ mod tests {
                 of_voxels.insert([77; 3], Moments::default());
             }
             let set = set_of(of_voxels);
-            let message = beside(&voxels, &set);
+            let message = beside(&voxels, &set, StopSignal::NEVER);
             prop_assert_eq!(message.key_gaps.is_empty(), !extra);
-            prop_assert_eq!(read(&message, &voxels).unwrap(), set);
+            prop_assert_eq!(read(&message, &voxels, StopSignal::NEVER).unwrap(), set);
         }
 
         #[test]

@@ -1,0 +1,145 @@
+//! The body of a map file as it is written: part by part, with a look at the stop signal between any two. The bytes are
+//! those that the message of `snapshot.proto` as a whole has.
+
+use prost::Message;
+use prost::encoding::{WireType, encode_key, encode_varint, encoded_len_varint, key_len};
+
+use super::Snapshot;
+use super::body::number;
+use crate::map::MapContents;
+use crate::store::codec::{moments, voxels};
+use crate::store::pb;
+use crate::util::StopSignal;
+
+/// Records, of scans and of requests, between two looks at the stop signal: a millisecond.
+const RECORDS_PER_LOOK: usize = 1024;
+/// Numbers between two looks at the stop signal: a millisecond.
+const NUMBERS_PER_LOOK: usize = 128 << 10;
+
+/// The body of a snapshot; a part of it once stopped.
+pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
+    let Snapshot { uuid, settings, contents } = snapshot;
+    let MapContents { revision, voxels, moments, trajectory, requests } = contents;
+    let mut body = pb::Snapshot {
+        uuid: uuid.as_bytes().to_vec().into(),
+        resolution_m: settings.resolution_m,
+        levels: settings.levels,
+        filter_hashes: settings.filter.hashes,
+        filter_bits_per_voxel: settings.filter.bits_per_key,
+        revision: *revision,
+        ..pb::Snapshot::default()
+    }
+    .encode_to_vec();
+    append(&mut body, trajectory.poses(), stop, |trajectory| pb::Snapshot {
+        trajectory,
+        ..Default::default()
+    });
+    append_voxels(&mut body, &voxels::write(voxels, stop), stop);
+    append(&mut body, trajectory.withdrawn(), stop, |withdrawn| pb::Snapshot {
+        withdrawn,
+        ..Default::default()
+    });
+    append(&mut body, requests.iter(), stop, |requests| pb::Snapshot { requests, ..Default::default() });
+    append_moments(&mut body, &moments::beside(voxels, moments, stop), stop);
+    append(&mut body, trajectory.forgotten(), stop, |forgotten| pb::Snapshot {
+        forgotten,
+        ..Default::default()
+    });
+    body
+}
+
+/// Appends the messages of `items`, some at a time, each as `snapshot_of` puts them into the field that is theirs.
+fn append<T: Into<R>, R>(
+    body: &mut Vec<u8>,
+    items: impl IntoIterator<Item = T>,
+    stop: StopSignal<'_>,
+    snapshot_of: impl Fn(Vec<R>) -> pb::Snapshot,
+) {
+    let mut items = items.into_iter();
+    while !stop.is_stopped() {
+        let records: Vec<R> = items.by_ref().take(RECORDS_PER_LOOK).map(Into::into).collect();
+        if records.is_empty() {
+            return;
+        }
+        body.append(&mut snapshot_of(records).encode_to_vec());
+    }
+}
+
+fn append_voxels(body: &mut Vec<u8>, voxels: &pb::Voxels, stop: StopSignal<'_>) {
+    let gaps = Packed::of(number::KEY_GAPS, &voxels.key_gaps, |gap| *gap, stop);
+    begin_message(body, number::VOXELS, gaps.len() + len_of_bytes(number::OCTREES, &voxels.octrees));
+    gaps.append_to(body, stop);
+    append_bytes(body, number::OCTREES, &voxels.octrees);
+}
+
+fn append_moments(body: &mut Vec<u8>, moments: &pb::Moments, stop: StopSignal<'_>) {
+    let gaps = Packed::of(number::KEY_GAPS, &moments.key_gaps, |gap| *gap, stop);
+    let numbers = Packed::of(number::NUMBERS, &moments.numbers, |number| zigzag(*number), stop);
+    let bytes = [(number::FORMS, &moments.forms), (number::POINTS, &moments.points)];
+    let length = bytes.iter().map(|(number, bytes)| len_of_bytes(*number, bytes)).sum::<usize>();
+    begin_message(body, number::MOMENTS, gaps.len() + numbers.len() + length);
+    gaps.append_to(body, stop);
+    numbers.append_to(body, stop);
+    bytes.iter().for_each(|(number, bytes)| append_bytes(body, *number, bytes));
+}
+
+/// What stands before the fields of a message of that length.
+fn begin_message(body: &mut Vec<u8>, number: u64, length: usize) {
+    body.reserve_exact(length + 16);
+    encode_key(number as u32, WireType::LengthDelimited, body);
+    encode_varint(length as u64, body);
+}
+
+fn append_bytes(body: &mut Vec<u8>, number: u64, bytes: &[u8]) {
+    if !bytes.is_empty() {
+        encode_key(number as u32, WireType::LengthDelimited, body);
+        encode_varint(bytes.len() as u64, body);
+        body.extend_from_slice(bytes);
+    }
+}
+
+/// Bytes of a field of bytes.
+fn len_of_bytes(number: u64, bytes: &[u8]) -> usize {
+    len_of_field(number, bytes.len())
+}
+
+/// Bytes of a field that is so long but for its key and length; it is left out where it is empty.
+fn len_of_field(number: u64, length: usize) -> usize {
+    if length == 0 { 0 } else { key_len(number as u32) + encoded_len_varint(length as u64) + length }
+}
+
+fn zigzag(number: i64) -> u64 {
+    ((number << 1) ^ (number >> 63)) as u64
+}
+
+/// A field of packed numbers.
+struct Packed<'a, T> {
+    number: u64,
+    values: &'a [T],
+    varint: fn(&T) -> u64,
+    /// Of the values.
+    bytes: usize,
+}
+
+impl<'a, T> Packed<'a, T> {
+    fn of(number: u64, values: &'a [T], varint: fn(&T) -> u64, stop: StopSignal<'_>) -> Self {
+        let bytes_of = |values: &[T]| values.iter().map(|it| encoded_len_varint(varint(it))).sum::<usize>();
+        let bytes = stop.pieces(values, NUMBERS_PER_LOOK).map(bytes_of).sum();
+        Self { number, values, varint, bytes }
+    }
+
+    /// Bytes of the field.
+    fn len(&self) -> usize {
+        len_of_field(self.number, self.bytes)
+    }
+
+    fn append_to(&self, body: &mut Vec<u8>, stop: StopSignal<'_>) {
+        if self.bytes > 0 {
+            encode_key(self.number as u32, WireType::LengthDelimited, body);
+            encode_varint(self.bytes as u64, body);
+            for values in stop.pieces(self.values, NUMBERS_PER_LOOK) {
+                values.iter().for_each(|value| encode_varint((self.varint)(value), body));
+            }
+        }
+    }
+}
