@@ -5,6 +5,8 @@
 
 mod common;
 mod map_folders;
+#[path = "durability/operators.rs"]
+mod operators;
 
 use std::path::Path;
 use std::sync::Arc;

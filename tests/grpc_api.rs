@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::{Daemon, PATIENCE, bits_of, corner, guess_pb, points_pb, query_pb, row, scan_pb};
 use mrol::wire::pb;
@@ -303,6 +303,39 @@ async fn a_read_waits_for_its_revision_or_its_deadline() {
     let (answer, _) = tokio::join!(planner.query_points(later()), daemon.put_in("a", &second));
     let answer = answer.unwrap().into_inner();
     assert_eq!((answer.occupied[0], answer.state.unwrap().revision), (0b10, 1));
+}
+
+#[tokio::test]
+async fn who_waits_for_a_revision_hears_of_the_maps_end_at_once() {
+    let patience = 10.0 * PATIENCE.as_secs_f64();
+    let daemon = Daemon::start_with(|config| config.limits.min_revision_wait_max_s = patience).await;
+    for (map, code, word) in
+        [("gone", Code::NotFound, "map_not_found"), ("other", Code::FailedPrecondition, "map_replaced")]
+    {
+        daemon.make_map(map).await;
+        let path = format!("/v1/maps/{map}/snapshot");
+        let file = daemon.get(&path).await.bytes().await.unwrap();
+        let mut planner = daemon.occupancy().await;
+        let later = pb::QueryPointsRequest { min_revision: Some(9), ..query_pb(map, &row(3)) };
+        let waiting = tokio::spawn(async move { planner.query_points(later).await });
+        // It waits when the metrics say that it is in work.
+        let start = Instant::now();
+        while daemon.metric("mrol_requests_in_flight{state=\"in_work\"}").await != Some(1.0) {
+            assert!(start.elapsed() < PATIENCE, "it never begins");
+            tokio::task::yield_now().await;
+        }
+        let ended = match map {
+            "gone" => daemon.delete("/v1/maps/gone").await,
+            _ => {
+                let put = common::client().put(daemon.url(&format!("{path}?replace=true")));
+                put.header("content-type", "application/octet-stream").body(file).send().await.unwrap()
+            }
+        };
+        assert!(ended.status().is_success(), "{map}: {}", ended.status());
+        let told = tokio::time::timeout(PATIENCE, waiting).await.expect("it is told at once");
+        let told = told.unwrap().unwrap_err();
+        assert_eq!((told.code(), &*reason(&told)), (code, word));
+    }
 }
 
 #[tokio::test]

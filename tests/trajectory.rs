@@ -80,6 +80,48 @@ async fn a_thinned_scans_id_stays_known_and_inserts_nothing() {
 }
 
 #[tokio::test]
+async fn a_thinned_trajectory_is_no_illness() {
+    let daemon = Daemon::start_with(short_undo).await;
+    daemon.make_map("a").await;
+    for id in 1..=20 {
+        insert(&daemon, "r", id, 0.0).await;
+    }
+    let mut data = daemon.stop().await;
+    let mut thinned = 0;
+    for id in 1..=6 {
+        let daemon = Daemon::start_in(data, short_undo).await;
+        insert(&daemon, "other", id, 50.0).await;
+        thinned += usize::from(ids(&poses(&daemon, "?robot=r").await).len() < 20);
+        data = daemon.stop().await;
+        let mut doctor = std::process::Command::new(env!("CARGO_BIN_EXE_mrol"));
+        let told = doctor.args(["doctor", "--json"]).arg(data.path()).output().unwrap();
+        let told = String::from_utf8(told.stdout).unwrap();
+        let found: Value = serde_json::from_str(told.lines().next().unwrap()).unwrap();
+        assert_eq!(found["problems"], json!([]), "after {id} restarts: {told}");
+        assert!(found["snapshots"].as_array().unwrap().len() > 1, "there is nothing to compare: {told}");
+    }
+    assert!(thinned > 1, "nothing was thinned");
+}
+
+#[tokio::test]
+async fn a_page_is_charged_as_the_page_and_not_as_the_trajectory() {
+    // Of memory for bodies and answers: room for a page, and not for the pieces of all poses.
+    let daemon = Daemon::start_with(|config| {
+        config.limits.body_bytes_max = 1 << 20;
+        config.limits.message_bytes_max = 1 << 20;
+    })
+    .await;
+    daemon.make_map("a").await;
+    for id in 1..=5 {
+        insert(&daemon, "r", id, 0.0).await;
+    }
+    assert_eq!(ids(&poses(&daemon, "?limit=3").await), [1, 2, 3]);
+    let refused = daemon.get("/v1/maps/a/trajectory").await;
+    assert_eq!(refused.status(), StatusCode::TOO_MANY_REQUESTS, "the whole needs more room than there is");
+    assert_eq!(ids(&poses(&daemon, "?limit=10&since_revision=3").await), [4, 5]);
+}
+
+#[tokio::test]
 async fn a_map_in_memory_is_thinned_too() {
     let daemon = Daemon::start_with(|config| {
         config.data_dir = "".into();

@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where something is missing")]
 
 mod common;
+mod map_folders;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -297,6 +298,51 @@ async fn a_snapshot_without_room_is_put_off_and_scans_go_on() {
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
     let contents = daemon.contents("a").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("a").await, contents);
+    daemon.stop().await;
+}
+
+#[tokio::test]
+async fn undo_is_given_up_where_the_disk_is_scarce_and_what_cannot_be_given_up_keeps_nothing_from_going_on() {
+    let reach = async |daemon: &Daemon| {
+        let map = json_of(daemon.get("/v1/maps/a").await).await;
+        map["storage"]["undo_from_revision"].as_u64().unwrap()
+    };
+    let (daemon, _) = with_dials(|_| {}).await;
+    let mut data = daemon.stop().await;
+    for _ in 0..3 {
+        let daemon = Daemon::start_in(data, |_| {}).await;
+        assert_eq!(insert(&daemon).await.status(), StatusCode::OK);
+        assert_eq!(reach(&daemon).await, 1);
+        data = daemon.stop().await;
+    }
+    let dials = Arc::new(Dials::default());
+    dials.turn_disk(10_000);
+    dials.turn_memory(100);
+    let folder = map_folders::folder_of(data.path(), "a");
+    let gauges = Arc::clone(&dials) as Arc<dyn Gauges>;
+    let daemon =
+        Daemon::start_with_gauges_in(data, gauges, |config| config.store.snapshot_interval_s = 1).await;
+    // A snapshot for undo alone that cannot be removed: it is a folder now.
+    let oldest = folder.join("snapshot-00000000000000000000.mrol");
+    std::fs::remove_file(&oldest).unwrap();
+    std::fs::create_dir(&oldest).unwrap();
+    dials.turn_disk(300);
+    let start = Instant::now();
+    while reach(&daemon).await == 1 {
+        assert!(start.elapsed() < PATIENCE, "undo is never given up");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert!(oldest.exists());
+    // The map goes on, and its snapshots with it.
+    assert_eq!(insert_numbered(&daemon, 7).await.status(), StatusCode::OK);
+    let contents = daemon.contents("a").await;
+    while snapshot_revision(&daemon).await != json!(contents.0) {
+        assert!(start.elapsed() < 2 * PATIENCE, "no snapshot is written any more");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    std::fs::remove_dir(&oldest).unwrap();
     let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
     assert_eq!(daemon.contents("a").await, contents);
     daemon.stop().await;

@@ -1,6 +1,8 @@
 //! The maps by name, in memory and on disk.
 
 mod opening;
+#[cfg(test)]
+mod turns;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -100,6 +100,8 @@ struct Waiting {
 pub(super) struct Committing {
     inbox: SyncSender<Waiting>,
     stopped: Arc<OnceLock<Stop>>,
+    /// True once no other revision will come: those who wait for one hold the map, and so its thread.
+    ended: watch::Sender<bool>,
     durations: Arc<SharedDurations>,
 }
 
@@ -150,7 +152,7 @@ impl Committing {
             Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations), settings);
         // It waits for just this.
         drop(thread.0.send((worker, waiting)));
-        Self { inbox, stopped, durations }
+        Self { inbox, stopped, ended: watch::Sender::new(false), durations }
     }
 
     /// Hands a change over; its outcome comes when it is visible, and with [`Durability::Always`] durable. Does not
@@ -183,6 +185,13 @@ impl Committing {
     /// The map is deleted: it takes no more changes.
     pub(super) fn end(&self) {
         self.stopped.get_or_init(|| Stop::Deleted);
+        self.ended.send_replace(true);
+    }
+
+    /// Waits until the map is deleted or replaced.
+    pub(super) async fn ended(&self) {
+        // The sender is there as long as this is.
+        drop(self.ended.subscribe().wait_for(|ended| *ended).await);
     }
 
     /// Another map takes its place: it takes no more changes here, and when this returns, none is on its way.
@@ -194,6 +203,7 @@ impl Committing {
         if self.inbox.send(Waiting { proposal, answer }).is_ok() {
             drop(behind_all.blocking_recv());
         }
+        self.ended.send_replace(true);
     }
 }
 

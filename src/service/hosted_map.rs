@@ -177,24 +177,28 @@ impl HostedMap {
         turn.lock_owned().await
     }
 
-    /// Waits until `revision` is there.
+    /// Waits until `revision` is there. Who waits hears of the map's end at once.
     pub(super) async fn reached(&self, revision: u64, wait_max: Duration) -> Result<(), ServiceError> {
         let mut announced = self.announced.clone();
-        let reached = announced.wait_for(|announced| *announced >= revision);
-        match tokio::time::timeout(wait_max, reached).await {
-            Ok(Ok(_)) => Ok(()),
-            Ok(Err(_)) | Err(_) => {
-                if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.committing.stopped() {
-                    return Err(stop.refusal(&self.name));
-                }
-                let message = format!(
-                    "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
-                    self.name,
-                    self.map.revision()
-                );
-                Err(ServiceError::new(ErrorCode::DeadlineExceeded, "revision_not_reached", message))
+        let reached = async {
+            tokio::select! {
+                biased;
+                reached = async { announced.wait_for(|announced| *announced >= revision).await.is_ok() } => reached,
+                () = self.committing.ended() => false,
             }
+        };
+        if let Ok(true) = tokio::time::timeout(wait_max, reached).await {
+            return Ok(());
         }
+        if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.committing.stopped() {
+            return Err(stop.refusal(&self.name));
+        }
+        let message = format!(
+            "min_revision {revision} was not reached within {wait_max:?}: map {} is at {}",
+            self.name,
+            self.map.revision()
+        );
+        Err(ServiceError::new(ErrorCode::DeadlineExceeded, "revision_not_reached", message))
     }
 
     pub(super) fn check_level(&self, level: u32) -> Result<(), ServiceError> {

@@ -15,7 +15,7 @@ use crate::align::Guess;
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
 use crate::map::{
-    Lookup, MapContents, MapName, MapSettings, MultiResolutionMap, Region, RobotName, ScanRecord,
+    Lookup, MapContents, MapName, MapSettings, MultiResolutionMap, Region, RobotName, SHARDS, ScanRecord,
     TrajectoryPose,
 };
 use crate::store::StoreSettings;
@@ -68,6 +68,20 @@ fn a_query_looks_at_the_signal_in_proportion_to_its_points() {
         };
         map.query(&query, StopSignal::when(&count_look)).unwrap();
         assert!(count / looks.get() <= 64 << 10, "{count} points, {} looks", looks.get());
+    }
+}
+
+#[test]
+fn a_listing_looks_at_the_signal_before_each_shard() {
+    let map = hosted();
+    for region in [None, Some(Region::cuboid([-100.0; 3], [100.0; 3]).unwrap())] {
+        let looks = Cell::new(0);
+        let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
+        let listing = map.list(0, region.as_ref(), usize::MAX, StopSignal::when(&count_look)).unwrap();
+        assert!(listing.keys.len() > 5000 && looks.get() >= SHARDS, "{} looks", looks.get());
+        let gone = || true;
+        let gone = map.list(0, region.as_ref(), usize::MAX, StopSignal::when(&gone)).unwrap_err();
+        assert_eq!(gone.reason, "caller_gone");
     }
 }
 

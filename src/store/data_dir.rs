@@ -126,7 +126,7 @@ impl DataDir {
         }
         let entry = Entry::folder_name(name, first.uuid);
         self.make(&entry, first, None, StopSignal::NEVER)?;
-        self.folder(&entry, first)
+        self.folder(&entry, first).inspect_err(|_| self.leave(&entry))
     }
 
     /// Makes a map that takes the place of `old` under its name `name`; that map gets the name `kept`.

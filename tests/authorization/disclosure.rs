@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::time::{Duration, Instant};
 
 use mrol::access::{Operation, Scope, Secret};
+use mrol::wire::pb;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use tonic::transport::Channel;
@@ -82,6 +83,31 @@ async fn metrics_count_by_key_and_are_open_where_the_settings_say_so() {
     let open = open.await;
     assert_eq!(open.get("/metrics").await.status(), StatusCode::OK);
     assert_eq!(open.get("/v1/maps").await.status(), StatusCode::UNAUTHORIZED);
+}
+
+/// The map that was there gets another name, which a key for some maps does not reach.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_for_some_maps_replaces_none() {
+    let (server, key) = Guarded::start_with(|keys| keys.add("own", Scope::Admin, Some(&["own"]))).await;
+    server.make_map("own").await;
+    let path = "/v1/maps/own/snapshot";
+    let snapshot = server.http(Method::GET, path, Some(&key), None).await;
+    let file = snapshot.bytes().await.unwrap();
+    let replace = async |key: &Secret| {
+        let put = client().put(server.daemon.url(&format!("{path}?replace=true"))).bearer_auth(key.reveal());
+        put.header("content-type", "application/octet-stream").body(file.clone()).send().await.unwrap()
+    };
+    let refused = replace(&key).await;
+    assert_eq!(refused.status(), StatusCode::FORBIDDEN);
+    assert_eq!(refused.json::<Value>().await.unwrap()["error"]["reason"], "map_not_allowed");
+    let piece = pb::RestoreMapRequest { map: "own".into(), data: file.clone(), replace: true };
+    let mut call = tonic::Request::new(tokio_stream::iter([piece]));
+    call.metadata_mut().insert("authorization", format!("Bearer {}", key.reveal()).parse().unwrap());
+    let refused = server.daemon.maps().await.restore_map(call).await.unwrap_err();
+    assert_eq!(refused.metadata().get("mrol-reason").unwrap(), "map_not_allowed");
+    assert_eq!(server.maps().await, ["own"]);
+    assert_eq!(replace(&server.master).await.status(), StatusCode::CREATED);
+    assert_eq!(server.maps().await, ["own", "own-replaced-1"]);
 }
 
 /// The log of everything that every crate in it has to say, while keys are used, misused and misplaced.

@@ -52,7 +52,15 @@ impl Daemon {
 
     /// With other gauges of disk and memory than the system's.
     pub async fn start_with_gauges(gauges: Arc<dyn Gauges>, change: impl FnOnce(&mut Config)) -> Self {
-        let data = tempfile::tempdir().expect("a folder");
+        Self::start_with_gauges_in(tempfile::tempdir().expect("a folder"), gauges, change).await
+    }
+
+    /// The same with the maps in `data`.
+    pub async fn start_with_gauges_in(
+        data: TempDir,
+        gauges: Arc<dyn Gauges>,
+        change: impl FnOnce(&mut Config),
+    ) -> Self {
         let server = Server::bind_with(config(&data, change), gauges).await.expect("a server");
         Self::serve(server, data)
     }

@@ -19,19 +19,19 @@ use uuid::Uuid;
 
 use super::simulated::{Fault, SimulatedDisk};
 
-fn office() -> MapName {
+pub(crate) fn office() -> MapName {
     MapName::new("office").unwrap()
 }
 
-fn data_dir(disk: &SimulatedDisk) -> DataDir {
+pub(crate) fn data_dir(disk: &SimulatedDisk) -> DataDir {
     DataDir::on(Arc::new(disk.clone()), Path::new("data"), StoreSettings::default()).unwrap()
 }
 
-fn empty() -> MultiResolutionMap {
+pub(crate) fn empty() -> MultiResolutionMap {
     MultiResolutionMap::new(MapSettings::new(0.1, 5)).unwrap()
 }
 
-fn commit(folder: &MapFolder, map: &MultiResolutionMap, place: i32) {
+pub(crate) fn commit(folder: &MapFolder, map: &MultiResolutionMap, place: i32) {
     let voxels: VoxelSet = (0..9).filter_map(|i| VoxelKey::new([place, i, 0])).collect();
     let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
     let change = Change::Insertion(ScanRecord::of_voxels(pose, voxels));

@@ -7,6 +7,7 @@
 #![expect(unreachable_pub, reason = "a test has no crate to reach it from")]
 
 mod incarnations;
+mod leftovers;
 mod simulated;
 mod workload;
 

@@ -66,6 +66,12 @@ pub(crate) fn hostile_files() -> Vec<(&'static str, Vec<u8>)> {
         ("numbers of moments", packed(0x6a, 0x12)),
         ("numbers of moments one by one", single(0x6a, 0x10)),
         ("numbers of a pose", file(&[&map[..], &field(0x4a, &field(0x32, &vec![0; 64 << 20]))].concat())),
+        // Bytes that are copied out of the body.
+        ("octrees of no block", file(&[&map[..], &field(0x52, &field(0x12, &vec![0; 48 << 20]))].concat())),
+        ("forms and points of no voxel", {
+            let copied = [field(0x1a, &vec![0; 24 << 20]), field(0x22, &vec![0; 24 << 20])].concat();
+            file(&[&map[..], &field(0x6a, &copied)].concat())
+        }),
         ("unknown fields", repeated(&[0x7a, 0])),
         ("blocks of one voxel", file(&[&map[..], &voxels(1_000_000)].concat())),
         ("wide filters of a few voxels", file(&[settings(12, 4096.0), voxels(20_000)].concat())),

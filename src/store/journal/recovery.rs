@@ -182,3 +182,42 @@ impl Segment<'_> {
         Ok(Cut { path: self.path.to_owned(), offset, bytes: bytes - offset, reason: broken.reason })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::map::{RobotName, ScanRecord, TrajectoryPose};
+    use crate::store::journal::Journal;
+    use crate::store::{Disk, Record, StoreSettings};
+    use crate::voxel::VoxelSet;
+
+    #[test]
+    fn a_replay_that_nobody_wants_any_more_ends_before_the_next_record() {
+        let data = tempfile::tempdir().unwrap();
+        let files: Arc<dyn FileSystem> = Arc::new(Disk::of_mode(StoreSettings::default().mode));
+        let (folder, known) = (FolderPath::new(data.path().to_owned()), Known { snapshot: 0, durable: 0 });
+        let progress = OpeningProgress::default();
+        let recover = |replay: &mut dyn FnMut(u64, Change) -> Result<(), String>| {
+            let files = Arc::clone(&files);
+            SegmentedJournal::recover(files, &folder, Uuid::nil(), known, 1 << 20, &progress, replay)
+        };
+        let (mut journal, _) = recover(&mut |_, _| Ok(())).unwrap();
+        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let record =
+            Record::of(&Change::Insertion(ScanRecord::of_voxels(pose, VoxelSet::default()))).unwrap();
+        journal.append(&[&record; 10]).unwrap();
+        journal.sync().unwrap();
+        drop(journal);
+        let mut replayed = 0;
+        let ended = recover(&mut |_, _| {
+            replayed += 1;
+            if replayed == 3 {
+                progress.cancel();
+            }
+            Ok(())
+        });
+        assert!(matches!(ended, Err(StoreError::Cancelled)), "it went on to record {replayed}");
+        assert_eq!(replayed, 3);
+    }
+}

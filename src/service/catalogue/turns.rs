@@ -1,0 +1,43 @@
+//! Whoever makes, replaces or deletes a map waits for its turn, and not for ever.
+
+use super::*;
+use crate::map::MapContents;
+use crate::service::map_file::from_file;
+use crate::service::room::Room;
+use crate::service::{Limits, Marks};
+use crate::voxel::VoxelSet;
+
+const MAPS_MAX: usize = 8;
+
+fn named(name: &str) -> Reachable {
+    MapReach::Every.check(&MapName::new(name).unwrap()).unwrap()
+}
+
+fn built(settings: MapSettings) -> BuiltMap {
+    let contents = MapContents::at(0, VoxelSet::default());
+    let file = Snapshot { uuid: Uuid::nil(), settings, contents }.encode().unwrap();
+    from_file(&file, &Limits::default(), &Room::new(None, Marks::default())).unwrap()
+}
+
+/// What is told within ten times as long as anybody is to wait.
+async fn told<T>(waiting: impl Future<Output = Result<T, ServiceError>>) -> (ErrorCode, &'static str) {
+    let ended = tokio::time::timeout(10 * TURN_MAX, waiting).await.expect("it does not wait for ever");
+    ended.map(drop).map_err(|error| (error.code, error.reason)).expect_err("it has no turn")
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
+    let progress = OpeningProgress::default();
+    let catalogue = Catalogue::open(None, &StoreSettings::default(), &progress).unwrap();
+    let settings = MapSettings::new(0.1, 4);
+    catalogue.create(named("there"), settings, MAPS_MAX).await.unwrap();
+    let turn = catalogue.writing.lock().await;
+    let busy = (ErrorCode::Unavailable, "catalogue_busy");
+    assert_eq!(told(catalogue.create(named("new"), settings, MAPS_MAX)).await, busy);
+    assert_eq!(told(catalogue.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
+    assert_eq!(told(catalogue.delete(&named("there"))).await, busy);
+    // What is there already waits for nobody.
+    assert!(!catalogue.create(named("there"), settings, MAPS_MAX).await.unwrap().1);
+    drop(turn);
+    assert!(catalogue.create(named("new"), settings, MAPS_MAX).await.unwrap().1);
+}

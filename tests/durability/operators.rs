@@ -1,0 +1,121 @@
+//! What operators put into the data folder, and maps that take the place of others.
+
+use std::time::Duration;
+
+use mrol::geometry::Pose;
+use mrol::map::{
+    AnsweredRequest, MapContents, MapSettings, RequestId, RobotName, Trajectory, TrajectoryPose,
+};
+use mrol::store::{Durability, Snapshot};
+use mrol::voxel::{VoxelKey, VoxelSet};
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use uuid::Uuid;
+
+use crate::common::{Daemon, json_of, row};
+use crate::map_folders::folder_of;
+use crate::put_file;
+
+#[tokio::test]
+async fn a_backup_beside_its_map_stays_and_the_map_is_served() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &row(3)).await;
+    let data = daemon.stop().await;
+    let maps = data.path().join("maps");
+    // Of the map itself, from before it went on; a folder that is none; and what no server knows.
+    let backup =
+        std::fs::read(folder_of(data.path(), "a").join("snapshot-00000000000000000001.mrol")).unwrap();
+    std::fs::create_dir(maps.join(format!("bare.{}", Uuid::from_u128(7)))).unwrap();
+    std::fs::write(maps.join("notes.txt"), "mine").unwrap();
+    let daemon = Daemon::start_in(data, |_| {}).await;
+    daemon.put_in("a", &row(7)).await;
+    let contents = daemon.contents("a").await;
+    let mut data = daemon.stop().await;
+    std::fs::write(maps.join("a.mrol"), &backup).unwrap();
+    for _ in 0..2 {
+        let daemon = Daemon::start_in(data, |_| {}).await;
+        assert_eq!(daemon.contents("a").await, contents);
+        let ready = json_of(daemon.get("/readyz").await).await;
+        let unavailable: Vec<&Value> = ready["unavailable"].as_array().unwrap().iter().collect();
+        assert_eq!((unavailable.len(), &unavailable[0]["map"]), (1, &json!("bare")), "{ready}");
+        assert_eq!(std::fs::read(maps.join("a.mrol")).unwrap(), backup);
+        assert_eq!(std::fs::read(maps.join("notes.txt")).unwrap(), b"mine");
+        data = daemon.stop().await;
+    }
+}
+
+#[tokio::test]
+async fn what_was_acknowledged_of_a_replaced_map_is_synced() {
+    let hourly = |config: &mut mrol::config::Config| {
+        config.store.durability = Durability::Interval(Duration::from_secs(3600));
+    };
+    let daemon = Daemon::start_with(hourly).await;
+    daemon.make_map("a").await;
+    let file = daemon.get("/v1/maps/a/snapshot").await.bytes().await.unwrap();
+    daemon.put_in("a", &row(7)).await;
+    let durable = async |map: &str| {
+        let map = json_of(daemon.get(&format!("/v1/maps/{map}")).await).await;
+        map["storage"]["durable_revision"].as_u64().unwrap()
+    };
+    assert_eq!(durable("a").await, 0, "nothing is to be synced yet");
+    let replaced = put_file(&daemon, "/v1/maps/a/snapshot?replace=true", file.to_vec()).send().await.unwrap();
+    assert_eq!(replaced.status(), StatusCode::CREATED);
+    assert_eq!(durable("a-replaced-1").await, 1);
+    let daemon = Daemon::start_in(daemon.stop().await, hourly).await;
+    assert_eq!(daemon.contents("a-replaced-1").await.1.len(), 7);
+}
+
+/// A file of a map of a voxel, with what `change` makes of it.
+fn file_with(change: impl FnOnce(&mut MapContents)) -> Vec<u8> {
+    let mut contents =
+        MapContents::at(9, [VoxelKey::new([1, 2, 3]).unwrap()].into_iter().collect::<VoxelSet>());
+    change(&mut contents);
+    Snapshot { uuid: Uuid::from_u128(7), settings: MapSettings::new(0.1, 4), contents }.encode().unwrap()
+}
+
+fn pose(robot: &str, revision: u64, overlaps: usize) -> TrajectoryPose {
+    let pose = TrajectoryPose::new(RobotName::new(robot).unwrap(), Pose::identity());
+    TrajectoryPose { revision, scan_id: Some(revision), level_overlaps: vec![0.5; overlaps], ..pose }
+}
+
+#[tokio::test]
+async fn a_map_file_is_held_to_the_limits_of_a_map() {
+    let daemon = Daemon::start_with(|config| config.limits.robots_per_map_max = 2).await;
+    let restore = async |name: &str, file: Vec<u8>| {
+        let put = put_file(&daemon, &format!("/v1/maps/{name}/snapshot"), file).send().await.unwrap();
+        (put.status(), put.text().await.unwrap())
+    };
+    let robots = |names: &[&str]| {
+        let poses: Vec<_> = (1..).zip(names).map(|(revision, name)| pose(name, revision, 4)).collect();
+        file_with(|contents| contents.trajectory = Trajectory::new(poses, Vec::new()))
+    };
+    assert_eq!(restore("two", robots(&["r1", "r2"])).await.0, StatusCode::CREATED);
+    let (status, said) = restore("three", robots(&["r1", "r2", "r3"])).await;
+    assert_eq!(status, StatusCode::TOO_MANY_REQUESTS, "{said}");
+    assert!(said.contains("map_full") && said.contains("robots_per_map_max is 2"), "{said}");
+
+    let overlaps =
+        file_with(|contents| contents.trajectory = Trajectory::new([pose("r1", 1, 5)], Vec::new()));
+    let (status, said) = restore("overlaps", overlaps).await;
+    assert_eq!(status, StatusCode::BAD_REQUEST, "{said}");
+    assert!(said.contains("5 overlaps, of a map of 4 levels"), "{said}");
+
+    let requests = |of: &[(&str, u64, usize)]| {
+        let request = |&(id, revision, scans): &(&str, u64, usize)| AnsweredRequest {
+            id: RequestId::new(id).unwrap(),
+            digest: 1,
+            revision,
+            voxels: 1,
+            scans,
+        };
+        file_with(|contents| contents.requests = of.iter().map(request).collect())
+    };
+    // An undo and a deletion may have one id.
+    assert_eq!(restore("kinds", requests(&[("x", 2, 0), ("x", 3, 1)])).await.0, StatusCode::CREATED);
+    for twice in [[("x", 2, 0), ("x", 3, 0)], [("x", 2, 1), ("x", 3, 1)], [("x", 2, 0), ("y", 2, 0)]] {
+        let (status, said) = restore("twice", requests(&twice)).await;
+        assert_eq!(status, StatusCode::BAD_REQUEST, "{said}");
+        assert!(said.contains("their ids must differ"), "{said}");
+    }
+}
