@@ -8,10 +8,10 @@ use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::room::Room;
 use super::{ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceSettings};
-use crate::align::Guess;
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::mapping::Guess;
 use crate::store::StoreSettings;
 use crate::util::StopSignal;
 
