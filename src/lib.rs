@@ -7,11 +7,12 @@
 //!   points and poses.
 //! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
 //!   point-cloud files and simulated sensors.
+//! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Open this first.
 //! * `store`: map files. `service`: the operations, once for every protocol.
 //! * `wire`: between generated and domain types. `access`: the operations by name, and who may ask for each. `grpc`,
 //!   `http`, `client`: adapters. `server`, `cli`: the daemon and the program.
 //!
-//! The first three lines know no runtime, no protocol and no serialisation, and are there without any feature:
+//! The first four lines know no runtime, no protocol and no serialisation, and are there without any feature:
 //!
 //! ```
 //! use mrol::geometry::{Point, Pose};
@@ -61,6 +62,7 @@ pub mod http;
 #[cfg(feature = "server")]
 pub mod lifecycle;
 pub mod map;
+pub mod mapping;
 #[cfg(feature = "server")]
 pub mod reload;
 pub mod scan;

@@ -8,11 +8,12 @@ mod common;
 use std::time::Duration;
 
 use common::{Daemon, PATIENCE, bytes_of, json_of, points_pb};
+use mrol::align::Verdict;
 use mrol::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
-use mrol::align::{Guess, Verdict};
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose, pose, pose_difference, translation_m};
 use mrol::map::{MapName, RobotName};
+use mrol::mapping::Guess;
 use mrol::scan::{Scene, Tour, tours};
 use mrol::service::{LocalizationRequest, ScanRequest};
 use mrol::wire::pb;

@@ -16,9 +16,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use mrol::align::Guess;
 use mrol::geometry::{Point, Pose};
 use mrol::map::{Lookup, MapContents, MapName, MapSettings, Region, RobotName};
+use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, Limits, MapService, PointQuery, ScanRequest, ServiceSettings};
 use mrol::store::{OpeningProgress, Snapshot};
 use mrol::voxel::{VoxelKey, VoxelSet};

@@ -11,10 +11,10 @@ mod process;
 use std::time::{Duration, Instant};
 
 use memory::Memory;
-use mrol::align::Guess;
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RobotName};
+use mrol::mapping::Guess;
 use mrol::service::ScanRequest;
 use process::Process;
 

@@ -32,21 +32,6 @@ use reach::within_reach;
 use refine::{refine, surface_fit};
 use verdict::Fit;
 
-/// Where a scan is thought to have been taken.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Guess {
-    /// At the robot's last accepted pose: the paper's guess.
-    #[default]
-    Last,
-    /// There: map_from_sensor.
-    Pose(Pose),
-    /// This far from the robot's last accepted pose: last_from_sensor, as odometry tells.
-    Motion(Pose),
-    /// As far from the last accepted pose as that is from the one before it, or in proportion to the time that went
-    /// by where all three scans tell it.
-    ConstantVelocity,
-}
-
 /// A scan with the samples that its alignment looks at.
 #[derive(Debug)]
 struct SampledScan<'a> {

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use tokio::task::JoinSet;
 
 use super::workload::Queries;
-use crate::align::Guess;
 use crate::map::{MapName, MapSettings, RobotName};
+use crate::mapping::Guess;
 use crate::service::{MapService, PointCloud, ScanRequest, ServiceError, ServiceSettings};
 use crate::store::{Durability, OpeningProgress, StoreSettings};
 

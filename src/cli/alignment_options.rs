@@ -3,7 +3,8 @@
 use clap::ValueEnum;
 
 use super::parse;
-use crate::align::{Guess, Method};
+use crate::align::Method;
+use crate::mapping::Guess;
 use crate::scan::{PointFilter, PointFilterError};
 
 /// How scans are aligned.

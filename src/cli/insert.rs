@@ -16,10 +16,11 @@ use super::parse;
 use super::remote::MapOptions;
 use super::scan_report::{PLACE_HEAD, name_of, name_width, place, seven};
 use super::truth::true_poses;
-use crate::align::{Guess, Method};
+use crate::align::Method;
 use crate::client::{Client, ClientError};
 use crate::geometry::Pose;
 use crate::map::RobotName;
+use crate::mapping::Guess;
 use crate::scan::{PointFilter, read_points, scan_files};
 use crate::service::{ScanAnswer, ScanRequest};
 

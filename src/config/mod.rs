@@ -37,7 +37,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
-use crate::service::{ServiceSettings, StandingSettings};
+use crate::mapping::StationarySettings;
+use crate::service::ServiceSettings;
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: u64 = 3600;
@@ -186,7 +187,7 @@ impl Config {
                 method: self.alignment.method.into(),
                 ..AlignmentSettings::default()
             },
-            standing: StandingSettings::default(),
+            stationary: StationarySettings::default(),
             robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.filter())).collect(),
             filter: FilterSettings { hashes, bits_per_key: bits_per_voxel },
         }

@@ -11,13 +11,13 @@ use super::room::Room;
 use super::{
     ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceError, ServiceSettings,
 };
-use crate::align::Guess;
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
 use crate::map::{
     Lookup, MapContents, MapName, MapSettings, MultiResolutionMap, Region, RobotName, SHARDS, ScanRecord,
     TrajectoryPose,
 };
+use crate::mapping::Guess;
 use crate::store::StoreSettings;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;

@@ -7,6 +7,7 @@ mod committing;
 mod deletion;
 mod digest;
 mod error;
+mod filtered_scan;
 mod gauges;
 mod growth;
 mod hosted_map;
@@ -29,7 +30,6 @@ mod shortage;
 mod time_limit;
 mod trajectory;
 mod undo;
-mod usable_scan;
 mod watermarks;
 
 pub use error::{ErrorCode, ServiceError};
@@ -47,7 +47,7 @@ pub use request::{
     UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
 pub use scan_reach::ScanReach;
-pub use settings::{EVERY_ROBOT, ServiceSettings, StandingSettings};
+pub use settings::{EVERY_ROBOT, ServiceSettings};
 pub use shortage::Shortage;
 pub use trajectory::TrajectoryPieces;
 pub use watermarks::Marks;

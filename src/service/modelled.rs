@@ -16,9 +16,9 @@ use super::committing::{CommitThread, Step};
 use super::hosted_map::{HostedMap, Saving};
 use super::room::Room;
 use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
-use crate::align::Guess;
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MapSettings, MultiResolutionMap, Region, RobotName};
+use crate::mapping::Guess;
 use crate::store::{DataDir, OpeningProgress, Snapshot, StoreSettings};
 use crate::util::StopSignal;
 

@@ -6,9 +6,10 @@ use bytes::Bytes;
 use uuid::Uuid;
 
 use super::ServiceError;
-use crate::align::{Direction, Guess, Method, Verdict};
+use crate::align::{Direction, Method, Verdict};
 use crate::geometry::{Point, Pose};
 use crate::map::{LevelInfo, Lookup, MapName, MapSettings, Region, RequestId, RobotName, TrajectoryPose};
+use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::store::JournalUse;
 use crate::util::Durations;

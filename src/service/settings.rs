@@ -8,6 +8,7 @@ use super::{Gauges, Limits};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::map::RobotName;
+use crate::mapping::StationarySettings;
 use crate::scan::PointFilter;
 use crate::store::StoreSettings;
 
@@ -32,8 +33,8 @@ pub struct ServiceSettings {
     pub localization_threads: usize,
     /// Of every alignment.
     pub alignment: AlignmentSettings,
-    /// When a robot counts as standing.
-    pub standing: StandingSettings,
+    /// When a robot counts as standing still.
+    pub stationary: StationarySettings,
     /// Which points of whose scans count; the name `*` stands for every other robot.
     pub robots: BTreeMap<String, PointFilter>,
     /// Of maps whose makers do not say.
@@ -48,24 +49,5 @@ impl ServiceSettings {
     pub(super) fn filter_of(&self, robot: &RobotName) -> PointFilter {
         let filter = self.robots.get(robot.as_str()).or_else(|| self.robots.get(EVERY_ROBOT));
         filter.copied().unwrap_or_default()
-    }
-}
-
-/// When an aligned scan is of a robot that stands still with its view known already. It is accepted and not kept, so that
-/// a robot that sends scan after scan from its dock does not grow trajectory and storage without bound.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StandingSettings {
-    /// At most this far from the robot's last pose, as a fraction of r_0. 0.5.
-    pub distance: f64,
-    /// At most this much turned against it, degrees. 0.5.
-    pub rotation_deg: f64,
-    /// At most this fraction of the scan's voxels is new. 0.001: noise puts a few points next to a surface, a cup on a
-    /// table is more.
-    pub new_voxels: f64,
-}
-
-impl Default for StandingSettings {
-    fn default() -> Self {
-        Self { distance: 0.5, rotation_deg: 0.5, new_voxels: 0.001 }
     }
 }

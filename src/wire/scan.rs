@@ -6,8 +6,9 @@ use bytes::Bytes;
 
 use super::types::count_from;
 use super::{InField, pb, required};
-use crate::align::{Direction, Guess, Method, Verdict};
+use crate::align::{Direction, Method, Verdict};
 use crate::map::{MapName, RobotName};
+use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{Foreground, ScanAnswer, ScanRequest, ServiceError};
 

@@ -17,12 +17,12 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use common::{Daemon, json_of};
-use mrol::align::Guess;
 use mrol::client::Client;
 use mrol::geometry::{self, Point, Pose};
 use mrol::map::{
     Lookup, MapName, MapSettings, MultiResolutionMap, Region, RobotName, ScanRecord, TrajectoryPose,
 };
+use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, PointQuery, ScanRequest};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::{RngExt, SeedableRng};

@@ -3,10 +3,10 @@
 
 use std::time::{Duration, Instant};
 
-use mrol::align::Guess;
 use mrol::client::Client;
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RobotName};
+use mrol::mapping::Guess;
 use mrol::service::ScanRequest;
 use reqwest::StatusCode;
 use serde_json::json;

@@ -24,10 +24,10 @@ use std::time::Duration;
 
 use disk::Disk;
 use map_folders::folder_of;
-use mrol::align::Guess;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RequestId, RobotName};
+use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, ScanRequest, Undo, UndoTarget};
 use mrol::voxel::{Lattice, VoxelKey};
 use process::Process;

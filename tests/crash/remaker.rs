@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use bytes::Bytes;
-use mrol::align::Guess;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RobotName};
+use mrol::mapping::Guess;
 use mrol::service::{MapInfo, ScanRequest};
 use mrol::voxel::{Lattice, VoxelKey};
 use rand::{RngExt, SeedableRng};

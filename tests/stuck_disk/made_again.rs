@@ -4,10 +4,10 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use mrol::align::Guess;
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RobotName};
+use mrol::mapping::Guess;
 use mrol::service::ScanRequest;
 use mrol::voxel::VoxelKey;
 use uuid::Uuid;

@@ -7,11 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use crate::align::Guess;
 use crate::cli::error::CliError;
 use crate::client::Client;
 use crate::geometry::{Pose, pose_difference};
 use crate::map::{MapName, RobotName};
+use crate::mapping::Guess;
 use crate::scan::{Scene, Sensor, Tour};
 use crate::service::{ScanAnswer, ScanRequest};
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::chart::{Axis, Curve, Panel, Scale, Style, panels};
 use super::table::{Table, folder};
-use crate::align::{AlignmentSettings, Guess, Method, WideStartSettings};
+use crate::align::{AlignmentSettings, Method, WideStartSettings};
 use crate::bench::align::Scan;
 use crate::bloom::FilterSettings;
 use crate::cli::error::CliError;
@@ -20,6 +20,7 @@ use crate::cli::output::Output;
 use crate::cli::sequence;
 use crate::geometry::{Pose, pose_difference};
 use crate::map::{Lookup, MapSettings};
+use crate::mapping::Guess;
 use crate::scan::{Sensor, Tour, tours};
 
 const EXAMPLES: &str = "\

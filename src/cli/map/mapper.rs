@@ -1,11 +1,13 @@
 //! Scans into a map, one after the other.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::align::{Alignment, AlignmentSettings, Guess, Verdict, align, judge_at};
+use crate::align::{Alignment, AlignmentSettings, Verdict};
 use crate::cli::error::CliError;
-use crate::geometry::{Point, Pose, extrapolate};
-use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::geometry::{Point, Pose};
+use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
+use crate::mapping::{Guess, MappingError, MappingSettings, Scan, ScanMapper};
+use crate::util::StopSignal;
 
 /// Whose scans they are, in the map's trajectory.
 const ROBOT: &str = "mrol";
@@ -13,12 +15,8 @@ const ROBOT: &str = "mrol";
 /// A map that grows scan by scan.
 pub(in crate::cli) struct Mapper {
     map: MultiResolutionMap,
-    settings: AlignmentSettings,
+    settings: MappingSettings,
     robot: RobotName,
-    /// The last accepted pose, the paper's guess.
-    last: Pose,
-    /// The one before it.
-    before: Option<Pose>,
     guess: Guess,
 }
 
@@ -44,15 +42,14 @@ impl Mapped {
 impl Mapper {
     pub(in crate::cli) fn new(
         map: MapSettings,
-        settings: AlignmentSettings,
+        alignment: AlignmentSettings,
         guess: Guess,
     ) -> Result<Self, CliError> {
         Ok(Self {
             map: MultiResolutionMap::new(map).map_err(CliError::usage)?,
-            settings,
+            // Every scan that fits is wanted in the map's trajectory.
+            settings: MappingSettings { alignment, stationary: None },
             robot: RobotName::new(ROBOT).map_err(CliError::failed)?,
-            last: Pose::identity(),
-            before: None,
             guess,
         })
     }
@@ -63,7 +60,7 @@ impl Mapper {
 
     /// True when the alignment asks the filters alone.
     pub(in crate::cli) fn asks_filters(&self) -> bool {
-        self.settings.lookup == Lookup::Bloom
+        self.settings.alignment.lookup == Lookup::Bloom
     }
 
     /// Aligns scan `k` to the map, or takes `known` as its pose, and adds it where it fits.
@@ -75,56 +72,24 @@ impl Mapper {
         k: usize,
         points: &[Point],
         known: Option<Pose>,
-    ) -> Result<Mapped, String> {
+    ) -> Result<Mapped, MappingError> {
         let false_positive_rate = if self.asks_filters() { self.false_positive_rate() } else { 0.0 };
-        let start = Instant::now();
-        let alignment = self.place(points, known);
-        let align_time = start.elapsed();
-
-        let start = Instant::now();
-        let accepted = alignment.verdict == Verdict::Accepted;
-        let new_voxels = if accepted { self.commit(k, points, &alignment)? } else { 0 };
-        let insert_time = start.elapsed();
-        let voxels = self.map.voxels(0);
-        Ok(Mapped { alignment, new_voxels, voxels, false_positive_rate, align_time, insert_time })
-    }
-
-    fn place(&self, points: &[Point], known: Option<Pose>) -> Alignment {
-        let next = match (&self.guess, &self.before) {
-            (Guess::ConstantVelocity, Some(before)) => extrapolate(before, &self.last, 1.0),
-            _ => self.last,
-        };
-        let guess = known.unwrap_or(next);
-        if self.map.is_empty() || known.is_some() {
-            // Nothing to align to, or nothing to find out.
-            return judge_at(&self.map, points, &guess, &self.settings).on_the_callers_word();
-        }
-        align(&self.map, points, &guess, &self.settings)
-    }
-
-    /// Adds a scan where it was found to be; the number of new voxels.
-    fn commit(&mut self, k: usize, points: &[Point], alignment: &Alignment) -> Result<usize, String> {
-        let map_from_sensor = alignment.map_from_sensor;
-        let pose = TrajectoryPose {
-            robot: self.robot.clone(),
+        let scan = Scan {
             scan_id: Some(k as u64),
-            timestamp_ns: None,
-            map_from_sensor,
-            revision: 0,
-            level_overlaps: alignment.level_overlaps.clone(),
-            iterations: alignment.iterations,
-            points_skipped: 0,
-            new_voxels: 0,
-            digest: 0,
+            guess: known.map_or(self.guess, Guess::Pose),
+            at_guess: known.is_some(),
+            ..Scan::new(&self.robot, points)
         };
-        let record = ScanRecord::of_points(pose, points, self.map.lattice());
-        if record.voxels.is_empty() {
-            let (min_m, end_m) = self.map.lattice().range_m();
-            return Err(format!("no point of the scan lies within the map's range of {min_m} to {end_m} m"));
-        }
-        self.before = (!self.map.is_empty()).then_some(self.last);
-        self.last = map_from_sensor;
-        Ok(self.map.committer().insert_scan(record).voxels)
+        let mapper = ScanMapper::new(&self.map, self.settings);
+        let outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
+        Ok(Mapped {
+            new_voxels: outcome.committed.map_or(0, |committed| committed.voxels),
+            voxels: self.map.voxels(0),
+            false_positive_rate,
+            align_time: outcome.located.align_time,
+            insert_time: outcome.insert_time,
+            alignment: outcome.located.alignment,
+        })
     }
 
     /// The largest of the levels' expected false positive rates, as the filters are filled now.

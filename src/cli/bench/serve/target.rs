@@ -3,13 +3,13 @@
 use uuid::Uuid;
 
 use super::address::{GrpcAddress, HttpAddress};
-use crate::align::Guess;
 use crate::bench::workload::Workload;
 use crate::cli::bench::workload::MapOptions;
 use crate::cli::error::CliError;
 use crate::client::{Client, NewMap};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, RobotName};
+use crate::mapping::Guess;
 use crate::service::{PointCloud, ScanRequest};
 use crate::voxel::{Lattice, VoxelSet};
 

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use super::fleet::Member;
-use crate::align::Guess;
 use crate::bench::workload::Queries;
 use crate::cli::bench::serve::Target;
 use crate::cli::error::CliError;
 use crate::client::{Client, NewMap};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, Region, RobotName};
+use crate::mapping::Guess;
 use crate::service::{Deletion, DeletionTarget, PointCloud, ScanRequest, Undo, UndoTarget};
 
 /// Points of a turn of the workload's sensor.

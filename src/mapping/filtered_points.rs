@@ -1,0 +1,52 @@
+//! The points of a scan that show something.
+
+use super::MappingError;
+use crate::geometry::Point;
+use crate::map::RobotName;
+use crate::scan::PointFilter;
+
+/// The points of a scan that show its robot's surroundings: finite, and kept by the robot's filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilteredPoints {
+    /// The points, sensor frame.
+    pub points: Vec<Point>,
+    /// How many were left out.
+    pub skipped: usize,
+    filter: PointFilter,
+}
+
+impl FilteredPoints {
+    /// Filters the points of a scan (sensor frame). A point that is not finite means "no return" in every depth camera:
+    /// it is left out, or an error where the scan is `strict`.
+    ///
+    /// # Errors
+    /// No point is left, one had to be left out of a strict scan, or the filter is none.
+    pub fn of(
+        all: &[Point],
+        filter: PointFilter,
+        robot: &RobotName,
+        strict: bool,
+    ) -> Result<Self, MappingError> {
+        let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
+        let not_finite = all.len() - points.len();
+        if strict && not_finite > 0 {
+            let index = all.iter().position(|point| !point.is_finite()).unwrap_or_default();
+            return Err(MappingError::NotFinite { index, count: not_finite });
+        }
+        if points.is_empty() {
+            return Err(MappingError::NoReturns { points: all.len() });
+        }
+        let filter = filter.checked()?;
+        let points: Vec<Point> = points.into_iter().filter(|&point| filter.keeps(point)).collect();
+        if points.is_empty() {
+            let filter = format!("{filter:?}");
+            return Err(MappingError::AllFiltered { points: all.len(), filter, robot: robot.clone() });
+        }
+        Ok(Self { skipped: all.len() - points.len(), points, filter })
+    }
+
+    /// True of a point (sensor frame) that passes the filter.
+    pub fn keeps(&self, point: Point) -> bool {
+        point.is_finite() && self.filter.keeps(point)
+    }
+}

@@ -1,0 +1,85 @@
+//! Where a scan is thought to have been taken.
+
+use super::MappingError;
+use crate::geometry::{Pose, extrapolate};
+use crate::map::{RobotName, Trajectory, TrajectoryPose};
+
+/// Where a scan is thought to have been taken.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Guess {
+    /// At the robot's last accepted pose: the paper's guess.
+    #[default]
+    Last,
+    /// At this pose: map_from_sensor.
+    Pose(Pose),
+    /// This far from the robot's last accepted pose: last_from_sensor, as odometry tells.
+    Motion(Pose),
+    /// As far from the last accepted pose as that is from the one before it, or in proportion to the time that passed
+    /// where all three scans tell it.
+    ConstantVelocity,
+}
+
+impl Guess {
+    /// The pose that the guess stands for: map_from_sensor.
+    ///
+    /// A robot without an accepted scan is at the origin of an empty map.
+    ///
+    /// # Errors
+    /// The guess needs an accepted scan of the robot, there is none, and the map is not empty.
+    pub fn resolve(
+        &self,
+        robot: &RobotName,
+        timestamp_ns: Option<i64>,
+        trajectory: &Trajectory,
+        map_is_empty: bool,
+    ) -> Result<Pose, MappingError> {
+        let last_or_origin = || match trajectory.last_of(robot) {
+            Some(pose) => Ok(pose.map_from_sensor),
+            None if map_is_empty => Ok(Pose::identity()),
+            None => Err(MappingError::GuessRequired(robot.clone())),
+        };
+        match self {
+            Self::Pose(map_from_sensor) => Ok(*map_from_sensor),
+            Self::Last => last_or_origin(),
+            Self::Motion(last_from_sensor) => Ok(last_or_origin()? * last_from_sensor),
+            Self::ConstantVelocity => match trajectory.last_two_of(robot) {
+                Some((last, before)) => Ok(constant_velocity(before, last, timestamp_ns)),
+                None => last_or_origin(),
+            },
+        }
+    }
+}
+
+/// The pose of a robot that goes on as it went from `before` to `last`.
+fn constant_velocity(before: &TrajectoryPose, last: &TrajectoryPose, timestamp_ns: Option<i64>) -> Pose {
+    let share = match [before.timestamp_ns, last.timestamp_ns, timestamp_ns] {
+        // Of timestamps as far apart as the numbers go, the difference is no i64.
+        [Some(t0), Some(t1), Some(t2)] if t1 > t0 && t2 > t1 => {
+            t2.abs_diff(t1) as f64 / t1.abs_diff(t0) as f64
+        }
+        _ => 1.0,
+    };
+    extrapolate(&before.map_from_sensor, &last.map_from_sensor, share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, timestamp_ns: i64) -> TrajectoryPose {
+        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::translation(x, 0.0, 0.0));
+        TrajectoryPose { timestamp_ns: Some(timestamp_ns), ..pose }
+    }
+
+    #[test]
+    fn a_motion_goes_on_in_proportion_to_the_time_whatever_the_timestamps() {
+        let x = |before, last, now| {
+            constant_velocity(&at(0.0, before), &at(1.0, last), Some(now)).translation.vector.x
+        };
+        assert_eq!(x(0, 2, 3), 1.5);
+        assert!((x(i64::MIN, 0, i64::MAX) - 2.0).abs() < 1e-9);
+        assert_eq!(x(i64::MIN, i64::MAX - 1, i64::MAX), 1.0);
+        assert_eq!(x(i64::MIN, i64::MIN + 1, i64::MAX), 1.0 + crate::geometry::EXTRAPOLATION_SHARE_MAX);
+        assert_eq!(x(i64::MAX, i64::MIN, i64::MAX), 2.0, "a clock that went back tells no share");
+    }
+}

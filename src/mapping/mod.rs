@@ -1,0 +1,221 @@
+//! Mapping: a scan enters a map (paper III-B).
+//!
+//! [`ScanMapper::map_scan`] is the whole loop, and reads like the paper: the scan is located by aligning it to the map
+//! from a guess, judged, turned into a record of voxels and moments, and inserted with its pose. A server, which has to
+//! make the record durable before it is visible, calls [`ScanMapper::locate`], [`ScanMapper::record`] and
+//! [`ScanMapper::is_stationary`] by themselves and inserts through its commit queue.
+
+mod error;
+mod filtered_points;
+mod guess;
+mod stationary;
+
+pub use error::MappingError;
+pub use filtered_points::FilteredPoints;
+pub use guess::Guess;
+pub use stationary::StationarySettings;
+
+use std::time::{Duration, Instant};
+
+use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, judge_until};
+use crate::geometry::Point;
+use crate::map::{Committed, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::util::StopSignal;
+
+/// Maps scans: finds where each was taken, and adds those that fit to the map.
+///
+/// ```
+/// use mrol::geometry::{Point, Pose};
+/// use mrol::map::{MapSettings, MultiResolutionMap, RobotName};
+/// use mrol::mapping::{MappingSettings, Scan, ScanMapper};
+/// use mrol::util::StopSignal;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let map = MultiResolutionMap::new(MapSettings::new(0.05, 4))?;
+/// let robot = RobotName::new("r1")?;
+/// let points: Vec<_> = (0..200).map(|i| Point::new(2.0, 0.02 * i as f32, 0.5)).collect();
+///
+/// let mapper = ScanMapper::new(&map, MappingSettings::default());
+/// let mapped = mapper.map_scan(&Scan::new(&robot, &points), StopSignal::NEVER)?;
+/// assert!(mapped.is_inserted());
+/// assert_eq!(mapped.located.alignment.map_from_sensor, Pose::identity());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct ScanMapper<'a> {
+    map: &'a MultiResolutionMap,
+    settings: MappingSettings,
+}
+
+/// Settings of a [`ScanMapper`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MappingSettings {
+    /// How scans are aligned.
+    pub alignment: AlignmentSettings,
+    /// When a scan shows nothing new because its robot stands still; none: every scan that fits is inserted.
+    pub stationary: Option<StationarySettings>,
+}
+
+/// A scan to map.
+#[derive(Debug, Clone, Copy)]
+pub struct Scan<'a> {
+    /// The robot that took it.
+    pub robot: &'a RobotName,
+    /// The robot's own number of the scan.
+    pub scan_id: Option<u64>,
+    /// When it was taken, nanoseconds since the Unix epoch.
+    pub timestamp_ns: Option<i64>,
+    /// Its points in the sensor frame, all of them finite.
+    pub points: &'a [Point],
+    /// Points that were left out before, see [`FilteredPoints`].
+    pub points_skipped: usize,
+    /// Where it is thought to have been taken.
+    pub guess: Guess,
+    /// The guess is taken as it is, without aligning.
+    pub at_guess: bool,
+    /// It is inserted where it was found even if it does not fit there.
+    pub force: bool,
+    /// Digest of the request, which tells the same scan sent again from another one under its id.
+    pub digest: u64,
+}
+
+impl<'a> Scan<'a> {
+    /// A scan without number and time, thought to have been taken at the robot's last pose.
+    ///
+    /// `points` are in the sensor frame and finite.
+    pub fn new(robot: &'a RobotName, points: &'a [Point]) -> Self {
+        Self {
+            robot,
+            scan_id: None,
+            timestamp_ns: None,
+            points,
+            points_skipped: 0,
+            guess: Guess::Last,
+            at_guess: false,
+            force: false,
+            digest: 0,
+        }
+    }
+}
+
+/// Where a scan was found to have been taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocatedScan {
+    /// The pose, and how well the scan fits the map there.
+    pub alignment: Alignment,
+    /// How long it took to find it.
+    pub align_time: Duration,
+    /// The map was empty, so that the scan went to its guess. Who inserts it must see to it that the map is still empty
+    /// then, or locate it again.
+    pub is_first: bool,
+}
+
+impl LocatedScan {
+    /// True of a scan that fits the map.
+    pub fn is_accepted(&self) -> bool {
+        self.alignment.verdict == Verdict::Accepted
+    }
+}
+
+/// What became of a scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanOutcome {
+    /// Where it was found.
+    pub located: LocatedScan,
+    /// The change that it made to the map; none of a scan that was refused, or whose robot stands still.
+    pub committed: Option<Committed>,
+    /// How long recording and inserting it took.
+    pub insert_time: Duration,
+}
+
+impl ScanOutcome {
+    /// True of a scan that is in the map.
+    pub fn is_inserted(&self) -> bool {
+        self.committed.is_some()
+    }
+}
+
+impl<'a> ScanMapper<'a> {
+    /// A mapper of scans into `map`.
+    pub fn new(map: &'a MultiResolutionMap, settings: MappingSettings) -> Self {
+        Self { map, settings }
+    }
+
+    /// Maps one scan: aligns it to the map from its guess and, where it fits, adds all its points (paper III-B).
+    ///
+    /// A scan that does not fit is an answer and no error: the map is as it was.
+    ///
+    /// # Errors
+    /// The guess needs a pose that is not there, no point lies within the map's range, or `stop` said so; the map is as
+    /// it was.
+    pub fn map_scan(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<ScanOutcome, MappingError> {
+        let located = self.locate(scan, stop)?;
+        if !located.is_accepted() && !scan.force {
+            return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
+        }
+        let start = Instant::now();
+        let record = self.record(scan, &located.alignment)?;
+        let is_new = !self.is_stationary(scan, &record);
+        let committed = is_new.then(|| self.map.committer().insert_scan(record));
+        Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
+    }
+
+    /// Finds where a scan was taken; changes nothing.
+    ///
+    /// The first scan of an empty map is taken at its guess. Every other one is aligned from its guess, or only judged
+    /// there where the caller wants it at its guess.
+    ///
+    /// # Errors
+    /// The guess needs a pose that is not there, or `stop` said so.
+    pub fn locate(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<LocatedScan, MappingError> {
+        let Self { map, settings: MappingSettings { alignment: settings, .. } } = self;
+        let start = Instant::now();
+        let map_is_empty = map.is_empty();
+        let guess = scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), map_is_empty)?;
+        let alignment = if map_is_empty {
+            Alignment::trusted(guess, map.settings().levels, scan.points)
+        } else if scan.at_guess {
+            judge_until(map, scan.points, &guess, settings, stop).on_the_callers_word()
+        } else {
+            align_until(map, scan.points, &guess, settings, stop)
+        };
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
+        Ok(LocatedScan { alignment, align_time: start.elapsed(), is_first: map_is_empty && !scan.at_guess })
+    }
+
+    /// The record of a scan where it was found: every voxel it touches, the moments of its points, and its pose.
+    ///
+    /// # Errors
+    /// No point lies within the map's range.
+    pub fn record(&self, scan: &Scan<'_>, alignment: &Alignment) -> Result<ScanRecord, MappingError> {
+        let pose = TrajectoryPose {
+            robot: scan.robot.clone(),
+            scan_id: scan.scan_id,
+            timestamp_ns: scan.timestamp_ns,
+            map_from_sensor: alignment.map_from_sensor,
+            revision: 0,
+            level_overlaps: alignment.level_overlaps.clone(),
+            iterations: alignment.iterations,
+            points_skipped: scan.points_skipped,
+            new_voxels: 0,
+            digest: scan.digest,
+        };
+        let record = ScanRecord::of_points(pose, scan.points, self.map.lattice());
+        if record.voxels.is_empty() {
+            let (min_m, end_m) = self.map.lattice().range_m();
+            return Err(MappingError::OutOfRange { min_m, end_m });
+        }
+        Ok(record)
+    }
+
+    /// True of a scan that shows again what its robot's last one showed, from where that was taken.
+    ///
+    /// Never true of a scan that the caller wants at its guess.
+    pub fn is_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
+        let settings = self.settings.stationary.filter(|_| !scan.at_guess);
+        settings.is_some_and(|settings| settings.is_stationary(self.map, record))
+    }
+}

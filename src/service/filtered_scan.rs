@@ -1,0 +1,88 @@
+//! A scan request with the points that count.
+
+use super::{ErrorCode, ScanRequest, ServiceError, ServiceSettings};
+use crate::geometry::{Point, rotation_xyzw, translation_m};
+use crate::mapping::{FilteredPoints, Guess, MappingError, Scan};
+
+/// A scan request with the points of the robot's surroundings.
+pub(super) struct FilteredScan<'a> {
+    pub(super) request: &'a ScanRequest,
+    filtered: FilteredPoints,
+    /// Of the request.
+    pub(super) digest: u64,
+}
+
+impl<'a> FilteredScan<'a> {
+    /// Leaves out what the request's filter, or the server's for this robot, does not keep.
+    ///
+    /// # Errors
+    /// When no point is left, or one had to be left out of a strict request.
+    pub(super) fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
+        let filter = request.filter.or(settings.filter_of(&request.robot));
+        let filtered = FilteredPoints::of(request.points.as_slice(), filter, &request.robot, request.strict)?;
+        Ok(Self { request, filtered, digest: digest(request) })
+    }
+
+    /// The scan as the core maps it.
+    pub(super) fn to_map(&self) -> Scan<'_> {
+        let ScanRequest { robot, scan_id, timestamp_ns, guess, at_guess, force, .. } = self.request;
+        Scan {
+            robot,
+            scan_id: *scan_id,
+            timestamp_ns: *timestamp_ns,
+            points: &self.filtered.points,
+            points_skipped: self.filtered.skipped,
+            guess: *guess,
+            at_guess: *at_guess,
+            force: *force,
+            digest: self.digest,
+        }
+    }
+
+    /// Number of points that were left out.
+    pub(super) fn skipped(&self) -> usize {
+        self.filtered.skipped
+    }
+
+    /// True of a point of the robot's surroundings.
+    pub(super) fn keeps(&self, point: Point) -> bool {
+        self.filtered.keeps(point)
+    }
+}
+
+impl From<MappingError> for ServiceError {
+    fn from(error: MappingError) -> Self {
+        let message = error.to_string();
+        match error {
+            MappingError::NotFinite { .. } => Self::invalid("point_not_finite", message),
+            MappingError::NoReturns { .. } => Self::invalid("no_returns", message),
+            MappingError::BadFilter(_) => Self::invalid("bad_filter", message),
+            MappingError::AllFiltered { .. } => Self::invalid("all_points_filtered", message),
+            MappingError::OutOfRange { .. } => Self::invalid("scan_out_of_range", message),
+            MappingError::GuessRequired(_) => {
+                Self::new(ErrorCode::FailedPrecondition, "guess_required", message)
+            }
+            MappingError::Stopped => Self::new(ErrorCode::DeadlineExceeded, "time_limit", message),
+        }
+    }
+}
+
+/// Tells one request from another under the same id: points, guess, and whether to align.
+fn digest(request: &ScanRequest) -> u64 {
+    let guess = match &request.guess {
+        Guess::Last | Guess::ConstantVelocity => Vec::new(),
+        Guess::Pose(pose) | Guess::Motion(pose) => {
+            [&translation_m(pose)[..], &rotation_xyzw(pose)[..]].concat()
+        }
+    };
+    let guess_kind = match &request.guess {
+        Guess::Last | Guess::Pose(_) => 0,
+        Guess::Motion(_) => 1,
+        Guess::ConstantVelocity => 2,
+    };
+    let kind = [u8::from(request.at_guess), guess_kind];
+    let checksum = crc32c::crc32c(bytemuck::cast_slice(request.points.as_slice()));
+    let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(&guess));
+    let checksum = crc32c::crc32c_append(checksum, &kind);
+    (request.points.len() as u64) << 32 | u64::from(checksum)
+}
