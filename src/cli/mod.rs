@@ -176,18 +176,6 @@ mod tests {
     }
 
     #[test]
-    fn no_option_goes_without_a_sentence() {
-        fn look(command: &clap::Command) {
-            for argument in command.get_arguments() {
-                let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
-                assert!(help.split_whitespace().count() > 1, "{} {argument}: {help:?}", command.get_name());
-            }
-            command.get_subcommands().for_each(look);
-        }
-        look(&CommandLine::command());
-    }
-
-    #[test]
     fn every_command_says_what_it_does_and_shows_examples() {
         for command in CommandLine::command().get_subcommands() {
             assert!(command.get_about().is_some(), "{}", command.get_name());

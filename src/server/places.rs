@@ -394,15 +394,18 @@ mod tests {
         let three = places.take().await.unwrap();
         assert!((NEWCOMER_GRACE..2 * NEWCOMER_GRACE).contains(&start.elapsed()));
         assert!(one.0.lost.is_cancelled() && !two.0.lost.is_cancelled() && three.is_reserved());
-        // Who asks for something else has it no longer.
-        three.misused();
-        let four = places.take_now().unwrap();
-        assert!(three.0.lost.is_cancelled() && !two.0.lost.is_cancelled());
-        drop((one, two, three, four));
+        drop((one, two, three));
         assert_eq!(places.taken.lock().reserved.len(), 0);
         drop(used);
         assert!(!places.take_now().unwrap().is_reserved());
         assert!(Places::new(0, 0).take().await.is_none());
+        // Who asks for something else has it no longer.
+        let reserved = Places::new(0, 1);
+        let (one, start) = (reserved.take_now().unwrap(), Instant::now());
+        assert!(reserved.take_now().is_err());
+        one.misused();
+        let _two = reserved.take().await.unwrap();
+        assert!(one.0.lost.is_cancelled() && start.elapsed() < NEWCOMER_GRACE);
     }
 
     #[tokio::test(start_paused = true)]
