@@ -104,6 +104,7 @@ async fn a_map_file_is_held_to_the_limits_of_a_map() {
     let requests = |of: &[(&str, u64, usize)]| {
         let request = |&(id, revision, scans): &(&str, u64, usize)| AnsweredRequest {
             id: RequestId::new(id).unwrap(),
+            caller: None,
             digest: 1,
             revision,
             voxels: 1,

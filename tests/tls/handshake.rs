@@ -101,7 +101,7 @@ async fn a_unix_socket_stays_in_the_clear() {
     });
     let _daemon = daemon.await;
     let client = Client::connect(&format!("unix:{}", socket.display())).await.unwrap();
-    assert!(client.list_maps().await.unwrap().is_empty());
+    assert!(client.list_maps().await.unwrap().maps.is_empty());
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -5,6 +5,7 @@ use crate::map::MapContents;
 use crate::service::map_file::from_file;
 use crate::service::room::Room;
 use crate::service::{Limits, Marks};
+use crate::util::StopSignal;
 use crate::voxel::VoxelSet;
 
 const MAPS_MAX: usize = 8;
@@ -16,7 +17,7 @@ fn named(name: &str) -> Reachable {
 fn built(settings: MapSettings) -> BuiltMap {
     let contents = MapContents::at(0, VoxelSet::default());
     let file = Snapshot { uuid: Uuid::nil(), settings, contents }.encode().unwrap();
-    from_file(&file, &Limits::default(), &Room::new(None, Marks::default())).unwrap()
+    from_file(&file, &Limits::default(), &Room::new(None, Marks::default()), StopSignal::NEVER).unwrap()
 }
 
 /// What is told within ten times as long as anybody is to wait.
