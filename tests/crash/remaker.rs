@@ -72,8 +72,8 @@ pub(crate) struct Remaker {
     pub counts: Counts,
 }
 
-/// In the paths of the map's files.
-const FOLDER: &str = "/depot";
+/// In the paths of its files, finished and unfinished.
+const FOLDER: &str = "depot.";
 
 fn depot() -> MapName {
     MapName::new("depot").unwrap()

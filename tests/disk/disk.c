@@ -1,6 +1,6 @@
 /* A disk that hangs or fails: preloaded into the server, it makes what changes files wait for as long as a control file
  * is there. The file says which paths are meant: those that hold its text. Where the text begins with an exclamation
- * mark, every third operation on such a path fails at once instead. Reading goes on, as from a cache. */
+ * mark, every seventh operation on such a path fails at once instead. Reading goes on, as from a cache. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -39,7 +39,7 @@ static int path_fails(const char *path) {
     static atomic_uint operations;
     struct timespec moment = {0, 5000000};
     enum hindrance hindrance = hindrance_of(path);
-    if (hindrance == FAIL && atomic_fetch_add(&operations, 1) % 3 == 2) {
+    if (hindrance == FAIL && atomic_fetch_add(&operations, 1) % 7 == 6) {
         errno = EIO;
         return 1;
     }

@@ -45,7 +45,7 @@ impl Disk {
         self.tell(part);
     }
 
-    /// From now on every third change of a file fails whose path, below the folder, has `part` in it.
+    /// From now on every seventh change of a file fails whose path, below the folder, has `part` in it.
     pub(crate) fn fail(&self, part: &str) {
         self.tell(&format!("!{part}"));
     }
