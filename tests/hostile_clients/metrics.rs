@@ -1,5 +1,7 @@
 //! Scrapes and answers that are asked for again and again, and never read.
 
+use std::time::{Duration, Instant};
+
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpSocket, TcpStream};
@@ -46,13 +48,15 @@ async fn scrapes_that_nobody_reads() {
 #[tokio::test]
 async fn answers_in_json_that_nobody_reads() {
     const POINTS: usize = 1_000_000;
-    const UNREAD: usize = 100;
+    const UNREAD: usize = 60;
     // `false,` for each point, of each of them.
     const WITHOUT_BOUND: usize = UNREAD * POINTS * "false,".len();
+    /// Some come in a second.
+    const ANSWERED_WITHIN: Duration = Duration::from_secs(120);
     // 64 MiB of bodies and answers, and what two threads have in hand: points, and the text that is made of them, in
     // lists that double their room.
     const BOUND: usize = (64 + 2 * 64) * MIB;
-    const { assert!(WITHOUT_BOUND > 5 * BOUND / 2) };
+    const { assert!(WITHOUT_BOUND > 3 * BOUND / 2) };
     let siege = Siege::begin_within("large answers unread", "", BOUND).await;
     let body = format!("{{\"points\":[{}[9,9,9]]}}", "[9,9,9],".repeat(POINTS - 1));
     let head = format!(
@@ -62,7 +66,10 @@ async fn answers_in_json_that_nobody_reads() {
     );
     let request = [head.as_bytes(), body.as_bytes()].concat();
     let (mut unread, mut answered) = (Vec::new(), 0);
-    for _ in 0..UNREAD {
+    let start = Instant::now();
+    // Who leaves an answer unread gives way after a second to who wants one: there is room for some at a time.
+    while answered < UNREAD {
+        assert!(start.elapsed() < ANSWERED_WITHIN, "{answered} of {UNREAD} answers were begun");
         // The system takes little of what is not read: the rest lies in the server.
         let socket = TcpSocket::new_v4().unwrap();
         socket.set_recv_buffer_size(4 << 10).unwrap();
@@ -75,8 +82,5 @@ async fn answers_in_json_that_nobody_reads() {
         answered += usize::from(read.is_ok() && &status == b"HTTP/1.1 200");
         unread.push(connection);
     }
-    println!("{answered} of {UNREAD} answers were begun");
-    // Not all were refused: answers lie in the server.
-    assert!(answered * POINTS * "false,".len() > 32 * MIB, "{answered} answers were begun");
     siege.end().await;
 }
