@@ -12,7 +12,8 @@ use super::arrival::Arrival;
 /// An answer goes to its connection in pieces of so many bytes. The connection asks for the next one when it has room,
 /// so that the most of an answer that nobody reads lies here, where it counts.
 const PIECE_BYTES: usize = 64 << 10;
-/// Pieces below this size do not count any more once the connection has them: it copies them.
+/// Pieces below this size do not count any more once the connection has them. They are copied, so that nothing larger is
+/// kept for them.
 const COPIED_BYTES_MAX: usize = 16 << 10;
 
 /// A body that holds the request that it answers, and `H`, until it was sent, or nobody takes it any more.
@@ -54,7 +55,7 @@ impl<H: Send + Sync + 'static> HeldBody<H> {
     fn next_piece(&mut self) -> Frame<Bytes> {
         let piece = self.rest.split_to(self.rest.len().min(PIECE_BYTES));
         Frame::data(if piece.len() < COPIED_BYTES_MAX {
-            piece
+            Bytes::copy_from_slice(&piece)
         } else {
             Bytes::from_owner(HeldPiece { piece, _held: Arc::clone(&self.held) })
         })

@@ -7,8 +7,8 @@ use super::{CallerName, RequestId};
 /// Requests that a map remembers, those of all callers together.
 pub const REQUESTS_KEPT: usize = 65_536;
 
-/// Requests of one caller that a map remembers, and as many of those without a name: one more displaces the caller's own
-/// oldest.
+/// Requests of one caller with a name that a map remembers: one more displaces the caller's own oldest. Those of callers
+/// without a name, as all of a server without keys are, share [`REQUESTS_KEPT`] with the others.
 pub const REQUESTS_PER_CALLER_KEPT: usize = 8_192;
 
 /// A change that was asked for under an id, and what came of it.
@@ -30,7 +30,7 @@ pub struct AnsweredRequest {
 
 /// The last answered requests of each caller, in the order of their revisions.
 ///
-/// A caller has [`REQUESTS_PER_CALLER_KEPT`] at most, so that nobody's requests displace those of others. Where
+/// A caller with a name has [`REQUESTS_PER_CALLER_KEPT`] at most, so that nobody's requests displace those of others. Where
 /// [`REQUESTS_KEPT`] are remembered all the same, the oldest goes of the caller that has most: who asks for little keeps
 /// all of it.
 #[derive(Debug, Clone, Default)]
@@ -74,7 +74,7 @@ impl Requests {
         self.by_id.insert((request.id.clone(), request.kind()), revision);
         self.by_caller.entry(caller.clone()).or_default().push_back(revision);
         self.answered.insert(revision, request);
-        if self.of(&caller) > REQUESTS_PER_CALLER_KEPT {
+        if caller.is_some() && self.of(&caller) > REQUESTS_PER_CALLER_KEPT {
             self.forget_oldest_of(&caller);
         } else if self.answered.len() > REQUESTS_KEPT {
             let most = self.by_caller.iter().max_by_key(|(other, of)| (of.len(), **other == caller));
@@ -143,12 +143,17 @@ mod tests {
     #[test]
     fn the_oldest_request_of_a_caller_is_forgotten_first() {
         let kept = REQUESTS_PER_CALLER_KEPT as u64;
-        let requests: Requests = (0..kept + 2).map(request).collect();
-        let find = |n: u64| requests.find(RequestKind::Deletion, &request(n).id);
-        assert_eq!(find(1), None);
-        assert_eq!(find(2), Some(&request(2)));
-        assert_eq!(find(kept + 1), Some(&request(kept + 1)));
+        let requests: Requests = (0..kept + 2).map(|n| of_caller("r1", n)).collect();
+        assert!(!remembers(&requests, 1) && remembers(&requests, 2) && remembers(&requests, kept + 1));
         assert_eq!(requests.iter().count(), REQUESTS_PER_CALLER_KEPT);
+    }
+
+    #[test]
+    fn callers_without_a_name_share_all_there_is() {
+        let kept = REQUESTS_KEPT as u64;
+        let requests: Requests = (0..kept + 2).map(request).collect();
+        assert!(!remembers(&requests, 1) && remembers(&requests, 2) && remembers(&requests, kept + 1));
+        assert_eq!(requests.iter().count(), REQUESTS_KEPT);
     }
 
     #[test]

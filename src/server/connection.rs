@@ -58,8 +58,6 @@ impl Endpoint {
             _ = &mut connection => return,
             () = self.not_opened(bytes_read) => return,
             () = place.idle_for(self.bounds.idle_max) => {}
-            // One answer is all that it is for.
-            () = place.asked(), if place.is_reserved() => {}
             () = self.closing.cancelled() => {}
         }
         connection.as_mut().graceful_shutdown();
@@ -102,8 +100,5 @@ async fn answer(
     request.extensions_mut().insert(HangUp(place.hang_up()));
     request.extensions_mut().insert(place.shared());
     let response = router.oneshot(request).await?;
-    if place.is_reserved() && !response.status().is_success() {
-        place.misused();
-    }
     Ok(response.map(|body| Body::new(AnswerBody::new(body, used))))
 }

@@ -82,12 +82,7 @@ impl Endpoint {
                 () = self.closing.cancelled() => return,
                 stream = sockets.next() => stream,
             };
-            let place = tokio::select! {
-                biased;
-                () = self.closing.cancelled() => return,
-                place = self.places.take() => place,
-            };
-            match place {
+            match self.places.take() {
                 Some(place) => {
                     let tls = self.tls_at(&sockets);
                     let open = self.metrics.connection_opened(listener);
