@@ -42,7 +42,8 @@ pub use requests::{AnsweredRequest, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, Req
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{
-    ID_RANGES_PER_ROBOT_MAX, ScanRecord, Trajectory, TrajectoryPose, TrajectorySpacing, WithdrawnScan,
+    ID_RANGES_PER_ROBOT_MAX, OverlapOfNoLevel, ScanRecord, Trajectory, TrajectoryPose, TrajectorySpacing,
+    WithdrawnScan,
 };
 pub use view::{LongRead, MapView};
 

@@ -69,9 +69,13 @@ impl Requests {
         self.answered.values()
     }
 
+    /// Remembers a request in place of an older one of its kind and id. No server answers an id that it remembers, but a
+    /// journal may have been written by one that remembered fewer.
     pub(super) fn push(&mut self, request: AnsweredRequest) {
         let (caller, revision) = (request.caller.clone(), request.revision);
-        self.by_id.insert((request.id.clone(), request.kind()), revision);
+        if let Some(older) = self.by_id.insert((request.id.clone(), request.kind()), revision) {
+            self.forget(older);
+        }
         self.by_caller.entry(caller.clone()).or_default().push_back(revision);
         self.answered.insert(revision, request);
         if caller.is_some() && self.of(&caller) > REQUESTS_PER_CALLER_KEPT {
@@ -90,14 +94,23 @@ impl Requests {
     }
 
     fn forget_oldest_of(&mut self, caller: &Option<CallerName>) {
-        let oldest = self.by_caller.get_mut(caller).and_then(VecDeque::pop_front);
-        if let Some(gone) = oldest.and_then(|revision| self.answered.remove(&revision)) {
+        let oldest = self.by_caller.get(caller).and_then(|of| of.front().copied());
+        if let Some(gone) = oldest.and_then(|revision| self.forget(revision)) {
             let kind = gone.kind();
             self.by_id.remove(&(gone.id, kind));
         }
-        if self.of(caller) == 0 {
-            self.by_caller.remove(caller);
+    }
+
+    /// Takes out the request that made `revision`, but for its id.
+    fn forget(&mut self, revision: u64) -> Option<AnsweredRequest> {
+        let gone = self.answered.remove(&revision)?;
+        if let Some(of) = self.by_caller.get_mut(&gone.caller) {
+            of.binary_search(&revision).ok().and_then(|i| of.remove(i));
+            if of.is_empty() {
+                self.by_caller.remove(&gone.caller);
+            }
         }
+        Some(gone)
     }
 }
 
@@ -138,6 +151,15 @@ mod tests {
         let requests: Requests = [undo.clone()].into_iter().collect();
         assert_eq!(requests.find(RequestKind::Deletion, &undo.id), None);
         assert_eq!(requests.find(RequestKind::Undo, &undo.id), Some(&undo));
+    }
+
+    #[test]
+    fn an_id_is_remembered_once_whoever_used_it() {
+        let again = AnsweredRequest { revision: 9, ..of_caller("r1", 1) };
+        let requests: Requests = [request(1), again.clone()].into_iter().collect();
+        assert_eq!(requests.iter().collect::<Vec<_>>(), [&again]);
+        assert_eq!(requests.find(RequestKind::Deletion, &again.id), Some(&again));
+        assert_eq!(requests.of(&None), 0);
     }
 
     #[test]

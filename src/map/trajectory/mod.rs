@@ -21,7 +21,7 @@ mod scan;
 mod thinning;
 
 pub use id_ranges::ID_RANGES_PER_ROBOT_MAX;
-pub use scan::{ScanRecord, TrajectoryPose, WithdrawnScan};
+pub use scan::{OverlapOfNoLevel, ScanRecord, TrajectoryPose, WithdrawnScan};
 pub use thinning::TrajectorySpacing;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -78,6 +78,25 @@ impl TrajectoryPose {
     pub fn overlap(&self) -> f64 {
         self.level_overlaps.first().copied().unwrap_or(0.0)
     }
+
+    /// Whether a map of so many levels can have recorded it.
+    ///
+    /// # Errors
+    /// When it has an overlap of a level that the map lacks.
+    pub fn check_levels(&self, levels: u32) -> Result<(), OverlapOfNoLevel> {
+        let overlaps = self.level_overlaps.len();
+        (overlaps <= levels as usize).then_some(()).ok_or(OverlapOfNoLevel { overlaps, levels })
+    }
+}
+
+/// A scan with more overlaps than its map has levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a scan with {overlaps} overlaps, of a map of {levels} levels")]
+pub struct OverlapOfNoLevel {
+    /// Overlaps of the scan.
+    pub overlaps: usize,
+    /// Levels of the map.
+    pub levels: u32,
 }
 
 /// A scan that was taken out again.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::{FolderPath, MapFolder};
-use crate::map::MultiResolutionMap;
+use crate::map::{Change, MultiResolutionMap};
 use crate::store::journal::{Known, Recovered, SegmentedJournal};
 use crate::store::snapshot_files::{
     Newest, check_owner, newest_good, not_understood, set_aside, snapshot_name, snapshot_revisions,
@@ -97,7 +97,12 @@ impl MapFolder {
         let map = MultiResolutionMap::restore_until(snapshot.settings, snapshot.contents, stop)
             .map_err(|e| StoreError::damaged(&path, e.to_string()))?
             .ok_or(StoreError::Cancelled)?;
+        let levels = map.settings().levels;
         let replay = |revision, change| {
+            // What a snapshot may not hold, no change may bring in.
+            if let Change::Insertion(scan) = &change {
+                scan.pose.check_levels(levels).map_err(|e| e.to_string())?;
+            }
             let committed = map.committer().apply_until(&change, stop).ok_or("it was stopped")?;
             let made = format!("replayed, it makes revision {}", committed.revision);
             (committed.revision == revision).then_some(()).ok_or(made)

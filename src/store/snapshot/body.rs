@@ -289,10 +289,7 @@ impl<'a> Body<'a> {
         let mut scans = Vec::with_capacity(self.scans);
         for record in self.records(number::TRAJECTORY) {
             let scan: TrajectoryPose = decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?;
-            let (overlaps, levels) = (scan.level_overlaps.len(), self.levels as usize);
-            if overlaps > levels {
-                return Err(format!("a scan with {overlaps} overlaps, of a map of {levels} levels"));
-            }
+            scan.check_levels(self.levels).map_err(|e| e.to_string())?;
             scans.push(scan);
         }
         Ok(scans)
