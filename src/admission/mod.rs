@@ -144,8 +144,8 @@ impl Admission {
     fn check_connection(&self, operation: Operation, request: &Request) -> Result<(), ServiceError> {
         let Some(connection) = request.extensions().get::<OfConnection>() else { return Ok(()) };
         let authorized = request.extensions().get::<Authorized>();
-        if authorized.is_some_and(|authorized| authorized.caller.name().is_some()) {
-            connection.show_key();
+        if let Some(name) = authorized.and_then(|authorized| authorized.caller.name()) {
+            connection.show_key(name);
         }
         connection.check(operation.is_probe() && operation != Operation::Metrics)
     }

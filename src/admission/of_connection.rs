@@ -1,7 +1,6 @@
 //! What is known of a connection that a request came by.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use super::quota::{Quota, Taken};
 use crate::service::ServiceError;
@@ -12,7 +11,8 @@ pub struct OfConnection(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
-    has_key: AtomicBool,
+    /// The name of the first key that was shown.
+    key: OnceLock<String>,
     /// It was taken when all places were in use: for health checks alone.
     is_reserved: bool,
     watches: Quota,
@@ -22,17 +22,17 @@ impl OfConnection {
     /// Of a new connection; `is_reserved` where it may ask for nothing but health.
     pub fn new(is_reserved: bool) -> Self {
         let watches = Quota::new("health watches of one connection", 1);
-        Self(Arc::new(Shared { has_key: AtomicBool::new(false), is_reserved, watches }))
+        Self(Arc::new(Shared { key: OnceLock::new(), is_reserved, watches }))
     }
 
-    /// True once a request came with a key that counts.
-    pub fn has_key(&self) -> bool {
-        self.0.has_key.load(Ordering::Relaxed)
+    /// The name of the key that a request came with, the first that counts.
+    pub fn key(&self) -> Option<&str> {
+        self.0.key.get().map(String::as_str)
     }
 
-    /// A request came with a key that counts.
-    pub(crate) fn show_key(&self) {
-        self.0.has_key.store(true, Ordering::Relaxed);
+    /// A request came with the key of that name, which counts.
+    pub(crate) fn show_key(&self, name: &str) {
+        self.0.key.get_or_init(|| name.to_owned());
     }
 
     /// # Errors

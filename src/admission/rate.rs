@@ -15,7 +15,7 @@ use crate::access::{Allowance, Authorized, InWork};
 use crate::service::ServiceError;
 
 /// Where a request came from; whom it counts for where there is no key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Peer {
     /// An address.
     Address(IpAddr),

@@ -18,8 +18,8 @@ pub struct LimitsConfig {
     /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
     pub connections_max: usize,
     /// Connections of each protocol besides, where all of those are in use: for one health check each, and for
-    /// `probe_time_max_s` at most. Where all of these are taken too, the oldest gives way that came half a second ago or more,
-    /// or asked for something else. 16.
+    /// `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives way, or one of the peer that
+    /// has most. 128.
     pub connections_reserved: usize,
     /// Seconds until a connection has to be secure and to begin to speak. 10.
     pub connection_opening_max_s: f64,
@@ -106,7 +106,7 @@ impl Default for LimitsConfig {
         Self {
             message_bytes_max: crate::wire::transport::MESSAGE_BYTES_MAX,
             connections_max: 2048,
-            connections_reserved: 16,
+            connections_reserved: 128,
             connection_opening_max_s: 10.0,
             http_idle_max_s: 30.0,
             grpc_idle_max_s: 600.0,

@@ -6,6 +6,7 @@ use std::time::Duration;
 use axum::Router;
 
 use hyper_util::server::conn::auto::Builder;
+use tokio::task::yield_now;
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -82,15 +83,19 @@ impl Endpoint {
                 () = self.closing.cancelled() => return,
                 stream = sockets.next() => stream,
             };
-            match self.places.take() {
+            match self.places.take(stream.peer) {
                 Some(place) => {
-                    let tls = self.tls_at(&sockets);
+                    let (tls, is_reserved) = (self.tls_at(&sockets), place.is_reserved());
                     let open = self.metrics.connection_opened(listener);
                     let serving = self.clone().serve(stream, tls, place);
                     self.tasks.spawn(async move {
                         serving.await;
                         drop(open);
                     });
+                    if is_reserved {
+                        // What came is looked at before the next that may take its place.
+                        yield_now().await;
+                    }
                 }
                 None => {
                     self.metrics.connection_refused(listener);

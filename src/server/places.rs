@@ -1,14 +1,16 @@
 //! Places for the connections of a protocol.
 //!
-//! Where all are taken, a new connection gets that of another: of the one without a key that has been idle for longest,
-//! then of the one without a key whose client has left an answer unread for longest, then of the one with a key that
-//! has been idle for longest. Connections that nobody uses can therefore never keep others out, however many there are;
+//! Where all are taken, a new connection gets that of another: of the one without a key that has been idle, or has left an
+//! answer unread, for longest, then of the one that has been idle for longest of the key that has most. Connections that nobody uses can therefore never keep others out, however many there are;
 //! those in use are fewer than the places, since requests and streams in flight have lower limits.
 //!
-//! Should all be in use nonetheless, a new connection gets a place of some that are kept for health checks, for a moment;
-//! the oldest of those gives way.
+//! Should all be in use nonetheless, a new connection gets a place of some that are kept for health checks, for a moment
+//! ([`reserved`]).
 
-use std::collections::BTreeMap;
+mod reserved;
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -17,10 +19,12 @@ use parking_lot::Mutex;
 use tokio::time::{Instant, sleep};
 use tokio_util::sync::CancellationToken;
 
-use crate::admission::OfConnection;
+use self::reserved::Reserved;
+use crate::admission::{OfConnection, Peer};
 
-/// How long a client without a key may leave an answer unread while others find no place.
-const UNREAD_GRACE: Duration = Duration::from_secs(1);
+/// How long a client without a key may leave an answer unread while others find no place, and how old a silent connection
+/// is no newcomer any more.
+const GRACE: Duration = Duration::from_secs(1);
 
 /// The places of a protocol. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
@@ -34,8 +38,7 @@ pub(super) struct Places {
 struct Taken {
     /// By the order in which they came.
     connections: BTreeMap<u64, Connection>,
-    /// The same of those kept for health checks: when each came is all that counts.
-    reserved: BTreeMap<u64, CancellationToken>,
+    reserved: Reserved,
     next: u64,
 }
 
@@ -82,11 +85,11 @@ impl Places {
     }
 
     /// A place for a new connection; none where all are taken by connections in use, and none are reserved.
-    pub(super) fn take(&self) -> Option<Place> {
+    pub(super) fn take(&self, peer: Peer) -> Option<Place> {
         let mut taken = self.taken.lock();
-        let has_place = taken.connections.len() < self.most || taken.free_one();
+        let has_place = taken.connections.len() < self.most || taken.free_one(self.reserved_most);
         if !has_place {
-            taken.free_a_reserved_one(self.reserved_most)?;
+            taken.reserved.free_one(self.reserved_most)?;
         }
         let (number, lost, unread) = (taken.next, CancellationToken::new(), Unread::default());
         let shared = OfConnection::new(!has_place);
@@ -96,7 +99,7 @@ impl Places {
             let connection = Connection { requests: 0, idle_since: Instant::now(), lost, shared, unread };
             taken.connections.insert(number, connection);
         } else {
-            taken.reserved.insert(number, lost.clone());
+            taken.reserved.insert(number, peer, lost.clone());
         }
         Some(Place(Arc::new(Held {
             number,
@@ -111,36 +114,44 @@ impl Places {
 }
 
 impl Taken {
-    /// Takes the place of a connection that gives way; false where none does.
-    fn free_one(&mut self) -> bool {
-        let first_of = |gives_way: &dyn Fn(&Connection) -> Option<Instant>| {
-            let able = self.connections.iter().filter_map(|(&number, it)| Some((gives_way(it)?, number)));
-            able.min().map(|(_, number)| number)
+    /// Takes the place of a connection that gives way; false where none does. So few as `spared` that have only just
+    /// come, and have not asked yet, give way to nobody: a newcomer finds a reserved place instead.
+    fn free_one(&mut self, spared: usize) -> bool {
+        let without_key = || self.connections.iter().filter(|(_, it)| it.shared.key().is_none());
+        let unused = without_key().filter_map(|(&number, it)| Some((it.unused_since()?, number))).min();
+        let number = match unused {
+            Some((since, number)) => {
+                let idle = without_key().filter(|(_, it)| it.requests == 0).count();
+                (since.elapsed() >= GRACE || idle > spared).then_some(number)
+            }
+            None => self.idle_of_who_has_most(),
         };
-        let idle = |it: &Connection| (it.requests == 0).then_some(it.idle_since);
-        let without_key = |it: &Connection| !it.shared.has_key();
-        let number = first_of(&|it| idle(it).filter(|_| without_key(it)))
-            .or_else(|| first_of(&|it| it.unread_since().filter(|_| without_key(it))))
-            .or_else(|| first_of(&|it| idle(it)));
         let freed = number.and_then(|number| self.connections.remove(&number));
         freed.map(|connection| connection.lost.cancel()).is_some()
     }
 
-    /// Makes sure that one of `most` reserved places is free; none where there are none.
-    fn free_a_reserved_one(&mut self, most: usize) -> Option<()> {
-        if self.reserved.len() >= most {
-            let (_, oldest) = self.reserved.pop_first()?;
-            oldest.cancel();
+    /// The connection that has been idle for longest, of the key that has most idle ones.
+    fn idle_of_who_has_most(&self) -> Option<u64> {
+        let mut idle: HashMap<Option<&str>, (usize, Instant, u64)> = HashMap::new();
+        for (&number, it) in self.connections.iter().filter(|(_, it)| it.requests == 0) {
+            let (count, since, longest) = idle.entry(it.shared.key()).or_insert((0, it.idle_since, number));
+            *count += 1;
+            (*since, *longest) = (*since, *longest).min((it.idle_since, number));
         }
-        (most > 0).then_some(())
+        let most = idle.into_values().max_by_key(|&(count, since, _)| (count, Reverse(since)));
+        most.map(|(_, _, longest)| longest)
     }
 }
 
 impl Connection {
-    /// Since when its client has read nothing of an answer, where that is long enough for others to go first.
-    fn unread_since(&self) -> Option<Instant> {
-        let oldest = self.unread.lock().values().min().copied();
-        oldest.filter(|since| since.elapsed() >= UNREAD_GRACE)
+    /// Since when its client has had no request, or has read nothing of an answer where that is long enough for others to
+    /// go first.
+    fn unused_since(&self) -> Option<Instant> {
+        let oldest = || self.unread.lock().values().min().copied();
+        match self.requests {
+            0 => Some(self.idle_since),
+            _ => oldest().filter(|since| since.elapsed() >= GRACE),
+        }
     }
 }
 
@@ -148,6 +159,9 @@ impl Place {
     /// A request begins.
     pub(super) fn used(&self) -> InUse {
         self.change(|connection| connection.requests += 1);
+        if self.0.is_reserved {
+            self.0.places.taken.lock().reserved.asks(self.0.number);
+        }
         InUse { place: self.clone(), answer: self.0.next_answer.fetch_add(1, Ordering::Relaxed) }
     }
 
@@ -227,6 +241,9 @@ impl Drop for InUse {
             connection.requests -= 1;
             connection.idle_since = Instant::now();
         });
+        if self.place.is_reserved() {
+            self.place.0.places.taken.lock().reserved.is_answered(self.place.0.number);
+        }
     }
 }
 
@@ -234,7 +251,7 @@ impl Drop for Held {
     fn drop(&mut self) {
         let mut taken = self.places.taken.lock();
         taken.connections.remove(&self.number);
-        taken.reserved.remove(&self.number);
+        taken.reserved.remove(self.number);
     }
 }
 
@@ -245,13 +262,13 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_newcomer_gets_the_place_that_was_idle_for_longest() {
         let places = Places::new(2, 0);
-        let first = places.take().unwrap();
+        let first = places.take(Peer::Local).unwrap();
         sleep(Duration::from_secs(1)).await;
-        let second = places.take().unwrap();
+        let second = places.take(Peer::Local).unwrap();
         // The first is now the one that was used last.
         sleep(Duration::from_secs(1)).await;
         drop(first.used());
-        let _third = places.take().unwrap();
+        let _third = places.take(Peer::Local).unwrap();
         assert!(second.0.lost.is_cancelled() && !first.0.lost.is_cancelled());
         // What it does in its last moments harms nobody.
         drop(second.used());
@@ -262,49 +279,102 @@ mod tests {
     #[tokio::test]
     async fn a_place_in_use_is_nobody_elses() {
         let places = Places::new(1, 0);
-        let place = places.take().unwrap();
+        let place = places.take(Peer::Local).unwrap();
         let used = place.used();
-        assert!(places.take().is_none());
+        assert!(places.take(Peer::Local).is_none());
         drop(used);
-        assert!(places.take().is_some());
+        assert!(places.take(Peer::Local).is_some());
     }
 
     #[tokio::test(start_paused = true)]
     async fn who_has_shown_no_key_gives_way_first() {
         let places = Places::new(3, 0);
-        let keyed = places.take().unwrap();
-        keyed.0.shared.show_key();
+        let keyed = places.take(Peer::Local).unwrap();
+        keyed.0.shared.show_key("r1");
         sleep(Duration::from_secs(9)).await;
-        let (idle, unread) = (places.take().unwrap(), places.take().unwrap());
+        let (idle, unread) = (places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap());
         let used = unread.used();
         used.handed_over();
-        let _first = places.take().unwrap().used();
+        let _first = places.take(Peer::Local).unwrap().used();
         assert!(idle.0.lost.is_cancelled() && !keyed.0.lost.is_cancelled() && !unread.0.lost.is_cancelled());
-        sleep(UNREAD_GRACE).await;
-        let _second = places.take().unwrap().used();
+        sleep(GRACE).await;
+        let _second = places.take(Peer::Local).unwrap().used();
         assert!(unread.0.lost.is_cancelled() && !keyed.0.lost.is_cancelled());
-        let _third = places.take().unwrap().used();
+        let _third = places.take(Peer::Local).unwrap().used();
         assert!(keyed.0.lost.is_cancelled());
-        assert!(places.take().is_none());
+        assert!(places.take(Peer::Local).is_none());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_newcomer_among_connections_that_nobody_reads_is_not_the_first_to_go() {
+        let places = Places::new(3, 2);
+        let flood: Vec<_> = (0..3).map(|_| places.take(Peer::Local).unwrap()).collect();
+        let _unread: Vec<_> = flood
+            .iter()
+            .map(|place| {
+                let used = place.used();
+                used.handed_over();
+                used
+            })
+            .collect();
+        sleep(GRACE).await;
+        let check = places.take(Peer::Local).unwrap();
+        assert!(!check.is_reserved() && flood[0].0.lost.is_cancelled());
+        let _others = [places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap()];
+        assert!(flood[2].0.lost.is_cancelled() && !check.0.lost.is_cancelled());
+        // All have only just come: one of them goes, since more are silent than places are kept for checks.
+        let another = places.take(Peer::Local).unwrap();
+        assert!(!another.is_reserved() && check.0.lost.is_cancelled());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_few_that_have_only_just_come_are_spared_for_a_moment() {
+        let places = Places::new(2, 1);
+        let (_used, check) = (places.take(Peer::Local).unwrap().used(), places.take(Peer::Local).unwrap());
+        assert!(places.take(Peer::Local).unwrap().is_reserved());
+        assert!(!check.0.lost.is_cancelled());
+        sleep(GRACE).await;
+        assert!(!places.take(Peer::Local).unwrap().is_reserved());
+        assert!(check.0.lost.is_cancelled());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn idle_connections_of_one_key_leave_those_of_others_alone() {
+        let places = Places::new(4, 0);
+        let of_key = |key| {
+            let place = places.take(Peer::Local).unwrap();
+            place.0.shared.show_key(key);
+            place
+        };
+        let quiet = of_key("quiet");
+        sleep(Duration::from_secs(1)).await;
+        let mut flood = Vec::new();
+        for _ in 0..10 {
+            flood.push(of_key("flooder"));
+            sleep(Duration::from_millis(1)).await;
+        }
+        assert!(!quiet.0.lost.is_cancelled());
+        let left = flood.iter().map(|place| !place.0.lost.is_cancelled());
+        assert!(left.eq((0..10).map(|i| i >= 7)));
     }
 
     #[tokio::test]
     async fn where_all_are_in_use_some_places_are_left_for_health() {
         let places = Places::new(1, 2);
-        let used = places.take().unwrap().used();
-        let (one, two) = (places.take().unwrap(), places.take().unwrap());
+        let used = places.take(Peer::Local).unwrap().used();
+        let (one, two) = (places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap());
         assert!(one.is_reserved() && two.is_reserved() && !used.place.is_reserved());
-        let three = places.take().unwrap();
+        let three = places.take(Peer::Local).unwrap();
         assert!(one.0.lost.is_cancelled() && !two.0.lost.is_cancelled() && three.is_reserved());
         drop((one, two, three));
         assert_eq!(places.taken.lock().reserved.len(), 0);
         drop(used);
-        assert!(!places.take().unwrap().is_reserved());
+        assert!(!places.take(Peer::Local).unwrap().is_reserved());
     }
 
     #[tokio::test(start_paused = true)]
     async fn an_answer_that_nobody_reads_is_found_out() {
-        let place = Places::new(1, 0).take().unwrap();
+        let place = Places::new(1, 0).take(Peer::Local).unwrap();
         let (slow, quick) = (place.used(), place.used());
         let start = Instant::now();
         slow.handed_over();
@@ -329,7 +399,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn idle_time_is_counted_from_the_last_request() {
-        let place = Places::new(1, 0).take().unwrap();
+        let place = Places::new(1, 0).take(Peer::Local).unwrap();
         let (start, used) = (Instant::now(), place.used());
         let idle = tokio::spawn({
             let place = place.clone();

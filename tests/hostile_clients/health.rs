@@ -97,7 +97,6 @@ async fn watches_leave_streams_to_those_who_work() {
 }
 
 #[tokio::test]
-#[ignore = "a health check is reset where connections_reserved newcomers come before it is answered: the oldest gives way"]
 async fn connections_in_use_leave_some_to_health() {
     // More than there are, each with a refusal that nobody has room for: none of them counts as a request.
     let siege = Siege::begin("connections that are all in use").await;
