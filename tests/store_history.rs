@@ -10,15 +10,16 @@ mod plain_set;
 mod simulated;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
 use mrol::map::{
-    Change, DeletionRecord, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
-    UndoRecord,
+    Change, DeletionRecord, Leaving, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord,
+    TrajectoryPose, UndoRecord,
 };
-use mrol::store::{DataDir, MapFolder, Observed, OpeningProgress, Record, Snapshot, StoreSettings};
+use mrol::store::{DataDir, MapFolder, NotObserved, OpeningProgress, Record, Snapshot, StoreSettings};
 use mrol::util::StopSignal;
 use mrol::voxel::{Moments, VoxelKey, VoxelSet};
 use plain_set::{PlainSet, assert_equal, up};
@@ -163,15 +164,17 @@ impl Kept {
     /// False where the journal does not reach back to the scans.
     fn undo(&self, scans: &[u64]) -> bool {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
-        let observed = self.folder.observations(scans, &withdrawn, StopSignal::NEVER).unwrap();
-        let Some(Observed { observations, revision: seen, .. }) = observed else {
-            let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
-            assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());
-            return false;
+        let all = |_| Ok::<_, Infallible>(());
+        let mut observed = match self.folder.observations(scans, &withdrawn, all, StopSignal::NEVER) {
+            Err(NotObserved::OutOfReach) => {
+                let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
+                assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());
+                return false;
+            }
+            observed => observed.unwrap(),
         };
-        assert_eq!(seen, self.map.revision());
-        let voxels = observations.held_by_targets_alone();
-        let moments = observations.moments_without_targets();
+        assert_eq!(observed.revision, self.map.revision());
+        let Leaving { voxels, moments } = observed.observations.leaving(StopSignal::NEVER).unwrap();
         self.commit(&Change::Undo(UndoRecord { scans: scans.to_vec(), voxels, moments, request: None }));
         true
     }

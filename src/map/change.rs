@@ -33,7 +33,7 @@ pub struct UndoRecord {
     /// The finest voxels that no other scan holds, all of them there before.
     pub voxels: VoxelSet,
     /// What the moments of the voxels that the scans touched are without them, see
-    /// [`Observations::moments_without_targets`](super::Observations::moments_without_targets).
+    /// [`Leaving::moments`](super::Leaving::moments).
     pub moments: MomentSet,
     /// Under which id it was asked for.
     pub request: Option<Request>,

@@ -35,7 +35,7 @@ pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;
 pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
-pub use observations::Observations;
+pub use observations::{Leaving, Observations};
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError, SPHERE_M_MAX};
 pub use requests::{AnsweredRequest, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind, Requests};

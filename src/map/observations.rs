@@ -1,171 +1,194 @@
 //! Which voxels would not be there without certain scans.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use super::{Change, MapContents, WithdrawnScan};
+use hashbrown::HashMap;
+
+use super::{Change, MapContents, ScanRecord, WithdrawnScan};
 use crate::util::StopSignal;
 use crate::voxel::{BlockMask, MomentSet, Moments, VoxelKey, VoxelSet};
 
-/// Who holds each voxel: scans that are to be undone, others, or both.
+/// Who holds each voxel that scans which are to be undone, the targets, have touched: they, others, or both.
 ///
 /// A scan holds the voxels that it touched, until a deletion takes them from everybody or the scan is undone; a
 /// voxel is occupied as long as somebody holds it. So a map without certain scans follows from its changes: it is
 /// what replaying them without those scans would give, with the deletions as they were.
 ///
-/// What leaves with the targets can be found out beforehand ([`Observations::plan`]): what is observed afterwards is
-/// noted, and changes the plan by that much and no more.
+/// Observations are made in this order: each target is [touched](Observations::touch), so that nothing else need be
+/// remembered; the [base](Observations::begin) and every change after it, the targets among them, are
+/// [observed](Observations::observe); what leaves with the targets is [found out](Observations::leaving); and what is
+/// observed after that [renews](Observations::renew) it. They take memory by what the targets touched, whatever else
+/// the map held.
 #[derive(Debug)]
 pub struct Observations {
     /// By revision, ascending.
     targets: Vec<u64>,
     /// Scans that hold nothing any more, ascending.
     withdrawn: Vec<u64>,
-    /// Blocks that the targets hold voxels of, or held.
-    by_targets: BTreeMap<VoxelKey, BlockMask>,
-    by_others: BTreeMap<VoxelKey, BlockMask>,
-    /// As they are without the targets.
-    moments: BTreeMap<VoxelKey, Moments>,
-    /// The voxels whose moments the targets changed.
-    touched: BTreeSet<VoxelKey>,
-    planned: Option<Planned>,
+    /// Blocks that the targets touched.
+    blocks: HashMap<VoxelKey, Holders>,
+    /// Voxels whose moments the targets changed, as they are without them.
+    moments: HashMap<VoxelKey, Moments>,
+    /// What of both changed since it was found out what leaves.
+    since: Option<Since>,
 }
 
-/// What leaves with the targets, as it was when it was found out.
+/// Who holds which voxels of a block.
+#[derive(Debug, Clone, Copy)]
+struct Holders {
+    targets: BlockMask,
+    others: BlockMask,
+}
+
 #[derive(Debug, Default)]
-struct Planned {
-    voxels: VoxelSet,
-    moments: MomentSet,
-    /// Blocks and voxels with moments that were observed since, of those that the targets touched.
-    blocks_since: BTreeSet<VoxelKey>,
-    moments_since: BTreeSet<VoxelKey>,
+struct Since {
+    blocks: BTreeSet<VoxelKey>,
+    moments: BTreeSet<VoxelKey>,
 }
 
-/// Entries of a base that are taken over between two looks at the stop signal.
+/// What leaves a map with the scans that are undone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Leaving {
+    /// The voxels that nobody but the targets holds.
+    pub voxels: VoxelSet,
+    /// The moments of all voxels that the targets touched, as they are without them: what they were, and of no points where
+    /// nothing is left.
+    pub moments: MomentSet,
+}
+
+/// Entries that are looked at between two looks at the stop signal.
 const ENTRIES_PER_LOOK: usize = 16 << 10;
-/// What a tree takes for an entry besides the entry itself, a node of eleven of them being full; rounded up.
-const OF_ENTRY: usize = 16;
 
 impl Observations {
-    /// Begins with `base`, what the map held at a revision before that of any scan of `targets`; its holders are
-    /// others; none once stopped. No scan may lie before the base and be withdrawn after it.
-    pub fn new(
-        mut targets: Vec<u64>,
-        withdrawn: &[WithdrawnScan],
-        base: &MapContents,
-        stop: StopSignal<'_>,
-    ) -> Option<Self> {
+    /// Of scans that are to be undone, by revision; those of `withdrawn` hold nothing any more.
+    pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan]) -> Self {
         targets.sort_unstable();
         let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();
         withdrawn.sort_unstable();
-        let by_others = stop.pieces(base.voxels.blocks(), ENTRIES_PER_LOOK).flatten().copied().collect();
-        let moments = stop.pieces(base.moments.as_slice(), ENTRIES_PER_LOOK).flatten().copied().collect();
-        let (by_targets, touched) = (BTreeMap::new(), BTreeSet::new());
-        let observations =
-            Self { targets, withdrawn, by_targets, by_others, moments, touched, planned: None };
-        (!stop.is_stopped()).then_some(observations)
+        Self { targets, withdrawn, blocks: HashMap::new(), moments: HashMap::new(), since: None }
     }
 
-    /// Bytes that observations of a base of so many blocks and voxels with moments take, at most: each entry twice, since
-    /// maps are sorted before they are built.
-    pub fn bytes_max(blocks: usize, moments: usize) -> usize {
-        // That the targets hold it as well.
-        const OF_BLOCK: usize = 2 * size_of::<(VoxelKey, BlockMask)>();
-        const OF_MOMENTS: usize = size_of::<(VoxelKey, Moments)>();
-        let twice = |entry: usize| 2 * entry + OF_ENTRY;
-        blocks.saturating_mul(twice(OF_BLOCK)).saturating_add(moments.saturating_mul(twice(OF_MOMENTS)))
+    /// Bytes of memory that touching `target` takes at most: an entry of each of its blocks and voxels with moments, in
+    /// tables that grow to twice their size beside the old ones.
+    pub fn bytes_of(target: &ScanRecord) -> usize {
+        const OF_BLOCK: usize = 4 * size_of::<(VoxelKey, Holders)>();
+        const OF_MOMENTS: usize = 4 * size_of::<(VoxelKey, Moments)>();
+        target.voxels.blocks().len() * OF_BLOCK + target.moments.as_slice().len() * OF_MOMENTS
     }
 
-    /// The scans that are to be undone, by revision, ascending.
-    pub fn targets(&self) -> &[u64] {
-        &self.targets
+    /// Bytes of memory that finding out what leaves takes at most: it, once more while it is renewed, and what is noted
+    /// meanwhile.
+    pub fn leaving_bytes(&self) -> usize {
+        const OF_BLOCK: usize = 2 * size_of::<(VoxelKey, BlockMask)>() + 2 * size_of::<VoxelKey>();
+        const OF_MOMENTS: usize = 2 * size_of::<(VoxelKey, Moments)>() + 2 * size_of::<VoxelKey>();
+        self.blocks.len() * OF_BLOCK + self.moments.len() * OF_MOMENTS
+    }
+
+    /// Takes note of what a target touches.
+    pub fn touch(&mut self, target: &ScanRecord) {
+        let nobody = Holders { targets: BlockMask::EMPTY, others: BlockMask::EMPTY };
+        for (block, _) in target.voxels.blocks() {
+            self.blocks.entry(*block).or_insert(nobody);
+        }
+        for (voxel, _) in target.moments.as_slice() {
+            self.moments.entry(*voxel).or_default();
+        }
+    }
+
+    /// Begins with `base`, what the map held at a revision before that of any target; its holders are others. False once
+    /// stopped. No scan may lie before the base and be withdrawn after it.
+    pub fn begin(&mut self, base: &MapContents, stop: StopSignal<'_>) -> bool {
+        for (block, mask) in stop.pieces(base.voxels.blocks(), ENTRIES_PER_LOOK).flatten() {
+            if let Some(holders) = self.blocks.get_mut(block) {
+                holders.others = *mask;
+            }
+        }
+        for (voxel, moments) in stop.pieces(base.moments.as_slice(), ENTRIES_PER_LOOK).flatten() {
+            if let Some(without) = self.moments.get_mut(voxel) {
+                *without = *moments;
+            }
+        }
+        !stop.is_stopped()
     }
 
     /// Takes note of the next change after the base.
     pub fn observe(&mut self, revision: u64, change: &Change) {
         match change {
             Change::Insertion(_) if self.withdrawn.binary_search(&revision).is_ok() => {}
-            Change::Insertion(scan) => {
-                let is_target = self.targets.binary_search(&revision).is_ok();
-                let holders = if is_target { &mut self.by_targets } else { &mut self.by_others };
-                for (block, mask) in scan.voxels.blocks() {
-                    let by = holders.entry(*block).or_insert(BlockMask::EMPTY);
-                    *by = by.union(mask);
-                    self.planned.iter_mut().for_each(|planned| planned.blocks_since.extend([*block]));
-                }
-                for &(voxel, moments) in scan.moments.as_slice() {
-                    match is_target {
-                        true => drop(self.touched.insert(voxel)),
-                        false => *self.moments.entry(voxel).or_default() += moments,
-                    }
-                    self.planned.iter_mut().for_each(|planned| planned.moments_since.extend([voxel]));
-                }
-            }
-            Change::Deletion(deletion) => {
-                for (block, mask) in deletion.voxels.blocks() {
-                    self.planned.iter_mut().for_each(|planned| planned.blocks_since.extend([*block]));
-                    if let Some(by_targets) = self.by_targets.get_mut(block) {
-                        *by_targets = by_targets.difference(mask);
-                    }
-                    if let Some(by_others) = self.by_others.get_mut(block) {
-                        let before = std::mem::replace(by_others, by_others.difference(mask));
-                        let rebuilt = by_others.rebuilt_moments(&before, *block).inspect(|(voxel, _)| {
-                            self.planned
-                                .iter_mut()
-                                .for_each(|planned| planned.moments_since.extend([*voxel]));
-                        });
-                        self.moments.extend(rebuilt);
-                    }
-                }
-            }
+            Change::Insertion(scan) => self.observe_scan(scan, self.targets.binary_search(&revision).is_ok()),
+            Change::Deletion(deletion) => self.observe_deletion(&deletion.voxels),
             // The scans that it took out were passed over where they went in.
             Change::Undo(_) => {}
         }
     }
 
-    /// The moments of all voxels that the targets touched, as they are without them: what they were, and of no points
-    /// where nothing is left.
-    pub fn moments_without_targets(&self) -> MomentSet {
-        let Some(Planned { moments, moments_since, .. }) = &self.planned else {
-            return self.moments_until(StopSignal::NEVER);
-        };
-        let since = moments_since.iter().filter(|voxel| self.touched.contains(voxel));
-        merged(moments.as_slice(), since.map(|&voxel| (voxel, self.moment_without_targets(voxel)))).collect()
+    fn observe_scan(&mut self, scan: &ScanRecord, is_target: bool) {
+        for (block, mask) in scan.voxels.blocks() {
+            let Some(holders) = self.blocks.get_mut(block) else { continue };
+            let of = if is_target { &mut holders.targets } else { &mut holders.others };
+            *of = of.union(mask);
+            self.since.iter_mut().for_each(|since| since.blocks.extend([*block]));
+        }
+        for &(voxel, moments) in scan.moments.as_slice().iter().filter(|_| !is_target) {
+            let Some(without) = self.moments.get_mut(&voxel) else { continue };
+            *without += moments;
+            self.since.iter_mut().for_each(|since| since.moments.extend([voxel]));
+        }
     }
 
-    /// The voxels that nobody but the targets holds.
-    pub fn held_by_targets_alone(&self) -> VoxelSet {
-        let Some(Planned { voxels, blocks_since, .. }) = &self.planned else {
-            return self.alone_until(StopSignal::NEVER);
-        };
-        let since = blocks_since
-            .iter()
-            .filter_map(|block| Some((*block, self.alone(*block, self.by_targets.get(block)?))));
-        merged(voxels.blocks(), since).collect()
+    fn observe_deletion(&mut self, voxels: &VoxelSet) {
+        for (block, mask) in voxels.blocks() {
+            let Some(holders) = self.blocks.get_mut(block) else { continue };
+            let before = holders.others;
+            holders.targets = holders.targets.difference(mask);
+            holders.others = before.difference(mask);
+            self.since.iter_mut().for_each(|since| since.blocks.extend([*block]));
+            for (voxel, rebuilt) in holders.others.rebuilt_moments(&before, *block) {
+                let Some(without) = self.moments.get_mut(&voxel) else { continue };
+                *without = rebuilt;
+                self.since.iter_mut().for_each(|since| since.moments.extend([voxel]));
+            }
+        }
     }
 
-    /// Finds out beforehand what leaves with the targets. False once stopped; there is no plan then.
-    pub fn plan(&mut self, stop: StopSignal<'_>) -> bool {
-        let (voxels, moments) = (self.alone_until(stop), self.moments_until(stop));
-        self.planned = (!stop.is_stopped()).then(|| Planned { voxels, moments, ..Planned::default() });
-        self.planned.is_some()
+    /// What leaves with the targets; none once stopped. What is observed afterwards is noted, for
+    /// [`Observations::renew`].
+    pub fn leaving(&mut self, stop: StopSignal<'_>) -> Option<Leaving> {
+        let blocks = stop.paced(&self.blocks, ENTRIES_PER_LOOK);
+        let blocks = blocks.map(|(&block, holders)| (block, holders.targets_alone())).collect();
+        let moments = stop.paced(&self.moments, ENTRIES_PER_LOOK).map(|(&voxel, without)| (voxel, *without));
+        let moments = MomentSet::of_voxels_until(moments.collect(), stop);
+        let leaving = Leaving { voxels: VoxelSet::of_blocks_until(blocks, stop), moments };
+        self.since = Some(Since::default());
+        (!stop.is_stopped()).then_some(leaving)
     }
 
-    fn alone(&self, block: VoxelKey, by_targets: &BlockMask) -> BlockMask {
-        by_targets.difference(self.by_others.get(&block).unwrap_or(&BlockMask::EMPTY))
+    /// Makes what left with the targets what leaves now; true where that may be something else. It takes as long as what was
+    /// observed since, and where that was something, a copy.
+    pub fn renew(&self, voxels: &mut VoxelSet, moments: &mut MomentSet) -> bool {
+        let Some(since) = self.since.as_ref().filter(|since| !since.is_empty()) else { return false };
+        let changed = |block: &VoxelKey| Some((*block, self.blocks.get(block)?.targets_alone()));
+        *voxels = merged(voxels.blocks(), since.blocks.iter().filter_map(changed)).collect();
+        let changed = |voxel: &VoxelKey| Some((*voxel, *self.moments.get(voxel)?));
+        *moments = merged(moments.as_slice(), since.moments.iter().filter_map(changed)).collect();
+        true
     }
 
-    fn alone_until(&self, stop: StopSignal<'_>) -> VoxelSet {
-        let held = stop.paced(&self.by_targets, ENTRIES_PER_LOOK);
-        held.map(|(&block, by_targets)| (block, self.alone(block, by_targets))).collect()
+    /// The scans that are to be undone, by revision, ascending.
+    pub fn targets(&self) -> &[u64] {
+        &self.targets
     }
+}
 
-    fn moment_without_targets(&self, voxel: VoxelKey) -> Moments {
-        self.moments.get(&voxel).copied().unwrap_or_default()
+impl Since {
+    fn is_empty(&self) -> bool {
+        self.blocks.is_empty() && self.moments.is_empty()
     }
+}
 
-    fn moments_until(&self, stop: StopSignal<'_>) -> MomentSet {
-        let touched = stop.paced(&self.touched, ENTRIES_PER_LOOK);
-        touched.map(|&voxel| (voxel, self.moment_without_targets(voxel))).collect()
+impl Holders {
+    fn targets_alone(&self) -> BlockMask {
+        self.targets.difference(&self.others)
     }
 }
 
@@ -192,7 +215,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{DeletionRecord, RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{DeletionRecord, RobotName, TrajectoryPose};
     use crate::voxel::Lattice;
 
     fn base(side: i32) -> MapContents {
@@ -200,24 +223,15 @@ mod tests {
         MapContents::at(1, square.filter_map(VoxelKey::new).collect())
     }
 
-    #[test]
-    fn a_base_is_taken_over_with_looks_at_the_signal_in_proportion_to_its_size() {
-        for side in [50, 200, 400] {
-            let (base, looks) = (base(side), Cell::new(0));
-            let count = || looks.replace(looks.get() + 1) == usize::MAX;
-            assert!(Observations::new(vec![2], &[], &base, StopSignal::when(&count)).is_some());
-            let entries = base.voxels.blocks().len() + base.moments.as_slice().len();
-            assert!(entries / looks.get() <= ENTRIES_PER_LOOK, "{entries} entries, {} looks", looks.get());
-        }
-        let gone = || true;
-        assert!(Observations::new(vec![2], &[], &base(50), StopSignal::when(&gone)).is_none());
-    }
-
-    fn insertion(revision: u64, x: std::ops::Range<i32>) -> Change {
+    fn scan(revision: u64, x: std::ops::Range<i32>) -> ScanRecord {
         let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
         let points: Vec<Point> = x.map(|x| Point::new(x as f32 + 0.5, 0.5, 0.5)).collect();
         let lattice = Lattice::new(1.0, 1).unwrap();
-        Change::Insertion(ScanRecord::of_points(TrajectoryPose { revision, ..pose }, &points, &lattice))
+        ScanRecord::of_points(TrajectoryPose { revision, ..pose }, &points, &lattice)
+    }
+
+    fn insertion(revision: u64, x: std::ops::Range<i32>) -> Change {
+        Change::Insertion(scan(revision, x))
     }
 
     fn deletion(x: std::ops::Range<i32>) -> Change {
@@ -225,8 +239,35 @@ mod tests {
         Change::Deletion(DeletionRecord { voxels, request: None })
     }
 
+    /// Of targets among `changes`, the first of which makes revision 2.
+    fn begun(targets: &[u64], changes: &[Change], base: &MapContents) -> Observations {
+        let mut observations = Observations::of(targets.to_vec(), &[]);
+        for (revision, change) in (2..).zip(changes) {
+            match change {
+                Change::Insertion(scan) if targets.contains(&revision) => observations.touch(scan),
+                _ => {}
+            }
+        }
+        assert!(observations.begin(base, StopSignal::NEVER));
+        observations
+    }
+
     #[test]
-    fn a_plan_becomes_what_is_found_out_at_the_end_whatever_comes_between() {
+    fn a_base_is_looked_at_with_looks_at_the_signal_in_proportion_to_its_size() {
+        for side in [50, 200, 400] {
+            let (base, looks) = (base(side), Cell::new(0));
+            let count = || looks.replace(looks.get() + 1) == usize::MAX;
+            let mut observations = begun(&[2], &[insertion(2, 0..10)], &base);
+            assert!(observations.begin(&base, StopSignal::when(&count)));
+            let entries = base.voxels.blocks().len() + base.moments.as_slice().len();
+            assert!(entries / looks.get() <= ENTRIES_PER_LOOK, "{entries} entries, {} looks", looks.get());
+            let gone = || true;
+            assert!(!observations.begin(&base, StopSignal::when(&gone)));
+        }
+    }
+
+    #[test]
+    fn what_leaves_becomes_what_is_found_out_at_the_end_whatever_comes_between() {
         let changes = [
             insertion(2, 0..100),
             insertion(3, 50..60),
@@ -236,46 +277,58 @@ mod tests {
             deletion(0..12),
             insertion(6, 1000..1020),
             deletion(200..1010),
+            insertion(7, 5000..5010),
         ];
-        for planned_after in 0..=changes.len() {
-            let begin = || Observations::new(vec![2, 4], &[], &base(3), StopSignal::NEVER).unwrap();
-            let (mut planned, mut fresh) = (begin(), begin());
+        for found_out_after in 0..=changes.len() {
+            let (mut early, mut late) =
+                (begun(&[2, 4], &changes, &base(3)), begun(&[2, 4], &changes, &base(3)));
+            let mut leaving = None;
             for (at, (revision, change)) in (2..).zip(&changes).enumerate() {
-                if at == planned_after {
-                    assert!(planned.plan(StopSignal::NEVER));
+                if at == found_out_after {
+                    leaving = early.leaving(StopSignal::NEVER);
                 }
-                planned.observe(revision, change);
-                fresh.observe(revision, change);
-                assert_eq!(planned.held_by_targets_alone(), fresh.held_by_targets_alone());
-                assert_eq!(planned.moments_without_targets(), fresh.moments_without_targets());
+                early.observe(revision, change);
+                late.observe(revision, change);
+                if let Some(leaving) = &leaving {
+                    let mut now = Leaving::clone(leaving);
+                    early.renew(&mut now.voxels, &mut now.moments);
+                    assert_eq!(now, late.leaving(StopSignal::NEVER).unwrap(), "{found_out_after}, {at}");
+                }
             }
         }
     }
 
     #[test]
-    fn what_leaves_with_the_targets_costs_what_they_hold_and_not_what_the_map_holds() {
-        let mut observations = Observations::new(vec![2], &[], &base(400), StopSignal::NEVER).unwrap();
-        observations.observe(2, &insertion(2, 0..100_000));
-        let looks = Cell::new(0);
-        let count = || looks.replace(looks.get() + 1) == usize::MAX;
-        assert!(observations.plan(StopSignal::when(&count)));
-        let entries = observations.by_targets.len() + observations.touched.len();
-        assert!(
-            (1..=2 * entries.div_ceil(ENTRIES_PER_LOOK) + 2).contains(&looks.get()),
-            "{} looks",
-            looks.get()
-        );
-        let gone = || true;
-        assert!(!observations.plan(StopSignal::when(&gone)));
+    fn what_the_targets_did_not_touch_changes_nothing_and_takes_no_memory() {
+        let mut observations = begun(&[2], &[insertion(2, 0..10)], &base(300));
+        observations.observe(2, &insertion(2, 0..10));
+        let mut leaving = observations.leaving(StopSignal::NEVER).unwrap();
+        observations.observe(3, &insertion(3, 1000..100_000));
+        observations.observe(4, &deletion(2000..90_000));
+        assert!(!observations.renew(&mut leaving.voxels, &mut leaving.moments));
+        assert_eq!((observations.blocks.len(), observations.moments.len()), (2, 3));
     }
 
     #[test]
-    fn what_is_reserved_for_a_base_covers_its_entries_twice() {
-        let base = base(100);
-        let (blocks, moments) = (base.voxels.blocks().len(), base.moments.as_slice().len());
-        let entries =
-            2 * blocks * size_of::<(VoxelKey, BlockMask)>() + moments * size_of::<(VoxelKey, Moments)>();
-        let reserved = Observations::bytes_max(blocks, moments);
-        assert!((2 * entries..3 * entries).contains(&reserved), "{reserved} for {entries} bytes of entries");
+    fn what_leaves_with_the_targets_is_found_out_with_looks_in_proportion_to_what_they_touched() {
+        let target = insertion(2, 0..1_000_000);
+        let mut observations = begun(&[2], std::slice::from_ref(&target), &base(400));
+        observations.observe(2, &target);
+        let looks = Cell::new(0);
+        let count = || looks.replace(looks.get() + 1) == usize::MAX;
+        assert!(observations.leaving(StopSignal::when(&count)).is_some());
+        let entries = observations.blocks.len() + observations.moments.len();
+        assert!(looks.get() >= entries / ENTRIES_PER_LOOK && entries > 10 * ENTRIES_PER_LOOK, "{entries}");
+        let gone = || true;
+        assert_eq!(observations.leaving(StopSignal::when(&gone)), None);
+    }
+
+    #[test]
+    fn what_a_target_is_said_to_add_covers_its_tables() {
+        let scan = scan(2, 0..100_000);
+        let mut observations = Observations::of(vec![2], &[]);
+        observations.touch(&scan);
+        let tables = observations.blocks.allocation_size() + observations.moments.allocation_size();
+        assert!(tables <= Observations::bytes_of(&scan), "{tables} bytes");
     }
 }

@@ -22,7 +22,7 @@ use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 use super::room::Promise;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
-use crate::store::{MapFolder, Record, StoreError, StoreSettings};
+use crate::store::{MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use crate::sync::thread;
 use crate::util::{Durations, SharedDurations, StopSignal};
@@ -38,10 +38,15 @@ pub(super) type Turn = Arc<OwnedMutexGuard<()>>;
 pub(super) type Decision =
     Box<dyn FnOnce(&MultiResolutionMap, StopSignal<'_>) -> Result<Option<Decided>, Refusal> + Send + 'static>;
 
-/// A change that was decided on in its turn, with the memory that making it takes.
+/// A change that was decided on in its turn.
 pub(super) struct Decided {
     pub(super) change: Change,
-    pub(super) lent: Option<Promise>,
+    /// Where it was made before.
+    pub(super) record: Option<Record>,
+    /// The memory that it takes.
+    pub(super) lent: Vec<Promise>,
+    /// Keeps what it was made of until it is visible.
+    pub(super) pin: Option<Pin>,
 }
 
 /// A change on its way into the map.

@@ -45,8 +45,9 @@ impl HostedMap {
                 return Ok(None);
             }
             drop(lent);
-            let lent = Some(room.lend(removal_bytes(core, &voxels), "a deletion")?);
-            Ok(Some(Decided { change: Change::Deletion(DeletionRecord { voxels, request }), lent }))
+            let lent = vec![room.lend(removal_bytes(core, &voxels), "a deletion")?];
+            let change = Change::Deletion(DeletionRecord { voxels, request });
+            Ok(Some(Decided { change, record: None, lent, pin: None }))
         };
         let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
@@ -126,7 +127,7 @@ fn search_bytes(map: &MultiResolutionMap, deletion: &Deletion) -> u64 {
 
 /// Memory that taking voxels out takes: two copies of their blocks, their record, the keys of one shard's voxels with
 /// what their filters lose, and a copy of the filters' planes.
-fn removal_bytes(map: &MultiResolutionMap, voxels: &VoxelSet) -> u64 {
+pub(super) fn removal_bytes(map: &MultiResolutionMap, voxels: &VoxelSet) -> u64 {
     const OF_RECORD: usize = 3;
     const OF_SHARD: usize = 36;
     let count = voxels.len();

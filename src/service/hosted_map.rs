@@ -46,6 +46,8 @@ pub(super) struct HostedMap {
     announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
+    /// One undo is found out and made before the next is looked at.
+    pub(super) undo_turn: Arc<tokio::sync::Mutex<()>>,
     /// A snapshot is due, and there is no room for it.
     is_put_off: AtomicBool,
 }
@@ -95,6 +97,7 @@ impl HostedMap {
             committing,
             announced,
             turns: Mutex::new(Rank::Brief, HashMap::new()),
+            undo_turn: Arc::default(),
             is_put_off: AtomicBool::default(),
         }
     }

@@ -272,6 +272,8 @@ impl MapService {
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
         let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
+        // Until its outcome is known: what was withdrawn before it is then what it found.
+        let _turns = map.turns_of_undo(&undo.target).await;
         self.carry_through(&self.inner.undo, move |stop| {
             limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
         })

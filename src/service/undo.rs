@@ -2,22 +2,66 @@
 
 use std::sync::Arc;
 
-use super::committing::{Decided, Proposal, Refusal, Step, Stop};
+use tokio::sync::OwnedMutexGuard;
+
+use super::committing::{Decided, Proposal, Refusal, Step, Stop, record_of};
+use super::deletion::removal_bytes;
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
-use super::room::Room;
+use super::room::{Promise, Room};
 use super::time_limit::TimeLimit;
 use super::trajectory::check_not_forgotten;
-use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped};
+use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
 use crate::map::{
-    CallerName, Change, Committed, MultiResolutionMap, Observations, Request, RequestKind, Trajectory,
+    CallerName, Change, Committed, Leaving, MultiResolutionMap, Request, RequestKind, Trajectory,
     TrajectoryPose, UndoRecord, WithdrawnScan,
 };
-use crate::store::{MapFolder, StoreError};
+use crate::store::{MapFolder, NotObserved, Observed, Record, StoreError};
 use crate::util::StopSignal;
-use crate::voxel::{Moments, VoxelKey};
+
+/// Whom memory is lent to, in refusals.
+const UNDO: &str = "an undo";
+
+/// An undo as it would be had nothing changed since.
+struct PlannedUndo {
+    change: Change,
+    record: Record,
+    observed: Observed,
+    lent: Vec<Promise>,
+}
+
+impl PlannedUndo {
+    /// The undo as it is now, while nobody else can change the map: what came since is little, and changes it by as much.
+    fn decided(
+        self,
+        map: &HostedMap,
+        folder: &MapFolder,
+        stop: StopSignal<'_>,
+    ) -> Result<Decided, ServiceError> {
+        let Self { mut change, record, mut observed, lent } = self;
+        folder.observe(&mut observed, stop).map_err(|e| map.unreadable(&e))?;
+        check_not_stopped(stop)?;
+        let Observed { observations, pin, .. } = observed;
+        let is_other = match &mut change {
+            Change::Undo(undo) => observations.renew(&mut undo.voxels, &mut undo.moments),
+            Change::Insertion(_) | Change::Deletion(_) => false,
+        };
+        Ok(Decided { change, record: Some(record).filter(|_| !is_other), lent, pin: Some(pin) })
+    }
+}
 
 impl HostedMap {
+    /// Waits until the undos before are done, and of an undo of all scans of a robot, until its earlier scans are: those that
+    /// come later wait in turn, so that none that the undo does not know of lies before it.
+    pub(super) async fn turns_of_undo(&self, target: &UndoTarget) -> [Option<OwnedMutexGuard<()>>; 2] {
+        let undo = Arc::clone(&self.undo_turn).lock_owned().await;
+        let robot = match target {
+            UndoTarget::RobotSince { robot, .. } => Some(self.turn_of(robot).await),
+            UndoTarget::Scan { .. } | UndoTarget::Revision(_) => None,
+        };
+        [Some(undo), robot]
+    }
+
     /// Sets an undo on its way, unless it was done before.
     ///
     /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
@@ -48,31 +92,16 @@ impl HostedMap {
             let state = self.state(self.map.revision());
             return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, state, replayed: false }));
         }
-        // The map's content as it was before the first of them.
-        let lent = room.lend(self.undo_bytes(), "an undo")?;
-        let observed = folder.observations(&scans, &withdrawn, stop).map_err(|e| self.unreadable(&e))?;
-        check_not_stopped(stop)?;
-        let mut observed = observed.ok_or_else(|| self.out_of_reach(&folder, scans[0]))?;
-        // What takes long is done here; what comes meanwhile is little, and changes the plan by as much.
-        observed.observations.plan(stop);
-        folder.observe(&mut observed, stop).map_err(|e| self.unreadable(&e))?;
-        check_not_stopped(stop)?;
-
-        let (map, count, limit) = (Arc::clone(self), scans.len(), limit.clone());
+        let count = scans.len();
+        let planned = self.plan_undo(&folder, scans, &withdrawn, request.clone(), room, stop)?;
+        let (map, limit) = (Arc::clone(self), limit.clone());
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Undo, request.as_ref(), former)?;
             if core.trajectory().withdrawn() != withdrawn {
                 return Err(Refusal::Stale);
             }
             // What came meanwhile is shown while the map waits: that ends with the request's time as well.
-            limit.run(stop, |stop| {
-                folder.observe(&mut observed, stop).map_err(|e| map.unreadable(&e))?;
-                check_not_stopped(stop)
-            })?;
-            let voxels = observed.observations.held_by_targets_alone();
-            let moments = observed.observations.moments_without_targets();
-            let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
-            Ok(Some(Decided { change, lent: Some(lent) }))
+            Ok(Some(limit.run(stop, |stop| planned.decided(&map, &folder, stop))?))
         };
         let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
@@ -85,12 +114,51 @@ impl HostedMap {
         Ok(Step::Proposed(outcome, Box::new(answer)))
     }
 
-    /// Bytes of memory that an undo takes: the snapshot that it begins with, read and decoded, and who holds which voxels of
-    /// it. A map that had more in it then than now takes more.
-    fn undo_bytes(&self) -> u64 {
-        let blocks = self.map.view().lists(0).map(|list| list.blocks().len()).sum();
-        let moments = self.map.moments().bytes() / size_of::<(VoxelKey, Moments)>();
-        self.snapshot_bytes() + Observations::bytes_max(blocks, moments) as u64
+    /// What leaves with `scans`, as the map is now: what takes long is done here, on a thread of its own.
+    fn plan_undo(
+        &self,
+        folder: &MapFolder,
+        scans: Vec<u64>,
+        withdrawn: &[WithdrawnScan],
+        request: Option<Request>,
+        room: &Room,
+        stop: StopSignal<'_>,
+    ) -> Result<PlannedUndo, ServiceError> {
+        let mut observed = self.observe(folder, &scans, withdrawn, room, stop)?;
+        let finding_out = room.lend(observed.observations.leaving_bytes() as u64, UNDO)?;
+        let leaving = observed.observations.leaving(stop).ok_or_else(|| ended_early(stop))?;
+        let Leaving { mut voxels, mut moments } = leaving;
+        folder.observe(&mut observed, stop).map_err(|e| self.unreadable(&e))?;
+        check_not_stopped(stop)?;
+        observed.observations.renew(&mut voxels, &mut moments);
+        let removal = room.lend(removal_bytes(&self.map, &voxels), UNDO)?;
+        let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
+        let record = record_of(&change)?;
+        Ok(PlannedUndo { change, record, observed, lent: vec![finding_out, removal] })
+    }
+
+    /// Who holds which of the voxels that `scans` touched. Memory is lent for each part before it is built.
+    fn observe(
+        &self,
+        folder: &MapFolder,
+        scans: &[u64],
+        withdrawn: &[WithdrawnScan],
+        room: &Room,
+        stop: StopSignal<'_>,
+    ) -> Result<Observed, ServiceError> {
+        // What was lent before lies in memory by the time more is asked for, and is measured there.
+        let mut part = None;
+        let reserve = |bytes| {
+            drop(part.take());
+            part = Some(room.lend(bytes, UNDO)?);
+            Ok(())
+        };
+        folder.observations(scans, withdrawn, reserve, stop).map_err(|why| match why {
+            NotObserved::OutOfReach => self.out_of_reach(folder, scans[0]),
+            NotObserved::Stopped => ended_early(stop),
+            NotObserved::NoMemory(refusal) => refusal,
+            NotObserved::Unreadable(error) => self.unreadable(&error),
+        })
     }
 
     /// The revisions of the scans that are meant, ascending, and the scans that were withdrawn before.

@@ -11,9 +11,11 @@
 //! for them. What readers ask is in [`Facts`].
 
 mod facts;
+mod observing;
 mod opening;
 
-pub use facts::FolderUse;
+pub use facts::{FolderUse, Pin};
+pub use observing::{NotObserved, Observed};
 pub use opening::OpenedMap;
 
 use std::path::{Path, PathBuf};
@@ -27,10 +29,9 @@ use super::journal::{Journal, Place, Record, SegmentedJournal};
 use super::retention::UndoReach;
 use super::snapshot_files::{Sizes, forget_damaged, snapshot_name};
 use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
-use crate::map::{Observations, WithdrawnScan};
+use crate::map::WithdrawnScan;
 use crate::sync::{Mutex, Rank};
-use crate::util::StopSignal;
-use facts::{Facts, Pin};
+use facts::Facts;
 
 /// What keeps a map across crashes.
 #[derive(Debug)]
@@ -47,16 +48,6 @@ pub struct MapFolder {
     /// It was taken away. Changed while both locks are held.
     is_gone: AtomicBool,
     facts: Facts,
-}
-
-/// Who held which voxels, as the journal tells. What it was read from stays there until this is dropped.
-#[derive(Debug)]
-pub struct Observed {
-    /// Up to `revision`.
-    pub observations: Observations,
-    /// The head of the journal when it was read.
-    pub revision: u64,
-    _pin: Pin,
 }
 
 impl MapFolder {
@@ -204,49 +195,6 @@ impl MapFolder {
             self.files.remove(&path).map_err(StoreError::io(&path))?;
         }
         self.files.sync(&path).map_err(StoreError::io(&path))
-    }
-
-    /// Who holds which voxels, up to the present head of the journal; none where the journal does not reach back to the
-    /// first of `scans`, and where it is stopped.
-    ///
-    /// # Errors
-    /// When a snapshot or the journal cannot be read.
-    pub fn observations(
-        &self,
-        scans: &[u64],
-        withdrawn: &[WithdrawnScan],
-        stop: StopSignal<'_>,
-    ) -> Result<Option<Observed>, StoreError> {
-        let Some(pin) = self.facts.pin_base_of(scans, withdrawn) else {
-            return Ok(None);
-        };
-        let base = pin.snapshot;
-        let path = self.path.file(&snapshot_name(base));
-        let base_contents = match Snapshot::read_until(&*self.files, &path, stop) {
-            Err(StoreError::Cancelled) => return Ok(None),
-            snapshot => snapshot?.contents,
-        };
-        let Some(observations) = Observations::new(scans.to_vec(), withdrawn, &base_contents, stop) else {
-            return Ok(None);
-        };
-        let mut observed = Observed { observations, revision: base, _pin: pin };
-        self.observe(&mut observed, stop)?;
-        Ok(Some(observed))
-    }
-
-    /// Shows `observed` the changes that it has not seen, while somebody wants to know.
-    ///
-    /// # Errors
-    /// When the journal cannot be read.
-    pub fn observe(&self, observed: &mut Observed, stop: StopSignal<'_>) -> Result<(), StoreError> {
-        let (segments, head) = self.facts.journal();
-        let changes = self.place.read_from(observed.revision + 1, &segments, head);
-        for change in changes.take_while(|_| !stop.is_stopped()) {
-            let (revision, change) = change?;
-            observed.observations.observe(revision, &change);
-        }
-        observed.revision = head;
-        Ok(())
     }
 
     /// How much is kept, and how. Waits for no disk.

@@ -1,6 +1,7 @@
 //! What a failed operation leaves, and what somebody else put there: the first is never served, the second never removed.
 
 use std::cell::Cell;
+use std::convert::Infallible;
 use std::path::Path;
 
 use mrol::store::{FileSystem, OpeningProgress, Snapshot, StoreError};
@@ -165,6 +166,6 @@ fn reading_for_an_undo_looks_at_the_signal_at_each_record() {
     (0..RECORDS as i32).for_each(|i| commit(&folder, &map, i));
     let looks = Cell::new(0);
     let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
-    folder.observations(&[1], &[], StopSignal::when(&count_look)).unwrap().unwrap();
+    folder.observations(&[1], &[], |_| Ok::<_, Infallible>(()), StopSignal::when(&count_look)).unwrap();
     assert!(looks.get() >= RECORDS, "{} looks", looks.get());
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
 use crate::service::room::Promise;
-use crate::store::{Durability, MapFolder, Record, StoreError, StoreSettings};
+use crate::store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, RecvTimeoutError};
 use crate::util::{SharedDurations, StopSignal};
 
@@ -41,7 +41,8 @@ struct Pending {
     answer: oneshot::Sender<Outcome>,
     /// Kept until the change is visible.
     _turn: Option<Turn>,
-    _memory: Option<Promise>,
+    _memory: Vec<Promise>,
+    _pin: Option<Pin>,
 }
 
 impl Worker {
@@ -97,7 +98,8 @@ impl Worker {
                             continue;
                         }
                     }
-                    group.push(Pending { change, record, answer, _turn: Some(turn), _memory: Some(promise) });
+                    let (_turn, _memory) = (Some(turn), vec![promise]);
+                    group.push(Pending { change, record, answer, _turn, _memory, _pin: None });
                 }
                 Proposal::Undecided(decide) => {
                     self.commit_group(&mut group);
@@ -113,15 +115,18 @@ impl Worker {
         let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
         let caller_gone = || answer.is_closed();
         let decided = || match decide(&self.map, StopSignal::when(&caller_gone))? {
-            Some(decided) => {
-                let record = self.folder.as_ref().map(|_| record_of(&decided.change)).transpose()?;
-                Ok(Some((decided, record)))
+            Some(Decided { change, record, lent, pin }) => {
+                let record = match (record, &self.folder) {
+                    (None, Some(_)) => Some(record_of(&change)?),
+                    (record, _) => record,
+                };
+                Ok(Some((change, record, lent, pin)))
             }
             None => Ok(None),
         };
         match decided() {
-            Ok(Some((Decided { change, lent }, record))) => {
-                group.push(Pending { change, record, answer, _turn: None, _memory: lent });
+            Ok(Some((change, record, _memory, _pin))) => {
+                group.push(Pending { change, record, answer, _turn: None, _memory, _pin });
             }
             Ok(None) => drop(answer.send(Ok(unchanged))),
             Err(refusal) => drop(answer.send(Err(refusal))),

@@ -205,6 +205,19 @@ impl Place {
         Box::new(Reader { place: self.clone(), segments, revision, head, open: None })
     }
 
+    /// The changes that made `revisions`, ascending, alone: others are passed over without a look into them.
+    pub(in crate::store) fn read_at(&self, revisions: Vec<u64>, segments: &[u64], head: u64) -> Changes {
+        let first = revisions.first().copied().unwrap_or_default();
+        let begin = segments.partition_point(|&begins| begins <= first).saturating_sub(1);
+        let segments = segments[begin..].iter().copied().collect();
+        let mut reader = Reader { place: self.clone(), segments, revision: first, head, open: None };
+        let known = revisions.into_iter().take_while(move |&revision| revision <= head);
+        Box::new(known.map(move |revision| {
+            reader.revision = revision;
+            reader.read()
+        }))
+    }
+
     /// A segment without a frame, in the place of one that is there.
     pub(super) fn begin_segment(&self, first: u64) -> std::io::Result<Box<dyn Appending>> {
         let mut file = self.files.create(&self.path(first))?;
@@ -283,6 +296,9 @@ impl Reader {
             let reason = format!("revision {} is no longer kept", self.revision);
             StoreError::damaged(&self.place.folder.get(), reason)
         };
+        while self.segments.get(1).is_some_and(|&next| next <= self.revision) {
+            self.segments.pop_front();
+        }
         let first = self.segments.pop_front().filter(|&first| first <= self.revision).ok_or_else(missing)?;
         let path = self.place.path(first);
         let bytes = self.place.read(&path)?;

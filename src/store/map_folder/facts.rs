@@ -72,7 +72,7 @@ struct Saved {
 
 /// Keeps a snapshot, and the journal from it on, until it is dropped.
 #[derive(Debug)]
-pub(super) struct Pin {
+pub struct Pin {
     facts: Facts,
     pub(super) snapshot: u64,
 }

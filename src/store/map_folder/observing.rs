@@ -1,0 +1,113 @@
+//! Who held which voxels, as a map's folder tells: for undo.
+
+use super::MapFolder;
+use super::facts::Pin;
+use crate::map::{Change, Observations, WithdrawnScan};
+use crate::store::snapshot_files::snapshot_name;
+use crate::store::{MapFileError, MapFileLimits, Snapshot, StoreError, folder};
+use crate::util::StopSignal;
+
+/// Who held which of the voxels that some scans touched.
+#[derive(Debug)]
+pub struct Observed {
+    /// Up to `revision`.
+    pub observations: Observations,
+    /// The last change that was seen.
+    pub revision: u64,
+    /// What it was read from stays as long as this.
+    pub pin: Pin,
+}
+
+/// Why nothing was observed.
+#[derive(Debug, thiserror::Error)]
+pub enum NotObserved<E> {
+    /// The journal does not reach back to the first of the scans.
+    #[error("the journal does not reach back to the first of the scans")]
+    OutOfReach,
+    /// Nobody waits for it any more, or its time is up.
+    #[error("it was stopped")]
+    Stopped,
+    /// There is no memory for it.
+    #[error("{0}")]
+    NoMemory(E),
+    /// A snapshot or the journal cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] StoreError),
+}
+
+impl MapFolder {
+    /// Who holds which of the voxels that `scans` touched, up to the present head of the journal. `reserve` is asked for the
+    /// bytes of each part before it is built: what was asked for before is there by then.
+    ///
+    /// The journal is read twice: for what the scans touched, so that nothing else need be remembered, and from the base on.
+    ///
+    /// # Errors
+    /// When the journal does not reach back so far, something cannot be read, `reserve` refuses, or it is stopped.
+    pub fn observations<E: std::fmt::Display>(
+        &self,
+        scans: &[u64],
+        withdrawn: &[WithdrawnScan],
+        mut reserve: impl FnMut(u64) -> Result<(), E>,
+        stop: StopSignal<'_>,
+    ) -> Result<Observed, NotObserved<E>> {
+        let pin = self.facts.pin_base_of(scans, withdrawn).ok_or(NotObserved::OutOfReach)?;
+        let mut observations = Observations::of(scans.to_vec(), withdrawn);
+        self.touch(&mut observations, &mut reserve, stop)?;
+        let (revision, path) = (pin.snapshot, self.path.file(&snapshot_name(pin.snapshot)));
+        let bytes = self.files.size(&path).map_err(StoreError::io(&path))?;
+        reserve(bytes).map_err(NotObserved::NoMemory)?;
+        let file = match folder::read_until(&*self.files, &path, stop) {
+            Err(StoreError::Cancelled) => return Err(NotObserved::Stopped),
+            file => file?,
+        };
+        let base = Snapshot::decode_until(&file, &MapFileLimits::OWN, &mut reserve, stop);
+        let base = base.map_err(|refusal| match refusal {
+            MapFileError::NoMemory(refusal) => NotObserved::NoMemory(refusal),
+            MapFileError::Stopped => NotObserved::Stopped,
+            refusal => NotObserved::Unreadable(StoreError::damaged(&path, refusal.to_string())),
+        })?;
+        if !observations.begin(&base.contents, stop) {
+            return Err(NotObserved::Stopped);
+        }
+        drop((base, file));
+        let mut observed = Observed { observations, revision, pin };
+        self.observe(&mut observed, stop)?;
+        if stop.is_stopped() { Err(NotObserved::Stopped) } else { Ok(observed) }
+    }
+
+    /// Reads what the targets touched.
+    fn touch<E>(
+        &self,
+        observations: &mut Observations,
+        reserve: &mut impl FnMut(u64) -> Result<(), E>,
+        stop: StopSignal<'_>,
+    ) -> Result<(), NotObserved<E>> {
+        let (segments, head) = self.facts.journal();
+        let targets = observations.targets().to_vec();
+        for change in self.place.read_at(targets, &segments, head) {
+            if stop.is_stopped() {
+                return Err(NotObserved::Stopped);
+            }
+            if let (_, Change::Insertion(scan)) = change? {
+                reserve(Observations::bytes_of(&scan) as u64).map_err(NotObserved::NoMemory)?;
+                observations.touch(&scan);
+            }
+        }
+        Ok(())
+    }
+
+    /// Shows `observed` the changes that it has not seen, while somebody wants to know.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn observe(&self, observed: &mut Observed, stop: StopSignal<'_>) -> Result<(), StoreError> {
+        let (segments, head) = self.facts.journal();
+        let changes = self.place.read_from(observed.revision + 1, &segments, head);
+        for change in changes.take_while(|_| !stop.is_stopped()) {
+            let (revision, change) = change?;
+            observed.observations.observe(revision, &change);
+            observed.revision = revision;
+        }
+        Ok(())
+    }
+}
