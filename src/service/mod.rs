@@ -91,8 +91,8 @@ struct Inner {
     mapping: Pool,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
     alignment: Pool,
-    /// For finding out what an undo takes back, which reads a snapshot and the journal behind it: one at a time, since two
-    /// of one map cannot both be made as they were prepared, and each takes memory as the map does.
+    /// For finding out what an undo takes back, which reads a snapshot and the journal behind it: one at a time, since each
+    /// takes memory as a snapshot does.
     undo: Pool,
     /// For map files, out of the server and in, which take seconds and much memory each: one at a time, and no query
     /// or scan waits for them.

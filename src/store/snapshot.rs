@@ -446,6 +446,21 @@ mod tests {
     }
 
     #[test]
+    fn a_request_that_is_there_twice_is_an_error() {
+        let mut message = message(&snapshot());
+        let read = |message: &pb::Snapshot| {
+            let body = message.encode_to_vec();
+            let body = Body::of(&body, StopSignal::NEVER).unwrap();
+            body.read(&MapFileLimits::OWN, &mut Memory(|_| Ok::<_, Infallible>(())))
+        };
+        assert!(read(&message).is_ok());
+        let older = pb::AnsweredRequest { revision: 41, ..message.requests[0].clone() };
+        message.requests.insert(0, older);
+        let refused = read(&message).unwrap_err().to_string();
+        assert!(refused.contains("their ids must differ"), "{refused}");
+    }
+
+    #[test]
     fn a_newer_version_is_refused_by_name() {
         let mut bytes = snapshot().encode().unwrap();
         bytes[8] = 5;
