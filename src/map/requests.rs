@@ -37,10 +37,13 @@ pub struct AnsweredRequest {
 pub struct Requests {
     /// By the revision that each made.
     answered: BTreeMap<u64, AnsweredRequest>,
-    by_id: HashMap<(RequestId, RequestKind), u64>,
+    by_id: HashMap<Key, u64>,
     /// The revisions of each caller's, ascending.
     by_caller: BTreeMap<Option<CallerName>, VecDeque<u64>>,
 }
+
+/// Whose id it is, and for what: callers do not know of each other's ids.
+type Key = (Option<CallerName>, RequestKind, RequestId);
 
 /// What was asked for. Ids of one kind say nothing of those of the other: who may undo scans is not always who may delete.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -56,12 +59,23 @@ impl AnsweredRequest {
     pub fn kind(&self) -> RequestKind {
         if self.scans > 0 { RequestKind::Undo } else { RequestKind::Deletion }
     }
+
+    fn key(&self) -> Key {
+        (self.caller.clone(), self.kind(), self.id.clone())
+    }
 }
 
 impl Requests {
-    /// What came of the request of that kind and id.
-    pub fn find(&self, kind: RequestKind, id: &RequestId) -> Option<&AnsweredRequest> {
-        self.answered.get(self.by_id.get(&(id.clone(), kind))?)
+    /// What came of the caller's request of that kind and id. Requests of which nobody noted the caller, as those of a server
+    /// that had no keys then, are everybody's.
+    pub fn find(
+        &self,
+        kind: RequestKind,
+        id: &RequestId,
+        caller: Option<&CallerName>,
+    ) -> Option<&AnsweredRequest> {
+        let of = |caller| self.by_id.get(&(caller, kind, id.clone()));
+        self.answered.get(of(caller.cloned()).or_else(|| of(None))?)
     }
 
     /// All of them, in the order of their revisions.
@@ -69,11 +83,11 @@ impl Requests {
         self.answered.values()
     }
 
-    /// Remembers a request in place of an older one of its kind and id. No server answers an id that it remembers, but a
+    /// Remembers a request in place of an older one of its caller, kind and id. No server answers an id that it remembers, but a
     /// journal may have been written by one that remembered fewer.
     pub(super) fn push(&mut self, request: AnsweredRequest) {
         let (caller, revision) = (request.caller.clone(), request.revision);
-        if let Some(older) = self.by_id.insert((request.id.clone(), request.kind()), revision) {
+        if let Some(older) = self.by_id.insert(request.key(), revision) {
             self.forget(older);
         }
         self.by_caller.entry(caller.clone()).or_default().push_back(revision);
@@ -96,8 +110,7 @@ impl Requests {
     fn forget_oldest_of(&mut self, caller: &Option<CallerName>) {
         let oldest = self.by_caller.get(caller).and_then(|of| of.front().copied());
         if let Some(gone) = oldest.and_then(|revision| self.forget(revision)) {
-            let kind = gone.kind();
-            self.by_id.remove(&(gone.id, kind));
+            self.by_id.remove(&gone.key());
         }
     }
 
@@ -142,24 +155,36 @@ mod tests {
     }
 
     fn remembers(requests: &Requests, n: u64) -> bool {
-        requests.find(RequestKind::Deletion, &request(n).id).is_some()
+        requests.iter().any(|request| request.digest == n)
     }
 
     #[test]
     fn an_undo_answers_for_no_deletion_of_the_same_id() {
         let undo = AnsweredRequest { scans: 1, ..request(1) };
         let requests: Requests = [undo.clone()].into_iter().collect();
-        assert_eq!(requests.find(RequestKind::Deletion, &undo.id), None);
-        assert_eq!(requests.find(RequestKind::Undo, &undo.id), Some(&undo));
+        assert_eq!(requests.find(RequestKind::Deletion, &undo.id, None), None);
+        assert_eq!(requests.find(RequestKind::Undo, &undo.id, None), Some(&undo));
     }
 
     #[test]
-    fn an_id_is_remembered_once_whoever_used_it() {
-        let again = AnsweredRequest { revision: 9, ..of_caller("r1", 1) };
-        let requests: Requests = [request(1), again.clone()].into_iter().collect();
-        assert_eq!(requests.iter().collect::<Vec<_>>(), [&again]);
-        assert_eq!(requests.find(RequestKind::Deletion, &again.id), Some(&again));
-        assert_eq!(requests.of(&None), 0);
+    fn an_id_is_remembered_once_a_caller_and_callers_do_not_know_of_each_others() {
+        let of = |caller: &str, revision| AnsweredRequest { revision, ..of_caller(caller, 1) };
+        let (mallory, old, alice) = (of("mallory", 2), of("alice", 3), of("alice", 9));
+        let requests: Requests = [mallory.clone(), old, alice.clone()].into_iter().collect();
+        assert!(requests.iter().eq([&mallory, &alice]));
+        let find = |caller: &str| {
+            requests.find(RequestKind::Deletion, &alice.id, Some(&CallerName::new(caller).unwrap()))
+        };
+        assert_eq!((find("mallory"), find("alice"), find("bob")), (Some(&mallory), Some(&alice), None));
+        assert_eq!(requests.find(RequestKind::Deletion, &alice.id, None), None);
+        assert_eq!(requests.of(&alice.caller), 1);
+    }
+
+    #[test]
+    fn a_request_whose_caller_nobody_noted_is_everybodys() {
+        let requests: Requests = [request(1)].into_iter().collect();
+        let caller = CallerName::new("r1").unwrap();
+        assert_eq!(requests.find(RequestKind::Deletion, &request(1).id, Some(&caller)), Some(&request(1)));
     }
 
     #[test]

@@ -69,7 +69,7 @@ impl HostedMap {
         let Some(request) = request else {
             return Ok(None);
         };
-        match self.map.requests().find(kind, &request.id) {
+        match self.map.requests().find(kind, &request.id, request.caller.as_ref()) {
             Some(answered) if ![request.digest, former_digest].contains(&answered.digest) => {
                 let message = format!(
                     "request_id {} was accepted at revision {} with other content: name new requests anew",

@@ -342,11 +342,13 @@ impl HostedMap {
     }
 
     fn storage(&self) -> Option<MapStorage> {
-        let used: FolderUse = self.folder.as_ref()?.used();
+        let folder = self.folder.as_ref()?;
+        let used: FolderUse = folder.used();
+        let undo_from_revision = folder.undo_from(self.map.trajectory().withdrawn());
         Some(MapStorage {
             durable_revision: used.durable,
             snapshot_revision: used.snapshot,
-            undo_from_revision: used.undo_from,
+            undo_from_revision,
             journal: used.journal,
             snapshot_age: used.snapshot_age,
             snapshot_failures: used.snapshot_failures,

@@ -149,7 +149,7 @@ impl HostedMap {
 
 /// Thins the poses of `map` that undo reaches no more. Waits for the turn to change the map.
 pub(super) fn thin(map: &MultiResolutionMap, folder: &MapFolder) {
-    let before = folder.used().undo_from;
+    let before = folder.used().kept_from;
     map.committer().thin(before, &folder.settings().trajectory_spacing);
 }
 

@@ -154,7 +154,7 @@ impl HostedMap {
             Ok(())
         };
         folder.observations(scans, withdrawn, reserve, stop).map_err(|why| match why {
-            NotObserved::OutOfReach => self.out_of_reach(folder, scans[0]),
+            NotObserved::OutOfReach => self.out_of_reach(folder, scans[0], withdrawn),
             NotObserved::Stopped => ended_early(stop),
             NotObserved::NoMemory(refusal) => refusal,
             NotObserved::Unreadable(error) => self.unreadable(&error),
@@ -190,8 +190,8 @@ impl HostedMap {
     /// Refuses a scan that may be out of reach and is not kept.
     fn check_reach(&self, trajectory: &Trajectory, revision: u64) -> Result<(), ServiceError> {
         let folder = self.folder.as_ref().filter(|_| trajectory.at(revision).is_none());
-        let out_of_reach = folder.filter(|folder| revision < folder.used().undo_from);
-        out_of_reach.map_or(Ok(()), |folder| Err(self.out_of_reach(folder, revision)))
+        let out_of_reach = folder.filter(|folder| revision < folder.undo_from(trajectory.withdrawn()));
+        out_of_reach.map_or(Ok(()), |folder| Err(self.out_of_reach(folder, revision, trajectory.withdrawn())))
     }
 
     /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
@@ -208,11 +208,12 @@ impl HostedMap {
         ServiceError::new(ErrorCode::FailedPrecondition, "no_journal", message)
     }
 
-    fn out_of_reach(&self, folder: &MapFolder, first: u64) -> ServiceError {
+    fn out_of_reach(&self, folder: &MapFolder, first: u64, withdrawn: &[WithdrawnScan]) -> ServiceError {
         let message = format!(
-            "undo reaches back to revision {} of map {}, and the first of the scans made revision {first}; \
-             store.undo_revisions is {}, store.undo_bytes_max {}",
-            folder.used().undo_from,
+            "undo reaches back to revision {} of map {}, and the first of the scans made revision {first}: it takes a \
+             snapshot from before it, without scans that were undone later, and the journal from there on, which are kept \
+             within store.undo_revisions, {}, and store.undo_bytes_max, {}, and not where the map was restored since",
+            folder.undo_from(withdrawn),
             self.name,
             folder.settings().undo_revisions,
             folder.settings().undo_bytes_max

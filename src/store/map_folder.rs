@@ -166,11 +166,11 @@ impl MapFolder {
         if !self.facts.may_give_up() {
             return Ok(false);
         }
-        let before = self.used().undo_from;
+        let before = self.used().kept_from;
         let _writing = self.snapshots.lock();
         self.check_there()?;
         let given_up = self.forget(UndoReach { bytes_max: 0, ..self.undo_reach() }, &[]);
-        let gave_up = given_up.is_ok() && self.used().undo_from != before;
+        let gave_up = given_up.is_ok() && self.used().kept_from != before;
         self.facts.tell_given_up(gave_up);
         self.count_bytes();
         given_up.map(|()| gave_up)
@@ -200,6 +200,11 @@ impl MapFolder {
     /// How much is kept, and how. Waits for no disk.
     pub fn used(&self) -> FolderUse {
         self.facts.used()
+    }
+
+    /// The oldest revision that undo reaches, where the scans of `withdrawn` were taken out before. Waits for no disk.
+    pub fn undo_from(&self, withdrawn: &[WithdrawnScan]) -> u64 {
+        self.facts.undo_from(withdrawn)
     }
 
     /// True where the map was deleted, and this folder with it.

@@ -87,3 +87,27 @@ async fn scope_insert_undoes_scans_of_named_robots_and_deletes_nothing() {
         assert_eq!(http(&server, path, body, &key).await.as_deref(), Some("scope_too_small"), "{path}");
     }
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_keys_request_ids_are_not_anothers() {
+    let (server, [mallory, alice]) =
+        Guarded::start_with(|keys| ["mallory", "alice"].map(|name| keys.add(name, Scope::Write, None))).await;
+    server.make_map("own").await;
+    let ask = async |path: &str, body: Value, key: &Secret| {
+        let path = format!("/v1/maps/own/{path}");
+        server.http(Method::POST, &path, Some(key), Some(body)).await.json::<Value>().await.unwrap()
+    };
+    let scan =
+        json!({"robot": "r", "points": [[1, 2, 3], [4, 5, 6]], "guess": identity_json(), "align": false});
+    ask("scans", scan, &alice).await;
+    let delete = |point: [i32; 3]| json!({"points": [point], "request_id": "job-1"});
+    let first = ask("deletions", delete([1, 2, 3]), &mallory).await;
+    assert_eq!((&first["removed"], &first["replayed"]), (&json!(1), &json!(false)));
+    // The same id with other content, and nothing is told of the other's.
+    let second = ask("deletions", delete([4, 5, 6]), &alice).await;
+    assert_eq!((&second["removed"], &second["replayed"]), (&json!(1), &json!(false)), "{second}");
+    for (key, point, done) in [(&mallory, [1, 2, 3], first), (&alice, [4, 5, 6], second)] {
+        let again = ask("deletions", delete(point), key).await;
+        assert_eq!((&again["replayed"], &again["revision"]), (&json!(true), &done["revision"]));
+    }
+}

@@ -32,10 +32,14 @@ pub(crate) fn empty() -> MultiResolutionMap {
     MultiResolutionMap::new(MapSettings::new(0.1, 5)).unwrap()
 }
 
-pub(crate) fn commit(folder: &MapFolder, map: &MultiResolutionMap, place: i32) {
+pub(crate) fn insertion(place: i32) -> Change {
     let voxels: VoxelSet = (0..9).filter_map(|i| VoxelKey::new([place, i, 0])).collect();
     let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
-    let change = Change::Insertion(ScanRecord::of_voxels(pose, voxels));
+    Change::Insertion(ScanRecord::of_voxels(pose, voxels))
+}
+
+pub(crate) fn commit(folder: &MapFolder, map: &MultiResolutionMap, place: i32) {
+    let change = insertion(place);
     folder.append(&[&Record::of(&change).unwrap()]).unwrap();
     folder.sync().unwrap();
     map.committer().apply(&change);
@@ -314,19 +318,19 @@ fn what_undo_alone_needs_is_bounded_in_bytes_and_stays_while_it_is_read() {
         folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
     };
     grow(0);
-    let scan = folder.used().undo_from;
+    let scan = folder.used().kept_from;
     let reading = folder.observations(&[scan], &[], |_| Ok::<_, Infallible>(()), StopSignal::NEVER).unwrap();
     (1..20).for_each(|i| grow(i * 10));
-    assert_eq!(folder.used().undo_from, scan, "what is read went");
+    assert_eq!(folder.used().kept_from, scan, "what is read went");
     let mut reading = reading;
     folder.observe(&mut reading, StopSignal::NEVER).unwrap();
     assert_eq!(reading.revision, 200);
     drop(reading);
     grow(200);
-    let reach = folder.used().undo_from;
+    let reach = folder.used().kept_from;
     assert!(reach > 100 && reach < 200, "undo reaches back to {reach}");
     assert!(folder.give_up_undo().unwrap());
-    assert_eq!(folder.used().undo_from, 201);
+    assert_eq!(folder.used().kept_from, 201);
     assert!(!folder.give_up_undo().unwrap());
     drop((folder, data));
     let opened = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();

@@ -4,11 +4,12 @@ use std::cell::Cell;
 use std::convert::Infallible;
 use std::path::Path;
 
-use mrol::store::{FileSystem, OpeningProgress, Snapshot, StoreError};
+use mrol::map::WithdrawnScan;
+use mrol::store::{FileSystem, NotObserved, OpeningProgress, Record, Snapshot, StoreError};
 use mrol::util::StopSignal;
 use uuid::Uuid;
 
-use super::incarnations::{commit, data_dir, empty, office};
+use super::incarnations::{commit, data_dir, empty, insertion, office};
 use super::simulated::{Fault, SimulatedDisk};
 
 const MAPS: &str = "data/maps";
@@ -52,6 +53,30 @@ fn a_map_whose_creation_failed_is_not_there_after_a_restart() {
         }
     }
     assert!(failed > 3, "{failed} of {operations} operations");
+}
+
+#[test]
+fn a_full_disk_keeps_no_map_from_being_opened() {
+    let (disk, map, uuid) = (SimulatedDisk::default(), empty(), Uuid::new_v4());
+    let folder = data_dir(&disk).create(&office(), &Snapshot::of(&map, uuid)).unwrap();
+    commit(&folder, &map, 1);
+    folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+    // The next record begins a segment: its file is made, and half of its header written.
+    disk.set_fault(Some(Fault::Full));
+    assert!(folder.append(&[&Record::of(&insertion(2)).unwrap()]).is_err());
+    drop(folder);
+    for _ in 0..2 {
+        let opened = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();
+        assert!(opened.map.contents() == map.contents());
+        assert!(opened.folder.append(&[&Record::of(&insertion(2)).unwrap()]).is_err());
+    }
+    disk.set_fault(None);
+    let opened = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();
+    commit(&opened.folder, &opened.map, 2);
+    let contents = opened.map.contents();
+    drop(opened);
+    let again = data_dir(&disk).map(&office(), &OpeningProgress::default()).unwrap();
+    assert!(again.map.contents() == contents);
 }
 
 #[test]
@@ -156,6 +181,33 @@ fn undo_that_cannot_be_given_up_loses_nothing() {
             assert!(opened.map.contents() == map.contents(), "operation {at} failed: changes are lost");
         }
     }
+}
+
+#[test]
+fn undo_reaches_what_it_is_said_to_reach() {
+    let (disk, map, uuid) = (SimulatedDisk::default(), empty(), Uuid::new_v4());
+    let folder = data_dir(&disk).create(&office(), &Snapshot::of(&map, uuid)).unwrap();
+    for snapshot in [10, 20] {
+        while map.revision() < snapshot {
+            commit(&folder, &map, map.revision() as i32);
+        }
+        folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+    }
+    (0..5).for_each(|i| commit(&folder, &map, i));
+    folder.give_up_undo().unwrap();
+    let reach = |withdrawn: &[WithdrawnScan]| {
+        let from = folder.undo_from(withdrawn);
+        let observe =
+            |scan| folder.observations(&[scan], withdrawn, |_| Ok::<_, Infallible>(()), StopSignal::NEVER);
+        assert!(from > map.revision() || observe(from).is_ok());
+        assert!(matches!(observe(from - 1), Err(NotObserved::OutOfReach)));
+        from
+    };
+    // The snapshots of revisions 10 and 20 are left.
+    assert_eq!(reach(&[]), 11);
+    assert_eq!(reach(&[WithdrawnScan { scan: 5, revision: 18 }]), 21);
+    assert_eq!(reach(&[WithdrawnScan { scan: 15, revision: 24 }]), 11);
+    assert_eq!(reach(&[WithdrawnScan { scan: 5, revision: 24 }]), 26);
 }
 
 #[test]

@@ -20,6 +20,8 @@ pub enum Fault {
     FallsShort(usize),
     /// The power goes: this operation and all after it fail.
     Crash(usize),
+    /// There is no space left: files can be made, and have half of what is first written to them.
+    Full,
 }
 
 /// A handle; clones are the same file system.
@@ -275,7 +277,9 @@ impl Appending for SimulatedFile {
     fn append(&mut self, new: &[u8]) -> io::Result<()> {
         let mut state = self.disk.state();
         let allowed = state.operation();
-        let short = matches!(state.fault, Some(Fault::FallsShort(_) | Fault::Crash(_)));
+        let short = matches!(state.fault, Some(Fault::FallsShort(_) | Fault::Crash(_) | Fault::Full));
+        let allowed =
+            if state.fault == Some(Fault::Full) { Err(error(ErrorKind::StorageFull)) } else { allowed };
         if let Node::File { bytes, .. } = &mut state.nodes[self.id] {
             match allowed {
                 Ok(()) => bytes.extend_from_slice(new),

@@ -22,6 +22,9 @@ pub(super) fn open_all(
         tracing::warn!(path = %path.display(), "not understood, and left alone: no map");
     }
     data_dir.expect(&stock.maps, progress);
+    if let Some(error) = &stock.not_swept {
+        tracing::warn!(%error, "what a crash left unfinished cannot be swept away: the next start tries again");
+    }
     let mut maps = Named::default();
     for name in stock.maps {
         tracing::info!(map = %name, "opening");
@@ -41,9 +44,9 @@ pub(super) fn open_all(
         }
     }
     for (name, error) in stock.refused {
-        // The map that is there is served; the file waits for somebody.
+        // The map that is there is served; the rest waits for somebody, or for the next start.
         if maps.open.contains_key(&name) || maps.unavailable.contains_key(&name) {
-            tracing::error!(map = %name, %error, "a map file is not taken in");
+            tracing::error!(map = %name, %error, "what the data folder has for this map is not put right");
         } else {
             maps.set_unavailable(name, &error);
         }

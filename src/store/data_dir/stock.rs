@@ -18,6 +18,8 @@ pub struct Stock {
     pub refused: Vec<(MapName, StoreError)>,
     /// Files and folders that nobody understands.
     pub not_understood: Vec<PathBuf>,
+    /// Why what a crash left unfinished is there still. Nobody looks for it, and the next start tries again.
+    pub not_swept: Option<StoreError>,
 }
 
 impl DataDir {
@@ -36,9 +38,9 @@ impl DataDir {
     /// # Errors
     /// As there; `Cancelled` where nobody wants them any more.
     pub fn take_stock_until(&self, progress: &OpeningProgress) -> Result<Stock, StoreError> {
-        folder::sweep(&*self.files, &self.maps)?;
-        self.end_replacements()?;
-        let mut stock = Stock::default();
+        let not_swept = folder::sweep(&*self.files, &self.maps).err();
+        let mut stock = Stock { not_swept, ..Stock::default() };
+        self.end_replacements(&mut stock)?;
         for entry in self.entries()? {
             match Entry::of(&entry) {
                 Entry::MapFile(name) => match self.take_in(&name, progress) {
@@ -71,17 +73,18 @@ impl DataDir {
         }
     }
 
-    /// Ends the replacements of maps that a crash came between.
-    fn end_replacements(&self) -> Result<(), StoreError> {
+    /// Ends the replacements of maps that a crash came between. Where one cannot be ended, neither map of the name can be
+    /// told from the other: it is refused, and the next start tries again.
+    fn end_replacements(&self, stock: &mut Stock) -> Result<(), StoreError> {
         for entry in self.entries()? {
-            if !matches!(Entry::of(&entry), Entry::Map { .. }) {
-                continue;
-            }
+            let Entry::Map { name, .. } = Entry::of(&entry) else { continue };
             let new = self.maps.join(&entry);
             // Told when the map is opened, where something is wrong with it.
             let Ok(Some(replacement)) = Replacement::in_folder(&*self.files, &new) else { continue };
-            replacement.keep_old(&*self.files, &self.maps)?;
-            replacement::finish(&*self.files, &new)?;
+            let ended = replacement.keep_old(&*self.files, &self.maps);
+            if let Err(error) = ended.and_then(|()| replacement::finish(&*self.files, &new)) {
+                stock.refused.push((name, error));
+            }
         }
         Ok(())
     }

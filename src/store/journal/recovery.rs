@@ -174,8 +174,9 @@ impl Segment<'_> {
     fn cut(&self, broken: Break, place: &Place) -> Result<Cut, StoreError> {
         let (offset, bytes) = (broken.offset as u64, self.bytes.len() as u64);
         let cut = || match offset {
-            // Begun anew and not removed: the segment before it would be the last then, and be read by other rules.
-            0 => place.begin_segment(self.first).map(drop),
+            // Begun anew and not removed: the segment before it would be the last then, and be read by other rules. Where that
+            // fails, as on a full disk, it is as good as it was: the next record begins it anew.
+            0 => place.begin_segment(self.first).map(drop).or(Ok(())),
             _ => place.files.truncate(self.path, offset).and_then(|()| place.files.sync(self.path)),
         };
         cut().map_err(StoreError::io(self.path))?;

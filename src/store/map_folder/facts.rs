@@ -22,8 +22,8 @@ pub struct FolderUse {
     pub durable: u64,
     /// The newest snapshot's revision.
     pub snapshot: u64,
-    /// Scans of this revision and later can be undone.
-    pub undo_from: u64,
+    /// The revision from which on all changes are kept.
+    pub kept_from: u64,
     /// What the journal has done.
     pub journal: JournalUse,
     /// Time since the newest snapshot was written, or since the folder was opened where that was later.
@@ -176,11 +176,11 @@ impl Facts {
         let oldest = known.snapshots.first().copied().unwrap_or_default();
         let snapshot = known.snapshots.last().copied().unwrap_or_default();
         let tail = known.segments.first().copied();
-        let undo_from = tail.map_or(known.head + 1, |tail| tail.max(oldest + 1));
+        let kept_from = tail.map_or(known.head + 1, |tail| tail.max(oldest + 1));
         FolderUse {
             durable: known.durable,
             snapshot,
-            undo_from,
+            kept_from,
             journal: known.journal,
             snapshot_age: known.saved.at.elapsed(),
             snapshot_failures: known.saved.failures,
@@ -194,14 +194,18 @@ impl Facts {
         (known.segments.clone(), known.head)
     }
 
+    /// The oldest revision that undo reaches, where the scans of `withdrawn` were taken out before.
+    pub(super) fn undo_from(&self, withdrawn: &[WithdrawnScan]) -> u64 {
+        let known = self.lock();
+        let fits = |snapshot: &&u64| known.is_base(**snapshot, withdrawn);
+        known.snapshots.iter().find(fits).map_or(known.head, |base| *base) + 1
+    }
+
     /// The newest snapshot that undo can begin with, which stays as long as somebody reads from there.
     pub(super) fn pin_base_of(&self, scans: &[u64], withdrawn: &[WithdrawnScan]) -> Option<Pin> {
         let first = *scans.iter().min()?;
         let mut known = self.lock();
-        let tail = known.segments.first().copied()?;
-        let fits = |&&snapshot: &&u64| {
-            snapshot < first && tail <= snapshot + 1 && retention::is_base(snapshot, withdrawn)
-        };
+        let fits = |&&snapshot: &&u64| snapshot < first && known.is_base(snapshot, withdrawn);
         let snapshot = known.snapshots.iter().rfind(fits).copied()?;
         known.pinned.push(snapshot);
         drop(known);
@@ -222,5 +226,14 @@ impl Facts {
         }
         known.snapshots.clone_from(&kept);
         kept
+    }
+}
+
+impl Known {
+    /// True of a snapshot that undo can begin with: the journal is kept from there on, and it holds nothing of a scan that
+    /// was withdrawn after it.
+    fn is_base(&self, snapshot: u64, withdrawn: &[WithdrawnScan]) -> bool {
+        let is_kept = self.segments.first().is_some_and(|tail| *tail <= snapshot + 1);
+        is_kept && retention::is_base(snapshot, withdrawn)
     }
 }

@@ -295,12 +295,13 @@ impl<'a> Body<'a> {
         Ok(scans)
     }
 
-    /// Each of its own revision, and each id once a kind: which answer is whose is told by them.
+    /// Each of its own revision, and each id of a caller once a kind: which answer is whose is told by them.
     fn requests(&self) -> Result<Requests, Unreadable> {
         let requests: Vec<AnsweredRequest> =
             self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?;
         let ascend = requests.is_sorted_by(|one, next| one.revision < next.revision);
-        let ids: HashSet<_> = requests.iter().map(|request| (&request.id, request.kind())).collect();
+        let ids: HashSet<_> =
+            requests.iter().map(|request| (&request.caller, &request.id, request.kind())).collect();
         if !ascend || ids.len() != requests.len() {
             return Err("the revisions of its requests must ascend, and their ids must differ".into());
         }
