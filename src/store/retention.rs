@@ -25,8 +25,9 @@ pub(super) fn kept(
 ) -> Vec<u64> {
     let can_be_base = |snapshot: &&u64| is_base(**snapshot, withdrawn);
     let reach = head.saturating_sub(undo_revisions);
-    let base =
-        snapshots.iter().filter(|&&snapshot| snapshot <= reach).rfind(can_be_base).or(snapshots.first());
+    // Where none is old enough, the oldest that undo can begin with: what is older is of no use to it.
+    let base = snapshots.iter().filter(|&&snapshot| snapshot <= reach).rfind(can_be_base);
+    let base = base.or_else(|| snapshots.iter().find(can_be_base));
     // So that the base can move on without all snapshots being kept until then.
     let next = snapshots.iter().filter(|&snapshot| Some(snapshot) > base).find(can_be_base);
     let newest = snapshots.iter().rev().take(FOR_RECOVERY);
@@ -129,5 +130,13 @@ mod tests {
         let bases: Vec<u64> = (1..7).map(|i| i * 10).filter(|&s| is_base(s, &withdrawn)).collect();
         assert_eq!(bases, [10, 50, 60]);
         assert_eq!(kept(&[10, 20, 30, 40, 50, 60, 70], 70, 30, &withdrawn), [10, 50, 60, 70]);
+    }
+
+    #[test]
+    fn what_is_kept_for_undo_begins_with_a_base_where_there_is_one() {
+        let withdrawn = [WithdrawnScan { scan: 5, revision: 45 }];
+        let snapshots = [10, 20, 30, 50, 60, 70];
+        assert_eq!(kept(&snapshots, 70, 1000, &withdrawn), [50, 60, 70]);
+        assert_eq!(kept(&[10, 20, 30, 40], 40, 1000, &withdrawn), [30, 40]);
     }
 }
