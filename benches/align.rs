@@ -3,8 +3,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use mrol::align::{AlignmentSettings, Method, align};
 use mrol::geometry::{Point, Pose};
+use mrol::lab::simulate::{Scene, Tour, tours};
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use mrol::scan::{Scene, Tour, tours};
 use mrol::voxel::volumetric_sample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

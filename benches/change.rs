@@ -1,7 +1,7 @@
 //! Changes: points in voxels that are not there, in voxels that are, and out again; all levels and filters.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use mrol::bench::workload::{Order, Queries, Room, Site, Workload, add};
+use mrol::lab::workload::{Order, Queries, Room, Site, Workload, add};
 use mrol::map::{MapSettings, MultiResolutionMap};
 use mrol::voxel::{Lattice, VoxelSet};
 

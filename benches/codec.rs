@@ -3,7 +3,7 @@
 
 use bytes::Bytes;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mrol::bench::workload::{Order, Room, Site, Workload};
+use mrol::lab::workload::{Order, Room, Site, Workload};
 use mrol::map::{
     Change, Lookup, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
 };

@@ -11,7 +11,7 @@ use std::hint::black_box;
 use bytes::Bytes;
 use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
-use mrol::bench::workload::{Order, Queries, Room, Workload, add};
+use mrol::lab::workload::{Order, Queries, Room, Workload, add};
 use mrol::map::lookup::stages;
 use mrol::map::{Lookup, MapName, MapSettings, MultiResolutionMap};
 use mrol::service::{MapState, PointAnswer, PointQuery};

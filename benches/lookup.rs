@@ -3,8 +3,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mrol::bench::structures::StructureName;
-use mrol::bench::workload::{Order, Room, Site, Workload};
+use mrol::lab::rivals::StructureName;
+use mrol::lab::workload::{Order, Room, Site, Workload};
 use mrol::map::lookup::stages;
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap};
 

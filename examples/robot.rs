@@ -10,8 +10,9 @@ use std::path::PathBuf;
 
 use mrol::client::{Client, Credentials, NewMap};
 use mrol::geometry::{Point, translation_m};
+use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{MapName, RobotName};
-use mrol::scan::{Scene, read_points, scan_files, tours};
+use mrol::scan::{read_points, scan_files};
 use mrol::service::ScanRequest;
 use rand::SeedableRng;
 

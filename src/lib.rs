@@ -6,11 +6,12 @@
 //! * [`voxel`], [`bloom`], [`geometry`]: keys, lattice and blocks (paper II-B, III); counting Bloom filters (II-A);
 //!   points and poses.
 //! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
-//!   point-cloud files and simulated sensors.
+//!   point-cloud files.
 //! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Open this first.
 //! * `store`: map files. `service`: the operations, once for every protocol.
 //! * `wire`: between generated and domain types. `access`: the operations by name, and who may ask for each. `grpc`,
 //!   `http`, `client`: adapters. `server`, `cli`: the daemon and the program.
+//! * `lab`: what simulates, measures and compares. Nothing but `cli` names it.
 //!
 //! The first four lines know no runtime, no protocol and no serialisation, and are there without any feature:
 //!
@@ -45,8 +46,6 @@ pub mod access;
 #[cfg(feature = "server")]
 pub mod admission;
 pub mod align;
-#[cfg(feature = "server")]
-pub mod bench;
 pub mod bloom;
 #[cfg(feature = "server")]
 pub mod cli;
@@ -59,6 +58,8 @@ pub mod geometry;
 pub mod grpc;
 #[cfg(feature = "server")]
 pub mod http;
+#[cfg(feature = "simulate")]
+pub mod lab;
 #[cfg(feature = "server")]
 pub mod lifecycle;
 pub mod map;

@@ -4,8 +4,8 @@
 
 use mrol::align::{Alignment, AlignmentSettings, Verdict, WideStartSettings, align};
 use mrol::geometry::{Point, Pose, pose_difference};
+use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use mrol::scan::{Scene, tours};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -10,8 +10,8 @@ mod shared_scans;
 use mrol::align::{AlignmentSettings, Method, WideStartSettings, align};
 use mrol::bloom::FilterSettings;
 use mrol::geometry::{Point, Pose, pose_difference};
+use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use mrol::scan::{Scene, tours};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

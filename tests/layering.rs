@@ -4,14 +4,15 @@
 use std::path::{Path, PathBuf};
 
 /// Modules and their layers, bottom first.
-const LAYERS: [&[&str]; 7] = [
+const LAYERS: [&[&str]; 8] = [
     &["util", "sync", "voxel", "bloom", "geometry"],
     &["map", "align", "scan", "mapping"],
     &["store"],
     &["service"],
-    &["bench", "wire", "config", "telemetry", "lifecycle", "admission", "reload", "access"],
+    &["wire", "config", "telemetry", "lifecycle", "admission", "reload", "access"],
     &["grpc", "http", "client"],
-    &["server", "cli", "main"],
+    &["server", "lab"],
+    &["cli", "main"],
 ];
 
 /// Crates that layers 0 and 1 must not know.

@@ -8,8 +8,8 @@ use mrol::align::localize::{
 };
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Point, Pose, pose_difference, translation_m};
+use mrol::lab::simulate::{Scene, Tour, tours};
 use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
-use mrol::scan::{Scene, Tour, tours};
 use mrol::util::StopSignal;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

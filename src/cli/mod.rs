@@ -5,16 +5,18 @@
 //! makes no sense.
 
 mod alignment_options;
-mod bench;
 mod config;
 mod delete;
-mod demo;
 mod doctor;
 mod error;
-mod experiment;
 mod health;
 mod insert;
 mod key;
+#[cfg(feature = "lab")]
+mod lab;
+#[cfg(not(feature = "lab"))]
+#[path = "without_lab.rs"]
+mod lab;
 mod localize;
 mod map;
 mod map_report;
@@ -25,7 +27,6 @@ mod query;
 mod remote;
 mod runtime;
 mod scan_report;
-mod sequence;
 mod serve;
 mod snapshot;
 mod statistics;
@@ -64,7 +65,8 @@ struct CommandLine {
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Serve),
-    Demo(demo::Demo),
+    #[command(flatten)]
+    Lab(lab::Lab),
     Map(map::Map),
     Insert(insert::Insert),
     Localize(localize::Localize),
@@ -72,8 +74,6 @@ enum Command {
     Delete(delete::Delete),
     Undo(undo::UndoScans),
     Maps(maps::Maps),
-    Bench(bench::Bench),
-    Experiment(experiment::Experiment),
     Health(health::Health),
     Key(key::Keys),
     Snapshot(snapshot::TakeSnapshots),
@@ -102,7 +102,7 @@ impl Command {
     fn run(self, output: Output) -> Result<(), CliError> {
         match self {
             Self::Serve(serve) => runtime::block_on(serve.run(output)),
-            Self::Demo(demo) => runtime::block_on(demo.run(output)),
+            Self::Lab(lab) => lab.run(output),
             Self::Map(map) => map.run(output),
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
             Self::Localize(localize) => runtime::block_on(localize.run(output)),
@@ -110,8 +110,6 @@ impl Command {
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
-            Self::Bench(bench) => bench.run(output),
-            Self::Experiment(experiment) => experiment.run(output),
             Self::Health(health) => runtime::block_on(health.run(output)),
             Self::Key(key) => key.run(&output),
             Self::Snapshot(snapshot) => runtime::block_on(snapshot.run(output)),

@@ -18,7 +18,8 @@ mod remote;
 
 use assert_cmd::Command;
 use mrol::geometry::{Pose, rotation_xyzw, translation_m};
-use mrol::scan::{Scene, StampedPose, tours, write_ply, write_trajectory};
+use mrol::lab::simulate::{Scene, tours};
+use mrol::scan::{StampedPose, write_ply, write_trajectory};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;

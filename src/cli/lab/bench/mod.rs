@@ -1,0 +1,72 @@
+//! `mrol bench`: what everything costs on this machine.
+
+mod align;
+mod growth;
+mod insert;
+mod journal;
+mod lookup;
+mod readers;
+mod serve;
+mod soak;
+mod start;
+pub(super) mod workload;
+
+use clap::Subcommand;
+
+use crate::cli::error::CliError;
+use crate::cli::output::Output;
+use crate::cli::runtime;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol bench lookup                                   this map against other structures, in a simulated room
+  mrol bench lookup --workload site --order scan      the same on ten million voxels, as a sensor asks
+  mrol bench lookup --voxels map.ply --points scan.ply --resolution 0.05
+  mrol bench insert --workload site
+  mrol bench journal --workload site                  what it costs that nothing is lost
+  mrol bench growth --workload site                   memory, and who waits, while ten million voxels go in
+  mrol bench start --workload site                    a start with ten million voxels
+  mrol bench align scans/ --resolution 0.05
+  mrol bench readers --workload site                  readers beside each other, and beside a writer
+  mrol bench serve                                    a load of point queries on a server of its own
+  mrol bench soak                                     an hour under a fleet's load: memory, errors
+
+Figures are medians of several runs; give the machine nothing else to do meanwhile. `mrol bench WHAT --help`
+explains each.";
+
+/// Measure look-ups, insertions, alignments and a server's answers on this machine
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(in crate::cli) struct Bench {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    Lookup(lookup::Lookup),
+    Insert(insert::Insert),
+    Growth(growth::Growth),
+    Journal(journal::Journal),
+    Align(align::Align),
+    Readers(readers::Readers),
+    Serve(serve::Serve),
+    Soak(soak::Soak),
+    Start(start::Start),
+}
+
+impl Bench {
+    pub(super) fn run(self, output: Output) -> Result<(), CliError> {
+        match self.what {
+            What::Lookup(lookup) => lookup.run(&output),
+            What::Insert(insert) => insert.run(&output),
+            What::Growth(growth) => growth.run(&output),
+            What::Journal(journal) => runtime::block_on(journal.run(output)),
+            What::Align(align) => align.run(&output),
+            What::Readers(readers) => readers.run(&output),
+            What::Start(start) => start.run(&output),
+            What::Serve(serve) => runtime::block_on(serve.run(output)),
+            What::Soak(soak) => runtime::block_on(soak.run(output)),
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Connections that ask again and again.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use hdrhistogram::Histogram;
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+use tokio_stream::wrappers::ReceiverStream;
+
+use super::address::{GrpcAddress, HttpAddress};
+use super::http::HttpConnection;
+use crate::cli::error::CliError;
+use crate::geometry::{Pose, rotation_xyzw, translation_m};
+use crate::lab::workload::Queries;
+use crate::map::{Lookup, MapName};
+use crate::service::{PointCloud, PointQuery};
+
+/// Answers that take longer count as this long: ten minutes.
+const LATENCY_NS_MAX: u64 = 600_000_000_000;
+/// Digits of a time that are kept.
+const LATENCY_DIGITS: u8 = 3;
+
+/// What is asked, message after message.
+#[derive(Debug, Clone)]
+pub(in crate::cli::lab::bench) struct Question {
+    messages: Arc<[PointCloud]>,
+    map_from_points: Pose,
+    lookup: Lookup,
+}
+
+impl Question {
+    /// Messages of `points` points each, all of `queries` in turn.
+    pub(in crate::cli::lab::bench) fn of(queries: &Queries, points: usize, lookup: Lookup) -> Self {
+        let mut endless = queries.points.iter().cycle().copied();
+        let messages = queries.points.len().div_ceil(points);
+        let message = |_| PointCloud::from(endless.by_ref().take(points).collect::<Vec<_>>());
+        let messages = (0..messages).map(message).collect();
+        Self { messages, map_from_points: queries.map_from_points, lookup }
+    }
+
+    pub(in crate::cli::lab::bench) fn query(&self, message: usize) -> PointQuery {
+        PointQuery {
+            points: self.points(message),
+            map_from_points: Some(self.map_from_points),
+            level: 0,
+            lookup: self.lookup,
+            min_revision: None,
+            map_uuid: None,
+        }
+    }
+
+    pub(in crate::cli::lab::bench) fn points(&self, message: usize) -> PointCloud {
+        self.messages[message % self.messages.len()].clone()
+    }
+
+    /// All of it but the points, as an address.
+    pub(in crate::cli::lab::bench) fn asked_at(&self, server: &HttpAddress, map: &MapName) -> HttpAddress {
+        let ([x, y, z], [qx, qy, qz, qw]) =
+            (translation_m(&self.map_from_points), rotation_xyzw(&self.map_from_points));
+        let lookup = self.lookup.as_str();
+        let url = format!(
+            "{}/v1/maps/{map}/occupancy?lookup={lookup}&pose={x},{y},{z},{qx},{qy},{qz},{qw}",
+            server.url
+        );
+        HttpAddress { url, ..server.clone() }
+    }
+}
+
+/// A way to ask.
+#[derive(Debug, Clone)]
+pub(super) enum Load {
+    Unary { server: GrpcAddress, map: MapName, question: Question },
+    Stream { server: GrpcAddress, map: MapName, question: Question, in_flight: usize },
+    Http { http: HttpAddress, question: Question },
+}
+
+/// All answers of some time.
+pub(super) struct Answered {
+    /// Nanoseconds from question to answer.
+    pub(super) latencies: Histogram<u64>,
+    pub(super) points: usize,
+    pub(super) occupied: usize,
+    pub(super) seconds: f64,
+}
+
+impl Answered {
+    fn none() -> Result<Self, CliError> {
+        let latencies =
+            Histogram::new_with_bounds(1, LATENCY_NS_MAX, LATENCY_DIGITS).map_err(CliError::failed)?;
+        Ok(Self { latencies, points: 0, occupied: 0, seconds: 0.0 })
+    }
+
+    fn add(&mut self, asked: Instant, points: usize, occupied: usize) {
+        self.latencies.saturating_record(asked.elapsed().as_nanos() as u64);
+        self.points += points;
+        self.occupied += occupied;
+    }
+
+    fn merge(&mut self, other: &Self) -> Result<(), CliError> {
+        self.latencies.add(&other.latencies).map_err(CliError::failed)?;
+        self.points += other.points;
+        self.occupied += other.occupied;
+        Ok(())
+    }
+}
+
+impl Load {
+    /// Asks over `connections` connections for `time`.
+    pub(super) async fn run(&self, connections: usize, time: Duration) -> Result<Answered, CliError> {
+        let mut asking = JoinSet::new();
+        let start = Instant::now();
+        for connection in 0..connections {
+            // Each begins with another message.
+            asking.spawn(self.clone().ask(connection, time));
+        }
+        let mut all = Answered::none()?;
+        while let Some(answered) = asking.join_next().await {
+            all.merge(&answered.map_err(CliError::failed)??)?;
+        }
+        all.seconds = start.elapsed().as_secs_f64();
+        Ok(all)
+    }
+
+    async fn ask(self, first: usize, time: Duration) -> Result<Answered, CliError> {
+        match self {
+            Self::Unary { server, map, question } => unary(&server, &map, &question, first, time).await,
+            Self::Stream { server, map, question, in_flight } => {
+                stream(&server, &map, &question, first, in_flight, time).await
+            }
+            Self::Http { http, question } => over_http(&http, &question, first, time).await,
+        }
+    }
+}
+
+async fn unary(
+    server: &GrpcAddress,
+    map: &MapName,
+    question: &Question,
+    first: usize,
+    time: Duration,
+) -> Result<Answered, CliError> {
+    let client = server.connect().await?;
+    let (mut answered, start) = (Answered::none()?, Instant::now());
+    for message in first.. {
+        let asked = Instant::now();
+        if asked - start >= time {
+            break;
+        }
+        let answer = client.query_points(map, question.query(message)).await?;
+        answered.add(asked, answer.points, answer.points_occupied);
+    }
+    Ok(answered)
+}
+
+async fn over_http(
+    address: &HttpAddress,
+    question: &Question,
+    first: usize,
+    time: Duration,
+) -> Result<Answered, CliError> {
+    let connection = HttpConnection::to(address)?;
+    let (mut answered, start) = (Answered::none()?, Instant::now());
+    for message in first.. {
+        let asked = Instant::now();
+        if asked - start >= time {
+            break;
+        }
+        let points = question.points(message);
+        let count = points.len();
+        let occupied = connection.ask(points).await?;
+        answered.add(asked, count, occupied);
+    }
+    Ok(answered)
+}
+
+/// One stream, on which the next message is sent for each that is answered.
+async fn stream(
+    server: &GrpcAddress,
+    map: &MapName,
+    question: &Question,
+    first: usize,
+    in_flight: usize,
+    time: Duration,
+) -> Result<Answered, CliError> {
+    let client = server.connect().await?;
+    let (mut answered, start) = (Answered::none()?, Instant::now());
+    let (sender, questions) = mpsc::channel(in_flight);
+    let mut answers = client.query_stream(map, ReceiverStream::new(questions)).await?;
+    let (mut under_way, mut messages) = (VecDeque::new(), first..);
+    // Without a sender the stream ends, once all is answered.
+    let mut sender = Some(sender);
+    loop {
+        while let Some(open) = sender.as_ref().filter(|_| under_way.len() < in_flight) {
+            under_way.push_back(Instant::now());
+            let message = messages.next().unwrap_or(first);
+            // Who does not read any more says why in an answer.
+            let _ = open.send(question.query(message)).await;
+        }
+        let Some(answer) = answers.next().await else {
+            return Ok(answered);
+        };
+        let (answer, asked) = (answer?, under_way.pop_front().unwrap_or(start));
+        answered.add(asked, answer.points, answer.points_occupied);
+        if start.elapsed() >= time {
+            sender = None;
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! A member of the fleet that asks.
+
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+
+use super::fleet::Member;
+use crate::cli::error::CliError;
+use crate::cli::lab::bench::serve::{HttpAddress, HttpConnection, Question, Target};
+use crate::client::{Answers, Client};
+use crate::map::MapName;
+use crate::service::{PointAnswer, PointQuery};
+
+/// Asks about points, by every protocol in turn.
+pub(super) struct Planner {
+    map: MapName,
+    question: Question,
+    client: Client,
+    stream: QueryStream,
+    http: HttpConnection,
+}
+
+impl Planner {
+    pub(super) async fn new(target: &Target, question: Question) -> Result<Self, CliError> {
+        let client = target.grpc.connect().await?;
+        let http = target.http.clone().unwrap_or_else(|| HttpAddress::open(""));
+        Ok(Self {
+            map: target.map.clone(),
+            http: HttpConnection::to(&question.asked_at(&http, &target.map))?,
+            stream: QueryStream::open(&client, &target.map).await?,
+            client,
+            question,
+        })
+    }
+}
+
+impl Member for Planner {
+    async fn carry_out(&mut self, number: u64) -> Result<(), CliError> {
+        let message = number as usize;
+        match number % 3 {
+            0 => {
+                self.client.query_points(&self.map, self.question.query(message)).await?;
+            }
+            1 => self.stream.ask(self.question.query(message)).await?,
+            _ => {
+                self.http.ask(self.question.points(message)).await?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A stream of queries with one under way at a time.
+struct QueryStream {
+    questions: mpsc::Sender<PointQuery>,
+    answers: Answers<PointAnswer>,
+}
+
+impl QueryStream {
+    async fn open(client: &Client, map: &MapName) -> Result<Self, CliError> {
+        let (questions, asked) = mpsc::channel(1);
+        let answers = client.query_stream(map, ReceiverStream::new(asked)).await?;
+        Ok(Self { questions, answers })
+    }
+
+    async fn ask(&mut self, query: PointQuery) -> Result<(), CliError> {
+        // Who does not read any more says why in an answer.
+        let _ = self.questions.send(query).await;
+        match self.answers.next().await {
+            Some(answer) => answer.map(drop).map_err(CliError::from),
+            None => Err(CliError::failed("the stream of queries was ended")),
+        }
+    }
+}

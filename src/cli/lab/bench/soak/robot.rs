@@ -1,0 +1,171 @@
+//! A member of the fleet that maps.
+
+use std::sync::Arc;
+
+use super::fleet::Member;
+use crate::cli::error::CliError;
+use crate::cli::lab::bench::serve::Target;
+use crate::client::{Client, NewMap};
+use crate::geometry::{Point, Pose};
+use crate::lab::workload::Queries;
+use crate::map::{MapName, Region, RobotName};
+use crate::mapping::Guess;
+use crate::service::{Deletion, DeletionTarget, PointCloud, ScanRequest, Undo, UndoTarget};
+
+/// Points of a turn of the workload's sensor.
+pub(super) const TURN_POINTS: usize = 64 * 1024;
+/// Scans of a mission.
+const SCANS: u64 = 20;
+/// What is deleted at once.
+const DELETED_RADIUS_M: f64 = 0.3;
+
+/// What robots see of the workload, turn by turn.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    turns: Arc<[PointCloud]>,
+    map_from_points: Pose,
+}
+
+impl Seen {
+    /// Whole turns of `points`, each thinned evenly to `scan_points` at most.
+    pub(super) fn of(points: &Queries, scan_points: usize) -> Self {
+        let every = TURN_POINTS.div_ceil(scan_points);
+        let thinned = |turn: &[Point]| turn.iter().copied().step_by(every).collect::<Vec<_>>().into();
+        let turns = points.points.chunks_exact(TURN_POINTS).map(thinned).collect();
+        Self { turns, map_from_points: points.map_from_points }
+    }
+
+    /// The turns follow each other again and again.
+    fn turn(&self, number: u64) -> PointCloud {
+        self.turns[number as usize % self.turns.len()].clone()
+    }
+}
+
+/// A robot goes on one mission after the other, each with a map of its own that ends with it; one scan of each is for the
+/// map that all have.
+pub(super) struct Robot {
+    name: RobotName,
+    client: Client,
+    seen: Seen,
+    /// The map that all have,
+    shared: MapName,
+    /// and the mission's.
+    own: MapName,
+    settings: NewMap,
+    /// Steps of the mission that are done.
+    steps: u64,
+    /// The revision of the mission's map after half of its scans.
+    half_way: u64,
+}
+
+/// A step of a mission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    MakeMap,
+    Scan,
+    Delete,
+    UndoHalf,
+    ScanForAll,
+    DeleteForAll,
+    DeleteMap,
+}
+
+impl Step {
+    /// The step after `steps` steps of a mission.
+    fn after(steps: u64) -> Self {
+        match steps.checked_sub(SCANS) {
+            None if steps == 0 => Self::MakeMap,
+            None | Some(0) => Self::Scan,
+            Some(1) => Self::Delete,
+            Some(2) => Self::UndoHalf,
+            Some(3) => Self::ScanForAll,
+            Some(4) => Self::DeleteForAll,
+            Some(_) => Self::DeleteMap,
+        }
+    }
+}
+
+impl Robot {
+    pub(super) async fn new(number: u16, target: &Target, seen: Seen) -> Result<Self, CliError> {
+        let name = format!("soak-{number}");
+        Ok(Self {
+            own: MapName::new(&format!("{name}-own")).map_err(CliError::failed)?,
+            name: RobotName::new(&name).map_err(CliError::failed)?,
+            client: target.grpc.connect().await?,
+            seen,
+            shared: target.map.clone(),
+            settings: NewMap::of(target.resolution_m),
+            steps: 0,
+            half_way: 0,
+        })
+    }
+
+    /// Adds a turn, aligned or as it is. All turns fit, so that a refused one is an error here.
+    async fn insert(&self, map: &MapName, number: u64, at_guess: bool) -> Result<u64, CliError> {
+        let scan = ScanRequest {
+            scan_id: Some(number),
+            guess: Guess::Pose(self.seen.map_from_points),
+            at_guess,
+            ..ScanRequest::new(self.name.clone(), self.seen.turn(number))
+        };
+        let answer = self.client.insert_scan(map, scan).await?;
+        match answer.accepted {
+            true => Ok(answer.state.revision),
+            false => Err(CliError::failed(format!("a scan was refused: {}", answer.reason))),
+        }
+    }
+
+    /// Takes out what is around one point of a turn.
+    async fn delete(&self, map: &MapName, number: u64) -> Result<(), CliError> {
+        let turn = self.seen.turn(number);
+        let seen = turn.as_slice()[number as usize * 7919 % turn.len()];
+        let center_m = (self.seen.map_from_points * seen.to_f64()).into();
+        let ball = Region::ball(center_m, DELETED_RADIUS_M).map_err(CliError::failed)?;
+        let deletion = Deletion { target: DeletionTarget::Region(ball), level: 0, request_id: None };
+        self.client.delete_voxels(map, deletion).await?;
+        Ok(())
+    }
+
+    /// Takes out what came in since half-way.
+    async fn undo_half(&self) -> Result<(), CliError> {
+        let target = UndoTarget::RobotSince { robot: self.name.clone(), revision: self.half_way };
+        self.client.undo_scans(&self.own, Undo { target, request_id: None }).await?;
+        Ok(())
+    }
+}
+
+impl Member for Robot {
+    async fn carry_out(&mut self, number: u64) -> Result<(), CliError> {
+        let step = Step::after(self.steps);
+        self.steps = if step == Step::DeleteMap { 0 } else { self.steps + 1 };
+        match step {
+            Step::MakeMap => self.client.create_map(&self.own, self.settings).await.map(drop)?,
+            Step::Scan => {
+                // A few thinned turns are too little for others to overlap with.
+                let at_guess = self.steps <= SCANS / 2;
+                let revision = self.insert(&self.own, number, at_guess).await?;
+                if self.steps == SCANS / 2 {
+                    self.half_way = revision;
+                }
+            }
+            Step::Delete => self.delete(&self.own, number).await?,
+            Step::UndoHalf => self.undo_half().await?,
+            Step::ScanForAll => drop(self.insert(&self.shared, number, false).await?),
+            Step::DeleteForAll => self.delete(&self.shared, number).await?,
+            Step::DeleteMap => self.client.delete_map(&self.own).await?,
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mission_is_scans_and_what_becomes_of_them() {
+        let steps: Vec<_> = (0..).map(Step::after).take_while(|step| *step != Step::DeleteMap).collect();
+        assert_eq!(steps.iter().filter(|step| **step == Step::Scan).count() as u64, SCANS);
+        assert_eq!((steps[0], steps.len() as u64), (Step::MakeMap, SCANS + 5));
+    }
+}

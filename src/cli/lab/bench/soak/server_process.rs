@@ -1,0 +1,91 @@
+//! A server in a process of its own, so that its memory is its own.
+
+use std::path::Path;
+use std::process::{ExitStatus, Stdio};
+use std::time::Duration;
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde::Deserialize;
+use tokio::io::{AsyncBufReadExt, BufReader};
+use tokio::process::{Child, Command};
+use tokio::time::timeout;
+
+use super::memory::resident_bytes;
+use crate::cli::error::CliError;
+use crate::cli::lab::bench::serve::{GrpcAddress, HttpAddress};
+
+/// How long it may take to go down, beyond the ten seconds of its drain.
+const STOPPING_MAX: Duration = Duration::from_secs(30);
+
+/// Of undo nothing is asked but within short missions; more would fill the disk.
+const UNDO_REVISIONS: &str = "1000";
+
+/// This same program as a daemon, on free ports. It is killed where it was not stopped.
+pub(super) struct ServerProcess {
+    child: Child,
+    pid: u32,
+    serving: Serving,
+}
+
+/// What it prints first.
+#[derive(Deserialize)]
+struct Serving {
+    http: String,
+    grpc: String,
+}
+
+impl ServerProcess {
+    /// Starts it with its maps in `data_dir`.
+    pub(super) async fn start(data_dir: &Path) -> Result<Self, CliError> {
+        let no_server = |error: &dyn std::fmt::Display| CliError::failed(format!("no server: {error}"));
+        let program = std::env::current_exe().map_err(|error| no_server(&error))?;
+        let mut child = Command::new(program)
+            .args(["serve", "--json", "--log-level", "warn"])
+            .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0", "--data-dir"])
+            .arg(data_dir)
+            .env("MROL_STORE__UNDO_REVISIONS", UNDO_REVISIONS)
+            .stdout(Stdio::piped())
+            .kill_on_drop(true)
+            .spawn()
+            .map_err(|error| no_server(&error))?;
+        let mut line = String::new();
+        let (Some(pid), Some(output)) = (child.id(), child.stdout.take()) else {
+            return Err(no_server(&"it ended at once"));
+        };
+        BufReader::new(output).read_line(&mut line).await.map_err(|error| no_server(&error))?;
+        let serving = serde_json::from_str(&line).map_err(|error| no_server(&error))?;
+        Ok(Self { child, pid, serving })
+    }
+
+    /// Its gRPC address.
+    pub(super) fn grpc(&self) -> GrpcAddress {
+        GrpcAddress::open(&self.serving.grpc)
+    }
+
+    /// Its HTTP address.
+    pub(super) fn http(&self) -> HttpAddress {
+        HttpAddress::open(format!("http://{}", self.serving.http))
+    }
+
+    /// Memory that it has resident.
+    pub(super) fn resident_bytes(&self) -> Result<u64, CliError> {
+        resident_bytes(self.pid)
+    }
+
+    /// Tells it to end as a service manager does, and sees that it does so well.
+    pub(super) async fn stop(mut self) -> Result<(), CliError> {
+        if let Some(pid) = i32::try_from(self.pid).ok().and_then(Pid::from_raw) {
+            kill_process(pid, Signal::TERM).map_err(CliError::failed)?;
+        }
+        let ended = timeout(STOPPING_MAX, self.child.wait()).await;
+        let ended = ended.map_err(|_| CliError::failed("the server does not end"))?;
+        match ended.map_err(CliError::failed)? {
+            status if status.success() => Ok(()),
+            status => Err(ended_badly(status)),
+        }
+    }
+}
+
+fn ended_badly(status: ExitStatus) -> CliError {
+    CliError::failed(format!("the server ended with {status}"))
+}

@@ -1,0 +1,145 @@
+//! `mrol demo`: the main job with nothing to download.
+//!
+//! Two simulated robots ray-cast scans of a furnished building and stream them over gRPC, at once, into one map
+//! of the real daemon, while a planner asks about it. Everything printed is measured.
+
+mod checks;
+mod daemon;
+mod guide;
+mod journal;
+mod planner;
+mod report;
+mod robot;
+mod summary;
+
+use std::net::SocketAddr;
+use std::pin::pin;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+
+use crate::cli::error::CliError;
+use crate::cli::output::Output;
+use crate::cli::serve::Serving;
+use crate::client::{Client, NewMap};
+use crate::lab::simulate::{Scene, tours};
+use crate::map::{LEVELS_DEFAULT, MapName};
+use crate::server::shutdown_signal;
+use checks::Checks;
+use daemon::Daemon;
+use journal::Journal;
+use planner::Planner;
+use report::{Beginning, Line};
+use robot::Robot;
+use summary::Summary;
+
+/// The map that the robots make.
+const MAP: &str = "demo";
+/// Answers that robots may be ahead of the printer.
+const NEWS_AHEAD: usize = 16;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol demo              then look around with the commands that it prints; Ctrl-C ends it
+  mrol demo --once       end when the robots are done: exit code 0 if all is as it should be
+  mrol demo --seed 7     other furniture, other noise";
+
+/// See it work: two simulated robots build one map in the real daemon, a planner asks about it
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(in crate::cli) struct Demo {
+    /// End when the robots are done
+    #[arg(long)]
+    once: bool,
+    /// Of furniture and noise: the same seed gives the same scene and the same scans
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Scans of each robot
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=500))]
+    scans: u16,
+    /// Side of a finest voxel, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.03)]
+    resolution: f64,
+    /// Levels of the map
+    #[arg(long, default_value_t = LEVELS_DEFAULT)]
+    levels: u32,
+    /// Address of HTTP [default: 127.0.0.1:7333, or any free port where that is taken]
+    #[arg(long, value_name = "ADDRESS")]
+    http_listen: Option<SocketAddr>,
+    /// Address of gRPC [default: 127.0.0.1:7334, or any free port where that is taken]
+    #[arg(long, value_name = "ADDRESS")]
+    grpc_listen: Option<SocketAddr>,
+}
+
+impl Demo {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let mut interrupt = pin!(shutdown_signal());
+        let daemon = Daemon::start(self.http_listen, self.grpc_listen, &output).await?;
+        let shown = tokio::select! {
+            shown = self.show(daemon.serving(), &output) => shown,
+            () = &mut interrupt => Err(CliError::failed("interrupted before the robots were done")),
+        };
+        if !self.once && shown.is_ok() {
+            output.say("\nThe daemon stays up: Ctrl-C ends it.")?;
+            interrupt.await;
+        }
+        daemon.stop().await?;
+        shown?.verdict()
+    }
+
+    /// The whole story; what there is to say against it.
+    async fn show(&self, serving: Serving, output: &Output) -> Result<Checks, CliError> {
+        let map = MapName::new(MAP).map_err(CliError::failed)?;
+        let operator = Client::connect(&serving.grpc.to_string()).await?;
+        let new_map = NewMap { levels: Some(self.levels), ..NewMap::of(self.resolution) };
+        let (info, _) = operator.create_map(&map, new_map).await?;
+        let robots = self.robots();
+        output.print(&Beginning::new(serving, &info, self.seed, &robots))?;
+        output.say(Line::head())?;
+
+        let start = Instant::now();
+        let planner = Planner::start(&serving, &map, self.seed).await?;
+        let mut journal = Journal::new(start, planner.tally());
+        self.run_robots(robots, &serving, &map, |news| output.print(&journal.enter(news))).await?;
+        let queries = planner.stop().await?;
+
+        let info = operator.map_info(&map).await?;
+        let checks = Checks::of(&journal, &queries, &info);
+        output.print(&Summary::new(&journal, &queries, &info, &checks))?;
+        output.say(guide::text(&serving, self.once))?;
+        Ok(checks)
+    }
+
+    fn robots(&self) -> Vec<Robot> {
+        let scene = Arc::new(Scene::furnished(self.seed));
+        let tours = tours(usize::from(self.scans)).into_iter();
+        tours.zip(0..).map(|(tour, stream)| Robot::new(tour, Arc::clone(&scene), self.seed, stream)).collect()
+    }
+
+    /// Lets all robots go at once, and tells of each scan when it is answered.
+    async fn run_robots(
+        &self,
+        robots: Vec<Robot>,
+        serving: &Serving,
+        map: &MapName,
+        mut tell: impl FnMut(robot::News) -> Result<(), CliError>,
+    ) -> Result<(), CliError> {
+        let (sender, mut news) = mpsc::channel(NEWS_AHEAD);
+        // Dropped with this future, and all robots with it.
+        let mut on_tour = JoinSet::new();
+        for robot in robots {
+            let client = Client::connect(&serving.grpc.to_string()).await?;
+            on_tour.spawn(robot.tour(client, map.clone(), sender.clone()));
+        }
+        drop(sender);
+        while let Some(news) = news.recv().await {
+            tell(news)?;
+        }
+        while let Some(ended) = on_tour.join_next().await {
+            ended.map_err(CliError::failed)??;
+        }
+        Ok(())
+    }
+}

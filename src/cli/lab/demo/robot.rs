@@ -1,0 +1,114 @@
+//! A simulated robot: it goes on its tour, looks around, and streams what it sees.
+
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+
+use crate::cli::error::CliError;
+use crate::client::Client;
+use crate::geometry::{Pose, pose_difference};
+use crate::lab::simulate::{Scene, Sensor, Tour};
+use crate::map::{MapName, RobotName};
+use crate::mapping::Guess;
+use crate::service::{ScanAnswer, ScanRequest};
+
+/// Scans ray-cast ahead of the one that is being sent.
+const SCANS_AHEAD: usize = 2;
+
+pub(super) struct Robot {
+    tour: Tour,
+    scene: Arc<Scene>,
+    /// Of the sensor's noise.
+    rng: ChaCha8Rng,
+}
+
+/// What became of a robot's scan.
+pub(super) struct News {
+    pub(super) robot: &'static str,
+    /// Counted from 1.
+    pub(super) scan: usize,
+    pub(super) scans: usize,
+    pub(super) answer: ScanAnswer,
+    /// Of the pose found against the true one, metres and degrees.
+    pub(super) error: (f64, f64),
+}
+
+impl Robot {
+    /// The robot of a tour, whose noise is stream `stream` of `seed`.
+    pub(super) fn new(tour: Tour, scene: Arc<Scene>, seed: u64, stream: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        Self { tour, scene, rng }
+    }
+
+    pub(super) fn name(&self) -> &'static str {
+        self.tour.name
+    }
+
+    pub(super) fn scans(&self) -> usize {
+        self.tour.poses.len()
+    }
+
+    /// What it looks with, in words.
+    pub(super) fn sensor(&self) -> String {
+        match &self.tour.sensor {
+            Sensor::DepthCamera(camera) => {
+                let (width, height) = (camera.width_px, camera.height_px);
+                format!("depth camera, {width} x {height} points, {} m", camera.range_max_m)
+            }
+            Sensor::SpinningLidar(lidar) => {
+                let (rings, azimuths) = (lidar.rings, lidar.azimuths);
+                format!("spinning lidar, {rings} x {azimuths} points, {} m", lidar.range_max_m)
+            }
+        }
+    }
+
+    /// Goes on its tour and streams a scan from each place; tells what became of each.
+    pub(super) async fn tour(
+        self,
+        client: Client,
+        map: MapName,
+        news: mpsc::Sender<News>,
+    ) -> Result<(), CliError> {
+        let (robot, true_poses) = (self.name(), self.tour.poses.clone());
+        let name = RobotName::new(robot).map_err(CliError::failed)?;
+        let (sender, scans) = mpsc::channel(SCANS_AHEAD);
+        let looking = tokio::task::spawn_blocking(move || self.look_around(&name, &sender));
+        let mut answers = client.insert_scans(&map, ReceiverStream::new(scans)).await?;
+        for (k, true_pose) in true_poses.iter().enumerate() {
+            let answer = answers.next().await.ok_or_else(|| {
+                CliError::failed(format!("the daemon answered {k} of {} scans of {robot}", true_poses.len()))
+            })??;
+            let error = pose_difference(true_pose, &answer.map_from_sensor);
+            let scans = true_poses.len();
+            if news.send(News { robot, scan: k + 1, scans, answer, error }).await.is_err() {
+                break;
+            }
+        }
+        looking.await.map_err(CliError::failed)
+    }
+
+    /// Ray-casts scan after scan, until nobody takes them any more.
+    fn look_around(mut self, name: &RobotName, sender: &mpsc::Sender<ScanRequest>) {
+        for (k, pose) in self.tour.poses.iter().enumerate() {
+            let points = self.tour.sensor.scan(&self.scene, pose, &mut self.rng);
+            let scan = ScanRequest {
+                scan_id: Some(k as u64),
+                guess: guess(k, pose),
+                at_guess: k == 0,
+                ..ScanRequest::new(name.clone(), points.into())
+            };
+            if sender.blocking_send(scan).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// A robot knows where it starts. From there on it has its last pose in the map, and no odometry.
+fn guess(k: usize, true_pose: &Pose) -> Guess {
+    if k == 0 { Guess::Pose(*true_pose) } else { Guess::Last }
+}

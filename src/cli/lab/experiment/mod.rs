@@ -1,0 +1,53 @@
+//! `mrol experiment`: the paper's experiments again, as plots and tables.
+
+mod convergence;
+mod lookup;
+mod mapping;
+mod scaling;
+mod simulation;
+
+use clap::Subcommand;
+
+use crate::cli::error::CliError;
+use crate::cli::output::Output;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol experiment lookup --out results/        experiment 1 of the paper: lookup.svg, lookup.csv
+  mrol experiment scaling --out results/       cost a point against the size of the map: scaling.svg, .csv, .md
+  mrol experiment simulation --out results/    experiment 2 of the paper: poses with the filter, without, with a small one
+  mrol experiment mapping scans/ --resolution 0.05 --out results/
+                                               experiment 3 of the paper: time and growth, scan by scan
+  mrol experiment convergence scans/0000.ply scans/0001.ply --truth poses.txt --resolution 0.1 --out results/
+                                               share of alignments that find the pose, against how far off the guess is
+
+Everything is measured when it is asked for, on one core; give the machine nothing else to do meanwhile.";
+
+/// Repeat the paper's experiments, and see how cost and alignments scale: plots and tables
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(in crate::cli) struct Experiment {
+    #[command(subcommand)]
+    which: Which,
+}
+
+#[derive(Debug, Subcommand)]
+enum Which {
+    Convergence(convergence::Convergence),
+    Lookup(lookup::Lookup),
+    Mapping(mapping::Mapping),
+    Scaling(scaling::Scaling),
+    Simulation(simulation::Simulation),
+}
+
+impl Experiment {
+    pub(super) fn run(self, output: Output) -> Result<(), CliError> {
+        match self.which {
+            Which::Convergence(convergence) => convergence.run(&output),
+            Which::Lookup(lookup) => lookup.run(&output),
+            Which::Mapping(mapping) => mapping.run(&output),
+            Which::Scaling(scaling) => scaling.run(&output),
+            Which::Simulation(simulation) => simulation.run(&output),
+        }
+    }
+}

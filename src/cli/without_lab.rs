@@ -1,0 +1,44 @@
+//! What stands in the place of the lab's commands in a program that was built for the daemon alone.
+
+use clap::Subcommand;
+
+use super::error::CliError;
+use super::output::Output;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  cargo run --release -- demo      from the sources: a program with all commands";
+
+/// The commands that are not there, by their names.
+#[derive(Debug, Subcommand)]
+pub(super) enum Lab {
+    /// Not in this program, which was built without the lab: see the daemon at work
+    Demo(Ignored),
+    /// Not in this program, which was built without the lab: measure it on this machine
+    Bench(Ignored),
+    /// Not in this program, which was built without the lab: repeat the paper's experiments
+    Experiment(Ignored),
+}
+
+/// Whatever stands behind the name of a command that is not there.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Ignored {
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+impl Lab {
+    pub(super) fn run(self, _output: Output) -> Result<(), CliError> {
+        let (name, ignored) = match self {
+            Self::Demo(ignored) => ("demo", ignored),
+            Self::Bench(ignored) => ("bench", ignored),
+            Self::Experiment(ignored) => ("experiment", ignored),
+        };
+        let command = [name.to_owned()].into_iter().chain(ignored.arguments).collect::<Vec<_>>().join(" ");
+        Err(CliError::usage(format!(
+            "`mrol {name}` is not in this program: it was built without the feature `lab`, as in the container image, \
+             which holds the daemon alone. From the sources, `cargo run --release -- {command}` runs it."
+        )))
+    }
+}

@@ -1,0 +1,93 @@
+//! Maps that grow scan by scan, timed (paper IV-C).
+
+use std::time::Instant;
+
+use crate::geometry::{Point, Pose};
+use crate::lab::rivals::HashTables;
+use crate::map::{MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+
+/// A map of any structure.
+pub trait GrowingMap {
+    /// Adds the voxels of `points`.
+    fn insert(&mut self, points: &[Point], map_from_points: &Pose);
+
+    /// Number of finest occupied voxels.
+    fn voxels(&self) -> usize;
+}
+
+/// Our own map, as a robot called `bench` makes it grow.
+#[derive(Debug)]
+pub struct OwnMap {
+    /// Its voxels, their filters and the moments of their points.
+    pub map: MultiResolutionMap,
+    /// Whose scans they are.
+    pub robot: RobotName,
+}
+
+impl GrowingMap for OwnMap {
+    fn insert(&mut self, points: &[Point], map_from_points: &Pose) {
+        let pose = TrajectoryPose::new(self.robot.clone(), *map_from_points);
+        self.map.committer().insert_scan(ScanRecord::of_points(pose, points, self.map.lattice()));
+    }
+
+    fn voxels(&self) -> usize {
+        self.map.voxels(0)
+    }
+}
+
+impl GrowingMap for HashTables {
+    fn insert(&mut self, points: &[Point], map_from_points: &Pose) {
+        Self::insert(self, points, map_from_points);
+    }
+
+    fn voxels(&self) -> usize {
+        self.voxels(0)
+    }
+}
+
+/// A map, and where its last scan was taken.
+#[derive(Debug)]
+pub struct Mapping<M> {
+    map: M,
+    last: Pose,
+}
+
+/// What became of a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mapped {
+    /// Where it was found to be.
+    pub map_from_sensor: Pose,
+    /// How long that took.
+    pub align_ms: f64,
+    /// How long it took to add it.
+    pub update_ms: f64,
+    /// Finest occupied voxels after it.
+    pub voxels: usize,
+}
+
+impl<M: GrowingMap> Mapping<M> {
+    /// Before the first scan, which will be at the origin.
+    pub fn new(map: M) -> Self {
+        Self { map, last: Pose::identity() }
+    }
+
+    /// As it is now.
+    pub fn map(&self) -> &M {
+        &self.map
+    }
+
+    /// Adds `points` (sensor frame, finite) where `find(map, points, guess)` finds them; the guess is the last pose, as
+    /// in the paper.
+    pub fn add(&mut self, points: &[Point], find: impl FnOnce(&M, &[Point], &Pose) -> Pose) -> Mapped {
+        let start = Instant::now();
+        if self.map.voxels() > 0 {
+            self.last = find(&self.map, points, &self.last);
+        }
+        let align_ms = start.elapsed().as_secs_f64() * 1e3;
+
+        let start = Instant::now();
+        self.map.insert(points, &self.last);
+        let update_ms = start.elapsed().as_secs_f64() * 1e3;
+        Mapped { map_from_sensor: self.last, align_ms, update_ms, voxels: self.map.voxels() }
+    }
+}

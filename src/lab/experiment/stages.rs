@@ -1,0 +1,137 @@
+//! Experiment 1 of the paper: the stages of a look-up, one by one (IV-A, Fig. 1).
+
+use std::hint::black_box;
+
+use crate::lab::measure::stopwatch::Runs;
+use crate::lab::rivals::{Dense, DenseTooLarge, HashSet, Kernel, Structure, bits};
+use crate::lab::workload::Queries;
+use crate::map::MultiResolutionMap;
+use crate::map::lookup::{Lookup, stages};
+use crate::voxel::LatticeFromPoints;
+
+/// A stage and how long it took, nanoseconds a point, run by run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// As in the figure.
+    pub name: &'static str,
+    /// Run by run.
+    pub runs: Runs,
+}
+
+/// The stages of Fig. 1 from bottom to top, and the dense array's whole, which the figure leaves out.
+pub const STAGES: [&str; 8] = [
+    "look-up: Bloom filter",
+    "look-up: dense array",
+    "look-up: hash table",
+    "look-up: set intersection",
+    "rotate, translate, quantise",
+    "transform and look-up: Bloom filter",
+    "transform and look-up: dense array",
+    "transform and look-up: hash table",
+];
+
+/// Times each stage `runs` times on level 0 of `map`, each after a run that is not timed. The stages take turns.
+///
+/// # Errors
+/// When a dense array of the map would be too large.
+pub fn measure(
+    map: &MultiResolutionMap,
+    queries: &Queries,
+    runs: usize,
+) -> Result<Vec<Stage>, DenseTooLarge> {
+    let mut bench = Bench::new(map, queries)?;
+    let mut measured = STAGES.map(|name| Stage { name, runs: Runs::default() });
+    for _ in 0..runs {
+        for (stage, measured) in measured.iter_mut().enumerate() {
+            // What the others left in the caches is not this one's doing.
+            bench.run(stage, &mut Runs::default());
+            bench.run(stage, &mut measured.runs);
+        }
+    }
+    Ok(measured.into())
+}
+
+/// All that the stages need, made beforehand.
+struct Bench<'a> {
+    queries: &'a Queries,
+    quantise: LatticeFromPoints,
+    map: &'a MultiResolutionMap,
+    filter: Kernel<'a>,
+    dense: Dense,
+    set: HashSet,
+    /// Of all points: what the look-ups by themselves begin with.
+    keys: Vec<u64>,
+    offsets: Vec<u32>,
+    occupied: Vec<u64>,
+}
+
+impl<'a> Bench<'a> {
+    fn new(map: &'a MultiResolutionMap, queries: &'a Queries) -> Result<Self, DenseTooLarge> {
+        let (points, quantise) = (&queries.points, map.lattice().from_points(&queries.map_from_points));
+        let dense = Dense::of(map, 0)?;
+        let (mut keys, mut offsets) = (vec![0; points.len()], vec![0; points.len()]);
+        stages::keys(points, &quantise, 0, &mut keys);
+        stages::offsets(points, &quantise, 0, dense.grid(), &mut offsets);
+        Ok(Self {
+            queries,
+            quantise,
+            map,
+            filter: Kernel::new(map, 0, Lookup::Bloom),
+            dense,
+            set: HashSet::of(map, 0),
+            keys,
+            offsets,
+            occupied: vec![0; points.len().div_ceil(64)],
+        })
+    }
+
+    /// Runs the stage at that place of [`STAGES`].
+    fn run(&mut self, stage: usize, runs: &mut Runs) {
+        let points = self.queries.points.len();
+        runs.time(points, || match stage {
+            0 => stages::filter_contains(&self.keys, &self.map.view().level_view(0), &mut self.occupied),
+            1 => self.dense.contains(&self.offsets, &mut self.occupied),
+            2 => bits(&self.keys, &mut self.occupied, |key| self.set.keys().contains(key)),
+            3 => drop(black_box(self.intersection())),
+            4 => self.transform(),
+            5 => ask(&self.filter, self.queries, &mut self.occupied),
+            6 => ask(&self.dense, self.queries, &mut self.occupied),
+            _ => ask(&self.set, self.queries, &mut self.occupied),
+        });
+    }
+
+    /// The overlap as the paper's first implementation has it: the set of the scan's voxels, intersected with the map's.
+    fn intersection(&self) -> usize {
+        let scan: hashbrown::HashSet<u64> = self.keys.iter().copied().collect();
+        scan.intersection(self.set.keys()).count()
+    }
+
+    /// Keys of a thousand points at a time, which nothing but the innermost cache sees.
+    fn transform(&self) {
+        let mut keys = [0; 1024];
+        for points in self.queries.points.chunks(keys.len()) {
+            stages::keys(points, &self.quantise, 0, &mut keys[..points.len()]);
+            black_box(&mut keys);
+        }
+    }
+}
+
+fn ask(structure: &impl Structure, queries: &Queries, occupied: &mut [u64]) {
+    structure.occupied(&queries.points, &queries.map_from_points, occupied);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::workload::{Order, Scatter, Workload};
+    use crate::map::MapSettings;
+
+    #[test]
+    fn every_stage_is_timed_as_often_as_wished() {
+        let scatter = Workload::Scatter(Scatter::of(3000, 1));
+        let map = scatter.map(MapSettings::new(scatter.resolution_m(), 1)).unwrap();
+        let stages = measure(&map, &scatter.queries(Order::Random, 1000, 1), 3).unwrap();
+        assert!(stages.iter().map(|stage| stage.name).eq(STAGES));
+        assert!(stages.iter().all(|stage| stage.runs.ns_per_item().len() == 3 && stage.runs.median() > 0.0));
+    }
+}

@@ -1,0 +1,139 @@
+//! Structures side by side on the same questions.
+
+use super::stopwatch::Runs;
+use crate::lab::rivals::{Structure, StructureName};
+use crate::lab::workload::Queries;
+use crate::map::MultiResolutionMap;
+use crate::map::lookup::{self, Lookup};
+
+/// What a structure did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Which.
+    pub name: StructureName,
+    /// Of each pass over all points, nanoseconds a point.
+    pub runs: Runs,
+    /// Points asked about.
+    pub points: usize,
+    /// Points that it took for occupied, false positives among them.
+    pub occupied: usize,
+    /// Points that it took for occupied in voxels that are not.
+    pub false_positives: usize,
+    /// Bytes of memory that it takes.
+    pub bytes: usize,
+}
+
+/// A structure gave an answer that cannot be: its time is worth nothing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Disagreement {
+    /// It denies an occupied voxel.
+    #[error("{0} says of {1} points in occupied voxels that they are free")]
+    Denies(&'static str, usize),
+    /// It is exact and yet says "occupied" of a free voxel.
+    #[error("{0} says of {1} points in free voxels that they are occupied")]
+    Invents(&'static str, usize),
+}
+
+/// Times `structures` over `level` of `map` in `passes` passes over all points, each after one that is not timed. They
+/// take turns, so that whatever else the machine does meanwhile befalls all of them.
+///
+/// # Errors
+/// When answers contradict those of the map's exact set.
+pub fn compare(
+    structures: &[(StructureName, Box<dyn Structure + '_>)],
+    map: &MultiResolutionMap,
+    level: u32,
+    queries: &Queries,
+    passes: usize,
+) -> Result<Vec<Measured>, Disagreement> {
+    let truth = truth(map, level, queries);
+    let mut answers = vec![0; truth.len()];
+    let mut measured = Vec::with_capacity(structures.len());
+    for (name, structure) in structures {
+        structure.occupied(&queries.points, &queries.map_from_points, &mut answers);
+        measured.push(check(*name, structure.as_ref(), &answers, &truth, queries.points.len())?);
+    }
+    for _ in 0..passes {
+        for ((_, structure), measured) in structures.iter().zip(&mut measured) {
+            let mut ask = || structure.occupied(&queries.points, &queries.map_from_points, &mut answers);
+            // What the others left in the caches is not this one's doing.
+            ask();
+            measured.runs.time(queries.points.len(), ask);
+        }
+    }
+    Ok(measured)
+}
+
+/// The answers of the exact set.
+fn truth(map: &MultiResolutionMap, level: u32, queries: &Queries) -> Vec<u64> {
+    let mut occupied = vec![0; queries.points.len().div_ceil(64)];
+    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let view = map.view();
+    lookup::occupied(&queries.points, &quantise, &view.level_view(level), Lookup::Exact, &mut occupied);
+    occupied
+}
+
+fn check(
+    name: StructureName,
+    structure: &dyn Structure,
+    answers: &[u64],
+    truth: &[u64],
+    points: usize,
+) -> Result<Measured, Disagreement> {
+    let pairs = || answers.iter().zip(truth);
+    let denied = ones(pairs().map(|(answer, truth)| truth & !answer));
+    let false_positives = ones(pairs().map(|(answer, truth)| answer & !truth));
+    if denied > 0 {
+        return Err(Disagreement::Denies(name.as_str(), denied));
+    }
+    if name.is_exact() && false_positives > 0 {
+        return Err(Disagreement::Invents(name.as_str(), false_positives));
+    }
+    let (occupied, bytes) = (ones(answers.iter().copied()), structure.bytes());
+    Ok(Measured { name, runs: Runs::default(), points, occupied, false_positives, bytes })
+}
+
+fn ones(words: impl Iterator<Item = u64>) -> usize {
+    words.map(|word| word.count_ones() as usize).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point, Pose};
+    use crate::lab::workload::{Order, Site, Workload};
+    use crate::map::MapSettings;
+
+    struct Always(bool);
+
+    impl Structure for Always {
+        fn occupied(&self, _: &[Point], _: &Pose, occupied: &mut [u64]) {
+            occupied.fill(if self.0 { u64::MAX } else { 0 });
+        }
+
+        fn bytes(&self) -> usize {
+            0
+        }
+    }
+
+    fn compared(name: StructureName, structure: impl Structure) -> Result<Vec<Measured>, Disagreement> {
+        let site = Workload::Site(Site::of(5000, 1));
+        let map = site.map(MapSettings::new(site.resolution_m(), 2)).unwrap();
+        compare(&[(name, Box::new(structure))], &map, 0, &site.queries(Order::Random, 640, 1), 3)
+    }
+
+    #[test]
+    fn false_positives_are_counted_and_passes_timed() {
+        let measured = compared(StructureName::Paper, Always(true)).unwrap().remove(0);
+        assert_eq!((measured.points, measured.occupied, measured.runs.ns_per_item().len()), (640, 640, 3));
+        assert!((200..640).contains(&measured.false_positives), "{measured:?}");
+    }
+
+    #[test]
+    fn a_structure_that_is_wrong_is_not_timed() {
+        let denies = compared(StructureName::Paper, Always(false)).unwrap_err();
+        assert!(matches!(denies, Disagreement::Denies("paper", 1..)), "{denies}");
+        let invents = compared(StructureName::Dense, Always(true)).unwrap_err();
+        assert!(matches!(invents, Disagreement::Invents("dense", 200..)), "{invents}");
+    }
+}

@@ -1,0 +1,87 @@
+//! How long a server takes to start: a snapshot of a map, and the journal after it.
+
+use std::path::Path;
+
+use uuid::Uuid;
+
+use super::stopwatch::Runs;
+use crate::lab::workload::Queries;
+use crate::map::{Change, MapName, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::service::{MapService, ServiceError, ServiceSettings};
+use crate::store::{DataDir, OpeningProgress, Record, Snapshot, StoreError, StoreSettings};
+use crate::voxel::MomentSet;
+
+/// Bytes of snapshot and journal in a folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kept {
+    /// Of the snapshot, as a file.
+    pub snapshot_bytes: usize,
+    /// Of the journal after it.
+    pub journal_bytes: u64,
+    /// Records in that.
+    pub records: u64,
+}
+
+/// Fills an empty folder with a snapshot of `map`, and scans of `scan_points` of `points` as a journal of at least
+/// `journal_bytes` after it, over and over where they are few.
+///
+/// # Errors
+/// When the system refuses.
+pub fn keep(
+    folder: &Path,
+    map: &MultiResolutionMap,
+    points: &Queries,
+    scan_points: usize,
+    journal_bytes: u64,
+) -> Result<Kept, StoreError> {
+    let mut snapshot = Snapshot::of(map, Uuid::new_v4());
+    // A workload's map knows no points: as many moments as a map that robots made.
+    snapshot.contents.moments = MomentSet::of_centers(&snapshot.contents.voxels);
+    let snapshot_bytes = snapshot.encode().map_or(0, |bytes| bytes.len());
+    let name = MapName::new("bench").map_err(|e| StoreError::damaged(folder, e.to_string()))?;
+    let kept = DataDir::open(folder, StoreSettings::default())?.create(&name, &snapshot)?;
+    for scan in points.points.chunks(scan_points).cycle() {
+        if kept.used().journal.bytes >= journal_bytes {
+            break;
+        }
+        let robot = RobotName::new("bench").map_err(|e| StoreError::damaged(folder, e.to_string()))?;
+        let pose = TrajectoryPose::new(robot, points.map_from_points);
+        let change = Change::Insertion(ScanRecord::of_points(pose, scan, map.lattice()));
+        let record = Record::of(&change).map_err(|e| StoreError::damaged(folder, e))?;
+        kept.append(&[&record])?;
+    }
+    kept.sync()?;
+    let journal = kept.used().journal;
+    Ok(Kept { snapshot_bytes, journal_bytes: journal.bytes, records: journal.records })
+}
+
+/// Opens a service on the folder, `repeats` times: nanoseconds each.
+///
+/// # Errors
+/// When the service cannot be opened.
+pub fn open(folder: &Path, repeats: usize) -> Result<Runs, ServiceError> {
+    let mut runs = Runs::default();
+    for _ in 0..repeats {
+        let settings = ServiceSettings { data_dir: Some(folder.to_owned()), ..ServiceSettings::default() };
+        runs.time(1, || MapService::open(settings, &OpeningProgress::default()))?;
+    }
+    Ok(runs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::workload::{Order, Room, Workload};
+    use crate::map::MapSettings;
+
+    #[test]
+    fn a_folder_holds_the_journal_that_was_asked_for_and_opens() {
+        let folder = tempfile::tempdir().unwrap();
+        let room = Workload::Room(Room);
+        let map = room.map(MapSettings::new(0.05, 4)).unwrap();
+        let points = room.queries(Order::Scan, 5000, 1);
+        let kept = keep(folder.path(), &map, &points, 1000, 20_000).unwrap();
+        assert!(kept.journal_bytes >= 20_000 && kept.records > 1 && kept.snapshot_bytes > 1000);
+        assert_eq!(open(folder.path(), 2).unwrap().ns_per_item().len(), 2);
+    }
+}

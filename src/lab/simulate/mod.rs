@@ -1,0 +1,16 @@
+//! Sensors simulated in a simulated building.
+//!
+//! A scan is a `Vec<Point>` in its sensor's frame, metres, as in [`crate::scan`]; a beam without a return is a point
+//! with NaN coordinates.
+
+mod ride;
+mod route;
+mod scene;
+mod sensor;
+mod tour;
+
+pub use scene::Scene;
+#[cfg(feature = "lab")]
+pub(crate) use sensor::gaussian;
+pub use sensor::{DepthCamera, Sensor, SpinningLidar};
+pub use tour::{Tour, tours};

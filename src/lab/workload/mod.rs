@@ -1,0 +1,220 @@
+//! What is put into a map, and what it is asked: seeded, and made piece by piece, so that 50 million voxels need no
+//! list of their keys.
+
+mod ride;
+mod room;
+mod scatter;
+mod sequence;
+mod site;
+
+use nalgebra::{Translation3, UnitQuaternion};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::geometry::{Point, Pose};
+use crate::map::{MapSettings, MapSettingsError, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::voxel::{LatticeFromPoints, VoxelKey, VoxelSet};
+pub use room::Room;
+pub use scatter::Scatter;
+pub use sequence::{Scan, simulate};
+pub use site::Site;
+
+/// In which order a map is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Order {
+    /// Anywhere: uniform in the volume, on a site near its surface.
+    #[default]
+    Random,
+    /// As a spinning sensor of 64 rings sees the surface from a moving place.
+    Scan,
+    /// Each voxel once, row by row, as a survey without gaps would bring them.
+    Sweep,
+}
+
+/// Points to look up, and where their frame lies: as a sensor's are, neither upright nor at the origin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Queries {
+    /// In the frame of `map_from_points`.
+    pub points: Vec<Point>,
+    /// Places them in the map.
+    pub map_from_points: Pose,
+}
+
+impl Queries {
+    /// Points of the map frame, told in a tilted frame.
+    fn of_map_points(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
+        let map_from_points = tilted();
+        let points_from_map = map_from_points.inverse();
+        let told = |point: [f64; 3]| Point::from(points_from_map * nalgebra::Point3::from(point));
+        Self { points: points.into_iter().map(told).collect(), map_from_points }
+    }
+
+    /// The first point in each voxel, `most` of them at most.
+    pub fn first_of_each_voxel(
+        self,
+        lattice_from_map: impl Fn(&Pose) -> LatticeFromPoints,
+        most: usize,
+    ) -> Self {
+        let quantise = lattice_from_map(&self.map_from_points);
+        let mut seen = hashbrown::HashSet::new();
+        let is_first = |&point: &Point| quantise.key(point).is_some_and(|key| seen.insert(key.to_bits()));
+        Self { points: self.points.into_iter().filter(is_first).take(most).collect(), ..self }
+    }
+}
+
+/// A frame that makes the whole transform necessary: turned about every axis and shifted.
+fn tilted() -> Pose {
+    Pose::from_parts(Translation3::new(1.7, -2.9, 0.4), UnitQuaternion::from_euler_angles(0.05, -0.08, 0.9))
+}
+
+/// A map's content with the questions to go with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Workload {
+    /// The surfaces of a room, in the size of the paper's map.
+    Room(Room),
+    /// Rolling terrain, as large as is wished.
+    Site(Site),
+    /// Randomly generated voxels, as in the paper's first experiment.
+    Scatter(Scatter),
+}
+
+impl Workload {
+    /// Side of its voxels, metres.
+    pub fn resolution_m(&self) -> f64 {
+        match self {
+            Self::Room(_) => Room::RESOLUTION_M,
+            Self::Site(_) => Site::RESOLUTION_M,
+            Self::Scatter(_) => Scatter::RESOLUTION_M,
+        }
+    }
+
+    /// Its voxels in pieces of some hundred thousand at most, as parts of one whole: no voxel comes twice.
+    pub fn pieces(self) -> Box<dyn Iterator<Item = VoxelSet>> {
+        match self {
+            Self::Room(room) => Box::new(std::iter::once(room.voxels())),
+            Self::Site(site) => Box::new(site.pieces()),
+            Self::Scatter(scatter) => Box::new(std::iter::once(scatter.voxels())),
+        }
+    }
+
+    /// `count` points to ask about; of a sweep as many as there are voxels, at most. A sensor sees nothing of what is
+    /// scattered: there its order is random too.
+    pub fn queries(&self, order: Order, count: usize, seed: u64) -> Queries {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        match (self, order) {
+            (Self::Room(room), Order::Random) => room.random_queries(count, &mut random),
+            (Self::Room(room), Order::Scan) => ride::queries(room, count, &mut random),
+            (Self::Site(site), Order::Random) => site.random_queries(count, &mut random),
+            (Self::Site(site), Order::Scan) => ride::queries(site, count, &mut random),
+            (Self::Scatter(scatter), Order::Random | Order::Scan) => {
+                scatter.random_queries(count, &mut random)
+            }
+            (_, Order::Sweep) => self.sweep(count, &mut random),
+        }
+    }
+
+    /// A point somewhere in each voxel, but not on its border.
+    fn sweep(&self, count: usize, random: &mut ChaCha8Rng) -> Queries {
+        let indices: Box<dyn Iterator<Item = [i32; 3]>> = match *self {
+            Self::Room(room) => Box::new(room.indices()),
+            Self::Site(site) => Box::new(site.indices()),
+            Self::Scatter(scatter) => {
+                Box::new(scatter.voxels().iter().map(VoxelKey::index).collect::<Vec<_>>().into_iter())
+            }
+        };
+        let mut inside = |i: i32| (f64::from(i) + random.random_range(0.1..0.9)) * self.resolution_m();
+        Queries::of_map_points(indices.take(count).map(|index| index.map(&mut inside)))
+    }
+
+    /// A map of it with `settings`, its voxels streamed in.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn map(self, settings: MapSettings) -> Result<MultiResolutionMap, MapSettingsError> {
+        let map = MultiResolutionMap::new(settings)?;
+        self.pieces().for_each(|voxels| add(&map, voxels));
+        Ok(map)
+    }
+}
+
+/// Adds voxels to a map, as a scan would.
+pub fn add(map: &MultiResolutionMap, voxels: VoxelSet) {
+    let Ok(robot) = RobotName::new("bench") else { return };
+    let pose = TrajectoryPose::new(robot, Pose::identity());
+    map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::Lookup;
+
+    fn workloads() -> [Workload; 3] {
+        [Workload::Room(Room), Workload::Site(Site::of(50_000, 1)), Workload::Scatter(Scatter::of(20_000, 1))]
+    }
+
+    fn map_of(workload: Workload) -> MultiResolutionMap {
+        workload.map(MapSettings::new(workload.resolution_m(), 4)).unwrap()
+    }
+
+    fn occupied(map: &MultiResolutionMap, queries: &Queries) -> f64 {
+        let quantise = map.lattice().from_points(&queries.map_from_points);
+        let hits = map.view().count(&queries.points, &quantise, 0, Lookup::Exact);
+        hits as f64 / queries.points.len() as f64
+    }
+
+    #[test]
+    fn one_seed_gives_one_workload() {
+        for workload in workloads() {
+            for order in [Order::Random, Order::Scan, Order::Sweep] {
+                assert_eq!(workload.queries(order, 1000, 3), workload.queries(order, 1000, 3));
+                assert_ne!(workload.queries(order, 1000, 3), workload.queries(order, 1000, 4));
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_are_disjoint_and_as_many_as_wished() {
+        for (workload, wish) in workloads().into_iter().zip([150_000.0, 50_000.0, 20_000.0]) {
+            let in_pieces: usize = workload.pieces().map(|piece| piece.len()).sum();
+            assert_eq!(in_pieces, map_of(workload).voxels(0));
+            assert!((in_pieces as f64 / wish - 1.0).abs() < 0.05, "{workload:?}: {in_pieces}");
+        }
+    }
+
+    #[test]
+    fn scans_see_the_surface_and_random_points_mostly_miss_it() {
+        for workload in &workloads()[..2] {
+            let map = map_of(*workload);
+            let [random, scan] =
+                [Order::Random, Order::Scan].map(|order| occupied(&map, &workload.queries(order, 50_000, 1)));
+            assert!((0.02..0.4).contains(&random), "{workload:?}: {random}");
+            assert!(scan > 0.8, "{workload:?}: {scan}");
+        }
+    }
+
+    #[test]
+    fn a_sweep_meets_each_voxel_once() {
+        for workload in workloads() {
+            let map = map_of(workload);
+            let sweep = workload.queries(Order::Sweep, usize::MAX, 1);
+            assert_eq!((sweep.points.len(), occupied(&map, &sweep)), (map.voxels(0), 1.0));
+            assert_eq!(
+                sweep.first_of_each_voxel(|pose| map.lattice().from_points(pose), usize::MAX).points.len(),
+                map.voxels(0)
+            );
+        }
+    }
+
+    #[test]
+    fn the_first_point_of_each_voxel_is_kept_and_no_other() {
+        let workload = Workload::Room(Room);
+        let map = map_of(workload);
+        let first = workload
+            .queries(Order::Scan, 20_000, 1)
+            .first_of_each_voxel(|pose| map.lattice().from_points(pose), 5000);
+        let (voxels, _) =
+            VoxelSet::of_points(&first.points, &map.lattice().from_points(&first.map_from_points));
+        assert_eq!((first.points.len(), voxels.len()), (5000, 5000));
+    }
+}
