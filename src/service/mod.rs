@@ -193,7 +193,7 @@ impl MapService {
         if map.is_new(&scan) {
             self.inner.room.check_to_grow()?;
         }
-        let turn = Arc::new(map.turn_of(&scan.robot).await);
+        let turn = Arc::new(self.inner.mapping.in_turn(map.turn_of(&scan.robot)).await?);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
         let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
         self.carry_through(&self.inner.mapping, move |stop| {
@@ -273,7 +273,7 @@ impl MapService {
         let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
         let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
         // Until its outcome is known: what was withdrawn before it is then what it found.
-        let _turns = map.turns_of_undo(&undo.target).await;
+        let _turns = self.inner.undo.in_turn(map.turns_of_undo(&undo.target)).await?;
         self.carry_through(&self.inner.undo, move |stop| {
             limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
         })

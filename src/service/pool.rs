@@ -4,6 +4,7 @@
 //! in memory and its place among those that wait. A job in hand learns of it by its [`StopSignal`].
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -27,6 +28,8 @@ pub(super) struct Pool {
     places: Arc<Semaphore>,
     /// One permit for each thread that has no job.
     free: Arc<Semaphore>,
+    /// One permit for each caller that waits for the turn of its map or robot.
+    turns: Semaphore,
     jobs_waiting_max: usize,
     counts: Arc<Counts>,
 }
@@ -74,9 +77,30 @@ impl Pool {
             threads,
             places: Semaphore::new(free + jobs_waiting_max).into(),
             free: Semaphore::new(free).into(),
+            turns: Semaphore::new(jobs_waiting_max),
             jobs_waiting_max,
             counts: Arc::default(),
         })
+    }
+
+    /// Waits for `turn`, before which a job makes no sense; those that wait are as many as jobs may.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` at once when others have the turn and too many wait.
+    pub(super) async fn in_turn<T>(&self, turn: impl Future<Output = T>) -> Result<T, ServiceError> {
+        let mut turn = pin!(turn);
+        tokio::select! {
+            biased;
+            turn = &mut turn => return Ok(turn),
+            () = std::future::ready(()) => {}
+        }
+        let _place = self.turns.try_acquire().map_err(|_| self.full())?;
+        Ok(turn.await)
+    }
+
+    fn full(&self) -> ServiceError {
+        let most = self.jobs_waiting_max;
+        ServiceError::overloaded(format!("jobs_waiting_max is {most}: all places are taken, try again"))
     }
 
     /// Runs `job` on a thread of the pool, first come first served; not at all where the caller does not wait for its
@@ -88,11 +112,7 @@ impl Pool {
         &self,
         job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
-            let message =
-                format!("jobs_waiting_max is {}: all places are taken, try again", self.jobs_waiting_max);
-            return Err(ServiceError::overloaded(message));
-        };
+        let place = Arc::clone(&self.places).try_acquire_owned().map_err(|_| self.full())?;
         let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
         let begin = Instant::now();
         let thread = Arc::clone(&self.free).acquire_owned().await.map_err(|_| failed())?;
@@ -200,6 +220,23 @@ mod tests {
         assert_eq!(pool.run(|_| 4).await.unwrap(), 4);
         let PoolUse { waiting, running, begun, cancelled, .. } = pool.in_use();
         assert_eq!((waiting, running, begun, cancelled), (0, 0, 3, 0));
+    }
+
+    #[tokio::test]
+    async fn no_more_wait_for_a_turn_than_may_and_whoever_finds_it_free_does_not_wait() {
+        let (pool, lock) = (pool(1), Arc::new(tokio::sync::Mutex::new(())));
+        let held = pool.in_turn(Arc::clone(&lock).lock_owned()).await.unwrap();
+        let waiting = tokio::spawn({
+            let (pool, turn) = (Arc::clone(&pool), Arc::clone(&lock).lock_owned());
+            async move { pool.in_turn(turn).await.map(drop) }
+        });
+        until(|| pool.turns.available_permits() == 0).await;
+        let refused = pool.in_turn(Arc::clone(&lock).lock_owned()).await.unwrap_err();
+        assert!(refused.message.contains("jobs_waiting_max is 1"), "{}", refused.message);
+        drop(held);
+        waiting.await.unwrap().unwrap();
+        drop(pool.in_turn(lock.lock_owned()).await.unwrap());
+        assert_eq!(pool.turns.available_permits(), 1);
     }
 
     #[tokio::test]
