@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use super::{ErrorCode, ServiceError};
 use crate::util::{Durations, SharedDurations, StopSignal};
@@ -112,14 +112,36 @@ impl Pool {
         &self,
         job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
+        let thread = self.thread().await?;
+        self.run_on(thread, job).await
+    }
+
+    /// Waits for a thread of the pool, first come first served.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` at once when the queue is full.
+    pub(super) async fn thread(&self) -> Result<FreeThread, ServiceError> {
         let place = Arc::clone(&self.places).try_acquire_owned().map_err(|_| self.full())?;
         let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
         let begin = Instant::now();
         let thread = Arc::clone(&self.free).acquire_owned().await.map_err(|_| failed())?;
         self.counts.waits.record(begin.elapsed());
+        Ok(FreeThread { _place: place, _thread: thread, unanswered })
+    }
+
+    /// Runs `job` on a thread that was waited for.
+    ///
+    /// # Errors
+    /// `Internal` when the job panicked.
+    pub(super) async fn run_on<T: Send + 'static>(
+        &self,
+        thread: FreeThread,
+        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
         let (answer, answered) = oneshot::channel();
         let span = tracing::Span::current();
         self.threads.spawn(move || {
+            let FreeThread { _place: place, _thread: thread, unanswered } = thread;
             unanswered.counts.begun.fetch_add(1, Ordering::Relaxed);
             let caller_gone = || answer.is_closed();
             let job = AssertUnwindSafe(|| span.in_scope(|| job(StopSignal::when(&caller_gone))));
@@ -149,7 +171,16 @@ impl Pool {
     }
 }
 
+/// A thread of a pool that has no job yet, and waits for one until this is dropped.
+#[derive(Debug)]
+pub(super) struct FreeThread {
+    _place: OwnedSemaphorePermit,
+    _thread: OwnedSemaphorePermit,
+    unanswered: Unanswered,
+}
+
 /// A job without an answer: cancelled where it is dropped as such.
+#[derive(Debug)]
 struct Unanswered {
     counts: Arc<Counts>,
     answered: bool,
