@@ -2,11 +2,11 @@
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use governor::clock::{Clock, DefaultClock};
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::service::ServiceError;
 
@@ -17,7 +17,7 @@ pub struct KeyLimits {
     pub requests_per_s_max: Option<NonZeroU32>,
     /// As many may come at once; in place of `limits.caller_burst_max`. Of use with a rate alone.
     pub burst_max: Option<NonZeroU32>,
-    /// Requests and streams in work at a time; the server bounds those of all callers together alone.
+    /// Requests and streams in work at a time; in place of `limits.caller_requests_at_once_max`.
     pub requests_at_once_max: Option<NonZeroU32>,
 }
 
@@ -29,11 +29,18 @@ const BURST_DEFAULT: NonZeroU32 = NonZeroU32::new(100).expect("more than zero");
 pub struct Allowance {
     pub(super) limits: KeyLimits,
     rate: Option<DefaultDirectRateLimiter>,
-    at_once: Option<Arc<Semaphore>>,
+    at_once: Arc<AtomicUsize>,
 }
 
 /// A request in work, until it is dropped.
-pub type InWork = Option<OwnedSemaphorePermit>;
+#[derive(Debug)]
+pub struct InWork(Arc<AtomicUsize>);
+
+impl Drop for InWork {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
 
 impl Allowance {
     pub(super) fn new(limits: KeyLimits) -> Self {
@@ -42,8 +49,7 @@ impl Allowance {
                 Quota::per_second(per_s).allow_burst(limits.burst_max.unwrap_or(BURST_DEFAULT)),
             )
         });
-        let at_once = limits.requests_at_once_max.map(|most| Arc::new(Semaphore::new(most.get() as usize)));
-        Self { limits, rate, at_once }
+        Self { limits, rate, at_once: Arc::default() }
     }
 
     /// Counts a request by the key's own rate; none where it has none, and the server's counts.
@@ -60,16 +66,20 @@ impl Allowance {
         }))
     }
 
-    /// Takes a place for a request in work.
+    /// Takes a place for a request in work, of as many as the key says, or else of `usual`; any number where that is none.
     ///
     /// # Errors
     /// When as many of `who` are in work as may be.
-    pub fn begin(&self, who: &str) -> Result<InWork, ServiceError> {
-        let Some(at_once) = &self.at_once else { return Ok(None) };
-        Arc::clone(at_once).try_acquire_owned().map(Some).map_err(|_| {
-            let most = self.limits.requests_at_once_max.map_or(0, NonZeroU32::get);
-            ServiceError::overloaded(format!("requests_at_once_max is {most}: {who} has as many in work"))
-        })
+    pub fn begin(&self, who: &str, usual: Option<NonZeroU32>) -> Result<InWork, ServiceError> {
+        let (name, most) = match self.limits.requests_at_once_max {
+            Some(own) => ("requests_at_once_max", Some(own)),
+            None => ("caller_requests_at_once_max", usual),
+        };
+        let more = |now: usize| most.is_none_or(|most| now < most.get() as usize).then_some(now + 1);
+        self.at_once.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more).map_err(|now| {
+            ServiceError::overloaded(format!("{name} is {now}: {who} has as many in work, try again"))
+        })?;
+        Ok(InWork(Arc::clone(&self.at_once)))
     }
 }
 
@@ -86,13 +96,21 @@ mod tests {
         let rates: Vec<bool> = (0..3).map(|_| allowance.check_rate("key a").unwrap().is_ok()).collect();
         assert_eq!(rates, [true, true, false]);
 
-        let held = [allowance.begin("key a").unwrap(), allowance.begin("key a").unwrap()];
-        let refused = allowance.begin("key a").unwrap_err().message;
-        assert_eq!(refused, "requests_at_once_max is 2: key a has as many in work");
+        let begin = |allowance: &Allowance| allowance.begin("key a", NonZeroU32::new(3));
+        let held = [begin(&allowance).unwrap(), begin(&allowance).unwrap()];
+        let refused = begin(&allowance).unwrap_err().message;
+        assert_eq!(refused, "requests_at_once_max is 2: key a has as many in work, try again");
         drop(held);
-        assert!(allowance.begin("key a").is_ok());
+        assert!(begin(&allowance).is_ok());
+    }
 
-        let none = Allowance::new(KeyLimits::default());
-        assert!(none.check_rate("key a").is_none() && none.begin("key a").unwrap().is_none());
+    #[test]
+    fn without_numbers_of_its_own_a_key_has_the_usual_ones() {
+        let allowance = Allowance::new(KeyLimits::default());
+        assert!(allowance.check_rate("key a").is_none());
+        let _held = [(); 3].map(|()| allowance.begin("key a", NonZeroU32::new(3)).unwrap());
+        let refused = allowance.begin("key a", NonZeroU32::new(3)).unwrap_err().message;
+        assert_eq!(refused, "caller_requests_at_once_max is 3: key a has as many in work, try again");
+        assert!(allowance.begin("key a", None).is_ok());
     }
 }

@@ -21,6 +21,9 @@ pub struct AdmissionLimits {
     pub caller_requests_per_s_max: u32,
     /// As many may come at once. 100.
     pub caller_burst_max: u32,
+    /// Requests and streams in work at a time of one key that says nothing of that itself; 0 = any number. Less than half of
+    /// `requests_max`, so that no key keeps the others out. 192.
+    pub caller_requests_at_once_max: u32,
     /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are taken,
     /// the oldest gives way. 64.
     pub probes_max: usize,
@@ -48,6 +51,7 @@ impl Default for AdmissionLimits {
             body_bytes_per_s_min: 1024,
             caller_requests_per_s_max: 0,
             caller_burst_max: 100,
+            caller_requests_at_once_max: 192,
             probes_max: 64,
             probe_body_bytes_max: 1 << 10,
             probe_time_max: Duration::from_secs(5),

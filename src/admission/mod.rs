@@ -29,6 +29,7 @@ pub use limits::AdmissionLimits;
 pub use of_connection::OfConnection;
 pub use rate::{Asking, Peer};
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -55,6 +56,8 @@ pub struct Admission(Arc<Inner>);
 struct Inner {
     lifecycle: Lifecycle,
     rates: Option<Rates>,
+    /// Requests of a key at once, where it says nothing of that.
+    at_once_max: Option<NonZeroU32>,
     streams: Quota,
     bodies: Bodies,
     probes: Probes,
@@ -95,6 +98,7 @@ impl Admission {
         Self(Arc::new(Inner {
             lifecycle,
             rates: Rates::new(limits),
+            at_once_max: NonZeroU32::new(limits.caller_requests_at_once_max),
             streams: Quota::new("streams_max", limits.streams_max),
             bodies: Bodies::new(limits),
             probes: Probes::new(limits),
@@ -122,9 +126,10 @@ impl Admission {
         let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
         let asking = Asking::of(request.extensions());
         self.check_rate(&asking)?;
-        let own_place = asking.begin()?;
+        let own_place = asking.begin(self.0.at_once_max)?;
         let hang_up = request.extensions().get().cloned();
         let arrival = self.0.bodies.begin(operation.is_stream(), hang_up)?;
+        let let_in = request.extensions().get().map(OfConnection::let_in);
         let request = Self::metered(request, &arrival)?;
         let answered = self.0.lifecycle.admit(handle(request)).await?;
         let mut response = arrival.refusal().map_or(answered, Err)?;
@@ -137,7 +142,8 @@ impl Admission {
                 bytes => arrival.add(bytes)?,
             }
         }
-        Ok(response.map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held)))))
+        Ok(response
+            .map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held, let_in)))))
     }
 
     /// Notes that a key came by a connection, and keeps to health what was taken for it.

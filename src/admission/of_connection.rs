@@ -2,6 +2,9 @@
 
 use std::sync::{Arc, OnceLock};
 
+use parking_lot::Mutex;
+use tokio::time::Instant;
+
 use super::quota::{Quota, Taken};
 use crate::service::ServiceError;
 
@@ -15,14 +18,28 @@ struct Shared {
     key: OnceLock<String>,
     /// It was taken when all places were in use: for health checks alone.
     is_reserved: bool,
+    admitted: Mutex<Admitted>,
     watches: Quota,
 }
+
+/// How many requests of a connection were let in and are not answered yet.
+#[derive(Debug)]
+struct Admitted {
+    requests: usize,
+    /// When the last of them was answered, or the connection came.
+    last: Instant,
+}
+
+/// A request that was let in, until its answer is sent.
+#[derive(Debug)]
+pub(crate) struct LetIn(OfConnection);
 
 impl OfConnection {
     /// Of a new connection; `is_reserved` where it may ask for nothing but health.
     pub fn new(is_reserved: bool) -> Self {
         let watches = Quota::new("health watches of one connection", 1);
-        Self(Arc::new(Shared { key: OnceLock::new(), is_reserved, watches }))
+        let admitted = Mutex::new(Admitted { requests: 0, last: Instant::now() });
+        Self(Arc::new(Shared { key: OnceLock::new(), is_reserved, admitted, watches }))
     }
 
     /// The name of the key that a request came with, the first that counts.
@@ -33,6 +50,20 @@ impl OfConnection {
     /// A request came with the key of that name, which counts.
     pub(crate) fn show_key(&self, name: &str) {
         self.0.key.get_or_init(|| name.to_owned());
+    }
+
+    /// Since when the connection has had no request that was let in; none while it has one. Requests that are refused,
+    /// whatever becomes of their answers, are no use of a connection: limits bound how many are let in, and nothing bounds
+    /// how many are refused.
+    pub fn idle_since(&self) -> Option<Instant> {
+        let admitted = self.0.admitted.lock();
+        (admitted.requests == 0).then_some(admitted.last)
+    }
+
+    /// A request is let in.
+    pub(crate) fn let_in(&self) -> LetIn {
+        self.0.admitted.lock().requests += 1;
+        LetIn(self.clone())
     }
 
     /// # Errors
@@ -52,5 +83,13 @@ impl OfConnection {
     /// Where it has one.
     pub(super) fn watch(&self) -> Result<Taken, ServiceError> {
         self.0.watches.take()
+    }
+}
+
+impl Drop for LetIn {
+    fn drop(&mut self) {
+        let mut admitted = self.0.0.admitted.lock();
+        admitted.requests -= 1;
+        admitted.last = Instant::now();
     }
 }

@@ -56,6 +56,7 @@ impl Probes {
         let watch = (operation == Operation::HealthWatch).then(|| self.watch(&request)).transpose()?;
         let places = if operation == Operation::Metrics { &self.scrapes } else { &self.checks };
         let arrival = places.begin(false, request.extensions().get().cloned())?;
+        let let_in = request.extensions().get().map(OfConnection::let_in);
         let request = self.with_body(request, &arrival).await?;
         let answered = if watch.is_some() {
             // From here on it has a place of its own kind.
@@ -66,7 +67,7 @@ impl Probes {
             Some(arrival)
         };
         let response = handle(request).await?;
-        Ok(response.map(|body| Body::new(HeldBody::new(body, answered, watch))))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, answered, (watch, let_in)))))
     }
 
     fn watch(&self, request: &Request) -> Result<Watch, ServiceError> {

@@ -61,12 +61,12 @@ impl Asking {
         own.unwrap_or_else(|| rates.map_or(Ok(()), |rates| rates.check(self)))
     }
 
-    /// Takes a place among those of the caller's key.
+    /// Takes a place among those of the caller's key, which are as many as it says, or `usual`.
     ///
     /// # Errors
     /// When all are taken.
-    pub(super) fn begin(&self) -> Result<InWork, ServiceError> {
-        self.own.as_ref().map_or(Ok(None), |own| own.begin(&self.name))
+    pub(super) fn begin(&self, usual: Option<NonZeroU32>) -> Result<Option<InWork>, ServiceError> {
+        self.own.as_ref().map(|own| own.begin(&self.name, usual)).transpose()
     }
 }
 

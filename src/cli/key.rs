@@ -78,7 +78,7 @@ struct NewKey {
     /// As many may come at once, where they are limited to some a second [default: 100]
     #[arg(long, value_name = "N", requires = "requests_per_s_max")]
     burst_max: Option<NonZeroU32>,
-    /// Requests of its holder in work at a time [default: any number]
+    /// Requests of its holder in work at a time [default: limits.caller_requests_at_once_max of the server]
     #[arg(long, value_name = "N")]
     requests_at_once_max: Option<NonZeroU32>,
     /// The file of keys to add it to, made where it is not there [default: the entry is printed for you to add]

@@ -41,6 +41,8 @@ pub struct LimitsConfig {
     pub caller_requests_per_s_max: u32,
     /// See [`AdmissionLimits::caller_burst_max`].
     pub caller_burst_max: u32,
+    /// See [`AdmissionLimits::caller_requests_at_once_max`].
+    pub caller_requests_at_once_max: u32,
     /// See [`AdmissionLimits::probes_max`].
     pub probes_max: usize,
     /// See [`AdmissionLimits::probe_body_bytes_max`].
@@ -117,6 +119,7 @@ impl Default for LimitsConfig {
             body_bytes_per_s_min: admission.body_bytes_per_s_min,
             caller_requests_per_s_max: admission.caller_requests_per_s_max,
             caller_burst_max: admission.caller_burst_max,
+            caller_requests_at_once_max: admission.caller_requests_at_once_max,
             probes_max: admission.probes_max,
             probe_body_bytes_max: admission.probe_body_bytes_max,
             probe_time_max_s: admission.probe_time_max.as_secs_f64(),
@@ -160,6 +163,7 @@ impl LimitsConfig {
             body_bytes_per_s_min: self.body_bytes_per_s_min,
             caller_requests_per_s_max: self.caller_requests_per_s_max,
             caller_burst_max: self.caller_burst_max,
+            caller_requests_at_once_max: self.caller_requests_at_once_max,
             probes_max: self.probes_max,
             probe_body_bytes_max: self.probe_body_bytes_max,
             probe_time_max: Duration::from_secs_f64(self.probe_time_max_s),

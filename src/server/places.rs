@@ -1,8 +1,9 @@
 //! Places for the connections of a protocol.
 //!
 //! Where all are taken, a new connection gets that of another: of the one without a key that has been idle, or has left an
-//! answer unread, for longest, then of the one that has been idle for longest of the key that has most. Connections that nobody uses can therefore never keep others out, however many there are;
-//! those in use are fewer than the places, since requests and streams in flight have lower limits.
+//! answer unread, for longest, then of the one that has been idle for longest of the key that has most. A connection is
+//! idle that has no request which was let in: refusals, asked for and not read, keep nobody out. Connections that nobody uses can therefore never keep others out, however many there are; those in use are fewer
+//! than the places, since requests and streams in flight have lower limits.
 //!
 //! Should all be in use nonetheless, a new connection gets a place of some that are kept for health checks, for a moment
 //! ([`reserved`]).
@@ -22,8 +23,8 @@ use tokio_util::sync::CancellationToken;
 use self::reserved::Reserved;
 use crate::admission::{OfConnection, Peer};
 
-/// How long a client without a key may leave an answer unread while others find no place, and how old a silent connection
-/// is no newcomer any more.
+/// How long a client without a key may leave an answer unread while others find no place, and how old a connection is no
+/// newcomer any more.
 const GRACE: Duration = Duration::from_secs(1);
 
 /// The places of a protocol. A clone is another handle on the same ones.
@@ -87,7 +88,7 @@ impl Places {
     /// A place for a new connection; none where all are taken by connections in use, and none are reserved.
     pub(super) fn take(&self, peer: Peer) -> Option<Place> {
         let mut taken = self.taken.lock();
-        let has_place = taken.connections.len() < self.most || taken.free_one(self.reserved_most);
+        let has_place = taken.connections.len() < self.most || taken.free_one(self.spared());
         if !has_place {
             taken.reserved.free_one(self.reserved_most)?;
         }
@@ -111,32 +112,39 @@ impl Places {
             next_answer: AtomicU64::new(0),
         })))
     }
+
+    /// Newcomers that give way to nobody: as many as could be checks of health.
+    fn spared(&self) -> usize {
+        self.reserved_most.min(self.most / 2)
+    }
 }
 
 impl Taken {
     /// Takes the place of a connection that gives way; false where none does. So few as `spared` that have only just
-    /// come, and have not asked yet, give way to nobody: a newcomer finds a reserved place instead.
+    /// come, and were let in for nothing yet, give way to nobody.
     fn free_one(&mut self, spared: usize) -> bool {
         let without_key = || self.connections.iter().filter(|(_, it)| it.shared.key().is_none());
         let unused = without_key().filter_map(|(&number, it)| Some((it.unused_since()?, number))).min();
         let number = match unused {
             Some((since, number)) => {
-                let idle = without_key().filter(|(_, it)| it.requests == 0).count();
-                (since.elapsed() >= GRACE || idle > spared).then_some(number)
+                let newcomers = without_key().filter(|(_, it)| it.unused_since().is_some()).count();
+                (since.elapsed() >= GRACE || newcomers > spared).then_some(number)
             }
-            None => self.idle_of_who_has_most(),
+            None => None,
         };
+        let number = number.or_else(|| self.idle_of_who_has_most());
         let freed = number.and_then(|number| self.connections.remove(&number));
         freed.map(|connection| connection.lost.cancel()).is_some()
     }
 
     /// The connection that has been idle for longest, of the key that has most idle ones.
     fn idle_of_who_has_most(&self) -> Option<u64> {
-        let mut idle: HashMap<Option<&str>, (usize, Instant, u64)> = HashMap::new();
-        for (&number, it) in self.connections.iter().filter(|(_, it)| it.requests == 0) {
-            let (count, since, longest) = idle.entry(it.shared.key()).or_insert((0, it.idle_since, number));
+        let mut idle: HashMap<&str, (usize, Instant, u64)> = HashMap::new();
+        for (&number, it) in &self.connections {
+            let (Some(key), Some(idle_since)) = (it.shared.key(), it.shared.idle_since()) else { continue };
+            let (count, since, longest) = idle.entry(key).or_insert((0, idle_since, number));
             *count += 1;
-            (*since, *longest) = (*since, *longest).min((it.idle_since, number));
+            (*since, *longest) = (*since, *longest).min((idle_since, number));
         }
         let most = idle.into_values().max_by_key(|&(count, since, _)| (count, Reverse(since)));
         most.map(|(_, _, longest)| longest)
@@ -144,14 +152,11 @@ impl Taken {
 }
 
 impl Connection {
-    /// Since when its client has had no request, or has read nothing of an answer where that is long enough for others to
-    /// go first.
+    /// Since when its client has had no request that was let in, or has read nothing of an answer where that is long enough
+    /// for others to go first.
     fn unused_since(&self) -> Option<Instant> {
-        let oldest = || self.unread.lock().values().min().copied();
-        match self.requests {
-            0 => Some(self.idle_since),
-            _ => oldest().filter(|since| since.elapsed() >= GRACE),
-        }
+        let unread = || self.unread.lock().values().min().copied().filter(|since| since.elapsed() >= GRACE);
+        self.shared.idle_since().or_else(unread)
     }
 }
 
@@ -259,6 +264,11 @@ impl Drop for Held {
 mod tests {
     use super::*;
 
+    /// A request that is let in.
+    fn in_use(place: &Place) -> (InUse, impl Sized + use<>) {
+        (place.used(), place.0.shared.let_in())
+    }
+
     #[tokio::test(start_paused = true)]
     async fn a_newcomer_gets_the_place_that_was_idle_for_longest() {
         let places = Places::new(2, 0);
@@ -267,11 +277,11 @@ mod tests {
         let second = places.take(Peer::Local).unwrap();
         // The first is now the one that was used last.
         sleep(Duration::from_secs(1)).await;
-        drop(first.used());
+        drop(in_use(&first));
         let _third = places.take(Peer::Local).unwrap();
         assert!(second.0.lost.is_cancelled() && !first.0.lost.is_cancelled());
         // What it does in its last moments harms nobody.
-        drop(second.used());
+        drop(in_use(&second));
         drop(second);
         assert_eq!(places.taken.lock().connections.len(), 2);
     }
@@ -280,7 +290,7 @@ mod tests {
     async fn a_place_in_use_is_nobody_elses() {
         let places = Places::new(1, 0);
         let place = places.take(Peer::Local).unwrap();
-        let used = place.used();
+        let used = in_use(&place);
         assert!(places.take(Peer::Local).is_none());
         drop(used);
         assert!(places.take(Peer::Local).is_some());
@@ -293,35 +303,33 @@ mod tests {
         keyed.0.shared.show_key("r1");
         sleep(Duration::from_secs(9)).await;
         let (idle, unread) = (places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap());
-        let used = unread.used();
-        used.handed_over();
-        let _first = places.take(Peer::Local).unwrap().used();
+        let used = in_use(&unread);
+        used.0.handed_over();
+        let _first = in_use(&places.take(Peer::Local).unwrap());
         assert!(idle.0.lost.is_cancelled() && !keyed.0.lost.is_cancelled() && !unread.0.lost.is_cancelled());
         sleep(GRACE).await;
-        let _second = places.take(Peer::Local).unwrap().used();
+        let _second = in_use(&places.take(Peer::Local).unwrap());
         assert!(unread.0.lost.is_cancelled() && !keyed.0.lost.is_cancelled());
-        let _third = places.take(Peer::Local).unwrap().used();
+        let _third = in_use(&places.take(Peer::Local).unwrap());
         assert!(keyed.0.lost.is_cancelled());
         assert!(places.take(Peer::Local).is_none());
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_newcomer_among_connections_that_nobody_reads_is_not_the_first_to_go() {
-        let places = Places::new(3, 2);
-        let flood: Vec<_> = (0..3).map(|_| places.take(Peer::Local).unwrap()).collect();
-        let _unread: Vec<_> = flood
-            .iter()
-            .map(|place| {
-                let used = place.used();
-                used.handed_over();
-                used
-            })
-            .collect();
+        let places = Places::new(4, 2);
+        let flood: Vec<_> = (0..4).map(|_| places.take(Peer::Local).unwrap()).collect();
+        let unread = flood.iter().map(|place| {
+            let used = in_use(place);
+            used.0.handed_over();
+            used
+        });
+        let _unread: Vec<_> = unread.collect();
         sleep(GRACE).await;
         let check = places.take(Peer::Local).unwrap();
         assert!(!check.is_reserved() && flood[0].0.lost.is_cancelled());
-        let _others = [places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap()];
-        assert!(flood[2].0.lost.is_cancelled() && !check.0.lost.is_cancelled());
+        let _others = [(); 3].map(|()| places.take(Peer::Local).unwrap());
+        assert!(flood[3].0.lost.is_cancelled() && !check.0.lost.is_cancelled());
         // All have only just come: one of them goes, since more are silent than places are kept for checks.
         let another = places.take(Peer::Local).unwrap();
         assert!(!another.is_reserved() && check.0.lost.is_cancelled());
@@ -330,12 +338,49 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_few_that_have_only_just_come_are_spared_for_a_moment() {
         let places = Places::new(2, 1);
-        let (_used, check) = (places.take(Peer::Local).unwrap().used(), places.take(Peer::Local).unwrap());
+        let _used = in_use(&places.take(Peer::Local).unwrap());
+        let check = places.take(Peer::Local).unwrap();
         assert!(places.take(Peer::Local).unwrap().is_reserved());
         assert!(!check.0.lost.is_cancelled());
         sleep(GRACE).await;
         assert!(!places.take(Peer::Local).unwrap().is_reserved());
         assert!(check.0.lost.is_cancelled());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn refusals_that_nobody_reads_keep_nobody_out_however_often_they_are_asked_for() {
+        let places = Places::new(4, 1);
+        let held: Vec<_> = (0..4).map(|_| places.take(Peer::Local).unwrap()).collect();
+        let mut asked = Vec::new();
+        for _ in 0..4 {
+            // The last answer is read when the next is there.
+            let answers = held.iter().map(|place| {
+                let used = place.used();
+                used.handed_over();
+                used
+            });
+            asked = answers.collect();
+            sleep(GRACE * 7 / 10).await;
+        }
+        let robots = [(); 4].map(|()| {
+            let robot = places.take(Peer::Local).unwrap();
+            robot.0.shared.show_key("r1");
+            assert!(!robot.is_reserved());
+            in_use(&robot)
+        });
+        assert!(held.iter().all(|place| place.0.lost.is_cancelled()));
+        drop((asked, robots));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn newcomers_do_not_shut_out_others_while_places_of_a_key_are_idle() {
+        let places = Places::new(4, 2);
+        let insider: Vec<_> = (0..4).map(|_| places.take(Peer::Local).unwrap()).collect();
+        insider.iter().for_each(|place| place.0.shared.show_key("insider"));
+        let trickle = places.take(Peer::Local).unwrap();
+        let robot = places.take(Peer::Local).unwrap();
+        assert!(!trickle.is_reserved() && !robot.is_reserved());
+        assert!(insider[1].0.lost.is_cancelled() && !trickle.0.lost.is_cancelled());
     }
 
     #[tokio::test(start_paused = true)]
@@ -361,9 +406,9 @@ mod tests {
     #[tokio::test]
     async fn where_all_are_in_use_some_places_are_left_for_health() {
         let places = Places::new(1, 2);
-        let used = places.take(Peer::Local).unwrap().used();
+        let used = in_use(&places.take(Peer::Local).unwrap());
         let (one, two) = (places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap());
-        assert!(one.is_reserved() && two.is_reserved() && !used.place.is_reserved());
+        assert!(one.is_reserved() && two.is_reserved() && !used.0.place.is_reserved());
         let three = places.take(Peer::Local).unwrap();
         assert!(one.0.lost.is_cancelled() && !two.0.lost.is_cancelled() && three.is_reserved());
         drop((one, two, three));

@@ -60,7 +60,7 @@ use crate::util::StopSignal;
 use catalogue::Catalogue;
 use committing::{Refusal, Step};
 use hosted_map::HostedMap;
-use pool::Pool;
+use pool::{FreeThread, Pool};
 use room::Room;
 use time_limit::{TimeLimit, check_not_stopped, ended_early};
 
@@ -193,10 +193,10 @@ impl MapService {
         if map.is_new(&scan) {
             self.inner.room.check_to_grow()?;
         }
-        let turn = Arc::new(map.turn_of(&scan.robot).await);
+        let turn = Arc::new(self.inner.mapping.in_turn(map.turn_of(&scan.robot)).await?);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
         let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
-        self.carry_through(&self.inner.mapping, move |stop| {
+        self.carry_through(&self.inner.mapping, None, move |stop| {
             limit.run(stop, |stop| {
                 map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
             })
@@ -257,7 +257,7 @@ impl MapService {
         }
         let (inner, deletion, caller) = (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
         let propose = move |_: StopSignal<'_>| map.propose_deletion(&deletion, caller.as_ref(), &inner.room);
-        self.carry_through(&self.inner.mapping, propose).await
+        self.carry_through(&self.inner.mapping, None, propose).await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -273,8 +273,12 @@ impl MapService {
         let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
         let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
         // Until its outcome is known: what was withdrawn before it is then what it found.
-        let _turns = map.turns_of_undo(&undo.target).await;
-        self.carry_through(&self.inner.undo, move |stop| {
+        let pool = &self.inner.undo;
+        let _turn = pool.in_turn(map.turn_of_undo()).await?;
+        // A thread first: the robot's scans wait for this undo, and not for those of other maps.
+        let thread = pool.thread().await?;
+        let _robot = map.turn_of_target(&undo.target).await;
+        self.carry_through(pool, Some(thread), move |stop| {
             limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
         })
         .await
@@ -297,15 +301,20 @@ impl MapService {
         self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
     }
 
-    /// Prepares a change on a thread of `pool`, waits until it is made, and prepares it again where the map has moved on
+    /// Prepares a change on a thread of `pool`, on `first` where there is one, waits until it is made, and prepares it again where the map has moved on
     /// meanwhile. Whoever goes before it is decided on takes it along; after that it is made.
     async fn carry_through<A: Send + 'static>(
         &self,
         pool: &Pool,
+        mut first: Option<FreeThread>,
         propose: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
-            match pool.run(propose.clone()).await?? {
+            let thread = match first.take() {
+                Some(thread) => thread,
+                None => pool.thread().await?,
+            };
+            match pool.run_on(thread, propose.clone()).await?? {
                 Step::Answered(answer) => return Ok(answer),
                 Step::Proposed(outcome, answer) => match outcome.await.map_err(committing_ended)? {
                     Ok(committed) => return Ok(answer(committed)),

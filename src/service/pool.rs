@@ -4,11 +4,12 @@
 //! in memory and its place among those that wait. A job in hand learns of it by its [`StopSignal`].
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use super::{ErrorCode, ServiceError};
 use crate::util::{Durations, SharedDurations, StopSignal};
@@ -27,6 +28,8 @@ pub(super) struct Pool {
     places: Arc<Semaphore>,
     /// One permit for each thread that has no job.
     free: Arc<Semaphore>,
+    /// One permit for each caller that waits for the turn of its map or robot.
+    turns: Semaphore,
     jobs_waiting_max: usize,
     counts: Arc<Counts>,
 }
@@ -74,9 +77,30 @@ impl Pool {
             threads,
             places: Semaphore::new(free + jobs_waiting_max).into(),
             free: Semaphore::new(free).into(),
+            turns: Semaphore::new(jobs_waiting_max),
             jobs_waiting_max,
             counts: Arc::default(),
         })
+    }
+
+    /// Waits for `turn`, before which a job makes no sense; those that wait are as many as jobs may.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` at once when others have the turn and too many wait.
+    pub(super) async fn in_turn<T>(&self, turn: impl Future<Output = T>) -> Result<T, ServiceError> {
+        let mut turn = pin!(turn);
+        tokio::select! {
+            biased;
+            turn = &mut turn => return Ok(turn),
+            () = std::future::ready(()) => {}
+        }
+        let _place = self.turns.try_acquire().map_err(|_| self.full())?;
+        Ok(turn.await)
+    }
+
+    fn full(&self) -> ServiceError {
+        let most = self.jobs_waiting_max;
+        ServiceError::overloaded(format!("jobs_waiting_max is {most}: all places are taken, try again"))
     }
 
     /// Runs `job` on a thread of the pool, first come first served; not at all where the caller does not wait for its
@@ -88,18 +112,36 @@ impl Pool {
         &self,
         job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
-            let message =
-                format!("jobs_waiting_max is {}: all places are taken, try again", self.jobs_waiting_max);
-            return Err(ServiceError::overloaded(message));
-        };
+        let thread = self.thread().await?;
+        self.run_on(thread, job).await
+    }
+
+    /// Waits for a thread of the pool, first come first served.
+    ///
+    /// # Errors
+    /// `ResourceExhausted` at once when the queue is full.
+    pub(super) async fn thread(&self) -> Result<FreeThread, ServiceError> {
+        let place = Arc::clone(&self.places).try_acquire_owned().map_err(|_| self.full())?;
         let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
         let begin = Instant::now();
         let thread = Arc::clone(&self.free).acquire_owned().await.map_err(|_| failed())?;
         self.counts.waits.record(begin.elapsed());
+        Ok(FreeThread { _place: place, _thread: thread, unanswered })
+    }
+
+    /// Runs `job` on a thread that was waited for.
+    ///
+    /// # Errors
+    /// `Internal` when the job panicked.
+    pub(super) async fn run_on<T: Send + 'static>(
+        &self,
+        thread: FreeThread,
+        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
         let (answer, answered) = oneshot::channel();
         let span = tracing::Span::current();
         self.threads.spawn(move || {
+            let FreeThread { _place: place, _thread: thread, unanswered } = thread;
             unanswered.counts.begun.fetch_add(1, Ordering::Relaxed);
             let caller_gone = || answer.is_closed();
             let job = AssertUnwindSafe(|| span.in_scope(|| job(StopSignal::when(&caller_gone))));
@@ -129,7 +171,16 @@ impl Pool {
     }
 }
 
+/// A thread of a pool that has no job yet, and waits for one until this is dropped.
+#[derive(Debug)]
+pub(super) struct FreeThread {
+    _place: OwnedSemaphorePermit,
+    _thread: OwnedSemaphorePermit,
+    unanswered: Unanswered,
+}
+
 /// A job without an answer: cancelled where it is dropped as such.
+#[derive(Debug)]
 struct Unanswered {
     counts: Arc<Counts>,
     answered: bool,
@@ -200,6 +251,23 @@ mod tests {
         assert_eq!(pool.run(|_| 4).await.unwrap(), 4);
         let PoolUse { waiting, running, begun, cancelled, .. } = pool.in_use();
         assert_eq!((waiting, running, begun, cancelled), (0, 0, 3, 0));
+    }
+
+    #[tokio::test]
+    async fn no_more_wait_for_a_turn_than_may_and_whoever_finds_it_free_does_not_wait() {
+        let (pool, lock) = (pool(1), Arc::new(tokio::sync::Mutex::new(())));
+        let held = pool.in_turn(Arc::clone(&lock).lock_owned()).await.unwrap();
+        let waiting = tokio::spawn({
+            let (pool, turn) = (Arc::clone(&pool), Arc::clone(&lock).lock_owned());
+            async move { pool.in_turn(turn).await.map(drop) }
+        });
+        until(|| pool.turns.available_permits() == 0).await;
+        let refused = pool.in_turn(Arc::clone(&lock).lock_owned()).await.unwrap_err();
+        assert!(refused.message.contains("jobs_waiting_max is 1"), "{}", refused.message);
+        drop(held);
+        waiting.await.unwrap().unwrap();
+        drop(pool.in_turn(lock.lock_owned()).await.unwrap());
+        assert_eq!(pool.turns.available_permits(), 1);
     }
 
     #[tokio::test]

@@ -51,15 +51,18 @@ impl PlannedUndo {
 }
 
 impl HostedMap {
-    /// Waits until the undos before are done, and of an undo of all scans of a robot, until its earlier scans are: those that
-    /// come later wait in turn, so that none that the undo does not know of lies before it.
-    pub(super) async fn turns_of_undo(&self, target: &UndoTarget) -> [Option<OwnedMutexGuard<()>>; 2] {
-        let undo = Arc::clone(&self.undo_turn).lock_owned().await;
-        let robot = match target {
+    /// Waits until the undos before are done.
+    pub(super) async fn turn_of_undo(&self) -> OwnedMutexGuard<()> {
+        Arc::clone(&self.undo_turn).lock_owned().await
+    }
+
+    /// Waits, before an undo of all scans of a robot, until its earlier scans are done: those that come later wait in turn,
+    /// so that none that the undo does not know of lies before it.
+    pub(super) async fn turn_of_target(&self, target: &UndoTarget) -> Option<OwnedMutexGuard<()>> {
+        match target {
             UndoTarget::RobotSince { robot, .. } => Some(self.turn_of(robot).await),
             UndoTarget::Scan { .. } | UndoTarget::Revision(_) => None,
-        };
-        [Some(undo), robot]
+        }
     }
 
     /// Sets an undo on its way, unless it was done before.

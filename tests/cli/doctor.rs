@@ -37,6 +37,8 @@ fn a_folder_that_is_well_is_told_map_by_map() {
     assert!(complaint(&["doctor", &sequence.path("scans")], 2).contains("no data folder"));
     let server = Process::start(&data, &[]);
     assert!(complaint(&["doctor", &data], 1).contains("in use by another server"));
+    // Told to end before it serves, it would leave the folder as it found it.
+    assert_eq!(objects(&["maps", "show", "office", "--server", &server.grpc])[0]["revision"], json!(3));
     assert_eq!(server.stop(), Some(0));
     // The end wrote a snapshot, and the journal makes the same of the first one.
     let found = &objects(&["doctor", &data])[0];

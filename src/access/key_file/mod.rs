@@ -10,7 +10,7 @@
 //! expires = 2027-01-31           # a date or a time (2027-01-31T12:00:00Z); without it: never
 //! requests_per_s_max = 20        # in place of limits.caller_requests_per_s_max
 //! burst_max = 40                 # in place of limits.caller_burst_max
-//! requests_at_once_max = 4
+//! requests_at_once_max = 4       # in place of limits.caller_requests_at_once_max
 //! former_sha256 = "60303ae2..."  # the secret before the last rotation,
 //! former_expires = 2026-12-01    # which counts until then
 //! ```

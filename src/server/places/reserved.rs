@@ -1,7 +1,8 @@
 //! Places kept for health checks, for when all others are in use.
 //!
 //! Where all of these are taken as well, a new connection gets that of another: of one that has its answer, then the
-//! one without news for longest of the peer that has most. A request is news once, when it begins. So one peer's
+//! one without news for longest of the peers that have most, where that is more than a monitor takes that makes several
+//! checks at once. A request is news once, when it begins. So one peer's
 //! connections, however many come, leave those of other peers alone; and a check of the same peer has the time in which
 //! all places change hands, once to ask and once more to be answered.
 
@@ -26,6 +27,10 @@ struct Guest {
     lost: CancellationToken,
 }
 
+/// One of so many reserved places and more of them are a flood where one peer takes them: 8 of 128. Fewer are a monitor's
+/// that makes several checks at once, and do not make it the peer that has most.
+const MONITORS: usize = 16;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Silent,
@@ -37,7 +42,7 @@ impl Reserved {
     /// Makes sure that one of `most` places is free; none where there are none.
     pub(super) fn free_one(&mut self, most: usize) -> Option<()> {
         if self.0.len() >= most {
-            let gone = self.0.remove(&self.first_to_go()?)?;
+            let gone = self.0.remove(&self.first_to_go(most)?)?;
             gone.lost.cancel();
         }
         (most > 0).then_some(())
@@ -65,13 +70,14 @@ impl Reserved {
         }
     }
 
-    fn first_to_go(&self) -> Option<u64> {
+    fn first_to_go(&self, places: usize) -> Option<u64> {
         let mut of_peer: HashMap<Peer, usize> = HashMap::new();
         self.0.values().for_each(|guest| *of_peer.entry(guest.peer).or_default() += 1);
-        let most = of_peer.values().max().copied()?;
+        let burden = |peer: &Peer| of_peer[peer].max(places / MONITORS);
+        let most = of_peer.keys().map(burden).max()?;
         let is_answered = |guest: &Guest| guest.stage == Stage::Answered;
         // Those of a lesser peer go last, and never do as long as there are others.
-        let rank = |guest: &Guest| (!is_answered(guest), of_peer[&guest.peer] < most, guest.news);
+        let rank = |guest: &Guest| (!is_answered(guest), burden(&guest.peer) < most, guest.news);
         self.0.iter().min_by_key(|(_, guest)| rank(guest)).map(|(&number, _)| number)
     }
 
@@ -114,6 +120,19 @@ mod tests {
             let there = |&number: &u64| !self.lost[number as usize].is_cancelled();
             (0..self.lost.len() as u64).filter(there).collect()
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_flood_from_many_addresses_leaves_a_monitor_several_checks_at_once() {
+        let mut places = Places::new(48);
+        for address in 0..48 {
+            places.comes(address).await;
+        }
+        let checks = [places.comes(100).await, places.comes(100).await, places.comes(100).await];
+        for address in 101..146 {
+            places.comes(address).await;
+        }
+        assert!(checks.iter().all(|&check| !places.lost[check as usize].is_cancelled()));
     }
 
     #[tokio::test(start_paused = true)]

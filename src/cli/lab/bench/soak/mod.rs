@@ -70,6 +70,9 @@ pub(super) struct Soak {
     /// How much memory may grow over the second half, by the line through its measurements, for it to be flat
     #[arg(long, value_name = "SHARE", default_value_t = 0.03, value_parser = share)]
     growth_max: f64,
+    /// Of the operations that were due, how many may be undone when the time is over
+    #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = share)]
+    left_max: f64,
     /// Clients that ask
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
     planners: u16,
@@ -107,7 +110,9 @@ impl Soak {
         output.print(&verdict)?;
         target.delete().await?;
         server.stop().await?;
-        verdict.complaint(self.growth_max).map_or(Ok(()), |complaint| Err(CliError::failed(complaint)))
+        verdict
+            .complaint(self.growth_max, self.left_max)
+            .map_or(Ok(()), |complaint| Err(CliError::failed(complaint)))
     }
 
     async fn planners(&self, target: &Target) -> Result<Fleet<Planner>, CliError> {

@@ -8,9 +8,6 @@ use super::memory::Trend;
 use super::tally::Tally;
 use crate::cli::map_report::{bytes, count};
 
-/// Of the operations that were due, how many may be undone when the time is over.
-const LEFT_MAX: f64 = 0.01;
-
 /// Operations of one kind.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Done {
@@ -103,11 +100,11 @@ impl Verdict {
     }
 
     /// What is wrong, if anything.
-    pub(super) fn complaint(&self, growth_max: f64) -> Option<String> {
+    pub(super) fn complaint(&self, growth_max: f64, left_max: f64) -> Option<String> {
         let errors = self.queries.errors + self.changes.errors;
         if errors > 0 {
             Some(format!("{errors} operations failed"))
-        } else if self.left > LEFT_MAX {
+        } else if self.left > left_max {
             Some(format!("the load was too much: {:.1} % of it was not carried out", self.left * 100.0))
         } else if self.growth_of_second_half > growth_max {
             Some(format!("memory grew by more than {} % in the second half", growth_max * 100.0))
