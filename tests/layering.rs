@@ -4,14 +4,15 @@
 use std::path::{Path, PathBuf};
 
 /// Modules and their layers, bottom first.
-const LAYERS: [&[&str]; 8] = [
+const LAYERS: [&[&str]; 9] = [
     &["util", "sync", "voxel", "bloom", "geometry"],
     &["map", "align", "scan", "mapping"],
     &["store"],
     &["service"],
     &["wire", "config", "telemetry", "lifecycle", "admission", "reload", "access"],
     &["grpc", "http", "client"],
-    &["server", "lab"],
+    &["server"],
+    &["lab"],
     &["cli", "main"],
 ];
 
