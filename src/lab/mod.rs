@@ -7,13 +7,15 @@
 //! * [`rivals`]: other structures that answer the same question, with the same transform.
 //! * [`measure`]: what look-ups, insertions, alignments, journals and starts cost.
 //! * [`experiment`]: the paper's experiments (IV).
+//! * `fleet`: a server under the load of planners and robots.
 //! * [`report`]: results as tables and plots in files.
 //!
-//! What is measured runs in this process on one thread, without a network; a load on a server lives with the command
-//! line, which knows the client.
+//! What `measure` and `experiment` time runs in this process, without a network.
 
 #[cfg(feature = "lab")]
 pub mod experiment;
+#[cfg(feature = "lab")]
+pub(crate) mod fleet;
 #[cfg(feature = "lab")]
 pub mod measure;
 #[cfg(feature = "lab")]

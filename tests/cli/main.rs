@@ -5,6 +5,7 @@
 mod bench;
 mod demo;
 mod doctor;
+mod documents;
 mod errors;
 mod experiment;
 mod help;

@@ -10,6 +10,7 @@ use clap::Subcommand;
 use super::error::CliError;
 use super::output::Output;
 use super::runtime;
+use crate::lab::fleet::FleetError;
 use crate::lab::report::ReportError;
 
 /// The commands that simulate, measure and compare.
@@ -18,6 +19,17 @@ pub(super) enum Lab {
     Demo(demo::Demo),
     Bench(bench::Bench),
     Experiment(experiment::Experiment),
+}
+
+impl From<FleetError> for CliError {
+    fn from(error: FleetError) -> Self {
+        match error {
+            FleetError::Client(error) => error.into(),
+            FleetError::Server(error) => error.into(),
+            FleetError::Usage(message) => Self::usage(message),
+            FleetError::Failed(message) => Self::failed(message),
+        }
+    }
 }
 
 impl From<ReportError> for CliError {

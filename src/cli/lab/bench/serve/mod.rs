@@ -1,11 +1,6 @@
 //! `mrol bench serve`: a load of point queries on a server.
 
-mod address;
-mod daemon;
-mod http;
-mod load;
 mod report;
-mod target;
 
 use std::time::Duration;
 
@@ -17,13 +12,7 @@ use crate::cli::map_report::count;
 use crate::cli::output::Output;
 use crate::cli::parse::LookupName;
 use crate::cli::remote::CredentialOptions;
-pub(super) use address::{GrpcAddress, HttpAddress};
-pub(super) use http::HttpConnection;
-pub(super) use load::Question;
-pub(super) use target::Target;
-
-use daemon::Daemon;
-use load::Load;
+use crate::lab::fleet::{Daemon, GrpcAddress, HttpAddress, Load, Question, Target};
 use report::Line;
 
 const EXAMPLES: &str = "\
@@ -87,13 +76,13 @@ impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let time = Duration::try_from_secs_f64(self.seconds).map_err(CliError::usage)?;
         let workload = self.workload.workload();
-        self.map.settings(workload.resolution_m())?;
+        let settings = self.map.settings(workload.resolution_m())?;
         let daemon = match self.server {
             Some(_) => None,
-            None => Some(Daemon::start().await?),
+            None => Some(Daemon::start_in_memory().await?),
         };
         let (grpc, http) = self.addresses(daemon.as_ref(), &output)?;
-        let target = Target::make(grpc, http, workload, &self.map).await?;
+        let target = Target::make(grpc, http, workload, settings).await?;
         let measured = self.measure(&target, time, &output).await;
         target.delete().await?;
         if let Some(daemon) = daemon {
@@ -108,8 +97,8 @@ impl Serve {
         daemon: Option<&Daemon>,
         output: &Output,
     ) -> Result<(GrpcAddress, Option<HttpAddress>), CliError> {
-        if let Some(serving) = daemon.map(Daemon::serving) {
-            let (grpc, http) = (serving.grpc.to_string(), format!("http://{}", serving.http));
+        if let Some(daemon) = daemon {
+            let (grpc, http) = (daemon.grpc().to_string(), format!("http://{}", daemon.http()));
             return Ok((GrpcAddress::open(grpc), Some(HttpAddress::open(http))));
         }
         if self.http.is_none() && self.protocols.contains(&Protocol::Http) {

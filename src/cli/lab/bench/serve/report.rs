@@ -6,8 +6,8 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::Protocol;
-use super::load::Answered;
 use crate::cli::map_report::{count, percent};
+use crate::lab::fleet::Answered;
 
 /// Of one protocol and one size of messages.
 #[derive(Serialize)]

@@ -1,13 +1,6 @@
 //! `mrol bench soak`: a server under a fleet's load for hours. Does its memory grow, does anything fail?
 
-mod fleet;
-mod memory;
-mod pace;
-mod planner;
 mod report;
-mod robot;
-mod server_process;
-mod tally;
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -15,20 +8,16 @@ use std::time::{Duration, Instant};
 use tokio::time::sleep;
 
 use super::journal::new_folder;
-use super::serve::{Question, Target};
 use super::workload::{MapOptions, WorkloadOptions};
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
+use crate::lab::fleet::{
+    Fleet, Planner, Question, Robot, Seen, ServerProcess, TURN_POINTS, Tally, Target, Trend,
+};
 use crate::lab::workload::Order;
 use crate::map::Lookup;
-use fleet::Fleet;
-use memory::Trend;
-use planner::Planner;
 use report::{Done, Line, Verdict};
-use robot::{Robot, Seen, TURN_POINTS};
-use server_process::ServerProcess;
-use tally::Tally;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -94,8 +83,9 @@ impl Soak {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let folder = new_folder(self.folder.as_deref())?;
         let server = ServerProcess::start(folder.path()).await?;
-        let target =
-            Target::make(server.grpc(), Some(server.http()), self.workload.workload(), &self.map).await?;
+        let workload = self.workload.workload();
+        let settings = self.map.settings(workload.resolution_m())?;
+        let target = Target::make(server.grpc(), Some(server.http()), workload, settings).await?;
         let (planners, robots) = (self.planners(&target).await?, self.robots(&target).await?);
         let (workload, voxels) = (&self.workload, count(target.voxels));
         output.say(format!(

@@ -4,9 +4,8 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
-use super::memory::Trend;
-use super::tally::Tally;
 use crate::cli::map_report::{bytes, count};
+use crate::lab::fleet::{Tally, Trend};
 
 /// Operations of one kind.
 #[derive(Debug, Clone, Copy, Serialize)]

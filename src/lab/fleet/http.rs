@@ -7,25 +7,23 @@ use hyper_util::client::legacy::Client;
 use hyper_util::client::legacy::connect::HttpConnector;
 use hyper_util::rt::TokioExecutor;
 
+use super::FleetError;
 use super::address::HttpAddress;
-use crate::cli::error::CliError;
 use crate::service::PointCloud;
 
 /// Most bytes of an answer: a bit a point, or an error's text.
 const ANSWER_BYTES_MAX: usize = 1 << 20;
 
 /// A connection, and where it asks.
-pub(in crate::cli::lab::bench) struct HttpConnection {
+pub(crate) struct HttpConnection {
     client: Client<HttpConnector, Body>,
     uri: Uri,
     authorization: Option<HeaderValue>,
 }
 
 impl HttpConnection {
-    pub(in crate::cli::lab::bench) fn to(
-        HttpAddress { url, authorization }: &HttpAddress,
-    ) -> Result<Self, CliError> {
-        let uri = url.parse().map_err(|error| CliError::usage(format!("{url}: {error}")))?;
+    pub(crate) fn to(HttpAddress { url, authorization }: &HttpAddress) -> Result<Self, FleetError> {
+        let uri = url.parse().map_err(|error| FleetError::usage(format!("{url}: {error}")))?;
         let mut connector = HttpConnector::new();
         connector.set_nodelay(true);
         Ok(Self {
@@ -36,13 +34,13 @@ impl HttpConnection {
     }
 
     /// Asks about `points`; how many are occupied.
-    pub(in crate::cli::lab::bench) async fn ask(&self, points: PointCloud) -> Result<usize, CliError> {
+    pub(crate) async fn ask(&self, points: PointCloud) -> Result<usize, FleetError> {
         let request =
             Request::post(self.uri.clone()).header(header::CONTENT_TYPE, "application/octet-stream");
         let request =
             self.authorization.iter().fold(request, |request, key| request.header(AUTHORIZATION, key));
-        let request = request.body(Body::from(points.into_bytes())).map_err(CliError::failed)?;
-        let failed = |error: &dyn std::fmt::Display| CliError::failed(format!("{}: {error}", self.uri));
+        let request = request.body(Body::from(points.into_bytes())).map_err(FleetError::failed)?;
+        let failed = |error: &dyn std::fmt::Display| FleetError::failed(format!("{}: {error}", self.uri));
         let answer = self.client.request(request).await.map_err(|error| failed(&error))?;
         let status = answer.status();
         let bitmap = to_bytes(Body::new(answer.into_body()), ANSWER_BYTES_MAX)

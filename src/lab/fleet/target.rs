@@ -2,37 +2,36 @@
 
 use uuid::Uuid;
 
+use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
-use crate::cli::error::CliError;
-use crate::cli::lab::bench::workload::MapOptions;
 use crate::client::{Client, NewMap};
 use crate::geometry::{Point, Pose};
 use crate::lab::workload::Workload;
-use crate::map::{MapName, RobotName};
+use crate::map::{MapName, MapSettings, RobotName};
 use crate::mapping::Guess;
 use crate::service::{PointCloud, ScanRequest};
 use crate::voxel::{Lattice, VoxelSet};
 
 /// A map of a workload, under a name that no other map has.
-pub(in crate::cli::lab::bench) struct Target {
-    pub(in crate::cli::lab::bench) grpc: GrpcAddress,
-    pub(in crate::cli::lab::bench) http: Option<HttpAddress>,
-    pub(in crate::cli::lab::bench) map: MapName,
-    pub(in crate::cli::lab::bench) resolution_m: f64,
-    pub(in crate::cli::lab::bench) voxels: usize,
+pub(crate) struct Target {
+    pub(crate) grpc: GrpcAddress,
+    pub(crate) http: Option<HttpAddress>,
+    pub(crate) map: MapName,
+    pub(crate) resolution_m: f64,
+    pub(crate) voxels: usize,
     client: Client,
 }
 
 impl Target {
-    pub(in crate::cli::lab::bench) async fn make(
+    /// Makes the map on a server and fills it with `workload`.
+    pub(crate) async fn make(
         grpc: GrpcAddress,
         http: Option<HttpAddress>,
         workload: Workload,
-        options: &MapOptions,
-    ) -> Result<Self, CliError> {
+        settings: MapSettings,
+    ) -> Result<Self, FleetError> {
         let client = grpc.connect().await?;
-        let map = MapName::new(&format!("bench-{}", Uuid::new_v4())).map_err(CliError::failed)?;
-        let settings = options.settings(workload.resolution_m())?;
+        let map = MapName::new(&format!("bench-{}", Uuid::new_v4())).map_err(FleetError::failed)?;
         let new_map = NewMap {
             resolution_m: settings.resolution_m,
             levels: Some(settings.levels),
@@ -53,9 +52,9 @@ impl Target {
     }
 
     /// Sends the voxels as scans of points in their middles.
-    async fn fill(&mut self, workload: Workload) -> Result<(), CliError> {
-        let robot = RobotName::new("bench").map_err(CliError::failed)?;
-        let lattice = Lattice::new(workload.resolution_m(), 1).map_err(CliError::failed)?;
+    async fn fill(&mut self, workload: Workload) -> Result<(), FleetError> {
+        let robot = RobotName::new("bench").map_err(FleetError::failed)?;
+        let lattice = Lattice::new(workload.resolution_m(), 1).map_err(FleetError::failed)?;
         for voxels in workload.pieces() {
             let scan = ScanRequest {
                 guess: Guess::Pose(Pose::identity()),
@@ -68,7 +67,7 @@ impl Target {
         Ok(())
     }
 
-    pub(in crate::cli::lab::bench) async fn delete(self) -> Result<(), CliError> {
+    pub(crate) async fn delete(self) -> Result<(), FleetError> {
         Ok(self.client.delete_map(&self.map).await?)
     }
 }

@@ -7,7 +7,7 @@ use tokio::time::sleep_until;
 
 /// Numbers operations for all who carry them out, as fast as they are done or at a rate.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(crate) struct Pace {
     start: Instant,
     time: Duration,
     /// Operations a second; none for as fast as they are done.
@@ -18,26 +18,26 @@ pub(super) struct Pace {
 
 /// An operation that is to be carried out.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Due {
+pub(crate) struct Due {
     /// Its number.
-    pub(super) number: u64,
+    pub(crate) number: u64,
     /// When it was due. At a rate, who comes late to it makes it wait: that is part of what it took.
-    pub(super) since: Instant,
+    pub(crate) since: Instant,
 }
 
 impl Pace {
     /// Begins now, and ends after `time`. Numbers begin at `first`.
-    pub(super) fn new(rate: Option<f64>, time: Duration, first: u64) -> Self {
+    pub(crate) fn new(rate: Option<f64>, time: Duration, first: u64) -> Self {
         Self { start: Instant::now(), time, rate, first, next: AtomicU64::new(first) }
     }
 
     /// The number that comes next.
-    pub(super) fn next(&self) -> u64 {
+    pub(crate) fn next(&self) -> u64 {
         self.next.load(Ordering::Relaxed)
     }
 
     /// Waits until an operation is due; none when the time is over.
-    pub(super) async fn due(&self) -> Option<Due> {
+    pub(crate) async fn due(&self) -> Option<Due> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
         let since = match self.rate {
             Some(rate) => self.start + Duration::from_secs_f64((number - self.first) as f64 / rate),

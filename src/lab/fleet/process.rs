@@ -10,9 +10,9 @@ use tokio::io::{AsyncBufReadExt, BufReader};
 use tokio::process::{Child, Command};
 use tokio::time::timeout;
 
+use super::FleetError;
+use super::address::{GrpcAddress, HttpAddress};
 use super::memory::resident_bytes;
-use crate::cli::error::CliError;
-use crate::cli::lab::bench::serve::{GrpcAddress, HttpAddress};
 
 /// How long it may take to go down, beyond the ten seconds of its drain.
 const STOPPING_MAX: Duration = Duration::from_secs(30);
@@ -21,7 +21,7 @@ const STOPPING_MAX: Duration = Duration::from_secs(30);
 const UNDO_REVISIONS: &str = "1000";
 
 /// This same program as a daemon, on free ports. It is killed where it was not stopped.
-pub(super) struct ServerProcess {
+pub(crate) struct ServerProcess {
     child: Child,
     pid: u32,
     serving: Serving,
@@ -36,8 +36,8 @@ struct Serving {
 
 impl ServerProcess {
     /// Starts it with its maps in `data_dir`.
-    pub(super) async fn start(data_dir: &Path) -> Result<Self, CliError> {
-        let no_server = |error: &dyn std::fmt::Display| CliError::failed(format!("no server: {error}"));
+    pub(crate) async fn start(data_dir: &Path) -> Result<Self, FleetError> {
+        let no_server = |error: &dyn std::fmt::Display| FleetError::failed(format!("no server: {error}"));
         let program = std::env::current_exe().map_err(|error| no_server(&error))?;
         let mut child = Command::new(program)
             .args(["serve", "--json", "--log-level", "warn"])
@@ -58,34 +58,34 @@ impl ServerProcess {
     }
 
     /// Its gRPC address.
-    pub(super) fn grpc(&self) -> GrpcAddress {
+    pub(crate) fn grpc(&self) -> GrpcAddress {
         GrpcAddress::open(&self.serving.grpc)
     }
 
     /// Its HTTP address.
-    pub(super) fn http(&self) -> HttpAddress {
+    pub(crate) fn http(&self) -> HttpAddress {
         HttpAddress::open(format!("http://{}", self.serving.http))
     }
 
     /// Memory that it has resident.
-    pub(super) fn resident_bytes(&self) -> Result<u64, CliError> {
+    pub(crate) fn resident_bytes(&self) -> Result<u64, FleetError> {
         resident_bytes(self.pid)
     }
 
     /// Tells it to end as a service manager does, and sees that it does so well.
-    pub(super) async fn stop(mut self) -> Result<(), CliError> {
+    pub(crate) async fn stop(mut self) -> Result<(), FleetError> {
         if let Some(pid) = i32::try_from(self.pid).ok().and_then(Pid::from_raw) {
-            kill_process(pid, Signal::TERM).map_err(CliError::failed)?;
+            kill_process(pid, Signal::TERM).map_err(FleetError::failed)?;
         }
         let ended = timeout(STOPPING_MAX, self.child.wait()).await;
-        let ended = ended.map_err(|_| CliError::failed("the server does not end"))?;
-        match ended.map_err(CliError::failed)? {
+        let ended = ended.map_err(|_| FleetError::failed("the server does not end"))?;
+        match ended.map_err(FleetError::failed)? {
             status if status.success() => Ok(()),
             status => Err(ended_badly(status)),
         }
     }
 }
 
-fn ended_badly(status: ExitStatus) -> CliError {
-    CliError::failed(format!("the server ended with {status}"))
+fn ended_badly(status: ExitStatus) -> FleetError {
+    FleetError::failed(format!("the server ended with {status}"))
 }

@@ -3,15 +3,18 @@
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::fleet::Member;
-use crate::cli::error::CliError;
-use crate::cli::lab::bench::serve::{HttpAddress, HttpConnection, Question, Target};
+use super::FleetError;
+use super::address::HttpAddress;
+use super::http::HttpConnection;
+use super::load::Question;
+use super::member::Member;
+use super::target::Target;
 use crate::client::{Answers, Client};
 use crate::map::MapName;
 use crate::service::{PointAnswer, PointQuery};
 
 /// Asks about points, by every protocol in turn.
-pub(super) struct Planner {
+pub(crate) struct Planner {
     map: MapName,
     question: Question,
     client: Client,
@@ -20,7 +23,7 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    pub(super) async fn new(target: &Target, question: Question) -> Result<Self, CliError> {
+    pub(crate) async fn new(target: &Target, question: Question) -> Result<Self, FleetError> {
         let client = target.grpc.connect().await?;
         let http = target.http.clone().unwrap_or_else(|| HttpAddress::open(""));
         Ok(Self {
@@ -34,7 +37,7 @@ impl Planner {
 }
 
 impl Member for Planner {
-    async fn carry_out(&mut self, number: u64) -> Result<(), CliError> {
+    async fn carry_out(&mut self, number: u64) -> Result<(), FleetError> {
         let message = number as usize;
         match number % 3 {
             0 => {
@@ -56,18 +59,18 @@ struct QueryStream {
 }
 
 impl QueryStream {
-    async fn open(client: &Client, map: &MapName) -> Result<Self, CliError> {
+    async fn open(client: &Client, map: &MapName) -> Result<Self, FleetError> {
         let (questions, asked) = mpsc::channel(1);
         let answers = client.query_stream(map, ReceiverStream::new(asked)).await?;
         Ok(Self { questions, answers })
     }
 
-    async fn ask(&mut self, query: PointQuery) -> Result<(), CliError> {
+    async fn ask(&mut self, query: PointQuery) -> Result<(), FleetError> {
         // Who does not read any more says why in an answer.
         let _ = self.questions.send(query).await;
         match self.answers.next().await {
-            Some(answer) => answer.map(drop).map_err(CliError::from),
-            None => Err(CliError::failed("the stream of queries was ended")),
+            Some(answer) => answer.map(drop).map_err(FleetError::from),
+            None => Err(FleetError::failed("the stream of queries was ended")),
         }
     }
 }

@@ -6,37 +6,37 @@ use std::time::Duration;
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
 
+use super::FleetError;
 use super::pace::Pace;
 use super::tally::Tally;
-use crate::cli::error::CliError;
 
 /// Who carries out operations.
-pub(super) trait Member: Send + 'static {
+pub(crate) trait Member: Send + 'static {
     /// Carries out the operation with a number, which no other has.
-    fn carry_out(&mut self, number: u64) -> impl Future<Output = Result<(), CliError>> + Send;
+    fn carry_out(&mut self, number: u64) -> impl Future<Output = Result<(), FleetError>> + Send;
 }
 
 /// Members of one kind between two spells of work.
-pub(super) struct Fleet<M> {
+pub(crate) struct Fleet<M> {
     members: Vec<M>,
     /// Of the next operation.
     number: u64,
 }
 
 /// The same at work.
-pub(super) struct Working<M> {
+pub(crate) struct Working<M> {
     members: JoinSet<M>,
     pace: Arc<Pace>,
     tally: Arc<Mutex<Tally>>,
 }
 
 impl<M: Member> Fleet<M> {
-    pub(super) fn new(members: Vec<M>) -> Self {
+    pub(crate) fn new(members: Vec<M>) -> Self {
         Self { members, number: 0 }
     }
 
     /// Sets them to work for `time`, without a pause or at `rate` operations a second.
-    pub(super) fn work(self, rate: Option<f64>, time: Duration) -> Result<Working<M>, CliError> {
+    pub(crate) fn work(self, rate: Option<f64>, time: Duration) -> Result<Working<M>, FleetError> {
         let pace = Arc::new(Pace::new(rate, time, self.number));
         let tally = Arc::new(Mutex::new(Tally::new()?));
         let mut members = JoinSet::new();
@@ -49,15 +49,15 @@ impl<M: Member> Fleet<M> {
 
 impl<M: Member> Working<M> {
     /// What was done since it was asked for last.
-    pub(super) fn tally(&self) -> Result<Tally, CliError> {
+    pub(crate) fn tally(&self) -> Result<Tally, FleetError> {
         Ok(std::mem::replace(&mut *self.tally.lock(), Tally::new()?))
     }
 
     /// Waits until the time is over and all are done; the rest of what was done.
-    pub(super) async fn end(mut self) -> Result<(Fleet<M>, Tally), CliError> {
+    pub(crate) async fn end(mut self) -> Result<(Fleet<M>, Tally), FleetError> {
         let mut members = Vec::new();
         while let Some(member) = self.members.join_next().await {
-            members.push(member.map_err(CliError::failed)?);
+            members.push(member.map_err(FleetError::failed)?);
         }
         Ok((Fleet { members, number: self.pace.next() }, self.tally()?))
     }

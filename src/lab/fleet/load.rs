@@ -9,9 +9,9 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 
+use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
 use super::http::HttpConnection;
-use crate::cli::error::CliError;
 use crate::geometry::{Pose, rotation_xyzw, translation_m};
 use crate::lab::workload::Queries;
 use crate::map::{Lookup, MapName};
@@ -24,7 +24,7 @@ const LATENCY_DIGITS: u8 = 3;
 
 /// What is asked, message after message.
 #[derive(Debug, Clone)]
-pub(in crate::cli::lab::bench) struct Question {
+pub(crate) struct Question {
     messages: Arc<[PointCloud]>,
     map_from_points: Pose,
     lookup: Lookup,
@@ -32,7 +32,7 @@ pub(in crate::cli::lab::bench) struct Question {
 
 impl Question {
     /// Messages of `points` points each, all of `queries` in turn.
-    pub(in crate::cli::lab::bench) fn of(queries: &Queries, points: usize, lookup: Lookup) -> Self {
+    pub(crate) fn of(queries: &Queries, points: usize, lookup: Lookup) -> Self {
         let mut endless = queries.points.iter().cycle().copied();
         let messages = queries.points.len().div_ceil(points);
         let message = |_| PointCloud::from(endless.by_ref().take(points).collect::<Vec<_>>());
@@ -40,7 +40,7 @@ impl Question {
         Self { messages, map_from_points: queries.map_from_points, lookup }
     }
 
-    pub(in crate::cli::lab::bench) fn query(&self, message: usize) -> PointQuery {
+    pub(crate) fn query(&self, message: usize) -> PointQuery {
         PointQuery {
             points: self.points(message),
             map_from_points: Some(self.map_from_points),
@@ -51,12 +51,12 @@ impl Question {
         }
     }
 
-    pub(in crate::cli::lab::bench) fn points(&self, message: usize) -> PointCloud {
+    pub(crate) fn points(&self, message: usize) -> PointCloud {
         self.messages[message % self.messages.len()].clone()
     }
 
     /// All of it but the points, as an address.
-    pub(in crate::cli::lab::bench) fn asked_at(&self, server: &HttpAddress, map: &MapName) -> HttpAddress {
+    pub(crate) fn asked_at(&self, server: &HttpAddress, map: &MapName) -> HttpAddress {
         let ([x, y, z], [qx, qy, qz, qw]) =
             (translation_m(&self.map_from_points), rotation_xyzw(&self.map_from_points));
         let lookup = self.lookup.as_str();
@@ -70,25 +70,25 @@ impl Question {
 
 /// A way to ask.
 #[derive(Debug, Clone)]
-pub(super) enum Load {
+pub(crate) enum Load {
     Unary { server: GrpcAddress, map: MapName, question: Question },
     Stream { server: GrpcAddress, map: MapName, question: Question, in_flight: usize },
     Http { http: HttpAddress, question: Question },
 }
 
 /// All answers of some time.
-pub(super) struct Answered {
+pub(crate) struct Answered {
     /// Nanoseconds from question to answer.
-    pub(super) latencies: Histogram<u64>,
-    pub(super) points: usize,
-    pub(super) occupied: usize,
-    pub(super) seconds: f64,
+    pub(crate) latencies: Histogram<u64>,
+    pub(crate) points: usize,
+    pub(crate) occupied: usize,
+    pub(crate) seconds: f64,
 }
 
 impl Answered {
-    fn none() -> Result<Self, CliError> {
+    fn none() -> Result<Self, FleetError> {
         let latencies =
-            Histogram::new_with_bounds(1, LATENCY_NS_MAX, LATENCY_DIGITS).map_err(CliError::failed)?;
+            Histogram::new_with_bounds(1, LATENCY_NS_MAX, LATENCY_DIGITS).map_err(FleetError::failed)?;
         Ok(Self { latencies, points: 0, occupied: 0, seconds: 0.0 })
     }
 
@@ -98,8 +98,8 @@ impl Answered {
         self.occupied += occupied;
     }
 
-    fn merge(&mut self, other: &Self) -> Result<(), CliError> {
-        self.latencies.add(&other.latencies).map_err(CliError::failed)?;
+    fn merge(&mut self, other: &Self) -> Result<(), FleetError> {
+        self.latencies.add(&other.latencies).map_err(FleetError::failed)?;
         self.points += other.points;
         self.occupied += other.occupied;
         Ok(())
@@ -108,7 +108,7 @@ impl Answered {
 
 impl Load {
     /// Asks over `connections` connections for `time`.
-    pub(super) async fn run(&self, connections: usize, time: Duration) -> Result<Answered, CliError> {
+    pub(crate) async fn run(&self, connections: usize, time: Duration) -> Result<Answered, FleetError> {
         let mut asking = JoinSet::new();
         let start = Instant::now();
         for connection in 0..connections {
@@ -117,13 +117,13 @@ impl Load {
         }
         let mut all = Answered::none()?;
         while let Some(answered) = asking.join_next().await {
-            all.merge(&answered.map_err(CliError::failed)??)?;
+            all.merge(&answered.map_err(FleetError::failed)??)?;
         }
         all.seconds = start.elapsed().as_secs_f64();
         Ok(all)
     }
 
-    async fn ask(self, first: usize, time: Duration) -> Result<Answered, CliError> {
+    async fn ask(self, first: usize, time: Duration) -> Result<Answered, FleetError> {
         match self {
             Self::Unary { server, map, question } => unary(&server, &map, &question, first, time).await,
             Self::Stream { server, map, question, in_flight } => {
@@ -140,7 +140,7 @@ async fn unary(
     question: &Question,
     first: usize,
     time: Duration,
-) -> Result<Answered, CliError> {
+) -> Result<Answered, FleetError> {
     let client = server.connect().await?;
     let (mut answered, start) = (Answered::none()?, Instant::now());
     for message in first.. {
@@ -159,7 +159,7 @@ async fn over_http(
     question: &Question,
     first: usize,
     time: Duration,
-) -> Result<Answered, CliError> {
+) -> Result<Answered, FleetError> {
     let connection = HttpConnection::to(address)?;
     let (mut answered, start) = (Answered::none()?, Instant::now());
     for message in first.. {
@@ -183,7 +183,7 @@ async fn stream(
     first: usize,
     in_flight: usize,
     time: Duration,
-) -> Result<Answered, CliError> {
+) -> Result<Answered, FleetError> {
     let client = server.connect().await?;
     let (mut answered, start) = (Answered::none()?, Instant::now());
     let (sender, questions) = mpsc::channel(in_flight);

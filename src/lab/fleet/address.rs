@@ -2,50 +2,50 @@
 
 use axum::http::HeaderValue;
 
-use crate::cli::error::CliError;
+use super::FleetError;
 use crate::client::{Client, Credentials};
 
 /// Of gRPC.
 #[derive(Debug, Clone)]
-pub(in crate::cli::lab::bench) struct GrpcAddress {
-    pub(in crate::cli::lab::bench) url: String,
-    pub(in crate::cli::lab::bench) credentials: Credentials,
+pub(crate) struct GrpcAddress {
+    pub(crate) url: String,
+    pub(crate) credentials: Credentials,
 }
 
 /// Of HTTP, in the clear.
 #[derive(Debug, Clone)]
-pub(in crate::cli::lab::bench) struct HttpAddress {
-    pub(in crate::cli::lab::bench) url: String,
+pub(crate) struct HttpAddress {
+    pub(crate) url: String,
     /// Marked as sensitive: no output shows it.
-    pub(in crate::cli::lab::bench) authorization: Option<HeaderValue>,
+    pub(crate) authorization: Option<HeaderValue>,
 }
 
 impl GrpcAddress {
     /// Of a server that asks for no key.
-    pub(in crate::cli::lab::bench) fn open(url: impl Into<String>) -> Self {
+    pub(crate) fn open(url: impl Into<String>) -> Self {
         Self { url: url.into(), credentials: Credentials::default() }
     }
 
-    pub(in crate::cli::lab::bench) async fn connect(&self) -> Result<Client, CliError> {
+    pub(crate) async fn connect(&self) -> Result<Client, FleetError> {
         Ok(Client::connect_with(&self.url, &self.credentials).await?)
     }
 }
 
 impl HttpAddress {
     /// Of a server that asks for no key.
-    pub(in crate::cli::lab::bench) fn open(url: impl Into<String>) -> Self {
+    pub(crate) fn open(url: impl Into<String>) -> Self {
         Self { url: url.into(), authorization: None }
     }
 
-    pub(in crate::cli::lab::bench) fn new(url: &str, secret: Option<&str>) -> Result<Self, CliError> {
+    pub(crate) fn new(url: &str, secret: Option<&str>) -> Result<Self, FleetError> {
         if url.starts_with("https://") {
-            return Err(CliError::usage(
+            return Err(FleetError::usage(
                 "--http: HTTP is measured in the clear alone, at an http:// address",
             ));
         }
         let bearer = |secret| HeaderValue::try_from(format!("Bearer {secret}"));
         let mut authorization =
-            secret.map(bearer).transpose().map_err(|_| CliError::usage("--key is no secret of a key"))?;
+            secret.map(bearer).transpose().map_err(|_| FleetError::usage("--key is no secret of a key"))?;
         if let Some(value) = &mut authorization {
             value.set_sensitive(true);
         }

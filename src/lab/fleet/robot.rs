@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::fleet::Member;
-use crate::cli::error::CliError;
-use crate::cli::lab::bench::serve::Target;
+use super::FleetError;
+use super::member::Member;
+use super::target::Target;
 use crate::client::{Client, NewMap};
 use crate::geometry::{Point, Pose};
 use crate::lab::workload::Queries;
@@ -13,7 +13,7 @@ use crate::mapping::Guess;
 use crate::service::{Deletion, DeletionTarget, PointCloud, ScanRequest, Undo, UndoTarget};
 
 /// Points of a turn of the workload's sensor.
-pub(super) const TURN_POINTS: usize = 64 * 1024;
+pub(crate) const TURN_POINTS: usize = 64 * 1024;
 /// Scans of a mission.
 const SCANS: u64 = 20;
 /// What is deleted at once.
@@ -21,14 +21,14 @@ const DELETED_RADIUS_M: f64 = 0.3;
 
 /// What robots see of the workload, turn by turn.
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(crate) struct Seen {
     turns: Arc<[PointCloud]>,
     map_from_points: Pose,
 }
 
 impl Seen {
     /// Whole turns of `points`, each thinned evenly to `scan_points` at most.
-    pub(super) fn of(points: &Queries, scan_points: usize) -> Self {
+    pub(crate) fn of(points: &Queries, scan_points: usize) -> Self {
         let every = TURN_POINTS.div_ceil(scan_points);
         let thinned = |turn: &[Point]| turn.iter().copied().step_by(every).collect::<Vec<_>>().into();
         let turns = points.points.chunks_exact(TURN_POINTS).map(thinned).collect();
@@ -43,7 +43,7 @@ impl Seen {
 
 /// A robot goes on one mission after the other, each with a map of its own that ends with it; one scan of each is for the
 /// map that all have.
-pub(super) struct Robot {
+pub(crate) struct Robot {
     name: RobotName,
     client: Client,
     seen: Seen,
@@ -86,11 +86,11 @@ impl Step {
 }
 
 impl Robot {
-    pub(super) async fn new(number: u16, target: &Target, seen: Seen) -> Result<Self, CliError> {
+    pub(crate) async fn new(number: u16, target: &Target, seen: Seen) -> Result<Self, FleetError> {
         let name = format!("soak-{number}");
         Ok(Self {
-            own: MapName::new(&format!("{name}-own")).map_err(CliError::failed)?,
-            name: RobotName::new(&name).map_err(CliError::failed)?,
+            own: MapName::new(&format!("{name}-own")).map_err(FleetError::failed)?,
+            name: RobotName::new(&name).map_err(FleetError::failed)?,
             client: target.grpc.connect().await?,
             seen,
             shared: target.map.clone(),
@@ -101,7 +101,7 @@ impl Robot {
     }
 
     /// Adds a turn, aligned or as it is. All turns fit, so that a refused one is an error here.
-    async fn insert(&self, map: &MapName, number: u64, at_guess: bool) -> Result<u64, CliError> {
+    async fn insert(&self, map: &MapName, number: u64, at_guess: bool) -> Result<u64, FleetError> {
         let scan = ScanRequest {
             scan_id: Some(number),
             guess: Guess::Pose(self.seen.map_from_points),
@@ -111,23 +111,23 @@ impl Robot {
         let answer = self.client.insert_scan(map, scan).await?;
         match answer.accepted {
             true => Ok(answer.state.revision),
-            false => Err(CliError::failed(format!("a scan was refused: {}", answer.reason))),
+            false => Err(FleetError::failed(format!("a scan was refused: {}", answer.reason))),
         }
     }
 
     /// Takes out what is around one point of a turn.
-    async fn delete(&self, map: &MapName, number: u64) -> Result<(), CliError> {
+    async fn delete(&self, map: &MapName, number: u64) -> Result<(), FleetError> {
         let turn = self.seen.turn(number);
         let seen = turn.as_slice()[number as usize * 7919 % turn.len()];
         let center_m = (self.seen.map_from_points * seen.to_f64()).into();
-        let ball = Region::ball(center_m, DELETED_RADIUS_M).map_err(CliError::failed)?;
+        let ball = Region::ball(center_m, DELETED_RADIUS_M).map_err(FleetError::failed)?;
         let deletion = Deletion { target: DeletionTarget::Region(ball), level: 0, request_id: None };
         self.client.delete_voxels(map, deletion).await?;
         Ok(())
     }
 
     /// Takes out what came in since half-way.
-    async fn undo_half(&self) -> Result<(), CliError> {
+    async fn undo_half(&self) -> Result<(), FleetError> {
         let target = UndoTarget::RobotSince { robot: self.name.clone(), revision: self.half_way };
         self.client.undo_scans(&self.own, Undo { target, request_id: None }).await?;
         Ok(())
@@ -135,7 +135,7 @@ impl Robot {
 }
 
 impl Member for Robot {
-    async fn carry_out(&mut self, number: u64) -> Result<(), CliError> {
+    async fn carry_out(&mut self, number: u64) -> Result<(), FleetError> {
         let step = Step::after(self.steps);
         self.steps = if step == Step::DeleteMap { 0 } else { self.steps + 1 };
         match step {

@@ -1,30 +1,30 @@
 //! Memory of a process, and whether it grows.
 
-use crate::cli::error::CliError;
+use super::FleetError;
 
 /// Memory that a process has resident, as Linux tells it.
-pub(super) fn resident_bytes(pid: u32) -> Result<u64, CliError> {
+pub(crate) fn resident_bytes(pid: u32) -> Result<u64, FleetError> {
     let path = format!("/proc/{pid}/status");
     let status = std::fs::read_to_string(&path)
-        .map_err(|error| CliError::failed(format!("{path} does not tell the server's memory: {error}")))?;
+        .map_err(|error| FleetError::failed(format!("{path} does not tell the server's memory: {error}")))?;
     let kib =
         status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.strip_suffix("kB")?.trim().parse().ok());
-    let kib: u64 = kib.ok_or_else(|| CliError::failed(format!("{path} has no VmRSS")))?;
+    let kib: u64 = kib.ok_or_else(|| FleetError::failed(format!("{path} has no VmRSS")))?;
     Ok(kib << 10)
 }
 
 /// A line through measurements, by least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Trend {
+pub(crate) struct Trend {
     /// Of all measurements.
-    pub(super) mean: f64,
+    pub(crate) mean: f64,
     /// A second.
-    pub(super) slope: f64,
+    pub(crate) slope: f64,
 }
 
 impl Trend {
     /// Of measurements (seconds, value); none where there are fewer than two moments.
-    pub(super) fn of(measured: &[(f64, f64)]) -> Option<Self> {
+    pub(crate) fn of(measured: &[(f64, f64)]) -> Option<Self> {
         let count = measured.len() as f64;
         let mean_of = |value: fn(&(f64, f64)) -> f64| measured.iter().map(value).sum::<f64>() / count;
         let (mean_s, mean) = (mean_of(|m| m.0), mean_of(|m| m.1));

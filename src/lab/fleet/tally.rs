@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use hdrhistogram::Histogram;
 
-use crate::cli::error::CliError;
+use super::FleetError;
 
 /// Answers that take longer count as this long: ten minutes.
 const LATENCY_NS_MAX: u64 = 600_000_000_000;
@@ -14,20 +14,20 @@ const LATENCY_DIGITS: u8 = 3;
 
 /// Latencies and errors.
 #[derive(Debug, Clone)]
-pub(super) struct Tally {
+pub(crate) struct Tally {
     /// Nanoseconds from the moment when an operation was due.
     latencies: Histogram<u64>,
     /// How often each message came.
-    pub(super) errors: BTreeMap<String, u64>,
+    pub(crate) errors: BTreeMap<String, u64>,
 }
 
 impl Tally {
-    pub(super) fn new() -> Result<Self, CliError> {
+    pub(crate) fn new() -> Result<Self, FleetError> {
         let latencies = Histogram::new_with_bounds(1, LATENCY_NS_MAX, LATENCY_DIGITS);
-        Ok(Self { latencies: latencies.map_err(CliError::failed)?, errors: BTreeMap::new() })
+        Ok(Self { latencies: latencies.map_err(FleetError::failed)?, errors: BTreeMap::new() })
     }
 
-    pub(super) fn count(&mut self, took: Duration, failed: Option<String>) {
+    pub(crate) fn count(&mut self, took: Duration, failed: Option<String>) {
         self.latencies.saturating_record(took.as_nanos() as u64);
         if let Some(error) = failed {
             *self.errors.entry(error).or_default() += 1;
@@ -35,24 +35,24 @@ impl Tally {
     }
 
     /// Adds what `other` counted.
-    pub(super) fn merge(&mut self, other: &Self) -> Result<(), CliError> {
-        self.latencies.add(&other.latencies).map_err(CliError::failed)?;
+    pub(crate) fn merge(&mut self, other: &Self) -> Result<(), FleetError> {
+        self.latencies.add(&other.latencies).map_err(FleetError::failed)?;
         for (error, count) in &other.errors {
             *self.errors.entry(error.clone()).or_default() += count;
         }
         Ok(())
     }
 
-    pub(super) fn operations(&self) -> u64 {
+    pub(crate) fn operations(&self) -> u64 {
         self.latencies.len()
     }
 
-    pub(super) fn error_count(&self) -> u64 {
+    pub(crate) fn error_count(&self) -> u64 {
         self.errors.values().sum()
     }
 
     /// The time within which that share of the operations was done, milliseconds.
-    pub(super) fn quantile_ms(&self, share: f64) -> f64 {
+    pub(crate) fn quantile_ms(&self, share: f64) -> f64 {
         self.latencies.value_at_quantile(share) as f64 / 1e6
     }
 }

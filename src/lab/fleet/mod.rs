@@ -1,0 +1,57 @@
+//! A server under a fleet's load: the daemon or a process of its own, planners that ask and robots that map.
+
+mod address;
+mod daemon;
+mod http;
+mod load;
+mod member;
+mod memory;
+mod pace;
+mod planner;
+mod process;
+mod robot;
+mod tally;
+mod target;
+
+use std::fmt::Display;
+
+use crate::client::ClientError;
+use crate::server::ServerError;
+
+pub(crate) use address::{GrpcAddress, HttpAddress};
+pub(crate) use daemon::{Daemon, Taken};
+pub(crate) use load::{Answered, Load, Question};
+pub(crate) use member::Fleet;
+pub(crate) use memory::Trend;
+pub(crate) use planner::Planner;
+pub(crate) use process::ServerProcess;
+pub(crate) use robot::{Robot, Seen, TURN_POINTS};
+pub(crate) use tally::Tally;
+pub(crate) use target::Target;
+
+/// What kept a fleet from its work.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum FleetError {
+    /// The server refused something, or is not there.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// The daemon cannot serve.
+    #[error(transparent)]
+    Server(#[from] ServerError),
+    /// Whoever called for it asked for something that makes no sense.
+    #[error("{0}")]
+    Usage(String),
+    /// Anything else.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl FleetError {
+    fn usage(message: impl Display) -> Self {
+        Self::Usage(message.to_string())
+    }
+
+    fn failed(message: impl Display) -> Self {
+        Self::Failed(message.to_string())
+    }
+}
