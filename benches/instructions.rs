@@ -47,9 +47,9 @@ fn room(lookup: Lookup) -> (MultiResolutionMap, Queries, Lookup) {
 #[bench::exact(args = (Lookup::Exact), config = limited(1_101_000))]
 fn wide((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; POINTS / 64] {
     let mut occupied = [0; POINTS / 64];
-    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let quantize = map.lattice().from_points(&queries.map_from_points);
     let view = map.view_of(&queries.points, &queries.map_from_points);
-    view.query(&queries.points, &quantise, 0, lookup, &mut occupied);
+    view.query(&queries.points, &quantize, 0, lookup, &mut occupied);
     drop(view);
     std::mem::forget((map, queries));
     occupied
@@ -60,9 +60,9 @@ fn wide((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; 
 #[bench::exact(args = (Lookup::Exact), config = limited(3_942_000))]
 fn scalar((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64; POINTS / 64] {
     let mut occupied = [0; POINTS / 64];
-    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let quantize = map.lattice().from_points(&queries.map_from_points);
     let view = map.view();
-    stages::occupied_scalar(&queries.points, &quantise, &view.level_view(0), lookup, &mut occupied);
+    stages::occupied_scalar(&queries.points, &quantize, &view.level_view(0), lookup, &mut occupied);
     drop(view);
     std::mem::forget((map, queries));
     occupied
@@ -75,8 +75,8 @@ fn to_insert(times_known: usize) -> (MultiResolutionMap, Queries) {
 }
 
 fn insert(map: &MultiResolutionMap, scan: &Queries) {
-    let quantise = map.lattice().from_points(&scan.map_from_points);
-    add(map, VoxelSet::of_points(&scan.points, &quantise).0);
+    let quantize = map.lattice().from_points(&scan.map_from_points);
+    add(map, VoxelSet::of_points(&scan.points, &quantize).0);
 }
 
 #[library_benchmark(setup = to_insert)]

@@ -50,10 +50,10 @@ fn parts(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(POINTS as u64));
     scalar(&mut group, &map);
     let queries = Workload::Room(Room).queries(Order::Scan, POINTS, 2);
-    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let quantize = map.lattice().from_points(&queries.map_from_points);
     let (mut keys, mut occupied) = (vec![0; POINTS], vec![0; POINTS.div_ceil(64)]);
     group.bench_function("transform", |bencher| {
-        bencher.iter(|| stages::keys(&queries.points, &quantise, 0, black_box(&mut keys)));
+        bencher.iter(|| stages::keys(&queries.points, &quantize, 0, black_box(&mut keys)));
     });
     let view = map.view();
     let view = view.level_view(0);
@@ -67,7 +67,7 @@ type Group<'a> = criterion::BenchmarkGroup<'a, criterion::measurement::WallTime>
 
 fn scalar(group: &mut Group<'_>, map: &MultiResolutionMap) {
     let queries = Workload::Room(Room).queries(Order::Scan, POINTS, 2);
-    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let quantize = map.lattice().from_points(&queries.map_from_points);
     let mut occupied = vec![0; POINTS.div_ceil(64)];
     let view = map.view();
     let view = view.level_view(0);
@@ -75,7 +75,7 @@ fn scalar(group: &mut Group<'_>, map: &MultiResolutionMap) {
         group.bench_function(format!("{} scalar", lookup.as_str()), |bencher| {
             let points = &queries.points;
             bencher
-                .iter(|| stages::occupied_scalar(points, &quantise, &view, lookup, black_box(&mut occupied)));
+                .iter(|| stages::occupied_scalar(points, &quantize, &view, lookup, black_box(&mut occupied)));
         });
     }
 }

@@ -12,7 +12,7 @@ use mrol::geometry::Point;
 use mrol::map::{Lookup, MapName};
 use mrol::service::PointQuery;
 
-/// The slice: metres from the map's origin, one metre above the floor, a point every 0.125 x 0.25 m.
+/// The slice: meters from the map's origin, one meter above the floor, a point every 0.125 x 0.25 m.
 const COLUMNS: usize = 112;
 const ROWS: usize = 36;
 const HEIGHT_M: f32 = 1.0;

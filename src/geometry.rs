@@ -9,17 +9,17 @@ use nalgebra::{
     UnitQuaternion, Vector3,
 };
 
-/// A rigid transform in metres, double precision, named `a_from_b` wherever it appears.
+/// A rigid transform in meters, double precision, named `a_from_b` wherever it appears.
 pub type Pose = Isometry3<f64>;
 
-/// How far a quaternion's norm may lie from one before it is refused instead of normalised.
+/// How far a quaternion's norm may lie from one before it is refused instead of normalized.
 pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-3;
 
 /// How far a quaternion's norm may lie from one by rounding alone. Such a quaternion is left as it is, so that a pose
 /// that is sent or stored comes back bit for bit.
 pub const QUATERNION_NORM_ROUNDING: f64 = 1e-9;
 
-/// A point of three little-endian f32 (x, y, z in metres): the wire form *is* the memory form.
+/// A point of three little-endian f32 (x, y, z in meters): the wire form *is* the memory form.
 ///
 /// It has alignment 1, so that the bytes of a request, at whatever address the network left them, are a
 /// `&[Point]` without a copy.
@@ -31,13 +31,13 @@ impl Point {
     /// Bytes of one point on the wire and in memory.
     pub const BYTES: usize = 12;
 
-    /// The point (x, y, z), metres.
+    /// The point (x, y, z), meters.
     #[inline]
     pub fn new(x: f32, y: f32, z: f32) -> Self {
         Self([x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes()])
     }
 
-    /// Its coordinates \[x, y, z\], metres.
+    /// Its coordinates \[x, y, z\], meters.
     #[inline]
     pub fn xyz(self) -> [f32; 3] {
         self.0.map(f32::from_le_bytes)
@@ -89,11 +89,11 @@ pub enum PoseError {
     Rotation([f64; 4], f64),
 }
 
-/// A pose from a translation in metres and a unit quaternion x, y, z, w.
+/// A pose from a translation in meters and a unit quaternion x, y, z, w.
 ///
 /// # Errors
 /// When a number is not finite, or the quaternion's norm is further from one than
-/// [`QUATERNION_NORM_TOLERANCE`]; within it the quaternion is normalised, unless it is off by rounding alone.
+/// [`QUATERNION_NORM_TOLERANCE`]; within it the quaternion is normalized, unless it is off by rounding alone.
 pub fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Pose, PoseError> {
     if !translation_m.iter().all(|c| c.is_finite()) {
         return Err(PoseError::Translation(translation_m));
@@ -113,7 +113,7 @@ pub fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Pose, Po
     Ok(Pose::from_parts(Translation3::from(Vector3::from(translation_m)), rotation))
 }
 
-/// The translation in metres of a pose.
+/// The translation in meters of a pose.
 pub fn translation_m(pose: &Pose) -> [f64; 3] {
     pose.translation.vector.into()
 }
@@ -123,7 +123,7 @@ pub fn rotation_xyzw(pose: &Pose) -> [f64; 4] {
     pose.rotation.coords.into()
 }
 
-/// How far two poses lie apart: (metres, degrees).
+/// How far two poses lie apart: (meters, degrees).
 pub fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let a_from_b = a.inv_mul(b);
     (a_from_b.translation.vector.norm(), a_from_b.rotation.angle().to_degrees())
@@ -187,16 +187,16 @@ mod tests {
         let rotation = UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3);
         let before = Pose::from_parts(Translation3::new(1.0, 2.0, 3.0), rotation);
         let after = pose(translation_m(&before), rotation_xyzw(&before)).unwrap();
-        let (metres, degrees) = pose_difference(&before, &after);
-        assert!(metres < 1e-12 && degrees < 1e-5);
+        let (meters, degrees) = pose_difference(&before, &after);
+        assert!(meters < 1e-12 && degrees < 1e-5);
     }
 
     #[test]
     fn a_constant_velocity_goes_on() {
         let step = Pose::new(Vector3::new(0.2, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.1));
         let (before, last) = (Pose::identity(), step);
-        let (metres, degrees) = pose_difference(&extrapolate(&before, &last, 1.0), &(step * step));
-        assert!(metres < 1e-12 && degrees < 1e-5);
+        let (meters, degrees) = pose_difference(&extrapolate(&before, &last, 1.0), &(step * step));
+        assert!(meters < 1e-12 && degrees < 1e-5);
         let half = extrapolate(&before, &last, 0.5);
         assert!(((last.inv_mul(&half)).rotation.angle() - 0.05).abs() < 1e-12);
     }

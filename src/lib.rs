@@ -13,7 +13,7 @@
 //!   `http`, `client`: adapters. `server`, `cli`: the daemon and the program.
 //! * `lab`: what simulates, measures and compares. Nothing but `cli` names it.
 //!
-//! The first four lines know no runtime, no protocol and no serialisation, and are there without any feature:
+//! The first four lines know no runtime, no protocol and no serialization, and are there without any feature:
 //!
 //! ```
 //! use mrol::geometry::{Point, Pose};
@@ -30,9 +30,9 @@
 //! let committed = map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 //! assert_eq!((committed.revision, committed.voxels), (1, 2));
 //!
-//! let quantise = map.lattice().from_points(&map_from_sensor);
+//! let quantize = map.lattice().from_points(&map_from_sensor);
 //! let view = map.view_of(&scan, &map_from_sensor);
-//! assert_eq!(view.count(&scan, &quantise, 0, Lookup::Bloom), 2);
+//! assert_eq!(view.count(&scan, &quantize, 0, Lookup::Bloom), 2);
 //! # Ok(())
 //! # }
 //! ```

@@ -67,13 +67,13 @@ fn corner(random: &mut ChaCha8Rng) -> Vec<Point> {
 #[test]
 fn a_corner_holds_the_pose_to_a_hundredth_of_a_voxel_edge() {
     let (alignment, truth) = aligned(corner, offset());
-    let (metres, degrees) = pose_difference(&alignment.map_from_sensor, &truth);
+    let (meters, degrees) = pose_difference(&alignment.map_from_sensor, &truth);
     assert_eq!(alignment.verdict, Verdict::Accepted, "{}", alignment.reason);
-    assert!(metres < 0.001 && degrees < 0.05, "{metres} m {degrees} deg");
+    assert!(meters < 0.001 && degrees < 0.05, "{meters} m {degrees} deg");
     assert!(alignment.overlap() > 0.6 && alignment.inliers > 0.9 && alignment.undetermined.is_empty());
     // The error is one that the information matrix expects.
     let worst = alignment.information.directions()[0].std_m;
-    assert!(metres < 4.0 * worst && worst < 0.2 * RESOLUTION_M, "{metres} m, std {worst} m");
+    assert!(meters < 4.0 * worst && worst < 0.2 * RESOLUTION_M, "{meters} m, std {worst} m");
 }
 
 #[test]
@@ -170,9 +170,9 @@ fn simulated_scans_with_noise_align_well_below_a_voxel_and_alike_every_time() {
                 let find = || align(&map, &points, &last, &AlignmentSettings::default());
                 let alignment = find();
                 assert_eq!(alignment, find());
-                let (metres, degrees) = pose_difference(&alignment.map_from_sensor, truth);
+                let (meters, degrees) = pose_difference(&alignment.map_from_sensor, truth);
                 assert_eq!(alignment.verdict, Verdict::Accepted, "{} {k}: {}", tour.name, alignment.reason);
-                assert!(metres < 0.02 && degrees < 0.6, "{} {k}: {metres} m {degrees} deg", tour.name);
+                assert!(meters < 0.02 && degrees < 0.6, "{} {k}: {meters} m {degrees} deg", tour.name);
                 last = alignment.map_from_sensor;
             }
             insert(&map, &points, last);

@@ -65,12 +65,12 @@ struct Answer {
 }
 
 fn ask(map: &MultiResolutionMap) -> Answer {
-    let (points, quantise) = (points(&[0, 2], 3), map.lattice().from_map());
+    let (points, quantize) = (points(&[0, 2], 3), map.lattice().from_map());
     let view = map.view_of(&points, &Pose::identity());
     let ways = [(0, Lookup::Exact), (0, Lookup::Bloom), (3, Lookup::Exact), (3, Lookup::Bloom)];
     let occupied = ways.map(|(level, lookup)| {
         let mut bits = [0];
-        view.query(&points, &quantise, level, lookup, &mut bits);
+        view.query(&points, &quantize, level, lookup, &mut bits);
         bits[0]
     });
     Answer { revision: view.revision(), occupied }

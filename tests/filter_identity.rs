@@ -84,8 +84,8 @@ fn assert_identical_by(method: Method, name: &str, scans: &[Vec<Point>], resolut
     if method == Method::Refined {
         let usual = map(FilterSettings::default(), Lookup::Bloom);
         for (k, (usual, exact)) in usual.poses.iter().zip(&exact.poses).enumerate() {
-            let (metres, degrees) = pose_difference(usual, exact);
-            assert!(metres <= 1e-4 && degrees <= 1e-3, "scan {k}: {metres} m, {degrees} degrees");
+            let (meters, degrees) = pose_difference(usual, exact);
+            assert!(meters <= 1e-4 && degrees <= 1e-3, "scan {k}: {meters} m, {degrees} degrees");
         }
     }
 }

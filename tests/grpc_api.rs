@@ -159,9 +159,9 @@ async fn voxels_are_deleted_by_points_keys_box_and_sphere() {
         (Target::Points(points_pb(&[row(1)[0], row(2)[1], [-5.0, 0.0, 0.0]]).unwrap()), 0, 2),
         // The second and third voxel of level 1: the four of level 0 below them.
         (Target::Keys(pb::VoxelKeys { keys: keys[1..3].to_vec() }), 1, 4),
-        // Centres from 1.05 to 1.45.
+        // Centers from 1.05 to 1.45.
         (region(Shape::Box(cuboid)), 0, 5),
-        // Centres 1.95 (about), 2.05 and 2.15.
+        // Centers 1.95 (about), 2.05 and 2.15.
         (region(Shape::Sphere(pb::Sphere { radius_m: 0.12, ..ball })), 0, 3),
         // All of it again.
         (region(Shape::Sphere(pb::Sphere { radius_m: 0.12, ..ball })), 0, 0),

@@ -1,5 +1,5 @@
 //! Layers run one way: a module names only modules of its own layer or below, and the core names no runtime,
-//! no protocol and no serialisation.
+//! no protocol and no serialization.
 
 use std::path::{Path, PathBuf};
 

@@ -100,12 +100,12 @@ fn a_robot_is_found_in_the_building_that_another_one_mapped() {
     for k in [5, 35, 65, 95] {
         let (points, truth) = building.scan(k);
         let found = find(&building.map, &points, &query(down(&truth)));
-        let (metres, degrees) = pose_difference(&found.candidates[0].map_from_sensor(), &truth);
+        let (meters, degrees) = pose_difference(&found.candidates[0].map_from_sensor(), &truth);
         println!(
-            "scan {k}: {:?}, {} cells, {metres:.3} m {degrees:.2} degrees off",
+            "scan {k}: {:?}, {} cells, {meters:.3} m {degrees:.2} degrees off",
             found.verdict, found.cells
         );
-        assert!(metres < 0.05 && degrees < 0.5, "{metres} m, {degrees} degrees: {}", found.reason);
+        assert!(meters < 0.05 && degrees < 0.5, "{meters} m, {degrees} degrees: {}", found.reason);
         assert!(found.exhaustive && !found.cut_short);
         assert!(found.candidates.len() <= 3);
         assert!(found.candidates.windows(2).all(|pair| pair[0].fit() >= pair[1].fit()));
@@ -119,8 +119,8 @@ fn without_gravity_the_scans_own_surfaces_lead_there() {
     let turned = Pose::rotation(nalgebra::Vector3::new(0.4, -1.1, 2.0));
     let points: Vec<Point> = points.iter().map(|point| (turned.inverse() * point.to_f64()).into()).collect();
     let found = find(&building.map, &points, &query(None));
-    let (metres, degrees) = pose_difference(&found.candidates[0].map_from_sensor(), &(truth * turned));
-    assert!(metres < 0.05 && degrees < 0.5, "{metres} m, {degrees} degrees: {}", found.reason);
+    let (meters, degrees) = pose_difference(&found.candidates[0].map_from_sensor(), &(truth * turned));
+    assert!(meters < 0.05 && degrees < 0.5, "{meters} m, {degrees} degrees: {}", found.reason);
     assert!(!found.exhaustive && !found.cut_short);
 }
 

@@ -98,8 +98,8 @@ async fn a_scan_is_found_alike_on_every_way_in() {
     assert_eq!(found.verdict, Verdict::Accepted, "{}", found.reason);
     assert!(found.exhaustive && !found.cut_short && found.accepted());
     let best = &found.candidates[0];
-    let (metres, degrees) = pose_difference(&best.map_from_sensor, &building.truth);
-    assert!(metres < 0.05 && degrees < 0.5, "{metres} m, {degrees} degrees");
+    let (meters, degrees) = pose_difference(&best.map_from_sensor, &building.truth);
+    assert!(meters < 0.05 && degrees < 0.5, "{meters} m, {degrees} degrees");
     assert!(best.overlap > 0.5 && best.inliers > 0.5 && best.blocked < 0.4);
     assert!((best.fit - best.overlap * (1.0 - best.blocked)).abs() < 1e-12);
     assert_eq!(found.state.revision, 5);
@@ -125,9 +125,9 @@ async fn a_scan_is_found_alike_on_every_way_in() {
         let candidates = answer["candidates"].as_array().unwrap();
         assert_eq!(candidates.len(), found.candidates.len());
         for (candidate, expected) in candidates.iter().zip(&found.candidates) {
-            let (metres, degrees) =
+            let (meters, degrees) =
                 pose_difference(&pose_of(&candidate["map_from_sensor"]), &expected.map_from_sensor);
-            assert!(metres < 1e-9 && degrees < 1e-5, "{metres} m, {degrees} degrees");
+            assert!(meters < 1e-9 && degrees < 1e-5, "{meters} m, {degrees} degrees");
             assert_eq!(candidate["overlap"].as_f64().unwrap(), expected.overlap);
             assert_eq!(candidate["margin"].as_f64(), expected.margin);
         }
@@ -225,7 +225,7 @@ async fn a_question_that_makes_no_sense_is_refused_with_its_reason() {
         ),
         (json!({"points": points, "time_limit_s": -2}), ["time_limit_s", "-2"]),
         (json!({"points": points, "candidates": 8}), ["candidates", "7"]),
-        (json!({"points": points, "colour": 1}), ["colour", "unknown"]),
+        (json!({"points": points, "color": 1}), ["color", "unknown"]),
     ] {
         let (status, error) = building.post(bad).await;
         assert_eq!(status, StatusCode::BAD_REQUEST, "{error}");

@@ -222,9 +222,9 @@ async fn deletions(service: MapService, size: &Size, enough: Arc<AtomicBool>, he
         let columns = random.random_range(least..most) / least * least;
         let (first, floor) =
             (random.random_range(0..=FLOOR_SIDE - columns), random.random_range(0..size.floors));
-        let metres = |voxels: usize| voxels as f64 * RESOLUTION_M;
-        let low = [metres(first), 0.0, metres(floor * FLOOR_HEIGHT)];
-        let high = [metres(first + columns), metres(FLOOR_SIDE), metres(floor * FLOOR_HEIGHT + 1)];
+        let meters = |voxels: usize| voxels as f64 * RESOLUTION_M;
+        let low = [meters(first), 0.0, meters(floor * FLOOR_HEIGHT)];
+        let high = [meters(first + columns), meters(FLOOR_SIDE), meters(floor * FLOOR_HEIGHT + 1)];
         let answer = delete(&service, Region::cuboid(low, high).unwrap()).await;
         removed += usize::from(answer > 0);
         heart.beat();

@@ -1,4 +1,4 @@
-//! Real panoramic scans, metres apart, aligned from the pose of the scan before: in process, and through the
+//! Real panoramic scans, meters apart, aligned from the pose of the scan before: in process, and through the
 //! running daemon over both protocols, to the same poses.
 
 #![cfg(feature = "server")]
@@ -78,21 +78,21 @@ fn pose_of(value: &Value) -> Pose {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn scans_metres_apart_align_to_the_truth_and_alike_on_every_way_in() {
+async fn scans_meters_apart_align_to_the_truth_and_alike_on_every_way_in() {
     let Some(set) = shared_scans::open("uos_3dtk_dat") else { return };
     let poses = in_process(&set);
     for (k, (found, truth)) in poses.iter().zip(&set.map_from_sensor).enumerate() {
-        let (metres, degrees) = pose_difference(&(set.map_from_sensor[0].inv_mul(truth)), found);
-        println!("scan {k}: {metres:.4} m, {degrees:.3} degrees from the truth");
-        assert!(metres <= 0.03 && degrees <= 0.4, "scan {k}: {metres} m, {degrees} degrees");
+        let (meters, degrees) = pose_difference(&(set.map_from_sensor[0].inv_mul(truth)), found);
+        println!("scan {k}: {meters:.4} m, {degrees:.3} degrees from the truth");
+        assert!(meters <= 0.03 && degrees <= 0.4, "scan {k}: {meters} m, {degrees} degrees");
     }
     let daemon = Daemon::start().await;
     let (over_grpc, over_http) = (over_grpc(&daemon, &set).await, over_http(&daemon, &set).await);
     for k in 0..poses.len() {
-        // A pose crosses the wire as a quaternion that is normalised again on arrival: the last bit may differ.
+        // A pose crosses the wire as a quaternion that is normalized again on arrival: the last bit may differ.
         for (way, pose) in [("gRPC", &over_grpc[k]), ("HTTP", &over_http[k])] {
-            let (metres, degrees) = pose_difference(&poses[k], pose);
-            assert!(metres < 1e-12 && degrees < 1e-6, "scan {k} over {way}: {metres} m, {degrees} degrees");
+            let (meters, degrees) = pose_difference(&poses[k], pose);
+            assert!(meters < 1e-12 && degrees < 1e-6, "scan {k} over {way}: {meters} m, {degrees} degrees");
         }
     }
     daemon.stop().await;

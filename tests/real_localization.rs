@@ -1,4 +1,4 @@
-//! Real scans localised with no guess: in the map of the place they were taken in, and in others.
+//! Real scans localized with no guess: in the map of the place they were taken in, and in others.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
@@ -78,9 +78,9 @@ impl Place {
     fn is_found(&self, map: &MultiResolutionMap, k: usize, gravity: Option<Gravity>) -> bool {
         let found = self.find(map, k, gravity);
         let best = found.candidates.first().map_or_else(Pose::identity, |best| best.map_from_sensor());
-        let (metres, degrees) = pose_difference(&best, &self.set.map_from_sensor[k]);
-        println!("  {metres:.3} m, {degrees:.2} degrees from the truth");
-        assert!(metres < 0.2 && degrees < 2.0, "scan {k}: {metres} m, {degrees} degrees: {}", found.reason);
+        let (meters, degrees) = pose_difference(&best, &self.set.map_from_sensor[k]);
+        println!("  {meters:.3} m, {degrees:.2} degrees from the truth");
+        assert!(meters < 0.2 && degrees < 2.0, "scan {k}: {meters} m, {degrees} degrees: {}", found.reason);
         found.verdict == Verdict::Accepted
     }
 }

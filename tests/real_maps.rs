@@ -67,17 +67,17 @@ fn questions(map: &MultiResolutionMap, model: &HashSet<[i32; 3]>, random: &mut C
 }
 
 fn assert_answers(map: &MultiResolutionMap, model: &HashSet<[i32; 3]>, points: &[Point]) {
-    let quantise = map.lattice().from_map();
+    let quantize = map.lattice().from_map();
     let view = map.view_of(points, &Pose::identity());
     for level in 0..LEVELS {
         let occupied: HashSet<[i32; 3]> = model.iter().map(|i| i.map(|c| c >> level)).collect();
         let mut exact = vec![0u64; points.len().div_ceil(64)];
         let mut bloom = exact.clone();
-        assert!(view.query(points, &quantise, level, Lookup::Exact, &mut exact));
-        assert!(view.query(points, &quantise, level, Lookup::Bloom, &mut bloom));
+        assert!(view.query(points, &quantize, level, Lookup::Exact, &mut exact));
+        assert!(view.query(points, &quantize, level, Lookup::Bloom, &mut bloom));
         for (i, &point) in points.iter().enumerate() {
             let bit = |words: &[u64]| words[i / 64] >> (i % 64) & 1 == 1;
-            let index = quantise.index(point).unwrap().map(|c| c >> level);
+            let index = quantize.index(point).unwrap().map(|c| c >> level);
             assert_eq!(bit(&exact), occupied.contains(&index), "{point:?} at level {level}");
             assert!(bit(&bloom) || !bit(&exact), "the filter denies {point:?} at level {level}");
         }
@@ -116,7 +116,7 @@ fn assert_false_positives(set: &ScanSet, map: &MultiResolutionMap) {
             level.expected_rate * 100.0,
             level.unblocked_rate * 100.0
         );
-        // A level of a few hundred voxels has too few neighbours for a rate: four standard errors on top.
+        // A level of a few hundred voxels has too few neighbors for a rate: four standard errors on top.
         let samples = (level.voxels as f64).min(SAMPLES as f64) * 0.5;
         let noise = 4.0 * (level.expected_rate / samples).sqrt();
         assert!(measured <= 1.2 * level.expected_rate + noise, "level {}: {measured}", level.level);

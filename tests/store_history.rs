@@ -65,7 +65,7 @@ struct Model {
 }
 
 enum Event {
-    /// A scan of the centres of these voxels.
+    /// A scan of the centers of these voxels.
     Scan(u64, Vec<[i32; 3]>),
     /// The finest voxels that went.
     Deletion(PlainSet),
@@ -110,7 +110,7 @@ impl Model {
     }
 }
 
-/// The moments of a finest voxel's centre in its voxel of level 2.
+/// The moments of a finest voxel's center in its voxel of level 2.
 fn of_center(index: [i32; 3]) -> Moments {
     Moments::of_offset(index.map(|i| i64::from(2 * (i & 3) - 3) * (Moments::UNITS / 8)))
 }

@@ -25,7 +25,7 @@ import small_gicp
 CONVERGED_M, CONVERGED_DEG = 0.1, 1.0
 BINS_M = [(low / 2, low / 2 + 0.5) for low in range(4)]
 BINS_DEG = [(low * 10, low * 10 + 10) for low in range(4)]
-# How far GICP looks for a neighbour, and the sides of VGICP's voxels, metres: alone, and coarse to fine, each from where
+# How far GICP looks for a neighbor, and the sides of VGICP's voxels, meters: alone, and coarse to fine, each from where
 # the coarser one ended.
 REACHES_M = {
     "VGICP": [[0.5], [2.0, 1.0, 0.5], [2.0, 1.0, 0.5, 0.2]],
@@ -63,7 +63,7 @@ def read_tum(path):
 
 
 def difference(a, b):
-    """Metres and degrees between two poses."""
+    """Meters and degrees between two poses."""
     a_from_b = numpy.linalg.inv(a) @ b
     turned = numpy.linalg.norm(a_from_b[:3, :3] - numpy.eye(3)) / (2 * numpy.sqrt(2))
     return numpy.linalg.norm(a_from_b[:3, 3]), numpy.degrees(2 * numpy.arcsin(min(1.0, turned)))
@@ -130,8 +130,8 @@ def trials(align, source, guesses, truth):
         start = time.perf_counter()
         found = align(source, start_pose)
         ms = (time.perf_counter() - start) * 1e3
-        metres, degrees = difference(found, truth)
-        outcomes.append((metres <= CONVERGED_M and degrees <= CONVERGED_DEG, ms))
+        meters, degrees = difference(found, truth)
+        outcomes.append((meters <= CONVERGED_M and degrees <= CONVERGED_DEG, ms))
     return outcomes
 
 

@@ -57,7 +57,7 @@ impl From<Pose> for Ascent {
 }
 
 impl Ascent {
-    /// Moves to the neighbour of highest overlap until none is higher than where it stands (a tie keeps the
+    /// Moves to the neighbor of highest overlap until none is higher than where it stands (a tie keeps the
     /// pose), `iterations_max` moves were made, or nobody wants to know.
     pub(super) fn climb(
         &mut self,
@@ -72,7 +72,7 @@ impl Ascent {
             if stop.is_stopped() {
                 return;
             }
-            let candidates = neighbours(&self.pose, steps);
+            let candidates = neighbors(&self.pose, steps);
             let heights = overlap.at(&candidates, stop);
             // Heights of a look-up that was stopped are too low, each by as much as it happens.
             if stop.is_stopped() {
@@ -93,9 +93,9 @@ fn highest(heights: &[usize]) -> Option<usize> {
     (0..heights.len()).rev().max_by_key(|&i| heights[i])
 }
 
-/// The 48 neighbours of a pose: 6 shifts, 6 turns, and the 36 pairs of a shift and a turn. Shifts are along the
+/// The 48 neighbors of a pose: 6 shifts, 6 turns, and the 36 pairs of a shift and a turn. Shifts are along the
 /// map's axes; turns are about them, through the sensor.
-fn neighbours(pose: &Pose, steps: Steps) -> Vec<Pose> {
+fn neighbors(pose: &Pose, steps: Steps) -> Vec<Pose> {
     let shifts = SINGLE_AXIS.map(|axis| Translation3::from(Vector3::from(axis) * steps.translation_m));
     let turns =
         SINGLE_AXIS.map(|axis| UnitQuaternion::from_scaled_axis(Vector3::from(axis) * steps.rotation_rad));
@@ -119,14 +119,14 @@ mod tests {
     use crate::geometry::pose_difference;
 
     #[test]
-    fn a_pose_has_48_neighbours_one_step_away() {
+    fn a_pose_has_48_neighbors_one_step_away() {
         let pose = Pose::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.3, -0.2, 0.1));
         let steps = Steps { translation_m: 0.1, rotation_rad: 0.02 };
-        let neighbours = neighbours(&pose, steps);
-        assert_eq!(neighbours.len(), 48);
-        for (i, neighbour) in neighbours.iter().enumerate() {
-            let shift = (neighbour.translation.vector - pose.translation.vector).norm();
-            let turn = (neighbour.rotation * pose.rotation.inverse()).angle();
+        let neighbors = neighbors(&pose, steps);
+        assert_eq!(neighbors.len(), 48);
+        for (i, neighbor) in neighbors.iter().enumerate() {
+            let shift = (neighbor.translation.vector - pose.translation.vector).norm();
+            let turn = (neighbor.rotation * pose.rotation.inverse()).angle();
             let expected = if i < 6 {
                 (0.1, 0.0)
             } else if i < 12 {
@@ -138,7 +138,7 @@ mod tests {
                 (shift - expected.0).abs() < 1e-12 && (turn - expected.1).abs() < 1e-7,
                 "{i}: {shift} {turn}"
             );
-            assert!(neighbours[..i].iter().all(|other| pose_difference(other, neighbour) != (0.0, 0.0)));
+            assert!(neighbors[..i].iter().all(|other| pose_difference(other, neighbor) != (0.0, 0.0)));
         }
     }
 

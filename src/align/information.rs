@@ -6,7 +6,7 @@ use crate::geometry::{Point, symmetric_eigen};
 
 /// The information matrix (inverse covariance) of a pose.
 ///
-/// Rows and columns are x y z (metres, along the map's axes) and rx ry rz (radians, about the map's axes through the
+/// Rows and columns are x y z (meters, along the map's axes) and rx ry rz (radians, about the map's axes through the
 /// sensor): what a pose graph takes as the weight of this measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseInformation {
@@ -20,7 +20,7 @@ pub struct Direction {
     /// A unit vector: x y z along the map's axes, then rotations about them through the sensor, each times the scan's
     /// mean range, so that both are lengths.
     pub direction: [f64; 6],
-    /// Standard deviation along it, metres; infinite where nothing holds it.
+    /// Standard deviation along it, meters; infinite where nothing holds it.
     pub std_m: f64,
 }
 
@@ -75,7 +75,7 @@ impl std::fmt::Display for Direction {
     }
 }
 
-/// Of `points` from the sensor, metres; 0 without points.
+/// Of `points` from the sensor, meters; 0 without points.
 pub(super) fn root_mean_square_range_m(points: &[Point]) -> f64 {
     let squares: f64 = points.iter().map(|point| point.to_f64().coords.norm_squared()).sum();
     (squares / points.len().max(1) as f64).sqrt()

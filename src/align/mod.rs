@@ -173,12 +173,12 @@ fn finish(
         }
         Method::Overlap | Method::WeightedSum => climb_sub_voxel(map, scan, &mut ascent, settings),
     }
-    let (metres, degrees) = pose_difference(&climbed, &ascent.pose);
+    let (meters, degrees) = pose_difference(&climbed, &ascent.pose);
     fit(
         map,
         scan,
         ascent,
-        metres + degrees.to_radians() * root_mean_square_range_m(&scan.surface_sample),
+        meters + degrees.to_radians() * root_mean_square_range_m(&scan.surface_sample),
         settings,
     )
     .judged(map, settings)

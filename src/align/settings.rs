@@ -92,7 +92,7 @@ pub struct RefinementSettings {
 }
 
 impl RefinementSettings {
-    /// The last stage's uncertainty of a point, metres.
+    /// The last stage's uncertainty of a point, meters.
     pub(super) fn std_m(&self, resolution_m: f64) -> f64 {
         self.std * resolution_m
     }

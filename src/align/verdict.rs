@@ -54,7 +54,7 @@ pub struct Alignment {
     pub information: PoseInformation,
     /// Directions of the pose that they leave open.
     pub undetermined: Vec<Direction>,
-    /// How far the refinement moved the end of the ascent, metres; turns count by the scan's root mean square range.
+    /// How far the refinement moved the end of the ascent, meters; turns count by the scan's root mean square range.
     pub refined_by_m: f64,
     /// Steps that moved the pose, over all stages.
     pub iterations: u32,
@@ -78,14 +78,14 @@ impl Alignment {
         settings: &AlignmentSettings,
     ) -> bool {
         let (resolution_m, wide_start) = (map.lattice().resolution_m(0), &settings.wide_start);
-        let (metres, degrees) = pose_difference(guess, &self.map_from_sensor);
+        let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
         if wide_start.ascents == 0 {
             return false;
         }
         self.fitness < wide_start.fitness_below
             || self.refined_by_m > settings.refinement_reach * resolution_m
             || self.information.directions()[0].std_m > wide_start.std_above * resolution_m
-            || metres > wide_start.motion_above * resolution_m
+            || meters > wide_start.motion_above * resolution_m
             || degrees > wide_start.motion_above_deg
     }
 
@@ -96,13 +96,13 @@ impl Alignment {
         map: &MultiResolutionMap,
         settings: &AlignmentSettings,
     ) -> Self {
-        let (metres, degrees) = pose_difference(guess, &self.map_from_sensor);
+        let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
         let (reach_m, reach_deg) = (settings.reach * map.lattice().resolution_m(0), settings.reach_deg);
-        if self.verdict != Verdict::Accepted || metres <= reach_m && degrees <= reach_deg {
+        if self.verdict != Verdict::Accepted || meters <= reach_m && degrees <= reach_deg {
             return self;
         }
         let reason = format!(
-            "it is {metres:.2} m and {degrees:.1} deg from the guess, within {reach_m:.2} m and {reach_deg} deg \
+            "it is {meters:.2} m and {degrees:.1} deg from the guess, within {reach_m:.2} m and {reach_deg} deg \
              others were looked for"
         );
         self.but(Verdict::Ambiguous, reason)
@@ -118,7 +118,7 @@ impl Alignment {
 #[derive(Debug)]
 pub(super) struct Fit {
     pub(super) map_from_sensor: Pose,
-    /// How far the refinement moved the pose, metres; turns count by the points' range.
+    /// How far the refinement moved the pose, meters; turns count by the points' range.
     pub(super) refined_by_m: f64,
     pub(super) level_overlaps: Vec<f64>,
     pub(super) surfaces: SurfaceFit,

@@ -41,8 +41,8 @@ pub(super) fn align(
     lookups += climbed.iter().map(|ascent| ascent.lookups).sum::<u64>();
     let finest = Overlap::new(map, &scan.sample, 0, settings.lookup);
     let is_same = |a: &Pose, b: &Pose| {
-        let (metres, degrees) = pose_difference(a, b);
-        metres < SAME_VOXELS * map.lattice().resolution_m(0) && degrees < SAME_DEG
+        let (meters, degrees) = pose_difference(a, b);
+        meters < SAME_VOXELS * map.lattice().resolution_m(0) && degrees < SAME_DEG
     };
     let mut ends: Vec<Pose> = Vec::new();
     for end in highest(climbed.iter().map(|ascent| ascent.pose).collect(), &finest, climbed.len(), scan.stop)
@@ -81,9 +81,9 @@ pub(super) fn align(
     });
     match as_good {
         Some(other) if is_accepted(&best) => {
-            let (metres, degrees) = pose_difference(&other.map_from_sensor, &best.map_from_sensor);
+            let (meters, degrees) = pose_difference(&other.map_from_sensor, &best.map_from_sensor);
             let reason = format!(
-                "a pose {metres:.2} m and {degrees:.1} deg away fits about as well: {:.3} against {:.3}",
+                "a pose {meters:.2} m and {degrees:.1} deg away fits about as well: {:.3} against {:.3}",
                 other.fitness, best.fitness
             );
             best.but(Verdict::Ambiguous, reason)

@@ -26,7 +26,7 @@ pub(crate) const BITS_OF_HASH: u32 = 5;
 ///
 /// All k bits lie in one word (a *blocked* filter), so that a look-up is one load. The paper's two hashes
 /// `5381 * 33 ^ key` and `2166136261 * 16777619 ^ key` differ by a constant: where the table's size is a power
-/// of two their two positions collapse into one, and neighbouring keys fall on neighbouring counters. A hash
+/// of two their two positions collapse into one, and neighboring keys fall on neighboring counters. A hash
 /// that mixes is as good at every size; one of 32 bits takes a register of sixteen keys where one of 64 takes two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Probe {

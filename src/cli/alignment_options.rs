@@ -54,10 +54,10 @@ impl AlignmentOptions {
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct PointOptions {
     /// Skip points nearer to the sensor than this
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METERS")]
     range_min: Option<f64>,
     /// Skip points farther from the sensor than this
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METERS")]
     range_max: Option<f64>,
     /// Skip points in this box in the sensor frame, the robot itself: "x y z x y z"
     #[arg(long, value_name = "BOX", allow_hyphen_values = true, value_parser = parse::corners)]

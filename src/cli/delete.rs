@@ -22,7 +22,7 @@ EXAMPLES:
   mrol delete --map office --point 1.0,2.5,0.3 --level 2        a coarse voxel with all it contains
   mrol delete --map office --points gone.ply
 
-A box or sphere takes the voxels whose centres lie inside. Voxels that are not there are no error.";
+A box or sphere takes the voxels whose centers lie inside. Voxels that are not there are no error.";
 
 /// Take voxels out of a map on a server
 #[derive(Debug, clap::Args)]
@@ -46,13 +46,13 @@ struct Target {
     /// The voxels of a file's points: .ply .pcd .xyz .f32
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
-    /// The voxel of a point, metres; may be repeated
+    /// The voxel of a point, meters; may be repeated
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
     point: Vec<Point>,
-    /// The voxels in a box: smallest and largest corner, metres
+    /// The voxels in a box: smallest and largest corner, meters
     #[arg(long = "box", value_name = "X Y Z X Y Z", allow_hyphen_values = true, value_parser = parse::cuboid)]
     cuboid: Option<Region>,
-    /// The voxels in a sphere: centre and radius, metres
+    /// The voxels in a sphere: center and radius, meters
     #[arg(long, value_name = "X Y Z R", allow_hyphen_values = true, value_parser = parse::ball)]
     sphere: Option<Region>,
 }

@@ -75,8 +75,8 @@ pub(super) struct Insert {
     /// Make the map first
     #[arg(long, requires = "resolution")]
     create: bool,
-    /// With --create: side of a finest voxel, metres
-    #[arg(long, value_name = "METRES", requires = "create")]
+    /// With --create: side of a finest voxel, meters
+    #[arg(long, value_name = "METERS", requires = "create")]
     resolution: Option<f64>,
     #[command(flatten)]
     settings: OptionalSettings,
@@ -158,7 +158,7 @@ impl Insert {
 fn not_inserted(name: &str, error: &ClientError) -> CliError {
     let advice = match error.reason() {
         Some("guess_required") => "; --guess says where the first scan was taken",
-        Some("map_not_found") => "; --create --resolution METRES makes it",
+        Some("map_not_found") => "; --create --resolution METERS makes it",
         _ => "",
     };
     CliError::failed(format!("{name}: {error}{advice}"))

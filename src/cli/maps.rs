@@ -69,8 +69,8 @@ struct Named {
 /// Settings of a map to make; what is not given is the server's default.
 #[derive(Debug, clap::Args)]
 pub(super) struct NewMapOptions {
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES")]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS")]
     resolution: f64,
     #[command(flatten)]
     rest: OptionalSettings,

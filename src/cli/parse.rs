@@ -22,31 +22,31 @@ impl From<LookupName> for Lookup {
     }
 }
 
-/// "x y z qx qy qz qw", metres and a unit quaternion.
+/// "x y z qx qy qz qw", meters and a unit quaternion.
 pub(super) fn pose(text: &str) -> Result<Pose, String> {
     let [x, y, z, qx, qy, qz, qw] = numbers(text, "x y z qx qy qz qw")?;
     geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|error| error.to_string())
 }
 
-/// "x,y,z", metres.
+/// "x,y,z", meters.
 pub(super) fn point(text: &str) -> Result<Point, String> {
     let [x, y, z] = numbers(text, "x,y,z")?;
     Ok(Point::from(nalgebra::Point3::new(x, y, z)))
 }
 
-/// "x y z x y z": smallest and largest corner, metres.
+/// "x y z x y z": smallest and largest corner, meters.
 pub(super) fn cuboid(text: &str) -> Result<Region, String> {
     let (min_m, max_m) = corners(text)?;
     Region::cuboid(min_m, max_m).map_err(|error| error.to_string())
 }
 
-/// "x y z x y z": two corners, metres.
+/// "x y z x y z": two corners, meters.
 pub(super) fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
     Ok(([x0, y0, z0], [x1, y1, z1]))
 }
 
-/// "x y z x y z": smallest and largest corner of where a sensor may be, metres.
+/// "x y z x y z": smallest and largest corner of where a sensor may be, meters.
 pub(super) fn search_box(text: &str) -> Result<SearchBox, String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
     SearchBox::new([x0, y0, z0], [x1, y1, z1]).map_err(|error| error.to_string())
@@ -57,7 +57,7 @@ pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
     numbers(text, "x,y,z")
 }
 
-/// "x y z r": centre and radius, metres.
+/// "x y z r": center and radius, meters.
 pub(super) fn ball(text: &str) -> Result<Region, String> {
     let [x, y, z, radius_m] = numbers(text, "x y z r")?;
     Region::ball([x, y, z], radius_m).map_err(|error| error.to_string())

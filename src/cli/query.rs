@@ -35,7 +35,7 @@ pub(super) struct Query {
     /// Points to ask about: .ply .pcd .xyz .f32
     #[arg(required_unless_present = "point", conflicts_with = "point")]
     points_file: Option<PathBuf>,
-    /// A point to ask about, metres; may be repeated
+    /// A point to ask about, meters; may be repeated
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
     point: Vec<Point>,
     #[command(flatten)]

@@ -14,7 +14,7 @@ pub(super) fn name_width(files: &[PathBuf]) -> usize {
     files.iter().map(|file| name_of(file).chars().count()).max().unwrap_or(0).max("scan".len())
 }
 
-/// A pose as x y z (metres) qx qy qz qw.
+/// A pose as x y z (meters) qx qy qz qw.
 pub(super) fn seven(pose: &Pose) -> [f64; 7] {
     let ([x, y, z], [qx, qy, qz, qw]) = (translation_m(pose), rotation_xyzw(pose));
     [x, y, z, qx, qy, qz, qw]

@@ -6,7 +6,7 @@ use crate::wire::pb;
 /// Settings of a map to make; what is none is the server's default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewMap {
-    /// Side of a finest voxel, r_0, metres.
+    /// Side of a finest voxel, r_0, meters.
     pub resolution_m: f64,
     /// Number of levels.
     pub levels: Option<u32>,

@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn a_key_that_is_none_is_named() {
         for (toml, key) in
-            [("colour = 1", "colour"), ("[http]\nlisen = \"a\"", "lisen"), ("[limits]\nx = 1", "x")]
+            [("color = 1", "color"), ("[http]\nlisen = \"a\"", "lisen"), ("[limits]\nx = 1", "x")]
         {
             let error = load(toml, json!({})).unwrap_err().to_string();
             assert!(error.contains(key), "{error}");

@@ -40,11 +40,11 @@ impl From<MethodConfig> for Method {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotConfig {
-    /// Distance from the sensor, metres; nearer points are skipped.
+    /// Distance from the sensor, meters; nearer points are skipped.
     pub range_min_m: Option<f64>,
-    /// Distance from the sensor, metres; farther points are skipped.
+    /// Distance from the sensor, meters; farther points are skipped.
     pub range_max_m: Option<f64>,
-    /// The robot's own body in the sensor frame, metres: smallest and largest corner.
+    /// The robot's own body in the sensor frame, meters: smallest and largest corner.
     pub body_m: Option<[[f64; 3]; 2]>,
 }
 

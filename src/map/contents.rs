@@ -43,7 +43,7 @@ pub struct MapContents {
 }
 
 impl MapContents {
-    /// Voxels alone, at a revision; their centres stand for the points.
+    /// Voxels alone, at a revision; their centers stand for the points.
     pub fn at(revision: u64, voxels: VoxelSet) -> Self {
         Self { revision, moments: MomentSet::of_centers(&voxels), voxels, ..Self::default() }
     }

@@ -13,7 +13,7 @@ use crate::voxel::VoxelKey;
 pub struct LevelInfo {
     /// 0 is the finest.
     pub level: u32,
-    /// Side of its voxels, metres.
+    /// Side of its voxels, meters.
     pub resolution_m: f64,
     /// Occupied voxels.
     pub voxels: usize,
@@ -25,7 +25,7 @@ pub struct LevelInfo {
     pub expected_rate: f64,
     /// The same by eq. (1) of the paper.
     pub unblocked_rate: f64,
-    /// The share of absent neighbours of occupied voxels that the filter lets through; none of an empty level.
+    /// The share of absent neighbors of occupied voxels that the filter lets through; none of an empty level.
     pub measured_rate: Option<f64>,
 }
 
@@ -47,7 +47,7 @@ pub struct MapDescription {
 impl MultiResolutionMap {
     /// Describes the map, at one revision.
     ///
-    /// False positives are measured on `samples` absent neighbours of occupied voxels a level, drawn from `seed`.
+    /// False positives are measured on `samples` absent neighbors of occupied voxels a level, drawn from `seed`.
     pub fn describe(&self, samples: usize, seed: u64) -> MapDescription {
         self.described_until(samples, seed, StopSignal::NEVER)
     }
@@ -127,7 +127,7 @@ impl MultiResolutionMap {
     }
 }
 
-/// The share of about `samples` absent neighbours of occupied voxels that the filter takes for occupied.
+/// The share of about `samples` absent neighbors of occupied voxels that the filter takes for occupied.
 ///
 /// Queries near surfaces are what planners and alignments ask, so this is the rate they meet. Occupied voxels are
 /// drawn from every n-th block of each shard, so that the cost does not grow with the map.
@@ -144,12 +144,12 @@ fn measured_rate(
     for list in stop.paced(view.lists(level).filter(|list| !list.is_empty()), 1) {
         let wish = (samples * list.len()).div_ceil(total);
         for voxel in list.sample(wish, &mut random) {
-            let Some(neighbour) = random_neighbour(voxel, &mut random) else {
+            let Some(neighbor) = random_neighbor(voxel, &mut random) else {
                 continue;
             };
-            if !view.contains(neighbour, level) {
+            if !view.contains(neighbor, level) {
                 absent += 1;
-                let_through += usize::from(view.may_contain(neighbour, level));
+                let_through += usize::from(view.may_contain(neighbor, level));
             }
         }
     }
@@ -157,7 +157,7 @@ fn measured_rate(
 }
 
 /// One of the 26 voxels around `voxel`.
-fn random_neighbour(voxel: VoxelKey, random: &mut ChaCha8Rng) -> Option<VoxelKey> {
+fn random_neighbor(voxel: VoxelKey, random: &mut ChaCha8Rng) -> Option<VoxelKey> {
     let step = random.random_range(0..26);
     let step = if step < 13 { step } else { step + 1 };
     let [x, y, z] = voxel.index();

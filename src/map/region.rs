@@ -3,23 +3,23 @@
 /// A part of space in the map frame; borders belong to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Region {
-    /// An axis-aligned box, metres.
+    /// An axis-aligned box, meters.
     Box {
         /// Smallest coordinates.
         min_m: [f64; 3],
         /// Largest coordinates.
         max_m: [f64; 3],
     },
-    /// A ball, metres.
+    /// A ball, meters.
     Sphere {
-        /// Its centre.
+        /// Its center.
         center_m: [f64; 3],
         /// Its radius.
         radius_m: f64,
     },
 }
 
-/// How far from the origin a sphere may lie and reach, metres: ten thousand times as far as the largest map goes.
+/// How far from the origin a sphere may lie and reach, meters: ten thousand times as far as the largest map goes.
 pub const SPHERE_M_MAX: f64 = 1e12;
 
 /// Why numbers are not a region.
@@ -28,10 +28,10 @@ pub enum RegionError {
     /// A corner with NaN, or corners in the wrong order.
     #[error("box.min_m must not exceed box.max_m in any axis, got {0:?} and {1:?}")]
     Box([f64; 3], [f64; 3]),
-    /// A centre or radius that is not finite, or a negative radius.
+    /// A center or radius that is not finite, or a negative radius.
     #[error("sphere.center_m must be finite and sphere.radius_m not negative, got {0:?} and {1}")]
     Sphere([f64; 3], f64),
-    /// A centre or radius beyond [`SPHERE_M_MAX`].
+    /// A center or radius beyond [`SPHERE_M_MAX`].
     #[error(
         "sphere.center_m and sphere.radius_m must lie within {SPHERE_M_MAX:e} m, got {0:?} and {1}: no map goes as far"
     )]

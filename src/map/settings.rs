@@ -6,7 +6,7 @@ use crate::voxel::{Lattice, SettingError};
 /// Settings of a map, fixed for its life.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSettings {
-    /// Side of a finest voxel, r_0, metres.
+    /// Side of a finest voxel, r_0, meters.
     pub resolution_m: f64,
     /// Number of levels; level n has r_n = r_0 * 2^n.
     pub levels: u32,
@@ -15,7 +15,7 @@ pub struct MapSettings {
 }
 
 /// Levels of a map where its maker does not say: voxels up to 32 r_0, so that an alignment finds its way from 1 m and 20
-/// degrees off at r_0 = 0.04 m. (The paper takes 4 and steps of a few centimetres, III-B.)
+/// degrees off at r_0 = 0.04 m. (The paper takes 4 and steps of a few centimeters, III-B.)
 pub const LEVELS_DEFAULT: u32 = 6;
 
 /// Why settings cannot make a map.

@@ -13,7 +13,7 @@ const REGION_SHIFT_MIN: u32 = 6;
 /// Space cut into cubic regions, each of one shard.
 ///
 /// A region is at least as large as a coarsest voxel, so that parents share their children's shard. Shards are
-/// dealt out as colours, (x + z + 4 (y + z)) mod 16 of the region's indices: neighbours never share a lock,
+/// dealt out as colors, (x + z + 4 (y + z)) mod 16 of the region's indices: neighbors never share a lock,
 /// any 4 x 4 regions of a horizontal plane lie in 16 shards, and the wide kernels need no multiplication.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sharding {
@@ -124,8 +124,8 @@ fn touched_in(ranges: [(i64, i64); 3]) -> ShardsTouched {
 
 #[inline(always)]
 pub(super) fn shard_of_region([x, y, z]: [i32; 3]) -> usize {
-    let colour = x.wrapping_add(z).wrapping_add(y.wrapping_add(z) << 2);
-    colour as usize & (SHARDS - 1)
+    let color = x.wrapping_add(z).wrapping_add(y.wrapping_add(z) << 2);
+    color as usize & (SHARDS - 1)
 }
 
 #[cfg(test)]
@@ -134,7 +134,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn neighbouring_regions_never_share_a_shard() {
+    fn neighboring_regions_never_share_a_shard() {
         for d in [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, -1, 0], [0, 1, -1]] {
             assert_ne!(shard_of_region([0; 3]), shard_of_region(d), "{d:?}");
         }
@@ -157,9 +157,9 @@ mod tests {
             let lattice = Lattice::new(0.05, levels).unwrap();
             let sharding = Sharding::new(levels);
             let touched = sharding.touched_by(&points, &pose, &lattice);
-            let quantise = lattice.from_points(&pose);
+            let quantize = lattice.from_points(&pose);
             for point in points {
-                if let Some(index) = quantise.index(point) {
+                if let Some(index) = quantize.index(point) {
                     prop_assert!(touched.contains(sharding.shard_of(index, 0)));
                 }
             }

@@ -1,6 +1,6 @@
 //! Scans: point clouds and trajectories in files.
 //!
-//! A scan is a `Vec<Point>` in its sensor's frame, metres; a point with a NaN or infinite coordinate means "no
+//! A scan is a `Vec<Point>` in its sensor's frame, meters; a point with a NaN or infinite coordinate means "no
 //! return", and readers and sensors alike keep it.
 
 mod point_filter;

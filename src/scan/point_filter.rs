@@ -5,11 +5,11 @@ use crate::geometry::Point;
 /// The points of a robot's scans that are of its surroundings: neither too near, nor too far, nor of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PointFilter {
-    /// Distance from the sensor, metres; nearer points are skipped. None: no such limit.
+    /// Distance from the sensor, meters; nearer points are skipped. None: no such limit.
     pub range_min_m: Option<f64>,
-    /// Distance from the sensor, metres; farther points are skipped. None: no such limit.
+    /// Distance from the sensor, meters; farther points are skipped. None: no such limit.
     pub range_max_m: Option<f64>,
-    /// The robot's own body in the sensor frame, metres: smallest and largest corner; points within are skipped.
+    /// The robot's own body in the sensor frame, meters: smallest and largest corner; points within are skipped.
     pub body_m: Option<([f64; 3], [f64; 3])>,
 }
 

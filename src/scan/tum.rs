@@ -8,7 +8,7 @@ use std::path::Path;
 use super::reader::{Problem, ReadError, lines, number, read_file};
 use crate::geometry::{Pose, pose, rotation_xyzw, translation_m};
 
-/// Numbers of a line: id, tx ty tz in metres, qx qy qz qw.
+/// Numbers of a line: id, tx ty tz in meters, qx qy qz qw.
 const COLUMNS: usize = 8;
 
 /// The pose of one scan of a trajectory.

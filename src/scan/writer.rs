@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::geometry::Point;
 
-/// Writes `points` to `path` as binary little-endian `.ply`: x y z float, in metres.
+/// Writes `points` to `path` as binary little-endian `.ply`: x y z float, in meters.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -22,7 +22,7 @@ pub fn write_ply(path: &Path, points: &[Point]) -> io::Result<()> {
     file.write_all(bytemuck::cast_slice(points))
 }
 
-/// Writes `points` to `path` as raw little-endian f32 x y z, in metres.
+/// Writes `points` to `path` as raw little-endian f32 x y z, in meters.
 ///
 /// # Errors
 /// When the file cannot be written.

@@ -3,7 +3,7 @@
 //! ```text
 //! many threads                one thread a map
 //!
-//! align, quantise, encode --> take all that wait
+//! align, quantize, encode --> take all that wait
 //!                             append to the journal   they take their revisions here
 //!                             sync                    once for all of them
 //!                             apply                   in the order of revisions

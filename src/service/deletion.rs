@@ -107,10 +107,10 @@ impl HostedMap {
     }
 
     fn keys_of(&self, points: &[Point], level: u32) -> Result<Vec<VoxelKey>, ServiceError> {
-        let quantise = self.map.lattice().from_map();
+        let quantize = self.map.lattice().from_map();
         let keys: Option<Vec<_>> =
-            points.iter().map(|&point| Some(quantise.key(point)?.ancestor(level))).collect();
-        keys.ok_or_else(|| self.point_without_voxel(points, &quantise))
+            points.iter().map(|&point| Some(quantize.key(point)?.ancestor(level))).collect();
+        keys.ok_or_else(|| self.point_without_voxel(points, &quantize))
     }
 }
 

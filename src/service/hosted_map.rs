@@ -250,17 +250,17 @@ impl HostedMap {
     ) -> Result<PointAnswer, ServiceError> {
         let points = query.points.as_slice();
         let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
-        let quantise = self.map.lattice().from_points(&map_from_points);
+        let quantize = self.map.lattice().from_points(&map_from_points);
         let mut occupied = vec![0; points.len().div_ceil(64)];
         let mut all_have_a_voxel = true;
         for (points, words) in points.chunks(POINTS_PER_STEP).zip(occupied.chunks_mut(POINTS_PER_STEP / 64)) {
             check_not_stopped(stop)?;
-            all_have_a_voxel &= view.query(points, &quantise, query.level, query.lookup, words);
+            all_have_a_voxel &= view.query(points, &quantize, query.level, query.lookup, words);
         }
         let state = self.state(view.revision());
         drop(view);
         if !all_have_a_voxel {
-            return Err(self.point_without_voxel(points, &quantise));
+            return Err(self.point_without_voxel(points, &quantize));
         }
         Ok(PointAnswer {
             points: points.len(),
@@ -271,8 +271,8 @@ impl HostedMap {
     }
 
     /// Names the first point that falls in no voxel.
-    pub(super) fn point_without_voxel(&self, points: &[Point], quantise: &LatticeFromPoints) -> ServiceError {
-        let place = points.iter().position(|&point| quantise.index(point).is_none()).unwrap_or_default();
+    pub(super) fn point_without_voxel(&self, points: &[Point], quantize: &LatticeFromPoints) -> ServiceError {
+        let place = points.iter().position(|&point| quantize.index(point).is_none()).unwrap_or_default();
         let point = points[place];
         let (min_m, end_m) = self.map.lattice().range_m();
         let (reason, what) = match point.is_finite() {

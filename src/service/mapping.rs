@@ -1,4 +1,4 @@
-//! How a scan enters a map: align, quantise, propose (paper III).
+//! How a scan enters a map: align, quantize, propose (paper III).
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -86,9 +86,9 @@ impl HostedMap {
     fn foreground(&self, scan: &FilteredScan<'_>, map_from_sensor: &Pose, level: u32) -> Foreground {
         let all = scan.request.points.as_slice();
         let mut words = vec![0; all.len().div_ceil(64)];
-        let quantise = self.map.lattice().from_points(map_from_sensor);
+        let quantize = self.map.lattice().from_points(map_from_sensor);
         let long_read = self.map.long_read();
-        long_read.view().query(all, &quantise, level, Lookup::Exact, &mut words);
+        long_read.view().query(all, &quantize, level, Lookup::Exact, &mut words);
         drop(long_read);
         for (word, points) in words.iter_mut().zip(all.chunks(64)) {
             let counts = |(i, &point): (usize, &Point)| u64::from(scan.keeps(point)) << i;

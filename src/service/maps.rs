@@ -11,7 +11,7 @@ use crate::map::{MapName, MapSettings};
 use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
 
-/// Absent neighbours of occupied voxels on which a description measures each level's false positives.
+/// Absent neighbors of occupied voxels on which a description measures each level's false positives.
 const RATE_SAMPLES: usize = 4096;
 
 impl MapService {
@@ -26,7 +26,7 @@ impl MapService {
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
         let name = self.reach.check(&name)?;
-        let is_new = self.inner.catalogue.get(&name).is_err();
+        let is_new = self.inner.catalog.get(&name).is_err();
         let settings = settings.checked()?;
         if is_new {
             self.inner.room.check_to_grow()?;
@@ -34,7 +34,7 @@ impl MapService {
         let inner = Arc::clone(&self.inner);
         let create = async move {
             let _empty = is_new.then(|| inner.room.reserve(settings.empty_filter_bytes())).transpose()?;
-            inner.catalogue.create(name, settings, inner.settings.limits.maps_max).await
+            inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
         };
         let (map, created) = to_its_end(create).await?;
         Ok((self.describe(map).await?, created))
@@ -53,7 +53,7 @@ impl MapService {
     /// # Errors
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
-        let maps = self.inner.catalogue.within(&self.reach);
+        let maps = self.inner.catalog.within(&self.reach);
         let describe =
             move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
         self.inner.queries.run(describe).await?
@@ -61,18 +61,18 @@ impl MapService {
 
     /// The names of the maps that the caller may name.
     pub fn map_names(&self) -> Vec<MapName> {
-        self.inner.catalogue.within(&self.reach).iter().map(|map| map.name.clone()).collect()
+        self.inner.catalog.within(&self.reach).iter().map(|map| map.name.clone()).collect()
     }
 
     /// The maps that take no changes since their journal failed, by name, with the reason.
     pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
-        let maps = self.inner.catalogue.within(&self.reach);
+        let maps = self.inner.catalog.within(&self.reach);
         maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
     }
 
     /// The maps that could not be opened, by name, with the reason and what helps. Their names are taken.
     pub fn unavailable_maps(&self) -> Vec<UnavailableMap> {
-        self.inner.catalogue.unavailable_within(&self.reach)
+        self.inner.catalog.unavailable_within(&self.reach)
     }
 
     /// Takes a map out, in memory and on disk.
@@ -82,7 +82,7 @@ impl MapService {
     /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
         let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
-        to_its_end(async move { inner.catalogue.delete(&name).await }).await
+        to_its_end(async move { inner.catalog.delete(&name).await }).await
     }
 
     /// A map as a map file, at one revision.
@@ -116,13 +116,13 @@ impl MapService {
             return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));
         }
         self.inner.room.check_to_grow()?;
-        self.inner.catalogue.check_free(&name, self.limits().maps_max, replace)?;
+        self.inner.catalog.check_free(&name, self.limits().maps_max, replace)?;
         let inner = Arc::clone(&self.inner);
         let build = move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room, stop);
         let built = self.inner.map_files.run(build).await??;
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
-        let restore = async move { inner.catalogue.restore(name, built, maps_max, replace).await };
+        let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
         let map = to_its_end(restore).await?;
         self.describe(map).await
     }
@@ -142,8 +142,7 @@ impl MapService {
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        let made_room =
-            self.inner.catalogue.save(move |map| map.make_room(&inner.room).map(|()| false)).await;
+        let made_room = self.inner.catalog.save(move |map| map.make_room(&inner.room).map(|()| false)).await;
         // The others are saved all the same: their journals grow just where there is no room.
         let saved = self.save_maps(Saving::Due).await;
         made_room.and(saved)
@@ -151,7 +150,7 @@ impl MapService {
 
     async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        self.inner.catalogue.save(move |map| map.save(which, &inner.room)).await
+        self.inner.catalog.save(move |map| map.save(which, &inner.room)).await
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {

@@ -2,7 +2,7 @@
 //!
 //! Limits are checked here and before any work is done; every failure is a [`ServiceError`].
 
-mod catalogue;
+mod catalog;
 mod committing;
 mod deletion;
 mod digest;
@@ -19,7 +19,7 @@ mod map_file;
 mod mapping;
 mod maps;
 #[cfg(all(test, feature = "shuttle"))]
-mod modelled;
+mod modeled;
 mod pool;
 mod reach;
 mod request;
@@ -57,7 +57,7 @@ use std::sync::Arc;
 use crate::map::{CallerName, MapName, Region};
 use crate::store::OpeningProgress;
 use crate::util::StopSignal;
-use catalogue::Catalogue;
+use catalog::Catalog;
 use committing::{Refusal, Step};
 use hosted_map::HostedMap;
 use pool::{FreeThread, Pool};
@@ -84,7 +84,7 @@ const MAP_FILE_THREADS: usize = 1;
 #[derive(Debug)]
 struct Inner {
     settings: ServiceSettings,
-    catalogue: Catalogue,
+    catalog: Catalog,
     /// For queries, listings and descriptions, so that no alignment starves them.
     queries: Pool,
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
@@ -113,7 +113,7 @@ impl MapService {
         settings.filter.checked()?;
         let waiting = settings.limits.jobs_waiting_max;
         let inner = Inner {
-            catalogue: Catalogue::open(settings.data_dir.as_deref(), &settings.store, progress)?,
+            catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
             queries: Pool::new("query", settings.query_threads, waiting)?,
             mapping: Pool::new("mapping", settings.mapping_threads, waiting)?,
             alignment: Pool::new("alignment", settings.alignment_threads, waiting)?,
@@ -326,7 +326,7 @@ impl MapService {
     }
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
-        self.inner.catalogue.get(&self.reach.check(name)?)
+        self.inner.catalog.get(&self.reach.check(name)?)
     }
 }
 

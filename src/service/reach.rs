@@ -16,7 +16,7 @@ pub enum MapReach {
     Only(Arc<BTreeSet<MapName>>),
 }
 
-/// A name that its caller may name. The catalogue takes no other, so that no operation can leave the question out.
+/// A name that its caller may name. The catalog takes no other, so that no operation can leave the question out.
 #[derive(Debug, Clone)]
 pub(super) struct Reachable(MapName);
 

@@ -233,7 +233,7 @@ pub enum DeletionTarget {
     Points(PointCloud),
     /// By key, of the deletion's level.
     Keys(Vec<VoxelKey>),
-    /// Those whose centres lie inside.
+    /// Those whose centers lie inside.
     Region(Region),
 }
 
@@ -325,7 +325,7 @@ pub struct MapFile {
 /// The occupied voxels of a level.
 #[derive(Debug, Clone)]
 pub struct VoxelListing {
-    /// Their side, metres.
+    /// Their side, meters.
     pub resolution_m: f64,
     /// In no order.
     pub keys: Vec<VoxelKey>,

@@ -9,7 +9,7 @@
 //! DATA_DIR/maps/.unfinished-...   what a crash left: swept away
 //! ```
 //!
-//! The folder *is* the catalogue. A map's name and uuid are its folder's; its settings are in each of its snapshots. That
+//! The folder *is* the catalog. A map's name and uuid are its folder's; its settings are in each of its snapshots. That
 //! a map is made or deleted is one rename of its folder, which is atomic, so there is no second store that could
 //! disagree with the files, and nothing to repair between the two. Likewise requests: which scans and deletions were
 //! accepted is part of the changes themselves, durable in the same record.

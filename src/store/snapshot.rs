@@ -468,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_moments_is_restored_with_those_of_voxel_centres() {
+    fn a_file_without_moments_is_restored_with_those_of_voxel_centers() {
         let mut message = message(&snapshot());
         message.moments = None;
         let body = message.encode_to_vec();

@@ -4,7 +4,7 @@ use std::fmt::{self, Debug, Formatter};
 use std::ops::{Deref, DerefMut};
 
 #[cfg(feature = "shuttle")]
-use super::modelled as primitive;
+use super::modeled as primitive;
 #[cfg(not(feature = "shuttle"))]
 use parking_lot as primitive;
 

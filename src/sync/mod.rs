@@ -18,7 +18,7 @@
 mod checks;
 mod locks;
 #[cfg(feature = "shuttle")]
-mod modelled;
+mod modeled;
 
 #[cfg(feature = "client")]
 pub(crate) use checks::before_file_operation;

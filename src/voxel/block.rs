@@ -188,7 +188,7 @@ impl BlockMask {
     }
 
     /// The moments of the voxels of `block` two levels up that had other descendants `before`: which of their points
-    /// lay in what is gone is not known, and so the centres of what remains stand for them.
+    /// lay in what is gone is not known, and so the centers of what remains stand for them.
     pub(crate) fn rebuilt_moments(
         &self,
         before: &Self,
@@ -201,7 +201,7 @@ impl BlockMask {
         })
     }
 
-    /// The moments of the centres of `block`'s voxels, voxel by voxel two levels up.
+    /// The moments of the centers of `block`'s voxels, voxel by voxel two levels up.
     pub(crate) fn moments(&self, block: VoxelKey) -> impl Iterator<Item = (VoxelKey, Moments)> + use<> {
         self.rebuilt_moments(&Self::EMPTY, block)
     }

@@ -1,4 +1,4 @@
-//! Voxels: packed keys (paper II-B), the lattice that quantises points (II, III) and volumetric sampling
+//! Voxels: packed keys (paper II-B), the lattice that quantizes points (II, III) and volumetric sampling
 //! (III-A).
 
 mod block;

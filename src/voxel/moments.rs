@@ -15,7 +15,7 @@ pub const MOMENT_LEVEL: u32 = 2;
 /// Steps of an offset along a voxel's side.
 const STEPS: i64 = Moments::UNITS / Moments::STEP;
 
-/// How far points lie from the centre of their voxel, summed: count, sum d and sum d d^T.
+/// How far points lie from the center of their voxel, summed: count, sum d and sum d d^T.
 ///
 /// Offsets d are whole numbers of 1 / [`Moments::UNITS`] of the voxel's side, of points multiples of [`Moments::STEP`], so
 /// that sums neither round nor depend on their order: every thread count gives the same map, and a map without a scan is
@@ -32,15 +32,15 @@ impl Moments {
     /// Count, the three of sum d, the six of sum d d^T (xx xy xz yy yz zz).
     pub const NUMBERS: usize = 10;
     /// Points of one voxel, at most. More of them say nothing new, and no sum comes near the end of its numbers, about
-    /// whatever centre it is taken.
+    /// whatever center it is taken.
     pub const COUNT_MAX: i64 = 1 << 32;
 
-    /// Of one point at an offset from the centre.
+    /// Of one point at an offset from the center.
     pub fn of_offset([x, y, z]: [i64; 3]) -> Self {
         Self([1, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z])
     }
 
-    /// Of the centres of a voxel's descendants two levels down, which `word` holds in Morton order: what stays known
+    /// Of the centers of a voxel's descendants two levels down, which `word` holds in Morton order: what stays known
     /// when points were deleted.
     pub(crate) fn of_descendants(word: u64) -> Self {
         let axis = |bit: u32, axis: u32| i64::from(bit >> axis & 1 | bit >> (axis + 2) & 2);
@@ -78,7 +78,7 @@ impl Moments {
         self.count() == 0
     }
 
-    /// The same points about a centre that lies `by` units away: each offset grows by that.
+    /// The same points about a center that lies `by` units away: each offset grows by that.
     pub fn about(&self, [x, y, z]: [i64; 3]) -> Self {
         let [n, sx, sy, sz, xx, xy, xz, yy, yz, zz] = self.0;
         Self([
@@ -128,7 +128,7 @@ impl MomentSet {
     /// Of `points`; those without a voxel (not finite, out of range) are left out.
     pub fn of_points(points: &[Point], lattice_from_points: &LatticeFromPoints) -> Self {
         let mut moments = HashMap::<VoxelKey, Moments>::with_capacity(points.len() / 16);
-        // Neighbours in a scan share voxels: one probe serves a run of points.
+        // Neighbors in a scan share voxels: one probe serves a run of points.
         let mut run: Option<(VoxelKey, Moments)> = None;
         for &point in points {
             let Some((voxel, steps)) = lattice_from_points.offset(point, MOMENT_LEVEL, STEPS) else {
@@ -150,7 +150,7 @@ impl MomentSet {
         moments.into_iter().collect()
     }
 
-    /// Of the centres of `voxels`, where points are not known.
+    /// Of the centers of `voxels`, where points are not known.
     pub fn of_centers(voxels: &VoxelSet) -> Self {
         Self::of_centers_until(voxels, StopSignal::NEVER)
     }
@@ -214,7 +214,7 @@ mod tests {
         }
 
         #[test]
-        fn moments_about_another_centre_are_those_of_shifted_points(
+        fn moments_about_another_center_are_those_of_shifted_points(
             offsets in proptest::collection::vec(offset(), 1..50), by in offset(),
         ) {
             let shifted: Vec<_> = offsets.iter().map(|d| [0, 1, 2].map(|i| d[i] + by[i])).collect();
@@ -248,7 +248,7 @@ mod tests {
         let mut sum = full;
         sum += Moments::of_offset([0; 3]);
         assert_eq!(sum, full);
-        // About the farthest centre that coarser levels need.
+        // About the farthest center that coarser levels need.
         let farther = Moments::of_offset([4 * half; 3]).to_numbers();
         assert_eq!(full.about([3 * half; 3]).to_numbers(), farther.map(|number| number * most));
         let beyond = Moments::of_offset([half + 1, 0, 0]).to_numbers();
@@ -275,11 +275,11 @@ mod tests {
     }
 
     #[test]
-    fn descendants_count_at_their_centres() {
+    fn descendants_count_at_their_centers() {
         let lattice = Lattice::new(1.0, 1).unwrap().from_map();
         for cell in [[0, 0, 0], [3, 0, 1], [2, 3, 3], [1, 2, 0]] {
-            let centre = Point::from(cell.map(|c| c as f32 + 0.5));
-            let expected = MomentSet::of_points(&[centre], &lattice);
+            let center = Point::from(cell.map(|c| c as f32 + 0.5));
+            let expected = MomentSet::of_points(&[center], &lattice);
             let (_, bit) = Cell::of(cell);
             assert_eq!(Moments::of_descendants(1 << bit.bit()), expected.as_slice()[0].1, "{cell:?}");
         }

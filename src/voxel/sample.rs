@@ -11,7 +11,7 @@ use crate::util::StopSignal;
 pub struct VolumetricSample {
     /// The sampled points, in the order of the scan.
     pub points: Vec<Point>,
-    /// The resolution of the sample lattice that gave them, metres.
+    /// The resolution of the sample lattice that gave them, meters.
     pub resolution_m: f64,
 }
 
@@ -19,7 +19,7 @@ pub struct VolumetricSample {
 const TOLERANCE: f64 = 0.05;
 /// Trials of the sample resolution, at most.
 const TRIALS: usize = 16;
-/// The first of them, metres.
+/// The first of them, meters.
 const FIRST_M: f64 = 0.25;
 /// Points that are looked at between two looks at the stop signal: a millisecond or less.
 const POINTS_PER_LOOK: usize = 16 << 10;

@@ -176,8 +176,8 @@ mod tests {
             let rotation = nalgebra::UnitQuaternion::from_scaled_axis(axis.into());
             let pose = Pose::from_parts(nalgebra::Translation3::from(nalgebra::Vector3::from(t)), rotation);
             let back = Pose::try_from(pb::Pose::from(&pose)).unwrap();
-            let (metres, degrees) = geometry::pose_difference(&pose, &back);
-            prop_assert!(metres < 1e-9 && degrees < 1e-5);
+            let (meters, degrees) = geometry::pose_difference(&pose, &back);
+            prop_assert!(meters < 1e-9 && degrees < 1e-5);
         }
 
         #[test]

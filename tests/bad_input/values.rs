@@ -182,7 +182,7 @@ async fn settings_and_levels_out_of_range_are_named_with_the_range() {
         (json!({"resolution_m": 0.1, "filter": {"hashes": 0}}), ["hashes", "1"]),
         (json!({"resolution_m": 0.1, "filter": {"bits_per_voxel": 0}}), ["bits_per", "0"]),
         (json!({"levels": 4}), ["missing field", "resolution_m"]),
-        (json!({"resolution_m": 0.1, "colour": 1}), ["unknown field", "colour"]),
+        (json!({"resolution_m": 0.1, "color": 1}), ["unknown field", "color"]),
     ] {
         assert_refused(refused(daemon.put("/v1/maps/b", settings).await).await, &words);
     }
@@ -240,7 +240,7 @@ async fn json_that_is_not_what_a_route_takes_is_refused_with_its_place() {
         (r#"{"points": [[1, 2, "x"]]}"#, ["line 1", "number"]),
         ("{\n\"points\": [], \"level\": -1}", ["line 2", "whole number"]),
         (r#"{"points": [], "lookup": "maybe"}"#, ["maybe", "exact"]),
-        (r#"{"points": [], "colour": 1}"#, ["colour", "points"]),
+        (r#"{"points": [], "color": 1}"#, ["color", "points"]),
         (r#"{"level": 0}"#, ["missing field", "points"]),
         ("", ["line 1", "EOF"]),
     ] {
@@ -250,7 +250,7 @@ async fn json_that_is_not_what_a_route_takes_is_refused_with_its_place() {
     }
     for (parameters, words) in [
         ("level=x", ["level", "whole number"]),
-        ("colour=1", ["colour", "unknown"]),
+        ("color=1", ["color", "unknown"]),
         ("lookup=maybe", ["lookup", "maybe"]),
         ("min_revision=-1", ["min_revision", "whole number"]),
         ("map_uuid=1", ["map_uuid", "\"1\""]),

@@ -58,7 +58,7 @@ fn convergence_counts_every_trial_of_every_method() {
     for name in ["error_m", "error_deg", "ms"] {
         assert_eq!(column(&trials, name).len(), 12);
     }
-    assert!(column(&out.join("guesses.csv"), "offset_m").iter().all(|&metres| metres < 2.0));
+    assert!(column(&out.join("guesses.csv"), "offset_m").iter().all(|&meters| meters < 2.0));
     // A head and its rule, a row for each of 4 x 4 bins, and one for all.
     let table = std::fs::read_to_string(out.join("convergence.md")).unwrap();
     assert_eq!(table.lines().count(), 2 + 16 + 1);

@@ -46,8 +46,8 @@ fn a_sequence_becomes_lines_a_trajectory_and_a_map() {
     let poses = read_trajectory(trajectory.as_ref()).unwrap();
     assert_eq!(poses.iter().map(|pose| pose.id).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 3.0]);
     for (found, truth) in poses.iter().zip(&sequence.poses) {
-        let (metres, degrees) = pose_difference(&found.map_from_sensor, truth);
-        assert!(metres < 0.02 && degrees < 0.3, "{metres} m {degrees} degrees");
+        let (meters, degrees) = pose_difference(&found.map_from_sensor, truth);
+        assert!(meters < 0.02 && degrees < 0.3, "{meters} m {degrees} degrees");
     }
     let snapshot = Snapshot::read(&Disk::default(), map.as_ref()).unwrap().contents;
     assert_eq!((snapshot.voxels.len() as u64, snapshot.trajectory.len()), (added, SCANS));

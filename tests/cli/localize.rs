@@ -20,8 +20,8 @@ fn a_scan_of_a_map_file_is_found_where_it_was_taken() {
     let numbers: [f64; 7] =
         serde_json::from_value(found[0]["candidates"][0]["map_from_sensor"].clone()).unwrap();
     let [x, y, z, qx, qy, qz, qw] = numbers;
-    let (metres, degrees) = pose_difference(&pose([x, y, z], [qx, qy, qz, qw]).unwrap(), &sequence.poses[1]);
-    assert!(metres < 0.05 && degrees < 1.0, "{metres} m, {degrees} degrees: {}", found[0]["reason"]);
+    let (meters, degrees) = pose_difference(&pose([x, y, z], [qx, qy, qz, qw]).unwrap(), &sequence.poses[1]);
+    assert!(meters < 0.05 && degrees < 1.0, "{meters} m, {degrees} degrees: {}", found[0]["reason"]);
 
     let output = mrol(&arguments).assert().success();
     let table = String::from_utf8(output.get_output().stdout.clone()).unwrap();

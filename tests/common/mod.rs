@@ -251,7 +251,7 @@ pub fn query_pb(map: &str, points: &[[f32; 3]]) -> pb::QueryPointsRequest {
     pb::QueryPointsRequest { map: map.into(), points: points_pb(points), ..Default::default() }
 }
 
-/// Centres of `count` voxels of 0.1 m in a row along x.
+/// Centers of `count` voxels of 0.1 m in a row along x.
 pub fn row(count: usize) -> Vec<[f32; 3]> {
     (0..count).map(|i| [i as f32 * 0.1 + 0.05, 0.05, 0.05]).collect()
 }

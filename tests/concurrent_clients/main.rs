@@ -216,8 +216,8 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
             let view = map.view();
             let keys: Vec<VoxelKey> = match &deletion.target {
                 DeletionTarget::Points(points) => {
-                    let quantise = map.lattice().from_map();
-                    let key = |&point: &Point| quantise.key(point).unwrap().ancestor(deletion.level);
+                    let quantize = map.lattice().from_map();
+                    let key = |&point: &Point| quantize.key(point).unwrap().ancestor(deletion.level);
                     points.as_slice().iter().map(key).collect()
                 }
                 DeletionTarget::Keys(keys) => keys.clone(),
@@ -234,9 +234,9 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
 fn assert_answered(map: &MultiResolutionMap, revision: u64, event: &Event) {
     match event {
         Event::Queried { points, level, occupied } => {
-            let (view, quantise) = (map.view(), map.lattice().from_map());
+            let (view, quantize) = (map.view(), map.lattice().from_map());
             for (i, (&point, &occupied)) in points.iter().zip(occupied).enumerate() {
-                let voxel = quantise.key(point).unwrap().ancestor(*level);
+                let voxel = quantize.key(point).unwrap().ancestor(*level);
                 assert_eq!(view.contains(voxel, *level), occupied, "point {i} at revision {revision}");
             }
         }

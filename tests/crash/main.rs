@@ -174,7 +174,7 @@ struct Model {
 impl Model {
     /// Does what was acknowledged, in the order of revisions, of which none may be missing.
     fn follow(&mut self, done: BTreeMap<u64, Done>) {
-        let quantise = Lattice::new(RESOLUTION_M, LEVELS).unwrap().from_map();
+        let quantize = Lattice::new(RESOLUTION_M, LEVELS).unwrap().from_map();
         for (revision, Done { writer, wish, voxels }) in done {
             assert_eq!(revision, self.revision + 1, "a revision that nobody was told of");
             self.revision = revision;
@@ -182,7 +182,7 @@ impl Model {
             match wish {
                 Wish::Insert { scan_id, points } => {
                     for &point in &points {
-                        self.holders.entry(quantise.key(point).unwrap()).or_default().insert(revision);
+                        self.holders.entry(quantize.key(point).unwrap()).or_default().insert(revision);
                     }
                     self.trajectory.push((revision, format!("robot-{writer}"), Some(scan_id)));
                 }

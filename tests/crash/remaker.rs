@@ -159,9 +159,9 @@ impl Remaker {
         let there = self.there.as_mut().expect("a map");
         assert_eq!(answer.state.map_uuid, there.uuid, "another incarnation answered");
         assert_eq!(answer.state.revision, there.revision + 1, "{scan_id}");
-        let quantise = Lattice::new(RESOLUTION_M, LEVELS).unwrap().from_map();
+        let quantize = Lattice::new(RESOLUTION_M, LEVELS).unwrap().from_map();
         let before = there.voxels.len();
-        there.voxels.extend(points.iter().map(|&point| quantise.key(point).unwrap()));
+        there.voxels.extend(points.iter().map(|&point| quantize.key(point).unwrap()));
         assert_eq!(answer.new_voxels, there.voxels.len() - before, "{scan_id}");
         there.revision += 1;
         there.scan_ids.push(scan_id);

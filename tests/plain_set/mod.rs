@@ -36,8 +36,8 @@ pub fn assert_equal(map: &MultiResolutionMap, model: &PlainSet) {
             );
         }
         for &i in model.iter().take(20) {
-            let neighbour = VoxelKey::new(up(i, level).map(|c| c + 1)).expect("in range");
-            assert_eq!(view.contains(neighbour, level), expected.contains(&neighbour.index()));
+            let neighbor = VoxelKey::new(up(i, level).map(|c| c + 1)).expect("in range");
+            assert_eq!(view.contains(neighbor, level), expected.contains(&neighbor.index()));
         }
     }
 }

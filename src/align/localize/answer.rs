@@ -65,11 +65,11 @@ pub enum LocalizationError {
     /// Every point is too far away to be on any map.
     #[error("no point of the scan is within {reach_m} m, farther than two places of the map can lie apart")]
     NothingInReach {
-        /// How far that is, metres.
+        /// How far that is, meters.
         reach_m: f64,
     },
     /// There is no map yet.
-    #[error("the map is empty: nothing to localise in")]
+    #[error("the map is empty: nothing to localize in")]
     EmptyMap,
     /// No voxel near the box.
     #[error("search_box is nowhere near the map: no voxel is within {range_m:.1} m of it, the scan's range")]

@@ -29,7 +29,7 @@ pub(super) struct PoseCell {
 /// The upper bounds of a search.
 ///
 /// From a cell of half side h and turn delta a point at range rho lands within h + 2 rho sin(delta / 2) of where the
-/// cell's centre puts it, an axis. It can fall on the map only if an occupied voxel is within so many voxels, rounded
+/// cell's center puts it, an axis. It can fall on the map only if an occupied voxel is within so many voxels, rounded
 /// up. Counting the points for which that is so bounds the overlap of every pose in the cell from above.
 #[derive(Debug)]
 pub(super) struct Bounds<'a> {
@@ -37,7 +37,7 @@ pub(super) struct Bounds<'a> {
     sample: &'a SearchSample,
     orientations: &'a [Orientation],
     pub(super) rotations: RotationLattice,
-    /// Side of the cubes at depth 0, metres.
+    /// Side of the cubes at depth 0, meters.
     side_m: f64,
     /// The sample for each depth, with how far, in voxels of its field, a voxel may be for each point.
     points: Vec<Vec<ReachingPoint>>,
@@ -80,7 +80,7 @@ impl<'a> Bounds<'a> {
         self.orientations.len()
     }
 
-    /// Side of a depth's cubes, metres.
+    /// Side of a depth's cubes, meters.
     pub(super) fn side_m_at(&self, depth: u32) -> f64 {
         self.side_m * f64::from(1u32 << depth)
     }
@@ -92,7 +92,7 @@ impl<'a> Bounds<'a> {
         std::array::from_fn(|axis| 2 * pairs(axis) as i32)
     }
 
-    /// The pose at the centre of a cell.
+    /// The pose at the center of a cell.
     pub(super) fn center(&self, cell: &PoseCell) -> Pose {
         let side_m = self.side_m_at(cell.depth);
         let min_m = self.levels.domain.min_m();
@@ -102,7 +102,7 @@ impl<'a> Bounds<'a> {
         Pose::from_parts(center_m.into(), rotation)
     }
 
-    /// True when a part of the cube lies in the search's box; of a finest one, when its centre does.
+    /// True when a part of the cube lies in the search's box; of a finest one, when its center does.
     pub(super) fn is_in_domain(&self, cell: &PoseCell) -> bool {
         let (min_m, max_m) = (self.levels.domain.min_m(), self.levels.domain.max_m());
         let side_m = self.side_m_at(cell.depth);
@@ -134,7 +134,7 @@ pub(super) struct Turned<'a> {
     field: &'a DistanceField,
     points: &'a [ReachingPoint],
     rotation: [[f32; 3]; 3],
-    /// The centre of the first cube, in voxels from the grid's corner.
+    /// The center of the first cube, in voxels from the grid's corner.
     corner: [f32; 3],
     side: f32,
 }

@@ -85,9 +85,9 @@ impl Refinement<'_> {
         let mut distinct: Vec<Candidate> = Vec::with_capacity(ranked.len());
         for candidate in ranked {
             let same = distinct.iter_mut().find(|better| {
-                let (metres, degrees) =
+                let (meters, degrees) =
                     pose_difference(&better.map_from_sensor(), &candidate.map_from_sensor());
-                metres < radius_m && degrees < self.settings.basin_deg
+                meters < radius_m && degrees < self.settings.basin_deg
             });
             match same {
                 Some(better) => better.search_overlap = better.search_overlap.max(candidate.search_overlap),

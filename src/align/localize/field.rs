@@ -49,7 +49,7 @@ impl DistanceField {
 
     /// Finds the distances to the voxels that are occupied.
     ///
-    /// One voxel further each round: the smallest of 3 x 3 x 3 neighbours, axis by axis, and one.
+    /// One voxel further each round: the smallest of 3 x 3 x 3 neighbors, axis by axis, and one.
     pub(super) fn spread(&mut self, stop: StopSignal<'_>) -> Result<(), Unbuilt> {
         let strides = [1, self.size[0], self.size[0] * self.size[1]];
         let (mut from, mut to) =
@@ -169,7 +169,7 @@ impl DistanceField {
     /// How many points are within reach of an occupied voxel, for the eight translations `grid_from_sensor` + {0,
     /// `side`} an axis (x fastest). Zeros when none of them can exceed `floor`.
     ///
-    /// This is where a search spends its time: rotate, translate, quantise, look up, as everywhere in this map, eight
+    /// This is where a search spends its time: rotate, translate, quantize, look up, as everywhere in this map, eight
     /// look-ups a point.
     pub(super) fn count_of_eight(
         &self,
@@ -183,7 +183,7 @@ impl DistanceField {
         let mut counts = [0u16; 8];
         let mut left = points.len();
         for points in points.chunks(CHUNK) {
-            // Rows of the grid, low and high translation, axis by axis: two loops, so that the first is vectorised.
+            // Rows of the grid, low and high translation, axis by axis: two loops, so that the first is vectorized.
             let mut rows = [[[0u32; CHUNK]; 2]; 3];
             for axis in 0..3 {
                 let [r0, r1, r2] = grid_from_sensor.rotation[axis];
@@ -212,14 +212,14 @@ impl DistanceField {
     }
 }
 
-/// A point in the sensor frame, metres, and how far from it an occupied voxel may be, in voxels.
+/// A point in the sensor frame, meters, and how far from it an occupied voxel may be, in voxels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ReachingPoint {
     pub(super) xyz: [f32; 3],
     pub(super) reach: u8,
 }
 
-/// From metres in the sensor frame to voxels from the corner of a grid.
+/// From meters in the sensor frame to voxels from the corner of a grid.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GridFromSensor {
     /// Rows of the rotation matrix, over the resolution.
@@ -232,7 +232,7 @@ const CHUNK: usize = 32;
 
 /// The whole part of `place`, clamped to 0..=`last`.
 ///
-/// Adding 2^23 leaves no bit for fractions: a conversion that vectorises without any unsafe code. It rounds to
+/// Adding 2^23 leaves no bit for fractions: a conversion that vectorizes without any unsafe code. It rounds to
 /// nearest, so half is taken off; a tie may go either way, which the slack of a bound allows for.
 #[inline(always)]
 fn whole(place: f32, last: f32) -> u32 {
@@ -253,15 +253,14 @@ fn far_everywhere(cells: usize, stop: StopSignal<'_>) -> Result<Vec<u8>, Unbuilt
     Ok(distances)
 }
 
-/// The smallest of each value and its neighbours a `stride` away; the ends of the grid are border.
+/// The smallest of each value and its neighbors a `stride` away; the ends of the grid are border.
 fn smallest_of_three(from: &[u8], stride: usize, to: &mut [u8], stop: StopSignal<'_>) -> Result<(), Unbuilt> {
     let inner = from.len() - 2 * stride;
     for start in (0..inner).step_by(CELLS_PER_LOOK) {
         check(stop)?;
         let end = inner.min(start + CELLS_PER_LOOK);
-        let neighbours =
-            from[start..end].iter().zip(&from[start + stride..]).zip(&from[start + 2 * stride..]);
-        for (smallest, ((a, b), c)) in to[start + stride..].iter_mut().zip(neighbours) {
+        let neighbors = from[start..end].iter().zip(&from[start + stride..]).zip(&from[start + 2 * stride..]);
+        for (smallest, ((a, b), c)) in to[start + stride..].iter_mut().zip(neighbors) {
             *smallest = *a.min(b).min(c);
         }
     }

@@ -1,7 +1,7 @@
-//! Global localisation: where in a map a scan was taken, with no guess (the paper's \[8\]).
+//! Global localization: where in a map a scan was taken, with no guess (the paper's \[8\]).
 //!
 //! [`localize`] is branch and bound over all poses. The overlap of every pose in a cell of poses is bounded from above
-//! by the overlap of the cell's centre with a map that is dilated by as much as points move within the cell
+//! by the overlap of the cell's center with a map that is dilated by as much as points move within the cell
 //! (`bound`); cells that cannot hold a place worth knowing are left out, the others divided, down to cells from which
 //! an alignment finds its way. That is the modern form of what \[8\] does on the levels of this map: a coarse level is
 //! such a bound only after dilation, since a point's cube of translations spans up to 2 x 2 x 2 of its voxels and

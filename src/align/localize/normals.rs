@@ -64,7 +64,7 @@ fn are_near(a: &Vector3<f64>, b: &Vector3<f64>, degrees: f64) -> bool {
     a.dot(b).abs() >= degrees.to_radians().cos()
 }
 
-/// The normal of the plane through a voxel's neighbourhood, where that is flat.
+/// The normal of the plane through a voxel's neighborhood, where that is flat.
 fn normal_at(voxel: VoxelKey, is_occupied: &dyn Fn(VoxelKey) -> bool) -> Option<Vector3<f64>> {
     let [x, y, z] = voxel.index();
     let span = |center: i32| center - WINDOW..=center + WINDOW;

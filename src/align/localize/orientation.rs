@@ -57,7 +57,7 @@ pub(super) struct Orientations {
 const MAP_DIRECTIONS: usize = 2;
 /// Directions of the scan's surfaces; most scans show no more.
 const SCAN_DIRECTIONS: usize = 4;
-/// Points of a scan that are quantised between two looks at the stop signal.
+/// Points of a scan that are quantized between two looks at the stop signal.
 const POINTS_PER_LOOK: usize = 16 << 10;
 
 impl Orientations {

@@ -25,7 +25,7 @@ pub struct Gravity {
 /// Down in the frame of a map whose z axis points up.
 pub const MAP_DOWN: [f64; 3] = [0.0, 0.0, -1.0];
 
-/// A box in the map frame, metres; its sides may be infinite.
+/// A box in the map frame, meters; its sides may be infinite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
     pub(super) min_m: [f64; 3],
@@ -83,12 +83,12 @@ impl SearchBox {
         if ordered { Ok(Self { min_m, max_m }) } else { Err(LocalizationQueryError::Box(min_m, max_m)) }
     }
 
-    /// Smallest coordinates, metres.
+    /// Smallest coordinates, meters.
     pub fn min_m(&self) -> [f64; 3] {
         self.min_m
     }
 
-    /// Largest coordinates, metres.
+    /// Largest coordinates, meters.
     pub fn max_m(&self) -> [f64; 3] {
         self.max_m
     }

@@ -25,7 +25,7 @@ pub(super) struct RotationCell {
 }
 
 impl RotationLattice {
-    /// Cells of at most `turn_rad` from their centre at depth 0 and about twice as much a depth, half of it for
+    /// Cells of at most `turn_rad` from their center at depth 0 and about twice as much a depth, half of it for
     /// the yaw and half for the tilt.
     pub(super) fn new(turn_rad: f64, tilt_max_rad: f64, depths: u32) -> Self {
         let turn_at = |depth: u32| turn_rad * f64::from(1u32 << depth);
@@ -48,7 +48,7 @@ impl RotationLattice {
         self.yaws.len() as u32
     }
 
-    /// The largest angle between a cell's centre and a rotation in it.
+    /// The largest angle between a cell's center and a rotation in it.
     ///
     /// The angle between exp(a) and exp(b) is at most |a - b| (Hartley and Kahl, *Global Optimization through
     /// Rotation Space Search*, IJCV 2009), and angles add up at most.
@@ -57,7 +57,7 @@ impl RotationLattice {
         TAU / f64::from(self.yaws[depth]) / 2.0 + self.tilt_max_rad * SQRT_2 / f64::from(self.tilts[depth])
     }
 
-    /// The rotation at the centre of a cell, map_from_sensor.
+    /// The rotation at the center of a cell, map_from_sensor.
     pub(super) fn center(
         &self,
         orientation: &Orientation,
@@ -122,7 +122,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_rotation_of_a_cell_is_further_from_its_centre_than_the_turn(
+        fn no_rotation_of_a_cell_is_further_from_its_center_than_the_turn(
             lattice in lattice(),
             axes: [[i8; 3]; 2],
             depth in 0u32..4,
@@ -134,8 +134,8 @@ mod tests {
             let (yaws, tilts) = (lattice.yaws[depth as usize], lattice.tilts[depth as usize]);
             let [yaw, x, y] = cell.map(i32::from);
             let cell = RotationCell { yaw: yaw % yaws, tilt: [x % tilts, y % tilts] };
-            let centre = lattice.center(&orientation, depth, cell);
-            let angle = centre.angle_to(&lattice.at(&orientation, depth, cell, part));
+            let center = lattice.center(&orientation, depth, cell);
+            let angle = center.angle_to(&lattice.at(&orientation, depth, cell, part));
             prop_assert!(angle <= lattice.turn_rad(depth) + 1e-9, "{angle} of {}", lattice.turn_rad(depth));
         }
 

@@ -14,12 +14,12 @@ use crate::voxel::volumetric_sample_until;
 pub(super) struct SearchSample {
     /// Sensor frame.
     pub(super) points: Vec<Point3<f64>>,
-    /// Distance from the sensor within which three quarters of them lie, metres: what a rotation is measured by.
+    /// Distance from the sensor within which three quarters of them lie, meters: what a rotation is measured by.
     pub(super) range_m: f64,
 }
 
 /// Points of the volumetric sample that one search point stands for. Thinned straight to a few hundred, a scan
-/// would be mostly its stray far points, each alone in a voxel of metres.
+/// would be mostly its stray far points, each alone in a voxel of meters.
 const THINNING: usize = 20;
 /// Share of the points within [`SearchSample::range_m`].
 const RANGE_QUANTILE: f64 = 0.75;
@@ -41,7 +41,7 @@ impl SearchSample {
         Self { points, range_m }
     }
 
-    /// Within which a voxel lies of every place where at least `share` of the points fall on the map, metres, from that
+    /// Within which a voxel lies of every place where at least `share` of the points fall on the map, meters, from that
     /// place: where so many do, one of the nearest does. A stray far return has no say, unless `share` is so small that
     /// strays alone could make it.
     pub(super) fn sight_m(&self, share: f64) -> f64 {
@@ -51,7 +51,7 @@ impl SearchSample {
         }
     }
 
-    /// The largest distance of a point from the sensor, metres.
+    /// The largest distance of a point from the sensor, meters.
     pub(super) fn range_max_m(&self) -> f64 {
         self.points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max)
     }

@@ -144,7 +144,7 @@ impl<'a, 's> Search<'a, 's> {
         ControlFlow::Continue(())
     }
 
-    /// Bounds `first` and its seven neighbours of the same parent, and lets those wait that are worth it.
+    /// Bounds `first` and its seven neighbors of the same parent, and lets those wait that are worth it.
     fn enter_eight(&mut self, first: PoseCell, turned: &Turned<'_>, parent: u16) -> ControlFlow<()> {
         self.since_look += 1;
         if self.since_look >= EIGHTS_PER_LOOK {

@@ -22,7 +22,7 @@ const RAYS_PER_LOOK: usize = 16;
 /// The share of the sample's rays that pass through what the map holds and come out behind it, before they reach
 /// their points. 0 without points.
 ///
-/// Coming out is what counts: a ray along a floor is within its voxels for metres before it ends there. The paper
+/// Coming out is what counts: a ray along a floor is within its voxels for meters before it ends there. The paper
 /// stores no free space (III-B); this is its converse, the rays of one scan against the occupied voxels. It means nothing
 /// once stopped.
 pub(super) fn blocked_share(

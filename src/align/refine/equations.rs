@@ -14,7 +14,7 @@ pub(super) const POINTS_PER_LOOK: usize = 256;
 
 /// What all points say together of how the pose should change.
 ///
-/// A change is (translation, rotation): metres along the map's axes, radians about them through the sensor.
+/// A change is (translation, rotation): meters along the map's axes, radians about them through the sensor.
 #[derive(Debug, Clone)]
 pub(super) struct NormalEquations {
     /// Sum of J^T W J.
@@ -108,9 +108,9 @@ pub(super) fn information(
 
 /// A point and the Gaussian that it belongs to.
 struct Match {
-    /// From the sensor to the point, along the map's axes, metres.
+    /// From the sensor to the point, along the map's axes, meters.
     from_sensor: Vector3<f64>,
-    /// From the Gaussian's mean to the point, metres.
+    /// From the Gaussian's mean to the point, meters.
     error: Vector3<f64>,
     /// 1 on the surface, a half at the robust scale.
     fit: f64,
@@ -155,7 +155,7 @@ fn hessian(from_sensor: &Vector3<f64>, weight: &Matrix3<f64>) -> Matrix6<f64> {
     hessian
 }
 
-/// A change of pose: metres along the map's axes, radians about them through the sensor.
+/// A change of pose: meters along the map's axes, radians about them through the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step(Vector6<f64>);
 
@@ -169,7 +169,7 @@ impl Step {
         )
     }
 
-    /// True when it moves by less than this, metres and radians.
+    /// True when it moves by less than this, meters and radians.
     pub(super) fn is_below(&self, translation_m: f64, rotation_rad: f64) -> bool {
         self.0.fixed_rows::<3>(0).norm() < translation_m && self.0.fixed_rows::<3>(3).norm() < rotation_rad
     }

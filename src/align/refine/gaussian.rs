@@ -14,7 +14,7 @@ const SPREAD_MIN: f64 = 0.005;
 /// How much a Gaussian holds its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Softness {
-    /// By how much points are uncertain beyond the spread of the surface, metres.
+    /// By how much points are uncertain beyond the spread of the surface, meters.
     pub(super) std_m: f64,
     /// Directions in which the points spread by this fraction of the voxel's side squared hold nothing: there the
     /// surface goes on, and only what was seen of it ends. A surface that fills its voxel spreads by 1/12.
@@ -25,7 +25,7 @@ pub(super) struct Softness {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Gaussian {
     mean_m: Vector3<f64>,
-    /// Along `axes`, square metres.
+    /// Along `axes`, square meters.
     variances: Vector3<f64>,
     axes: Matrix3<f64>,
     side_m: f64,
@@ -78,7 +78,7 @@ impl Gaussian {
         (thickness + noise) / (thickness / count + noise)
     }
 
-    /// From the mean to a point of the map frame, metres.
+    /// From the mean to a point of the map frame, meters.
     pub(super) fn to(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         point_m - self.mean_m
     }

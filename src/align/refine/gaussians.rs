@@ -39,7 +39,7 @@ impl VoxelGaussians {
     }
 
     /// The number of the Gaussian that a point of the map frame belongs to: that of its finest voxel that has one, or
-    /// of the neighbours across the nearest faces, or the same of larger voxels. (A surface on the border of two voxels
+    /// of the neighbors across the nearest faces, or the same of larger voxels. (A surface on the border of two voxels
     /// would otherwise hold on to the points on its own side alone.)
     pub(super) fn nearest(&mut self, moments: &MomentsView<'_>, point_m: &Vector3<f64>) -> Option<u32> {
         (0..SIZES).find_map(|size| self.nearest_of(moments, point_m, size))
@@ -53,10 +53,10 @@ impl VoxelGaussians {
         }
         let mut nearest = None;
         for axis in 0..3 {
-            let mut neighbour = index;
+            let mut neighbor = index;
             let side = if scaled[axis] - f64::from(index[axis]) < 0.5 { -1 } else { 1 };
-            neighbour[axis] = index[axis].saturating_add(side);
-            if let Some(i) = self.of_voxel(moments, neighbour.into(), size) {
+            neighbor[axis] = index[axis].saturating_add(side);
+            if let Some(i) = self.of_voxel(moments, neighbor.into(), size) {
                 let distance = self.get(i).distance_squared(point_m);
                 if nearest.is_none_or(|(_, least)| distance < least) {
                     nearest = Some((i, distance));
@@ -89,7 +89,7 @@ impl VoxelGaussians {
     }
 }
 
-/// The moments of the points in a voxel `size` levels above those that keep them, about its centre.
+/// The moments of the points in a voxel `size` levels above those that keep them, about its center.
 fn moments_of(moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Moments {
     let side = 1 << size;
     let mut sum = Moments::default();

@@ -1,4 +1,4 @@
-//! Refinement: the last centimetre, which overlap cannot see.
+//! Refinement: the last centimeter, which overlap cannot see.
 //!
 //! Takes the place of step 5 of the paper's III-B. Overlap is flat within a voxel; the Gaussian of the points in it is
 //! not. Points are matched with the Gaussian of their voxel and the pose moves to where they lie on its surface: the

@@ -50,8 +50,8 @@ pub(super) struct Map {
     /// Scan files, or folders of them: .ply .pcd .xyz .f32
     #[arg(required = true, value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES")]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS")]
     resolution: f64,
     /// Number of levels, each twice as coarse as the one before: 1 to 12
     #[arg(long, default_value_t = LEVELS_DEFAULT)]

@@ -50,7 +50,7 @@ impl ScanLine {
             voxels: mapped.voxels,
             align_ms: mapped.align_time.as_secs_f64() * 1e3,
             insert_ms: mapped.insert_time.as_secs_f64() * 1e3,
-            error_m: error.map(|(metres, _)| metres),
+            error_m: error.map(|(meters, _)| meters),
             error_deg: error.map(|(_, degrees)| degrees),
             name_width,
         }
@@ -82,7 +82,7 @@ impl Display for ScanLine {
             width = self.name_width
         )?;
         match (self.error_m, self.error_deg) {
-            (Some(metres), Some(degrees)) => write!(f, "  {metres:>8.4}  {degrees:>7.3}")?,
+            (Some(meters), Some(degrees)) => write!(f, "  {meters:>8.4}  {degrees:>7.3}")?,
             _ if !self.accepted => write!(f, "  {}", self.reason)?,
             _ => {}
         }
@@ -114,7 +114,7 @@ impl Serialize for Summary {
                 "refused": self.refused,
                 "voxels": self.voxels,
                 "seconds": self.seconds,
-                "error_m": self.error.map(|error| error.metres),
+                "error_m": self.error.map(|error| error.meters),
                 "error_deg": self.error.map(|error| error.degrees),
                 "filter": self.filter,
             }
@@ -145,7 +145,7 @@ impl Display for Summary {
 
 impl Display for ErrorSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { metres: m, degrees: d } = self;
+        let Self { meters: m, degrees: d } = self;
         write!(f, "error: max {:.4} m {:.3} deg, ", m.max, d.max)?;
         write!(f, "median {:.4} m {:.3} deg, rms {:.4} m {:.3} deg", m.median, d.median, m.rms, d.rms)
     }

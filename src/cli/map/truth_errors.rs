@@ -13,20 +13,20 @@ pub(in crate::cli) struct TruthErrors {
     truth: Vec<Pose>,
     /// E_0 and T_0.
     first: Option<(Pose, Pose)>,
-    metres: Vec<f64>,
+    meters: Vec<f64>,
     degrees: Vec<f64>,
 }
 
 /// What the errors come to.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(in crate::cli) struct ErrorSummary {
-    pub(in crate::cli) metres: Statistics,
+    pub(in crate::cli) meters: Statistics,
     pub(in crate::cli) degrees: Statistics,
 }
 
 impl TruthErrors {
     pub(in crate::cli) fn new(truth: Vec<Pose>) -> Self {
-        Self { truth, first: None, metres: Vec::new(), degrees: Vec::new() }
+        Self { truth, first: None, meters: Vec::new(), degrees: Vec::new() }
     }
 
     /// T_k.
@@ -34,20 +34,20 @@ impl TruthErrors {
         self.truth[k]
     }
 
-    /// Notes that scan `k` was found at `map_from_sensor`; its error, metres and degrees.
+    /// Notes that scan `k` was found at `map_from_sensor`; its error, meters and degrees.
     pub(in crate::cli) fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
         let (found_first, true_first) = *self.first.get_or_insert((*map_from_sensor, self.truth[k]));
         let found = found_first.inv_mul(map_from_sensor);
         let error = pose_difference(&true_first.inv_mul(&self.truth[k]), &found);
-        self.metres.push(error.0);
+        self.meters.push(error.0);
         self.degrees.push(error.1);
         error
     }
 
     /// None before the first scan.
     pub(in crate::cli) fn summary(&self) -> Option<ErrorSummary> {
-        let metres = Statistics::of(self.metres.clone())?;
-        Some(ErrorSummary { metres, degrees: Statistics::of(self.degrees.clone())? })
+        let meters = Statistics::of(self.meters.clone())?;
+        Some(ErrorSummary { meters, degrees: Statistics::of(self.degrees.clone())? })
     }
 }
 
@@ -65,8 +65,8 @@ mod tests {
         // The first scan was refused.
         assert!(errors.add(1, &(elsewhere * truth[1])).0 < 1e-9);
         let off = pose(0.3, 0.01);
-        let (metres, degrees) = errors.add(2, &(elsewhere * truth[2] * off));
-        assert!((metres - 0.3).abs() < 1e-9 && (degrees - 0.01f64.to_degrees()).abs() < 1e-6);
-        assert_eq!(errors.summary().unwrap().metres.max, metres);
+        let (meters, degrees) = errors.add(2, &(elsewhere * truth[2] * off));
+        assert!((meters - 0.3).abs() < 1e-9 && (degrees - 0.01f64.to_degrees()).abs() < 1e-6);
+        assert_eq!(errors.summary().unwrap().meters.max, meters);
     }
 }

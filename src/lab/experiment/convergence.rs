@@ -11,11 +11,11 @@ use crate::geometry::{Point, Pose, pose_difference};
 use crate::lab::simulate::gaussian;
 use crate::map::MultiResolutionMap;
 
-/// How far off guesses are at most, metres.
+/// How far off guesses are at most, meters.
 pub const OFFSET_MAX_M: f64 = 2.0;
 /// The same of turns, degrees.
 pub const OFFSET_MAX_DEG: f64 = 40.0;
-/// An alignment converged that ends this near to the truth, metres.
+/// An alignment converged that ends this near to the truth, meters.
 pub const CONVERGED_M: f64 = 0.1;
 /// The same of turns, degrees.
 pub const CONVERGED_DEG: f64 = 1.0;
@@ -95,8 +95,8 @@ mod tests {
         let truth = Pose::new(Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.1, -2.0));
         let guesses = guesses_around(&truth, 400, 1);
         for OffGuess { guess, offset_m, offset_deg } in &guesses {
-            let (metres, degrees) = pose_difference(guess, &truth);
-            assert!((metres - offset_m).abs() < 1e-9 && (degrees - offset_deg).abs() < 1e-5);
+            let (meters, degrees) = pose_difference(guess, &truth);
+            assert!((meters - offset_m).abs() < 1e-9 && (degrees - offset_deg).abs() < 1e-5);
         }
         let share =
             |is_far: fn(&OffGuess) -> bool| guesses.iter().filter(|g| is_far(g)).count() as f64 / 400.0;

@@ -9,12 +9,12 @@ use crate::lab::simulate::gaussian;
 
 /// Standard deviation of a step along each axis, as a share of its length,
 const SHIFT: f64 = 0.02;
-/// and about each axis, as a share of its turn, and degrees a metre.
+/// and about each axis, as a share of its turn, and degrees a meter.
 const TURN: f64 = 0.02;
 const TURN_DEG_PER_M: f64 = 0.5;
 
 /// What an odometry would tell of a sensor that went along `truth` (map_from_sensor): each step with an error drawn from
-/// `seed`, 2 % of its length along each axis, and 2 % of its turn and half a degree a metre about each (standard
+/// `seed`, 2 % of its length along each axis, and 2 % of its turn and half a degree a meter about each (standard
 /// deviations).
 pub fn drifting(truth: &[Pose], seed: u64) -> Vec<Pose> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -23,9 +23,9 @@ pub fn drifting(truth: &[Pose], seed: u64) -> Vec<Pose> {
     let mut poses = vec![first];
     let mut last = first;
     for step in truth.windows(2) {
-        let (metres, degrees) = pose_difference(&step[0], &step[1]);
-        let shift = Translation3::from(normal(SHIFT * metres));
-        let turn_deg = normal(TURN * degrees + TURN_DEG_PER_M * metres);
+        let (meters, degrees) = pose_difference(&step[0], &step[1]);
+        let shift = Translation3::from(normal(SHIFT * meters));
+        let turn_deg = normal(TURN * degrees + TURN_DEG_PER_M * meters);
         let error = Pose::from_parts(shift, UnitQuaternion::from_scaled_axis(turn_deg.map(f64::to_radians)));
         last = last * step[0].inv_mul(&step[1]) * error;
         poses.push(last);
@@ -42,8 +42,8 @@ mod tests {
         let truth: Vec<_> = (0..200).map(|i| Pose::translation(f64::from(i) * 0.1, 0.0, 0.0)).collect();
         let poses = drifting(&truth, 1);
         assert_eq!((poses.len(), poses[0]), (200, truth[0]));
-        let (metres, degrees) = pose_difference(&poses[199], &truth[199]);
-        assert!((0.01..2.0).contains(&metres) && (0.05..10.0).contains(&degrees), "{metres} m {degrees} deg");
+        let (meters, degrees) = pose_difference(&poses[199], &truth[199]);
+        assert!((0.01..2.0).contains(&meters) && (0.05..10.0).contains(&degrees), "{meters} m {degrees} deg");
         assert_eq!(poses, drifting(&truth, 1));
         assert_ne!(poses, drifting(&truth, 2));
         assert_eq!(drifting(&[truth[5]; 3], 1), [truth[5]; 3]);

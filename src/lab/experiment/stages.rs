@@ -24,7 +24,7 @@ pub const STAGES: [&str; 8] = [
     "look-up: dense array",
     "look-up: hash table",
     "look-up: set intersection",
-    "rotate, translate, quantise",
+    "rotate, translate, quantize",
     "transform and look-up: Bloom filter",
     "transform and look-up: dense array",
     "transform and look-up: hash table",
@@ -54,7 +54,7 @@ pub fn measure(
 /// All that the stages need, made beforehand.
 struct Bench<'a> {
     queries: &'a Queries,
-    quantise: LatticeFromPoints,
+    quantize: LatticeFromPoints,
     map: &'a MultiResolutionMap,
     filter: Kernel<'a>,
     dense: Dense,
@@ -67,14 +67,14 @@ struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     fn new(map: &'a MultiResolutionMap, queries: &'a Queries) -> Result<Self, DenseTooLarge> {
-        let (points, quantise) = (&queries.points, map.lattice().from_points(&queries.map_from_points));
+        let (points, quantize) = (&queries.points, map.lattice().from_points(&queries.map_from_points));
         let dense = Dense::of(map, 0)?;
         let (mut keys, mut offsets) = (vec![0; points.len()], vec![0; points.len()]);
-        stages::keys(points, &quantise, 0, &mut keys);
-        stages::offsets(points, &quantise, 0, dense.grid(), &mut offsets);
+        stages::keys(points, &quantize, 0, &mut keys);
+        stages::offsets(points, &quantize, 0, dense.grid(), &mut offsets);
         Ok(Self {
             queries,
-            quantise,
+            quantize,
             map,
             filter: Kernel::new(map, 0, Lookup::Bloom),
             dense,
@@ -110,7 +110,7 @@ impl<'a> Bench<'a> {
     fn transform(&self) {
         let mut keys = [0; 1024];
         for points in self.queries.points.chunks(keys.len()) {
-            stages::keys(points, &self.quantise, 0, &mut keys[..points.len()]);
+            stages::keys(points, &self.quantize, 0, &mut keys[..points.len()]);
             black_box(&mut keys);
         }
     }

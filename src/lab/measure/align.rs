@@ -20,7 +20,7 @@ pub struct Aligned {
     pub ms: Vec<f64>,
     /// Look-ups of all alignments.
     pub lookups: u64,
-    /// Of each scan but the first, metres and degrees from where it was taken; empty where that is not known.
+    /// Of each scan but the first, meters and degrees from where it was taken; empty where that is not known.
     pub errors: Vec<(f64, f64)>,
 }
 
@@ -100,9 +100,9 @@ mod tests {
         let ways = [(Method::Refined, Lookup::Bloom), (Method::Overlap, Lookup::Exact)];
         let aligned =
             align_each(&scans, &RobotName::new("r").unwrap(), MapSettings::new(0.05, 4), &ways, 1).unwrap();
-        for (aligned, metres_max) in aligned.iter().zip([0.01, 0.05]) {
+        for (aligned, meters_max) in aligned.iter().zip([0.01, 0.05]) {
             assert_eq!((aligned.ms.len(), aligned.errors.len()), (2, 2));
-            let near = |&(metres, degrees): &(f64, f64)| metres < metres_max && degrees < 0.5;
+            let near = |&(meters, degrees): &(f64, f64)| meters < meters_max && degrees < 0.5;
             assert!(aligned.errors.iter().all(near), "{aligned:?}");
         }
     }

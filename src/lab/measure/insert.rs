@@ -21,7 +21,7 @@ pub struct Inserted {
 }
 
 /// Inserts points at their known pose into an empty map, and then again, scan by scan of `scan_points` points,
-/// `repeats` times: quantise, group, and commit to all levels and filters. Each point should lie in a voxel of its
+/// `repeats` times: quantize, group, and commit to all levels and filters. Each point should lie in a voxel of its
 /// own.
 ///
 /// # Errors
@@ -43,9 +43,9 @@ pub fn into_map(
 }
 
 fn insert(map: &MultiResolutionMap, points: &Queries, scan_points: usize) {
-    let quantise = map.lattice().from_points(&points.map_from_points);
+    let quantize = map.lattice().from_points(&points.map_from_points);
     for scan in points.points.chunks(scan_points) {
-        add(map, VoxelSet::of_points(scan, &quantise).0);
+        add(map, VoxelSet::of_points(scan, &quantize).0);
     }
 }
 
@@ -105,10 +105,10 @@ pub fn out_of_map(
     for _ in 0..repeats {
         let map = MultiResolutionMap::new(settings)?;
         insert(&map, points, scan_points);
-        let quantise = map.lattice().from_points(&points.map_from_points);
+        let quantize = map.lattice().from_points(&points.map_from_points);
         runs.time(points.points.len(), || {
             for scan in points.points.chunks(scan_points) {
-                map.committer().remove(&VoxelSet::of_points(scan, &quantise).0);
+                map.committer().remove(&VoxelSet::of_points(scan, &quantize).0);
             }
         });
         debug_assert!(map.is_empty());

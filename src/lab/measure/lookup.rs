@@ -67,9 +67,9 @@ pub fn compare(
 /// The answers of the exact set.
 fn truth(map: &MultiResolutionMap, level: u32, queries: &Queries) -> Vec<u64> {
     let mut occupied = vec![0; queries.points.len().div_ceil(64)];
-    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let quantize = map.lattice().from_points(&queries.map_from_points);
     let view = map.view();
-    lookup::occupied(&queries.points, &quantise, &view.level_view(level), Lookup::Exact, &mut occupied);
+    lookup::occupied(&queries.points, &quantize, &view.level_view(level), Lookup::Exact, &mut occupied);
     occupied
 }
 

@@ -71,9 +71,9 @@ fn read(map: &ThroughMap<'_>, queries: &Queries, over: &AtomicBool, answered: &A
 }
 
 fn write(map: &MultiResolutionMap, queries: &Queries, over: &AtomicBool, commits: &AtomicUsize) {
-    let quantise = map.lattice().from_points(&queries.map_from_points);
+    let quantize = map.lattice().from_points(&queries.map_from_points);
     for scan in queries.points.chunks(SCAN_POINTS).cycle() {
-        let present = present(map, &VoxelSet::of_points(scan, &quantise).0);
+        let present = present(map, &VoxelSet::of_points(scan, &quantize).0);
         map.committer().remove(&present);
         add(map, present);
         commits.fetch_add(2, Ordering::Relaxed);

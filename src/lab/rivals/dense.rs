@@ -56,11 +56,11 @@ impl Dense {
 
 impl Structure for Dense {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
-        let quantise = self.lattice.from_points(map_from_points);
+        let quantize = self.lattice.from_points(map_from_points);
         let mut offsets = [0; CHUNK];
         for (points, words) in points.chunks(CHUNK).zip(occupied.chunks_mut(CHUNK / 64)) {
             let offsets = &mut offsets[..points.len()];
-            stages::offsets(points, &quantise, self.level, &self.grid, offsets);
+            stages::offsets(points, &quantize, self.level, &self.grid, offsets);
             self.contains(offsets, words);
         }
     }

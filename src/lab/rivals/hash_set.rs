@@ -29,8 +29,8 @@ impl HashSet {
 
 impl Structure for HashSet {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
-        let quantise = self.lattice.from_points(map_from_points);
-        occupied_by_key(points, &quantise, self.level, occupied, |key| self.keys.contains(&key));
+        let quantize = self.lattice.from_points(map_from_points);
+        occupied_by_key(points, &quantize, self.level, occupied, |key| self.keys.contains(&key));
     }
 
     fn bytes(&self) -> usize {

@@ -26,10 +26,10 @@ impl<'a> ThroughMap<'a> {
 
 impl Structure for ThroughMap<'_> {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
-        let quantise = self.map.lattice().from_points(map_from_points);
+        let quantize = self.map.lattice().from_points(map_from_points);
         for (points, words) in points.chunks(QUESTION_POINTS).zip(occupied.chunks_mut(QUESTION_POINTS / 64)) {
             let view = self.map.view_of(points, map_from_points);
-            view.query(points, &quantise, self.level, self.lookup, words);
+            view.query(points, &quantize, self.level, self.lookup, words);
         }
     }
 
@@ -55,9 +55,9 @@ impl<'a> Kernel<'a> {
 
 impl Structure for Kernel<'_> {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
-        let quantise = self.map.lattice().from_points(map_from_points);
+        let quantize = self.map.lattice().from_points(map_from_points);
         let view = self.map.view();
-        lookup::occupied(points, &quantise, &view.level_view(self.level), self.lookup, occupied);
+        lookup::occupied(points, &quantize, &view.level_view(self.level), self.lookup, occupied);
     }
 
     fn bytes(&self) -> usize {

@@ -48,9 +48,9 @@ fn repacked(key: u64) -> u64 {
 
 impl Structure for PaperFilter {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
-        let quantise = self.lattice.from_points(map_from_points);
+        let quantize = self.lattice.from_points(map_from_points);
         // Both are read whatever the first says: a branch that is wrong half the time would cost more.
-        occupied_by_key(points, &quantise, self.level, occupied, |key| {
+        occupied_by_key(points, &quantize, self.level, occupied, |key| {
             let [a, b] = places(key).map(|place| self.counters[place] != 0);
             a & b & (key != NO_KEY)
         });

@@ -1,6 +1,6 @@
 //! Sensors simulated in a simulated building.
 //!
-//! A scan is a `Vec<Point>` in its sensor's frame, metres, as in [`crate::scan`]; a beam without a return is a point
+//! A scan is a `Vec<Point>` in its sensor's frame, meters, as in [`crate::scan`]; a beam without a return is a point
 //! with NaN coordinates.
 
 mod ride;

@@ -12,11 +12,11 @@ const SHORTENING: f64 = 0.9;
 /// How often in a lap the sensor glances to the right and to the left; at the corners it then looks where the
 /// robot goes, not at the wall beside it.
 const GLANCES: f64 = 3.0;
-/// Ways over which it rolls, pitches and heaves once, metres; no two have a common multiple nearby.
+/// Ways over which it rolls, pitches and heaves once, meters; no two have a common multiple nearby.
 const ROLL_WAY_M: f64 = 2.9;
 const PITCH_WAY_M: f64 = 3.7;
 const HEAVE_WAY_M: f64 = 2.3;
-/// How far it heaves, metres.
+/// How far it heaves, meters.
 const HEAVE_M: f64 = 0.01;
 
 /// How a robot carries its sensor along a route.
@@ -61,8 +61,8 @@ impl Ride {
     }
 
     fn is_within_limits(&self, from: &Pose, to: &Pose) -> bool {
-        let (metres, degrees) = pose_difference(from, to);
-        metres <= self.step_max_m && degrees <= self.turn_max_deg
+        let (meters, degrees) = pose_difference(from, to);
+        meters <= self.step_max_m && degrees <= self.turn_max_deg
     }
 
     fn map_from_sensor(&self, way_m: f64) -> Pose {

@@ -22,16 +22,16 @@ pub(super) const LIDAR_ROUTE: Route = Route {
     turning_m: 2.3,
 };
 
-/// The northern rooms and the corridor: 22 m, half a metre beside the other route and less.
+/// The northern rooms and the corridor: 22 m, half a meter beside the other route and less.
 pub(super) const CAMERA_ROUTE: Route = Route {
     corners: &[[4.0, 6.75], [10.8, 6.75], [10.8, 4.45], [2.65, 4.45], [2.65, 6.75]],
     cornering_m: 1.4,
     turning_m: 2.3,
 };
 
-/// A closed route; places on it are given by the way gone from its start, metres, lap after lap.
+/// A closed route; places on it are given by the way gone from its start, meters, lap after lap.
 pub(super) struct Route {
-    /// Corners in the map frame, metres. The first is the start and lies on a straight stretch.
+    /// Corners in the map frame, meters. The first is the start and lies on a straight stretch.
     corners: &'static [[f64; 2]],
     /// Length over which places are averaged: a corner is cut from half of it before to half of it after.
     cornering_m: f64,
@@ -40,12 +40,12 @@ pub(super) struct Route {
 }
 
 impl Route {
-    /// Length of one lap along the corners, metres.
+    /// Length of one lap along the corners, meters.
     pub(super) fn length_m(&self) -> f64 {
         self.stretches().map(distance).sum()
     }
 
-    /// The place after `way_m`, map frame, metres.
+    /// The place after `way_m`, map frame, meters.
     pub(super) fn position(&self, way_m: f64) -> [f64; 2] {
         let mut sum = [0.0; 2];
         for i in 0..AVERAGED {

@@ -80,7 +80,7 @@ mod tests {
             let steps: Vec<_> =
                 tour.poses.windows(2).map(|pair| pose_difference(&pair[0], &pair[1])).collect();
             assert!(steps.iter().all(|(m, deg)| *m <= limits.0 && *deg <= limits.1 && *m > 0.05));
-            let mean = steps.iter().map(|(metres, _)| metres).sum::<f64>() / steps.len() as f64;
+            let mean = steps.iter().map(|(meters, _)| meters).sum::<f64>() / steps.len() as f64;
             assert!(mean > mean_m, "{mean} m a step");
         }
     }
@@ -137,7 +137,7 @@ mod tests {
         }
     }
 
-    /// Least over mean eigenvalue of the point-to-plane Hessian of a scan, its points centred and scaled to a
+    /// Least over mean eigenvalue of the point-to-plane Hessian of a scan, its points centered and scaled to a
     /// mean distance of one: zero would mean a motion that leaves the scan on itself.
     fn conditioning(scene: &Scene, tour: &Tour, pose: &Pose) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(0);

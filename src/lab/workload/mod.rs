@@ -55,9 +55,9 @@ impl Queries {
         lattice_from_map: impl Fn(&Pose) -> LatticeFromPoints,
         most: usize,
     ) -> Self {
-        let quantise = lattice_from_map(&self.map_from_points);
+        let quantize = lattice_from_map(&self.map_from_points);
         let mut seen = hashbrown::HashSet::new();
-        let is_first = |&point: &Point| quantise.key(point).is_some_and(|key| seen.insert(key.to_bits()));
+        let is_first = |&point: &Point| quantize.key(point).is_some_and(|key| seen.insert(key.to_bits()));
         Self { points: self.points.into_iter().filter(is_first).take(most).collect(), ..self }
     }
 }
@@ -79,7 +79,7 @@ pub enum Workload {
 }
 
 impl Workload {
-    /// Side of its voxels, metres.
+    /// Side of its voxels, meters.
     pub fn resolution_m(&self) -> f64 {
         match self {
             Self::Room(_) => Room::RESOLUTION_M,
@@ -158,8 +158,8 @@ mod tests {
     }
 
     fn occupied(map: &MultiResolutionMap, queries: &Queries) -> f64 {
-        let quantise = map.lattice().from_points(&queries.map_from_points);
-        let hits = map.view().count(&queries.points, &quantise, 0, Lookup::Exact);
+        let quantize = map.lattice().from_points(&queries.map_from_points);
+        let hits = map.view().count(&queries.points, &quantize, 0, Lookup::Exact);
         hits as f64 / queries.points.len() as f64
     }
 

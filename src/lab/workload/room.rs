@@ -16,13 +16,13 @@ pub struct Room;
 
 /// Half the room's sides, voxels.
 const HALF: [i32; 3] = [140, 90, 30];
-/// The sensor's way: an ellipse around the room's middle, metres,
+/// The sensor's way: an ellipse around the room's middle, meters,
 const WAY_M: [f64; 2] = [4.5, 2.5];
 /// and how far it gets in a turn of the sensor.
 const TURN_M: f64 = 0.1;
 
 impl Room {
-    /// Side of its voxels, metres.
+    /// Side of its voxels, meters.
     pub const RESOLUTION_M: f64 = 0.05;
 
     pub(super) fn voxels(self) -> VoxelSet {

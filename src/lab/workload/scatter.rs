@@ -17,7 +17,7 @@ pub struct Scatter {
 const SIZE: [i32; 3] = [280, 180, 60];
 
 impl Scatter {
-    /// Side of its voxels, metres.
+    /// Side of its voxels, meters.
     pub const RESOLUTION_M: f64 = 0.05;
     /// Voxels of the paper's map of real scans (IV).
     pub const VOXELS: usize = 142_812;

@@ -9,7 +9,7 @@ use crate::lab::simulate::{Scene, Tour};
 /// A scan of a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// Finite, in the sensor frame, metres.
+    /// Finite, in the sensor frame, meters.
     pub points: Vec<Point>,
     /// Where it was taken, if that is known.
     pub map_from_sensor: Option<Pose>,

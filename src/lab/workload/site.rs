@@ -24,25 +24,25 @@ pub struct Site {
 const PIECE_SIDE: i32 = 256;
 /// Voxels in a column.
 const THICKNESS: i32 = 2;
-/// Heights of the hills along x and y, metres,
+/// Heights of the hills along x and y, meters,
 const HILLS_M: [f64; 2] = [3.0, 2.5];
-/// and how steeply they go up and down, radians a metre.
+/// and how steeply they go up and down, radians a meter.
 const WAVES: [f64; 2] = [0.1, 0.13];
-/// Random questions are about points this far above or below the ground, metres.
+/// Random questions are about points this far above or below the ground, meters.
 const NEAR_M: f64 = 0.5;
-/// How high the sensor is carried, metres,
+/// How high the sensor is carried, meters,
 const SENSOR_HEIGHT_M: f64 = 2.0;
 /// or on small sites, this share of the side: from higher up it would look beyond the border.
 const SENSOR_HEIGHT_SHARE: f64 = 1.0 / 16.0;
-/// How far the sensor gets in a turn, metres.
+/// How far the sensor gets in a turn, meters.
 const TURN_M: f64 = 1.0;
-/// How far it sees, metres.
+/// How far it sees, meters.
 const RANGE_MAX_M: f64 = 100.0;
-/// The ground is met when a ray is as near as this, metres.
+/// The ground is met when a ray is as near as this, meters.
 const TOUCH_M: f64 = 1e-3;
 
 impl Site {
-    /// Side of its voxels, metres.
+    /// Side of its voxels, meters.
     pub const RESOLUTION_M: f64 = 0.1;
     /// Voxels of a site where nothing else is said.
     pub const VOXELS: usize = 10_000_000;
@@ -60,13 +60,13 @@ impl Site {
         f64::from(self.side) * Self::RESOLUTION_M
     }
 
-    /// Height of the ground, metres.
+    /// Height of the ground, meters.
     fn height_m(&self, x: f64, y: f64) -> f64 {
         let [px, py] = self.phases;
         HILLS_M[0] * (WAVES[0] * x + px).sin() + HILLS_M[1] * (WAVES[1] * y + py).sin()
     }
 
-    /// Its steepest slope, metres up a metre.
+    /// Its steepest slope, meters up a meter.
     fn slope_max() -> f64 {
         (HILLS_M[0] * WAVES[0]).hypot(HILLS_M[1] * WAVES[1])
     }

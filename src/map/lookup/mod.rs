@@ -1,4 +1,4 @@
-//! The critical path of everything (paper II): rotate, translate, quantise, look up.
+//! The critical path of everything (paper II): rotate, translate, quantize, look up.
 //!
 //! One operation: points and a pose in, a bit a point out. `scalar` defines it; the wide twins agree with it
 //! bit for bit and are chosen at run time.

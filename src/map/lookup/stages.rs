@@ -12,7 +12,7 @@ use crate::voxel::{LatticeFromPoints, VoxelKey};
 /// Stands among keys for a point that has no voxel; no key sets bit 63.
 pub const NO_KEY: u64 = u64::MAX;
 
-/// Rotate, translate, quantise, pack: the key of each point's voxel of `level`, [`NO_KEY`] where it has none.
+/// Rotate, translate, quantize, pack: the key of each point's voxel of `level`, [`NO_KEY`] where it has none.
 ///
 /// # Panics
 /// When `keys` is not as long as `points`.
@@ -73,7 +73,7 @@ impl Grid {
     }
 }
 
-/// Rotate, translate, quantise, and the offset of each point's voxel of `level` in `grid`: [`Grid::cells`] of
+/// Rotate, translate, quantize, and the offset of each point's voxel of `level` in `grid`: [`Grid::cells`] of
 /// what lies outside or has no voxel.
 ///
 /// # Panics
@@ -208,25 +208,25 @@ mod tests {
                 true => Pose::new([0.3, -7.0, 1.0].into(), [0.4, -0.2, 2.0].into()),
                 false => Pose::identity(),
             };
-            let (quantise, level, n) = (map.lattice().from_points(&pose), levels - 1, asked.len());
+            let (quantize, level, n) = (map.lattice().from_points(&pose), levels - 1, asked.len());
             let view = map.view();
             let view = view.level_view(level);
             let grid = Grid { min: [-20, -9, 3], size: [33, 18, 7] };
 
             let (mut all_keys, mut all_offsets) = (vec![1; n], vec![1; n]);
             let (mut bits, mut whole) = (vec![1; n.div_ceil(64)], vec![1; n.div_ceil(64)]);
-            keys_scalar(&asked, &quantise, level, &mut all_keys);
-            offsets_scalar(&asked, &quantise, level, &grid, &mut all_offsets);
+            keys_scalar(&asked, &quantize, level, &mut all_keys);
+            offsets_scalar(&asked, &quantize, level, &grid, &mut all_offsets);
             filter_contains_scalar(&all_keys, &view, &mut bits);
             // And the parts make the whole.
-            occupied_scalar(&asked, &quantise, &view, Lookup::Bloom, &mut whole);
+            occupied_scalar(&asked, &quantize, &view, Lookup::Bloom, &mut whole);
             prop_assert_eq!(&bits, &whole);
 
             for (name, keys, offsets, filter_contains) in wide() {
                 let (mut found_keys, mut found_offsets, mut found) =
                     (vec![2; n], vec![2; n], vec![2; n.div_ceil(64)]);
-                keys(&asked, &quantise, level, &mut found_keys);
-                offsets(&asked, &quantise, level, &grid, &mut found_offsets);
+                keys(&asked, &quantize, level, &mut found_keys);
+                offsets(&asked, &quantize, level, &grid, &mut found_offsets);
                 filter_contains(&all_keys, &view, &mut found);
                 prop_assert_eq!(&found_keys, &all_keys, "{}", name);
                 prop_assert_eq!(&found_offsets, &all_offsets, "{}", name);

@@ -27,7 +27,7 @@ fn wide_kernels() -> Vec<(&'static str, Kernel)> {
 }
 
 fn assert_twins(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
-    let quantise = map.lattice().from_points(pose);
+    let quantize = map.lattice().from_points(pose);
     let view = map.view();
     for (name, kernel) in wide_kernels() {
         for level in 0..map.settings().levels {
@@ -35,8 +35,8 @@ fn assert_twins(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
                 let (mut expected, mut found) =
                     (vec![0; points.len().div_ceil(64)], vec![7; points.len().div_ceil(64)]);
                 let level_view = view.level_view(level);
-                let all = scalar::occupied(points, &quantise, &level_view, lookup, &mut expected);
-                assert_eq!(kernel(points, &quantise, &level_view, lookup, &mut found), all, "{name}");
+                let all = scalar::occupied(points, &quantize, &level_view, lookup, &mut expected);
+                assert_eq!(kernel(points, &quantize, &level_view, lookup, &mut found), all, "{name}");
                 assert_eq!(found, expected, "{name}, level {level}, {lookup:?}");
             }
         }

@@ -1,4 +1,4 @@
-//! Rotate, translate, quantise, and keep each voxel once: what a scan touches.
+//! Rotate, translate, quantize, and keep each voxel once: what a scan touches.
 
 use super::stages;
 use crate::geometry::Point;
@@ -27,9 +27,9 @@ mod tests {
         #[test]
         fn a_set_of_points_is_the_set_of_their_keys(points: Vec<[i8; 3]>) {
             let points: Vec<Point> = points.iter().map(|p| Point::from(p.map(f32::from))).collect();
-            let quantise = Lattice::new(2.5, 1).unwrap().from_map();
-            let keys: BTreeSet<VoxelKey> = points.iter().map(|&p| quantise.key(p).unwrap()).collect();
-            let (set, skipped) = VoxelSet::of_points(&points, &quantise);
+            let quantize = Lattice::new(2.5, 1).unwrap().from_map();
+            let keys: BTreeSet<VoxelKey> = points.iter().map(|&p| quantize.key(p).unwrap()).collect();
+            let (set, skipped) = VoxelSet::of_points(&points, &quantize);
             prop_assert_eq!(skipped, 0);
             prop_assert_eq!(set.len(), keys.len());
             prop_assert_eq!(&set.iter().collect::<BTreeSet<_>>(), &keys);

@@ -20,10 +20,10 @@ impl ScanRecord {
     /// What a scan of `points` (sensor frame) taken at `pose` does to a map on `lattice`. Points without a voxel are
     /// left out and counted in `pose.points_skipped`.
     pub fn of_points(mut pose: TrajectoryPose, points: &[Point], lattice: &Lattice) -> Self {
-        let quantise = lattice.from_points(&pose.map_from_sensor);
-        let (voxels, out_of_range) = VoxelSet::of_points(points, &quantise);
+        let quantize = lattice.from_points(&pose.map_from_sensor);
+        let (voxels, out_of_range) = VoxelSet::of_points(points, &quantize);
         pose.points_skipped += out_of_range;
-        Self { pose, voxels, moments: MomentSet::of_points(points, &quantise) }
+        Self { pose, voxels, moments: MomentSet::of_points(points, &quantize) }
     }
 
     /// The same of voxels whose points are not known: the refinement of alignments learns nothing from it.

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 #[derive(Debug, Clone)]
 enum Step {
-    /// Scans of a robot, so many, each a step of that many centimetres further.
+    /// Scans of a robot, so many, each a step of that many centimeters further.
     Drive(u8, u16, i32),
     /// Takes every n-th scan out that undo reaches.
     Withdraw(usize),

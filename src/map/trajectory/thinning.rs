@@ -23,7 +23,7 @@ use crate::geometry::Pose;
 /// How far poses of one robot lie apart that are kept for good.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrajectorySpacing {
-    /// Side of the cells of which each keeps a pose, metres. 0.5.
+    /// Side of the cells of which each keeps a pose, meters. 0.5.
     pub distance_m: f64,
     /// Steps of roll, pitch and yaw of which each keeps a pose in each cell, degrees. 10.
     pub rotation_deg: f64,

@@ -27,7 +27,7 @@ const HEADER_BYTES_MAX: usize = 1 << 20;
 /// The extensions that [`read_points`] knows.
 const EXTENSIONS: [&str; 4] = [".ply", ".pcd", ".xyz", ".f32"];
 
-/// The points of the scan file at `path`, in the sensor frame, metres.
+/// The points of the scan file at `path`, in the sensor frame, meters.
 ///
 /// The extension says the format, in either case: `.ply` (ascii, binary of either byte order), `.pcd` (ascii,
 /// binary, binary_compressed), `.xyz` (text: the first three columns, divided by spaces or commas, `#` starts a

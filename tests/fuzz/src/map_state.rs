@@ -60,9 +60,9 @@ fn can_be_changed(map: &MultiResolutionMap, aligned: bool) {
     let before = map.revision();
     let committed = map.committer().insert_scan(record.clone());
     assert_eq!((committed.revision, map.revision()), (before + 1, before + 1));
-    let quantise = map.lattice().from_points(&map_from_sensor);
-    let known = map.view_of(&points, &map_from_sensor).count(&points, &quantise, 0, Lookup::Exact);
-    assert_eq!(known, points.iter().filter(|&&point| quantise.key(point).is_some()).count());
+    let quantize = map.lattice().from_points(&map_from_sensor);
+    let known = map.view_of(&points, &map_from_sensor).count(&points, &quantize, 0, Lookup::Exact);
+    assert_eq!(known, points.iter().filter(|&&point| quantize.key(point).is_some()).count());
     let region = Region::ball(near, 3.0 * map.lattice().resolution_m(0)).expect("a ball");
     let inside = map.view().voxels_in(&region, 0);
     let removed = map.committer().remove(&inside.iter().copied().collect());

@@ -34,8 +34,8 @@ pub(super) struct Align {
     /// Scan files, or folders of them: .ply .pcd .xyz .f32 [default: simulated scans]
     #[arg(value_name = "DIR_OR_FILES")]
     scans: Vec<PathBuf>,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES", default_value_t = 0.05)]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS", default_value_t = 0.05)]
     resolution: f64,
     /// True poses of the scans, a TUM file
     #[arg(long, value_name = "FILE", requires = "scans")]
@@ -130,8 +130,8 @@ impl Display for Line {
             "{method:<8} {lookup:<8} {ms_median:>10.2} {ms_max:>7.2} {lookups:>15} {ns_per_lookup:>13.2}"
         )?;
         match (&self.error_m, &self.error_deg) {
-            (Some(metres), Some(degrees)) => {
-                write!(f, "  {:.1} mm {:.3} deg", metres.median * 1e3, degrees.median)
+            (Some(meters), Some(degrees)) => {
+                write!(f, "  {:.1} mm {:.3} deg", meters.median * 1e3, degrees.median)
             }
             _ => Ok(()),
         }

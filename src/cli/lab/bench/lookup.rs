@@ -44,8 +44,8 @@ pub(super) struct Lookup {
     /// Ask about the points in this file
     #[arg(long, value_name = "FILE", requires = "voxels")]
     points: Option<PathBuf>,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES", requires = "voxels")]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS", requires = "voxels")]
     resolution: Option<f64>,
     /// Where the frame of --points lies in the map: "x y z qx qy qz qw" [default: the map's own frame]
     #[arg(long, value_name = "POSE", requires = "voxels", allow_hyphen_values = true, value_parser = parse::pose)]

@@ -53,8 +53,8 @@ fn all_accepted(robots: &[RobotSummary]) -> (bool, String) {
 
 fn close_to_the_truth(robots: &[RobotSummary], resolution_m: f64) -> (bool, String) {
     let worst = |error: fn(&RobotSummary) -> f64| robots.iter().map(error).fold(0.0, f64::max);
-    let (median_m, median_deg) = (worst(|robot| robot.metres.median), worst(|robot| robot.degrees.median));
-    let max_m = worst(|robot| robot.metres.max);
+    let (median_m, median_deg) = (worst(|robot| robot.meters.median), worst(|robot| robot.degrees.median));
+    let max_m = worst(|robot| robot.meters.max);
     let (median_max_m, max_max_m) = (MEDIAN_ERROR_MAX_VOXELS * resolution_m, ERROR_MAX_VOXELS * resolution_m);
     let good = median_m < median_max_m && median_deg < MEDIAN_ERROR_MAX_DEG && max_m < max_max_m;
     let text = format!(

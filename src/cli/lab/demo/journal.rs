@@ -28,7 +28,7 @@ pub(super) struct RobotJournal {
     name: &'static str,
     accepted: usize,
     refused: usize,
-    metres: Vec<f64>,
+    meters: Vec<f64>,
     degrees: Vec<f64>,
 }
 
@@ -37,7 +37,7 @@ pub(super) struct RobotSummary {
     pub(super) name: &'static str,
     pub(super) accepted: usize,
     pub(super) refused: usize,
-    pub(super) metres: Statistics,
+    pub(super) meters: Statistics,
     pub(super) degrees: Statistics,
 }
 
@@ -105,7 +105,7 @@ impl Journal {
 }
 
 impl RobotJournal {
-    fn enter(&mut self, accepted: bool, (metres, degrees): (f64, f64)) {
+    fn enter(&mut self, accepted: bool, (meters, degrees): (f64, f64)) {
         if !accepted {
             self.refused += 1;
             return;
@@ -113,7 +113,7 @@ impl RobotJournal {
         self.accepted += 1;
         // The first scan is where it was told to be.
         if self.accepted > 1 {
-            self.metres.push(metres);
+            self.meters.push(meters);
             self.degrees.push(degrees);
         }
     }
@@ -123,7 +123,7 @@ impl RobotJournal {
             name: self.name,
             accepted: self.accepted,
             refused: self.refused,
-            metres: Statistics::of(self.metres.clone())?,
+            meters: Statistics::of(self.meters.clone())?,
             degrees: Statistics::of(self.degrees.clone())?,
         })
     }

@@ -59,8 +59,8 @@ pub(in crate::cli) struct Demo {
     /// Scans of each robot
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=500))]
     scans: u16,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES", default_value_t = 0.03)]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS", default_value_t = 0.03)]
     resolution: f64,
     /// Levels of the map
     #[arg(long, default_value_t = LEVELS_DEFAULT)]

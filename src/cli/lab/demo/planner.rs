@@ -20,7 +20,7 @@ use crate::service::{PointCloud, PointQuery};
 pub(super) const BATCH_POINTS: usize = 100_000;
 /// Different batches, asked in turn.
 const BATCHES: usize = 8;
-/// The building of the simulated scene, metres: candidates lie anywhere in it.
+/// The building of the simulated scene, meters: candidates lie anywhere in it.
 const BUILDING_M: [f32; 3] = [14.0, 9.0, 2.7];
 
 pub(super) struct Planner {

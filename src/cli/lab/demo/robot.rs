@@ -32,7 +32,7 @@ pub(super) struct News {
     pub(super) scan: usize,
     pub(super) scans: usize,
     pub(super) answer: ScanAnswer,
-    /// Of the pose found against the true one, metres and degrees.
+    /// Of the pose found against the true one, meters and degrees.
     pub(super) error: (f64, f64),
 }
 

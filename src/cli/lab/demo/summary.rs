@@ -41,7 +41,7 @@ impl Display for Summary<'_> {
         if let Some(finest) = self.info.levels.first() {
             writeln!(
                 f,
-                "map      {} voxels of {} m in {}, filter plane {}; it lets {} of absent neighbours through",
+                "map      {} voxels of {} m in {}, filter plane {}; it lets {} of absent neighbors through",
                 count(finest.voxels),
                 finest.resolution_m,
                 bytes(self.info.set_bytes),
@@ -55,7 +55,7 @@ impl Display for Summary<'_> {
 
 impl Display for RobotSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, accepted, refused, metres: m, degrees: d } = self;
+        let Self { name, accepted, refused, meters: m, degrees: d } = self;
         write!(f, "{name:<8}{accepted:>8} {refused:>8}  ")?;
         write!(f, "{:>6.1} mm {:>5.2} deg  ", m.median * 1e3, d.median)?;
         write!(f, "{:>6.1} mm {:>5.2} deg", m.max * 1e3, d.max)
@@ -68,7 +68,7 @@ impl Serialize for Summary<'_> {
         let robot = |robot: &RobotSummary| {
             let summary = json!({
                 "accepted": robot.accepted, "refused": robot.refused,
-                "error_m": robot.metres, "error_deg": robot.degrees,
+                "error_m": robot.meters, "error_deg": robot.degrees,
             });
             (robot.name.to_owned(), summary)
         };

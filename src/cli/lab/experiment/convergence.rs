@@ -49,8 +49,8 @@ pub(super) struct Convergence {
     /// True poses of the scans in their folder, a TUM file
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES")]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS")]
     resolution: f64,
     /// Where to write the results; made if it is not there
     #[arg(long, value_name = "DIR")]
@@ -161,13 +161,13 @@ fn write_trials(series: &[Series], path: &Path) -> Result<(), CliError> {
 fn by_offset(series: &[Series]) -> Table {
     let names = series.iter().map(|series| series.method.as_str());
     let mut table = Table::new(["offset m", "offset deg", "trials"].into_iter().chain(names));
-    let mut row = |metres: String, degrees: String, is_in: &dyn Fn(&OffGuess) -> bool| {
+    let mut row = |meters: String, degrees: String, is_in: &dyn Fn(&OffGuess) -> bool| {
         let of = |series: &Series| -> Vec<Trial> {
             series.trials.iter().filter(|(off, _)| is_in(off)).map(|&(_, trial)| trial).collect()
         };
         let trials = series.first().map_or(0, |series| of(series).len());
         let shares = series.iter().map(|series| share_converged(&of(series)).map_or("-".into(), percent));
-        table.push([metres, degrees, trials.to_string()].into_iter().chain(shares));
+        table.push([meters, degrees, trials.to_string()].into_iter().chain(shares));
     };
     for (m, deg) in
         bins(OFFSET_MAX_M, BIN_M).flat_map(|m| bins(OFFSET_MAX_DEG, BIN_DEG).map(move |deg| (m, deg)))

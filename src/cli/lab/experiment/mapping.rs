@@ -31,7 +31,7 @@ EXAMPLES:
 Fig. 5 of the paper. The same scans go into three maps by the paper's method, each from the last pose: look-ups by Bloom
 filters, by hash tables (a set of packed keys a level, as before the paper), and, with the method of today, refined. Each
 scan goes into every map, wherever it was found to be. A fourth map takes them where odometry says: --odometry, or a file
-poses_odometry.txt beside the scans, or the truth with a seeded drift of 2 % of the way and half a degree a metre. Our
+poses_odometry.txt beside the scans, or the truth with a seeded drift of 2 % of the way and half a degree a meter. Our
 own map's updates are those of its moments too, which the refinement needs. On one core. Writes mapping.svg, mapping.csv
 (every scan) and mapping.md.";
 
@@ -48,8 +48,8 @@ pub(super) struct Mapping {
     /// Where to write the results; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES", default_value_t = 0.05)]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS", default_value_t = 0.05)]
     resolution: f64,
     /// True poses of the scans, a TUM file: report the errors
     #[arg(long, value_name = "FILE")]
@@ -157,7 +157,7 @@ impl Series {
         Self { map, scans: Vec::new() }
     }
 
-    /// Against `truth`, metres and degrees.
+    /// Against `truth`, meters and degrees.
     fn errors(&self, truth: &[Pose]) -> (Vec<(f64, f64)>, Option<ErrorSummary>) {
         let mut errors = TruthErrors::new(truth.to_vec());
         let of_scans =
@@ -175,22 +175,21 @@ impl Series {
         Statistics::of(values).map_or(0.0, |statistics| statistics.median)
     }
 
-    fn curve(&self, name: String, colour: usize, style: Style, of: fn(&Mapped) -> f64) -> Curve {
+    fn curve(&self, name: String, color: usize, style: Style, of: fn(&Mapped) -> f64) -> Curve {
         let points = self.scans.iter().enumerate().map(|(k, mapped)| (k as f64, of(mapped))).collect();
-        Curve { name, colour, style, points }
+        Curve { name, color, style, points }
     }
 }
 
 /// The first panel of Fig. 5.
 fn times(series: &[Series]) -> Panel {
     let aligned = series.iter().enumerate().filter(|(_, series)| series.aligns());
-    let curves = aligned.flat_map(|(colour, series)| {
+    let curves = aligned.flat_map(|(color, series)| {
         let mut alignment =
-            series
-                .curve(format!("{}: alignment", series.map), colour, Style::Solid, |mapped| mapped.align_ms);
+            series.curve(format!("{}: alignment", series.map), color, Style::Solid, |mapped| mapped.align_ms);
         alignment.points.remove(0);
         let update =
-            series.curve(format!("{}: update", series.map), colour, Style::Dashed, |mapped| mapped.update_ms);
+            series.curve(format!("{}: update", series.map), color, Style::Dashed, |mapped| mapped.update_ms);
         [alignment, update]
     });
     Panel {
@@ -203,10 +202,10 @@ fn times(series: &[Series]) -> Panel {
 
 /// The second panel of Fig. 5.
 fn growth(series: &[Series]) -> Panel {
-    let curve = |(colour, series): (usize, &Series)| {
+    let curve = |(color, series): (usize, &Series)| {
         // On top of that of the Bloom filters, which a solid one would hide.
         let style = if series.map == "hash table" { Style::Dashed } else { Style::Solid };
-        series.curve(series.map.to_owned(), colour, style, |mapped| mapped.voxels as f64)
+        series.curve(series.map.to_owned(), color, style, |mapped| mapped.voxels as f64)
     };
     Panel {
         title: "Growth of the map".into(),
@@ -251,7 +250,7 @@ fn write_maps(
         let Line { map, align_ms, update_ms, voxels, error_m, error_deg, .. } =
             Line::of(series, errors(series));
         let error = |of: fn(&Statistics) -> f64| match (&error_m, &error_deg) {
-            (Some(metres), Some(degrees)) => format!("{:.4} m {:.3} deg", of(metres), of(degrees)),
+            (Some(meters), Some(degrees)) => format!("{:.4} m {:.3} deg", of(meters), of(degrees)),
             _ => "-".to_owned(),
         };
         let align = align_ms.map_or("-".to_owned(), |ms| format!("{ms:.2}"));
@@ -288,7 +287,7 @@ impl Line {
             align_ms: series.aligns().then(|| series.median(|mapped| mapped.align_ms)),
             update_ms: series.median(|mapped| mapped.update_ms),
             voxels: series.scans.last().map_or(0, |mapped| mapped.voxels),
-            error_m: error.map(|error| error.metres),
+            error_m: error.map(|error| error.meters),
             error_deg: error.map(|error| error.degrees),
         }
     }
@@ -300,7 +299,7 @@ impl Display for Line {
         let align = self.align_ms.map_or("-".to_owned(), |ms| format!("{ms:.2}"));
         write!(f, "{map:<15} {scans:>5}  {align:>8}  {update_ms:>9.2}  {:>10}", count(self.voxels))?;
         match (&self.error_m, &self.error_deg) {
-            (Some(metres), Some(degrees)) => write!(f, "  {:.4} m {:.3} deg", metres.median, degrees.median),
+            (Some(meters), Some(degrees)) => write!(f, "  {:.4} m {:.3} deg", meters.median, degrees.median),
             _ => Ok(()),
         }
     }

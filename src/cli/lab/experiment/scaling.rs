@@ -125,12 +125,12 @@ fn name_of(order: Order) -> &'static str {
 
 /// A curve for each structure.
 fn of_order(lines: &[Line], order: Order) -> impl Iterator<Item = Curve> {
-    STRUCTURES.iter().enumerate().map(move |(colour, structure)| {
+    STRUCTURES.iter().enumerate().map(move |(color, structure)| {
         let (structure, order_name) = (structure.as_str(), name_of(order));
         let own = lines.iter().filter(move |line| line.structure == structure && line.order == order_name);
         Curve {
             name: format!("{structure}, {order_name}"),
-            colour,
+            color,
             style: if order == Order::Scan { Style::Dashed } else { Style::Solid },
             points: own.map(|line| (line.voxels as f64, line.ns_per_point)).collect(),
         }

@@ -45,8 +45,8 @@ pub(super) struct Simulation {
     /// Scans of the sequence
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(2..=2000))]
     scans: u16,
-    /// Side of a finest voxel, metres
-    #[arg(long, value_name = "METRES", default_value_t = 0.04)]
+    /// Side of a finest voxel, meters
+    #[arg(long, value_name = "METERS", default_value_t = 0.04)]
     resolution: f64,
     /// Number of levels
     #[arg(long, default_value_t = 4)]
@@ -57,9 +57,9 @@ pub(super) struct Simulation {
     /// Which simulated robot's tour
     #[arg(long, value_enum, default_value_t)]
     robot: RobotKind,
-    /// Noise of the depth at one metre, metres, which grows with the depth squared; of the lidar, at any range. None in
+    /// Noise of the depth at one meter, meters, which grows with the depth squared; of the lidar, at any range. None in
     /// the paper
-    #[arg(long, value_name = "METRES", default_value_t = 0.0)]
+    #[arg(long, value_name = "METERS", default_value_t = 0.0)]
     noise: f64,
     /// Of furniture and noise
     #[arg(long, default_value_t = 1)]
@@ -171,7 +171,7 @@ impl Simulation {
         // The default filter's curves are those of the ample one, nearly.
         let shown = runs.iter().filter(|run| run.answers.name != "default filter");
         let curve = |run: &Run| {
-            let errors = run.scans.iter().map(|(_, (metres, _))| metres * 1e3);
+            let errors = run.scans.iter().map(|(_, (meters, _))| meters * 1e3);
             // The first scan's error is zero by definition, which a logarithm cannot show.
             run.curve(errors.enumerate().skip(1).filter(|(_, error)| *error > 0.0))
         };
@@ -190,7 +190,7 @@ impl Simulation {
             .collect();
         curves.push(Curve {
             name: "at the true poses".into(),
-            colour: 5,
+            color: 5,
             style: Style::Solid,
             points: numbered(at_truth.into_iter().enumerate()),
         });
@@ -235,7 +235,7 @@ fn numbered(values: impl Iterator<Item = (usize, f64)>) -> Vec<(f64, f64)> {
 struct Run {
     method: Method,
     answers: Answers,
-    /// With the errors, metres and degrees.
+    /// With the errors, meters and degrees.
     scans: Vec<(Mapped, (f64, f64))>,
     filter: FilterSummary,
     error: Option<ErrorSummary>,
@@ -248,14 +248,14 @@ impl Run {
 
     fn curve(&self, values: impl Iterator<Item = (usize, f64)>) -> Curve {
         let refined = usize::from(self.method == Method::Refined);
-        let (colour, style) = match self.answers.name {
+        let (color, style) = match self.answers.name {
             "small filter" => (2 + refined, Style::Solid),
             // On top of those of the exact set, which it hides if it is solid.
             "ample filter" => (4, Style::Dashed),
             _ => (refined, Style::Solid),
         };
         let name = format!("{}, {}", self.method.as_str(), self.answers.name);
-        Curve { name, colour, style, points: numbered(values) }
+        Curve { name, color, style, points: numbered(values) }
     }
 }
 
@@ -263,12 +263,12 @@ fn write_scans(runs: &[(Run, Vec<Pose>)], path: &Path) -> Result<(), CliError> {
     let head = ["scan", "method", "answers", "error_m", "error_deg", "voxels", "align_ms"];
     let mut table = Table::new(head);
     for (run, _) in runs {
-        for (k, (mapped, (metres, degrees))) in run.scans.iter().enumerate() {
+        for (k, (mapped, (meters, degrees))) in run.scans.iter().enumerate() {
             table.push([
                 k.to_string(),
                 run.method.as_str().to_owned(),
                 run.answers.name.to_owned(),
-                format!("{metres:.6}"),
+                format!("{meters:.6}"),
                 format!("{degrees:.5}"),
                 mapped.voxels.to_string(),
                 format!("{:.2}", mapped.align_time.as_secs_f64() * 1e3),
@@ -297,8 +297,8 @@ fn write_runs(runs: &[(Run, Vec<Pose>)], path: &Path) -> Result<(), CliError> {
             line.answers.to_owned(),
             line.filter_bits_per_voxel.map_or("-".to_owned(), |bits| bits.to_string()),
             rate,
-            millimetres(line.error_m_median, line.error_deg_median),
-            millimetres(line.error_m_max, line.error_deg_max),
+            millimeters(line.error_m_median, line.error_deg_median),
+            millimeters(line.error_m_max, line.error_deg_max),
             count(line.voxels),
             line.distance(),
         ]);
@@ -346,9 +346,9 @@ impl Line {
             false_positive_rate: filter.map(|_| run.filter.expected_false_positive_rate),
             expected_false_positives: filter.map(|_| run.filter.expected_false_positives),
             scans: run.scans.len(),
-            error_m_median: of_errors(|error| error.metres.median),
+            error_m_median: of_errors(|error| error.meters.median),
             error_deg_median: of_errors(|error| error.degrees.median),
-            error_m_max: of_errors(|error| error.metres.max),
+            error_m_max: of_errors(|error| error.meters.max),
             error_deg_max: of_errors(|error| error.degrees.max),
             voxels: run.scans.last().map_or(0, |(mapped, _)| mapped.voxels),
             poses_are_the_exact_sets: poses == exact,
@@ -360,13 +360,13 @@ impl Line {
     fn distance(&self) -> String {
         match self.poses_are_the_exact_sets {
             true => "identical".to_owned(),
-            false => millimetres(self.furthest_from_exact_m, self.furthest_from_exact_deg),
+            false => millimeters(self.furthest_from_exact_m, self.furthest_from_exact_deg),
         }
     }
 }
 
-fn millimetres(metres: f64, degrees: f64) -> String {
-    format!("{:.2} mm {degrees:.3} deg", metres * 1e3)
+fn millimeters(meters: f64, degrees: f64) -> String {
+    format!("{:.2} mm {degrees:.3} deg", meters * 1e3)
 }
 
 impl Display for Line {
@@ -374,8 +374,8 @@ impl Display for Line {
         let Self { method, answers, scans, .. } = self;
         let bits = self.filter_bits_per_voxel.map_or("-".to_owned(), |bits| bits.to_string());
         let rate = self.false_positive_rate.map_or("none".to_owned(), |rate| format!("{rate:.1e}"));
-        let median = millimetres(self.error_m_median, self.error_deg_median);
-        let max = millimetres(self.error_m_max, self.error_deg_max);
+        let median = millimeters(self.error_m_median, self.error_deg_median);
+        let max = millimeters(self.error_m_max, self.error_deg_max);
         let (voxels, distance) = (count(self.voxels), self.distance());
         write!(
             f,

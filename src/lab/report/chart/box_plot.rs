@@ -4,7 +4,7 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::{COLOURS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
+use super::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
 use crate::lab::experiment::stages::Stage;
 use crate::lab::report::{ReportError, Spread};
 
@@ -46,24 +46,24 @@ fn try_box_plot(path: &Path, title: &str, stages: &[Stage]) -> Outcome<()> {
         .draw()?;
     for (stage, name) in stages.iter().zip(&names) {
         let Some(spread) = Spread::of(stage.runs.ns_per_item()) else { continue };
-        let (colour, y) = (colour_of(stage.name), SegmentValue::CenterOf(name));
+        let (color, y) = (color_of(stage.name), SegmentValue::CenterOf(name));
         let at = |ns: f64| (ns as f32, y.clone());
         let across = |ns: f64, half: i32| {
-            EmptyElement::at(at(ns)) + PathElement::new([(0, -half), (0, half)], colour.stroke_width(2))
+            EmptyElement::at(at(ns)) + PathElement::new([(0, -half), (0, half)], color.stroke_width(2))
         };
         let [first, median, third] = spread.quartiles;
         chart.draw_series([
-            PathElement::new([at(spread.low), at(spread.high)], colour.stroke_width(2)),
+            PathElement::new([at(spread.low), at(spread.high)], color.stroke_width(2)),
             // Hides the whisker behind the box.
             PathElement::new([at(first), at(third)], WHITE.stroke_width(2 * HALF_BOX_PX as u32)),
-            PathElement::new([at(first), at(third)], colour.mix(0.4).stroke_width(2 * HALF_BOX_PX as u32)),
+            PathElement::new([at(first), at(third)], color.mix(0.4).stroke_width(2 * HALF_BOX_PX as u32)),
         ])?;
         chart.draw_series([
             across(spread.low, HALF_BOX_PX / 2),
             across(spread.high, HALF_BOX_PX / 2),
             across(median, HALF_BOX_PX),
         ])?;
-        chart.draw_series(spread.outliers.iter().map(|&ns| Circle::new(at(ns), 3, colour)))?;
+        chart.draw_series(spread.outliers.iter().map(|&ns| Circle::new(at(ns), 3, color)))?;
     }
     Ok(root.present()?)
 }
@@ -75,11 +75,11 @@ fn segment_name(segment: &SegmentValue<&&str>) -> String {
     }
 }
 
-/// One colour a structure.
-fn colour_of(stage: &str) -> RGBColor {
+/// One color a structure.
+fn color_of(stage: &str) -> RGBColor {
     let structures = ["Bloom filter", "dense array", "hash table"];
-    let colour = structures.iter().position(|structure| stage.ends_with(structure));
-    colour.map_or(BLACK, |colour| COLOURS[colour])
+    let color = structures.iter().position(|structure| stage.ends_with(structure));
+    color.map_or(BLACK, |color| COLORS[color])
 }
 
 #[cfg(test)]

@@ -19,8 +19,8 @@ const SIZE_PX: (u32, u32) = (900, 480);
 const TITLE_PX: i32 = 18;
 const LABEL_PX: i32 = 14;
 const MARGIN_PX: i32 = 12;
-/// Colours that can be told apart by those who do not see all of them, and in print.
-const COLOURS: [RGBColor; 6] = [
+/// Colors that can be told apart by those who do not see all of them, and in print.
+const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),

@@ -7,7 +7,7 @@ use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
-use super::{COLOURS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
+use super::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
 use crate::lab::report::ReportError;
 
 /// Lengths of a dash, of the gap after it, and of the piece of a curve beside its name.
@@ -57,8 +57,8 @@ pub enum Scale {
 pub struct Curve {
     /// In the legend.
     pub name: String,
-    /// Curves of one colour belong together.
-    pub colour: usize,
+    /// Curves of one color belong together.
+    pub color: usize,
     /// How the line is drawn.
     pub style: Style,
     /// Ascending by the first.
@@ -70,7 +70,7 @@ pub struct Curve {
 pub enum Style {
     /// A solid line.
     Solid,
-    /// Seen on top of a solid curve of another colour where both coincide.
+    /// Seen on top of a solid curve of another color where both coincide.
     Dashed,
 }
 
@@ -148,7 +148,7 @@ impl Panel {
             .y_label_formatter(&|value| short(*value))
             .draw()?;
         for curve in &self.curves {
-            let style = COLOURS[curve.colour % COLOURS.len()].stroke_width(2);
+            let style = COLORS[curve.color % COLORS.len()].stroke_width(2);
             let points = || curve.points.iter().copied();
             let legend = |(x, y)| [(x, y), (x + LEGEND_PX, y)];
             let drawn = match curve.style {
@@ -194,7 +194,7 @@ mod tests {
     fn panel(title: &str, x: Scale, y: Scale) -> Panel {
         let curve = |name: &str, style| Curve {
             name: format!("{title}, {name}"),
-            colour: 0,
+            color: 0,
             style,
             points: vec![(1e4, 1.0), (1e6, 2.0), (5e7, 8.0)],
         };

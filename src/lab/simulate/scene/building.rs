@@ -30,7 +30,7 @@ const NORTH_DIVIDE_M: f64 = 7.0;
 /// Where the wall between the southern rooms stands, x.
 const SOUTH_DIVIDE_M: f64 = 6.5;
 
-/// The floor of a room between its walls, map frame, metres.
+/// The floor of a room between its walls, map frame, meters.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
     /// From, to.
@@ -79,7 +79,7 @@ fn inner_walls() -> Vec<Shape> {
     .concat()
 }
 
-/// A wall along x at `y`, with doors centred at `doors`.
+/// A wall along x at `y`, with doors centered at `doors`.
 fn along_x(y: f64, x: (f64, f64), doors: &[f64]) -> Vec<Shape> {
     let piece = |(from, to): (f64, f64), (low, high): (f64, f64)| {
         Shape::cuboid([(from + to) / 2.0, y, low], [to - from, WALL_M, high - low])
@@ -87,7 +87,7 @@ fn along_x(y: f64, x: (f64, f64), doors: &[f64]) -> Vec<Shape> {
     wall(x, doors, piece)
 }
 
-/// A wall along y at `x`, with doors centred at `doors`.
+/// A wall along y at `x`, with doors centered at `doors`.
 fn along_y(x: f64, y: (f64, f64), doors: &[f64]) -> Vec<Shape> {
     let piece = |(from, to): (f64, f64), (low, high): (f64, f64)| {
         Shape::cuboid([x, (from + to) / 2.0, low], [WALL_M, to - from, high - low])

@@ -10,11 +10,11 @@ use super::building::{ARCHIVE, CORRIDOR, LOUNGE, Room, STUDY, WORKSHOP};
 use super::furniture::Kind;
 use crate::lab::simulate::route::{CAMERA_ROUTE, LIDAR_ROUTE, Route};
 
-/// How far furniture stays from the robots' routes, metres.
+/// How far furniture stays from the robots' routes, meters.
 const ROUTE_CLEARANCE_M: f64 = 0.4;
-/// Distance between the places of a route that are checked, metres.
+/// Distance between the places of a route that are checked, meters.
 const ROUTE_SPACING_M: f64 = 0.1;
-/// How far pieces stay from each other and from walls, metres.
+/// How far pieces stay from each other and from walls, meters.
 const GAP_M: f64 = 0.04;
 /// Draws before a piece is left out.
 const DRAWS_MAX: usize = 400;

@@ -1,6 +1,6 @@
 //! Pieces of furniture, built of shapes about the origin: x to the right, the back towards -y, the floor at z = 0.
 //!
-//! Lengths are metres.
+//! Lengths are meters.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

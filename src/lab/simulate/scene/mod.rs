@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use ray::{Bounds, Ray};
 use shape::Shape;
 
-/// Height of the ceiling, metres.
+/// Height of the ceiling, meters.
 const CEILING_M: f64 = 2.7;
 
 /// Four rooms and a corridor of 14 x 9 x 2.7 m, with furniture; the map frame's origin is a corner of the
@@ -29,10 +29,10 @@ impl Scene {
         Self { objects: [building::building(), furnish::furniture(seed)].concat() }
     }
 
-    /// Distance from `origin` (map frame, metres) to the first surface along `direction`, none beyond
+    /// Distance from `origin` (map frame, meters) to the first surface along `direction`, none beyond
     /// `range_max`.
     ///
-    /// Distances are in lengths of `direction`: metres for a unit vector, metres of depth for one whose
+    /// Distances are in lengths of `direction`: meters for a unit vector, meters of depth for one whose
     /// component along the optical axis is one.
     pub fn cast(&self, origin: Point3<f64>, direction: Vector3<f64>, range_max: f64) -> Option<f64> {
         let ray = Ray::new(origin, direction);
@@ -59,7 +59,7 @@ impl Object {
         Self { parts, bounds }
     }
 
-    /// The object turned by `yaw` radians about the origin's vertical, then moved by (x, y) metres.
+    /// The object turned by `yaw` radians about the origin's vertical, then moved by (x, y) meters.
     fn placed(&self, x: f64, y: f64, yaw: f64) -> Self {
         Self::new(self.parts.iter().map(|part| part.placed(x, y, yaw)).collect())
     }

@@ -46,7 +46,7 @@ pub(super) fn ball<const N: usize>(origin: [f64; N], direction: [f64; N], radius
     Some(((-half_b - root) / a, (-half_b + root) / a))
 }
 
-/// An axis-aligned box in the map frame, metres.
+/// An axis-aligned box in the map frame, meters.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
     pub(super) min: Point3<f64>,

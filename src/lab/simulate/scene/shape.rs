@@ -4,7 +4,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::ray::{Bounds, Interval, Ray, ball, intersection, slab};
 
-/// A solid in the map frame, or about the origin while furniture is built; metres.
+/// A solid in the map frame, or about the origin while furniture is built; meters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
     /// A box turned by `yaw` about its vertical axis.
@@ -16,7 +16,7 @@ pub(super) enum Shape {
 }
 
 impl Shape {
-    /// The box of `size` whose bottom's centre is `bottom`.
+    /// The box of `size` whose bottom's center is `bottom`.
     pub(super) fn cuboid(bottom: [f64; 3], size: [f64; 3]) -> Self {
         let half = Vector3::from(size) / 2.0;
         Self::Box {
@@ -27,7 +27,7 @@ impl Shape {
         }
     }
 
-    /// The upright cylinder whose bottom's centre is `bottom`.
+    /// The upright cylinder whose bottom's center is `bottom`.
     pub(super) fn cylinder(bottom: [f64; 3], radius: f64, height: f64) -> Self {
         let half_height = height / 2.0;
         Self::Cylinder { center: Point3::from(bottom) + Vector3::z() * half_height, radius, half_height }

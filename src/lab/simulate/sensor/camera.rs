@@ -18,11 +18,11 @@ pub struct DepthCamera {
     pub horizontal_fov_deg: f64,
     /// Angle across a column, degrees.
     pub vertical_fov_deg: f64,
-    /// Least depth (z) that it measures, metres.
+    /// Least depth (z) that it measures, meters.
     pub range_min_m: f64,
-    /// Largest depth (z) that it measures, metres.
+    /// Largest depth (z) that it measures, meters.
     pub range_max_m: f64,
-    /// Standard deviation of the depth at one metre, metres; it grows with the depth squared.
+    /// Standard deviation of the depth at one meter, meters; it grows with the depth squared.
     pub noise_at_1m_m: f64,
     /// Share of the returns that are lost.
     pub dropout: f64,
@@ -45,7 +45,7 @@ impl Default for DepthCamera {
 }
 
 impl DepthCamera {
-    /// One scan in the sensor frame, metres: a point for each pixel, row by row, NaN where nothing returned.
+    /// One scan in the sensor frame, meters: a point for each pixel, row by row, NaN where nothing returned.
     pub fn scan(&self, scene: &Scene, map_from_sensor: &Pose, rng: &mut ChaCha8Rng) -> Vec<Point> {
         let rows = (0..self.height_px).map(|row| tangent(row, self.height_px, self.vertical_fov_deg));
         let pixels = rows.flat_map(|y| {
@@ -64,7 +64,7 @@ impl DepthCamera {
     }
 }
 
-/// Where the centre of pixel `index` of `count`, which see `fov_deg` together, lies on the plane at z = 1.
+/// Where the center of pixel `index` of `count`, which see `fov_deg` together, lies on the plane at z = 1.
 fn tangent(index: u32, count: u32, fov_deg: f64) -> f64 {
     let half = (fov_deg / 2.0).to_radians().tan();
     ((f64::from(index) + 0.5) / f64::from(count) * 2.0 - 1.0) * half

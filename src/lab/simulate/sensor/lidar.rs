@@ -18,11 +18,11 @@ pub struct SpinningLidar {
     pub azimuths: u32,
     /// The rings are spread evenly over elevations from minus this to this, degrees.
     pub elevation_max_deg: f64,
-    /// Least distance that it measures, metres.
+    /// Least distance that it measures, meters.
     pub range_min_m: f64,
-    /// Largest distance that it measures, metres.
+    /// Largest distance that it measures, meters.
     pub range_max_m: f64,
-    /// Standard deviation of a distance, metres.
+    /// Standard deviation of a distance, meters.
     pub noise_m: f64,
     /// Share of the returns that are lost.
     pub dropout: f64,
@@ -44,7 +44,7 @@ impl Default for SpinningLidar {
 }
 
 impl SpinningLidar {
-    /// One scan in the sensor frame, metres: for each azimuth a point of each ring from the lowest, NaN where
+    /// One scan in the sensor frame, meters: for each azimuth a point of each ring from the lowest, NaN where
     /// nothing returned. The whole turn is measured from one pose, as if it took no time.
     pub fn scan(&self, scene: &Scene, map_from_sensor: &Pose, rng: &mut ChaCha8Rng) -> Vec<Point> {
         let shots = (0..self.azimuths).flat_map(|azimuth| (0..self.rings).map(move |ring| (azimuth, ring)));

@@ -25,7 +25,7 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    /// One scan in the sensor frame, metres; see the sensor's own `scan`.
+    /// One scan in the sensor frame, meters; see the sensor's own `scan`.
     pub fn scan(&self, scene: &Scene, map_from_sensor: &Pose, rng: &mut ChaCha8Rng) -> Vec<Point> {
         match self {
             Self::DepthCamera(camera) => camera.scan(scene, map_from_sensor, rng),

@@ -42,8 +42,8 @@ impl Place {
     pub(super) unsafe fn of(&self, points: &[Point], at: usize, batch: &mut Batch) -> u8 {
         // SAFETY: the feature is there.
         let [x, y, z] = unsafe { deinterleave(load(points)) };
-        let min = _mm256_set1_ps(LatticeFromPoints::QUANTISED_MIN);
-        let end = _mm256_set1_ps(LatticeFromPoints::QUANTISED_END);
+        let min = _mm256_set1_ps(LatticeFromPoints::QUANTIZED_MIN);
+        let end = _mm256_set1_ps(LatticeFromPoints::QUANTIZED_END);
         let mut valid = u8::MAX;
         let mut regions = [_mm256_setzero_si256(); 3];
         for (axis, region) in regions.iter_mut().enumerate() {
@@ -73,9 +73,9 @@ fn write(to: &mut [i32], lanes: __m256i) {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn shard([x, y, z]: [__m256i; 3]) -> __m256i {
-    let colour = _mm256_slli_epi32::<2>(_mm256_add_epi32(y, z));
-    let colour = _mm256_add_epi32(colour, _mm256_add_epi32(x, z));
-    _mm256_and_si256(colour, _mm256_set1_epi32(SHARDS as i32 - 1))
+    let color = _mm256_slli_epi32::<2>(_mm256_add_epi32(y, z));
+    let color = _mm256_add_epi32(color, _mm256_add_epi32(x, z));
+    _mm256_and_si256(color, _mm256_set1_epi32(SHARDS as i32 - 1))
 }
 
 /// The 24 coordinates of up to eight points, zeros after the last.

@@ -57,7 +57,7 @@ impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
         located
     }
 
-    /// Nothing is left to find out: neighbours' words lie apart.
+    /// Nothing is left to find out: neighbors' words lie apart.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn seek(

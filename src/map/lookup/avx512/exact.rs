@@ -12,7 +12,7 @@ use tables::{CELL_BITS, Found, Tables, within_shard};
 
 /// The table of blocks.
 ///
-/// Neighbours in a scan lie in one cluster more often than not: a point beside the one before it, or beside what the
+/// Neighbors in a scan lie in one cluster more often than not: a point beside the one before it, or beside what the
 /// sensor saw one turn of its lasers ago, which for 16, 32 or 64 of them is the same lane of the word before. A cluster
 /// that is known from either is not searched for, and where in it a block's mask is takes no memory to find out.
 ///
@@ -84,7 +84,7 @@ impl<const FETCH: bool> Probe for Exact<FETCH> {
     type Word = ExactWord;
     type Memory = ExactMemory;
 
-    /// One more than for filters: a word of neighbours needs few lines.
+    /// One more than for filters: a word of neighbors needs few lines.
     const AHEAD: usize = 3;
     const NO_WORD: ExactWord = ExactWord { cells: [eight_of(0); EIGHTS], words: [eight_of(0); EIGHTS] };
 

@@ -11,7 +11,7 @@ use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints};
 
 /// From points to indices of a level and shards.
 pub(super) struct Place {
-    quantise: Quantise,
+    quantize: Quantize,
     level: u32,
     shards: Shards,
 }
@@ -21,7 +21,7 @@ impl Place {
     #[target_feature(enable = "avx512f")]
     pub(super) fn load(lattice_from_points: &LatticeFromPoints, view: &LevelView<'_>) -> Self {
         Self {
-            quantise: Quantise::load(lattice_from_points),
+            quantize: Quantize::load(lattice_from_points),
             level: view.level,
             shards: Shards::load(view.region_shift),
         }
@@ -36,7 +36,7 @@ impl Place {
     pub(super) unsafe fn of(&self, points: &[Point]) -> ([__m512i; 3], __m512i, u16) {
         // SAFETY: the feature is there.
         let coordinates = unsafe { load(points) };
-        let (index, valid) = self.quantise.index(deinterleave(coordinates));
+        let (index, valid) = self.quantize.index(deinterleave(coordinates));
         let index = match self.level {
             0 => index,
             level => index.map(|i| _mm512_sra_epi32(i, _mm_cvtsi32_si128(level as i32))),
@@ -108,12 +108,12 @@ pub(super) fn deinterleave([a, b, c]: [__m512; 3]) -> [__m512; 3] {
 }
 
 /// The twin of [`LatticeFromPoints::index`].
-pub(super) struct Quantise {
+pub(super) struct Quantize {
     rotation: [[__m512; 3]; 3],
     translation: [__m512; 3],
 }
 
-impl Quantise {
+impl Quantize {
     #[inline]
     #[target_feature(enable = "avx512f")]
     pub(super) fn load(t: &LatticeFromPoints) -> Self {
@@ -161,8 +161,8 @@ impl Shards {
     #[target_feature(enable = "avx512f")]
     fn of(&self, index: [__m512i; 3]) -> __m512i {
         let [x, y, z] = index.map(|i| _mm512_and_si512(i, self.region));
-        let colour = _mm512_slli_epi32::<2>(_mm512_add_epi32(y, z));
-        let colour = _mm512_add_epi32(colour, _mm512_add_epi32(x, z));
-        _mm512_and_si512(_mm512_srl_epi32(colour, self.shift), _mm512_set1_epi32(SHARDS as i32 - 1))
+        let color = _mm512_slli_epi32::<2>(_mm512_add_epi32(y, z));
+        let color = _mm512_add_epi32(color, _mm512_add_epi32(x, z));
+        _mm512_and_si512(_mm512_srl_epi32(color, self.shift), _mm512_set1_epi32(SHARDS as i32 - 1))
     }
 }

@@ -4,7 +4,7 @@
 use std::arch::x86_64::*;
 
 use super::bloom::{BloomRegisters, Located};
-use super::place::{Quantise, deinterleave, load};
+use super::place::{Quantize, deinterleave, load};
 use super::registers::{halves_of, pack};
 use super::{GROUPS, LANES, WORD};
 use crate::geometry::Point;
@@ -49,12 +49,12 @@ pub(in crate::map::lookup) fn filter_contains(keys: &[u64], view: &LevelView<'_>
 /// Needs AVX-512 F and DQ, and a key for each point.
 #[target_feature(enable = "avx512f,avx512dq")]
 unsafe fn all_keys(points: &[Point], t: &LatticeFromPoints, level: u32, keys: &mut [u64]) {
-    let (quantise, level) = (Quantise::load(t), _mm_cvtsi32_si128(level as i32));
+    let (quantize, level) = (Quantize::load(t), _mm_cvtsi32_si128(level as i32));
     let none = _mm512_set1_epi64(NO_KEY as i64);
     for (points, keys) in points.chunks(LANES).zip(keys.chunks_mut(LANES)) {
         // SAFETY: the feature is there, and stores are masked to the keys that are.
         unsafe {
-            let (index, valid) = index(&quantise, level, points);
+            let (index, valid) = index(&quantize, level, points);
             let [a, b] = pack(index);
             let present = (1u32 << keys.len()) - 1;
             let (a, b) = (
@@ -71,14 +71,14 @@ unsafe fn all_keys(points: &[Point], t: &LatticeFromPoints, level: u32, keys: &m
 /// Needs AVX-512 F and DQ, and an offset for each point.
 #[target_feature(enable = "avx512f,avx512dq")]
 unsafe fn all_offsets(points: &[Point], t: &LatticeFromPoints, level: u32, grid: &Grid, offsets: &mut [u32]) {
-    let (quantise, level) = (Quantise::load(t), _mm_cvtsi32_si128(level as i32));
+    let (quantize, level) = (Quantize::load(t), _mm_cvtsi32_si128(level as i32));
     let (min, size) =
         (grid.min.map(|m| _mm512_set1_epi32(m)), grid.size.map(|s| _mm512_set1_epi32(s as i32)));
     let outside = _mm512_set1_epi32(grid.cells() as u32 as i32);
     for (points, offsets) in points.chunks(LANES).zip(offsets.chunks_mut(LANES)) {
         // SAFETY: the feature is there, and the store is masked to the offsets that are.
         unsafe {
-            let (index, mut inside) = index(&quantise, level, points);
+            let (index, mut inside) = index(&quantize, level, points);
             let cell: [__m512i; 3] = std::array::from_fn(|k| _mm512_sub_epi32(index[k], min[k]));
             for (cell, size) in cell.iter().zip(size) {
                 inside &= _mm512_cmplt_epu32_mask(*cell, size);
@@ -99,10 +99,10 @@ unsafe fn all_offsets(points: &[Point], t: &LatticeFromPoints, level: u32, grid:
 /// Needs AVX-512 F.
 #[inline]
 #[target_feature(enable = "avx512f")]
-unsafe fn index(quantise: &Quantise, level: __m128i, points: &[Point]) -> ([__m512i; 3], u16) {
+unsafe fn index(quantize: &Quantize, level: __m128i, points: &[Point]) -> ([__m512i; 3], u16) {
     // SAFETY: the feature is there.
     let coordinates = unsafe { load(points) };
-    let (index, valid) = quantise.index(deinterleave(coordinates));
+    let (index, valid) = quantize.index(deinterleave(coordinates));
     (index.map(|i| _mm512_sra_epi32(i, level)), valid)
 }
 
@@ -165,7 +165,7 @@ fn unpack(keys: __m512i) -> [__m512i; 3] {
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn shard([x, y, z]: [__m512i; 3]) -> __m512i {
-    let colour = _mm512_slli_epi64::<2>(_mm512_add_epi64(y, z));
-    let colour = _mm512_add_epi64(colour, _mm512_add_epi64(x, z));
-    _mm512_and_si512(colour, _mm512_set1_epi64(SHARDS as i64 - 1))
+    let color = _mm512_slli_epi64::<2>(_mm512_add_epi64(y, z));
+    let color = _mm512_add_epi64(color, _mm512_add_epi64(x, z));
+    _mm512_and_si512(color, _mm512_set1_epi64(SHARDS as i64 - 1))
 }

@@ -3,7 +3,7 @@
 use super::Numbers;
 use crate::voxel::Moments;
 
-/// At most [`FewPoints::MOST`], each three offsets from the voxel's centre, signed bytes in steps.
+/// At most [`FewPoints::MOST`], each three offsets from the voxel's center, signed bytes in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct FewPoints {
     offsets: [[u8; 3]; FewPoints::MOST as usize],

@@ -13,7 +13,7 @@ use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
 use crate::lab::fleet::{
-    Fleet, Planner, Question, Robot, Seen, ServerProcess, TURN_POINTS, Tally, Target, Trend,
+    Fleet, FleetError, Planner, Question, Robot, Seen, ServerProcess, TURN_POINTS, Tally, Target, Trend,
 };
 use crate::lab::workload::Order;
 use crate::map::Lookup;
@@ -181,7 +181,7 @@ impl Soak {
     }
 }
 
-fn merge(all: &mut [Tally; 2], more: &[Tally; 2]) -> Result<(), CliError> {
+fn merge(all: &mut [Tally; 2], more: &[Tally; 2]) -> Result<(), FleetError> {
     all.iter_mut().zip(more).try_for_each(|(all, more)| all.merge(more))
 }
 

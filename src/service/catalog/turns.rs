@@ -29,16 +29,16 @@ async fn told<T>(waiting: impl Future<Output = Result<T, ServiceError>>) -> (Err
 #[tokio::test(start_paused = true)]
 async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
     let progress = OpeningProgress::default();
-    let catalogue = Catalogue::open(None, &StoreSettings::default(), &progress).unwrap();
+    let catalog = Catalog::open(None, &StoreSettings::default(), &progress).unwrap();
     let settings = MapSettings::new(0.1, 4);
-    catalogue.create(named("there"), settings, MAPS_MAX).await.unwrap();
-    let turn = catalogue.writing.lock().await;
-    let busy = (ErrorCode::Unavailable, "catalogue_busy");
-    assert_eq!(told(catalogue.create(named("new"), settings, MAPS_MAX)).await, busy);
-    assert_eq!(told(catalogue.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
-    assert_eq!(told(catalogue.delete(&named("there"))).await, busy);
+    catalog.create(named("there"), settings, MAPS_MAX).await.unwrap();
+    let turn = catalog.writing.lock().await;
+    let busy = (ErrorCode::Unavailable, "catalog_busy");
+    assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX)).await, busy);
+    assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
+    assert_eq!(told(catalog.delete(&named("there"))).await, busy);
     // What is there already waits for nobody.
-    assert!(!catalogue.create(named("there"), settings, MAPS_MAX).await.unwrap().1);
+    assert!(!catalog.create(named("there"), settings, MAPS_MAX).await.unwrap().1);
     drop(turn);
-    assert!(catalogue.create(named("new"), settings, MAPS_MAX).await.unwrap().1);
+    assert!(catalog.create(named("new"), settings, MAPS_MAX).await.unwrap().1);
 }

@@ -27,7 +27,7 @@ const TURN_MAX: Duration = Duration::from_secs(10);
 
 /// Names to maps. Folders follow the same order of changes as the names: whoever makes or deletes holds `writing`.
 #[derive(Debug)]
-pub(super) struct Catalogue {
+pub(super) struct Catalog {
     maps: RwLock<Named>,
     data_dir: Option<Arc<DataDir>>,
     settings: StoreSettings,
@@ -42,7 +42,7 @@ struct Named {
     unavailable: BTreeMap<MapName, String>,
 }
 
-impl Catalogue {
+impl Catalog {
     /// Opens the maps of `data_dir`, as many as can be opened; without one, nothing outlives the process.
     pub(super) fn open(
         data_dir: Option<&Path>,
@@ -163,7 +163,7 @@ impl Catalogue {
                 "another map has been made, replaced or deleted for {TURN_MAX:?} and more: its disk hangs, or is slow; \
                  try again"
             );
-            ServiceError::new(ErrorCode::Unavailable, "catalogue_busy", message).retry_after(TURN_MAX)
+            ServiceError::new(ErrorCode::Unavailable, "catalog_busy", message).retry_after(TURN_MAX)
         })
     }
 
@@ -177,7 +177,7 @@ impl Catalogue {
         Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message))
     }
 
-    /// Takes a map into the catalogue, kept and named; the caller holds `writing`. It is built before it is kept: one that
+    /// Takes a map into the catalog, kept and named; the caller holds `writing`. It is built before it is kept: one that
     /// the server cannot build is not found again at its next start.
     async fn add(
         &self,

@@ -2,7 +2,7 @@
 //! is kept on a simulated disk. In every order of steps that it tries nobody waits for ever, and what was acknowledged
 //! is there when the folder is opened again.
 //!
-//!     cargo test --no-default-features --features shuttle --lib service::modelled
+//!     cargo test --no-default-features --features shuttle --lib service::modeled
 
 use std::path::Path;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ use crate::util::StopSignal;
 #[expect(dead_code, reason = "nothing fails here")]
 mod simulated;
 
-/// Of each modelled thread: what a change plans and a snapshot encodes takes more than the checker gives by itself.
+/// Of each modeled thread: what a change plans and a snapshot encodes takes more than the checker gives by itself.
 const STACK_BYTES: usize = 2 << 20;
 
 fn name() -> MapName {
