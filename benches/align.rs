@@ -4,7 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use mrol::align::{AlignmentSettings, Method, align};
 use mrol::geometry::{Point, Pose};
 use mrol::lab::simulate::{Scene, Tour, tours};
-use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{Lookup, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::voxel::volumetric_sample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -39,7 +39,7 @@ fn scan(tour: &Tour, step: usize) -> Vec<Point> {
 
 fn map_of(points: &[Point], map_from_sensor: &Pose) -> MultiResolutionMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).expect("settings in range");
-    let pose = TrajectoryPose::new(RobotName::new("r").expect("a name"), *map_from_sensor);
+    let pose = MappedScan::new(RobotName::new("r").expect("a name"), *map_from_sensor);
     map.committer().insert_scan(ScanRecord::of_points(pose, points, map.lattice()));
     map
 }

@@ -5,7 +5,7 @@ use bytes::Bytes;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mrol::lab::workload::{Order, Room, Site, Workload};
 use mrol::map::{
-    Change, Lookup, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
+    Change, Lookup, MapName, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord,
 };
 use mrol::service::{MapState, PointAnswer, PointQuery};
 use mrol::store::{Record, Snapshot};
@@ -82,7 +82,7 @@ fn stored(criterion: &mut Criterion) {
 fn scan(workload: Workload) -> ScanRecord {
     let queries = workload.queries(Order::Scan, POINTS, 2);
     let lattice = Lattice::new(workload.resolution_m(), 4).expect("settings");
-    let pose = TrajectoryPose::new(RobotName::new("bench").expect("a name"), queries.map_from_points);
+    let pose = MappedScan::new(RobotName::new("bench").expect("a name"), queries.map_from_points);
     ScanRecord::of_points(pose, &queries.points, &lattice)
 }
 

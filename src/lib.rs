@@ -17,7 +17,7 @@
 //!
 //! ```
 //! use mrol::geometry::{Point, Pose};
-//! use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+//! use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, MappedScan};
 //! use mrol::voxel::VoxelSet;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -26,7 +26,7 @@
 //! let map_from_sensor = Pose::translation(0.0, 0.0, 1.0);
 //!
 //! let (voxels, _out_of_range) = VoxelSet::of_points(&scan, &map.lattice().from_points(&map_from_sensor));
-//! let pose = TrajectoryPose::new(RobotName::new("r1")?, map_from_sensor);
+//! let pose = MappedScan::new(RobotName::new("r1")?, map_from_sensor);
 //! let committed = map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 //! assert_eq!((committed.revision, committed.voxels), (1, 2));
 //!

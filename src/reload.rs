@@ -12,7 +12,7 @@ use parking_lot::{Mutex, RwLock};
 ///
 /// Files are looked at, not watched: a look is a few system calls a second, and sees whatever way a file came to be
 /// replaced (written in place, renamed over, the target of a link exchanged, another file system mounted there).
-pub struct Reloaded<T, E> {
+pub struct ReloadableFile<T, E> {
     files: Vec<PathBuf>,
     make: Make<T, E>,
     current: RwLock<Arc<T>>,
@@ -47,7 +47,7 @@ pub enum Reload<E> {
     Refused(E),
 }
 
-impl<T, E: ToString> Reloaded<T, E> {
+impl<T, E: ToString> ReloadableFile<T, E> {
     /// The value that `make` makes of `files`.
     ///
     /// # Errors
@@ -100,10 +100,10 @@ impl<T, E: ToString> Reloaded<T, E> {
     }
 }
 
-impl<T, E> std::fmt::Debug for Reloaded<T, E> {
+impl<T, E> std::fmt::Debug for ReloadableFile<T, E> {
     /// The value may be secret.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Reloaded").field("files", &self.files).finish_non_exhaustive()
+        f.debug_struct("ReloadableFile").field("files", &self.files).finish_non_exhaustive()
     }
 }
 
@@ -124,7 +124,7 @@ fn appearance(file: &Metadata) -> Appearance {
 mod tests {
     use super::*;
 
-    type Number = Reloaded<u32, String>;
+    type Number = ReloadableFile<u32, String>;
 
     fn number_in(file: &Path) -> Result<Number, String> {
         let path = file.to_owned();
@@ -132,7 +132,7 @@ mod tests {
             let text = fs::read_to_string(&path).map_err(|error| error.to_string())?;
             text.parse().map_err(|_| format!("{text:?} is no number"))
         };
-        Reloaded::new(vec![file.to_owned()], make)
+        ReloadableFile::new(vec![file.to_owned()], make)
     }
 
     /// Replaces a file as an administrator's tool does.

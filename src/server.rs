@@ -1,28 +1,28 @@
 //! The daemon: its sockets, and going down within a bound.
 
-mod accepting;
+mod access_policy;
 mod answer_body;
+mod background;
 mod connection;
+mod connection_slots;
 mod endpoint;
-mod entrance;
 mod error;
 mod expiry;
 mod files;
-mod gauges;
 mod handshakes;
-mod housekeeping;
-mod open_files;
-mod places;
+mod listener;
 mod protocol;
+mod rlimit;
 mod signal;
 mod socket;
 mod starting;
 mod stream;
+mod system_readings;
 mod tls;
 mod watch;
 
 pub use error::ServerError;
-pub use files::ReloadedFiles;
+pub use files::ReloadableFiles;
 pub use signal::{Hangups, exit_after, exit_when_told, shutdown_signal};
 pub use tls::TlsError;
 
@@ -43,14 +43,14 @@ use crate::service::{Gauges, MapService, ServiceSettings};
 use crate::store::OpeningProgress;
 use crate::telemetry::{MeteredService, Metrics};
 use crate::{grpc, http};
-use accepting::{Accepting, TcpSocket};
+use background::keep_house;
 use endpoint::Endpoint;
 use files::Warnings;
-use gauges::SystemGauges;
-use housekeeping::keep_house;
+use listener::{Accepting, TcpSocket};
 use protocol::Protocol;
 use socket::UnixSocket;
 use starting::Starting;
+use system_readings::SystemGauges;
 use tls::Tls;
 use watch::{measure, watch};
 
@@ -95,9 +95,9 @@ impl Server {
     /// As there.
     pub async fn bind_with(config: Config, gauges: Arc<dyn Gauges>) -> Result<Self, ServerError> {
         let allowed_bytes = gauges.memory().map(|memory| memory.allowed_bytes);
-        let limits = open_files::within_allowed(config.limits).within_memory(allowed_bytes);
+        let limits = rlimit::within_allowed(config.limits).within_memory(allowed_bytes);
         let config = Config { limits, ..config };
-        let (access, tls) = (entrance::access(&config)?, Tls::of(&config.tls)?);
+        let (access, tls) = (access_policy::access(&config)?, Tls::of(&config.tls)?);
         let settings = ServiceSettings { gauges: Some(gauges), ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let progress = Arc::new(OpeningProgress::default());
@@ -150,12 +150,12 @@ impl Server {
     }
 
     /// The files that are read again while it runs.
-    pub fn files(&self) -> ReloadedFiles {
+    pub fn files(&self) -> ReloadableFiles {
         let warnings = Warnings {
             keys: self.config.access.expiry_warning(),
             certificates: self.config.tls.expiry_warning(),
         };
-        ReloadedFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone(), warnings)
+        ReloadableFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone(), warnings)
     }
 
     /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what

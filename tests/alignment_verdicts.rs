@@ -2,10 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-use mrol::align::{Alignment, AlignmentSettings, Verdict, WideStartSettings, align};
+use mrol::align::{Alignment, AlignmentSettings, MultiStartSettings, Verdict, align};
 use mrol::geometry::{Point, Pose, pose_difference};
 use mrol::lab::simulate::{Scene, tours};
-use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -34,7 +34,7 @@ fn map_of(points: &[Point]) -> MultiResolutionMap {
 }
 
 fn insert(map: &MultiResolutionMap, points: &[Point], pose: Pose) {
-    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), pose);
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), pose);
     map.committer().insert_scan(ScanRecord::of_points(pose, points, map.lattice()));
 }
 
@@ -149,8 +149,8 @@ fn a_square_room_without_furniture_fits_four_ways_round() {
     let scan = square(&mut ChaCha8Rng::seed_from_u64(2));
     let guess = Pose::rotation(Vector3::new(0.0, 0.0, 44f64.to_radians()));
     // Every end is doubted, so that others are looked for.
-    let wide_start = WideStartSettings { fitness_below: 1.0, ..WideStartSettings::default() };
-    let settings = AlignmentSettings { wide_start, ..AlignmentSettings::default() };
+    let multi_start = MultiStartSettings { fitness_below: 1.0, ..MultiStartSettings::default() };
+    let settings = AlignmentSettings { multi_start, ..AlignmentSettings::default() };
     let alignment = align(&map, &scan, &guess, &settings);
     assert_eq!(alignment.verdict, Verdict::Ambiguous, "{}", alignment.reason);
     assert!(alignment.reason.contains("90.0 deg away fits about as well"), "{}", alignment.reason);

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
 use mrol::map::{
-    Change, Committed, DeletionRecord, Lookup, MapContents, MapSettings, MultiResolutionMap, RobotName,
-    ScanRecord, TrajectoryPose,
+    Change, Committed, DeletionRecord, Lookup, MapContents, MapSettings, MappedScan, MultiResolutionMap,
+    RobotName, ScanRecord,
 };
 use mrol::voxel::VoxelSet;
 use shuttle::thread;
@@ -36,7 +36,7 @@ fn new_map() -> MultiResolutionMap {
 }
 
 fn insertion(map: &MultiResolutionMap, robot: &str, regions: &[u8], each: usize) -> Change {
-    let pose = TrajectoryPose {
+    let pose = MappedScan {
         robot: RobotName::new(robot).unwrap(),
         scan_id: None,
         timestamp_ns: None,

@@ -181,7 +181,7 @@ async fn a_data_folder_of_version_2_is_opened_with_its_journal() {
     let undo = json!({"revision": 2, "request_id": "u-2"});
     let again = json_of(daemon.post("/v1/maps/office/undo", undo).await).await;
     assert_eq!((&again["replayed"], &again["removed"]), (&json!(true), &json!(212)));
-    // Observations reach back to the first scan.
+    // VoxelOwnership reach back to the first scan.
     let undone = json_of(daemon.post("/v1/maps/office/undo", json!({"revision": 1})).await).await;
     assert_eq!(undone["scans"], 1);
 }

@@ -7,11 +7,11 @@
 
 mod shared_scans;
 
-use mrol::align::{AlignmentSettings, Method, WideStartSettings, align};
+use mrol::align::{AlignmentSettings, Method, MultiStartSettings, align};
 use mrol::bloom::FilterSettings;
 use mrol::geometry::{Point, Pose, pose_difference};
 use mrol::lab::simulate::{Scene, tours};
-use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{Lookup, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -21,7 +21,7 @@ const AMPLE: FilterSettings = FilterSettings { hashes: 10, bits_per_key: 4096.0 
 const SMALL: FilterSettings = FilterSettings { hashes: 2, bits_per_key: 2.0 };
 
 /// No other guesses than the first.
-const NONE: WideStartSettings = WideStartSettings {
+const NONE: MultiStartSettings = MultiStartSettings {
     fitness_below: 0.0,
     std_above: f64::MAX,
     motion_above: f64::MAX,
@@ -39,7 +39,7 @@ struct Run {
 fn map_sequence(scans: &[Vec<Point>], settings: MapSettings, lookup: Lookup, method: Method) -> Run {
     let map = MultiResolutionMap::new(settings).unwrap();
     // One ascent a scan: the bound below counts every look-up as one of an absent voxel.
-    let alignment = AlignmentSettings { lookup, method, wide_start: NONE, ..AlignmentSettings::default() };
+    let alignment = AlignmentSettings { lookup, method, multi_start: NONE, ..AlignmentSettings::default() };
     let mut run = Run { poses: vec![Pose::identity()], expected_false_positives: 0.0 };
     for (k, points) in scans.iter().enumerate() {
         if k > 0 {
@@ -55,8 +55,8 @@ fn map_sequence(scans: &[Vec<Point>], settings: MapSettings, lookup: Lookup, met
     run
 }
 
-fn pose_of(map_from_sensor: Pose) -> TrajectoryPose {
-    TrajectoryPose::new(RobotName::new("r").unwrap(), map_from_sensor)
+fn pose_of(map_from_sensor: Pose) -> MappedScan {
+    MappedScan::new(RobotName::new("r").unwrap(), map_from_sensor)
 }
 
 fn assert_identical(name: &str, scans: &[Vec<Point>], resolution_m: f64, levels: u32) {

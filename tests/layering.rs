@@ -112,7 +112,7 @@ fn generated_types_are_named_in_the_wire_layer_alone() {
 }
 
 /// What is written for wide instructions: look-ups, filling a filter, taking a block apart; and the prefetch.
-const KERNELS: [&str; 4] = ["map/lookup", "bloom/fill", "voxel/gained", "util/prefetch.rs"];
+const KERNELS: [&str; 4] = ["map/lookup", "bloom/fill", "voxel/new_keys", "util/prefetch.rs"];
 
 #[test]
 fn unsafe_code_stays_in_the_kernels() {

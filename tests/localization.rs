@@ -9,7 +9,7 @@ use mrol::align::localize::{
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Point, Pose, pose_difference, translation_m};
 use mrol::lab::simulate::{Scene, Tour, tours};
-use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::util::StopSignal;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -49,7 +49,7 @@ fn finite(tour: &Tour, scene: &Scene, k: usize, seed: u64) -> Vec<Point> {
 }
 
 fn add(map: &MultiResolutionMap, points: &[Point], map_from_sensor: Pose) {
-    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), map_from_sensor);
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), map_from_sensor);
     map.committer().insert_scan(ScanRecord::of_points(pose, points, map.lattice()));
 }
 

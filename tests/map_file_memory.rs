@@ -10,7 +10,7 @@ mod memory;
 
 use memory::Memory;
 use mrol::geometry::Pose;
-use mrol::map::{MapContents, MapSettings, RobotName, Trajectory, TrajectoryPose};
+use mrol::map::{MapContents, MapSettings, MappedScan, RobotName, Trajectory};
 use mrol::store::{MapFileLimits, Snapshot};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use uuid::Uuid;
@@ -26,11 +26,11 @@ const LIMITS: MapFileLimits =
 /// A map as a server writes it: surfaces, and a long ride.
 fn honest_file() -> Vec<u8> {
     let keys = (0..400_000).map(|i| VoxelKey::new([i % 700, i / 700, i / 9000]).unwrap());
-    let pose = |i: u64| TrajectoryPose {
+    let pose = |i: u64| MappedScan {
         scan_id: Some(i),
         revision: i + 1,
         level_overlaps: vec![0.5; 6],
-        ..TrajectoryPose::new(RobotName::new("r1").unwrap(), Pose::translation(i as f64, 0.0, 0.0))
+        ..MappedScan::new(RobotName::new("r1").unwrap(), Pose::translation(i as f64, 0.0, 0.0))
     };
     let contents = MapContents {
         trajectory: Trajectory::new((0..50_000).map(pose), Vec::new()),

@@ -7,7 +7,7 @@ mod plain_set;
 
 use mrol::bloom::FilterSettings;
 use mrol::geometry::Pose;
-use mrol::map::{MapSettings, MultiResolutionMap, Region, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord};
 use mrol::store::Snapshot;
 use mrol::voxel::{VoxelKey, VoxelSet};
 use plain_set::{PlainSet as Model, assert_equal, up};
@@ -42,8 +42,8 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
-fn pose_of(robot: &str) -> TrajectoryPose {
-    TrajectoryPose::new(RobotName::new(robot).unwrap(), Pose::identity())
+fn pose_of(robot: &str) -> MappedScan {
+    MappedScan::new(RobotName::new(robot).unwrap(), Pose::identity())
 }
 
 /// Makes the change on the map; the voxels that it added or removed.

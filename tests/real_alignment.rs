@@ -11,7 +11,7 @@ use common::{Daemon, client, json_of};
 use mrol::align::{AlignmentSettings, align};
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose, pose, pose_difference};
-use mrol::map::{MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{MapName, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::service::ScanRequest;
 use serde_json::{Value, json};
 use shared_scans::ScanSet;
@@ -28,7 +28,7 @@ fn in_process(set: &ScanSet) -> Vec<Pose> {
             None => Pose::identity(),
             Some(last) => align(&map, &points, last, &AlignmentSettings::default()).map_from_sensor,
         };
-        let pose = TrajectoryPose::new(robot(), map_from_sensor);
+        let pose = MappedScan::new(robot(), map_from_sensor);
         map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
         poses.push(map_from_sensor);
     }

@@ -9,7 +9,7 @@ use std::time::Instant;
 use mrol::align::localize::{Gravity, Localization, LocalizationQuery, LocalizationSettings, localize};
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Pose, pose_difference};
-use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use nalgebra::Vector3;
 use shared_scans::ScanSet;
 
@@ -40,7 +40,7 @@ impl Place {
     fn mapped(&self) -> MultiResolutionMap {
         let map = MultiResolutionMap::new(MapSettings::new(self.resolution_m, 6)).unwrap();
         for (k, pose) in self.set.map_from_sensor.iter().enumerate().step_by(2) {
-            let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), *pose);
+            let pose = MappedScan::new(RobotName::new("r").unwrap(), *pose);
             map.committer().insert_scan(ScanRecord::of_points(pose, &self.set.points(k), map.lattice()));
         }
         map

@@ -8,7 +8,7 @@ mod shared_scans;
 use std::collections::HashSet;
 
 use mrol::geometry::{Point, Pose};
-use mrol::map::{Lookup, MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{Lookup, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -34,7 +34,7 @@ fn brute_force_index(map: &MultiResolutionMap, point: Point, pose: &Pose) -> [i3
 
 fn insert(map: &MultiResolutionMap, points: &[Point], map_from_sensor: Pose) {
     let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_points(&map_from_sensor));
-    let pose = TrajectoryPose::new(RobotName::new("truth").unwrap(), map_from_sensor);
+    let pose = MappedScan::new(RobotName::new("truth").unwrap(), map_from_sensor);
     map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 }
 
@@ -114,7 +114,7 @@ fn assert_false_positives(set: &ScanSet, map: &MultiResolutionMap) {
             level.voxels,
             measured * 100.0,
             level.expected_rate * 100.0,
-            level.unblocked_rate * 100.0
+            level.ideal_false_positive_rate * 100.0
         );
         // A level of a few hundred voxels has too few neighbors for a rate: four standard errors on top.
         let samples = (level.voxels as f64).min(SAMPLES as f64) * 0.5;

@@ -16,8 +16,8 @@ use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
 use mrol::map::{
-    Change, DeletionRecord, Leaving, MapName, MapSettings, MultiResolutionMap, RobotName, ScanRecord,
-    TrajectoryPose, UndoRecord,
+    Change, DeletionRecord, Leaving, MapName, MapSettings, MappedScan, MultiResolutionMap, RobotName,
+    ScanRecord, UndoRecord,
 };
 use mrol::store::{DataDir, MapFolder, NotObserved, OpeningProgress, Record, Snapshot, StoreSettings};
 use mrol::util::StopSignal;
@@ -183,7 +183,7 @@ impl Kept {
         match step {
             Step::Insert { robot: number, indices } => {
                 let points: Vec<Point> = indices.iter().map(|i| i.map(|i| i as f32 + 0.5).into()).collect();
-                let pose = TrajectoryPose::new(robot(*number), Pose::identity());
+                let pose = MappedScan::new(robot(*number), Pose::identity());
                 let record = ScanRecord::of_points(pose, &points, self.map.lattice());
                 let revision = self.commit(&Change::Insertion(record));
                 model.events.push(Event::Scan(revision, indices.clone()));

@@ -4,7 +4,7 @@
 //! `MROL_GROWTH_SCANS=1000000` sets the number of scans; without, 64,000.
 
 use mrol::geometry::{Point, Pose};
-use mrol::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose, TrajectorySpacing};
+use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord, TrajectorySpacing};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -39,11 +39,11 @@ fn the_second_half_of_the_scans_adds_a_pose_a_minute_and_robot() {
     let mut half = 0;
     for scan in 0..scans {
         let (robot, step) = (scan % ROBOTS, scan / ROBOTS);
-        let pose = TrajectoryPose {
+        let pose = MappedScan {
             scan_id: Some(step),
             timestamp_ns: Some(step as i64 * 100_000_000),
             level_overlaps: vec![0.9; 4],
-            ..TrajectoryPose::new(names[robot as usize].clone(), place(robot, step, &mut random))
+            ..MappedScan::new(names[robot as usize].clone(), place(robot, step, &mut random))
         };
         map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
         // As far behind at half as in the end.

@@ -3,18 +3,18 @@
 use std::sync::Arc;
 
 use super::{Allowance, Key};
-use crate::service::{MapReach, ScanReach, ServiceError};
+use crate::service::{AllowedMaps, ScanReach, ServiceError};
 
 /// Who asks for something: the holder of a key, or anybody.
 #[derive(Debug, Clone)]
 pub struct Caller {
     key: Option<Arc<Key>>,
-    reach: MapReach,
+    reach: AllowedMaps,
 }
 
 impl Caller {
     /// Somebody without a key, who may name the maps of `reach`.
-    pub(super) fn without_key(reach: MapReach) -> Self {
+    pub(super) fn without_key(reach: AllowedMaps) -> Self {
         Self { key: None, reach }
     }
 
@@ -29,7 +29,7 @@ impl Caller {
     }
 
     /// The maps that the caller may name.
-    pub fn reach(&self) -> &MapReach {
+    pub fn reach(&self) -> &AllowedMaps {
         &self.reach
     }
 

@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Allowance, Digest, Expiry, KeyLimits, Scope};
 use crate::map::RobotName;
-use crate::service::{ErrorCode, MapReach, ScanReach, ServiceError};
+use crate::service::{AllowedMaps, ErrorCode, ScanReach, ServiceError};
 
 /// Characters of a key's name, at most.
 const NAME_LENGTH_MAX: usize = 64;
@@ -23,7 +23,7 @@ pub struct Key {
     pub(super) name: KeyName,
     pub(super) digest: Digest,
     pub(super) scope: Scope,
-    pub(super) reach: MapReach,
+    pub(super) reach: AllowedMaps,
     pub(super) robots: Option<Arc<BTreeSet<RobotName>>>,
     pub(super) expires: Option<Expiry>,
     pub(super) allowance: Arc<Allowance>,
@@ -49,7 +49,7 @@ pub(super) const KEY_EXPIRED: &str = "key_expired";
 
 impl Key {
     /// A key that counts, for every robot and for ever.
-    pub fn new(name: KeyName, digest: Digest, scope: Scope, reach: MapReach) -> Self {
+    pub fn new(name: KeyName, digest: Digest, scope: Scope, reach: AllowedMaps) -> Self {
         Self {
             name,
             digest,

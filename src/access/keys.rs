@@ -83,11 +83,11 @@ fn continued(key: Key, former: &[Arc<Key>]) -> Key {
 mod tests {
     use super::*;
     use crate::access::{KeyName, Scope};
-    use crate::service::MapReach;
+    use crate::service::AllowedMaps;
 
     fn key(name: &str, secret: &str, scope: Scope) -> Key {
         let name = KeyName::new(name).unwrap();
-        Key::new(name, Secret::new(secret).digest(), scope, MapReach::Every)
+        Key::new(name, Secret::new(secret).digest(), scope, AllowedMaps::Every)
     }
 
     #[test]

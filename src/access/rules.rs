@@ -8,14 +8,14 @@ use axum::http::Request;
 
 use super::site::{Hosts, check_origin};
 use super::{Caller, Expiry, Key, KeyFileError, KeyName, Keys, Operation, Scope, Secret};
-use crate::reload::Reloaded;
-use crate::service::{ErrorCode, MapReach, ServiceError};
+use crate::reload::ReloadableFile;
+use crate::service::{AllowedMaps, ErrorCode, ServiceError};
 
 /// The rules of a server. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
 pub struct Access {
     /// Without them anybody may do anything.
-    keys: Option<Arc<Reloaded<Keys, KeyFileError>>>,
+    keys: Option<Arc<ReloadableFile<Keys, KeyFileError>>>,
     /// Whether [`Operation::Metrics`] asks for no key.
     metrics_open: bool,
     /// The names that it answers to where there are no keys.
@@ -39,12 +39,12 @@ impl Access {
     /// When the file cannot be read or is none of keys.
     pub fn by_keys_of(file: &Path, metrics_open: bool) -> Result<Self, KeyFileError> {
         let path: PathBuf = file.to_owned();
-        let keys = Reloaded::new(vec![path.clone()], move |former| Keys::read(&path, former))?;
+        let keys = ReloadableFile::new(vec![path.clone()], move |former| Keys::read(&path, former))?;
         Ok(Self { keys: Some(Arc::new(keys)), metrics_open, hosts: Hosts::default() })
     }
 
     /// The keys, where there are any.
-    pub fn keys(&self) -> Option<&Reloaded<Keys, KeyFileError>> {
+    pub fn keys(&self) -> Option<&ReloadableFile<Keys, KeyFileError>> {
         self.keys.as_deref()
     }
 
@@ -86,15 +86,15 @@ impl Access {
     /// `Unauthenticated` where a key is needed and there is none that counts; `PermissionDenied` where it is for less.
     pub fn authorize(&self, operation: Operation, secret: Option<&Secret>) -> Result<Caller, ServiceError> {
         let Some(keys) = &self.keys else {
-            return Ok(Caller::without_key(MapReach::Every));
+            return Ok(Caller::without_key(AllowedMaps::Every));
         };
         if operation == Operation::Metrics && self.metrics_open {
-            return Ok(Caller::without_key(MapReach::Every));
+            return Ok(Caller::without_key(AllowedMaps::Every));
         }
         let key = secret.and_then(|secret| keys.current().find(secret));
         let Some(scope) = operation.scope() else {
             let key = key.filter(|key| !key.is_expired(SystemTime::now()));
-            return Ok(key.map_or_else(|| Caller::without_key(MapReach::none()), Caller::with));
+            return Ok(key.map_or_else(|| Caller::without_key(AllowedMaps::none()), Caller::with));
         };
         let key = key.ok_or_else(|| no_key(operation, secret.is_some()))?;
         if let Some(refusal) = key.expired(SystemTime::now()) {
@@ -128,7 +128,7 @@ fn check_scope(operation: Operation, scope: Scope, key: &Key) -> Result<(), Serv
 
 /// Of what speaks of every map, a key for some may see nothing. Maps that a request names are checked by the service.
 fn check_reach(operation: Operation, key: &Key) -> Result<(), ServiceError> {
-    if operation != Operation::Metrics || key.reach == MapReach::Every {
+    if operation != Operation::Metrics || key.reach == AllowedMaps::Every {
         return Ok(());
     }
     let message = format!("metrics speak of every map, key {} is for some", key.name);

@@ -8,7 +8,7 @@ use parking_lot::Mutex;
 use tokio_util::sync::CancellationToken;
 
 use super::InUse;
-use super::arrival::{Arrival, Body, HangUp};
+use super::inbound_body::{Body, CloseConnection, InboundBody};
 use super::limits::AdmissionLimits;
 use super::quota::Quota;
 use crate::service::{ErrorCode, ServiceError};
@@ -56,7 +56,7 @@ struct Known {
 
 /// Memory that is in use until this is dropped.
 #[derive(Debug)]
-pub struct Charge {
+pub struct MemoryPermit {
     bodies: Bodies,
     bytes: usize,
 }
@@ -94,7 +94,11 @@ impl Bodies {
     ///
     /// # Errors
     /// When as many requests are arriving as may be, and none was silent.
-    pub(super) fn begin(&self, is_stream: bool, hang_up: Option<HangUp>) -> Result<Arrival, ServiceError> {
+    pub(super) fn begin(
+        &self,
+        is_stream: bool,
+        hang_up: Option<CloseConnection>,
+    ) -> Result<InboundBody, ServiceError> {
         let mut known = self.0.known.lock();
         if !is_stream {
             let full = known.arriving >= self.0.limits.requests.1;
@@ -106,7 +110,7 @@ impl Bodies {
         let (number, ended) = (known.next, CancellationToken::new());
         known.next += 1;
         known.bodies.insert(number, Body::new(is_stream, ended.clone(), hang_up));
-        Ok(Arrival::new(self.clone(), number, ended))
+        Ok(InboundBody::new(self.clone(), number, ended))
     }
 
     /// More of a body has come.
@@ -157,12 +161,12 @@ impl Bodies {
     }
 
     /// The bytes of a body are somebody else's now, or nobody's.
-    pub(super) fn take(&self, number: u64) -> Charge {
+    pub(super) fn take(&self, number: u64) -> MemoryPermit {
         let mut known = self.0.known.lock();
         let bytes = known.change(number, Body::take_bytes).unwrap_or_default();
         // They are in use as before, by the charge.
         known.bytes += bytes;
-        Charge { bodies: self.clone(), bytes }
+        MemoryPermit { bodies: self.clone(), bytes }
     }
 
     /// Why a body was ended.
@@ -174,11 +178,11 @@ impl Bodies {
     ///
     /// # Errors
     /// When there is no room.
-    pub(super) fn charge(&self, bytes: usize) -> Result<Charge, ServiceError> {
+    pub(super) fn charge(&self, bytes: usize) -> Result<MemoryPermit, ServiceError> {
         let mut known = self.0.known.lock();
         self.make_room(&mut known, None, bytes)?;
         known.bytes += bytes;
-        Ok(Charge { bodies: self.clone(), bytes })
+        Ok(MemoryPermit { bodies: self.clone(), bytes })
     }
 
     /// Nobody has to do with a body any more.
@@ -273,7 +277,7 @@ impl Known {
     }
 }
 
-impl Charge {
+impl MemoryPermit {
     /// The same for something larger.
     ///
     /// # Errors
@@ -289,7 +293,7 @@ impl Charge {
     }
 }
 
-impl Drop for Charge {
+impl Drop for MemoryPermit {
     fn drop(&mut self) {
         self.bodies.0.known.lock().bytes -= self.bytes;
     }

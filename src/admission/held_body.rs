@@ -7,7 +7,7 @@ use std::task::{Context, Poll, ready};
 use axum::body::{Body, Bytes, HttpBody};
 use hyper::body::{Frame, SizeHint};
 
-use super::arrival::Arrival;
+use super::inbound_body::InboundBody;
 
 /// An answer goes to its connection in pieces of so many bytes. The connection asks for the next one when it has room,
 /// so that the most of an answer that nobody reads lies here, where it counts.
@@ -27,7 +27,7 @@ pub(super) struct HeldBody<H> {
 
 #[derive(Debug)]
 struct Held<H> {
-    answered: Option<Arrival>,
+    answered: Option<InboundBody>,
     _held: H,
 }
 
@@ -45,7 +45,7 @@ impl<H> AsRef<[u8]> for HeldPiece<H> {
 
 impl<H: Send + Sync + 'static> HeldBody<H> {
     /// `body`, with what is dropped after it.
-    pub(super) fn new(body: Body, answered: Option<Arrival>, held: H) -> Self {
+    pub(super) fn new(body: Body, answered: Option<InboundBody>, held: H) -> Self {
         if let Some(answered) = &answered {
             answered.answer_waits();
         }

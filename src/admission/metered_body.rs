@@ -7,13 +7,13 @@ use axum::body::{Body, Bytes, HttpBody};
 use hyper::body::{Frame, SizeHint};
 use tokio_util::sync::WaitForCancellationFutureOwned;
 
-use super::arrival::Arrival;
+use super::inbound_body::InboundBody;
 use crate::service::ServiceError;
 
 /// A request's body: each piece is counted when it has come, and the end is noted.
 pub(super) struct MeteredBody {
     body: Body,
-    arrival: Arrival,
+    arrival: InboundBody,
     /// Its reader has asked for a piece that has not come.
     awaited: bool,
     ended: Pin<Box<WaitForCancellationFutureOwned>>,
@@ -22,7 +22,7 @@ pub(super) struct MeteredBody {
 type Piece = Option<Result<Frame<Bytes>, axum::Error>>;
 
 impl MeteredBody {
-    pub(super) fn new(body: Body, arrival: Arrival) -> Self {
+    pub(super) fn new(body: Body, arrival: InboundBody) -> Self {
         let ended = Box::pin(arrival.ended().cancelled_owned());
         Self { body, arrival, awaited: false, ended }
     }

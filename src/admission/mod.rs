@@ -13,9 +13,9 @@
 //! once (`probes_max`, `probe_body_bytes_max`, `probe_time_max`), few scrapes (`scrapes_max`) and few watches
 //! (`health_watches_max`).
 
-mod arrival;
 mod bodies;
 mod held_body;
+mod inbound_body;
 mod limits;
 mod metered_body;
 mod of_connection;
@@ -23,11 +23,11 @@ mod probes;
 mod quota;
 mod rate;
 
-pub use arrival::{Arrival, HangUp};
-pub use bodies::{BODY_SILENT, Charge};
+pub use bodies::{BODY_SILENT, MemoryPermit};
+pub use inbound_body::{CloseConnection, InboundBody};
 pub use limits::AdmissionLimits;
 pub use of_connection::OfConnection;
-pub use rate::{Asking, Peer};
+pub use rate::{Peer, RateLimitKey};
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -124,7 +124,7 @@ impl Admission {
             return self.0.probes.answer(operation, request, handle).await;
         }
         let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
-        let asking = Asking::of(request.extensions());
+        let asking = RateLimitKey::of(request.extensions());
         self.check_rate(&asking)?;
         let own_place = asking.begin(self.0.at_once_max)?;
         let hang_up = request.extensions().get().cloned();
@@ -160,7 +160,7 @@ impl Admission {
     ///
     /// # Errors
     /// `ResourceExhausted` when the caller asks too often.
-    pub fn check_rate(&self, asking: &Asking) -> Result<(), ServiceError> {
+    pub fn check_rate(&self, asking: &RateLimitKey) -> Result<(), ServiceError> {
         asking.check_rate(self.0.rates.as_ref())
     }
 
@@ -173,7 +173,7 @@ impl Admission {
     ///
     /// # Errors
     /// `ResourceExhausted` when there is no room.
-    pub fn keep(&self, bytes: usize) -> Result<Charge, ServiceError> {
+    pub fn keep(&self, bytes: usize) -> Result<MemoryPermit, ServiceError> {
         self.0.bodies.charge(bytes)
     }
 
@@ -182,7 +182,7 @@ impl Admission {
     ///
     /// # Errors
     /// `ResourceExhausted` when there is no room.
-    pub fn keep_answer(&self, bytes: usize) -> Result<Option<Charge>, ServiceError> {
+    pub fn keep_answer(&self, bytes: usize) -> Result<Option<MemoryPermit>, ServiceError> {
         (bytes > SMALL_ANSWER_BYTES).then(|| self.keep(bytes)).transpose()
     }
 
@@ -210,8 +210,8 @@ impl Admission {
         InUse { streams: self.0.streams.taken(), ..self.0.bodies.in_use() }
     }
 
-    /// The request with a body that is counted as it arrives; a handler finds the [`Arrival`] among its extensions.
-    fn metered(mut request: Request, arrival: &Arrival) -> Result<Request, ServiceError> {
+    /// The request with a body that is counted as it arrives; a handler finds the [`InboundBody`] among its extensions.
+    fn metered(mut request: Request, arrival: &InboundBody) -> Result<Request, ServiceError> {
         request.extensions_mut().insert(arrival.clone());
         // Of other requests nobody reads the body to its end.
         let body_is_read = matches!(*request.method(), Method::POST | Method::PUT);

@@ -8,9 +8,9 @@ use axum::http::Method;
 use axum::response::Response;
 use tokio::time::timeout;
 
-use super::arrival::Arrival;
 use super::bodies::Bodies;
 use super::held_body::HeldBody;
+use super::inbound_body::InboundBody;
 use super::limits::AdmissionLimits;
 use super::of_connection::OfConnection;
 use super::quota::{Quota, Taken};
@@ -77,7 +77,7 @@ impl Probes {
     }
 
     /// The request with its body, which is there as a whole. Nobody reads that of a method without one.
-    async fn with_body(&self, request: Request, arrival: &Arrival) -> Result<Request, ServiceError> {
+    async fn with_body(&self, request: Request, arrival: &InboundBody) -> Result<Request, ServiceError> {
         if *request.method() != Method::POST {
             return Ok(request.map(|_| Body::empty()));
         }

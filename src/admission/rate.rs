@@ -34,13 +34,13 @@ impl std::fmt::Display for Peer {
 
 /// Whom a request counts for: the name of its key, or where there is none the place that it came from.
 #[derive(Debug, Clone)]
-pub struct Asking {
+pub struct RateLimitKey {
     name: String,
     /// The bounds of its key.
     own: Option<Arc<Allowance>>,
 }
 
-impl Asking {
+impl RateLimitKey {
     /// As a request's extensions say.
     pub fn of(request: &Extensions) -> Self {
         let caller = request.get::<Authorized>().map(|authorized| &authorized.caller);
@@ -87,7 +87,7 @@ impl Rates {
 
     /// # Errors
     /// When the caller asks too often; the error says when to come again.
-    pub(super) fn check(&self, asking: &Asking) -> Result<(), ServiceError> {
+    pub(super) fn check(&self, asking: &RateLimitKey) -> Result<(), ServiceError> {
         self.limiter.check_key(&asking.name).map_err(|not_yet| {
             let wait = not_yet.wait_time_from(DefaultClock::default().now());
             let message = format!(

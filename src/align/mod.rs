@@ -7,17 +7,17 @@
 mod ascent;
 mod information;
 pub mod localize;
+mod multi_start;
 mod overlap;
 mod reach;
 mod refine;
 mod settings;
 mod verdict;
-mod wide_start;
 
 pub use information::{Direction, PoseInformation};
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};
 pub use settings::{
-    AlignmentSettings, AlignmentSettingsError, Method, RefinementSettings, WideStartSettings,
+    AlignmentSettings, AlignmentSettingsError, Method, MultiStartSettings, RefinementSettings,
 };
 pub use verdict::{Alignment, Verdict};
 
@@ -82,14 +82,14 @@ pub fn align_until(
     let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
     let found = match found.is_doubtful(guess, map, settings) {
-        true if !stop.is_stopped() => wide_start::align(map, &scan, guess, found, settings),
+        true if !stop.is_stopped() => multi_start::align(map, &scan, guess, found, settings),
         _ => found,
     };
     found.within_reach_of(guess, map, settings)
 }
 
 /// Says how a scan fits the map where it is thought to be, without moving it.
-pub fn judge_at(
+pub fn evaluate_at(
     map: &MultiResolutionMap,
     points: &[Point],
     map_from_sensor: &Pose,

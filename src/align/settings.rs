@@ -57,7 +57,7 @@ pub struct AlignmentSettings {
     /// What follows the ascent with [`Method::Refined`].
     pub refinement: RefinementSettings,
     /// What to try where the ascent from the guess ends badly.
-    pub wide_start: WideStartSettings,
+    pub multi_start: MultiStartSettings,
     /// Fraction of a scan's points that must fall in occupied voxels for it to be accepted. 0.2: even a step
     /// that shows mostly new ground shares more than that with the map, a scan from elsewhere less.
     pub overlap_min: f64,
@@ -100,7 +100,7 @@ impl RefinementSettings {
 
 /// Settings of the wide start: more guesses around the first one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WideStartSettings {
+pub struct MultiStartSettings {
     /// Fitness below which the end of the first ascent is not believed, and others are tried. 0.85; 0 never tries. A scan
     /// of what the map shows has 0.9 or more, one that shows much new ground less: it pays a few times as long.
     pub fitness_below: f64,
@@ -130,7 +130,7 @@ impl Default for AlignmentSettings {
             sub_voxel_iterations_max: 100,
             sub_voxel_halvings: 4,
             refinement: RefinementSettings::default(),
-            wide_start: WideStartSettings::default(),
+            multi_start: MultiStartSettings::default(),
             overlap_min: 0.2,
             undetermined_std: 0.2,
             refinement_reach: 8.0,
@@ -147,7 +147,7 @@ impl Default for RefinementSettings {
     }
 }
 
-impl Default for WideStartSettings {
+impl Default for MultiStartSettings {
     fn default() -> Self {
         Self {
             fitness_below: 0.85,
@@ -199,9 +199,9 @@ impl AlignmentSettings {
             ("refinement_reach", self.refinement_reach),
             ("reach", self.reach),
             ("reach_deg", self.reach_deg),
-            ("wide_start.std_above", self.wide_start.std_above),
-            ("wide_start.motion_above", self.wide_start.motion_above),
-            ("wide_start.motion_above_deg", self.wide_start.motion_above_deg),
+            ("multi_start.std_above", self.multi_start.std_above),
+            ("multi_start.motion_above", self.multi_start.motion_above),
+            ("multi_start.motion_above_deg", self.multi_start.motion_above_deg),
         ];
         if let Some(&(name, value)) = positive.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
         {
@@ -209,8 +209,8 @@ impl AlignmentSettings {
         }
         let fractions = [
             ("overlap_min", self.overlap_min),
-            ("wide_start.fitness_below", self.wide_start.fitness_below),
-            ("wide_start.ambiguous_fitness", self.wide_start.ambiguous_fitness),
+            ("multi_start.fitness_below", self.multi_start.fitness_below),
+            ("multi_start.ambiguous_fitness", self.multi_start.ambiguous_fitness),
         ];
         match fractions.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
             Some(&(name, value)) => Err(AlignmentSettingsError::NotAFraction(name, value)),

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use super::*;
-use crate::map::{MapSettings, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
 use overlap::LOOKUPS_PER_LOOK;
 
 /// `count` points on two walls and a floor.
@@ -18,7 +18,7 @@ fn corner(count: usize) -> Vec<Point> {
 
 fn map() -> MultiResolutionMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
-    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
     map.committer().insert_scan(ScanRecord::of_points(pose, &corner(60_000), map.lattice()));
     map
 }

@@ -77,16 +77,16 @@ impl Alignment {
         map: &MultiResolutionMap,
         settings: &AlignmentSettings,
     ) -> bool {
-        let (resolution_m, wide_start) = (map.lattice().resolution_m(0), &settings.wide_start);
+        let (resolution_m, multi_start) = (map.lattice().resolution_m(0), &settings.multi_start);
         let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
-        if wide_start.ascents == 0 {
+        if multi_start.ascents == 0 {
             return false;
         }
-        self.fitness < wide_start.fitness_below
+        self.fitness < multi_start.fitness_below
             || self.refined_by_m > settings.refinement_reach * resolution_m
-            || self.information.directions()[0].std_m > wide_start.std_above * resolution_m
-            || meters > wide_start.motion_above * resolution_m
-            || degrees > wide_start.motion_above_deg
+            || self.information.directions()[0].std_m > multi_start.std_above * resolution_m
+            || meters > multi_start.motion_above * resolution_m
+            || degrees > multi_start.motion_above_deg
     }
 
     /// Ambiguous where it would be accepted and lies farther from the guess than was searched.
@@ -182,7 +182,7 @@ impl Alignment {
     }
 
     /// The same, accepted on the caller's word.
-    pub fn on_the_callers_word(self) -> Self {
+    pub fn accepted_by_caller(self) -> Self {
         self.but(Verdict::Accepted, "the caller's word".into())
     }
 }

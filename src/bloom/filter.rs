@@ -2,7 +2,7 @@
 
 use super::counters::{COUNTER_MAX, Counters, CountersOfWord};
 use super::fill::fill;
-use super::{FilterSettings, Probe, expected_rate, unblocked_rate};
+use super::{FilterSettings, Probe, expected_rate, ideal_false_positive_rate};
 
 /// A set of u64 keys that may answer "present" of an absent key, and never "absent" of a present one.
 ///
@@ -177,8 +177,8 @@ impl CountingBloomFilter {
     }
 
     /// What eq. (1) of the paper gives for as many keys, bits and hashes.
-    pub fn unblocked_rate(&self) -> f64 {
-        unblocked_rate(self.keys, self.plane.len() * u64::BITS as usize, self.settings.hashes)
+    pub fn ideal_false_positive_rate(&self) -> f64 {
+        ideal_false_positive_rate(self.keys, self.plane.len() * u64::BITS as usize, self.settings.hashes)
     }
 }
 

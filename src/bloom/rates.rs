@@ -58,7 +58,7 @@ impl FilterSettings {
 
 /// Eq. (1) of the paper: the false positive rate of `keys` keys in `bits` bits with `hashes` hash functions
 /// that may fall anywhere, (1 - (1 - 1/m)^(kn))^k.
-pub fn unblocked_rate(keys: usize, bits: usize, hashes: u32) -> f64 {
+pub fn ideal_false_positive_rate(keys: usize, bits: usize, hashes: u32) -> f64 {
     let hits = f64::from(hashes) * keys as f64;
     (1.0 - (1.0 - 1.0 / bits as f64).powf(hits)).powi(hashes as i32)
 }
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn equation_1_gives_the_papers_own_rate() {
         // 142,812 voxels in 6,000,000 counters with two hashes.
-        let rate = unblocked_rate(142_812, 6_000_000, 2);
+        let rate = ideal_false_positive_rate(142_812, 6_000_000, 2);
         assert!((rate - 0.00216).abs() < 1e-4, "{rate}");
     }
 
@@ -118,7 +118,7 @@ mod tests {
             let keys = 100_000;
             let words = FilterSettings { hashes, bits_per_key }.words(keys);
             let blocked = expected_rate(keys, words, hashes);
-            let free = unblocked_rate(keys, words * 64, hashes);
+            let free = ideal_false_positive_rate(keys, words * 64, hashes);
             assert!(blocked > free, "k {hashes}, {bits_per_key} bits: {blocked} against {free}");
         }
     }

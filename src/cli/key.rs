@@ -15,7 +15,7 @@ use super::output::Output;
 use super::parse;
 use crate::access::{Expiry, Key, KeyLimits, KeyName, Scope, Secret, add_to_file, to_toml};
 use crate::map::{MapName, RobotName};
-use crate::service::MapReach;
+use crate::service::AllowedMaps;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -141,7 +141,7 @@ impl NewKey {
     }
 
     fn key(&self, secret: &Secret) -> Key {
-        let reach = self.maps.clone().map_or(MapReach::Every, MapReach::from_iter);
+        let reach = self.maps.clone().map_or(AllowedMaps::Every, AllowedMaps::from_iter);
         let key = Key::new(self.name.clone(), secret.digest(), self.scope.into(), reach);
         let key = match &self.robots {
             Some(robots) => key.for_robots(robots.iter().cloned()),

@@ -112,7 +112,7 @@ impl From<&LevelInfo> for Level {
             plane_bytes: info.plane_bytes,
             counter_bytes: info.counter_bytes,
             false_positives_expected: info.expected_rate,
-            false_positives_equation_1: info.unblocked_rate,
+            false_positives_equation_1: info.ideal_false_positive_rate,
             false_positives_measured: info.measured_rate,
         }
     }

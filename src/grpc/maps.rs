@@ -6,9 +6,9 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::{Adapter, answered, service_of};
 use crate::access::Authorized;
-use crate::admission::Arrival;
+use crate::admission::InboundBody;
 use crate::map::MapName;
-use crate::service::{MapList, MapReach, ServiceError};
+use crate::service::{AllowedMaps, MapList, ServiceError};
 use crate::wire::{self, pb, snapshot_bytes, snapshot_pieces};
 use pb::maps_server::Maps;
 
@@ -79,7 +79,7 @@ impl Maps for Adapter {
         let Authorized { caller, service } = Authorized::of(pieces.extensions())?.clone();
         let service = service.maps();
         let most = service.limits().map_file_bytes_max;
-        let arrival = Arrival::of(pieces.extensions())?.clone();
+        let arrival = InboundBody::of(pieces.extensions())?.clone();
         let (name, replace, file) = gather(pieces.into_inner(), &arrival, caller.reach(), most).await?;
         let info = service.restore_map(name, file, replace).await?;
         Ok(answered(pb::RestoreMapResponse { map: Some(info.into()) }))
@@ -90,8 +90,8 @@ impl Maps for Adapter {
 /// that the caller may not name, before the second piece.
 async fn gather(
     mut pieces: Streaming<pb::RestoreMapRequest>,
-    arrival: &Arrival,
-    reach: &MapReach,
+    arrival: &InboundBody,
+    reach: &AllowedMaps,
     most: usize,
 ) -> Result<(MapName, bool, Bytes), Status> {
     let mut piece = pieces.message().await?.unwrap_or_default();

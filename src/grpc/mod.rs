@@ -1,16 +1,16 @@
 //! The gRPC adapters: convert in, call the service, convert out.
 
-mod around;
 mod deadline;
-mod inflation;
+mod deadline_body;
+mod decompression;
 mod mapping;
 mod maps;
+mod message_framing;
+mod middleware;
 mod not_grpc;
 mod occupancy;
 mod status;
 mod stream;
-mod timely_body;
-mod whole_messages;
 
 use prost::Message;
 use tonic::codec::CompressionEncoding;
@@ -20,12 +20,12 @@ use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
 use crate::access::{Authorized, Gate};
-use crate::admission::{Admission, AnswerBytes, Arrival};
+use crate::admission::{Admission, AnswerBytes, InboundBody};
 use crate::service::ServiceError;
 use crate::telemetry::MeteredService;
 use crate::wire::pb;
-use around::Around;
-use inflation::Inflation;
+use decompression::Inflation;
+use middleware::Around;
 use pb::mapping_server::{self, MappingServer};
 use pb::maps_server::{self, MapsServer};
 use pb::occupancy_server::{self, OccupancyServer};
@@ -40,7 +40,7 @@ struct Adapter {
 
 /// What the caller of `request` may use. The message counts by its own size from now on: it may have been compressed.
 fn service_of<T: Message>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
-    Arrival::of(request.extensions())?.at_least(request.get_ref().encoded_len())?;
+    InboundBody::of(request.extensions())?.at_least(request.get_ref().encoded_len())?;
     Ok(Authorized::of(request.extensions())?.service.clone())
 }
 

@@ -8,10 +8,10 @@ use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio_stream::Stream;
 use tonic::{Code, Request, Status, Streaming};
 
-use super::inflation::{Compressed, Inflation};
+use super::decompression::{Compressed, Inflation};
 use super::{Adapter, status};
 use crate::access::{Authorized, Operation};
-use crate::admission::{Admission, Arrival, Asking, Charge};
+use crate::admission::{Admission, InboundBody, MemoryPermit, RateLimitKey};
 use crate::lifecycle;
 use crate::service::ServiceError;
 use crate::sync::polled_by_runtime;
@@ -26,11 +26,11 @@ const MESSAGES_AHEAD_MAX: usize = 4;
 pub(super) struct Answers<T> {
     made: Receiver<Made<T>>,
     /// Held for the one on its way.
-    _unsent: Option<Charge>,
+    _unsent: Option<MemoryPermit>,
 }
 
 /// An answer, with the memory that it takes until it is sent.
-type Made<T> = Result<(T, Option<Charge>), Status>;
+type Made<T> = Result<(T, Option<MemoryPermit>), Status>;
 
 impl<T> Answers<T> {
     fn new(made: Receiver<Made<T>>) -> Self {
@@ -77,7 +77,7 @@ impl Adapter {
         let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let (outbox, answers) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let extensions = requests.extensions();
-        let (arrival, asking) = (Arrival::of(extensions)?.clone(), Asking::of(extensions));
+        let (arrival, asking) = (InboundBody::of(extensions)?.clone(), RateLimitKey::of(extensions));
         let (admission, authorized) = (self.admission.clone(), Authorized::of(extensions)?.clone());
         let worker = Worker { admission, asking, authorized, operation, handle, map: String::new() };
         let compressed = extensions.get().copied().unwrap_or(Compressed(true));
@@ -103,11 +103,11 @@ impl Adapter {
 }
 
 /// A request of a stream, with the memory that it takes until it is answered.
-type Read<M> = Result<(M, Charge), Status>;
+type Read<M> = Result<(M, MemoryPermit), Status>;
 
 struct Reader<M> {
     requests: Streaming<M>,
-    arrival: Arrival,
+    arrival: InboundBody,
     inflation: Inflation,
     compressed: Compressed,
     message_bytes_max: usize,
@@ -144,7 +144,7 @@ impl<M: Message> Reader<M> {
 
 struct Worker<H> {
     admission: Admission,
-    asking: Asking,
+    asking: RateLimitKey,
     authorized: Authorized,
     operation: Operation,
     handle: H,
@@ -199,7 +199,7 @@ impl<H> Worker<H> {
     }
 
     /// The answer, with room for it.
-    async fn kept<M, A, F>(&mut self, request: M) -> Result<(A, Option<Charge>), ServiceError>
+    async fn kept<M, A, F>(&mut self, request: M) -> Result<(A, Option<MemoryPermit>), ServiceError>
     where
         M: Message,
         A: prost::Message,

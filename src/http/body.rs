@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use super::error::{HttpError, excerpt};
 use super::object::Object;
 use super::{Adapter, parameters, unreadable};
-use crate::admission::Arrival;
+use crate::admission::InboundBody;
 use crate::service::{ErrorCode, PointCloud, ServiceError};
 use crate::wire::InField;
 
@@ -94,7 +94,7 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
             format!("with {JSON} the body holds everything, got the query {:?} too", excerpt(query));
         return Err(ServiceError::invalid("unexpected_query", message).into());
     }
-    let arrival = Arrival::of(request.extensions())?.clone();
+    let arrival = InboundBody::of(request.extensions())?.clone();
     let body = read(request, adapter).await?;
     arrival.at_least(body.len() * JSON_AND_PARSED)?;
     if body.len() <= PARSED_INLINE_MAX {

@@ -3,10 +3,10 @@
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonState};
+use super::middleware::Service;
 use super::object::Object;
 use super::parameters::{Map, request_id_of};
 use crate::map::Region;

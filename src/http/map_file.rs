@@ -8,9 +8,9 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 
-use super::around::Service;
 use super::error::HttpError;
 use super::maps::MapOut;
+use super::middleware::Service;
 use super::parameters::{Map, NoParameters, Parameters};
 use super::{Adapter, body, headers};
 use crate::wire::snapshot_pieces;

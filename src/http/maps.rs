@@ -4,10 +4,10 @@ use axum::http::StatusCode;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::around::Service;
 use super::body;
 use super::error::HttpError;
 use super::json::JsonState;
+use super::middleware::Service;
 use super::object::Object;
 use super::parameters::{Map, NoParameters};
 use crate::bloom::FilterSettings;
@@ -190,7 +190,7 @@ impl From<&LevelInfo> for LevelOut {
             plane_bytes: info.plane_bytes,
             counter_bytes: info.counter_bytes,
             false_positives_expected: info.expected_rate,
-            false_positives_equation_1: info.unblocked_rate,
+            false_positives_equation_1: info.ideal_false_positive_rate,
             false_positives_measured: info.measured_rate,
         }
     }

@@ -1,6 +1,5 @@
 //! The HTTP adapters, with the same meaning as gRPC: JSON for people, bytes for programs.
 
-mod around;
 mod body;
 mod deletions;
 mod error;
@@ -9,6 +8,7 @@ mod json;
 mod localization;
 mod map_file;
 mod maps;
+mod middleware;
 mod object;
 mod occupancy;
 mod parameters;
@@ -31,7 +31,7 @@ use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetReques
 
 use crate::access::Gate;
 use crate::admission::Admission;
-use around::Around;
+use middleware::Around;
 use scrapes::Scrapes;
 
 /// What every handler has at hand, besides the service that its caller may use.
@@ -48,7 +48,7 @@ pub fn router(gate: Gate, admission: Admission, message_bytes_max: usize) -> Rou
     let scrapes = Scrapes::new(admission.scrape_kept());
     routes::of_operations()
         .layer(DefaultBodyLimit::max(message_bytes_max))
-        .layer(from_fn_with_state(around, around::request))
+        .layer(from_fn_with_state(around, middleware::request))
         .layer(PropagateRequestIdLayer::x_request_id())
         .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
         .with_state(Adapter { admission, message_bytes_max, scrapes })

@@ -4,11 +4,11 @@ use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
 
-use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::headers;
 use super::json::{JsonLookup, JsonPoints, JsonPose, JsonState};
+use super::middleware::Service;
 use super::object::Object;
 use super::parameters::{self, Map};
 use crate::geometry::Pose;

@@ -7,8 +7,8 @@ use axum::response::IntoResponse;
 use serde_json::{Value, json};
 
 use super::Adapter;
-use super::around::Service;
 use super::error::HttpError;
+use super::middleware::Service;
 use super::parameters::NoParameters;
 use crate::access::Authorized;
 use crate::map::MapName;

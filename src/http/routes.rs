@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::access::{Access, Gate};
     use crate::admission::{Admission, AdmissionLimits};
-    use crate::http::around::{self, Around};
+    use crate::http::middleware::{self, Around};
     use crate::lifecycle::Lifecycle;
     use crate::service::{MapService, ServiceSettings};
     use crate::store::OpeningProgress;
@@ -75,7 +75,7 @@ mod tests {
         let around =
             Around { gate, admission: Admission::new(&AdmissionLimits::default(), Lifecycle::default()) };
         let stray = Router::new().route("/stray", get(async || "open to all"));
-        let stray = stray.layer(from_fn_with_state(around, around::request));
+        let stray = stray.layer(from_fn_with_state(around, middleware::request));
         let answer = stray
             .oneshot(Request::get("/stray").header("host", "localhost").body(Body::empty()).unwrap())
             .await

@@ -3,10 +3,10 @@
 use axum::response::Json;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::around::Service;
 use super::body::Points;
 use super::error::HttpError;
 use super::json::{JsonPoints, JsonPose, JsonState, word_of};
+use super::middleware::Service;
 use super::object::Object;
 use super::parameters::{self, Map};
 use crate::align::{Direction, Method};

@@ -7,7 +7,7 @@ use axum::body::Bytes;
 use tokio::sync::Mutex;
 use tokio::time::Instant;
 
-use crate::service::{MapReach, ServiceError};
+use crate::service::{AllowedMaps, ServiceError};
 
 /// Texts that are in memory at once, those among them that somebody still reads. Where there are as many, the newest
 /// answers however old it is.
@@ -29,7 +29,7 @@ struct Texts {
 
 #[derive(Debug)]
 struct Newest {
-    reach: MapReach,
+    reach: AllowedMaps,
     made: Instant,
     text: Arc<String>,
 }
@@ -45,7 +45,7 @@ impl Scrapes {
     /// `ResourceExhausted` where as many texts are being read as may be, and none of them is for the caller.
     pub(super) async fn text(
         &self,
-        reach: &MapReach,
+        reach: &AllowedMaps,
         make: impl AsyncFnOnce() -> String,
     ) -> Result<Bytes, ServiceError> {
         // Whoever comes meanwhile waits for the same text.
@@ -78,7 +78,7 @@ impl Texts {
     }
 
     /// Drops the caller's last text, and those that are too old for others.
-    fn forget(&mut self, reach: &MapReach, kept_for: Duration) {
+    fn forget(&mut self, reach: &AllowedMaps, kept_for: Duration) {
         self.newest.retain(|newest| newest.reach != *reach && newest.made.elapsed() < kept_for);
         // As many as there may be of callers who ask at once.
         let many = self.newest.len().saturating_sub(TEXTS_MAX - 1);
@@ -105,7 +105,7 @@ mod tests {
     const KEPT: Duration = Duration::from_secs(1);
 
     async fn scrape(scrapes: &Scrapes, number: u32) -> Bytes {
-        scrapes.text(&MapReach::Every, async || number.to_string()).await.unwrap()
+        scrapes.text(&AllowedMaps::Every, async || number.to_string()).await.unwrap()
     }
 
     #[tokio::test(start_paused = true)]
@@ -120,7 +120,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn who_may_name_other_maps_gets_another_text() {
         let scrapes = Scrapes::new(KEPT);
-        let only = MapReach::Only(Arc::new([MapName::new("a").unwrap()].into()));
+        let only = AllowedMaps::Only(Arc::new([MapName::new("a").unwrap()].into()));
         assert_eq!(scrape(&scrapes, 1).await, "1");
         assert_eq!(scrapes.text(&only, async || "a".into()).await.unwrap(), "a");
         assert_eq!(scrape(&scrapes, 2).await, "1");
@@ -136,7 +136,7 @@ mod tests {
         }
         assert_eq!(held[3], "4");
         assert!(held[4..].iter().all(|text| text == "4"));
-        let none = scrapes.text(&MapReach::none(), async || "none".into()).await;
+        let none = scrapes.text(&AllowedMaps::none(), async || "none".into()).await;
         assert_eq!(none.unwrap_err().reason, "overloaded");
         held.clear();
         assert_eq!(scrape(&scrapes, 10).await, "10");

@@ -12,11 +12,11 @@ use tokio_stream::StreamExt;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::Adapter;
-use super::around::Service;
 use super::error::HttpError;
 use super::json::{JsonPose, JsonState};
+use super::middleware::Service;
 use super::parameters::{Map, Parameters};
-use crate::map::{RobotName, TrajectoryPose};
+use crate::map::{MappedScan, RobotName};
 use crate::service::{ErrorCode, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 
 #[derive(Deserialize)]
@@ -120,8 +120,8 @@ fn json(value: &impl Serialize) -> Result<String, ServiceError> {
     serde_json::to_string(value).map_err(not_written)
 }
 
-impl From<&TrajectoryPose> for PoseOut {
-    fn from(pose: &TrajectoryPose) -> Self {
+impl From<&MappedScan> for PoseOut {
+    fn from(pose: &MappedScan) -> Self {
         Self {
             robot: pose.robot.to_string(),
             scan_id: pose.scan_id,

@@ -3,10 +3,10 @@
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::around::Service;
 use super::body;
 use super::error::HttpError;
 use super::json::JsonState;
+use super::middleware::Service;
 use super::parameters::{Map, request_id_of};
 use crate::map::RobotName;
 use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};

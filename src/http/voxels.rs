@@ -10,9 +10,9 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 
 use super::Adapter;
-use super::around::Service;
 use super::error::HttpError;
 use super::json::JsonState;
+use super::middleware::Service;
 use super::parameters::{Map, Parameters, numbers};
 use crate::map::Region;
 use crate::service::ServiceError;

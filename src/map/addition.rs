@@ -1,11 +1,11 @@
 //! What adding voxels to a shard comes to.
 
-use super::bulk::{count_each, find_each, show_each};
-use super::room::Room;
+use super::bulk::{count_each, find_each, write_plane_bits};
+use super::capacity_schedule::CapacitySchedule;
 use super::shard::{Block, Shard, levels_of};
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::StopSignal;
-use crate::voxel::{BLOCKS_PER_LOOK, Renewal, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCKS_PER_LOOK, ClusterUpdate, VoxelKey, VoxelSet};
 
 /// Keys that a filter is built of between two looks at the stop signal: some milliseconds.
 const KEYS_PER_LOOK: usize = 64 << 10;
@@ -16,7 +16,7 @@ const KEYS_PER_LOOK: usize = 64 << 10;
 #[derive(Debug)]
 #[must_use = "what is planned is counted already"]
 pub(super) struct Addition {
-    tiers: Vec<Renewal>,
+    tiers: Vec<ClusterUpdate>,
     levels: Vec<OfLevel>,
 }
 
@@ -60,7 +60,7 @@ impl Addition {
                 (0..).zip(&mut keys).for_each(|(up, keys)| before.keys_gained(voxels, block, up, keys));
             });
         }
-        self.tiers.push(Renewal::plan(table, &gains, stop));
+        self.tiers.push(ClusterUpdate::plan(table, &gains, stop));
         self.levels.extend(levels.zip(keys).map(|(level, keys)| OfLevel::plan(shard, level, keys, stop)));
         created
     }
@@ -73,7 +73,7 @@ impl Addition {
         }
         for (filter, addition) in shard.filters.iter_mut().zip(self.levels) {
             match addition {
-                OfLevel::Gains(probes) => show_each(filter, &probes, CountingBloomFilter::set_bits),
+                OfLevel::Gains(probes) => write_plane_bits(filter, &probes, CountingBloomFilter::set_bits),
                 OfLevel::Grown(larger) => *filter = larger,
             }
         }
@@ -89,7 +89,7 @@ impl OfLevel {
         if need <= filter.capacity() {
             return Self::Gains(count_each(filter, &keys, CountingBloomFilter::count_in));
         }
-        let capacity = Room::of(shard.number, level).for_items(need);
+        let capacity = CapacitySchedule::of(shard.number, level).for_items(need);
         let mut larger = CountingBloomFilter::with_capacity(capacity, filter.settings());
         stop.pieces(&keys, KEYS_PER_LOOK).for_each(|keys| larger.insert_each(keys));
         shard.level(level as u32).for_some_keys(|keys| larger.insert_each(keys));

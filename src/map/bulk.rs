@@ -3,17 +3,17 @@
 use super::shard::Block;
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::prefetch;
-use crate::voxel::{BlockMask, BlockTable, Place, VoxelKey};
+use crate::voxel::{BlockInCluster, BlockMask, ClusterTable, VoxelKey};
 
 /// How many misses are under way at once.
 const AT_ONCE: usize = 32;
 
 /// Calls `f(block, voxels there)` for each block: what leads to the next of them is fetched in three steps.
-pub(super) fn find_each(table: &BlockTable, blocks: &[&Block], mut f: impl FnMut(&Block, &BlockMask)) {
+pub(super) fn find_each(table: &ClusterTable, blocks: &[&Block], mut f: impl FnMut(&Block, &BlockMask)) {
     for blocks in blocks.chunks(AT_ONCE) {
-        let mut places = [(VoxelKey::default(), Place::default()); AT_ONCE];
+        let mut places = [(VoxelKey::default(), BlockInCluster::default()); AT_ONCE];
         for (place, block) in places.iter_mut().zip(blocks) {
-            *place = Place::of(block.0);
+            *place = BlockInCluster::of(block.0);
             prefetch(table.home(place.0));
         }
         let (mut clusters, mut last) = ([None; AT_ONCE], None);
@@ -55,7 +55,7 @@ pub(super) fn count_each(
 }
 
 /// Sets or clears what was counted.
-pub(super) fn show_each(
+pub(super) fn write_plane_bits(
     filter: &mut CountingBloomFilter,
     probes: &[Probe],
     show: impl Fn(&mut CountingBloomFilter, Probe),

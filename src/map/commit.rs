@@ -13,7 +13,7 @@ use super::removal::Removal;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
 use super::{
-    AnsweredRequest, Change, MultiResolutionMap, Request, ScanRecord, TrajectoryPose, TrajectorySpacing,
+    Change, CompletedRequest, MappedScan, MultiResolutionMap, Request, ScanRecord, TrajectorySpacing,
     UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
@@ -78,7 +78,7 @@ impl<'a> Committer<'a> {
         }
         let mut trajectory = self.map.trajectory.write();
         let revision = self.map.revision() + 1;
-        trajectory.push(TrajectoryPose { revision, new_voxels: voxels, ..scan.pose.clone() });
+        trajectory.push(MappedScan { revision, new_voxels: voxels, ..scan.pose.clone() });
         Some(self.publish(revision, voxels))
     }
 
@@ -145,7 +145,7 @@ impl<'a> Committer<'a> {
 
     fn remember(&self, request: Option<&Request>, Committed { revision, voxels }: Committed, scans: usize) {
         if let Some(Request { id, digest, caller }) = request.cloned() {
-            self.map.requests.write().push(AnsweredRequest { id, digest, caller, revision, voxels, scans });
+            self.map.requests.write().push(CompletedRequest { id, digest, caller, revision, voxels, scans });
         }
     }
 

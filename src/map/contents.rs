@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use super::{MapSettings, MapSettingsError, MultiResolutionMap, Requests, Trajectory};
+use super::{IdempotencyLog, MapSettings, MapSettingsError, MultiResolutionMap, Trajectory};
 use crate::util::StopSignal;
 use crate::voxel::{MomentSet, VoxelSet};
 
@@ -39,7 +39,7 @@ pub struct MapContents {
     /// The accepted scans.
     pub trajectory: Trajectory,
     /// Answers to changes that were asked for under an id.
-    pub requests: Requests,
+    pub requests: IdempotencyLog,
 }
 
 impl MapContents {

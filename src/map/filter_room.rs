@@ -1,7 +1,7 @@
 //! What filters take of memory: by the settings of a map, before there is one.
 
 use super::sharding::SHARDS;
-use super::{MapSettings, room};
+use super::{MapSettings, capacity_schedule};
 use crate::voxel::{BLOCK_LEVELS, VoxelSet};
 
 /// Bits of a filter for each bit of its plane: that bit, and its counter of four.
@@ -10,7 +10,7 @@ const BITS_A_BIT: f64 = 5.0;
 impl MapSettings {
     /// Bytes of memory of the filters of a map without a voxel, at most.
     pub fn empty_filter_bytes(&self) -> u64 {
-        let keys = room::FIRST * room::FACTOR;
+        let keys = capacity_schedule::FIRST * capacity_schedule::FACTOR;
         (SHARDS as f64 * f64::from(self.levels) * keys * self.filter_bytes_a_key()) as u64
     }
 
@@ -22,7 +22,7 @@ impl MapSettings {
         let keys: usize = (0..in_blocks).flat_map(of_block).sum();
         // Of the levels above each block has one voxel at most.
         let keys = keys + voxels.blocks().len() * (self.levels - in_blocks) as usize;
-        (keys as f64 * room::FACTOR * self.filter_bytes_a_key()) as u64
+        (keys as f64 * capacity_schedule::FACTOR * self.filter_bytes_a_key()) as u64
     }
 
     fn filter_bytes_a_key(&self) -> f64 {

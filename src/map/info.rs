@@ -24,7 +24,7 @@ pub struct LevelInfo {
     /// False positive rate by the closed form of the filter's layout: the mean over shards, weighted by voxels.
     pub expected_rate: f64,
     /// The same by eq. (1) of the paper.
-    pub unblocked_rate: f64,
+    pub ideal_false_positive_rate: f64,
     /// The share of absent neighbors of occupied voxels that the filter lets through; none of an empty level.
     pub measured_rate: Option<f64>,
 }
@@ -108,7 +108,7 @@ impl MultiResolutionMap {
             plane_bytes: 0,
             counter_bytes: 0,
             expected_rate: 0.0,
-            unblocked_rate: 0.0,
+            ideal_false_positive_rate: 0.0,
             measured_rate: measured_rate(view, level, samples, seed, stop),
         };
         for list in view.lists(level) {
@@ -118,11 +118,11 @@ impl MultiResolutionMap {
             info.plane_bytes += plane;
             info.counter_bytes += counters;
             info.expected_rate += filter.expected_rate() * filter.len() as f64;
-            info.unblocked_rate += filter.unblocked_rate() * filter.len() as f64;
+            info.ideal_false_positive_rate += filter.ideal_false_positive_rate() * filter.len() as f64;
         }
         let voxels = info.voxels.max(1) as f64;
         info.expected_rate /= voxels;
-        info.unblocked_rate /= voxels;
+        info.ideal_false_positive_rate /= voxels;
         info
     }
 }

@@ -6,46 +6,48 @@
 
 mod addition;
 mod bulk;
+mod capacity_schedule;
 mod change;
 pub mod commit;
 mod contents;
 mod filter_room;
+mod idempotency_log;
 mod info;
 mod level_voxels;
 pub mod lookup;
 mod moments;
 mod name;
-mod observations;
 mod occupied_voxel_list;
 mod region;
 mod removal;
-mod requests;
-mod room;
 mod settings;
 mod shard;
 mod sharding;
 mod trajectory;
 pub mod view;
+mod voxel_ownership;
 
 pub use change::{Change, DeletionRecord, Request, UndoRecord};
 pub use commit::{Committed, Committer};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
+pub use idempotency_log::{
+    CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
+};
 pub use info::{LevelInfo, MapDescription};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;
 pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
-pub use observations::{Leaving, Observations};
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError, SPHERE_M_MAX};
-pub use requests::{AnsweredRequest, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind, Requests};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{
-    ID_RANGES_PER_ROBOT_MAX, OverlapOfNoLevel, ScanRecord, Trajectory, TrajectoryPose, TrajectorySpacing,
+    ID_RANGES_PER_ROBOT_MAX, MappedScan, OverlapOfNoLevel, ScanRecord, Trajectory, TrajectorySpacing,
     WithdrawnScan,
 };
 pub use view::{LongRead, MapView};
+pub use voxel_ownership::{Leaving, VoxelOwnership};
 
 use std::sync::atomic::Ordering;
 
@@ -71,7 +73,7 @@ pub struct MultiResolutionMap {
     moments: ShardedMoments,
     shards: [RwLock<Shard>; SHARDS],
     trajectory: RwLock<Trajectory>,
-    requests: RwLock<Requests>,
+    requests: RwLock<IdempotencyLog>,
     revision: AtomicU64,
     committing: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
@@ -92,7 +94,7 @@ impl MultiResolutionMap {
             moments: ShardedMoments::new(sharding),
             shards: std::array::from_fn(|i| RwLock::new(Rank::Shard(i as u8), Shard::new(i, &settings))),
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
-            requests: RwLock::new(Rank::Requests, Requests::default()),
+            requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
             revision: AtomicU64::new(0),
             committing: Mutex::new(Rank::Commit, ()),
             long_reads: RwLock::new(Rank::LongRead, ()),
@@ -142,7 +144,7 @@ impl MultiResolutionMap {
     }
 
     /// Answers to changes that were asked for under an id.
-    pub fn requests(&self) -> RwLockReadGuard<'_, Requests> {
+    pub fn requests(&self) -> RwLockReadGuard<'_, IdempotencyLog> {
         self.requests.read()
     }
 

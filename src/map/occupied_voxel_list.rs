@@ -4,7 +4,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 
 use crate::bloom::CountingBloomFilter;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, VoxelKey};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, ClusterTable, VoxelKey};
 
 /// The occupied voxels of one level, of one shard: an exact set and the counting Bloom filter in front of it,
 /// which always hold the same keys.
@@ -14,7 +14,7 @@ use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, VoxelKey};
 #[derive(Debug, Clone, Copy)]
 pub struct OccupiedVoxelList<'a> {
     level: u32,
-    blocks: &'a BlockTable,
+    blocks: &'a ClusterTable,
     filter: &'a CountingBloomFilter,
 }
 
@@ -24,7 +24,7 @@ pub(super) fn tier_of(level: u32) -> (usize, u32) {
 }
 
 impl<'a> OccupiedVoxelList<'a> {
-    pub(super) fn new(level: u32, blocks: &'a BlockTable, filter: &'a CountingBloomFilter) -> Self {
+    pub(super) fn new(level: u32, blocks: &'a ClusterTable, filter: &'a CountingBloomFilter) -> Self {
         Self { level, blocks, filter }
     }
 
@@ -98,7 +98,7 @@ impl<'a> OccupiedVoxelList<'a> {
     }
 
     /// The exact set, shared with up to two other levels.
-    pub(crate) fn blocks(&self) -> &'a BlockTable {
+    pub(crate) fn blocks(&self) -> &'a ClusterTable {
         self.blocks
     }
 }

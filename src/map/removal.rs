@@ -1,11 +1,11 @@
 //! What taking voxels out of a shard comes to.
 
-use super::bulk::{count_each, find_each, show_each};
+use super::bulk::{count_each, find_each, write_plane_bits};
 use super::shard::{Block, Shard, levels_of};
 use super::{MapSettings, moments::MomentsLost};
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::StopSignal;
-use crate::voxel::{BLOCKS_PER_LOOK, Renewal, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCKS_PER_LOOK, ClusterUpdate, VoxelKey, VoxelSet};
 
 /// What is to be done to a shard to take voxels out at every level, found out while readers go on. Under the write lock
 /// pointers are exchanged, and at most [`CLEARED_IN_PLACE`] bits a level cleared, however much goes. It holds for the
@@ -27,7 +27,7 @@ enum Left {
     /// No voxel.
     Nothing,
     /// Some, or all.
-    Voxels { tiers: Vec<Renewal>, levels: Vec<OfLevel> },
+    Voxels { tiers: Vec<ClusterUpdate>, levels: Vec<OfLevel> },
 }
 
 /// What becomes of the bit plane of a level's filter.
@@ -84,7 +84,9 @@ impl Removal {
         }
         for (filter, level) in shard.filters.iter_mut().zip(levels) {
             match level {
-                OfLevel::Loses(cleared) => show_each(filter, &cleared, CountingBloomFilter::clear_bits),
+                OfLevel::Loses(cleared) => {
+                    write_plane_bits(filter, &cleared, CountingBloomFilter::clear_bits)
+                }
                 OfLevel::Plane { plane, keys_lost } => filter.set_plane(plane, keys_lost),
             }
         }
@@ -144,12 +146,12 @@ impl<'a> Tier<'a> {
     /// Plans for the tier; the blocks that lose their last voxel.
     fn plan(
         self,
-        tiers: &mut Vec<Renewal>,
+        tiers: &mut Vec<ClusterUpdate>,
         levels: &mut Vec<OfLevel>,
         stop: StopSignal<'_>,
     ) -> Vec<VoxelKey> {
         let Self { shard, tier, losses, emptied, keys } = self;
-        tiers.push(Renewal::plan(&shard.tiers[tier], &losses, stop));
+        tiers.push(ClusterUpdate::plan(&shard.tiers[tier], &losses, stop));
         drop(losses);
         let of_level = |(level, keys): (usize, Vec<u64>)| OfLevel::plan(&shard.filters[level], keys, stop);
         levels.extend(levels_of(tier, shard.filters.len()).zip(keys).map(of_level));

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::MapSettings;
+use super::capacity_schedule::CapacitySchedule;
 use super::occupied_voxel_list::{OccupiedVoxelList, tier_of};
-use super::room::Room;
 use crate::bloom::CountingBloomFilter;
-use crate::voxel::{BLOCK_LEVELS, BlockMask, BlockTable, VoxelKey, VoxelSet};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, ClusterTable, VoxelKey, VoxelSet};
 
 /// A block of a tier and its voxels.
 pub(super) type Block = (VoxelKey, BlockMask);
@@ -25,18 +25,22 @@ pub(super) type Block = (VoxelKey, BlockMask);
 pub(super) struct Shard {
     /// Which of the map's shards it is.
     pub(super) number: usize,
-    pub(super) tiers: Vec<BlockTable>,
+    pub(super) tiers: Vec<ClusterTable>,
     pub(super) filters: Vec<CountingBloomFilter>,
 }
 
 impl Shard {
     pub(super) fn new(number: usize, settings: &MapSettings) -> Self {
-        let filter =
-            |level| CountingBloomFilter::with_capacity(Room::of(number, level).for_items(1), settings.filter);
+        let filter = |level| {
+            CountingBloomFilter::with_capacity(
+                CapacitySchedule::of(number, level).for_items(1),
+                settings.filter,
+            )
+        };
         let tiers = tier_of(settings.levels - 1).0 + 1;
         Self {
             number,
-            tiers: std::iter::repeat_with(BlockTable::default).take(tiers).collect(),
+            tiers: std::iter::repeat_with(ClusterTable::default).take(tiers).collect(),
             filters: (0..settings.levels as usize).map(filter).collect(),
         }
     }
@@ -51,7 +55,7 @@ impl Shard {
 
     /// Bytes of memory of the exact sets.
     pub(super) fn set_bytes(&self) -> usize {
-        self.tiers.iter().map(BlockTable::bytes).sum()
+        self.tiers.iter().map(ClusterTable::bytes).sum()
     }
 
     /// The blocks of finest voxels.

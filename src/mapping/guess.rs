@@ -2,7 +2,7 @@
 
 use super::MappingError;
 use crate::geometry::{Pose, extrapolate};
-use crate::map::{RobotName, Trajectory, TrajectoryPose};
+use crate::map::{MappedScan, RobotName, Trajectory};
 
 /// Where a scan is thought to have been taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -51,7 +51,7 @@ impl Guess {
 }
 
 /// The pose of a robot that goes on as it went from `before` to `last`.
-fn constant_velocity(before: &TrajectoryPose, last: &TrajectoryPose, timestamp_ns: Option<i64>) -> Pose {
+fn constant_velocity(before: &MappedScan, last: &MappedScan, timestamp_ns: Option<i64>) -> Pose {
     let share = match [before.timestamp_ns, last.timestamp_ns, timestamp_ns] {
         // Of timestamps as far apart as the numbers go, the difference is no i64.
         [Some(t0), Some(t1), Some(t2)] if t1 > t0 && t2 > t1 => {
@@ -66,9 +66,9 @@ fn constant_velocity(before: &TrajectoryPose, last: &TrajectoryPose, timestamp_n
 mod tests {
     use super::*;
 
-    fn at(x: f64, timestamp_ns: i64) -> TrajectoryPose {
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::translation(x, 0.0, 0.0));
-        TrajectoryPose { timestamp_ns: Some(timestamp_ns), ..pose }
+    fn at(x: f64, timestamp_ns: i64) -> MappedScan {
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::translation(x, 0.0, 0.0));
+        MappedScan { timestamp_ns: Some(timestamp_ns), ..pose }
     }
 
     #[test]

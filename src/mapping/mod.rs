@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, judge_until};
 use crate::geometry::Point;
-use crate::map::{Committed, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::util::StopSignal;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
@@ -176,7 +176,7 @@ impl<'a> ScanMapper<'a> {
         let alignment = if map_is_empty {
             Alignment::trusted(guess, map.settings().levels, scan.points)
         } else if scan.at_guess {
-            judge_until(map, scan.points, &guess, settings, stop).on_the_callers_word()
+            judge_until(map, scan.points, &guess, settings, stop).accepted_by_caller()
         } else {
             align_until(map, scan.points, &guess, settings, stop)
         };
@@ -191,7 +191,7 @@ impl<'a> ScanMapper<'a> {
     /// # Errors
     /// No point lies within the map's range.
     pub fn record(&self, scan: &Scan<'_>, alignment: &Alignment) -> Result<ScanRecord, MappingError> {
-        let pose = TrajectoryPose {
+        let pose = MappedScan {
             robot: scan.robot.clone(),
             scan_id: scan.scan_id,
             timestamp_ns: scan.timestamp_ns,

@@ -6,7 +6,7 @@ use std::task::{Context, Poll, ready};
 use axum::body::{Body, Bytes, HttpBody};
 use hyper::body::{Frame, SizeHint};
 
-use super::places::InUse;
+use super::connection_slots::InUse;
 
 /// A body that keeps its connection in use until it is sent, and tells whether the client reads it: the next piece is
 /// asked for when there is room for it on the way.

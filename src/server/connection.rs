@@ -16,12 +16,12 @@ use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt;
 
 use super::CLOSING_MAX;
-use super::accepting::Accepted;
 use super::answer_body::AnswerBody;
+use super::connection_slots::ConnectionSlot;
 use super::endpoint::Endpoint;
-use super::places::Place;
+use super::listener::Accepted;
 use super::stream::{Count, Counted, secure};
-use crate::admission::{HangUp, Peer};
+use crate::admission::{CloseConnection, Peer};
 use crate::sync::polled_by_runtime;
 
 /// How long a client may leave unread what it asked for.
@@ -30,7 +30,7 @@ const UNREAD_MAX: Duration = Duration::from_secs(30);
 impl Endpoint {
     /// Serves a connection until its client closes it or leaves answers unread, it has been idle for too long, another
     /// gets its place, or the server is going down.
-    pub(super) async fn serve(self, stream: Accepted, tls: Option<TlsAcceptor>, place: Place) {
+    pub(super) async fn serve(self, stream: Accepted, tls: Option<TlsAcceptor>, place: ConnectionSlot) {
         tokio::select! {
             () = polled_by_runtime(self.serve_open(stream, tls, &place)) => {}
             () = place.lost() => {}
@@ -40,7 +40,7 @@ impl Endpoint {
         }
     }
 
-    async fn serve_open(&self, accepted: Accepted, tls: Option<TlsAcceptor>, place: &Place) {
+    async fn serve_open(&self, accepted: Accepted, tls: Option<TlsAcceptor>, place: &ConnectionSlot) {
         let Accepted { stream, peer, at } = accepted;
         let stream = match timeout(self.bounds.opening_max, secure(stream, tls)).await {
             Ok(Ok(stream)) => stream,
@@ -85,7 +85,7 @@ impl Endpoint {
 }
 
 /// Waits until a connection that is to be closed has had the time for it, and has no request in flight.
-async fn lingering(place: &Place) {
+async fn lingering(place: &ConnectionSlot) {
     sleep(CLOSING_MAX).await;
     place.idle_for(CLOSING_MAX).await;
 }
@@ -93,11 +93,11 @@ async fn lingering(place: &Place) {
 /// Answers a request; until the answer is sent, the connection is in use.
 async fn answer(
     router: Router,
-    place: Place,
+    place: ConnectionSlot,
     mut request: Request<Incoming>,
 ) -> Result<Response<Body>, Infallible> {
     let used = place.used();
-    request.extensions_mut().insert(HangUp(place.hang_up()));
+    request.extensions_mut().insert(CloseConnection(place.hang_up()));
     request.extensions_mut().insert(place.shared());
     let response = router.oneshot(request).await?;
     Ok(response.map(|body| Body::new(AnswerBody::new(body, used))))

@@ -11,8 +11,8 @@ use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-use super::accepting::Accepting;
-use super::places::Places;
+use super::connection_slots::ConnectionSlots;
+use super::listener::Accepting;
 use super::protocol::{Protocol, RuntimeExecutor};
 use super::tls::Tls;
 use crate::config::LimitsConfig;
@@ -34,7 +34,7 @@ pub(super) struct Endpoint {
     pub(super) cut: CancellationToken,
     metrics: Metrics,
     pub(super) tls: Option<Tls>,
-    places: Places,
+    places: ConnectionSlots,
     tasks: TaskTracker,
 }
 
@@ -68,7 +68,7 @@ impl Endpoint {
             cut: CancellationToken::new(),
             metrics,
             tls,
-            places: Places::new(limits.connections_max, limits.connections_reserved),
+            places: ConnectionSlots::new(limits.connections_max, limits.connections_reserved),
             tasks: TaskTracker::new(),
         }
     }

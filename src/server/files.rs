@@ -10,7 +10,7 @@ use super::protocol::Protocol;
 use super::tls::Tls;
 use crate::access::Access;
 use crate::lifecycle::Lifecycle;
-use crate::reload::{Reload, Reloaded};
+use crate::reload::{Reload, ReloadableFile};
 use crate::telemetry::Metrics;
 
 /// How often files are looked at.
@@ -18,7 +18,7 @@ const INTERVAL: Duration = Duration::from_secs(1);
 
 /// What of a server's settings is read again. A clone is another handle on the same.
 #[derive(Debug, Clone)]
-pub struct ReloadedFiles {
+pub struct ReloadableFiles {
     access: Access,
     tls: Option<Tls>,
     metrics: Metrics,
@@ -45,7 +45,7 @@ enum Look {
 }
 
 impl Look {
-    fn at<T, E: ToString>(self, files: &Reloaded<T, E>) -> Reload<E> {
+    fn at<T, E: ToString>(self, files: &ReloadableFile<T, E>) -> Reload<E> {
         match self {
             Self::IfChanged => files.refresh(),
             Self::Anyway => files.reload(),
@@ -53,7 +53,7 @@ impl Look {
     }
 }
 
-impl ReloadedFiles {
+impl ReloadableFiles {
     pub(super) fn new(access: Access, tls: Option<Tls>, metrics: Metrics, warnings: Warnings) -> Self {
         for (file, is_there) in [(KEYS, access.keys().is_some()), (CERTIFICATES, tls.is_some())] {
             if is_there {

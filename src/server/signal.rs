@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::ReloadedFiles;
+use super::ReloadableFiles;
 
 /// Waits for the process to be told to end: ctrl-c or SIGTERM.
 pub async fn shutdown_signal() {
@@ -76,7 +76,7 @@ impl Hangups {
     }
 
     /// Reads `files` again at each signal, for ever.
-    pub async fn reload(self, files: ReloadedFiles) {
+    pub async fn reload(self, files: ReloadableFiles) {
         let Some(mut signals) = self.0 else { return };
         while signals.recv().await.is_some() {
             if files.exist() {

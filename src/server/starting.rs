@@ -7,8 +7,8 @@ use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 use super::CLOSING_MAX;
-use super::accepting::{Accepting, TcpSocket};
 use super::endpoint::Endpoint;
+use super::listener::{Accepting, TcpSocket};
 use super::protocol::Protocol;
 use super::tls::Tls;
 use crate::config::LimitsConfig;

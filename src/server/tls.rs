@@ -16,7 +16,7 @@ use x509_parser::parse_x509_certificate;
 use super::handshakes::FailedHandshakes;
 use super::protocol::Protocol;
 use crate::config::TlsConfig;
-use crate::reload::{Reloaded, is_open_to_others};
+use crate::reload::{ReloadableFile, is_open_to_others};
 
 /// Why connections cannot be secured.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +42,7 @@ pub enum TlsError {
 /// What TCP connections are secured with. A clone is another handle on the same certificates.
 #[derive(Debug, Clone)]
 pub(super) struct Tls {
-    files: Arc<Reloaded<Certificates, TlsError>>,
+    files: Arc<ReloadableFile<Certificates, TlsError>>,
     failures: Arc<FailedHandshakes>,
 }
 
@@ -76,11 +76,11 @@ impl Tls {
         let (certificate, key, client_ca) = (certificate.clone(), key.clone(), settings.client_ca.clone());
         let read =
             move |_: Option<&Certificates>| Certificates::read(&certificate, &key, client_ca.as_deref());
-        Ok(Some(Self { files: Arc::new(Reloaded::new(files, read)?), failures: Arc::default() }))
+        Ok(Some(Self { files: Arc::new(ReloadableFile::new(files, read)?), failures: Arc::default() }))
     }
 
     /// The files, to be read again.
-    pub(super) fn files(&self) -> &Reloaded<Certificates, TlsError> {
+    pub(super) fn files(&self) -> &ReloadableFile<Certificates, TlsError> {
         &self.files
     }
 

@@ -15,7 +15,7 @@ use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
 use super::reach::Reachable;
-use super::{ErrorCode, MapReach, ServiceError, UnavailableMap};
+use super::{AllowedMaps, ErrorCode, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
 use crate::store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
@@ -79,12 +79,12 @@ impl Catalog {
     }
 
     /// The maps that a caller may name.
-    pub(super) fn within(&self, reach: &MapReach) -> Vec<Arc<HostedMap>> {
+    pub(super) fn within(&self, reach: &AllowedMaps) -> Vec<Arc<HostedMap>> {
         self.maps.read().open.values().filter(|map| reach.covers(&map.name)).cloned().collect()
     }
 
     /// Those that could not be opened.
-    pub(super) fn unavailable_within(&self, reach: &MapReach) -> Vec<UnavailableMap> {
+    pub(super) fn unavailable_within(&self, reach: &AllowedMaps) -> Vec<UnavailableMap> {
         let maps = self.maps.read();
         let reachable = maps.unavailable.iter().filter(|(name, _)| reach.covers(name));
         reachable

@@ -19,7 +19,7 @@ use std::sync::{Arc, OnceLock};
 
 use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 
-use super::room::Promise;
+use super::resource_budget::Reservation;
 use super::{ErrorCode, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::store::{MapFolder, Pin, Record, StoreError, StoreSettings};
@@ -44,7 +44,7 @@ pub(super) struct Decided {
     /// Where it was made before.
     pub(super) record: Option<Record>,
     /// The memory that it takes.
-    pub(super) lent: Vec<Promise>,
+    pub(super) lent: Vec<Reservation>,
     /// Keeps what it was made of until it is visible.
     pub(super) pin: Option<Pin>,
 }
@@ -66,7 +66,7 @@ pub(super) struct Prepared {
     pub(super) if_empty: bool,
     pub(super) turn: Turn,
     /// The memory that it takes.
-    pub(super) promise: Promise,
+    pub(super) reservation: Reservation,
 }
 
 /// Why a change was not made.
@@ -102,7 +102,7 @@ struct Waiting {
 
 /// The way into a map. Dropping it ends the map's thread, after the changes that wait.
 #[derive(Debug)]
-pub(super) struct Committing {
+pub(super) struct CommitQueue {
     inbox: SyncSender<Waiting>,
     stopped: Arc<OnceLock<Stop>>,
     /// True once no other revision will come: those who wait for one hold the map, and so its thread.
@@ -140,7 +140,7 @@ impl CommitThread {
     }
 }
 
-impl Committing {
+impl CommitQueue {
     /// Gives `thread` a map. `announced` is told of each revision.
     pub(super) fn begin(
         thread: CommitThread,

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::committing::{Decided, Proposal, Refusal, Step};
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
-use super::room::Room;
+use super::resource_budget::ResourceBudget;
 use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError, check_not_stopped};
 use crate::geometry::Point;
 use crate::map::{
-    AnsweredRequest, CallerName, Change, Committed, DeletionRecord, MultiResolutionMap, Region, Request,
+    CallerName, Change, Committed, CompletedRequest, DeletionRecord, MultiResolutionMap, Region, Request,
     RequestKind, SHARDS,
 };
 use crate::util::StopSignal;
@@ -21,7 +21,7 @@ impl HostedMap {
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
         caller: Option<&CallerName>,
-        room: &Arc<Room>,
+        room: &Arc<ResourceBudget>,
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request {
@@ -39,13 +39,13 @@ impl HostedMap {
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Deletion, request.as_ref(), former)?;
-            let lent = room.lend(search_bytes(core, &deletion), "a deletion")?;
+            let lent = room.reserve_transient(search_bytes(core, &deletion), "a deletion")?;
             let voxels = map.targets_of(&deletion, stop)?;
             if voxels.is_empty() {
                 return Ok(None);
             }
             drop(lent);
-            let lent = vec![room.lend(removal_bytes(core, &voxels), "a deletion")?];
+            let lent = vec![room.reserve_transient(removal_bytes(core, &voxels), "a deletion")?];
             let change = Change::Deletion(DeletionRecord { voxels, request });
             Ok(Some(Decided { change, record: None, lent, pin: None }))
         };
@@ -65,7 +65,7 @@ impl HostedMap {
         kind: RequestKind,
         request: Option<&Request>,
         former_digest: u64,
-    ) -> Result<Option<AnsweredRequest>, ServiceError> {
+    ) -> Result<Option<CompletedRequest>, ServiceError> {
         let Some(request) = request else {
             return Ok(None);
         };

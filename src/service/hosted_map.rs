@@ -9,9 +9,9 @@ use bytes::Bytes;
 use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
-use super::committing::{CommitThread, Committing, Stop};
+use super::committing::{CommitQueue, CommitThread, Stop};
 use super::map_file::snapshot_bytes;
-use super::room::Room;
+use super::resource_budget::ResourceBudget;
 use super::trajectory::thin;
 use super::{
     ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, VoxelListing,
@@ -41,7 +41,7 @@ pub(super) struct HostedMap {
     pub(super) map: Arc<MultiResolutionMap>,
     /// What keeps it across restarts, where anything does.
     pub(super) folder: Option<Arc<MapFolder>>,
-    pub(super) committing: Committing,
+    pub(super) committing: CommitQueue,
     /// The last revision that was published.
     announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
@@ -88,7 +88,7 @@ impl HostedMap {
     ) -> Self {
         let (announcing, announced) = watch::channel(map.revision());
         let committing =
-            Committing::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), announcing, settings);
+            CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), announcing, settings);
         Self {
             name,
             uuid,
@@ -104,7 +104,7 @@ impl HostedMap {
 
     /// Writes a snapshot where there is need and room for one; true when it did. A map whose journal failed is left as
     /// it is.
-    pub(super) fn save(&self, which: Saving, room: &Room) -> Result<bool, StoreError> {
+    pub(super) fn save(&self, which: Saving, room: &ResourceBudget) -> Result<bool, StoreError> {
         let Some(folder) = self.folder.as_ref().filter(|_| self.committing.stopped().is_none()) else {
             return Ok(false);
         };
@@ -112,7 +112,8 @@ impl HostedMap {
         if !changed || which == Saving::Due && !folder.snapshot_is_due() {
             return Ok(false);
         }
-        let lent = room.check_to_shrink().and_then(|()| room.lend(self.snapshot_bytes(), "a snapshot"));
+        let lent =
+            room.check_to_shrink().and_then(|()| room.reserve_transient(self.snapshot_bytes(), "a snapshot"));
         let Ok(_lent) = lent.inspect_err(|no_room| self.put_off(&no_room.message)) else {
             return Ok(false);
         };
@@ -134,7 +135,7 @@ impl HostedMap {
     }
 
     /// Gives up what is kept for undo alone, where the disk is so full that changes will be refused next.
-    pub(super) fn make_room(&self, room: &Room) -> Result<(), StoreError> {
+    pub(super) fn make_room(&self, room: &ResourceBudget) -> Result<(), StoreError> {
         let Some(folder) = self.folder.as_ref().filter(|_| room.is_disk_scarce()) else { return Ok(()) };
         match folder.give_up_undo() {
             Ok(true) => {
@@ -169,7 +170,7 @@ impl HostedMap {
     }
 
     /// Waits until the robot's earlier scans are done.
-    pub(super) async fn turn_of(&self, robot: &RobotName) -> OwnedMutexGuard<()> {
+    pub(super) async fn lock_robot(&self, robot: &RobotName) -> OwnedMutexGuard<()> {
         let turn = {
             let mut turns = self.turns.lock();
             if turns.len() >= TURNS_KEPT {
@@ -181,7 +182,11 @@ impl HostedMap {
     }
 
     /// Waits until `revision` is there. Who waits hears of the map's end at once.
-    pub(super) async fn reached(&self, revision: u64, wait_max: Duration) -> Result<(), ServiceError> {
+    pub(super) async fn wait_for_revision(
+        &self,
+        revision: u64,
+        wait_max: Duration,
+    ) -> Result<(), ServiceError> {
         let mut announced = self.announced.clone();
         let reached = async {
             tokio::select! {

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
-use super::room::{Promise, Room};
+use super::resource_budget::{Reservation, ResourceBudget};
 use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::Verdict;
 use crate::align::localize::{
@@ -146,14 +146,14 @@ impl HostedMap {
         &self,
         request: &LocalizationRequest,
         settings: &ServiceSettings,
-        room: &Room,
+        room: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let start = Instant::now();
         let limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
         let stop = stop.by(start + limit);
         let all = request.points.as_slice();
-        let _copy = room.lend(size_of_val(all) as u64, WHOM)?;
+        let _copy = room.reserve_transient(size_of_val(all) as u64, WHOM)?;
         let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
         if points.is_empty() {
             let message =
@@ -161,14 +161,15 @@ impl HostedMap {
             return Err(ServiceError::invalid("no_returns", message));
         }
         let search = search_settings(settings.limits.localization_grid_bytes_max);
-        let mut lent: Vec<Promise> = Vec::new();
+        let mut lent: Vec<Reservation> = Vec::new();
         let mut refused = None;
         let supervision = &mut Supervision {
             stop,
             search_stop: stop.by(start + limit.mul_f64(SEARCH_SHARE)),
             progress: &mut |_| (),
             reserve: &mut |bytes| {
-                let more = room.lend(bytes as u64, WHOM).map(|promise| lent.push(promise));
+                let more =
+                    room.reserve_transient(bytes as u64, WHOM).map(|reservation| lent.push(reservation));
                 more.map_err(|error| refused = Some(error)).is_ok()
             },
         };

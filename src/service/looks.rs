@@ -7,15 +7,15 @@ use uuid::Uuid;
 use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::from_file;
-use super::room::Room;
+use super::resource_budget::ResourceBudget;
 use super::{
     ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceError, ServiceSettings,
 };
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
 use crate::map::{
-    Lookup, MapContents, MapName, MapSettings, MultiResolutionMap, Region, RobotName, SHARDS, ScanRecord,
-    TrajectoryPose,
+    Lookup, MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, SHARDS,
+    ScanRecord,
 };
 use crate::mapping::Guess;
 use crate::store::StoreSettings;
@@ -32,7 +32,7 @@ fn robot() -> RobotName {
 
 fn hosted() -> HostedMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
-    let pose = TrajectoryPose::new(robot(), Pose::identity());
+    let pose = MappedScan::new(robot(), Pose::identity());
     map.committer().insert_scan(ScanRecord::of_points(pose, &wall(10_000), map.lattice()));
     {
         let name = MapName::new("a").unwrap();
@@ -106,7 +106,7 @@ fn an_alignment_whose_time_is_up_says_so_and_one_whose_caller_has_gone_is_not_to
 #[test]
 fn a_search_whose_caller_has_gone_is_no_answer_and_one_whose_time_is_up_is() {
     let (map, settings) = (hosted(), ServiceSettings::default());
-    let room = Room::new(None, Marks::default());
+    let room = ResourceBudget::new(None, Marks::default());
     let request = LocalizationRequest {
         points: PointCloud::from(wall(10_000)),
         query: LocalizationQuery { candidates: 1, ..LocalizationQuery::default() },
@@ -121,7 +121,7 @@ fn a_search_whose_caller_has_gone_is_no_answer_and_one_whose_time_is_up_is() {
 
 #[test]
 fn a_map_file_is_made_and_read_and_a_map_described_with_looks_in_proportion_to_its_size() {
-    let (room, limits) = (Room::new(None, Marks::default()), ServiceSettings::default().limits);
+    let (room, limits) = (ResourceBudget::new(None, Marks::default()), ServiceSettings::default().limits);
     for side in [40, 160, 320] {
         let (map, bytes) = sheet(side);
         let looks = Cell::new(0);
@@ -140,7 +140,7 @@ fn a_map_file_is_made_and_read_and_a_map_described_with_looks_in_proportion_to_i
 
 #[test]
 fn a_map_file_or_a_description_that_nobody_waits_for_is_given_up_at_the_next_look() {
-    let (room, limits) = (Room::new(None, Marks::default()), ServiceSettings::default().limits);
+    let (room, limits) = (ResourceBudget::new(None, Marks::default()), ServiceSettings::default().limits);
     let (map, _) = sheet(100);
     let file = map.to_file(&room, &limits, StopSignal::NEVER).unwrap().bytes;
     for looks_max in (0..20).chain([50, 100]) {

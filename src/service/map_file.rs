@@ -4,8 +4,8 @@ use uuid::Uuid;
 
 use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
-use super::room::Promise;
-use super::room::Room;
+use super::resource_budget::Reservation;
+use super::resource_budget::ResourceBudget;
 use super::{ErrorCode, Limits, MapFile, ServiceError, ended_early};
 use crate::map::MultiResolutionMap;
 use crate::store::{MapFileError, MapFileLimits, Snapshot, body_bytes};
@@ -18,11 +18,11 @@ impl HostedMap {
     /// `ResourceExhausted` for one that [`from_file`] would refuse: a backup that cannot be restored is none.
     pub(super) fn to_file(
         &self,
-        room: &Room,
+        room: &ResourceBudget,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<MapFile, ServiceError> {
-        let _lent = room.lend(self.snapshot_bytes(), "a map file")?;
+        let _lent = room.reserve_transient(self.snapshot_bytes(), "a map file")?;
         let ended = || ended_early(stop);
         let snapshot = Snapshot::of_until(&self.map, self.uuid, stop).ok_or_else(ended)?;
         let encoded = snapshot.encode_until(stop);
@@ -47,7 +47,7 @@ pub(super) struct BuiltMap {
     pub(super) uuid: Uuid,
     pub(super) map: MultiResolutionMap,
     /// Memory for its first snapshot.
-    pub(super) saving: Promise,
+    pub(super) saving: Reservation,
 }
 
 /// What a file holds, as a map of its own. Memory is reserved for each part before it is built, so that a file which is
@@ -55,7 +55,7 @@ pub(super) struct BuiltMap {
 pub(super) fn from_file(
     file: &[u8],
     limits: &Limits,
-    room: &Room,
+    room: &ResourceBudget,
     stop: StopSignal<'_>,
 ) -> Result<BuiltMap, ServiceError> {
     let bounds = MapFileLimits {

@@ -7,14 +7,14 @@ use super::committing::{Prepared, Proposal, Step, Turn, record_of};
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
-use super::room::Room;
+use super::resource_budget::ResourceBudget;
 use super::trajectory::check_not_forgotten;
 use super::{
     ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped,
 };
 use crate::align::{AlignmentSettings, Verdict};
 use crate::geometry::{Point, Pose};
-use crate::map::{Change, Committed, Lookup, ScanRecord, TrajectoryPose};
+use crate::map::{Change, Committed, Lookup, MappedScan, ScanRecord};
 use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper};
 use crate::util::StopSignal;
 
@@ -25,7 +25,7 @@ impl HostedMap {
         request: &ScanRequest,
         turn: Turn,
         settings: &ServiceSettings,
-        room: &Room,
+        room: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<Step<ScanAnswer>, ServiceError> {
         self.check_writable()?;
@@ -49,11 +49,11 @@ impl HostedMap {
         }
         let ScanRecord { voxels, moments, .. } = &scan_record;
         let moments = moments.as_slice().len();
-        let promise = room.promise(growth_bytes(self.map.settings(), voxels, moments))?;
+        let reservation = room.reserve_growth(growth_bytes(self.map.settings(), voxels, moments))?;
         let points_skipped = scan_record.pose.points_skipped;
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
-        let prepared = Prepared { change, record, if_empty: located.is_first, turn, promise };
+        let prepared = Prepared { change, record, if_empty: located.is_first, turn, reservation };
         let outcome = self.committing.propose(Proposal::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let answer = ScanAnswer { points_skipped, ..answer };
@@ -171,7 +171,7 @@ impl HostedMap {
     }
 
     /// The answer to a scan that was accepted before; what was only of its alignment's moment is not kept.
-    fn answer_again(&self, pose: &TrajectoryPose) -> ScanAnswer {
+    fn answer_again(&self, pose: &MappedScan) -> ScanAnswer {
         ScanAnswer {
             accepted: true,
             verdict: Verdict::Accepted,

@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
-use super::{ErrorCode, MapFile, MapInfo, MapReach, MapService, ServiceError, UnavailableMap};
+use super::{AllowedMaps, ErrorCode, MapFile, MapInfo, MapService, ServiceError, UnavailableMap};
 use crate::map::{MapName, MapSettings};
 use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
@@ -36,7 +36,7 @@ impl MapService {
             let _empty = is_new.then(|| inner.room.reserve(settings.empty_filter_bytes())).transpose()?;
             inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
         };
-        let (map, created) = to_its_end(create).await?;
+        let (map, created) = run_to_completion(create).await?;
         Ok((self.describe(map).await?, created))
     }
 
@@ -82,7 +82,7 @@ impl MapService {
     /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
         let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
-        to_its_end(async move { inner.catalog.delete(&name).await }).await
+        run_to_completion(async move { inner.catalog.delete(&name).await }).await
     }
 
     /// A map as a map file, at one revision.
@@ -110,7 +110,7 @@ impl MapService {
         replace: bool,
     ) -> Result<MapInfo, ServiceError> {
         let name = self.reach.check(&name)?;
-        if replace && self.reach != MapReach::Every {
+        if replace && self.reach != AllowedMaps::Every {
             let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
                            delete the map first, or ask with such a key";
             return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));
@@ -123,7 +123,7 @@ impl MapService {
         let inner = Arc::clone(&self.inner);
         let maps_max = self.limits().maps_max;
         let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
-        let map = to_its_end(restore).await?;
+        let map = run_to_completion(restore).await?;
         self.describe(map).await
     }
 
@@ -159,7 +159,7 @@ impl MapService {
 }
 
 /// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
-async fn to_its_end<T: Send + 'static>(
+async fn run_to_completion<T: Send + 'static>(
     change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let done = tokio::spawn(polled_by_runtime(change)).await;

@@ -23,7 +23,7 @@ mod modeled;
 mod pool;
 mod reach;
 mod request;
-mod room;
+mod resource_budget;
 mod scan_reach;
 mod settings;
 mod shortage;
@@ -40,7 +40,7 @@ pub use localization::{
     TIME_LIMIT_DEFAULT,
 };
 pub use pool::PoolUse;
-pub use reach::MapReach;
+pub use reach::AllowedMaps;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapState, MapStorage,
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery,
@@ -61,7 +61,7 @@ use catalog::Catalog;
 use committing::{Refusal, Step};
 use hosted_map::HostedMap;
 use pool::{FreeThread, Pool};
-use room::Room;
+use resource_budget::ResourceBudget;
 use time_limit::{TimeLimit, check_not_stopped, ended_early};
 
 /// All operations, on all maps or on those that a caller may name. A clone is another handle on the same maps.
@@ -70,7 +70,7 @@ use time_limit::{TimeLimit, check_not_stopped, ended_early};
 #[derive(Debug, Clone)]
 pub struct MapService {
     inner: Arc<Inner>,
-    reach: MapReach,
+    reach: AllowedMaps,
     scans: ScanReach,
     /// Whose requests a map remembers under this name.
     caller: Option<CallerName>,
@@ -99,7 +99,7 @@ struct Inner {
     map_files: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
-    room: Arc<Room>,
+    room: Arc<ResourceBudget>,
 }
 
 impl MapService {
@@ -120,15 +120,20 @@ impl MapService {
             undo: Pool::new("undo", UNDO_THREADS, waiting)?,
             map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
             localization: Pool::new("localization", settings.localization_threads, waiting)?,
-            room: Room::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
+            room: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
             settings,
         };
-        Ok(Self { inner: Arc::new(inner), reach: MapReach::Every, scans: ScanReach::default(), caller: None })
+        Ok(Self {
+            inner: Arc::new(inner),
+            reach: AllowedMaps::Every,
+            scans: ScanReach::default(),
+            caller: None,
+        })
     }
 
     /// The same maps for a caller of a name, who may name no others than those of `reach`, and send and undo no others than
     /// the scans of `scans`.
-    pub fn limited_to(&self, caller: Option<CallerName>, reach: MapReach, scans: ScanReach) -> Self {
+    pub fn limited_to(&self, caller: Option<CallerName>, reach: AllowedMaps, scans: ScanReach) -> Self {
         Self { inner: Arc::clone(&self.inner), reach, scans, caller }
     }
 
@@ -170,7 +175,7 @@ impl MapService {
         map.check_level(query.level)?;
         map.check_uuid(query.map_uuid)?;
         if let Some(revision) = query.min_revision {
-            map.reached(revision, self.limits().min_revision_wait_max).await?;
+            map.wait_for_revision(revision, self.limits().min_revision_wait_max).await?;
         }
         if query.points.len() <= pool::INLINE_POINTS
             && let Some(answer) = map.try_query(&query)
@@ -193,10 +198,10 @@ impl MapService {
         if map.is_new(&scan) {
             self.inner.room.check_to_grow()?;
         }
-        let turn = Arc::new(self.inner.mapping.in_turn(map.turn_of(&scan.robot)).await?);
+        let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
         let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
         let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
-        self.carry_through(&self.inner.mapping, None, move |stop| {
+        self.submit_and_wait(&self.inner.mapping, None, move |stop| {
             limit.run(stop, |stop| {
                 map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
             })
@@ -257,7 +262,7 @@ impl MapService {
         }
         let (inner, deletion, caller) = (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
         let propose = move |_: StopSignal<'_>| map.propose_deletion(&deletion, caller.as_ref(), &inner.room);
-        self.carry_through(&self.inner.mapping, None, propose).await
+        self.submit_and_wait(&self.inner.mapping, None, propose).await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -278,7 +283,7 @@ impl MapService {
         // A thread first: the robot's scans wait for this undo, and not for those of other maps.
         let thread = pool.thread().await?;
         let _robot = map.turn_of_target(&undo.target).await;
-        self.carry_through(pool, Some(thread), move |stop| {
+        self.submit_and_wait(pool, Some(thread), move |stop| {
             limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
         })
         .await
@@ -303,7 +308,7 @@ impl MapService {
 
     /// Prepares a change on a thread of `pool`, on `first` where there is one, waits until it is made, and prepares it again where the map has moved on
     /// meanwhile. Whoever goes before it is decided on takes it along; after that it is made.
-    async fn carry_through<A: Send + 'static>(
+    async fn submit_and_wait<A: Send + 'static>(
         &self,
         pool: &Pool,
         mut first: Option<FreeThread>,

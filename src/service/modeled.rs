@@ -14,7 +14,7 @@ use uuid::Uuid;
 
 use super::committing::{CommitThread, Step};
 use super::hosted_map::{HostedMap, Saving};
-use super::room::Room;
+use super::resource_budget::ResourceBudget;
 use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MapSettings, MultiResolutionMap, Region, RobotName};
@@ -39,7 +39,7 @@ fn data_dir(disk: &simulated::SimulatedDisk) -> DataDir {
 
 /// Three scans of a robot, at their guesses; the last one guesses by constant velocity. The newest revision that it was
 /// told.
-fn insert_three(map: &Arc<HostedMap>, room: &Arc<Room>, robot: &str, x: f32) -> u64 {
+fn insert_three(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>, robot: &str, x: f32) -> u64 {
     let mut newest = 0;
     for (scan_id, guess) in (0..).zip([Guess::Pose(Pose::identity()), Guess::Last, Guess::ConstantVelocity]) {
         let points = vec![Point::new(x, scan_id as f32, 0.5)].into();
@@ -49,7 +49,7 @@ fn insert_three(map: &Arc<HostedMap>, room: &Arc<Room>, robot: &str, x: f32) -> 
             at_guess: true,
             ..ScanRequest::new(RobotName::new(robot).unwrap(), points)
         };
-        let turn = Arc::new(block_on(map.turn_of(&request.robot)));
+        let turn = Arc::new(block_on(map.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
         let step = map.propose_scan(&request, turn, &settings, room, StopSignal::NEVER);
         newest = outcome(step).unwrap().state.revision;
@@ -68,7 +68,7 @@ fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
     }
 }
 
-fn delete_everything(map: &Arc<HostedMap>, room: &Arc<Room>) -> u64 {
+fn delete_everything(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>) -> u64 {
     let region = Region::ball([0.0; 3], 100.0).unwrap();
     let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
     outcome(map.propose_deletion(&Arc::new(deletion), None, room)).unwrap().state.revision
@@ -80,8 +80,8 @@ fn crowd() {
     let folder = data_dir(&disk).create(&name(), &Snapshot::of(&core, uuid)).unwrap();
     let thread = CommitThread::start(&name()).unwrap();
     let map = HostedMap::new(thread, name(), uuid, core, Some(folder), &StoreSettings::default());
-    let (map, room) = (Arc::new(map), Arc::new(Room::new(None, Marks::default())));
-    let spawn = |work: fn(&Arc<HostedMap>, &Arc<Room>) -> u64| {
+    let (map, room) = (Arc::new(map), Arc::new(ResourceBudget::new(None, Marks::default())));
+    let spawn = |work: fn(&Arc<HostedMap>, &Arc<ResourceBudget>) -> u64| {
         let (map, room) = (Arc::clone(&map), Arc::clone(&room));
         thread::spawn(move || work(&map, &room))
     };

@@ -8,7 +8,7 @@ use crate::map::MapName;
 
 /// The maps that a caller may name: all, or some.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum MapReach {
+pub enum AllowedMaps {
     /// Every map, those to come among them.
     #[default]
     Every,
@@ -20,7 +20,7 @@ pub enum MapReach {
 #[derive(Debug, Clone)]
 pub(super) struct Reachable(MapName);
 
-impl MapReach {
+impl AllowedMaps {
     /// No map at all.
     pub fn none() -> Self {
         Self::Only(Arc::default())
@@ -54,7 +54,7 @@ impl MapReach {
     }
 }
 
-impl FromIterator<MapName> for MapReach {
+impl FromIterator<MapName> for AllowedMaps {
     fn from_iter<I: IntoIterator<Item = MapName>>(names: I) -> Self {
         Self::Only(Arc::new(names.into_iter().collect()))
     }
@@ -73,11 +73,11 @@ mod tests {
     #[test]
     fn a_name_out_of_reach_is_refused_with_what_is_within() {
         let name = |name| MapName::new(name).unwrap();
-        let some: MapReach = [name("a"), name("b")].into_iter().collect();
+        let some: AllowedMaps = [name("a"), name("b")].into_iter().collect();
         assert_eq!(some.check(&name("b")).unwrap().name(), &name("b"));
         let refused = some.check(&name("c")).unwrap_err();
         assert_eq!((refused.code, refused.reason), (ErrorCode::PermissionDenied, "map_not_allowed"));
         assert_eq!(refused.message, "the key is not for map c: it is for a, b");
-        assert!(MapReach::Every.covers(&name("c")) && !MapReach::none().covers(&name("c")));
+        assert!(AllowedMaps::Every.covers(&name("c")) && !AllowedMaps::none().covers(&name("c")));
     }
 }

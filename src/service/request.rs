@@ -8,7 +8,7 @@ use uuid::Uuid;
 use super::ServiceError;
 use crate::align::{Direction, Method, Verdict};
 use crate::geometry::{Point, Pose};
-use crate::map::{LevelInfo, Lookup, MapName, MapSettings, Region, RequestId, RobotName, TrajectoryPose};
+use crate::map::{LevelInfo, Lookup, MapName, MapSettings, MappedScan, Region, RequestId, RobotName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::store::JournalUse;
@@ -306,7 +306,7 @@ pub struct TrajectoryQuery {
 #[derive(Debug, Clone)]
 pub struct TrajectoryAnswer {
     /// In the order of acceptance.
-    pub poses: Vec<TrajectoryPose>,
+    pub poses: Vec<MappedScan>,
     /// Ask for those since this revision for the next; none where these are the last.
     pub next_since_revision: Option<u64>,
     /// At this state.

@@ -22,7 +22,7 @@ pub enum Shortage {
     },
     /// Memory of the process.
     Memory {
-        /// Bytes in use, with those that are promised.
+        /// Bytes in use, with those that are reserved.
         in_use: u64,
         /// More are too many.
         high: u64,

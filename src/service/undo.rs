@@ -8,13 +8,13 @@ use super::committing::{Decided, Proposal, Refusal, Step, Stop, record_of};
 use super::deletion::removal_bytes;
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
-use super::room::{Promise, Room};
+use super::resource_budget::{Reservation, ResourceBudget};
 use super::time_limit::TimeLimit;
 use super::trajectory::check_not_forgotten;
 use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
 use crate::map::{
-    CallerName, Change, Committed, Leaving, MultiResolutionMap, Request, RequestKind, Trajectory,
-    TrajectoryPose, UndoRecord, WithdrawnScan,
+    CallerName, Change, Committed, Leaving, MappedScan, MultiResolutionMap, Request, RequestKind, Trajectory,
+    UndoRecord, WithdrawnScan,
 };
 use crate::store::{MapFolder, NotObserved, Observed, Record, StoreError};
 use crate::util::StopSignal;
@@ -27,7 +27,7 @@ struct PlannedUndo {
     change: Change,
     record: Record,
     observed: Observed,
-    lent: Vec<Promise>,
+    lent: Vec<Reservation>,
 }
 
 impl PlannedUndo {
@@ -60,7 +60,7 @@ impl HostedMap {
     /// so that none that the undo does not know of lies before it.
     pub(super) async fn turn_of_target(&self, target: &UndoTarget) -> Option<OwnedMutexGuard<()>> {
         match target {
-            UndoTarget::RobotSince { robot, .. } => Some(self.turn_of(robot).await),
+            UndoTarget::RobotSince { robot, .. } => Some(self.lock_robot(robot).await),
             UndoTarget::Scan { .. } | UndoTarget::Revision(_) => None,
         }
     }
@@ -73,7 +73,7 @@ impl HostedMap {
         self: &Arc<Self>,
         undo: &Undo,
         caller: Option<&CallerName>,
-        room: &Room,
+        room: &ResourceBudget,
         limit: &TimeLimit,
         stop: StopSignal<'_>,
     ) -> Result<Step<UndoAnswer>, ServiceError> {
@@ -124,17 +124,17 @@ impl HostedMap {
         scans: Vec<u64>,
         withdrawn: &[WithdrawnScan],
         request: Option<Request>,
-        room: &Room,
+        room: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<PlannedUndo, ServiceError> {
         let mut observed = self.observe(folder, &scans, withdrawn, room, stop)?;
-        let finding_out = room.lend(observed.observations.leaving_bytes() as u64, UNDO)?;
+        let finding_out = room.reserve_transient(observed.observations.leaving_bytes() as u64, UNDO)?;
         let leaving = observed.observations.leaving(stop).ok_or_else(|| ended_early(stop))?;
         let Leaving { mut voxels, mut moments } = leaving;
         folder.observe(&mut observed, stop).map_err(|e| self.unreadable(&e))?;
         check_not_stopped(stop)?;
         observed.observations.renew(&mut voxels, &mut moments);
-        let removal = room.lend(removal_bytes(&self.map, &voxels), UNDO)?;
+        let removal = room.reserve_transient(removal_bytes(&self.map, &voxels), UNDO)?;
         let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
         let record = record_of(&change)?;
         Ok(PlannedUndo { change, record, observed, lent: vec![finding_out, removal] })
@@ -146,14 +146,14 @@ impl HostedMap {
         folder: &MapFolder,
         scans: &[u64],
         withdrawn: &[WithdrawnScan],
-        room: &Room,
+        room: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<Observed, ServiceError> {
         // What was lent before lies in memory by the time more is asked for, and is measured there.
         let mut part = None;
         let reserve = |bytes| {
             drop(part.take());
-            part = Some(room.lend(bytes, UNDO)?);
+            part = Some(room.reserve_transient(bytes, UNDO)?);
             Ok(())
         };
         folder.observations(scans, withdrawn, reserve, stop).map_err(|why| match why {
@@ -167,7 +167,7 @@ impl HostedMap {
     /// The revisions of the scans that are meant, ascending, and the scans that were withdrawn before.
     fn targets_of_undo(&self, target: &UndoTarget) -> Result<(Vec<u64>, Vec<WithdrawnScan>), ServiceError> {
         let trajectory = self.map.trajectory();
-        let one = |found: Option<&TrajectoryPose>, what: String| {
+        let one = |found: Option<&MappedScan>, what: String| {
             let missing = || {
                 let message = format!("map {} has no accepted scan {what}", self.name);
                 ServiceError::new(ErrorCode::NotFound, "scan_not_found", message)

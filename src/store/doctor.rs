@@ -9,7 +9,7 @@ use super::data_dir::Entry;
 use super::folder::FolderPath;
 use super::journal::{self, Inspected};
 use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot, snapshot_files};
-use crate::map::{MapContents, MapName, MultiResolutionMap, TrajectoryPose};
+use crate::map::{MapContents, MapName, MappedScan, MultiResolutionMap};
 
 /// What was found of a map.
 #[derive(Debug, Default)]
@@ -227,7 +227,7 @@ impl Replay {
 fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
     let (revision, voxels, requests) = (&made.revision, &made.voxels, &made.requests);
     let same = (&written.revision, &written.voxels, &written.requests) == (revision, voxels, requests);
-    let is_known = |pose: &TrajectoryPose| made.trajectory.at(pose.revision) == Some(pose);
+    let is_known = |pose: &MappedScan| made.trajectory.at(pose.revision) == Some(pose);
     same && written.moments == made.moments && written.trajectory.poses().all(is_known)
 }
 

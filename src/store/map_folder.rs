@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use uuid::Uuid;
 
 use super::folder::FolderPath;
-use super::journal::{Journal, Place, Record, SegmentedJournal};
+use super::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
 use super::retention::UndoReach;
 use super::snapshot_files::{Sizes, forget_damaged, snapshot_name};
 use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
@@ -41,7 +41,7 @@ pub struct MapFolder {
     path: FolderPath,
     settings: StoreSettings,
     /// Where the journal's segments are.
-    place: Place,
+    place: SegmentFolder,
     journal: Mutex<SegmentedJournal>,
     /// Held while a snapshot is written, or old ones are removed.
     snapshots: Mutex<()>,

@@ -296,7 +296,7 @@ mod tests {
     use super::*;
     use crate::geometry;
     use crate::map::{
-        AnsweredRequest, CallerName, RequestId, RobotName, Trajectory, TrajectoryPose, WithdrawnScan,
+        CallerName, CompletedRequest, MappedScan, RequestId, RobotName, Trajectory, WithdrawnScan,
     };
     use crate::store::codec::moments;
     use crate::store::pb;
@@ -304,7 +304,7 @@ mod tests {
 
     fn snapshot() -> Snapshot {
         let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
-        let pose = TrajectoryPose {
+        let pose = MappedScan {
             robot: RobotName::new("r1").unwrap(),
             scan_id: Some(7),
             timestamp_ns: Some(-5),
@@ -320,7 +320,7 @@ mod tests {
         moments += Moments::of_offset([-2048, 2048, 0]);
         let id = RequestId::new("undo-1").unwrap();
         let caller = Some(CallerName::new("r1").unwrap());
-        let request = AnsweredRequest { id, digest: 9, caller, revision: 42, voxels: 0, scans: 1 };
+        let request = CompletedRequest { id, digest: 9, caller, revision: 42, voxels: 0, scans: 1 };
         Snapshot {
             uuid: Uuid::from_bytes([7; 16]),
             settings: MapSettings::new(0.05, 4),

@@ -114,7 +114,7 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
     for (map, level) in levels(maps) {
         let rates = [
             ("expected", Some(level.expected_rate)),
-            ("equation_1", Some(level.unblocked_rate)),
+            ("equation_1", Some(level.ideal_false_positive_rate)),
             ("measured", level.measured_rate),
         ];
         for (kind, rate) in rates {

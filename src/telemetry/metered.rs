@@ -3,8 +3,8 @@
 use super::Metrics;
 use crate::map::{CallerName, MapName};
 use crate::service::{
-    Deletion, DeletionAnswer, MapInfo, MapReach, MapService, PointAnswer, PointQuery, ScanAnswer, ScanReach,
-    ScanRequest, ServiceError, Undo, UndoAnswer,
+    AllowedMaps, Deletion, DeletionAnswer, MapInfo, MapService, PointAnswer, PointQuery, ScanAnswer,
+    ScanReach, ScanRequest, ServiceError, Undo, UndoAnswer,
 };
 
 /// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
@@ -22,7 +22,7 @@ impl MeteredService {
     }
 
     /// The same for a caller of a name, who may name no others than the maps of `reach`, nor send others than the scans of `scans`.
-    pub fn limited_to(&self, caller: Option<CallerName>, reach: MapReach, scans: ScanReach) -> Self {
+    pub fn limited_to(&self, caller: Option<CallerName>, reach: AllowedMaps, scans: ScanReach) -> Self {
         Self { service: self.service.limited_to(caller, reach, scans), metrics: self.metrics.clone() }
     }
 

@@ -23,9 +23,9 @@ pub(crate) struct CacheLine<T>(pub(crate) T);
 ///
 /// So the blocks of a cluster ascend as their keys do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Place(u32);
+pub(crate) struct BlockInCluster(u32);
 
-impl Place {
+impl BlockInCluster {
     /// The cluster (a key two levels coarser than blocks) and the place of `block`.
     #[inline(always)]
     pub(crate) fn of(block: VoxelKey) -> (VoxelKey, Self) {
@@ -33,7 +33,7 @@ impl Place {
         (block.ancestor(CLUSTER_LEVELS), Self(axis(0) | axis(1) << 2 | axis(2) << 4))
     }
 
-    /// The block here in `cluster`: the inverse of [`Place::of`].
+    /// The block here in `cluster`: the inverse of [`BlockInCluster::of`].
     #[inline(always)]
     fn block(self, cluster: VoxelKey) -> VoxelKey {
         let axis = |axis: u32| (u64::from(self.0) >> (2 * axis) & PLACE_MASK) << (axis * AXIS_BITS);
@@ -74,7 +74,7 @@ impl Cluster {
     /// A copy with the blocks of `present`: without the others of this one, and without a voxel in those that are new.
     pub(crate) fn with_blocks(&self, present: u64) -> Self {
         let mut masks = Vec::with_capacity(present.count_ones() as usize);
-        for_each_bit(present, |place| masks.push(CacheLine(*self.get(Place(place)))));
+        for_each_bit(present, |place| masks.push(CacheLine(*self.get(BlockInCluster(place)))));
         Self::new(present, masks.into_boxed_slice())
     }
 
@@ -90,7 +90,7 @@ impl Cluster {
 
     /// The voxels of the block at `place`; none of them where it is absent.
     #[inline(always)]
-    pub(crate) fn get(&self, place: Place) -> &BlockMask {
+    pub(crate) fn get(&self, place: BlockInCluster) -> &BlockMask {
         match self.present & place.bit() {
             0 => &BlockMask::EMPTY,
             _ => &self.masks[self.rank(place)].0,
@@ -101,7 +101,7 @@ impl Cluster {
     ///
     /// # Panics
     /// When it is not there, and none after it.
-    pub(crate) fn set(&mut self, place: Place, mask: BlockMask) {
+    pub(crate) fn set(&mut self, place: BlockInCluster, mask: BlockMask) {
         debug_assert!(self.present & place.bit() != 0);
         let rank = self.rank(place);
         self.masks[rank].0 = mask;
@@ -109,7 +109,7 @@ impl Cluster {
 
     /// How many blocks are before `place`.
     #[inline(always)]
-    fn rank(&self, place: Place) -> usize {
+    fn rank(&self, place: BlockInCluster) -> usize {
         (self.present & (place.bit() - 1)).count_ones() as usize
     }
 
@@ -119,7 +119,7 @@ impl Cluster {
         let places = std::iter::from_fn(move || {
             let place = (rest != 0).then(|| rest.trailing_zeros())?;
             rest &= rest - 1;
-            Some(Place(place))
+            Some(BlockInCluster(place))
         });
         places.zip(&self.masks).map(move |(place, mask)| (place.block(cluster), &mask.0))
     }
@@ -149,7 +149,7 @@ mod tests {
         #[test]
         fn a_block_is_its_cluster_and_place(index in prop::array::uniform3(-131_072i32..131_072)) {
             let block = VoxelKey::pack(index);
-            let (cluster, place) = Place::of(block);
+            let (cluster, place) = BlockInCluster::of(block);
             prop_assert_eq!(cluster, block.ancestor(CLUSTER_LEVELS));
             prop_assert_eq!(place.block(cluster), block);
         }
@@ -158,11 +158,11 @@ mod tests {
         fn a_cluster_holds_a_mask_for_each_block_that_is_there(present: u64, after: u64, wanted: [i16; 3]) {
             let key = VoxelKey::pack(wanted.map(i32::from));
             let mut cluster = Cluster::default().with_blocks(present);
-            for_each_bit(present, |place| cluster.set(Place(place), mask(place as u16)));
+            for_each_bit(present, |place| cluster.set(BlockInCluster(place), mask(place as u16)));
             let cluster = cluster.with_blocks(after);
             prop_assert_eq!(cluster.len(), after.count_ones() as usize);
             let mut expected = BTreeMap::new();
-            for place in (0..64).map(Place) {
+            for place in (0..64).map(BlockInCluster) {
                 let kept = if present & after & place.bit() == 0 { BlockMask::EMPTY } else { mask(place.0 as u16) };
                 prop_assert_eq!(cluster.get(place), &kept);
                 if after & place.bit() != 0 {

@@ -2,25 +2,25 @@
 //! (III-A).
 
 mod block;
-mod block_table;
+mod block_sort;
 mod cluster;
-mod gained;
-mod grouping;
+mod cluster_table;
+mod cluster_update;
 mod key;
 mod lattice;
 mod moments;
-mod renewal;
+mod new_keys;
 mod sample;
 mod set;
 mod slots;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
-pub use block_table::BlockTable;
-pub(crate) use cluster::{CLUSTER_LEVELS, CacheLine, Cluster, Place};
+pub(crate) use cluster::{BlockInCluster, CLUSTER_LEVELS, CacheLine, Cluster};
+pub use cluster_table::ClusterTable;
+pub(crate) use cluster_update::ClusterUpdate;
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};
 pub use lattice::{LEVELS_MAX, Lattice, LatticeFromPoints, RESOLUTION_MAX_M, RESOLUTION_MIN_M, SettingError};
 pub use moments::{MOMENT_LEVEL, MomentSet, Moments};
-pub(crate) use renewal::Renewal;
 pub use sample::{VolumetricSample, sample_bytes_max, volumetric_sample, volumetric_sample_until};
 pub(crate) use set::BLOCKS_PER_LOOK;
 pub use set::VoxelSet;

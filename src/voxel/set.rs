@@ -1,6 +1,6 @@
 //! A set of finest voxels as sorted blocks: what a scan touches, a deletion takes, a snapshot keeps.
 
-use super::grouping::blocks_of;
+use super::block_sort::blocks_of;
 use super::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, MOMENT_LEVEL, VoxelKey};
 use crate::util::{StopSignal, sort_by_key_until};
 

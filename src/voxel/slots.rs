@@ -1,6 +1,6 @@
 //! The slots of a table of clusters, as the look-ups read them: homes, tags and the search for a key.
 
-use super::cluster::{CacheLine, Cluster, Place};
+use super::cluster::{BlockInCluster, CacheLine, Cluster};
 use super::{BlockMask, VoxelKey};
 
 /// Marks a vacant slot; no key sets bit 63.
@@ -84,7 +84,7 @@ impl<'a> Slots<'a> {
     /// The voxels of `block`; none of them when the block is absent.
     #[inline(always)]
     pub(crate) fn get(self, block: VoxelKey) -> &'a BlockMask {
-        let (cluster, place) = Place::of(block);
+        let (cluster, place) = BlockInCluster::of(block);
         match self.find(cluster.to_bits()) {
             Some(slot) => self.clusters[slot].get(place),
             None => &BlockMask::EMPTY,

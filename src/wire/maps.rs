@@ -190,7 +190,7 @@ impl From<&LevelInfo> for pb::LevelInfo {
             plane_bytes: info.plane_bytes as u64,
             counter_bytes: info.counter_bytes as u64,
             false_positives_expected: info.expected_rate,
-            false_positives_equation_1: info.unblocked_rate,
+            false_positives_equation_1: info.ideal_false_positive_rate,
             false_positives_measured: info.measured_rate,
         }
     }
@@ -205,7 +205,7 @@ impl From<&pb::LevelInfo> for LevelInfo {
             plane_bytes: count_from(info.plane_bytes),
             counter_bytes: count_from(info.counter_bytes),
             expected_rate: info.false_positives_expected,
-            unblocked_rate: info.false_positives_equation_1,
+            ideal_false_positive_rate: info.false_positives_equation_1,
             measured_rate: info.false_positives_measured,
         }
     }

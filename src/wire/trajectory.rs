@@ -2,7 +2,7 @@
 
 use super::types::count_from;
 use super::{InField, pb, required};
-use crate::map::{MapName, RobotName, TrajectoryPose};
+use crate::map::{MapName, MappedScan, RobotName};
 use crate::service::{ServiceError, TrajectoryAnswer, TrajectoryQuery};
 
 impl TryFrom<pb::GetTrajectoryRequest> for (MapName, TrajectoryQuery) {
@@ -61,8 +61,8 @@ impl From<TrajectoryAnswer> for pb::StreamTrajectoryResponse {
     }
 }
 
-impl From<&TrajectoryPose> for pb::TrajectoryPose {
-    fn from(pose: &TrajectoryPose) -> Self {
+impl From<&MappedScan> for pb::TrajectoryPose {
+    fn from(pose: &MappedScan) -> Self {
         Self {
             robot: pose.robot.to_string(),
             scan_id: pose.scan_id,
@@ -97,7 +97,7 @@ impl TryFrom<pb::StreamTrajectoryResponse> for TrajectoryAnswer {
 }
 
 /// What the wire leaves out (overlaps above level 0, iterations, skipped points, the digest) is zero or empty.
-impl TryFrom<pb::TrajectoryPose> for TrajectoryPose {
+impl TryFrom<pb::TrajectoryPose> for MappedScan {
     type Error = ServiceError;
 
     fn try_from(pose: pb::TrajectoryPose) -> Result<Self, ServiceError> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use mrol::access::{Key, KeyName, Scope, Secret, add_to_file};
 use mrol::map::MapName;
-use mrol::service::MapReach;
+use mrol::service::AllowedMaps;
 use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -43,7 +43,7 @@ impl Keyring {
 pub(crate) fn add(file: &Path, name: &str, scope: Scope, maps: Option<&[&str]>) -> Secret {
     let secret = Secret::random().unwrap();
     let reach =
-        maps.map_or(MapReach::Every, |maps| maps.iter().map(|map| MapName::new(map).unwrap()).collect());
+        maps.map_or(AllowedMaps::Every, |maps| maps.iter().map(|map| MapName::new(map).unwrap()).collect());
     let key = Key::new(KeyName::new(name).unwrap(), secret.digest(), scope, reach);
     add_to_file(file, &key).unwrap();
     secret

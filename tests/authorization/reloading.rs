@@ -150,7 +150,7 @@ fn a_key_is_added_to_what_is_there_and_never_twice() {
     );
     let same_name = mrol::access::KeyName::new("a").unwrap();
     let digest = Secret::random().unwrap().digest();
-    let twice = mrol::access::Key::new(same_name, digest, Scope::Read, mrol::service::MapReach::Every);
+    let twice = mrol::access::Key::new(same_name, digest, Scope::Read, mrol::service::AllowedMaps::Every);
     let refused = mrol::access::add_to_file(&file, &twice).unwrap_err().to_string();
     assert!(refused.contains("another key has that name"), "{refused}");
     assert_eq!(fs::read_to_string(&file).unwrap(), text);

@@ -20,7 +20,7 @@ use common::{Daemon, json_of};
 use mrol::client::Client;
 use mrol::geometry::{self, Point, Pose};
 use mrol::map::{
-    Lookup, MapName, MapSettings, MultiResolutionMap, Region, RobotName, ScanRecord, TrajectoryPose,
+    Lookup, MapName, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord,
 };
 use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, PointQuery, ScanRequest};
@@ -209,7 +209,7 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
     match event {
         Event::Inserted { points, map_from_sensor, .. } => {
             let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_points(map_from_sensor));
-            let pose = TrajectoryPose::new(RobotName::new("replay").unwrap(), *map_from_sensor);
+            let pose = MappedScan::new(RobotName::new("replay").unwrap(), *map_from_sensor);
             map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels)).voxels
         }
         Event::Deleted { deletion, .. } => {

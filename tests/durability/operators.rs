@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use mrol::geometry::Pose;
-use mrol::map::{
-    AnsweredRequest, MapContents, MapSettings, RequestId, RobotName, Trajectory, TrajectoryPose,
-};
+use mrol::map::{CompletedRequest, MapContents, MapSettings, MappedScan, RequestId, RobotName, Trajectory};
 use mrol::store::{Durability, Snapshot};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use reqwest::StatusCode;
@@ -74,9 +72,9 @@ fn file_with(change: impl FnOnce(&mut MapContents)) -> Vec<u8> {
     Snapshot { uuid: Uuid::from_u128(7), settings: MapSettings::new(0.1, 4), contents }.encode().unwrap()
 }
 
-fn pose(robot: &str, revision: u64, overlaps: usize) -> TrajectoryPose {
-    let pose = TrajectoryPose::new(RobotName::new(robot).unwrap(), Pose::identity());
-    TrajectoryPose { revision, scan_id: Some(revision), level_overlaps: vec![0.5; overlaps], ..pose }
+fn pose(robot: &str, revision: u64, overlaps: usize) -> MappedScan {
+    let pose = MappedScan::new(RobotName::new(robot).unwrap(), Pose::identity());
+    MappedScan { revision, scan_id: Some(revision), level_overlaps: vec![0.5; overlaps], ..pose }
 }
 
 #[tokio::test]
@@ -102,7 +100,7 @@ async fn a_map_file_is_held_to_the_limits_of_a_map() {
     assert!(said.contains("5 overlaps, of a map of 4 levels"), "{said}");
 
     let requests = |of: &[(&str, u64, usize)]| {
-        let request = |&(id, revision, scans): &(&str, u64, usize)| AnsweredRequest {
+        let request = |&(id, revision, scans): &(&str, u64, usize)| CompletedRequest {
             id: RequestId::new(id).unwrap(),
             caller: None,
             digest: 1,

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use mrol::geometry::Pose;
 use mrol::map::{
-    Change, MapContents, MapName, MapSettings, MultiResolutionMap, REVISION_MAX, RobotName, ScanRecord,
-    TrajectoryPose,
+    Change, MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, REVISION_MAX, RobotName,
+    ScanRecord,
 };
 use mrol::store::{
     Appending, DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError,
@@ -34,7 +34,7 @@ pub(crate) fn empty() -> MultiResolutionMap {
 
 pub(crate) fn insertion(place: i32) -> Change {
     let voxels: VoxelSet = (0..9).filter_map(|i| VoxelKey::new([place, i, 0])).collect();
-    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
     Change::Insertion(ScanRecord::of_voxels(pose, voxels))
 }
 
@@ -109,7 +109,7 @@ fn a_map_whose_deletion_failed_acknowledges_nothing_that_the_next_start_sweeps_a
         if deleted.is_ok() {
             continue;
         }
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         let change = Change::Insertion(ScanRecord::of_voxels(
             pose,
             [VoxelKey::new([7; 3]).unwrap()].into_iter().collect(),
@@ -298,7 +298,7 @@ fn a_map_takes_no_more_changes_than_there_are_revisions() {
     let map = MultiResolutionMap::restore(MapSettings::new(0.1, 5), contents).unwrap();
     let folder = data.create(&office(), &Snapshot::of(&map, Uuid::new_v4())).unwrap();
     commit(&folder, &map, 1);
-    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
     let more = Change::Insertion(ScanRecord::of_voxels(pose, VoxelSet::default()));
     let refused = folder.append(&[&Record::of(&more).unwrap()]).unwrap_err();
     assert!(matches!(refused, StoreError::RevisionsUsedUp(REVISION_MAX)), "{refused}");

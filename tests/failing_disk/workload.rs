@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use mrol::geometry::Pose;
 use mrol::map::{
-    Change, DeletionRecord, MapContents, MapName, MapSettings, MultiResolutionMap, Request, RequestId,
-    RobotName, ScanRecord, TrajectoryPose,
+    Change, DeletionRecord, MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Request,
+    RequestId, RobotName, ScanRecord,
 };
 use mrol::store::{
     DataDir, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
@@ -126,11 +126,11 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
     });
     let voxels = keys.collect();
     let robot = RobotName::new(["r1", "r2"][rng.random_range(0..2)]).unwrap();
-    let pose = TrajectoryPose {
+    let pose = MappedScan {
         scan_id: Some(revision),
         digest: revision * 7,
         level_overlaps: vec![rng.random(), rng.random()],
-        ..TrajectoryPose::new(robot, Pose::translation(rng.random(), 0.0, 1.0 / 3.0))
+        ..MappedScan::new(robot, Pose::translation(rng.random(), 0.0, 1.0 / 3.0))
     };
     Change::Insertion(ScanRecord::of_voxels(pose, voxels))
 }

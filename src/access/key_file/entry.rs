@@ -7,7 +7,7 @@ use toml::value::Datetime;
 
 use crate::access::{Digest, Expiry, Key, KeyLimits, KeyName, Scope};
 use crate::map::{MapName, RobotName};
-use crate::service::MapReach;
+use crate::service::AllowedMaps;
 
 /// A key as its file holds it; the fields are described at the module's head.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -43,8 +43,8 @@ impl KeyEntry {
     /// That of a key.
     pub(super) fn of(key: &Key) -> Self {
         let maps = match &key.reach {
-            MapReach::Every => None,
-            MapReach::Only(names) => Some(names.iter().map(MapName::to_string).collect()),
+            AllowedMaps::Every => None,
+            AllowedMaps::Only(names) => Some(names.iter().map(MapName::to_string).collect()),
         };
         let robots = key.robots.as_ref().map(|robots| robots.iter().map(|r| r.as_str().to_owned()).collect());
         let limits = key.allowance.limits;
@@ -80,7 +80,7 @@ impl KeyEntry {
             Digest::parse(&self.sha256).ok_or("sha256 must be the 64 hexadecimal digits of a hash")?;
         let scope = Scope::ALL.into_iter().find(|scope| scope.as_str() == self.scope);
         let scope = scope.ok_or("scope must be read, insert, write or admin")?;
-        let reach = self.maps.as_deref().map_or(Ok(MapReach::Every), reach_of)?;
+        let reach = self.maps.as_deref().map_or(Ok(AllowedMaps::Every), reach_of)?;
         let mut key = Key::new(name, digest, scope, reach).with_limits(self.limits()?);
         if let Some(robots) = &self.robots {
             key = key.for_robots(robots_of(robots)?);
@@ -129,7 +129,7 @@ impl KeyEntry {
 
 const BAD_EXPIRES: &str = "expires must be a date or a time with an offset: 2027-01-31T12:00:00Z";
 
-fn reach_of(maps: &[String]) -> Result<MapReach, &'static str> {
+fn reach_of(maps: &[String]) -> Result<AllowedMaps, &'static str> {
     if maps.is_empty() {
         return Err("maps must name a map; without it the key is for every map");
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::dilated::DilatedLevels;
-use super::field::{DistanceField, GridFromSensor, REACH_MAX, ReachingPoint};
+use super::distance_field::{DISTANCE_MAX, DistanceField, GridFromSensor, ReachingPoint};
 use super::orientation::Orientation;
 use super::rotation::{RotationCell, RotationLattice};
 use super::sample::SearchSample;
@@ -62,7 +62,7 @@ impl<'a> Bounds<'a> {
         let reach = |range_m: f64| {
             let displacement_m = half_side_m + 2.0 * range_m * half_turn.sin();
             let voxels = (displacement_m / self.levels.at(depth).resolution_m() + ROUNDING).ceil();
-            if voxels <= f64::from(REACH_MAX) { voxels as u8 } else { ANYWHERE }
+            if voxels <= f64::from(DISTANCE_MAX) { voxels as u8 } else { ANYWHERE }
         };
         let reaching = |point: &nalgebra::Point3<f64>| ReachingPoint {
             xyz: point.coords.map(|c| c as f32).into(),
@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use crate::align::localize::LocalizationSettings;
     use crate::geometry::Point;
-    use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
     use crate::util::StopSignal;
 
     const RESOLUTION_M: f64 = 0.1;
@@ -176,7 +176,7 @@ mod tests {
 
     fn map_of(points: &[Point]) -> MultiResolutionMap {
         let map = MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, 3)).unwrap();
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         map.committer().insert_scan(ScanRecord::of_points(pose, points, map.lattice()));
         map
     }

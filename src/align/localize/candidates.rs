@@ -3,9 +3,9 @@
 use super::basins::Basin;
 use super::dilated::DilatedLevels;
 use super::sample::SearchSample;
-use super::sight::blocked_share;
+use super::visibility::blocked_share;
 use super::{Candidate, LocalizationSettings};
-use crate::align::{Alignment, AlignmentSettings, align_until, judge_at};
+use crate::align::{Alignment, AlignmentSettings, align_until, evaluate_at};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
@@ -57,7 +57,7 @@ impl Refinement<'_> {
                 return candidate;
             }
         }
-        let alignment = judge_at(self.map, thinned, &pose, self.alignment);
+        let alignment = evaluate_at(self.map, thinned, &pose, self.alignment);
         let blocked = blocked_share(self.levels, self.sample, &pose, StopSignal::NEVER);
         Candidate { alignment, search_overlap, blocked, margin: None }
     }
@@ -75,7 +75,7 @@ impl Refinement<'_> {
     /// The alignment of `points` from a place. Where that ends badly there is nothing to try around it: the search has.
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
         let mut alignment = *self.alignment;
-        alignment.wide_start.ascents = 0;
+        alignment.multi_start.ascents = 0;
         align_until(self.map, points, guess, &alignment, self.stop)
     }
 

@@ -1,6 +1,6 @@
 //! The levels that a search reads: those of one revision of the map, dilated, and coarser ones where needed.
 
-use super::field::DistanceField;
+use super::distance_field::DistanceField;
 use super::sample::SearchSample;
 use super::slabs::{BLOCKS_PER_LOOK, Slabs, VoxelBox};
 use super::supervision::{Unbuilt, check};

@@ -248,7 +248,7 @@ mod tests {
     use crate::align::localize::rotation::RotationLattice;
     use crate::align::localize::sample::SearchSample;
     use crate::geometry::{Point, Pose};
-    use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
     use crate::util::StopSignal;
 
     /// Two walls and a post, seen from inside.
@@ -268,7 +268,7 @@ mod tests {
     impl Problem {
         fn new() -> Self {
             let map = MultiResolutionMap::new(MapSettings::new(0.1, 3)).unwrap();
-            let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+            let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
             map.committer().insert_scan(ScanRecord::of_points(pose, &corner(), map.lattice()));
             let settings = LocalizationSettings {
                 resolutions_per_range: 10.0,

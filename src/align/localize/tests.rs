@@ -4,13 +4,13 @@ use std::cell::{Cell, RefCell};
 
 use super::*;
 use crate::geometry::Pose;
-use crate::map::{MapSettings, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
 
 /// Cells of a grid or points that are visited between two looks, at most.
 const WORK_PER_LOOK: u64 = 8 << 20;
 
 fn record(points: &[Point], map: &MultiResolutionMap) -> ScanRecord {
-    let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
     ScanRecord::of_points(pose, points, map.lattice())
 }
 

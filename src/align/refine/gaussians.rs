@@ -106,7 +106,7 @@ fn moments_of(moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Moment
 mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{MapSettings, RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
     use crate::voxel::{Lattice, MomentSet};
 
     #[test]
@@ -114,7 +114,7 @@ mod tests {
         let map = MultiResolutionMap::new(MapSettings::new(0.25, 4)).unwrap();
         let points: Vec<_> =
             (0..200).map(|i| Point::new((i % 32) as f32 / 8.0, (i % 7) as f32 / 2.0, 1.5)).collect();
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
 
         // The same points in a lattice four times as coarse, whose units are four times as long.

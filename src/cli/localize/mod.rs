@@ -84,8 +84,8 @@ impl Localize {
         let (query, time_limit) = (self.query()?, self.time_limit()?);
         let files = scan_files(&self.scans)?;
         let place = match (&self.map, self.name) {
-            (Some(file), _) => Place::open(file)?,
-            (None, Some(name)) => Place::Server(self.server.connect().await?, name),
+            (Some(file), _) => MapSource::open(file)?,
+            (None, Some(name)) => MapSource::Server(self.server.connect().await?, name),
             (None, None) => return Err(CliError::usage("one of --map and --name is needed")),
         };
         let output = output.with_spinner();
@@ -120,12 +120,12 @@ impl Localize {
 }
 
 /// Where the map is.
-enum Place {
+enum MapSource {
     File(Box<MultiResolutionMap>, MapState),
     Server(Client, MapName),
 }
 
-impl Place {
+impl MapSource {
     fn open(file: &Path) -> Result<Self, CliError> {
         let snapshot = Snapshot::read(&Disk::default(), file)?;
         let state = MapState { revision: snapshot.contents.revision, map_uuid: snapshot.uuid };

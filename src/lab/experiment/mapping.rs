@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::geometry::{Point, Pose};
 use crate::lab::rivals::HashTables;
-use crate::map::{MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 
 /// A map of any structure.
 pub trait GrowingMap {
@@ -26,7 +26,7 @@ pub struct OwnMap {
 
 impl GrowingMap for OwnMap {
     fn insert(&mut self, points: &[Point], map_from_points: &Pose) {
-        let pose = TrajectoryPose::new(self.robot.clone(), *map_from_points);
+        let pose = MappedScan::new(self.robot.clone(), *map_from_points);
         self.map.committer().insert_scan(ScanRecord::of_points(pose, points, self.map.lattice()));
     }
 

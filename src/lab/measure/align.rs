@@ -6,7 +6,7 @@ use crate::align::{Alignment, AlignmentSettings, Method, align};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::lab::workload::Scan;
 use crate::map::{
-    Lookup, MapSettings, MapSettingsError, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose,
+    Lookup, MapSettings, MapSettingsError, MappedScan, MultiResolutionMap, RobotName, ScanRecord,
 };
 
 /// All alignments of one kind.
@@ -63,7 +63,7 @@ pub fn align_each(
             // In reverse order, so that the first way has the last word.
             last = scan.map_from_sensor.unwrap_or(alignment.map_from_sensor);
         }
-        let pose = TrajectoryPose::new(robot.clone(), last);
+        let pose = MappedScan::new(robot.clone(), last);
         map.committer().insert_scan(ScanRecord::of_points(pose, &scan.points, map.lattice()));
     }
     Ok(all)

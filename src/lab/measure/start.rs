@@ -6,7 +6,7 @@ use uuid::Uuid;
 
 use super::stopwatch::Runs;
 use crate::lab::workload::Queries;
-use crate::map::{Change, MapName, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{Change, MapName, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::service::{MapService, ServiceError, ServiceSettings};
 use crate::store::{DataDir, OpeningProgress, Record, Snapshot, StoreError, StoreSettings};
 use crate::voxel::MomentSet;
@@ -45,7 +45,7 @@ pub fn keep(
             break;
         }
         let robot = RobotName::new("bench").map_err(|e| StoreError::damaged(folder, e.to_string()))?;
-        let pose = TrajectoryPose::new(robot, points.map_from_points);
+        let pose = MappedScan::new(robot, points.map_from_points);
         let change = Change::Insertion(ScanRecord::of_points(pose, scan, map.lattice()));
         let record = Record::of(&change).map_err(|e| StoreError::damaged(folder, e))?;
         kept.append(&[&record])?;

@@ -54,7 +54,7 @@ impl OccupiedVoxels for HashTables {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
     use nalgebra::Vector3;
 
     #[test]
@@ -65,7 +65,7 @@ mod tests {
             .collect();
         let pose = Pose::new(Vector3::new(0.3, -1.0, 0.2), Vector3::new(0.1, 0.2, -0.3));
         let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
-        let scan = TrajectoryPose::new(RobotName::new("r").unwrap(), pose);
+        let scan = MappedScan::new(RobotName::new("r").unwrap(), pose);
         map.committer().insert_scan(ScanRecord::of_points(scan, &points, map.lattice()));
         let mut tables = HashTables::new(*map.lattice());
         tables.insert(&points, &pose);

@@ -64,7 +64,7 @@ impl Structure for PaperFilter {
 #[cfg(test)]
 mod tests {
     use super::COUNTERS;
-    use crate::bloom::unblocked_rate;
+    use crate::bloom::ideal_false_positive_rate;
     use crate::lab::measure::lookup::compare;
     use crate::lab::rivals::StructureName;
     use crate::lab::workload::{Order, Scatter, Workload};
@@ -80,7 +80,7 @@ mod tests {
         let absent = measured.points - (measured.occupied - measured.false_positives);
         let ratio = measured.false_positives as f64
             / absent as f64
-            / unblocked_rate(Scatter::VOXELS, COUNTERS as usize, 2);
+            / ideal_false_positive_rate(Scatter::VOXELS, COUNTERS as usize, 2);
         assert!((0.5..1.5).contains(&ratio), "{ratio} of the rate by eq. (1)");
     }
 }

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{Point, Pose};
-use crate::map::{MapSettings, MapSettingsError, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{MapSettings, MapSettingsError, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::voxel::{LatticeFromPoints, VoxelKey, VoxelSet};
 pub use room::Room;
 pub use scatter::Scatter;
@@ -140,7 +140,7 @@ impl Workload {
 /// Adds voxels to a map, as a scan would.
 pub fn add(map: &MultiResolutionMap, voxels: VoxelSet) {
     let Ok(robot) = RobotName::new("bench") else { return };
-    let pose = TrajectoryPose::new(robot, Pose::identity());
+    let pose = MappedScan::new(robot, Pose::identity());
     map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
 }
 

@@ -15,7 +15,7 @@ use super::{LevelView, Lookup};
 use crate::geometry::Point;
 use crate::util;
 use crate::voxel::LatticeFromPoints;
-use place::Place;
+use place::Quantizer;
 
 /// Points of one f32 register.
 const LANES: usize = 8;
@@ -40,10 +40,10 @@ pub(super) fn occupied(
     unsafe {
         match lookup {
             Lookup::Bloom => {
-                run(points, &Place::load(lattice_from_points, view), &bloom::Planes::of(view), occupied)
+                run(points, &Quantizer::load(lattice_from_points, view), &bloom::Planes::of(view), occupied)
             }
             Lookup::Exact => {
-                run(points, &Place::load(lattice_from_points, view), &exact::Tables::of(view), occupied)
+                run(points, &Quantizer::load(lattice_from_points, view), &exact::Tables::of(view), occupied)
             }
         }
     }
@@ -60,7 +60,7 @@ impl Batch {
 }
 
 /// How a batch of voxels is looked up.
-trait Probe {
+trait LookupKernel {
     /// A bit for each voxel of the batch: is it occupied?
     ///
     /// # Safety
@@ -71,7 +71,7 @@ trait Probe {
 /// # Safety
 /// Needs AVX2, and a word of `occupied` for each 64 points.
 #[target_feature(enable = "avx2")]
-unsafe fn run(points: &[Point], place: &Place, probe: &impl Probe, occupied: &mut [u64]) -> bool {
+unsafe fn run(points: &[Point], place: &Quantizer, probe: &impl LookupKernel, occupied: &mut [u64]) -> bool {
     let mut batch = Batch::EMPTY;
     let mut all_have_a_voxel = true;
     for (points, words) in points.chunks(BATCH).zip(occupied.chunks_mut(BATCH / 64)) {

@@ -19,7 +19,7 @@ use crate::util::prefetch;
 use crate::voxel::LatticeFromPoints;
 use bloom::Bloom;
 use exact::Exact;
-use place::Place;
+use place::Quantizer;
 
 /// Points a step: one f32 register an axis.
 const LANES: usize = 16;
@@ -71,7 +71,7 @@ const GROUPS: usize = WORD / LANES;
 /// How the voxels of a word of points are looked up: where to look, which may start the fetch, and what is there.
 ///
 /// Each probe has one runner, and each step of it one caller: so all of them become one loop.
-trait Probe {
+trait LookupKernel {
     /// What the probe keeps in registers.
     type Registers<'a>;
     /// Sixteen voxels on their way.
@@ -127,7 +127,7 @@ trait Probe {
 /// # Safety
 /// Needs AVX-512 F, BW, DQ and CD, and a word of `occupied` for each 64 points.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
-unsafe fn run_near<P: Probe>(
+unsafe fn run_near<P: LookupKernel>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
@@ -146,12 +146,12 @@ unsafe fn run_near<P: Probe>(
     }
 }
 
-/// Seeks the points of each word [`Probe::AHEAD`] words before it answers for them.
+/// Seeks the points of each word [`LookupKernel::AHEAD`] words before it answers for them.
 ///
 /// # Safety
 /// Needs AVX-512 F, BW, DQ and CD, and a word of `occupied` for each 64 points.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
-unsafe fn run_far<P: Probe>(
+unsafe fn run_far<P: LookupKernel>(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
@@ -196,19 +196,21 @@ impl<W> Word<W> {
 }
 
 /// The steps of a look-up, and what they keep in registers.
-struct Steps<'a, P: Probe> {
-    place: Place,
+struct Steps<'a, P: LookupKernel> {
+    place: Quantizer,
     registers: P::Registers<'a>,
     memory: P::Memory,
 }
 
-impl<'a, P: Probe> Steps<'a, P> {
+impl<'a, P: LookupKernel> Steps<'a, P> {
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512cd,popcnt")]
     unsafe fn load(lattice_from_points: &LatticeFromPoints, view: &'a LevelView<'_>) -> Self {
         let memory = P::Memory::default();
         // SAFETY: the features are there.
-        unsafe { Self { place: Place::load(lattice_from_points, view), registers: P::load(view), memory } }
+        unsafe {
+            Self { place: Quantizer::load(lattice_from_points, view), registers: P::load(view), memory }
+        }
     }
 
     #[inline]

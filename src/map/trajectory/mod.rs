@@ -21,7 +21,7 @@ mod scan;
 mod thinning;
 
 pub use id_ranges::ID_RANGES_PER_ROBOT_MAX;
-pub use scan::{OverlapOfNoLevel, ScanRecord, TrajectoryPose, WithdrawnScan};
+pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, WithdrawnScan};
 pub use thinning::TrajectorySpacing;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,7 +31,7 @@ use super::RobotName;
 use chunked::{Chunked, Keyed};
 use robot_scans::RobotScans;
 
-impl Keyed for TrajectoryPose {
+impl Keyed for MappedScan {
     fn key(&self) -> u64 {
         self.revision
     }
@@ -41,7 +41,7 @@ impl Keyed for TrajectoryPose {
 #[derive(Debug, Clone, Default)]
 pub struct Trajectory {
     /// With those that are marked.
-    poses: Chunked<TrajectoryPose>,
+    poses: Chunked<MappedScan>,
     robots: Arc<BTreeMap<RobotName, Arc<RobotScans>>>,
     /// Of `poses`, those that were taken out again.
     marked: Arc<BTreeSet<u64>>,
@@ -52,7 +52,7 @@ pub struct Trajectory {
 
 impl Trajectory {
     /// In the order of acceptance.
-    pub fn poses(&self) -> impl DoubleEndedIterator<Item = &TrajectoryPose> {
+    pub fn poses(&self) -> impl DoubleEndedIterator<Item = &MappedScan> {
         self.poses.iter().filter(|pose| !self.marked.contains(&pose.revision))
     }
 
@@ -71,13 +71,13 @@ impl Trajectory {
         &'a self,
         revision: u64,
         robot: Option<&RobotName>,
-    ) -> Box<dyn Iterator<Item = &'a TrajectoryPose> + 'a> {
+    ) -> Box<dyn Iterator<Item = &'a MappedScan> + 'a> {
         let Some(first) = revision.checked_add(1) else {
             return Box::new(std::iter::empty());
         };
         match robot {
             None => Box::new(
-                self.poses.from(first).filter(|pose: &&TrajectoryPose| !self.marked.contains(&pose.revision)),
+                self.poses.from(first).filter(|pose: &&MappedScan| !self.marked.contains(&pose.revision)),
             ),
             Some(robot) => {
                 let revisions = self.robots.get(robot).into_iter();
@@ -88,7 +88,7 @@ impl Trajectory {
     }
 
     /// The scan that made `revision`.
-    pub fn at(&self, revision: u64) -> Option<&TrajectoryPose> {
+    pub fn at(&self, revision: u64) -> Option<&MappedScan> {
         self.poses.get(revision).filter(|pose| !self.marked.contains(&pose.revision))
     }
 
@@ -99,19 +99,19 @@ impl Trajectory {
     }
 
     /// A robot's last accepted scan.
-    pub fn last_of(&self, robot: &RobotName) -> Option<&TrajectoryPose> {
+    pub fn last_of(&self, robot: &RobotName) -> Option<&MappedScan> {
         self.poses.get(*self.robots.get(robot)?.revisions.iter().next_back()?)
     }
 
     /// A robot's last two accepted scans, the last one first.
-    pub fn last_two_of(&self, robot: &RobotName) -> Option<(&TrajectoryPose, &TrajectoryPose)> {
+    pub fn last_two_of(&self, robot: &RobotName) -> Option<(&MappedScan, &MappedScan)> {
         let mut backwards = self.robots.get(robot)?.revisions.iter().rev();
         let (last, before) = (backwards.next()?, backwards.next()?);
         Some((self.poses.get(*last)?, self.poses.get(*before)?))
     }
 
     /// A robot's accepted scan of that number, where its pose is kept.
-    pub fn find(&self, robot: &RobotName, scan_id: u64) -> Option<&TrajectoryPose> {
+    pub fn find(&self, robot: &RobotName, scan_id: u64) -> Option<&MappedScan> {
         self.poses.get(self.robots.get(robot)?.find(scan_id)?)
     }
 
@@ -153,7 +153,7 @@ impl Trajectory {
         size_of::<Self>() + self.poses.bytes() + self.overlap_bytes + robots + marked + withdrawn
     }
 
-    pub(super) fn push(&mut self, mut pose: TrajectoryPose) {
+    pub(super) fn push(&mut self, mut pose: MappedScan) {
         if self.poses.get(pose.revision).is_some() {
             return;
         }
@@ -171,7 +171,7 @@ impl Trajectory {
 
 impl Trajectory {
     /// The trajectory of these poses, after the scans of `withdrawn` were taken out of it.
-    pub fn new(poses: impl IntoIterator<Item = TrajectoryPose>, withdrawn: Vec<WithdrawnScan>) -> Self {
+    pub fn new(poses: impl IntoIterator<Item = MappedScan>, withdrawn: Vec<WithdrawnScan>) -> Self {
         let mut trajectory = Self { withdrawn: withdrawn.into(), ..Self::default() };
         poses.into_iter().for_each(|pose| trajectory.push(pose));
         trajectory
@@ -234,7 +234,7 @@ impl Trajectory {
 
     /// Makes robots forget scans, which ascend.
     fn take_from_robots(&mut self, scans: &[u64]) {
-        let mut by_robot: BTreeMap<RobotName, Vec<&TrajectoryPose>> = BTreeMap::new();
+        let mut by_robot: BTreeMap<RobotName, Vec<&MappedScan>> = BTreeMap::new();
         for pose in scans.iter().filter_map(|&scan| self.poses.get(scan)) {
             by_robot.entry(pose.robot.clone()).or_default().push(pose);
         }
@@ -249,7 +249,7 @@ impl Trajectory {
     }
 }
 
-fn overlap_bytes(pose: &TrajectoryPose) -> usize {
+fn overlap_bytes(pose: &MappedScan) -> usize {
     pose.level_overlaps.capacity() * size_of::<f64>()
 }
 
@@ -262,8 +262,8 @@ impl PartialEq for Trajectory {
     }
 }
 
-impl FromIterator<TrajectoryPose> for Trajectory {
-    fn from_iter<I: IntoIterator<Item = TrajectoryPose>>(poses: I) -> Self {
+impl FromIterator<MappedScan> for Trajectory {
+    fn from_iter<I: IntoIterator<Item = MappedScan>>(poses: I) -> Self {
         Self::new(poses, Vec::new())
     }
 }

@@ -1,6 +1,6 @@
 //! The scans of one robot.
 
-use super::TrajectoryPose;
+use super::MappedScan;
 use super::chunked::Chunked;
 use super::id_ranges::IdRanges;
 use super::thinning::Seen;
@@ -18,7 +18,7 @@ pub(super) struct RobotScans {
 }
 
 impl RobotScans {
-    pub(super) fn push(&mut self, pose: &TrajectoryPose) {
+    pub(super) fn push(&mut self, pose: &MappedScan) {
         self.revisions.insert(pose.revision);
         if let Some(id) = pose.scan_id {
             self.ids.insert((id, pose.revision));
@@ -31,7 +31,7 @@ impl RobotScans {
     }
 
     /// Takes these scans out, which ascend by revision; their ids.
-    pub(super) fn remove<'p>(&mut self, poses: impl Iterator<Item = &'p TrajectoryPose>) -> Vec<u64> {
+    pub(super) fn remove<'p>(&mut self, poses: impl Iterator<Item = &'p MappedScan>) -> Vec<u64> {
         let (mut revisions, mut ids) = (Vec::new(), Vec::new());
         for pose in poses {
             revisions.push(pose.revision);

@@ -9,7 +9,7 @@ use crate::voxel::{Lattice, MomentSet, VoxelSet};
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanRecord {
     /// What is kept of it in the trajectory; its revision and new voxels are filled in by the commit.
-    pub pose: TrajectoryPose,
+    pub pose: MappedScan,
     /// Every distinct finest voxel that the scan touches, known before or not.
     pub voxels: VoxelSet,
     /// What its points add to the moments of their voxels.
@@ -19,7 +19,7 @@ pub struct ScanRecord {
 impl ScanRecord {
     /// What a scan of `points` (sensor frame) taken at `pose` does to a map on `lattice`. Points without a voxel are
     /// left out and counted in `pose.points_skipped`.
-    pub fn of_points(mut pose: TrajectoryPose, points: &[Point], lattice: &Lattice) -> Self {
+    pub fn of_points(mut pose: MappedScan, points: &[Point], lattice: &Lattice) -> Self {
         let quantize = lattice.from_points(&pose.map_from_sensor);
         let (voxels, out_of_range) = VoxelSet::of_points(points, &quantize);
         pose.points_skipped += out_of_range;
@@ -27,14 +27,14 @@ impl ScanRecord {
     }
 
     /// The same of voxels whose points are not known: the refinement of alignments learns nothing from it.
-    pub fn of_voxels(pose: TrajectoryPose, voxels: VoxelSet) -> Self {
+    pub fn of_voxels(pose: MappedScan, voxels: VoxelSet) -> Self {
         Self { pose, voxels, moments: MomentSet::default() }
     }
 }
 
 /// One accepted scan.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TrajectoryPose {
+pub struct MappedScan {
     /// Who sent it.
     pub robot: RobotName,
     /// The robot's own number of the scan.
@@ -57,7 +57,7 @@ pub struct TrajectoryPose {
     pub digest: u64,
 }
 
-impl TrajectoryPose {
+impl MappedScan {
     /// A robot's scan at `map_from_sensor`, of which nothing else is known.
     pub fn new(robot: RobotName, map_from_sensor: Pose) -> Self {
         Self {

@@ -31,7 +31,7 @@ fn robot(n: u8) -> RobotName {
 /// All that ever happened, with nothing clever about it.
 #[derive(Default)]
 struct Model {
-    all: Vec<TrajectoryPose>,
+    all: Vec<MappedScan>,
     gone: BTreeSet<u64>,
     withdrawn: Vec<WithdrawnScan>,
     revision: u64,
@@ -39,13 +39,13 @@ struct Model {
 }
 
 impl Model {
-    fn accepted(&self) -> impl DoubleEndedIterator<Item = &TrajectoryPose> {
+    fn accepted(&self) -> impl DoubleEndedIterator<Item = &MappedScan> {
         self.all.iter().filter(|pose| !self.gone.contains(&pose.revision))
     }
 
     /// What is left when all that happened is thinned at once.
-    fn kept(&self, spacing: &TrajectorySpacing) -> Vec<TrajectoryPose> {
-        let mut old: BTreeMap<&RobotName, Vec<&TrajectoryPose>> = BTreeMap::new();
+    fn kept(&self, spacing: &TrajectorySpacing) -> Vec<MappedScan> {
+        let mut old: BTreeMap<&RobotName, Vec<&MappedScan>> = BTreeMap::new();
         for pose in self.accepted().filter(|pose| pose.revision < self.base) {
             old.entry(&pose.robot).or_default().push(pose);
         }
@@ -69,7 +69,7 @@ fn check(trajectory: &Trajectory, model: &Model, spacing: &TrajectorySpacing) ->
         prop_assert_eq!(trajectory.at(revision), kept.iter().find(|pose| pose.revision == revision));
     }
     for name in (0..3).map(robot) {
-        let of_robot = |pose: &&TrajectoryPose| pose.robot == name;
+        let of_robot = |pose: &&MappedScan| pose.robot == name;
         let mut newest = model.accepted().filter(of_robot).rev();
         let (last, before) = (newest.next(), newest.next());
         prop_assert_eq!(trajectory.last_of(&name), last);
@@ -104,12 +104,12 @@ proptest! {
                     model.revision += 1;
                     x[usize::from(n)] += cm;
                     let at = Pose::translation(f64::from(x[usize::from(n)] % 900) / 100.0, 0.0, 0.0);
-                    let pose = TrajectoryPose {
+                    let pose = MappedScan {
                         revision: model.revision,
                         scan_id: (model.revision % 5 != 0).then_some(model.revision * 7),
                         timestamp_ns: Some(model.revision as i64 * 300_000_000),
                         level_overlaps: vec![0.5; 3],
-                        ..TrajectoryPose::new(robot(n), at)
+                        ..MappedScan::new(robot(n), at)
                     };
                     trajectory.push(pose.clone());
                     model.all.push(pose);
@@ -146,11 +146,8 @@ proptest! {
 
 #[test]
 fn an_undone_id_may_be_used_again_and_is_then_that_of_the_new_scan() {
-    let pose = |revision| TrajectoryPose {
-        revision,
-        scan_id: Some(7),
-        ..TrajectoryPose::new(robot(0), Pose::identity())
-    };
+    let pose =
+        |revision| MappedScan { revision, scan_id: Some(7), ..MappedScan::new(robot(0), Pose::identity()) };
     let mut trajectory: Trajectory = [pose(1)].into_iter().collect();
     trajectory.withdraw(&[1], 2);
     assert!(!trajectory.knows(&robot(0)) && trajectory.find(&robot(0), 7).is_none());

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use hashbrown::HashSet;
 
-use super::TrajectoryPose;
+use super::MappedScan;
 use crate::geometry::Pose;
 
 /// How far poses of one robot lie apart that are kept for good.
@@ -50,7 +50,7 @@ pub(super) struct Seen {
 
 impl Seen {
     /// True when the next pose is to be kept.
-    pub(super) fn keeps(&mut self, pose: &TrajectoryPose, spacing: &TrajectorySpacing) -> bool {
+    pub(super) fn keeps(&mut self, pose: &MappedScan, spacing: &TrajectorySpacing) -> bool {
         self.judged = pose.revision;
         let cell = cell_of(&pose.map_from_sensor, spacing);
         let is_later = match (self.last_ns, pose.timestamp_ns) {
@@ -84,12 +84,12 @@ mod tests {
     use super::*;
     use crate::map::RobotName;
 
-    fn pose(x: f64, yaw_deg: f64, seconds: Option<i64>) -> TrajectoryPose {
+    fn pose(x: f64, yaw_deg: f64, seconds: Option<i64>) -> MappedScan {
         let map_from_sensor =
             Pose::new([x, 0.0, 0.0].into(), nalgebra::Vector3::new(0.0, 0.0, yaw_deg.to_radians()));
-        TrajectoryPose {
+        MappedScan {
             timestamp_ns: seconds.map(|s| s * 1_000_000_000),
-            ..TrajectoryPose::new(RobotName::new("r").unwrap(), map_from_sensor)
+            ..MappedScan::new(RobotName::new("r").unwrap(), map_from_sensor)
         }
     }
 

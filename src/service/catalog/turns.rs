@@ -3,7 +3,7 @@
 use super::*;
 use crate::map::MapContents;
 use crate::service::map_file::from_file;
-use crate::service::room::Room;
+use crate::service::resource_budget::ResourceBudget;
 use crate::service::{Limits, Marks};
 use crate::util::StopSignal;
 use crate::voxel::VoxelSet;
@@ -11,13 +11,14 @@ use crate::voxel::VoxelSet;
 const MAPS_MAX: usize = 8;
 
 fn named(name: &str) -> Reachable {
-    MapReach::Every.check(&MapName::new(name).unwrap()).unwrap()
+    AllowedMaps::Every.check(&MapName::new(name).unwrap()).unwrap()
 }
 
 fn built(settings: MapSettings) -> BuiltMap {
     let contents = MapContents::at(0, VoxelSet::default());
     let file = Snapshot { uuid: Uuid::nil(), settings, contents }.encode().unwrap();
-    from_file(&file, &Limits::default(), &Room::new(None, Marks::default()), StopSignal::NEVER).unwrap()
+    from_file(&file, &Limits::default(), &ResourceBudget::new(None, Marks::default()), StopSignal::NEVER)
+        .unwrap()
 }
 
 /// What is told within ten times as long as anybody is to wait.

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
-use crate::service::room::Promise;
+use crate::service::resource_budget::Reservation;
 use crate::store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, RecvTimeoutError};
 use crate::util::{SharedDurations, StopSignal};
@@ -41,7 +41,7 @@ struct Pending {
     answer: oneshot::Sender<Outcome>,
     /// Kept until the change is visible.
     _turn: Option<Turn>,
-    _memory: Vec<Promise>,
+    _memory: Vec<Reservation>,
     _pin: Option<Pin>,
 }
 
@@ -90,7 +90,7 @@ impl Worker {
         for Waiting { proposal, answer } in waiting {
             match proposal {
                 Proposal::Prepared(prepared) => {
-                    let Prepared { change, record, if_empty, turn, promise } = *prepared;
+                    let Prepared { change, record, if_empty, turn, reservation } = *prepared;
                     if if_empty {
                         self.commit_group(&mut group);
                         if !self.map.is_empty() {
@@ -98,7 +98,7 @@ impl Worker {
                             continue;
                         }
                     }
-                    let (_turn, _memory) = (Some(turn), vec![promise]);
+                    let (_turn, _memory) = (Some(turn), vec![reservation]);
                     group.push(Pending { change, record, answer, _turn, _memory, _pin: None });
                 }
                 Proposal::Undecided(decide) => {

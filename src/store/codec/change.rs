@@ -1,7 +1,7 @@
 //! Changes, and the requests behind them.
 
 use super::{Unreadable, count, required};
-use crate::map::{AnsweredRequest, CallerName, Change, DeletionRecord, Request, RequestId, UndoRecord};
+use crate::map::{CallerName, Change, CompletedRequest, DeletionRecord, Request, RequestId, UndoRecord};
 use crate::store::pb;
 
 impl From<&Change> for pb::Change {
@@ -95,9 +95,9 @@ impl TryFrom<pb::Request> for Request {
     }
 }
 
-impl From<&AnsweredRequest> for pb::AnsweredRequest {
-    fn from(answered: &AnsweredRequest) -> Self {
-        let AnsweredRequest { id, digest, caller, .. } = answered.clone();
+impl From<&CompletedRequest> for pb::AnsweredRequest {
+    fn from(answered: &CompletedRequest) -> Self {
+        let CompletedRequest { id, digest, caller, .. } = answered.clone();
         let request = Request { id, digest, caller };
         Self {
             request: Some((&request).into()),
@@ -108,7 +108,7 @@ impl From<&AnsweredRequest> for pb::AnsweredRequest {
     }
 }
 
-impl TryFrom<pb::AnsweredRequest> for AnsweredRequest {
+impl TryFrom<pb::AnsweredRequest> for CompletedRequest {
     type Error = Unreadable;
 
     fn try_from(message: pb::AnsweredRequest) -> Result<Self, Unreadable> {

@@ -2,12 +2,12 @@
 
 use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
-use crate::map::{ID_RANGES_PER_ROBOT_MAX, RobotName, ScanRecord, Trajectory, TrajectoryPose, WithdrawnScan};
+use crate::map::{ID_RANGES_PER_ROBOT_MAX, MappedScan, RobotName, ScanRecord, Trajectory, WithdrawnScan};
 use crate::store::pb;
 use crate::util::StopSignal;
 
-impl From<&TrajectoryPose> for pb::ScanPose {
-    fn from(pose: &TrajectoryPose) -> Self {
+impl From<&MappedScan> for pb::ScanPose {
+    fn from(pose: &MappedScan) -> Self {
         let [x, y, z] = translation_m(&pose.map_from_sensor);
         let [qx, qy, qz, qw] = rotation_xyzw(&pose.map_from_sensor);
         Self {
@@ -25,7 +25,7 @@ impl From<&TrajectoryPose> for pb::ScanPose {
     }
 }
 
-impl TryFrom<pb::ScanPose> for TrajectoryPose {
+impl TryFrom<pb::ScanPose> for MappedScan {
     type Error = Unreadable;
 
     fn try_from(message: pb::ScanPose) -> Result<Self, Unreadable> {

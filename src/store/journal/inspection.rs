@@ -5,7 +5,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::segment::{Break, Frames};
-use super::segmented::Place;
+use super::segmented::SegmentFolder;
 use crate::map::Change;
 use crate::store::folder::FolderPath;
 use crate::store::{FileSystem, StoreError};
@@ -32,7 +32,7 @@ pub(in crate::store) fn inspect(
     first: u64,
     mut each: impl FnMut(u64, Change) -> Result<(), String>,
 ) -> Result<Inspected, StoreError> {
-    let place = Place { files: Arc::clone(files), folder: folder.clone(), map };
+    let place = SegmentFolder { files: Arc::clone(files), folder: folder.clone(), map };
     let path = place.path(first);
     let bytes = place.read(&path)?;
     let mut inspected = Inspected { next: first, torn_bytes: 0, damage: None };

@@ -17,7 +17,7 @@ pub(super) use recovery::Known;
 pub use recovery::{Cut, Recovered};
 pub use segment::JOURNAL_VERSION;
 pub(super) use segment::{HEADER_BYTES as SEGMENT_HEADER_BYTES, first_revision, owner as owner_of_segment};
-pub(super) use segmented::Place;
+pub(super) use segmented::SegmentFolder;
 pub use segmented::{JournalUse, SegmentedJournal};
 
 use super::StoreError;

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
     use crate::map::{
-        CallerName, DeletionRecord, Request, RequestId, RobotName, ScanRecord, TrajectoryPose, UndoRecord,
+        CallerName, DeletionRecord, MappedScan, Request, RequestId, RobotName, ScanRecord, UndoRecord,
     };
     use crate::voxel::{Lattice, MomentSet, VoxelKey, VoxelSet};
     use rand::{RngExt, SeedableRng};
@@ -79,14 +79,14 @@ mod tests {
 
     #[test]
     fn every_kind_of_change_survives_its_record() {
-        let pose = TrajectoryPose {
+        let pose = MappedScan {
             scan_id: Some(7),
             timestamp_ns: Some(-5),
             level_overlaps: vec![0.1, 1.0 / 3.0],
             iterations: 12,
             points_skipped: 3,
             digest: u64::MAX,
-            ..TrajectoryPose::new(RobotName::new("r1").unwrap(), Pose::translation(0.1, -2.0, 1.0 / 3.0))
+            ..MappedScan::new(RobotName::new("r1").unwrap(), Pose::translation(0.1, -2.0, 1.0 / 3.0))
         };
         let request = Some(Request {
             id: RequestId::new("x-1").unwrap(),
@@ -121,7 +121,7 @@ mod tests {
             .map(|i| Point::new((i % 100) as f32 * 0.4 + along(), (i / 100) as f32 * 0.4 + along(), along()))
             .collect();
         let lattice = Lattice::new(0.1, 4).unwrap();
-        let pose = TrajectoryPose::new(RobotName::new("r1").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r1").unwrap(), Pose::identity());
         let change = Change::Insertion(ScanRecord::of_points(pose, &points, &lattice));
         let record = Record::of(&change).unwrap();
         assert!(record.len() < points.len() * 12 / 2, "{} bytes", record.len());

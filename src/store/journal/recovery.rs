@@ -6,7 +6,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::segment::{self, Break, Frames};
-use super::segmented::{Place, SegmentedJournal};
+use super::segmented::{SegmentFolder, SegmentedJournal};
 use crate::map::Change;
 use crate::store::folder::FolderPath;
 use crate::store::{FileSystem, OpeningProgress, StoreError};
@@ -68,7 +68,7 @@ impl SegmentedJournal {
         let path = folder.get();
         let names = files.list(&path).map_err(StoreError::io(&path))?;
         let segments: Vec<u64> = names.iter().filter_map(|name| segment::first_revision(name)).collect();
-        let place = Place { files, folder: folder.clone(), map };
+        let place = SegmentFolder { files, folder: folder.clone(), map };
         let mut journal = Self::at(place, segments, known.snapshot, segment_bytes_max);
         let mut recovered = Recovered::default();
         let needed = journal.segments.partition_point(|&first| first <= known.snapshot + 1);
@@ -111,7 +111,7 @@ impl Segment<'_> {
     /// Hands its changes after the snapshot to `replay`; the revision expected next.
     fn replay(
         &mut self,
-        place: &Place,
+        place: &SegmentFolder,
         known: Known,
         progress: &OpeningProgress,
         recovered: &mut Recovered,
@@ -148,7 +148,7 @@ impl Segment<'_> {
     fn ends_with(
         &self,
         broken: Break,
-        place: &Place,
+        place: &SegmentFolder,
         known: Known,
         recovered: &mut Recovered,
     ) -> Result<u64, StoreError> {
@@ -171,7 +171,7 @@ impl Segment<'_> {
         self.last && newest <= known.snapshot && broken.foreign.is_none()
     }
 
-    fn cut(&self, broken: Break, place: &Place) -> Result<Cut, StoreError> {
+    fn cut(&self, broken: Break, place: &SegmentFolder) -> Result<Cut, StoreError> {
         let (offset, bytes) = (broken.offset as u64, self.bytes.len() as u64);
         let cut = || match offset {
             // Begun anew and not removed: the segment before it would be the last then, and be read by other rules. Where that
@@ -188,7 +188,7 @@ impl Segment<'_> {
 mod tests {
     use super::*;
     use crate::geometry::Pose;
-    use crate::map::{RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{MappedScan, RobotName, ScanRecord};
     use crate::store::journal::Journal;
     use crate::store::{Disk, Record, StoreSettings};
     use crate::voxel::VoxelSet;
@@ -204,7 +204,7 @@ mod tests {
             SegmentedJournal::recover(files, &folder, Uuid::nil(), known, 1 << 20, &progress, replay)
         };
         let (mut journal, _) = recover(&mut |_, _| Ok(())).unwrap();
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         let record =
             Record::of(&Change::Insertion(ScanRecord::of_voxels(pose, VoxelSet::default()))).unwrap();
         journal.append(&[&record; 10]).unwrap();

@@ -17,7 +17,7 @@ use crate::util::{Durations, StopSignal};
 /// A journal as segments in a map's folder. It appends to segments that it began itself, never to one it found.
 #[derive(Debug)]
 pub struct SegmentedJournal {
-    pub(super) place: Place,
+    pub(super) place: SegmentFolder,
     /// The first revisions of the segments, ascending.
     pub(super) segments: Vec<u64>,
     active: Option<Active>,
@@ -43,7 +43,7 @@ pub struct JournalUse {
 
 /// Where a map's segments are.
 #[derive(Debug, Clone)]
-pub(in crate::store) struct Place {
+pub(in crate::store) struct SegmentFolder {
     pub(super) files: Arc<dyn FileSystem>,
     pub(super) folder: FolderPath,
     pub(super) map: Uuid,
@@ -58,7 +58,7 @@ struct Active {
 }
 
 impl SegmentedJournal {
-    pub(super) fn at(place: Place, segments: Vec<u64>, head: u64, segment_bytes_max: u64) -> Self {
+    pub(super) fn at(place: SegmentFolder, segments: Vec<u64>, head: u64, segment_bytes_max: u64) -> Self {
         Self {
             place,
             segments,
@@ -92,7 +92,7 @@ impl SegmentedJournal {
     }
 
     /// Where they are.
-    pub(in crate::store) fn place(&self) -> &Place {
+    pub(in crate::store) fn place(&self) -> &SegmentFolder {
         &self.place
     }
 
@@ -193,7 +193,7 @@ impl Journal for SegmentedJournal {
     }
 }
 
-impl Place {
+impl SegmentFolder {
     pub(super) fn path(&self, first: u64) -> PathBuf {
         self.folder.file(&segment::file_name(first))
     }
@@ -239,7 +239,7 @@ impl Place {
 
 /// Changes read segment by segment.
 struct Reader {
-    place: Place,
+    place: SegmentFolder,
     segments: VecDeque<u64>,
     /// The next to hand out.
     revision: u64,

@@ -2,7 +2,7 @@
 
 use super::MapFolder;
 use super::facts::Pin;
-use crate::map::{Change, Observations, WithdrawnScan};
+use crate::map::{Change, VoxelOwnership, WithdrawnScan};
 use crate::store::snapshot_files::snapshot_name;
 use crate::store::{MapFileError, MapFileLimits, Snapshot, StoreError, folder};
 use crate::util::StopSignal;
@@ -11,7 +11,7 @@ use crate::util::StopSignal;
 #[derive(Debug)]
 pub struct Observed {
     /// Up to `revision`.
-    pub observations: Observations,
+    pub observations: VoxelOwnership,
     /// The last change that was seen.
     pub revision: u64,
     /// What it was read from stays as long as this.
@@ -51,7 +51,7 @@ impl MapFolder {
         stop: StopSignal<'_>,
     ) -> Result<Observed, NotObserved<E>> {
         let pin = self.facts.pin_base_of(scans, withdrawn).ok_or(NotObserved::OutOfReach)?;
-        let mut observations = Observations::of(scans.to_vec(), withdrawn);
+        let mut observations = VoxelOwnership::of(scans.to_vec(), withdrawn);
         self.touch(&mut observations, &mut reserve, stop)?;
         let (revision, path) = (pin.snapshot, self.path.file(&snapshot_name(pin.snapshot)));
         let bytes = self.files.size(&path).map_err(StoreError::io(&path))?;
@@ -78,7 +78,7 @@ impl MapFolder {
     /// Reads what the targets touched.
     fn touch<E>(
         &self,
-        observations: &mut Observations,
+        observations: &mut VoxelOwnership,
         reserve: &mut impl FnMut(u64) -> Result<(), E>,
         stop: StopSignal<'_>,
     ) -> Result<(), NotObserved<E>> {
@@ -89,7 +89,7 @@ impl MapFolder {
                 return Err(NotObserved::Stopped);
             }
             if let (_, Change::Insertion(scan)) = change? {
-                reserve(Observations::bytes_of(&scan) as u64).map_err(NotObserved::NoMemory)?;
+                reserve(VoxelOwnership::bytes_of(&scan) as u64).map_err(NotObserved::NoMemory)?;
                 observations.touch(&scan);
             }
         }

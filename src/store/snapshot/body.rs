@@ -12,7 +12,7 @@ use super::fields::{
 use super::limits::{MapFileError, MapFileLimits, Memory};
 use crate::bloom::FilterSettings;
 use crate::map::{
-    AnsweredRequest, MapContents, MapSettings, REQUESTS_KEPT, Requests, Trajectory, TrajectoryPose,
+    CompletedRequest, IdempotencyLog, MapContents, MapSettings, MappedScan, REQUESTS_KEPT, Trajectory,
 };
 use crate::store::codec::{Unreadable, moments, voxels, with_forgotten};
 use crate::store::pb;
@@ -59,9 +59,9 @@ const RECORD_BYTES_MAX: usize = 4096;
 const NUMBER_BYTES: usize = 3 * size_of::<u64>();
 /// Of a scan in the trajectory: itself as it was read and in a list that doubles its room, its overlaps and name, and its
 /// places by robot and id.
-const SCAN_BYTES: usize = 3 * size_of::<TrajectoryPose>() + 12 * size_of::<f64>() + 240;
+const SCAN_BYTES: usize = 3 * size_of::<MappedScan>() + 12 * size_of::<f64>() + 240;
 /// Of a request, which is found by its id, its revision and its caller, each with a text of its own.
-const REQUEST_BYTES: usize = 3 * size_of::<AnsweredRequest>() + 320;
+const REQUEST_BYTES: usize = 3 * size_of::<CompletedRequest>() + 320;
 /// Robots whose forgotten scans a file may list.
 const ROBOTS_MAX: usize = 1 << 20;
 /// Of a robot whose scans were forgotten, besides their ids: its name, and its place by name.
@@ -285,10 +285,10 @@ impl<'a> Body<'a> {
         Ok(with_forgotten(trajectory, &forgotten, self.stop)?)
     }
 
-    fn scans(&self) -> Result<Vec<TrajectoryPose>, Unreadable> {
+    fn scans(&self) -> Result<Vec<MappedScan>, Unreadable> {
         let mut scans = Vec::with_capacity(self.scans);
         for record in self.records(number::TRAJECTORY) {
-            let scan: TrajectoryPose = decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?;
+            let scan: MappedScan = decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?;
             scan.check_levels(self.levels).map_err(|e| e.to_string())?;
             scans.push(scan);
         }
@@ -296,8 +296,8 @@ impl<'a> Body<'a> {
     }
 
     /// Each of its own revision, and each id of a caller once a kind: which answer is whose is told by them.
-    fn requests(&self) -> Result<Requests, Unreadable> {
-        let requests: Vec<AnsweredRequest> =
+    fn requests(&self) -> Result<IdempotencyLog, Unreadable> {
+        let requests: Vec<CompletedRequest> =
             self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?;
         let ascend = requests.is_sorted_by(|one, next| one.revision < next.revision);
         let ids: HashSet<_> =
@@ -332,7 +332,7 @@ impl<'a> Body<'a> {
     }
 }
 
-fn request(record: Result<&[u8], Unreadable>) -> Result<AnsweredRequest, Unreadable> {
+fn request(record: Result<&[u8], Unreadable>) -> Result<CompletedRequest, Unreadable> {
     decoded::<pb::AnsweredRequest>(record?, "a request")?.try_into()
 }
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use mrol::geometry::Pose;
 use mrol::map::{
-    Change, DeletionRecord, MapContents, MapName, MapSettings, MultiResolutionMap, Request, RequestId,
-    RobotName, ScanRecord, TrajectoryPose, UndoRecord,
+    Change, DeletionRecord, MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Request,
+    RequestId, RobotName, ScanRecord, UndoRecord,
 };
 use mrol::store::{
     DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
@@ -146,8 +146,7 @@ fn change(revision: u64) -> Change {
         }),
         _ => {
             let robot = RobotName::new("r1").expect("a name");
-            let pose =
-                TrajectoryPose { scan_id: Some(revision), ..TrajectoryPose::new(robot, Pose::identity()) };
+            let pose = MappedScan { scan_id: Some(revision), ..MappedScan::new(robot, Pose::identity()) };
             let first = revision as i32 * 20;
             let lattice = mrol::voxel::Lattice::new(0.1, 4).expect("settings");
             let points = (first..first + 100).map(|i| {

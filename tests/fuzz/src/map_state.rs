@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use mrol::align::{AlignmentSettings, align};
 use mrol::geometry::{Point, Pose};
-use mrol::map::{Lookup, MultiResolutionMap, Region, RobotName, ScanRecord, TrajectoryPose};
+use mrol::map::{Lookup, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord};
 use mrol::store::Snapshot;
 use uuid::Uuid;
 
@@ -55,7 +55,7 @@ fn can_be_changed(map: &MultiResolutionMap, aligned: bool) {
         map_from_sensor =
             align(map, &points, &map_from_sensor, &AlignmentSettings::default()).map_from_sensor;
     }
-    let pose = TrajectoryPose::new(RobotName::new("fuzz").expect("a name"), map_from_sensor);
+    let pose = MappedScan::new(RobotName::new("fuzz").expect("a name"), map_from_sensor);
     let record = ScanRecord::of_points(pose, &points, map.lattice());
     let before = map.revision();
     let committed = map.committer().insert_scan(record.clone());

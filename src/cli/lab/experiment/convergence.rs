@@ -15,7 +15,7 @@ use crate::geometry::{Pose, rotation_xyzw, translation_m};
 use crate::lab::experiment::convergence::{OFFSET_MAX_DEG, OFFSET_MAX_M, OffGuess, Trial, guesses_around};
 use crate::lab::report::{Table, folder};
 use crate::lab::workload::Scan;
-use crate::map::{MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+use crate::map::{MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::scan::{read_points, read_trajectory, scan_files};
 
 const EXAMPLES: &str = "\
@@ -97,7 +97,7 @@ impl Convergence {
         let settings = self.map.settings(self.resolution)?;
         let map = MultiResolutionMap::new(settings).map_err(CliError::usage)?;
         let robot = RobotName::new("experiment").map_err(CliError::failed)?;
-        let pose = TrajectoryPose::new(robot, Pose::identity());
+        let pose = MappedScan::new(robot, Pose::identity());
         let points = Scan::of_finite(read_points(&self.target)?, None).points;
         map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
         Ok(map)

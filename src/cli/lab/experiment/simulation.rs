@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde::Serialize;
 
-use crate::align::{AlignmentSettings, Method, WideStartSettings};
+use crate::align::{AlignmentSettings, Method, MultiStartSettings};
 use crate::bloom::FilterSettings;
 use crate::cli::error::CliError;
 use crate::cli::map::ample::{FalsePositives, FilterSummary};
@@ -212,12 +212,12 @@ fn unjudged(method: Method, lookup: Lookup) -> AlignmentSettings {
         overlap_min: 0.0,
         undetermined_std: f64::MAX,
         refinement_reach: f64::MAX,
-        wide_start: WideStartSettings {
+        multi_start: MultiStartSettings {
             fitness_below: 0.0,
             std_above: f64::MAX,
             motion_above: f64::MAX,
             motion_above_deg: f64::MAX,
-            ..defaults.wide_start
+            ..defaults.multi_start
         },
         ..defaults
     }

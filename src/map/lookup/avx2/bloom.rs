@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{BATCH, Batch, LANES, Probe, of_shards, prefetch, store};
+use super::{BATCH, Batch, LANES, LookupKernel, of_shards, prefetch, store};
 use crate::bloom::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
 use crate::map::lookup::LevelView;
 use crate::map::sharding::SHARDS;
@@ -24,7 +24,7 @@ impl Planes {
     }
 }
 
-impl Probe for Planes {
+impl LookupKernel for Planes {
     #[target_feature(enable = "avx2")]
     unsafe fn look_up(&self, batch: &Batch, points: usize) -> [u64; BATCH / 64] {
         let (mut addresses, mut bits) = ([0u64; BATCH], [0u32; BATCH]);

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{BATCH, Batch, LANES, Probe, mix, of_shards, pack, prefetch, scale, store};
+use super::{BATCH, Batch, LANES, LookupKernel, mix, of_shards, pack, prefetch, scale, store};
 use crate::map::lookup::LevelView;
 use crate::map::sharding::SHARDS;
 use crate::voxel::{BLOCK_LEVELS, BUCKET, BlockMask, Bucket, CLUSTER_LEVELS, Cell, Cluster, Slots};
@@ -29,7 +29,7 @@ static NO_CLUSTER: [u64; 2] = [0; 2];
 /// The mask of a block that is not there.
 static ABSENT: BlockMask = BlockMask::EMPTY;
 
-impl Probe for Tables<'_> {
+impl LookupKernel for Tables<'_> {
     #[target_feature(enable = "avx2")]
     unsafe fn look_up(&self, batch: &Batch, points: usize) -> [u64; BATCH / 64] {
         let (clusters, cells) = split(&batch.index, self.view.up);

@@ -9,14 +9,14 @@ use crate::map::sharding::SHARDS;
 use crate::voxel::LatticeFromPoints;
 
 /// The transform and the level, spread over lanes.
-pub(super) struct Place {
+pub(super) struct Quantizer {
     rotation: [[__m256; 3]; 3],
     translation: [__m256; 3],
     level: __m128i,
     region_shift: __m128i,
 }
 
-impl Place {
+impl Quantizer {
     #[target_feature(enable = "avx2")]
     pub(super) fn load(t: &LatticeFromPoints, view: &LevelView<'_>) -> Self {
         Self::of_level(t, view.level, view.region_shift)

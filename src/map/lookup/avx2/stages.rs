@@ -1,8 +1,8 @@
 //! The stages of a look-up, a batch at a time. All must only be called where [`super::is_available`].
 
 use super::bloom::Planes;
-use super::place::Place;
-use super::{BATCH, Batch, LANES, Probe, pack, store};
+use super::place::Quantizer;
+use super::{BATCH, Batch, LANES, LookupKernel, pack, store};
 use crate::geometry::Point;
 use crate::map::lookup::LevelView;
 use crate::map::lookup::stages::{Grid, NO_KEY};
@@ -40,7 +40,7 @@ pub(in crate::map::lookup) fn filter_contains(keys: &[u64], view: &LevelView<'_>
 /// Needs AVX2.
 #[target_feature(enable = "avx2")]
 unsafe fn all_keys(points: &[Point], t: &LatticeFromPoints, level: u32, keys: &mut [u64]) {
-    let (place, mut batch, mut packed) = (Place::of_level(t, level, 0), Batch::EMPTY, [0; BATCH]);
+    let (place, mut batch, mut packed) = (Quantizer::of_level(t, level, 0), Batch::EMPTY, [0; BATCH]);
     for (points, keys) in points.chunks(BATCH).zip(keys.chunks_mut(BATCH)) {
         // SAFETY: the feature is there.
         let has_voxel = unsafe { place_all(&place, points, &mut batch) };
@@ -57,7 +57,7 @@ unsafe fn all_keys(points: &[Point], t: &LatticeFromPoints, level: u32, keys: &m
 /// Needs AVX2.
 #[target_feature(enable = "avx2")]
 unsafe fn all_offsets(points: &[Point], t: &LatticeFromPoints, level: u32, grid: &Grid, offsets: &mut [u32]) {
-    let (place, mut batch) = (Place::of_level(t, level, 0), Batch::EMPTY);
+    let (place, mut batch) = (Quantizer::of_level(t, level, 0), Batch::EMPTY);
     for (points, offsets) in points.chunks(BATCH).zip(offsets.chunks_mut(BATCH)) {
         // SAFETY: the feature is there.
         let has_voxel = unsafe { place_all(&place, points, &mut batch) };
@@ -76,7 +76,7 @@ unsafe fn all_offsets(points: &[Point], t: &LatticeFromPoints, level: u32, grid:
 /// Needs AVX2.
 #[inline]
 #[target_feature(enable = "avx2")]
-unsafe fn place_all(place: &Place, points: &[Point], batch: &mut Batch) -> [bool; BATCH] {
+unsafe fn place_all(place: &Quantizer, points: &[Point], batch: &mut Batch) -> [bool; BATCH] {
     let mut has_voxel = [false; BATCH];
     for (group, points) in points.chunks(LANES).enumerate() {
         // SAFETY: the feature is there.

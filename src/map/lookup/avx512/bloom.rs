@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::registers::{
     Addresses, PerShard, addresses, eight_of, gather, halves, lanes, lengths, odd, prefetch, sum_of,
 };
-use super::{GROUPS, LANES, Probe};
+use super::{GROUPS, LANES, LookupKernel};
 use crate::bloom::{BITS_OF_HASH, HASH_BITS, HASH_MIX, HASH_NEXT, HASH_WORD};
 use crate::map::lookup::LevelView;
 
@@ -32,7 +32,7 @@ impl Located {
     pub(super) const NONE: Self = Self { addresses: [Addresses::NONE; 2], bits: eight_of(0) };
 }
 
-impl<const HASHES: u32, const FETCH: bool> Probe for Bloom<HASHES, FETCH> {
+impl<const HASHES: u32, const FETCH: bool> LookupKernel for Bloom<HASHES, FETCH> {
     type Registers<'a> = BloomRegisters;
     type Located = Located;
     type Word = [Located; GROUPS];

@@ -5,7 +5,7 @@ mod tables;
 use std::arch::x86_64::*;
 
 use super::registers::{eight_of, gather_now, lanes, load, pack, prefetch_now, store, widen};
-use super::{GROUPS, LANES, Probe, WORD};
+use super::{GROUPS, LANES, LookupKernel, WORD};
 use crate::map::lookup::LevelView;
 use crate::voxel::{BLOCK_LEVELS, CLUSTER_LEVELS, Cell};
 use tables::{CELL_BITS, Found, Tables, within_shard};
@@ -78,7 +78,7 @@ impl Default for ExactMemory {
     }
 }
 
-impl<const FETCH: bool> Probe for Exact<FETCH> {
+impl<const FETCH: bool> LookupKernel for Exact<FETCH> {
     type Registers<'a> = ExactRegisters<'a>;
     type Located = Located;
     type Word = ExactWord;

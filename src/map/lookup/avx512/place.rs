@@ -10,13 +10,13 @@ use crate::map::sharding::SHARDS;
 use crate::voxel::{INDEX_MAX, INDEX_MIN, LatticeFromPoints};
 
 /// From points to indices of a level and shards.
-pub(super) struct Place {
+pub(super) struct Quantizer {
     quantize: Quantize,
     level: u32,
     shards: Shards,
 }
 
-impl Place {
+impl Quantizer {
     #[inline]
     #[target_feature(enable = "avx512f")]
     pub(super) fn load(lattice_from_points: &LatticeFromPoints, view: &LevelView<'_>) -> Self {

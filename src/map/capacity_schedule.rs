@@ -14,11 +14,11 @@ const PHASES: usize = 16;
 /// would all grow within a few scans, and so would the map's memory. With many it stays near its mean, and a
 /// commit builds little.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Room {
+pub(super) struct CapacitySchedule {
     phase: f64,
 }
 
-impl Room {
+impl CapacitySchedule {
     /// Of one level of a shard.
     pub(super) fn of(shard: usize, level: usize) -> Self {
         // Five has no divisor in common with sixteen: levels of one shard are far apart.
@@ -41,7 +41,7 @@ mod tests {
     fn room_is_enough_and_not_much_too_much() {
         for need in [1, 64, 100, 12_345, 10_000_000] {
             for shard in 0..PHASES {
-                let room = Room::of(shard, 1).for_items(need);
+                let room = CapacitySchedule::of(shard, 1).for_items(need);
                 let most = (need.max(64) as f64 * FACTOR * 1.001) as usize;
                 assert!((need..=most).contains(&room), "{room} for {need} of shard {shard}");
             }
@@ -50,7 +50,8 @@ mod tests {
 
     #[test]
     fn shards_of_one_size_have_different_room_and_the_mean_of_it() {
-        let rooms: Vec<_> = (0..PHASES).map(|shard| Room::of(shard, 0).for_items(100_000)).collect();
+        let rooms: Vec<_> =
+            (0..PHASES).map(|shard| CapacitySchedule::of(shard, 0).for_items(100_000)).collect();
         let different: std::collections::BTreeSet<_> = rooms.iter().collect();
         assert_eq!(different.len(), PHASES);
         let mean = rooms.iter().sum::<usize>() as f64 / (PHASES * 100_000) as f64;

@@ -13,9 +13,9 @@ use tonic::{Code, Status};
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, RequestId, SetRequestIdLayer};
 use tracing::Instrument;
 
-use super::inflation::{Compressed, Inflation};
-use super::timely_body::TimelyBody;
-use super::whole_messages::WholeMessages;
+use super::deadline_body::DeadlineBody;
+use super::decompression::{Compressed, Inflation};
+use super::message_framing::WholeMessages;
 use super::{deadline, not_grpc, status};
 use crate::access::{Authorized, Gate, Operation, revocable};
 use crate::admission::Admission;
@@ -78,7 +78,7 @@ impl Around {
             Some(refused) => status::of_request(refused, self.message_bytes_max).into_http(),
             None => {
                 let response = match deadline {
-                    Some(most) => TimelyBody::wrap(response, most, begin, deadline::reached(most)),
+                    Some(most) => DeadlineBody::wrap(response, most, begin, deadline::reached(most)),
                     None => response,
                 };
                 match operation == Operation::HealthWatch && !has_key {
@@ -97,7 +97,7 @@ impl Around {
             most.as_secs_f64()
         );
         let over = ServiceError::new(ErrorCode::DeadlineExceeded, "health_watch_over", message);
-        TimelyBody::wrap(response, most, begin, over)
+        DeadlineBody::wrap(response, most, begin, over)
     }
 }
 

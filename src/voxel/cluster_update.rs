@@ -2,24 +2,24 @@
 
 use hashbrown::HashMap;
 
-use super::cluster::{Cluster, Place};
-use super::{BLOCKS_PER_LOOK, BlockMask, BlockTable, VoxelKey};
+use super::cluster::{BlockInCluster, Cluster};
+use super::{BLOCKS_PER_LOOK, BlockMask, ClusterTable, VoxelKey};
 use crate::util::StopSignal;
 
 /// Clusters as a change leaves them, made beside those that they are to replace: so readers go on meanwhile, and are
 /// kept waiting for no more than an exchange of pointers.
 #[derive(Debug)]
 #[must_use = "nothing has changed yet"]
-pub(crate) struct Renewal(Vec<(VoxelKey, Cluster)>);
+pub(crate) struct ClusterUpdate(Vec<(VoxelKey, Cluster)>);
 
-impl Renewal {
+impl ClusterUpdate {
     /// Of the clusters of `table`, once each of `blocks`, none of which comes twice, has got these voxels: none takes
     /// the block out. Once stopped, what comes of it is not to be applied.
-    pub(crate) fn plan(table: &BlockTable, blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Self {
+    pub(crate) fn plan(table: &ClusterTable, blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Self {
         let mut touched = Touched::default();
         let mut numbers = Vec::with_capacity(blocks.len());
         for (block, mask) in stop.pieces(blocks, BLOCKS_PER_LOOK).flatten() {
-            let (key, place) = Place::of(*block);
+            let (key, place) = BlockInCluster::of(*block);
             let number = touched.number(table, key);
             let present = &mut touched.clusters[number].present;
             *present = if mask.is_empty() { *present & !place.bit() } else { *present | place.bit() };
@@ -34,13 +34,13 @@ impl Renewal {
         }
         let new = stop.paced(blocks.iter().zip(numbers), BLOCKS_PER_LOOK);
         for ((block, mask), number) in new.filter(|((_, mask), _)| !mask.is_empty()) {
-            clusters[number].1.set(Place::of(*block).1, *mask);
+            clusters[number].1.set(BlockInCluster::of(*block).1, *mask);
         }
         Self(clusters)
     }
 
     /// Exchanges the clusters.
-    pub(crate) fn apply(self, table: &mut BlockTable) {
+    pub(crate) fn apply(self, table: &mut ClusterTable) {
         self.0.into_iter().for_each(|(key, cluster)| table.set_cluster(key, cluster));
     }
 }
@@ -62,7 +62,7 @@ struct TouchedCluster<'a> {
 
 impl<'a> Touched<'a> {
     /// The number of a cluster of `table`, whether it is there or not.
-    fn number(&mut self, table: &'a BlockTable, key: VoxelKey) -> usize {
+    fn number(&mut self, table: &'a ClusterTable, key: VoxelKey) -> usize {
         // Blocks come row by row: the last cluster is met again more often than not.
         if let Some((_, number)) = self.last.filter(|(last, _)| *last == key) {
             return number;

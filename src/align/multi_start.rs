@@ -34,7 +34,7 @@ pub(super) fn align(
     let guesses = around(guess, shift_m);
     let overlap = Overlap::new(map, &scan.sample, coarse, settings.lookup);
     let mut lookups = first.lookups + overlap.lookups() * guesses.len() as u64;
-    let guesses = highest(guesses, &overlap, settings.wide_start.ascents, scan.stop);
+    let guesses = highest(guesses, &overlap, settings.multi_start.ascents, scan.stop);
 
     let climbed: Vec<_> =
         guesses.into_iter().map(|guess| climb(map, scan, guess, coarse, settings)).collect();
@@ -77,7 +77,7 @@ pub(super) fn align(
     };
     let as_good = found.iter().find(|other| {
         !is_same(&other.map_from_sensor, &best.map_from_sensor)
-            && other.fitness >= settings.wide_start.ambiguous_fitness * best.fitness
+            && other.fitness >= settings.multi_start.ambiguous_fitness * best.fitness
     });
     match as_good {
         Some(other) if is_accepted(&best) => {

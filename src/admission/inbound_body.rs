@@ -7,7 +7,7 @@ use axum::http::Extensions;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-use super::bodies::{Bodies, Charge};
+use super::bodies::{Bodies, MemoryPermit};
 use super::quota::{Quota, Taken};
 use crate::service::{ErrorCode, ServiceError};
 
@@ -23,12 +23,12 @@ pub(super) struct Body {
     left_alone: Option<Instant>,
     state: State,
     ended: CancellationToken,
-    hang_up: Option<HangUp>,
+    hang_up: Option<CloseConnection>,
 }
 
 /// Closes the connection that a request came by; to be found among its extensions.
 #[derive(Debug, Clone)]
-pub struct HangUp(pub CancellationToken);
+pub struct CloseConnection(pub CancellationToken);
 
 #[derive(Debug)]
 enum State {
@@ -44,7 +44,7 @@ enum State {
 }
 
 impl Body {
-    pub(super) fn new(is_stream: bool, ended: CancellationToken, hang_up: Option<HangUp>) -> Self {
+    pub(super) fn new(is_stream: bool, ended: CancellationToken, hang_up: Option<CloseConnection>) -> Self {
         let (now, state) = (Instant::now(), State::Arriving);
         Self { is_stream, bytes: 0, in_time: now, left_alone: Some(now), state, ended, hang_up }
     }
@@ -78,7 +78,7 @@ impl Body {
 
     /// Closes the connection that it came by.
     pub(super) fn hang_up(&self) {
-        if let Some(HangUp(connection)) = &self.hang_up {
+        if let Some(CloseConnection(connection)) = &self.hang_up {
             connection.cancel();
         }
     }
@@ -148,7 +148,7 @@ impl Body {
 
 /// A handle on a body, which is forgotten with the last of them.
 #[derive(Debug, Clone)]
-pub struct Arrival(Arc<Held>);
+pub struct InboundBody(Arc<Held>);
 
 #[derive(Debug)]
 struct Held {
@@ -157,7 +157,7 @@ struct Held {
     ended: CancellationToken,
 }
 
-impl Arrival {
+impl InboundBody {
     pub(super) fn new(bodies: Bodies, number: u64, ended: CancellationToken) -> Self {
         Self(Arc::new(Held { bodies, number, ended }))
     }
@@ -213,7 +213,7 @@ impl Arrival {
     }
 
     /// Its bytes in memory, which are given back when the charge is dropped: of a message that was read from it.
-    pub fn take(&self) -> Charge {
+    pub fn take(&self) -> MemoryPermit {
         self.0.bodies.take(self.0.number)
     }
 

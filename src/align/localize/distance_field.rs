@@ -5,11 +5,11 @@ use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
 /// Chebyshev distances beyond this many voxels are not told apart.
-pub(super) const REACH_MAX: u8 = 8;
-/// A voxel with nothing occupied within [`REACH_MAX`].
-const FAR: u8 = REACH_MAX + 1;
+pub(super) const DISTANCE_MAX: u8 = 8;
+/// A voxel with nothing occupied within [`DISTANCE_MAX`].
+const FAR: u8 = DISTANCE_MAX + 1;
 
-/// The Chebyshev distance of every voxel of a box to the nearest occupied one, in voxels, up to [`REACH_MAX`].
+/// The Chebyshev distance of every voxel of a box to the nearest occupied one, in voxels, up to [`DISTANCE_MAX`].
 ///
 /// The voxels at distance `k` or less *are* the level dilated by `k` voxels each way, so one byte a voxel serves
 /// every cell of the search, whatever its size.
@@ -54,7 +54,7 @@ impl DistanceField {
         let strides = [1, self.size[0], self.size[0] * self.size[1]];
         let (mut from, mut to) =
             (far_everywhere(self.distances.len(), stop)?, far_everywhere(self.distances.len(), stop)?);
-        for _ in 0..REACH_MAX {
+        for _ in 0..DISTANCE_MAX {
             for (from, distances) in
                 from.chunks_mut(CELLS_PER_LOOK).zip(self.distances.chunks(CELLS_PER_LOOK))
             {

@@ -13,7 +13,7 @@ pub const REQUESTS_PER_CALLER_KEPT: usize = 8_192;
 
 /// A change that was asked for under an id, and what came of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AnsweredRequest {
+pub struct CompletedRequest {
     /// Chosen by the caller.
     pub id: RequestId,
     /// Of what was asked for.
@@ -34,9 +34,9 @@ pub struct AnsweredRequest {
 /// [`REQUESTS_KEPT`] are remembered all the same, the oldest goes of the caller that has most: who asks for little keeps
 /// all of it.
 #[derive(Debug, Clone, Default)]
-pub struct Requests {
+pub struct IdempotencyLog {
     /// By the revision that each made.
-    answered: BTreeMap<u64, AnsweredRequest>,
+    answered: BTreeMap<u64, CompletedRequest>,
     by_id: HashMap<Key, u64>,
     /// The revisions of each caller's, ascending.
     by_caller: BTreeMap<Option<CallerName>, VecDeque<u64>>,
@@ -54,7 +54,7 @@ pub enum RequestKind {
     Undo,
 }
 
-impl AnsweredRequest {
+impl CompletedRequest {
     /// Its kind: an undo takes out a scan at least, a deletion none.
     pub fn kind(&self) -> RequestKind {
         if self.scans > 0 { RequestKind::Undo } else { RequestKind::Deletion }
@@ -65,7 +65,7 @@ impl AnsweredRequest {
     }
 }
 
-impl Requests {
+impl IdempotencyLog {
     /// What came of the caller's request of that kind and id. Requests of which nobody noted the caller, as those of a server
     /// that had no keys then, are everybody's.
     pub fn find(
@@ -73,19 +73,19 @@ impl Requests {
         kind: RequestKind,
         id: &RequestId,
         caller: Option<&CallerName>,
-    ) -> Option<&AnsweredRequest> {
+    ) -> Option<&CompletedRequest> {
         let of = |caller| self.by_id.get(&(caller, kind, id.clone()));
         self.answered.get(of(caller.cloned()).or_else(|| of(None))?)
     }
 
     /// All of them, in the order of their revisions.
-    pub fn iter(&self) -> impl Iterator<Item = &AnsweredRequest> {
+    pub fn iter(&self) -> impl Iterator<Item = &CompletedRequest> {
         self.answered.values()
     }
 
     /// Remembers a request in place of an older one of its caller, kind and id. No server answers an id that it remembers, but a
     /// journal may have been written by one that remembered fewer.
-    pub(super) fn push(&mut self, request: AnsweredRequest) {
+    pub(super) fn push(&mut self, request: CompletedRequest) {
         let (caller, revision) = (request.caller.clone(), request.revision);
         if let Some(older) = self.by_id.insert(request.key(), revision) {
             self.forget(older);
@@ -115,7 +115,7 @@ impl Requests {
     }
 
     /// Takes out the request that made `revision`, but for its id.
-    fn forget(&mut self, revision: u64) -> Option<AnsweredRequest> {
+    fn forget(&mut self, revision: u64) -> Option<CompletedRequest> {
         let gone = self.answered.remove(&revision)?;
         if let Some(of) = self.by_caller.get_mut(&gone.caller) {
             of.binary_search(&revision).ok().and_then(|i| of.remove(i));
@@ -127,14 +127,14 @@ impl Requests {
     }
 }
 
-impl PartialEq for Requests {
+impl PartialEq for IdempotencyLog {
     fn eq(&self, other: &Self) -> bool {
         self.answered == other.answered
     }
 }
 
-impl FromIterator<AnsweredRequest> for Requests {
-    fn from_iter<I: IntoIterator<Item = AnsweredRequest>>(answered: I) -> Self {
+impl FromIterator<CompletedRequest> for IdempotencyLog {
+    fn from_iter<I: IntoIterator<Item = CompletedRequest>>(answered: I) -> Self {
         let mut requests = Self::default();
         answered.into_iter().for_each(|request| requests.push(request));
         requests
@@ -145,32 +145,32 @@ impl FromIterator<AnsweredRequest> for Requests {
 mod tests {
     use super::*;
 
-    fn request(n: u64) -> AnsweredRequest {
+    fn request(n: u64) -> CompletedRequest {
         let id = RequestId::new(&format!("r{n}")).unwrap();
-        AnsweredRequest { id, digest: n, caller: None, revision: n * 3, voxels: 1, scans: 0 }
+        CompletedRequest { id, digest: n, caller: None, revision: n * 3, voxels: 1, scans: 0 }
     }
 
-    fn of_caller(caller: &str, n: u64) -> AnsweredRequest {
-        AnsweredRequest { caller: Some(CallerName::new(caller).unwrap()), ..request(n) }
+    fn of_caller(caller: &str, n: u64) -> CompletedRequest {
+        CompletedRequest { caller: Some(CallerName::new(caller).unwrap()), ..request(n) }
     }
 
-    fn remembers(requests: &Requests, n: u64) -> bool {
+    fn remembers(requests: &IdempotencyLog, n: u64) -> bool {
         requests.iter().any(|request| request.digest == n)
     }
 
     #[test]
     fn an_undo_answers_for_no_deletion_of_the_same_id() {
-        let undo = AnsweredRequest { scans: 1, ..request(1) };
-        let requests: Requests = [undo.clone()].into_iter().collect();
+        let undo = CompletedRequest { scans: 1, ..request(1) };
+        let requests: IdempotencyLog = [undo.clone()].into_iter().collect();
         assert_eq!(requests.find(RequestKind::Deletion, &undo.id, None), None);
         assert_eq!(requests.find(RequestKind::Undo, &undo.id, None), Some(&undo));
     }
 
     #[test]
     fn an_id_is_remembered_once_a_caller_and_callers_do_not_know_of_each_others() {
-        let of = |caller: &str, revision| AnsweredRequest { revision, ..of_caller(caller, 1) };
+        let of = |caller: &str, revision| CompletedRequest { revision, ..of_caller(caller, 1) };
         let (mallory, old, alice) = (of("mallory", 2), of("alice", 3), of("alice", 9));
-        let requests: Requests = [mallory.clone(), old, alice.clone()].into_iter().collect();
+        let requests: IdempotencyLog = [mallory.clone(), old, alice.clone()].into_iter().collect();
         assert!(requests.iter().eq([&mallory, &alice]));
         let find = |caller: &str| {
             requests.find(RequestKind::Deletion, &alice.id, Some(&CallerName::new(caller).unwrap()))
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_request_whose_caller_nobody_noted_is_everybodys() {
-        let requests: Requests = [request(1)].into_iter().collect();
+        let requests: IdempotencyLog = [request(1)].into_iter().collect();
         let caller = CallerName::new("r1").unwrap();
         assert_eq!(requests.find(RequestKind::Deletion, &request(1).id, Some(&caller)), Some(&request(1)));
     }
@@ -190,7 +190,7 @@ mod tests {
     #[test]
     fn the_oldest_request_of_a_caller_is_forgotten_first() {
         let kept = REQUESTS_PER_CALLER_KEPT as u64;
-        let requests: Requests = (0..kept + 2).map(|n| of_caller("r1", n)).collect();
+        let requests: IdempotencyLog = (0..kept + 2).map(|n| of_caller("r1", n)).collect();
         assert!(!remembers(&requests, 1) && remembers(&requests, 2) && remembers(&requests, kept + 1));
         assert_eq!(requests.iter().count(), REQUESTS_PER_CALLER_KEPT);
     }
@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn callers_without_a_name_share_all_there_is() {
         let kept = REQUESTS_KEPT as u64;
-        let requests: Requests = (0..kept + 2).map(request).collect();
+        let requests: IdempotencyLog = (0..kept + 2).map(request).collect();
         assert!(!remembers(&requests, 1) && remembers(&requests, 2) && remembers(&requests, kept + 1));
         assert_eq!(requests.iter().count(), REQUESTS_KEPT);
     }
@@ -206,10 +206,10 @@ mod tests {
     #[test]
     fn one_callers_flood_displaces_none_of_anothers_requests() {
         let flood = (10..10 + REQUESTS_KEPT as u64).map(|n| of_caller("flooder", n));
-        let requests: Requests = [request(1), of_caller("quiet", 2)].into_iter().chain(flood).collect();
+        let requests: IdempotencyLog = [request(1), of_caller("quiet", 2)].into_iter().chain(flood).collect();
         assert!(remembers(&requests, 1) && remembers(&requests, 2));
         // The same after they were written and read.
-        let again: Requests = requests.iter().cloned().collect();
+        let again: IdempotencyLog = requests.iter().cloned().collect();
         assert_eq!(again, requests);
         assert!(remembers(&again, 2) && !remembers(&again, 10));
     }
@@ -222,7 +222,7 @@ mod tests {
             let first = 100_000 * (caller + 1);
             (first..first + REQUESTS_PER_CALLER_KEPT as u64).map(move |n| of_caller(&name, n))
         };
-        let mut requests: Requests = (0..full).flat_map(greedy).collect();
+        let mut requests: IdempotencyLog = (0..full).flat_map(greedy).collect();
         assert_eq!(requests.iter().count(), REQUESTS_KEPT);
         for n in 0..100 {
             requests.push(of_caller("quiet", 90_000_000 + n));
@@ -231,7 +231,7 @@ mod tests {
         assert!((0..100).all(|n| remembers(&requests, 90_000_000 + n)));
         let left = |caller: u64| requests.of(&Some(CallerName::new(&format!("c{caller}")).unwrap()));
         assert!((0..full).all(|caller| left(caller) >= REQUESTS_PER_CALLER_KEPT - 13));
-        let again: Requests = requests.iter().cloned().collect();
+        let again: IdempotencyLog = requests.iter().cloned().collect();
         assert_eq!(again, requests);
     }
 }

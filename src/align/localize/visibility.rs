@@ -1,7 +1,7 @@
 //! Free space as evidence: what a sensor looked through cannot be there.
 
 use super::dilated::DilatedLevels;
-use super::field::REACH_MAX;
+use super::distance_field::DISTANCE_MAX;
 use super::sample::SearchSample;
 use crate::geometry::Pose;
 use crate::util::StopSignal;
@@ -13,7 +13,7 @@ const THROUGH: f32 = 1.0;
 /// A ray's steps where something is near, in voxels.
 const STEP: f32 = 0.5;
 /// A ray's steps where nothing is, in voxels.
-const OPEN_STEP: f32 = REACH_MAX as f32;
+const OPEN_STEP: f32 = DISTANCE_MAX as f32;
 
 /// Rays that are followed between two looks at the stop signal, each by at most two steps for each voxel along the grid's
 /// diagonal.
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
     use crate::align::localize::LocalizationSettings;
     use crate::geometry::Point;
-    use crate::map::{MapSettings, MultiResolutionMap, RobotName, ScanRecord, TrajectoryPose};
+    use crate::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 
     fn plane(x: f32, y: std::ops::Range<i32>) -> impl Iterator<Item = Point> {
         y.flat_map(move |y| (-20..20).map(move |z| Point::new(x, y as f32 * 0.05, z as f32 * 0.05)))
@@ -79,7 +79,7 @@ mod tests {
     fn blocked(more: Vec<Point>) -> f64 {
         let wall: Vec<Point> = plane(4.0, -20..20).collect();
         let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         let all = [wall.clone(), more].concat();
         map.committer().insert_scan(ScanRecord::of_points(pose, &all, map.lattice()));
         let sample = SearchSample::of(&wall, 200, 0, StopSignal::NEVER);
@@ -107,7 +107,7 @@ mod tests {
     fn a_ray_to_a_far_return_takes_no_steps_outside_the_grid() {
         let wall: Vec<Point> = plane(4.0, -20..20).collect();
         let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         map.committer().insert_scan(ScanRecord::of_points(pose, &wall, map.lattice()));
         let near = SearchSample::of(&wall, 200, 0, StopSignal::NEVER);
         let levels = DilatedLevels::of_all(&map, &near, &LocalizationSettings::default());

@@ -29,7 +29,7 @@ const GRACE: Duration = Duration::from_secs(1);
 
 /// The places of a protocol. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
-pub(super) struct Places {
+pub(super) struct ConnectionSlots {
     most: usize,
     reserved_most: usize,
     taken: Arc<Mutex<Taken>>,
@@ -59,12 +59,12 @@ type Unread = Arc<Mutex<BTreeMap<u64, Instant>>>;
 
 /// The place of one connection, free again when this is dropped. A clone is another handle on it.
 #[derive(Debug, Clone)]
-pub(super) struct Place(Arc<Held>);
+pub(super) struct ConnectionSlot(Arc<Held>);
 
 #[derive(Debug)]
 struct Held {
     number: u64,
-    places: Places,
+    places: ConnectionSlots,
     lost: CancellationToken,
     shared: OfConnection,
     is_reserved: bool,
@@ -75,18 +75,18 @@ struct Held {
 /// A request in flight, until it is dropped.
 #[derive(Debug)]
 pub(super) struct InUse {
-    place: Place,
+    place: ConnectionSlot,
     answer: u64,
 }
 
-impl Places {
+impl ConnectionSlots {
     /// `most` places, and `reserved_most` for health checks besides.
     pub(super) fn new(most: usize, reserved_most: usize) -> Self {
         Self { most, reserved_most, taken: Arc::default() }
     }
 
     /// A place for a new connection; none where all are taken by connections in use, and none are reserved.
-    pub(super) fn take(&self, peer: Peer) -> Option<Place> {
+    pub(super) fn take(&self, peer: Peer) -> Option<ConnectionSlot> {
         let mut taken = self.taken.lock();
         let has_place = taken.connections.len() < self.most || taken.free_one(self.spared());
         if !has_place {
@@ -102,7 +102,7 @@ impl Places {
         } else {
             taken.reserved.insert(number, peer, lost.clone());
         }
-        Some(Place(Arc::new(Held {
+        Some(ConnectionSlot(Arc::new(Held {
             number,
             places: self.clone(),
             lost,
@@ -160,7 +160,7 @@ impl Connection {
     }
 }
 
-impl Place {
+impl ConnectionSlot {
     /// A request begins.
     pub(super) fn used(&self) -> InUse {
         self.change(|connection| connection.requests += 1);
@@ -265,13 +265,13 @@ mod tests {
     use super::*;
 
     /// A request that is let in.
-    fn in_use(place: &Place) -> (InUse, impl Sized + use<>) {
+    fn in_use(place: &ConnectionSlot) -> (InUse, impl Sized + use<>) {
         (place.used(), place.0.shared.let_in())
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_newcomer_gets_the_place_that_was_idle_for_longest() {
-        let places = Places::new(2, 0);
+        let places = ConnectionSlots::new(2, 0);
         let first = places.take(Peer::Local).unwrap();
         sleep(Duration::from_secs(1)).await;
         let second = places.take(Peer::Local).unwrap();
@@ -288,7 +288,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_place_in_use_is_nobody_elses() {
-        let places = Places::new(1, 0);
+        let places = ConnectionSlots::new(1, 0);
         let place = places.take(Peer::Local).unwrap();
         let used = in_use(&place);
         assert!(places.take(Peer::Local).is_none());
@@ -298,7 +298,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_has_shown_no_key_gives_way_first() {
-        let places = Places::new(3, 0);
+        let places = ConnectionSlots::new(3, 0);
         let keyed = places.take(Peer::Local).unwrap();
         keyed.0.shared.show_key("r1");
         sleep(Duration::from_secs(9)).await;
@@ -317,7 +317,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_newcomer_among_connections_that_nobody_reads_is_not_the_first_to_go() {
-        let places = Places::new(4, 2);
+        let places = ConnectionSlots::new(4, 2);
         let flood: Vec<_> = (0..4).map(|_| places.take(Peer::Local).unwrap()).collect();
         let unread = flood.iter().map(|place| {
             let used = in_use(place);
@@ -337,7 +337,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_few_that_have_only_just_come_are_spared_for_a_moment() {
-        let places = Places::new(2, 1);
+        let places = ConnectionSlots::new(2, 1);
         let _used = in_use(&places.take(Peer::Local).unwrap());
         let check = places.take(Peer::Local).unwrap();
         assert!(places.take(Peer::Local).unwrap().is_reserved());
@@ -349,7 +349,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn refusals_that_nobody_reads_keep_nobody_out_however_often_they_are_asked_for() {
-        let places = Places::new(4, 1);
+        let places = ConnectionSlots::new(4, 1);
         let held: Vec<_> = (0..4).map(|_| places.take(Peer::Local).unwrap()).collect();
         let mut asked = Vec::new();
         for _ in 0..4 {
@@ -374,7 +374,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn newcomers_do_not_shut_out_others_while_places_of_a_key_are_idle() {
-        let places = Places::new(4, 2);
+        let places = ConnectionSlots::new(4, 2);
         let insider: Vec<_> = (0..4).map(|_| places.take(Peer::Local).unwrap()).collect();
         insider.iter().for_each(|place| place.0.shared.show_key("insider"));
         let trickle = places.take(Peer::Local).unwrap();
@@ -385,7 +385,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn idle_connections_of_one_key_leave_those_of_others_alone() {
-        let places = Places::new(4, 0);
+        let places = ConnectionSlots::new(4, 0);
         let of_key = |key| {
             let place = places.take(Peer::Local).unwrap();
             place.0.shared.show_key(key);
@@ -405,7 +405,7 @@ mod tests {
 
     #[tokio::test]
     async fn where_all_are_in_use_some_places_are_left_for_health() {
-        let places = Places::new(1, 2);
+        let places = ConnectionSlots::new(1, 2);
         let used = in_use(&places.take(Peer::Local).unwrap());
         let (one, two) = (places.take(Peer::Local).unwrap(), places.take(Peer::Local).unwrap());
         assert!(one.is_reserved() && two.is_reserved() && !used.0.place.is_reserved());
@@ -419,7 +419,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn an_answer_that_nobody_reads_is_found_out() {
-        let place = Places::new(1, 0).take(Peer::Local).unwrap();
+        let place = ConnectionSlots::new(1, 0).take(Peer::Local).unwrap();
         let (slow, quick) = (place.used(), place.used());
         let start = Instant::now();
         slow.handed_over();
@@ -444,7 +444,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn idle_time_is_counted_from_the_last_request() {
-        let place = Places::new(1, 0).take(Peer::Local).unwrap();
+        let place = ConnectionSlots::new(1, 0).take(Peer::Local).unwrap();
         let (start, used) = (Instant::now(), place.used());
         let idle = tokio::spawn({
             let place = place.clone();

@@ -25,7 +25,7 @@ const SLOTS_A_CLUSTER: usize = 3;
 /// leaving tombstones. Any number of buckets is allowed (the home is a multiply-shift of the hash, not a
 /// remainder), so that a table grows in small steps.
 #[derive(Debug)]
-pub struct BlockTable {
+pub struct ClusterTable {
     tags: Vec<Tags>,
     keys: Vec<Bucket>,
     clusters: Vec<Cluster>,
@@ -35,14 +35,14 @@ pub struct BlockTable {
     mask_bytes: usize,
 }
 
-impl Default for BlockTable {
+impl Default for ClusterTable {
     /// Without a block.
     fn default() -> Self {
         Self::with_room_for(0)
     }
 }
 
-impl BlockTable {
+impl ClusterTable {
     fn with_room_for(clusters: usize) -> Self {
         // One slot more than the load allows for, so that a search always meets a bucket that is not full.
         let buckets = (clusters * SLOTS_A_CLUSTER + 1).div_ceil(BUCKET);
@@ -233,7 +233,7 @@ fn vacant(buckets: usize) -> Vec<Cluster> {
 mod tests {
     use super::*;
     use crate::util::StopSignal;
-    use crate::voxel::{Place, Renewal};
+    use crate::voxel::{BlockInCluster, ClusterUpdate};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
@@ -241,7 +241,7 @@ mod tests {
     fn cluster(key: VoxelKey, cell: u16) -> Cluster {
         let mut mask = BlockMask::EMPTY;
         mask.insert(Cell::from_bits(cell));
-        let (_, place) = Place::of(key.first_within(2));
+        let (_, place) = BlockInCluster::of(key.first_within(2));
         let mut cluster = Cluster::default().with_blocks(place.bit());
         cluster.set(place, mask);
         cluster
@@ -252,7 +252,7 @@ mod tests {
         fn a_table_holds_what_was_set_last(
             changes in prop::collection::vec(prop::collection::btree_map((0i32..60, -2i32..2), 0u16..3, 1..20), 0..40),
         ) {
-            let mut table = BlockTable::default();
+            let mut table = ClusterTable::default();
             let mut model = BTreeMap::new();
             for change in changes {
                 let mut blocks = Vec::new();
@@ -267,7 +267,7 @@ mod tests {
                     }
                     blocks.push((block, mask));
                 }
-                Renewal::plan(&table, &blocks, StopSignal::NEVER).apply(&mut table);
+                ClusterUpdate::plan(&table, &blocks, StopSignal::NEVER).apply(&mut table);
                 prop_assert_eq!(table.len(), model.len());
             }
             let mut found: Vec<_> = table.iter().collect();
@@ -287,9 +287,9 @@ mod tests {
         #[test]
         fn keys_that_overflow_are_found_and_removed(order in Just((0..37).collect::<Vec<i32>>()).prop_shuffle()) {
             let mut table =
-                BlockTable { tags: vec![0; 5], keys: vec![VACANT_BUCKET; 5], clusters: vacant(5), ..BlockTable::default() };
+                ClusterTable { tags: vec![0; 5], keys: vec![VACANT_BUCKET; 5], clusters: vacant(5), ..ClusterTable::default() };
             let key = |x: i32| VoxelKey::pack([x, 3, -9]);
-            let first_mask = |table: &BlockTable, x: i32| *table.get(key(x).first_within(2));
+            let first_mask = |table: &ClusterTable, x: i32| *table.get(key(x).first_within(2));
             for &x in &order {
                 let slot = table.add_in_room(key(x).to_bits());
                 table.clusters[slot] = cluster(key(x), x as u16);
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn clusters_of_a_plane_seldom_leave_their_home_bucket() {
-        let mut table = BlockTable::default();
+        let mut table = ClusterTable::default();
         for x in 0..100 {
             for y in 0..100 {
                 let key = VoxelKey::pack([x, y, x / 8]);

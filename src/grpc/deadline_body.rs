@@ -14,7 +14,7 @@ use tonic::Status;
 use crate::service::ServiceError;
 
 /// A body that goes, with whoever makes it, when the time is up; the call's status says so.
-pub(super) struct TimelyBody {
+pub(super) struct DeadlineBody {
     /// None when it has ended.
     body: Option<Body>,
     /// What its status says then.
@@ -22,7 +22,7 @@ pub(super) struct TimelyBody {
     reached: Pin<Box<Sleep>>,
 }
 
-impl TimelyBody {
+impl DeadlineBody {
     /// The same response, of a call that began at `begin` and ends with `late`.
     pub(super) fn wrap(
         response: Response,
@@ -44,7 +44,7 @@ impl TimelyBody {
     }
 }
 
-impl HttpBody for TimelyBody {
+impl HttpBody for DeadlineBody {
     type Data = Bytes;
     type Error = axum::Error;
 
@@ -89,7 +89,8 @@ mod tests {
         let response = Response::new(Body::from_stream(endless));
         let deadline = Duration::from_secs(3);
         let begin = tokio::time::Instant::now().into_std();
-        let response = TimelyBody::wrap(response, deadline, begin, crate::grpc::deadline::reached(deadline));
+        let response =
+            DeadlineBody::wrap(response, deadline, begin, crate::grpc::deadline::reached(deadline));
         let sent = response.into_body().collect().await.unwrap();
         let trailers = sent.trailers().unwrap();
         assert_eq!(trailers["grpc-status"], "4");

@@ -1,6 +1,6 @@
 //! Room on disk and in memory.
 //!
-//! The watermarks see what is there. What was let in and is not there yet is promised, and counts as if it were: many
+//! The watermarks see what is there. What was let in and is not there yet is reserved, and counts as if it were: many
 //! scans at once do not pass a mark together that each of them keeps.
 
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use super::{ErrorCode, Gauges, Marks, MemoryReading, Readings, ServiceError};
 /// Of what the process may have in memory, the percentage up to which some is lent for a while.
 const LENT_PERCENT: u64 = 95;
 
-/// What there is of disk and memory, and what of it is promised. Without gauges there is room for everything.
+/// What there is of disk and memory, and what of it is reserved. Without gauges there is room for everything.
 #[derive(Debug)]
-pub(super) struct Room {
+pub(super) struct ResourceBudget {
     gauges: Option<Arc<dyn Gauges>>,
     watermarks: Watermarks,
     marks: Marks,
@@ -24,18 +24,18 @@ pub(super) struct Room {
 
 /// Memory for what is not there yet, or not for long. To drop it gives it back.
 #[derive(Debug)]
-pub(super) struct Promise {
+pub(super) struct Reservation {
     bytes: u64,
     promised_bytes: Arc<AtomicU64>,
 }
 
-impl Drop for Promise {
+impl Drop for Reservation {
     fn drop(&mut self) {
         self.promised_bytes.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
-impl Room {
+impl ResourceBudget {
     pub(super) fn new(gauges: Option<Arc<dyn Gauges>>, marks: Marks) -> Self {
         let watermarks = Watermarks::new(marks.clone());
         Self { gauges, watermarks, marks, promised_bytes: Arc::default() }
@@ -45,7 +45,7 @@ impl Room {
     pub(super) fn look(&self) -> Readings {
         let readings = Readings { disk_free_bytes: self.disk_free_bytes(), memory: self.memory() };
         self.watermarks
-            .note(&Readings { memory: readings.memory.map(|it| self.with_promised(it)), ..readings });
+            .note(&Readings { memory: readings.memory.map(|it| self.with_reserved(it)), ..readings });
         readings
     }
 
@@ -72,11 +72,11 @@ impl Room {
     ///
     /// # Errors
     /// `ResourceExhausted` where there is no room for it below the mark, or none on the disk.
-    pub(super) fn promise(&self, bytes: u64) -> Result<Promise, ServiceError> {
-        let promise = self.count(bytes);
-        let memory = self.memory().map(|it| self.with_promised(it));
+    pub(super) fn reserve_growth(&self, bytes: u64) -> Result<Reservation, ServiceError> {
+        let reservation = self.count(bytes);
+        let memory = self.memory().map(|it| self.with_reserved(it));
         self.watermarks.note(&Readings { memory, ..Readings::default() });
-        self.watermarks.check_to_grow().map(|()| promise)
+        self.watermarks.check_to_grow().map(|()| reservation)
     }
 
     /// Memory for a part of what is built bit by bit, and may be far too much. It is refused where a scan would be; others
@@ -84,20 +84,20 @@ impl Room {
     ///
     /// # Errors
     /// `ResourceExhausted` where there is no room for it below the mark.
-    pub(super) fn reserve(&self, bytes: u64) -> Result<Promise, ServiceError> {
-        let promise = self.count(bytes);
-        let memory = self.memory().map(|it| self.with_promised(it));
+    pub(super) fn reserve(&self, bytes: u64) -> Result<Reservation, ServiceError> {
+        let reservation = self.count(bytes);
+        let memory = self.memory().map(|it| self.with_reserved(it));
         let shortage = memory.and_then(|memory| self.marks.memory(memory, false));
-        shortage.map_or(Ok(promise), |shortage| Err(shortage.refusal("")))
+        shortage.map_or(Ok(reservation), |shortage| Err(shortage.refusal("")))
     }
 
     /// Memory for a while, for `whom`. It may lie above the marks: what shrinks a map and what saves it needs some as well.
     ///
     /// # Errors
     /// `ResourceExhausted` where the process would have more than it may.
-    pub(super) fn lend(&self, bytes: u64, whom: &str) -> Result<Promise, ServiceError> {
-        let promise = self.count(bytes);
-        match self.memory().map(|it| self.with_promised(it)) {
+    pub(super) fn reserve_transient(&self, bytes: u64, whom: &str) -> Result<Reservation, ServiceError> {
+        let reservation = self.count(bytes);
+        match self.memory().map(|it| self.with_reserved(it)) {
             Some(MemoryReading { resident_bytes, allowed_bytes })
                 if resident_bytes > allowed_bytes / 100 * LENT_PERCENT =>
             {
@@ -111,7 +111,7 @@ impl Room {
                 let error = ServiceError::new(ErrorCode::ResourceExhausted, Shortage::MEMORY_FULL, message);
                 Err(error.retry_after(RETRY_AFTER))
             }
-            _ => Ok(promise),
+            _ => Ok(reservation),
         }
     }
 
@@ -127,14 +127,14 @@ impl Room {
         disk_free_low_bytes > 0 && self.disk_free_bytes().is_some_and(|free| free < disk_free_back_bytes)
     }
 
-    fn count(&self, bytes: u64) -> Promise {
+    fn count(&self, bytes: u64) -> Reservation {
         self.promised_bytes.fetch_add(bytes, Ordering::Relaxed);
-        Promise { bytes, promised_bytes: Arc::clone(&self.promised_bytes) }
+        Reservation { bytes, promised_bytes: Arc::clone(&self.promised_bytes) }
     }
 
-    fn with_promised(&self, memory: MemoryReading) -> MemoryReading {
-        let promised = self.promised_bytes.load(Ordering::Relaxed);
-        MemoryReading { resident_bytes: memory.resident_bytes.saturating_add(promised), ..memory }
+    fn with_reserved(&self, memory: MemoryReading) -> MemoryReading {
+        let reserved = self.promised_bytes.load(Ordering::Relaxed);
+        MemoryReading { resident_bytes: memory.resident_bytes.saturating_add(reserved), ..memory }
     }
 
     fn disk_free_bytes(&self) -> Option<u64> {
@@ -169,22 +169,22 @@ mod tests {
         }
     }
 
-    fn room(resident_mib: u64, disk_free_mib: u64) -> Room {
-        Room::new(Some(Arc::new(Fixed { resident_mib, disk_free_mib })), Marks::default())
+    fn room(resident_mib: u64, disk_free_mib: u64) -> ResourceBudget {
+        ResourceBudget::new(Some(Arc::new(Fixed { resident_mib, disk_free_mib })), Marks::default())
     }
 
     #[test]
     fn what_is_promised_counts_as_if_it_were_there_until_it_is() {
         let room = room(700, 10_000);
-        let (one, other) = (room.promise(100 * MIB).unwrap(), room.promise(50 * MIB).unwrap());
-        let refused = room.promise(MIB).unwrap_err();
+        let (one, other) = (room.reserve_growth(100 * MIB).unwrap(), room.reserve_growth(50 * MIB).unwrap());
+        let refused = room.reserve_growth(MIB).unwrap_err();
         assert_eq!(refused.reason, "memory_full");
         assert!(refused.message.contains("851 MiB"), "{}", refused.message);
         // The marks are 850 and 799 MiB: it takes more than the one that was refused to come back.
         drop(other);
-        assert!(room.promise(0).is_err());
+        assert!(room.reserve_growth(0).is_err());
         drop(one);
-        assert!(room.promise(0).is_ok());
+        assert!(room.reserve_growth(0).is_ok());
     }
 
     #[test]
@@ -192,17 +192,17 @@ mod tests {
         let room = room(700, 10_000);
         let refused = room.reserve(200 * MIB).unwrap_err();
         assert_eq!(refused.reason, "memory_full");
-        assert!(room.reserve(100 * MIB).is_ok() && room.promise(MIB).is_ok());
+        assert!(room.reserve(100 * MIB).is_ok() && room.reserve_growth(MIB).is_ok());
     }
 
     #[test]
     fn what_is_lent_may_lie_above_the_mark_and_not_above_what_there_is() {
         let room = room(900, 10_000);
-        let lent = room.lend(50 * MIB, "a snapshot").unwrap();
-        let refused = room.lend(MIB, "a snapshot").unwrap_err();
+        let lent = room.reserve_transient(50 * MIB, "a snapshot").unwrap();
+        let refused = room.reserve_transient(MIB, "a snapshot").unwrap_err();
         assert!(refused.message.contains("a snapshot takes 1 MiB"), "{}", refused.message);
         drop(lent);
-        assert!(room.lend(MIB, "a snapshot").is_ok());
+        assert!(room.reserve_transient(MIB, "a snapshot").is_ok());
     }
 
     #[test]
@@ -213,9 +213,12 @@ mod tests {
 
     #[test]
     fn without_gauges_there_is_room_for_everything() {
-        let room = Room::new(None, Marks::default());
+        let room = ResourceBudget::new(None, Marks::default());
         assert_eq!(room.look(), Readings::default());
-        assert!(room.promise(u64::MAX / 2).is_ok() && room.lend(u64::MAX / 2, "a search").is_ok());
+        assert!(
+            room.reserve_growth(u64::MAX / 2).is_ok()
+                && room.reserve_transient(u64::MAX / 2, "a search").is_ok()
+        );
         assert_eq!(room.file_bytes_max(), u64::MAX);
     }
 }

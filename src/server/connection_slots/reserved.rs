@@ -34,7 +34,7 @@ const MONITORS: usize = 16;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Silent,
-    Asking,
+    RateLimitKey,
     Answered,
 }
 
@@ -59,7 +59,7 @@ impl Reserved {
     /// A request of the connection begins.
     pub(super) fn asks(&mut self, number: u64) {
         if let Some(guest) = self.0.get_mut(&number).filter(|guest| guest.stage == Stage::Silent) {
-            (guest.stage, guest.news) = (Stage::Asking, Instant::now());
+            (guest.stage, guest.news) = (Stage::RateLimitKey, Instant::now());
         }
     }
 
@@ -94,13 +94,13 @@ mod tests {
     use std::time::Duration;
 
     /// So many places, and who is in them.
-    struct Places {
+    struct ConnectionSlots {
         reserved: Reserved,
         most: usize,
         lost: Vec<CancellationToken>,
     }
 
-    impl Places {
+    impl ConnectionSlots {
         fn new(most: usize) -> Self {
             Self { reserved: Reserved::default(), most, lost: Vec::new() }
         }
@@ -124,7 +124,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_flood_from_many_addresses_leaves_a_monitor_several_checks_at_once() {
-        let mut places = Places::new(48);
+        let mut places = ConnectionSlots::new(48);
         for address in 0..48 {
             places.comes(address).await;
         }
@@ -137,7 +137,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn one_peers_flood_leaves_anothers_check_alone() {
-        let mut places = Places::new(4);
+        let mut places = ConnectionSlots::new(4);
         let check = places.comes(1).await;
         for _ in 0..100 {
             places.comes(2).await;
@@ -147,7 +147,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn of_one_peer_the_connection_without_news_for_longest_goes_and_a_request_is_news_once() {
-        let mut places = Places::new(3);
+        let mut places = ConnectionSlots::new(3);
         let check = places.comes(1).await;
         places.comes(1).await;
         places.comes(1).await;
@@ -163,7 +163,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_has_its_answer_goes_first() {
-        let mut places = Places::new(3);
+        let mut places = ConnectionSlots::new(3);
         places.comes(1).await;
         places.comes(1).await;
         let answered = places.comes(2).await;

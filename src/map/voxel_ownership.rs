@@ -14,13 +14,13 @@ use crate::voxel::{BlockMask, MomentSet, Moments, VoxelKey, VoxelSet};
 /// voxel is occupied as long as somebody holds it. So a map without certain scans follows from its changes: it is
 /// what replaying them without those scans would give, with the deletions as they were.
 ///
-/// Observations are made in this order: each target is [touched](Observations::touch), so that nothing else need be
-/// remembered; the [base](Observations::begin) and every change after it, the targets among them, are
-/// [observed](Observations::observe); what leaves with the targets is [found out](Observations::leaving); and what is
-/// observed after that [renews](Observations::renew) it. They take memory by what the targets touched, whatever else
+/// VoxelOwnership are made in this order: each target is [touched](VoxelOwnership::touch), so that nothing else need be
+/// remembered; the [base](VoxelOwnership::begin) and every change after it, the targets among them, are
+/// [observed](VoxelOwnership::observe); what leaves with the targets is [found out](VoxelOwnership::leaving); and what is
+/// observed after that [renews](VoxelOwnership::renew) it. They take memory by what the targets touched, whatever else
 /// the map held.
 #[derive(Debug)]
-pub struct Observations {
+pub struct VoxelOwnership {
     /// By revision, ascending.
     targets: Vec<u64>,
     /// Scans that hold nothing any more, ascending.
@@ -59,7 +59,7 @@ pub struct Leaving {
 /// Entries that are looked at between two looks at the stop signal.
 const ENTRIES_PER_LOOK: usize = 16 << 10;
 
-impl Observations {
+impl VoxelOwnership {
     /// Of scans that are to be undone, by revision; those of `withdrawn` hold nothing any more.
     pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan]) -> Self {
         targets.sort_unstable();
@@ -152,7 +152,7 @@ impl Observations {
     }
 
     /// What leaves with the targets; none once stopped. What is observed afterwards is noted, for
-    /// [`Observations::renew`].
+    /// [`VoxelOwnership::renew`].
     pub fn leaving(&mut self, stop: StopSignal<'_>) -> Option<Leaving> {
         let blocks = stop.paced(&self.blocks, ENTRIES_PER_LOOK);
         let blocks = blocks.map(|(&block, holders)| (block, holders.targets_alone())).collect();
@@ -215,7 +215,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{DeletionRecord, RobotName, TrajectoryPose};
+    use crate::map::{DeletionRecord, MappedScan, RobotName};
     use crate::voxel::Lattice;
 
     fn base(side: i32) -> MapContents {
@@ -224,10 +224,10 @@ mod tests {
     }
 
     fn scan(revision: u64, x: std::ops::Range<i32>) -> ScanRecord {
-        let pose = TrajectoryPose::new(RobotName::new("r").unwrap(), Pose::identity());
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
         let points: Vec<Point> = x.map(|x| Point::new(x as f32 + 0.5, 0.5, 0.5)).collect();
         let lattice = Lattice::new(1.0, 1).unwrap();
-        ScanRecord::of_points(TrajectoryPose { revision, ..pose }, &points, &lattice)
+        ScanRecord::of_points(MappedScan { revision, ..pose }, &points, &lattice)
     }
 
     fn insertion(revision: u64, x: std::ops::Range<i32>) -> Change {
@@ -240,8 +240,8 @@ mod tests {
     }
 
     /// Of targets among `changes`, the first of which makes revision 2.
-    fn begun(targets: &[u64], changes: &[Change], base: &MapContents) -> Observations {
-        let mut observations = Observations::of(targets.to_vec(), &[]);
+    fn begun(targets: &[u64], changes: &[Change], base: &MapContents) -> VoxelOwnership {
+        let mut observations = VoxelOwnership::of(targets.to_vec(), &[]);
         for (revision, change) in (2..).zip(changes) {
             match change {
                 Change::Insertion(scan) if targets.contains(&revision) => observations.touch(scan),
@@ -326,9 +326,9 @@ mod tests {
     #[test]
     fn what_a_target_is_said_to_add_covers_its_tables() {
         let scan = scan(2, 0..100_000);
-        let mut observations = Observations::of(vec![2], &[]);
+        let mut observations = VoxelOwnership::of(vec![2], &[]);
         observations.touch(&scan);
         let tables = observations.blocks.allocation_size() + observations.moments.allocation_size();
-        assert!(tables <= Observations::bytes_of(&scan), "{tables} bytes");
+        assert!(tables <= VoxelOwnership::bytes_of(&scan), "{tables} bytes");
     }
 }
