@@ -5,6 +5,7 @@ use mrol::align::{AlignmentSettings, Method, align};
 use mrol::geometry::{Point, Pose};
 use mrol::lab::simulate::{Scene, Tour, tours};
 use mrol::map::{Lookup, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol::util::Keyword;
 use mrol::voxel::volumetric_sample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

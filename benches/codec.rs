@@ -7,7 +7,7 @@ use mrol::lab::workload::{Order, Room, Site, Workload};
 use mrol::map::{
     Change, Lookup, MapName, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord,
 };
-use mrol::service::{MapState, PointAnswer, PointQuery};
+use mrol::service::{MapVersion, PointAnswer, PointQuery};
 use mrol::store::{Record, Snapshot};
 use mrol::voxel::Lattice;
 use mrol::wire::pb;
@@ -33,7 +33,7 @@ fn codec(criterion: &mut Criterion) {
         occupied: vec![0x5a; POINTS.div_ceil(8)].into(),
         points: POINTS,
         points_occupied: POINTS / 2,
-        state: MapState { revision: 7, map_uuid: uuid::Uuid::from_u128(7) },
+        version: MapVersion { revision: 7, map_uuid: uuid::Uuid::from_u128(7) },
     };
     group.bench_function("encode an answer", |bencher| {
         bencher.iter(|| pb::QueryPointsResponse::from(answer.clone()).encode_to_vec());

@@ -14,7 +14,7 @@ use gungraun::{Callgrind, EventKind};
 use mrol::lab::workload::{Order, Queries, Room, Workload, add};
 use mrol::map::lookup::stages;
 use mrol::map::{Lookup, MapName, MapSettings, MultiResolutionMap};
-use mrol::service::{MapState, PointAnswer, PointQuery};
+use mrol::service::{MapVersion, PointAnswer, PointQuery};
 use mrol::voxel::VoxelSet;
 use mrol::wire::pb;
 use prost::Message;
@@ -117,7 +117,7 @@ fn answer() -> PointAnswer {
         occupied: vec![0x5a; POINTS / 8].into(),
         points: POINTS,
         points_occupied: POINTS / 2,
-        state: MapState { revision: 7, map_uuid: uuid::Uuid::from_u128(7) },
+        version: MapVersion { revision: 7, map_uuid: uuid::Uuid::from_u128(7) },
     }
 }
 

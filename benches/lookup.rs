@@ -7,6 +7,7 @@ use mrol::lab::rivals::StructureName;
 use mrol::lab::workload::{Order, Room, Site, Workload};
 use mrol::map::lookup::stages;
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap};
+use mrol::util::Keyword;
 
 const POINTS: usize = 100_000;
 const STRUCTURES: [StructureName; 7] = [

@@ -41,7 +41,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
         let line = (0..COLUMNS).map(|column| if occupied(row * COLUMNS + column) { '#' } else { '.' });
         println!("{}", line.collect::<String>());
     }
-    let revision = answer.state.revision;
+    let revision = answer.version.revision;
     println!("{} of {} points are occupied at revision {revision}", answer.points_occupied, answer.points);
     Ok(())
 }

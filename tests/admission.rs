@@ -36,12 +36,12 @@ async fn assert_shed(answer: Response, limit: &str) {
     assert_eq!(answer.status(), StatusCode::TOO_MANY_REQUESTS);
     let wait: u64 = answer.headers()["retry-after"].to_str().expect("text").parse().expect("seconds");
     assert!(wait >= 1);
-    let error = json_of(answer).await["error"].clone();
+    let error = json_of(answer).await;
     assert_eq!(
         (error["code"].as_str(), error["reason"].as_str()),
         (Some("resource_exhausted"), Some("overloaded"))
     );
-    let message = error["message"].as_str().expect("a message");
+    let message = error["detail"].as_str().expect("a message");
     assert!(message.contains(limit), "{message}");
 }
 

@@ -68,7 +68,7 @@ async fn a_map_whose_journal_fails_is_read_only_and_says_so() {
     assert!(refused.message().contains("map ill is read only since its journal failed"), "{refused}");
     let refused = daemon.post("/v1/maps/ill/deletions", json!({"points": row(3)})).await;
     assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
-    assert_eq!(json_of(refused).await["error"]["reason"], "map_read_only");
+    assert_eq!(json_of(refused).await["reason"], "map_read_only");
 
     // Nothing came of it, reading goes on, and other maps are as they were.
     assert_eq!(daemon.contents("ill").await, (0, vec![]));
@@ -111,7 +111,7 @@ async fn a_deletion_under_an_id_is_done_once_also_across_a_restart() {
     let other = json!({"points": row(5), "request_id": "wall-7"});
     let refused = daemon.post("/v1/maps/a/deletions", other).await;
     assert_eq!(refused.status(), StatusCode::CONFLICT);
-    assert_eq!(json_of(refused).await["error"]["reason"], "request_id_taken");
+    assert_eq!(json_of(refused).await["reason"], "request_id_taken");
     let bad = daemon.post("/v1/maps/a/deletions", json!({"points": row(5), "request_id": "a/b"})).await;
     assert_eq!(bad.status(), StatusCode::BAD_REQUEST);
 }
@@ -150,7 +150,7 @@ async fn a_server_that_is_starting_says_how_far_it_is() {
     assert_eq!(json_of(ready).await, expected);
     let refused = get("/v1/maps").await;
     assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
-    assert_eq!(json_of(refused).await["error"]["reason"], "starting");
+    assert_eq!(json_of(refused).await["reason"], "starting");
 }
 
 #[tokio::test]
@@ -255,7 +255,7 @@ async fn one_damaged_map_keeps_no_other_from_being_served() {
         client().delete(daemon.url("/v1/maps/ill")).send().await.unwrap(),
     ] {
         assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
-        assert_eq!(json_of(refused).await["error"]["reason"], "map_unavailable");
+        assert_eq!(json_of(refused).await["reason"], "map_unavailable");
     }
 }
 
@@ -268,7 +268,7 @@ async fn a_map_is_replaced_and_the_one_that_was_there_is_kept() {
     daemon.put_in("a", &row(7)).await;
     let put = async |daemon: &Daemon, path: &str| put_file(daemon, path, file.to_vec()).send().await.unwrap();
     let refused = put(&daemon, "/v1/maps/a/snapshot").await;
-    assert_eq!(json_of(refused).await["error"]["reason"], "map_exists");
+    assert_eq!(json_of(refused).await["reason"], "map_exists");
     assert_eq!(put(&daemon, "/v1/maps/a/snapshot?replace=true").await.status(), StatusCode::CREATED);
     let are_both_there = async |daemon: &Daemon| {
         assert_eq!(
@@ -300,13 +300,13 @@ async fn the_last_revision_is_refused_and_so_is_what_would_come_after_it() {
     };
     let refused = at(REVISION_MAX + 1).send().await.unwrap();
     assert_eq!(refused.status(), StatusCode::BAD_REQUEST);
-    assert!(json_of(refused).await["error"]["message"].as_str().unwrap().contains("9007199254740992"));
+    assert!(json_of(refused).await["detail"].as_str().unwrap().contains("9007199254740992"));
     assert_eq!(at(REVISION_MAX - 1).send().await.unwrap().status(), StatusCode::CREATED);
     let map = format!("m{}", REVISION_MAX - 1);
     daemon.put_in(&map, &row(3)).await;
     let scan = json!({"robot": "r", "points": row(5), "guess": identity_json(), "align": false});
     let refused = daemon.post(&format!("/v1/maps/{map}/scans"), scan).await;
-    assert_eq!(json_of(refused).await["error"]["reason"], "revisions_used_up");
+    assert_eq!(json_of(refused).await["reason"], "revisions_used_up");
     let before = daemon.contents(&map).await;
     assert_eq!(before.0, REVISION_MAX);
     let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
@@ -322,9 +322,9 @@ async fn a_map_file_that_could_not_be_restored_is_not_handed_out() {
     let far: Vec<[f32; 3]> = (0..300).map(|i| [i as f32, 0.0, 0.0]).collect();
     daemon.put_in("a", &far).await;
     let refused = daemon.get("/v1/maps/a/snapshot").await;
-    let error = json_of(refused).await["error"].clone();
+    let error = json_of(refused).await;
     assert_eq!(error["reason"], "map_file_too_large", "{error}");
-    assert!(error["message"].as_str().unwrap().contains("map_file_bytes_max is 300"), "{error}");
+    assert!(error["detail"].as_str().unwrap().contains("map_file_bytes_max is 300"), "{error}");
 }
 
 #[cfg(unix)]

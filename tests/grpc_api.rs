@@ -38,7 +38,7 @@ async fn a_map_is_made_described_listed_and_deleted() {
     let info = maps.get_map(get()).await.unwrap().into_inner().map.unwrap();
     assert_eq!(info.levels.len(), 3);
     assert!((info.levels[2].resolution_m - 0.2).abs() < 1e-12);
-    assert_eq!(info.state.unwrap().revision, 0);
+    assert_eq!(info.version.unwrap().revision, 0);
     let listed = maps.list_maps(pb::ListMapsRequest {}).await.unwrap().into_inner().maps;
     assert_eq!(listed.iter().map(|map| &map.map).collect::<Vec<_>>(), ["hall"]);
 
@@ -54,7 +54,7 @@ async fn a_map_made_again_has_another_uuid() {
     let daemon = Daemon::start().await;
     let mut maps = daemon.maps().await;
     let create = || pb::CreateMapRequest { map: "a".into(), settings: settings(0.1, 1) };
-    let uuid_of = |made: pb::CreateMapResponse| made.map.unwrap().state.unwrap().map_uuid;
+    let uuid_of = |made: pb::CreateMapResponse| made.map.unwrap().version.unwrap().map_uuid;
     let first = uuid_of(maps.create_map(create()).await.unwrap().into_inner());
     maps.delete_map(pb::DeleteMapRequest { map: "a".into() }).await.unwrap();
     let second = uuid_of(maps.create_map(create()).await.unwrap().into_inner());
@@ -72,7 +72,7 @@ async fn an_inserted_scan_answers_queries_bit_by_bit() {
     let mut robot = daemon.mapping().await;
     let inserted = robot.insert_scan(scan_pb("a", "r", &row(3))).await.unwrap().into_inner();
     assert!(inserted.accepted && !inserted.replayed);
-    assert_eq!((inserted.new_voxels, inserted.state.unwrap().revision), (3, 1));
+    assert_eq!((inserted.new_voxels, inserted.version.unwrap().revision), (3, 1));
 
     // Eleven points: two bytes, of which the first three bits and none else are set.
     let mut planner = daemon.occupancy().await;
@@ -130,7 +130,7 @@ async fn a_stream_of_scans_ends_with_the_first_failure() {
     let mut answers = robot.insert_scan_stream(tokio_stream::iter(scans)).await.unwrap().into_inner();
     for revision in 1..=2 {
         let answer = answers.message().await.unwrap().unwrap();
-        assert_eq!((answer.state.unwrap().revision, answer.new_voxels), (revision, 1));
+        assert_eq!((answer.version.unwrap().revision, answer.new_voxels), (revision, 1));
     }
     let failed = answers.message().await.unwrap_err();
     assert_eq!((failed.code(), reason(&failed).as_str()), (Code::InvalidArgument, "bad_name"));
@@ -181,7 +181,7 @@ async fn voxels_are_deleted_by_points_keys_box_and_sphere() {
         let (revision, voxels) = daemon.contents("a").await;
         assert_eq!((answer.removed, voxels.len()), (removed, left), "{target:?}");
         assert_eq!(revision, before + u64::from(removed > 0), "an empty deletion makes no revision");
-        assert_eq!(answer.state.unwrap().revision, revision);
+        assert_eq!(answer.version.unwrap().revision, revision);
     }
 }
 
@@ -225,7 +225,7 @@ async fn a_scan_sent_again_is_answered_as_the_first_time_and_another_under_its_i
     daemon.put_in("a", &row(9)).await;
     let again = robot.insert_scan(scan(&row(4))).await.unwrap().into_inner();
     assert!(again.replayed && again.accepted);
-    assert_eq!((&again.state, again.new_voxels), (&first.state, first.new_voxels));
+    assert_eq!((&again.version, again.new_voxels), (&first.version, first.new_voxels));
     let poses = [&again, &first].map(|answer| answer.alignment.as_ref().unwrap().map_from_sensor);
     assert_eq!(poses[0], poses[1]);
     assert_eq!(daemon.contents("a").await.0, 2);
@@ -302,7 +302,7 @@ async fn a_read_waits_for_its_revision_or_its_deadline() {
     let second = [row(2)[1]];
     let (answer, _) = tokio::join!(planner.query_points(later()), daemon.put_in("a", &second));
     let answer = answer.unwrap().into_inner();
-    assert_eq!((answer.occupied[0], answer.state.unwrap().revision), (0b10, 1));
+    assert_eq!((answer.occupied[0], answer.version.unwrap().revision), (0b10, 1));
 }
 
 #[tokio::test]
@@ -351,7 +351,7 @@ async fn a_listing_is_streamed_whole_by_region_and_by_level() {
         let request = pb::ListVoxelsRequest { map: "a".into(), level, region };
         let chunks = planner.list_voxels(request).await.unwrap().into_inner();
         let chunks: Vec<_> = chunks.map(|chunk| chunk.unwrap()).collect().await;
-        assert!(chunks.iter().all(|chunk| chunk.keys.len() <= 65_536 && chunk.state.is_some()));
+        assert!(chunks.iter().all(|chunk| chunk.keys.len() <= 65_536 && chunk.version.is_some()));
         (chunks.len(), chunks.iter().map(|chunk| chunk.keys.len()).sum::<usize>())
     };
     assert_eq!(list(0, None).await, (2, 90_000));

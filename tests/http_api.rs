@@ -9,7 +9,6 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 
 fn reason(error: &Value) -> (&str, &str) {
-    let error = &error["error"];
     (error["code"].as_str().unwrap_or_default(), error["reason"].as_str().unwrap_or_default())
 }
 
@@ -41,7 +40,7 @@ async fn a_map_is_made_described_listed_and_deleted() {
     assert_eq!(gone.status(), StatusCode::NOT_FOUND);
     let gone = json_of(gone).await;
     assert_eq!(reason(&gone).0, "not_found");
-    assert!(gone["error"]["message"].as_str().unwrap().contains("hall"), "{gone}");
+    assert!(gone["detail"].as_str().unwrap().contains("hall"), "{gone}");
 }
 
 #[tokio::test]
@@ -60,7 +59,7 @@ async fn a_scan_in_json_is_answered_in_full() {
         "accepted": true, "verdict": "accepted", "reason": "the first scan of the map",
         "map_from_sensor": pose_json([1.0, 0.0, 0.0]), "overlap": 0.0, "level_overlaps": vec![0.0; 4],
         "inliers": 0.0, "fitness": 0.0, "information": vec![vec![0.0; 6]; 6], "undetermined": [], "iterations": 0,
-        "new_voxels": 2, "points_skipped": 1, "replayed": false, "standing": false, "revision": 1,
+        "new_voxels": 2, "points_skipped": 1, "replayed": false, "stationary": false, "revision": 1,
         "map_uuid": uuid,
     });
     assert!(answer["align_ms"].as_f64().unwrap() >= 0.0);
@@ -163,7 +162,7 @@ async fn errors_of_state_have_statuses_of_their_own() {
         assert_eq!(answer.status().as_u16(), status);
         let error = json_of(answer).await;
         assert_eq!(reason(&error).0, code, "{error}");
-        assert!(!reason(&error).1.is_empty() && error["error"]["message"].is_string(), "{error}");
+        assert!(!reason(&error).1.is_empty() && error["detail"].is_string(), "{error}");
     }
 }
 
@@ -309,9 +308,6 @@ async fn a_map_goes_out_as_a_file_and_comes_back_under_another_name() {
     assert_eq!((status, reason(&error).0), (StatusCode::BAD_REQUEST, "invalid_argument"));
     let (status, error) = put("/v1/maps/other/snapshot", vec![0; 100_001]).await;
     assert_eq!((status, reason(&error).1), (StatusCode::PAYLOAD_TOO_LARGE, "body_too_large"));
-    assert!(
-        error["error"]["message"].as_str().unwrap().contains("100000 bytes (map_file_bytes_max)"),
-        "{error}"
-    );
+    assert!(error["detail"].as_str().unwrap().contains("100000 bytes (map_file_bytes_max)"), "{error}");
     assert_eq!(daemon.get("/v1/maps/other").await.status(), StatusCode::NOT_FOUND);
 }

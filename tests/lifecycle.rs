@@ -96,8 +96,10 @@ async fn what_is_in_flight_is_finished_and_what_is_new_is_refused() {
     assert_eq!(get("/livez").await.status(), StatusCode::OK);
     let refused = get("/v1/maps").await;
     assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
-    let expected = json!({"code": "unavailable", "reason": "draining", "message": "server is draining"});
-    assert_eq!(json_of(refused).await["error"], expected);
+    let expected = json!({
+        "title": "Service Unavailable", "status": 503, "detail": "server is draining", "code": "unavailable", "reason": "draining",
+    });
+    assert_eq!(json_of(refused).await, expected);
 
     // Its own bound ends it, not the server's end.
     assert_eq!(waiting.await.unwrap().unwrap().status(), StatusCode::GATEWAY_TIMEOUT);
@@ -176,7 +178,7 @@ async fn maps_survive_a_restart() {
     // It still knows the scans it has accepted.
     let again = daemon.mapping().await.insert_scan(scan).await.unwrap().into_inner();
     assert!(again.replayed && again.accepted);
-    assert_eq!((&again.state, again.new_voxels), (&first.state, first.new_voxels));
+    assert_eq!((&again.version, again.new_voxels), (&first.version, first.new_voxels));
 }
 
 #[tokio::test]
@@ -244,7 +246,7 @@ async fn metrics_count_what_was_done_and_forget_maps_that_are_gone() {
         r#"mrol_map_set_bytes{map="a"} "#,
         r#"mrol_map_filter_bytes{map="a",level="0",part="plane"} "#,
         r#"mrol_filter_false_positive_rate{map="a",level="0",kind="expected"} "#,
-        r#"mrol_filter_false_positive_rate{map="a",level="0",kind="equation_1"} "#,
+        r#"mrol_filter_false_positive_rate{map="a",level="0",kind="ideal"} "#,
         r#"mrol_filter_false_positive_rate{map="a",level="0",kind="measured"} "#,
     ] {
         assert!(text.contains(line), "{line} is not in\n{text}");
@@ -308,7 +310,7 @@ async fn a_full_queue_refuses_and_says_when_to_come_again() {
         let answer = answer.await.unwrap().unwrap();
         if answer.status() == StatusCode::TOO_MANY_REQUESTS {
             assert_eq!(answer.headers()["retry-after"], "1");
-            let message = json_of(answer).await["error"]["message"].as_str().unwrap().to_owned();
+            let message = json_of(answer).await["detail"].as_str().unwrap().to_owned();
             assert!(message.contains("jobs_waiting_max is 1"), "{message}");
             refused += 1;
         }

@@ -102,7 +102,7 @@ async fn a_scan_is_found_alike_on_every_way_in() {
     assert!(meters < 0.05 && degrees < 0.5, "{meters} m, {degrees} degrees");
     assert!(best.overlap > 0.5 && best.inliers > 0.5 && best.blocked < 0.4);
     assert!((best.fit - best.overlap * (1.0 - best.blocked)).abs() < 1e-12);
-    assert_eq!(found.state.revision, 5);
+    assert_eq!(found.version.revision, 5);
     assert_eq!(found.points_skipped, building.points.iter().filter(|point| !point.is_finite()).count());
 
     let points: Vec<[f32; 3]> = building.points.iter().map(|point| point.xyz()).collect();
@@ -229,7 +229,7 @@ async fn a_question_that_makes_no_sense_is_refused_with_its_reason() {
     ] {
         let (status, error) = building.post(bad).await;
         assert_eq!(status, StatusCode::BAD_REQUEST, "{error}");
-        let message = error["error"]["message"].as_str().unwrap();
+        let message = error["detail"].as_str().unwrap();
         assert!(words.iter().all(|word| message.contains(word)), "{words:?}: {message}");
     }
     let route = "/v1/maps/building/localize?map_gravity=0,0,1";

@@ -81,7 +81,7 @@ async fn points_out_of_range_or_of_the_robots_body_do_not_count() {
     assert!(refused.message().contains("range_min_m"), "{refused}");
     let route = "/v1/maps/a/scans?robot=r&range_min_m=3&range_max_m=2";
     let refused = json_of(daemon.post_bytes(route, bytes_of(&points)).await).await;
-    assert_eq!(refused["error"]["reason"], "bad_filter", "{refused}");
+    assert_eq!(refused["reason"], "bad_filter", "{refused}");
 }
 
 #[tokio::test]
@@ -97,7 +97,7 @@ async fn a_scan_that_is_not_accepted_is_added_by_force_alone() {
     let forced = robot.insert_scan(forced).await.unwrap().into_inner();
     assert!(forced.accepted && forced.new_voxels > 0);
     assert_eq!(forced.alignment.unwrap().verdict, i32::from(pb::Verdict::LowOverlap));
-    assert_eq!(forced.state.unwrap().revision, 2);
+    assert_eq!(forced.version.unwrap().revision, 2);
 }
 
 #[tokio::test]
@@ -128,7 +128,7 @@ async fn what_is_in_front_of_the_map_is_told_point_by_point() {
     assert_eq!(told, new);
     let body = json!({"robot": "r", "points": json, "foreground_level": 9});
     let refused = json_of(daemon.post("/v1/maps/a/alignment", body).await).await;
-    assert_eq!(refused["error"]["reason"], "level_out_of_range", "{refused}");
+    assert_eq!(refused["reason"], "level_out_of_range", "{refused}");
 }
 
 #[tokio::test]
@@ -137,19 +137,19 @@ async fn a_robot_that_stands_still_does_not_grow_its_trajectory() {
     daemon.make_map("a").await;
     let mut robot = daemon.mapping().await;
     let first = robot.insert_scan(to_align("r", &corner(), None)).await.unwrap().into_inner();
-    assert!(first.accepted && !first.standing);
+    assert!(first.accepted && !first.stationary);
     for _ in 0..5 {
         let again = robot.insert_scan(to_align("r", &corner(), None)).await.unwrap().into_inner();
-        assert!(again.accepted && again.standing && again.new_voxels == 0, "{again:?}");
-        assert_eq!(again.state.unwrap().revision, 1);
+        assert!(again.accepted && again.stationary && again.new_voxels == 0, "{again:?}");
+        assert_eq!(again.version.unwrap().revision, 1);
     }
     // Something new before it is worth keeping, and so is another place.
     let mut with_box = corner();
     with_box.extend((0..400).map(|i| [1.0 + (i % 20) as f32 * 0.02, 1.0 + (i / 20) as f32 * 0.02, 0.5]));
     let changed = robot.insert_scan(to_align("r", &with_box, None)).await.unwrap().into_inner();
-    assert!(changed.accepted && !changed.standing && changed.new_voxels > 10, "{changed:?}");
+    assert!(changed.accepted && !changed.stationary && changed.new_voxels > 10, "{changed:?}");
     let moved = to_align("r", &seen_from([0.2, 0.0, 0.0]), guess_pb([0.2, 0.0, 0.0]));
     let moved = robot.insert_scan(moved).await.unwrap().into_inner();
-    assert!(moved.accepted && !moved.standing && is_near(place(&moved), [0.2, 0.0, 0.0]), "{moved:?}");
-    assert_eq!(moved.state.unwrap().revision, 3);
+    assert!(moved.accepted && !moved.stationary && is_near(place(&moved), [0.2, 0.0, 0.0]), "{moved:?}");
+    assert_eq!(moved.version.unwrap().revision, 3);
 }

@@ -166,7 +166,7 @@ impl Kept {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
         let all = |_| Ok::<_, Infallible>(());
         let mut observed = match self.folder.observations(scans, &withdrawn, all, StopSignal::NEVER) {
-            Err(NotObserved::OutOfReach) => {
+            Err(NotObserved::OutsideUndoWindow) => {
                 let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
                 assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());
                 return false;

@@ -35,7 +35,7 @@ fn ids(trajectory: &Value) -> Vec<u64> {
 }
 
 /// Starts the server anew until undo reaches none of the first scans: each start and end writes a snapshot.
-async fn out_of_reach(mut data: TempDir, first_id: u64) -> Daemon {
+async fn outside_undo_window(mut data: TempDir, first_id: u64) -> Daemon {
     for id in first_id..first_id + 3 {
         let daemon = Daemon::start_in(data, short_undo).await;
         assert_eq!(insert(&daemon, "other", id, 50.0).await.status(), StatusCode::OK);
@@ -51,7 +51,7 @@ async fn a_thinned_scans_id_stays_known_and_inserts_nothing() {
     for id in 1..=20 {
         insert(&daemon, "r", id, 0.0).await;
     }
-    let mut daemon = out_of_reach(daemon.stop().await, 1).await;
+    let mut daemon = outside_undo_window(daemon.stop().await, 1).await;
     // Twice: as it was thinned, and as a snapshot has it.
     for round in 0..2 {
         assert_eq!(ids(&poses(&daemon, "?robot=r").await), [1, 19, 20], "round {round}");
@@ -59,10 +59,10 @@ async fn a_thinned_scans_id_stays_known_and_inserts_nothing() {
         for id in [2, 18] {
             let refused = insert(&daemon, "r", id, 0.0).await;
             assert_eq!(refused.status(), StatusCode::PRECONDITION_FAILED);
-            let error = json_of(refused).await["error"].clone();
+            let error = json_of(refused).await;
             assert_eq!(error["reason"], "scan_id_too_old");
             assert!(
-                error["message"].as_str().unwrap().contains(&format!("scan_id {id} of robot r")),
+                error["detail"].as_str().unwrap().contains(&format!("scan_id {id} of robot r")),
                 "{error}"
             );
         }
@@ -74,7 +74,7 @@ async fn a_thinned_scans_id_stays_known_and_inserts_nothing() {
             let refused = daemon.post("/v1/maps/a/undo", target).await;
             assert_eq!(refused.status(), StatusCode::PRECONDITION_FAILED);
         }
-        daemon = out_of_reach(daemon.stop().await, 10 + 10 * round).await;
+        daemon = outside_undo_window(daemon.stop().await, 10 + 10 * round).await;
     }
     assert_eq!(insert(&daemon, "r", 21, 0.0).await.status(), StatusCode::OK);
 }
@@ -163,7 +163,7 @@ async fn a_trajectory_comes_in_pages_and_in_pieces() {
             let request =
                 pb::GetTrajectoryRequest { map: "a".into(), since_revision, limit, ..Default::default() };
             let page = robot.get_trajectory(request).await.unwrap().into_inner();
-            assert_eq!(page.state.unwrap().revision, 1300);
+            assert_eq!(page.version.unwrap().revision, 1300);
             found.extend(page.poses.into_iter().map(|pose| pose.revision));
             count += 1;
             match page.next_since_revision {
@@ -186,7 +186,7 @@ async fn a_trajectory_comes_in_pages_and_in_pieces() {
         let found: Vec<u64> =
             pieces.iter().flat_map(|piece| &piece.poses).map(|pose| pose.revision).collect();
         assert_eq!(found, (first..=1300).step_by(step).collect::<Vec<_>>());
-        assert!(pieces.iter().all(|piece| piece.poses.len() <= 512 && piece.state.is_some()));
+        assert!(pieces.iter().all(|piece| piece.poses.len() <= 512 && piece.version.is_some()));
     }
     let request =
         pb::StreamTrajectoryRequest { map: "a".into(), robot: "nobody".into(), ..Default::default() };
@@ -222,9 +222,9 @@ async fn a_robot_more_than_there_may_be_is_refused_by_the_limits_name() {
         let answer = insert(&daemon, robot, id, 0.0).await;
         assert_eq!(answer.status(), status, "{robot} {id}");
         if status != StatusCode::OK {
-            let error = json_of(answer).await["error"].clone();
+            let error = json_of(answer).await;
             assert_eq!(error["reason"], "too_many_robots");
-            assert!(error["message"].as_str().unwrap().contains("robots_per_map_max is 2"), "{error}");
+            assert!(error["detail"].as_str().unwrap().contains("robots_per_map_max is 2"), "{error}");
         }
     }
 }

@@ -113,9 +113,9 @@ async fn restore(daemon: &Daemon, file: Vec<u8>) -> Response {
 async fn refused(answer: Response, status: StatusCode, reason: &str) -> String {
     assert_eq!(answer.status(), status);
     assert_eq!(answer.headers()["retry-after"], "5");
-    let error = json_of(answer).await["error"].take();
+    let error = json_of(answer).await;
     assert_eq!((&error["code"], &error["reason"]), (&json!("resource_exhausted"), &json!(reason)));
-    error["message"].as_str().unwrap().to_owned()
+    error["detail"].as_str().unwrap().to_owned()
 }
 
 /// Checks a refusal over gRPC.
@@ -131,9 +131,9 @@ fn deletion_pb() -> pb::DeleteVoxelsRequest {
     pb::DeleteVoxelsRequest { map: "a".into(), target, ..Default::default() }
 }
 
-fn undo_pb() -> pb::UndoScansRequest {
-    let target = Some(pb::undo_scans_request::Target::Revision(1));
-    pb::UndoScansRequest { map: "a".into(), target, ..Default::default() }
+fn undo_pb() -> pb::UndoRequest {
+    let target = Some(pb::undo_request::Target::Revision(1));
+    pb::UndoRequest { map: "a".into(), target, ..Default::default() }
 }
 
 fn new_map_pb() -> pb::CreateMapRequest {
@@ -162,7 +162,7 @@ async fn a_full_disk_refuses_every_change_and_no_question_until_there_is_room() 
 
     let full = StatusCode::INSUFFICIENT_STORAGE;
     let message = refused(insert(&daemon).await, full, "disk_full").await;
-    for part in ["100 MiB", "limits.disk_free_low_mib, 256", "limits.disk_free_back_mib, 512"] {
+    for part in ["100 MiB", "limits.disk_free_low_mib, 256", "limits.disk_free_resume_mib, 512"] {
         assert!(message.contains(part), "{part} is not in {message}");
     }
     let message = refused(delete_first_voxel(&daemon).await, full, "disk_full").await;
@@ -174,7 +174,7 @@ async fn a_full_disk_refuses_every_change_and_no_question_until_there_is_room() 
     let (mut mapping, mut maps) = (daemon.mapping().await, daemon.maps().await);
     refused_call(mapping.insert_scan(scan_pb("a", "r", &[[9.0; 3]])).await, "disk_full");
     refused_call(mapping.delete_voxels(deletion_pb()).await, "disk_full");
-    refused_call(mapping.undo_scans(undo_pb()).await, "disk_full");
+    refused_call(mapping.undo(undo_pb()).await, "disk_full");
     refused_call(maps.create_map(new_map_pb()).await, "disk_full");
     let restored = pb::RestoreMapRequest { map: "b".into(), data: file.clone().into(), replace: false };
     refused_call(maps.restore_map(tokio_stream::iter([restored])).await, "disk_full");
@@ -208,7 +208,7 @@ async fn full_memory_refuses_what_grows_and_takes_what_shrinks() {
 
     let full = StatusCode::SERVICE_UNAVAILABLE;
     let message = refused(insert(&daemon).await, full, "memory_full").await;
-    for part in ["900 MiB", "limits.memory_high_mib, 850", "limits.memory_back_mib, 799"] {
+    for part in ["900 MiB", "limits.memory_high_mib, 850", "limits.memory_resume_mib, 799"] {
         assert!(message.contains(part), "{part} is not in {message}");
     }
     refused(make(&daemon, "b").await, full, "memory_full").await;
@@ -244,7 +244,7 @@ async fn the_room_on_the_real_disk_counts_from_the_first_request_on_and_a_map_ca
     let daemon = Daemon::start_in(data, |config| {
         // An exbibyte.
         config.limits.disk_free_low_mib = 1 << 39;
-        config.limits.disk_free_back_mib = 1 << 40;
+        config.limits.disk_free_resume_mib = 1 << 40;
     })
     .await;
     refused(insert(&daemon).await, StatusCode::INSUFFICIENT_STORAGE, "disk_full").await;
@@ -374,7 +374,7 @@ async fn a_file_that_fills_the_real_disk_refuses_changes_until_it_is_removed() {
     let filler = data.path().join("filler");
     let daemon = Daemon::start_in(data, |config| {
         config.limits.disk_free_low_mib = free_mib - 1024;
-        config.limits.disk_free_back_mib = free_mib - 512;
+        config.limits.disk_free_resume_mib = free_mib - 512;
     })
     .await;
     daemon.make_map("a").await;

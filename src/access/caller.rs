@@ -3,24 +3,24 @@
 use std::sync::Arc;
 
 use super::{Allowance, Key};
-use crate::service::{AllowedMaps, ScanReach, ServiceError};
+use crate::service::{AllowedMaps, AllowedScans, ServiceError};
 
 /// Who asks for something: the holder of a key, or anybody.
 #[derive(Debug, Clone)]
 pub struct Caller {
     key: Option<Arc<Key>>,
-    reach: AllowedMaps,
+    allowed_maps: AllowedMaps,
 }
 
 impl Caller {
-    /// Somebody without a key, who may name the maps of `reach`.
-    pub(super) fn without_key(reach: AllowedMaps) -> Self {
-        Self { key: None, reach }
+    /// Somebody without a key, who may name the allowed maps.
+    pub(super) fn without_key(allowed_maps: AllowedMaps) -> Self {
+        Self { key: None, allowed_maps }
     }
 
     /// The holder of a key.
     pub(super) fn with(key: Arc<Key>) -> Self {
-        Self { reach: key.reach.clone(), key: Some(key) }
+        Self { allowed_maps: key.allowed_maps.clone(), key: Some(key) }
     }
 
     /// The name of the caller's key, for the log and metrics.
@@ -29,13 +29,13 @@ impl Caller {
     }
 
     /// The maps that the caller may name.
-    pub fn reach(&self) -> &AllowedMaps {
-        &self.reach
+    pub fn allowed_maps(&self) -> &AllowedMaps {
+        &self.allowed_maps
     }
 
     /// The scans that the caller may send and undo.
-    pub fn scans(&self) -> ScanReach {
-        self.key.as_ref().map(|key| key.scan_reach()).unwrap_or_default()
+    pub fn scans(&self) -> AllowedScans {
+        self.key.as_ref().map(|key| key.allowed_scans()).unwrap_or_default()
     }
 
     /// What is left of the bounds of the caller's key.

@@ -57,7 +57,7 @@ impl Gate {
         self.access.check_site(operation, request)?;
         let caller = self.access.authorize(operation, secret.as_ref())?;
         let name = caller.name().map(CallerName::new).transpose()?;
-        let service = self.service.limited_to(name, caller.reach().clone(), caller.scans());
+        let service = self.service.limited_to(name, caller.allowed_maps().clone(), caller.scans());
         Ok(Authorized { caller, service })
     }
 

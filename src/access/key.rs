@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Allowance, Digest, Expiry, KeyLimits, Scope};
 use crate::map::RobotName;
-use crate::service::{AllowedMaps, ErrorCode, ScanReach, ServiceError};
+use crate::service::{AllowedMaps, AllowedScans, ErrorCode, ServiceError};
 
 /// Characters of a key's name, at most.
 const NAME_LENGTH_MAX: usize = 64;
@@ -23,7 +23,7 @@ pub struct Key {
     pub(super) name: KeyName,
     pub(super) digest: Digest,
     pub(super) scope: Scope,
-    pub(super) reach: AllowedMaps,
+    pub(super) allowed_maps: AllowedMaps,
     pub(super) robots: Option<Arc<BTreeSet<RobotName>>>,
     pub(super) expires: Option<Expiry>,
     pub(super) allowance: Arc<Allowance>,
@@ -49,12 +49,12 @@ pub(super) const KEY_EXPIRED: &str = "key_expired";
 
 impl Key {
     /// A key that counts, for every robot and for ever.
-    pub fn new(name: KeyName, digest: Digest, scope: Scope, reach: AllowedMaps) -> Self {
+    pub fn new(name: KeyName, digest: Digest, scope: Scope, allowed_maps: AllowedMaps) -> Self {
         Self {
             name,
             digest,
             scope,
-            reach,
+            allowed_maps,
             robots: None,
             expires: None,
             allowance: Arc::new(Allowance::new(KeyLimits::default())),
@@ -83,7 +83,7 @@ impl Key {
             name: self.name.clone(),
             digest,
             scope: self.scope,
-            reach: self.reach.clone(),
+            allowed_maps: self.allowed_maps.clone(),
             robots: self.robots.clone(),
             expires: [self.expires, expires].into_iter().flatten().min(),
             allowance: Arc::clone(&self.allowance),
@@ -93,13 +93,13 @@ impl Key {
 
     /// True where both open the same to the same; until when, and how often, may differ.
     pub(super) fn is_same_as(&self, other: &Self) -> bool {
-        (&self.name, self.digest, self.scope, &self.reach, &self.robots)
-            == (&other.name, other.digest, other.scope, &other.reach, &other.robots)
+        (&self.name, self.digest, self.scope, &self.allowed_maps, &self.robots)
+            == (&other.name, other.digest, other.scope, &other.allowed_maps, &other.robots)
     }
 
     /// Whose scans its holder may send and undo.
-    pub(super) fn scan_reach(&self) -> ScanReach {
-        ScanReach { robots: self.robots.clone(), undo_of_others: self.scope >= Scope::Write }
+    pub(super) fn allowed_scans(&self) -> AllowedScans {
+        AllowedScans { robots: self.robots.clone(), undo_of_others: self.scope >= Scope::Write }
     }
 
     /// True where its time is up at `now`.

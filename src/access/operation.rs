@@ -63,7 +63,7 @@ operations! {
     AlignScan:         Some(Read),  grpc "/mrol.v1.Mapping/AlignScan",           http POST "/v1/maps/{map}/alignment";
     Localize:          Some(Read),  grpc "/mrol.v1.Mapping/Localize",            http POST "/v1/maps/{map}/localize";
     DeleteVoxels:      Some(Write), grpc "/mrol.v1.Mapping/DeleteVoxels",        http POST "/v1/maps/{map}/deletions";
-    UndoScans:         Some(Insert), grpc "/mrol.v1.Mapping/UndoScans",           http POST "/v1/maps/{map}/undo";
+    Undo:         Some(Insert), grpc "/mrol.v1.Mapping/Undo",           http POST "/v1/maps/{map}/undo";
     GetTrajectory:     Some(Read),  grpc "/mrol.v1.Mapping/GetTrajectory",       http GET "/v1/maps/{map}/trajectory";
     StreamTrajectory:  Some(Read),  grpc "/mrol.v1.Mapping/StreamTrajectory";
     CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";

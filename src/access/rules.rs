@@ -101,7 +101,7 @@ impl Access {
             return Err(refusal);
         }
         check_scope(operation, scope, &key)?;
-        check_reach(operation, &key)?;
+        check_metrics_allowed(operation, &key)?;
         Ok(Caller::with(key))
     }
 }
@@ -127,8 +127,8 @@ fn check_scope(operation: Operation, scope: Scope, key: &Key) -> Result<(), Serv
 }
 
 /// Of what speaks of every map, a key for some may see nothing. Maps that a request names are checked by the service.
-fn check_reach(operation: Operation, key: &Key) -> Result<(), ServiceError> {
-    if operation != Operation::Metrics || key.reach == AllowedMaps::Every {
+fn check_metrics_allowed(operation: Operation, key: &Key) -> Result<(), ServiceError> {
+    if operation != Operation::Metrics || key.allowed_maps == AllowedMaps::Every {
         return Ok(());
     }
     let message = format!("metrics speak of every map, key {} is for some", key.name);

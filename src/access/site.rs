@@ -14,6 +14,7 @@ use axum::http::uri::Authority;
 use axum::http::{Extensions, HeaderMap, Request, Uri};
 
 use crate::service::{ErrorCode, ServiceError};
+use crate::util::excerpt;
 
 /// Where a request came in; to be found among its extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,12 +140,6 @@ fn not_allowed(what: &str) -> ServiceError {
 fn cross_site(what: &str) -> ServiceError {
     let message = format!("{what}: pages of other sites change nothing here");
     ServiceError::new(ErrorCode::PermissionDenied, CROSS_SITE, message)
-}
-
-/// What a client sent, short enough to be repeated to it.
-fn excerpt(text: &str) -> String {
-    const LENGTH_MAX: usize = 80;
-    text.chars().take(LENGTH_MAX).collect()
 }
 
 #[cfg(test)]

@@ -5,11 +5,11 @@
 //! map's surfaces look like. `verdict` says whether to believe the end of it.
 
 mod ascent;
+mod extent;
 mod information;
 pub mod localize;
 mod multi_start;
 mod overlap;
-mod reach;
 mod refine;
 mod settings;
 mod verdict;
@@ -26,9 +26,9 @@ use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
 use crate::voxel::volumetric_sample_until;
 use ascent::{Ascent, Steps};
+use extent::within_extent;
 use information::root_mean_square_range_m;
 use overlap::{Overlap, level_overlaps_until};
-use reach::within_reach;
 use refine::{refine, surface_fit};
 use verdict::Fit;
 
@@ -46,9 +46,9 @@ struct SampledScan<'a> {
 }
 
 impl<'a> SampledScan<'a> {
-    /// 1) Take a volumetric sample of points: of those that can be on a map that reaches as far as `reach_m`.
-    fn new(points: &'a [Point], reach_m: f64, settings: &AlignmentSettings, stop: StopSignal<'a>) -> Self {
-        let near = within_reach(points, reach_m, stop);
+    /// 1) Take a volumetric sample of points: of those that can be on a map that reaches as far as `extent_m`.
+    fn new(points: &'a [Point], extent_m: f64, settings: &AlignmentSettings, stop: StopSignal<'a>) -> Self {
+        let near = within_extent(points, extent_m, stop);
         let wish = settings.refinement.sample_points.max(settings.sample_points);
         let fine = volumetric_sample_until(&near, wish, settings.seed, stop);
         let sample =
@@ -78,14 +78,14 @@ pub fn align_until(
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = SampledScan::new(points, map.lattice().reach_m(), settings, stop);
+    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, stop);
     let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
     let found = match found.is_doubtful(guess, map, settings) {
         true if !stop.is_stopped() => multi_start::align(map, &scan, guess, found, settings),
         _ => found,
     };
-    found.within_reach_of(guess, map, settings)
+    found.within_max_correction(guess, map, settings)
 }
 
 /// Says how a scan fits the map where it is thought to be, without moving it.
@@ -106,7 +106,7 @@ pub fn judge_until(
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
-    let scan = SampledScan::new(points, map.lattice().reach_m(), settings, stop);
+    let scan = SampledScan::new(points, map.lattice().extent_m(), settings, stop);
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
@@ -117,7 +117,7 @@ pub fn ascend(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Pose {
-    let scan = SampledScan::new(points, voxels.lattice().reach_m(), settings, StopSignal::NEVER);
+    let scan = SampledScan::new(points, voxels.lattice().extent_m(), settings, StopSignal::NEVER);
     let mut ascent = climb(voxels, &scan, *guess, voxels.lattice().levels() - 1, settings);
     climb_sub_voxel(voxels, &scan, &mut ascent, settings);
     ascent.pose
@@ -133,10 +133,7 @@ fn climb(
 ) -> Ascent {
     let mut ascent = Ascent::from(guess);
     for level in (0..=coarsest).rev() {
-        let overlap = match settings.method {
-            Method::WeightedSum => Overlap::weighted_sum(voxels, &scan.sample, settings.lookup),
-            Method::Overlap | Method::Refined => Overlap::new(voxels, &scan.sample, level, settings.lookup),
-        };
+        let overlap = Overlap::new(voxels, &scan.sample, level, settings.lookup);
         let steps = Steps::of_level(level, voxels.lattice(), settings);
         ascent.climb(&overlap, steps, settings.iterations_per_level_max, scan.stop);
     }
@@ -171,7 +168,7 @@ fn finish(
             ascent.pose = refined.map_from_sensor;
             ascent.iterations += refined.iterations;
         }
-        Method::Overlap | Method::WeightedSum => climb_sub_voxel(map, scan, &mut ascent, settings),
+        Method::Overlap => climb_sub_voxel(map, scan, &mut ascent, settings),
     }
     let (meters, degrees) = pose_difference(&climbed, &ascent.pose);
     fit(

@@ -1,7 +1,5 @@
 //! The objective of alignment: how many points of a scan fall in occupied voxels (paper III-B).
 
-use std::ops::RangeInclusive;
-
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MultiResolutionMap};
 use crate::util::StopSignal;
@@ -39,12 +37,12 @@ impl OccupiedVoxels for MultiResolutionMap {
 /// Look-ups between two looks at the stop signal: a few milliseconds where every one misses all caches.
 pub(super) const LOOKUPS_PER_LOOK: usize = 1 << 18;
 
-/// The overlap of some points with one or more levels of a map, as a function of their pose.
+/// The overlap of some points with one level of a map, as a function of their pose.
 #[derive(Debug, Clone)]
 pub(super) struct Overlap<'a> {
     voxels: &'a dyn OccupiedVoxels,
     points: &'a [Point],
-    levels: RangeInclusive<u32>,
+    level: u32,
     lookup: Lookup,
 }
 
@@ -56,28 +54,20 @@ impl<'a> Overlap<'a> {
         level: u32,
         lookup: Lookup,
     ) -> Self {
-        Self { voxels, points, levels: level..=level, lookup }
-    }
-
-    /// At all levels, summed: a level counts twice as much as the next coarser one (paper \[9\]).
-    pub(super) fn weighted_sum(voxels: &'a dyn OccupiedVoxels, points: &'a [Point], lookup: Lookup) -> Self {
-        Self { voxels, points, levels: 0..=voxels.lattice().levels() - 1, lookup }
+        Self { voxels, points, level, lookup }
     }
 
     /// Points whose voxel is occupied, for each candidate pose; once it is stopped, fewer of them.
     pub(super) fn at(&self, poses: &[Pose], stop: StopSignal<'_>) -> Vec<usize> {
         let mut heights = vec![0; poses.len()];
         let poses_per_look = (LOOKUPS_PER_LOOK / self.points.len().max(1)).max(1);
-        'levels: for level in self.levels.clone() {
-            let weight = self.levels.end() - level;
-            for (poses, heights) in poses.chunks(poses_per_look).zip(heights.chunks_mut(poses_per_look)) {
-                for points in self.points.chunks(LOOKUPS_PER_LOOK) {
-                    if stop.is_stopped() {
-                        break 'levels;
-                    }
-                    let hits = self.voxels.hits(points, poses, level, self.lookup);
-                    heights.iter_mut().zip(hits).for_each(|(sum, hits)| *sum += hits << weight);
+        'scan: for (poses, heights) in poses.chunks(poses_per_look).zip(heights.chunks_mut(poses_per_look)) {
+            for points in self.points.chunks(LOOKUPS_PER_LOOK) {
+                if stop.is_stopped() {
+                    break 'scan;
                 }
+                let hits = self.voxels.hits(points, poses, self.level, self.lookup);
+                heights.iter_mut().zip(hits).for_each(|(sum, hits)| *sum += hits);
             }
         }
         heights
@@ -85,7 +75,7 @@ impl<'a> Overlap<'a> {
 
     /// Look-ups that one pose costs.
     pub(super) fn lookups(&self) -> u64 {
-        self.points.len() as u64 * self.levels.clone().count() as u64
+        self.points.len() as u64
     }
 }
 

@@ -1,6 +1,7 @@
 //! The constants of the method, by name.
 
 use crate::map::Lookup;
+use crate::util::Keyword;
 
 /// How a scan is aligned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -10,21 +11,15 @@ pub enum Method {
     Refined,
     /// The paper's method, III-B steps 1 to 5.
     Overlap,
-    /// The older objective of the paper's \[9\], for comparison: the hits at all levels as a weighted sum, a level
-    /// counting twice as much as the next coarser one; the rest as in [`Method::Overlap`].
-    WeightedSum,
 }
 
-impl Method {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Refined, Self::Overlap, Self::WeightedSum];
+impl Keyword for Method {
+    const ALL: &'static [Self] = &[Self::Refined, Self::Overlap];
 
-    /// `refined`, `overlap` or `weighted_sum`.
-    pub fn as_str(self) -> &'static str {
+    fn as_str(self) -> &'static str {
         match self {
             Self::Refined => "refined",
             Self::Overlap => "overlap",
-            Self::WeightedSum => "weighted_sum",
         }
     }
 }
@@ -66,11 +61,11 @@ pub struct AlignmentSettings {
     pub undetermined_std: f64,
     /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
     /// where anything holds it. 8.
-    pub refinement_reach: f64,
+    pub refinement_max_correction: f64,
     /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 48.
-    pub reach: f64,
+    pub max_correction: f64,
     /// The same of its rotation, degrees. 60.
-    pub reach_deg: f64,
+    pub max_correction_deg: f64,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").
     pub lookup: Lookup,
@@ -133,9 +128,9 @@ impl Default for AlignmentSettings {
             multi_start: MultiStartSettings::default(),
             overlap_min: 0.2,
             undetermined_std: 0.2,
-            refinement_reach: 8.0,
-            reach: 48.0,
-            reach_deg: 60.0,
+            refinement_max_correction: 8.0,
+            max_correction: 48.0,
+            max_correction_deg: 60.0,
             lookup: Lookup::Bloom,
         }
     }
@@ -196,9 +191,9 @@ impl AlignmentSettings {
             ("refinement.std", self.refinement.std),
             ("refinement.robust_scale", self.refinement.robust_scale),
             ("undetermined_std", self.undetermined_std),
-            ("refinement_reach", self.refinement_reach),
-            ("reach", self.reach),
-            ("reach_deg", self.reach_deg),
+            ("refinement_max_correction", self.refinement_max_correction),
+            ("max_correction", self.max_correction),
+            ("max_correction_deg", self.max_correction_deg),
             ("multi_start.std_above", self.multi_start.std_above),
             ("multi_start.motion_above", self.multi_start.motion_above),
             ("multi_start.motion_above_deg", self.multi_start.motion_above_deg),

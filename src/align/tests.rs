@@ -1,5 +1,6 @@
 //! Alignments under a stop signal, and of scans with far returns.
 
+use crate::util::Keyword;
 use std::cell::Cell;
 
 use super::*;
@@ -30,7 +31,7 @@ fn settings(method: Method) -> AlignmentSettings {
 #[test]
 fn an_alignment_looks_at_the_signal_in_proportion_to_its_work() {
     let (map, guess) = (map(), Pose::translation(0.07, -0.06, 0.05));
-    for method in Method::ALL {
+    for &method in Method::ALL {
         for count in [3_000, 30_000, 300_000] {
             let looks = Cell::new(0u64);
             let count_look = || looks.replace(looks.get() + 1) == u64::MAX;
@@ -61,7 +62,7 @@ fn judging_a_pose_looks_at_the_signal_in_proportion_to_its_work() {
 fn an_alignment_that_is_stopped_at_any_look_ends_there() {
     let (map, guess) = (map(), Pose::translation(0.3, -0.25, 0.2));
     let points = corner(300_000);
-    for method in Method::ALL {
+    for &method in Method::ALL {
         for looks_max in [0, 1, 3, 10, 20, 30, 50, 100] {
             let looks = Cell::new(0u64);
             let is_over = || looks.replace(looks.get() + 1) >= looks_max;

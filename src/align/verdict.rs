@@ -83,26 +83,27 @@ impl Alignment {
             return false;
         }
         self.fitness < multi_start.fitness_below
-            || self.refined_by_m > settings.refinement_reach * resolution_m
+            || self.refined_by_m > settings.refinement_max_correction * resolution_m
             || self.information.directions()[0].std_m > multi_start.std_above * resolution_m
             || meters > multi_start.motion_above * resolution_m
             || degrees > multi_start.motion_above_deg
     }
 
     /// Ambiguous where it would be accepted and lies farther from the guess than was searched.
-    pub(super) fn within_reach_of(
+    pub(super) fn within_max_correction(
         self,
         guess: &Pose,
         map: &MultiResolutionMap,
         settings: &AlignmentSettings,
     ) -> Self {
         let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
-        let (reach_m, reach_deg) = (settings.reach * map.lattice().resolution_m(0), settings.reach_deg);
-        if self.verdict != Verdict::Accepted || meters <= reach_m && degrees <= reach_deg {
+        let (max_correction_m, max_correction_deg) =
+            (settings.max_correction * map.lattice().resolution_m(0), settings.max_correction_deg);
+        if self.verdict != Verdict::Accepted || meters <= max_correction_m && degrees <= max_correction_deg {
             return self;
         }
         let reason = format!(
-            "it is {meters:.2} m and {degrees:.1} deg from the guess, within {reach_m:.2} m and {reach_deg} deg \
+            "it is {meters:.2} m and {degrees:.1} deg from the guess, within {max_correction_m:.2} m and {max_correction_deg} deg \
              others were looked for"
         );
         self.but(Verdict::Ambiguous, reason)
@@ -132,16 +133,17 @@ impl Fit {
         let resolution_m = map.lattice().resolution_m(0);
         let (overlap, overlap_min) = (self.level_overlaps[0], settings.overlap_min);
         let open_m = settings.undetermined_std * resolution_m;
-        let reach_m = settings.refinement_reach * resolution_m;
+        let max_correction_m = settings.refinement_max_correction * resolution_m;
         let undetermined = self.surfaces.information.undetermined(open_m);
         let (verdict, reason) = if overlap < overlap_min {
             (Verdict::LowOverlap, format!("overlap {overlap:.3} is below overlap_min {overlap_min}"))
         } else if let Some(worst) = undetermined.first() {
             (Verdict::Undetermined, format!("open along {worst}, at most {open_m:.3} m is accepted"))
-        } else if self.refined_by_m > reach_m {
+        } else if self.refined_by_m > max_correction_m {
             let moved_m = self.refined_by_m;
-            let reason =
-                format!("the refinement moved it by {moved_m:.3} m, at most {reach_m:.3} m is accepted");
+            let reason = format!(
+                "the refinement moved it by {moved_m:.3} m, at most {max_correction_m:.3} m is accepted"
+            );
             (Verdict::Undetermined, reason)
         } else {
             let held_m = self.surfaces.information.directions()[0].std_m;

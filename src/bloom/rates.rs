@@ -31,7 +31,7 @@ pub enum FilterSettingsError {
     #[error("filter_hashes must lie in 1..={HASHES_MAX}, got {0}")]
     Hashes(u32),
     /// Bits a key out of range.
-    #[error("filter_bits_per_voxel must lie in {BITS_PER_KEY_MIN}..={BITS_PER_KEY_MAX}, got {0}")]
+    #[error("filter_bits_per_key must lie in {BITS_PER_KEY_MIN}..={BITS_PER_KEY_MAX}, got {0}")]
     BitsPerKey(f64),
 }
 
@@ -136,6 +136,6 @@ mod tests {
         let hashes = FilterSettings { hashes: 11, ..Default::default() }.checked().unwrap_err();
         assert!(hashes.to_string().contains("filter_hashes"));
         let bits = FilterSettings { bits_per_key: f64::NAN, ..Default::default() }.checked().unwrap_err();
-        assert!(bits.to_string().contains("filter_bits_per_voxel"));
+        assert!(bits.to_string().contains("filter_bits_per_key"));
     }
 }

@@ -10,17 +10,10 @@ use crate::scan::{PointFilter, PointFilterError};
 /// How scans are aligned.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct AlignmentOptions {
-    /// How to align: the ascent on overlap and a refinement on the points' Gaussians, the ascent alone as in the paper,
-    /// or the older ascent on a weighted sum over the levels [default: refined]
-    #[arg(long, value_enum)]
-    method: Option<MethodName>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum MethodName {
-    Refined,
-    Overlap,
-    WeightedSum,
+    /// How to align: the ascent on overlap and a refinement on the points' Gaussians (refined), or the ascent alone as in
+    /// the paper (overlap) [default: refined]
+    #[arg(long, value_parser = parse::keyword::<Method>())]
+    method: Option<Method>,
 }
 
 /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one before.
@@ -42,11 +35,7 @@ impl From<GuessName> for Guess {
 
 impl AlignmentOptions {
     pub(super) fn method(&self) -> Option<Method> {
-        self.method.map(|name| match name {
-            MethodName::Refined => Method::Refined,
-            MethodName::Overlap => Method::Overlap,
-            MethodName::WeightedSum => Method::WeightedSum,
-        })
+        self.method
     }
 }
 

@@ -90,7 +90,7 @@ struct Deleted {
 
 impl From<DeletionAnswer> for Deleted {
     fn from(answer: DeletionAnswer) -> Self {
-        let (revision, map_uuid) = (answer.state.revision, answer.state.map_uuid.to_string());
+        let (revision, map_uuid) = (answer.version.revision, answer.version.map_uuid.to_string());
         Self { removed: answer.removed, replayed: answer.replayed, revision, map_uuid }
     }
 }

@@ -226,7 +226,7 @@ struct ScanLine {
     revision: u64,
     map_uuid: String,
     replayed: bool,
-    standing: bool,
+    stationary: bool,
     #[serde(skip)]
     width: usize,
 }
@@ -245,10 +245,10 @@ impl ScanLine {
             align_ms: answer.align_time.as_secs_f64() * 1e3,
             new_voxels: answer.new_voxels,
             points_skipped: answer.points_skipped,
-            revision: answer.state.revision,
-            map_uuid: answer.state.map_uuid.to_string(),
+            revision: answer.version.revision,
+            map_uuid: answer.version.map_uuid.to_string(),
             replayed: answer.replayed,
-            standing: answer.standing,
+            stationary: answer.stationary,
             width,
         }
     }
@@ -273,7 +273,7 @@ impl Display for ScanLine {
         )?;
         match self {
             Self { replayed: true, .. } => write!(f, "  (was there already)"),
-            Self { standing: true, .. } => write!(f, "  (nothing new from where it stands)"),
+            Self { stationary: true, .. } => write!(f, "  (nothing new from where it stands)"),
             Self { verdict: "accepted", .. } => Ok(()),
             Self { reason, .. } => write!(f, "  {reason}"),
         }

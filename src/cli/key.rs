@@ -141,8 +141,8 @@ impl NewKey {
     }
 
     fn key(&self, secret: &Secret) -> Key {
-        let reach = self.maps.clone().map_or(AllowedMaps::Every, AllowedMaps::from_iter);
-        let key = Key::new(self.name.clone(), secret.digest(), self.scope.into(), reach);
+        let allowed_maps = self.maps.clone().map_or(AllowedMaps::Every, AllowedMaps::from_iter);
+        let key = Key::new(self.name.clone(), secret.digest(), self.scope.into(), allowed_maps);
         let key = match &self.robots {
             Some(robots) => key.for_robots(robots.iter().cloned()),
             None => key,

@@ -43,7 +43,7 @@ struct Settings {
 #[derive(Serialize)]
 struct Filter {
     hashes: u32,
-    bits_per_voxel: f64,
+    bits_per_key: f64,
 }
 
 #[derive(Serialize)]
@@ -53,9 +53,9 @@ struct Level {
     voxels: usize,
     plane_bytes: usize,
     counter_bytes: usize,
-    false_positives_expected: f64,
-    false_positives_equation_1: f64,
-    false_positives_measured: Option<f64>,
+    expected_false_positive_rate: f64,
+    ideal_false_positive_rate: f64,
+    measured_false_positive_rate: Option<f64>,
 }
 
 impl MapReport {
@@ -69,7 +69,7 @@ impl MapReport {
             info.settings.levels,
             count(voxels),
             count(info.scans),
-            info.state.revision,
+            info.version.revision,
         )
     }
 }
@@ -77,13 +77,13 @@ impl MapReport {
 impl From<&MapInfo> for MapReport {
     fn from(info: &MapInfo) -> Self {
         let filter =
-            Filter { hashes: info.settings.filter.hashes, bits_per_voxel: info.settings.filter.bits_per_key };
+            Filter { hashes: info.settings.filter.hashes, bits_per_key: info.settings.filter.bits_per_key };
         let settings =
             Settings { resolution_m: info.settings.resolution_m, levels: info.settings.levels, filter };
         Self {
             map: info.name.to_string(),
-            revision: info.state.revision,
-            map_uuid: info.state.map_uuid.to_string(),
+            revision: info.version.revision,
+            map_uuid: info.version.map_uuid.to_string(),
             settings,
             levels: info.levels.iter().map(Level::from).collect(),
             scans: info.scans,
@@ -111,9 +111,9 @@ impl From<&LevelInfo> for Level {
             voxels: info.voxels,
             plane_bytes: info.plane_bytes,
             counter_bytes: info.counter_bytes,
-            false_positives_expected: info.expected_rate,
-            false_positives_equation_1: info.ideal_false_positive_rate,
-            false_positives_measured: info.measured_rate,
+            expected_false_positive_rate: info.expected_rate,
+            ideal_false_positive_rate: info.ideal_false_positive_rate,
+            measured_false_positive_rate: info.measured_rate,
         }
     }
 }
@@ -129,8 +129,8 @@ impl Display for MapReport {
             Some(storage) => writeln!(f, "{storage}")?,
             None => writeln!(f, "in memory only: it ends with the server")?,
         }
-        let Filter { hashes, bits_per_voxel } = self.settings.filter;
-        writeln!(f, "filters of {hashes} hashes, {bits_per_voxel} bits a voxel at least\n")?;
+        let Filter { hashes, bits_per_key } = self.settings.filter;
+        writeln!(f, "filters of {hashes} hashes, {bits_per_key} bits a voxel at least\n")?;
         write!(f, "level  resolution          voxels   filter plane      counters   false positives:")?;
         write!(f, " expected   eq. (1)   measured")?;
         self.levels.iter().try_for_each(|level| write!(f, "\n{level}"))
@@ -148,7 +148,7 @@ impl Display for Storage {
 
 impl Display for Level {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let measured = self.false_positives_measured.map_or("-".into(), percent);
+        let measured = self.measured_false_positive_rate.map_or("-".into(), percent);
         write!(
             f,
             "{:>5} {:>9} m {:>15} {:>14} {:>13} {:>26} {:>9} {measured:>10}",
@@ -157,8 +157,8 @@ impl Display for Level {
             count(self.voxels),
             bytes(self.plane_bytes),
             bytes(self.counter_bytes),
-            percent(self.false_positives_expected),
-            percent(self.false_positives_equation_1),
+            percent(self.expected_false_positive_rate),
+            percent(self.ideal_false_positive_rate),
         )
     }
 }

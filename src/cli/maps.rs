@@ -87,13 +87,13 @@ pub(super) struct OptionalSettings {
     filter_hashes: Option<u32>,
     /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
     #[arg(long, value_name = "BITS")]
-    filter_bits_per_voxel: Option<f64>,
+    filter_bits_per_key: Option<f64>,
 }
 
 impl OptionalSettings {
     /// True when one is given.
     pub(super) fn is_any(&self) -> bool {
-        self.levels.is_some() || self.filter_hashes.is_some() || self.filter_bits_per_voxel.is_some()
+        self.levels.is_some() || self.filter_hashes.is_some() || self.filter_bits_per_key.is_some()
     }
 
     pub(super) fn with_resolution(&self, resolution_m: f64) -> NewMap {
@@ -101,7 +101,7 @@ impl OptionalSettings {
             resolution_m,
             levels: self.levels,
             filter_hashes: self.filter_hashes,
-            filter_bits_per_voxel: self.filter_bits_per_voxel,
+            filter_bits_per_key: self.filter_bits_per_key,
         }
     }
 }

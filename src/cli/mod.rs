@@ -72,7 +72,7 @@ enum Command {
     Localize(localize::Localize),
     Query(query::Query),
     Delete(delete::Delete),
-    Undo(undo::UndoScans),
+    Undo(undo::Undo),
     Maps(maps::Maps),
     Health(health::Health),
     Key(key::Keys),

@@ -1,25 +1,16 @@
 //! Values of options: poses, points, regions, names.
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::align::localize::SearchBox;
 use crate::geometry::{self, Point, Pose};
-use crate::map::{Lookup, MapName, Region, RequestId, RobotName};
+use crate::map::{MapName, Region, RequestId, RobotName};
+use crate::util::Keyword;
 
-/// What decides whether a voxel is occupied: the exact set, or the counting Bloom filter alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum LookupName {
-    Exact,
-    Bloom,
-}
-
-impl From<LookupName> for Lookup {
-    fn from(name: LookupName) -> Self {
-        match name {
-            LookupName::Exact => Self::Exact,
-            LookupName::Bloom => Self::Bloom,
-        }
-    }
+/// An option's value by its word; `--help` lists the words.
+pub(super) fn keyword<T: Keyword>() -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(T::ALL.iter().map(|value| value.as_str()))
+        .map(|word| T::from_word(&word).expect("one of the words"))
 }
 
 /// "x y z qx qy qz qw", meters and a unit quaternion.

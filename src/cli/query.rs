@@ -10,11 +10,12 @@ use serde::Serialize;
 use super::error::CliError;
 use super::map_report::{count, percent};
 use super::output::Output;
-use super::parse::{self, LookupName};
+use super::parse;
 use super::remote::MapOptions;
 use crate::geometry::{Point, Pose};
+use crate::map::Lookup;
 use crate::scan::read_points;
-use crate::service::{MapState, PointAnswer, PointQuery};
+use crate::service::{MapVersion, PointAnswer, PointQuery};
 
 /// Points of one message. A multiple of 8, so that the bitmaps of messages follow each other without a gap.
 const BATCH_POINTS: usize = 1_000_000;
@@ -44,8 +45,8 @@ pub(super) struct Query {
     #[arg(long, default_value_t = 0)]
     level: u32,
     /// What decides: the exact set, or the Bloom filter alone, which may say "occupied" of a free voxel
-    #[arg(long, value_enum, default_value_t = LookupName::Exact)]
-    lookup: LookupName,
+    #[arg(long, value_parser = parse::keyword::<Lookup>(), default_value = "exact")]
+    lookup: Lookup,
     /// Where the points' frame lies in the map: "x y z qx qy qz qw" [default: the map's own frame]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
     pose: Option<Pose>,
@@ -93,7 +94,7 @@ impl Query {
             points: points.to_vec().into(),
             map_from_points: self.pose,
             level: self.level,
-            lookup: self.lookup.into(),
+            lookup: self.lookup,
             min_revision: None,
             map_uuid: None,
         }
@@ -129,7 +130,7 @@ struct Answer {
 
 impl Answer {
     fn add(&mut self, answer: &PointAnswer) {
-        let MapState { revision, map_uuid } = answer.state;
+        let MapVersion { revision, map_uuid } = answer.version;
         self.points += answer.points;
         self.occupied += answer.points_occupied;
         self.bitmap.extend_from_slice(&answer.occupied);

@@ -137,7 +137,7 @@ impl Restore {
                 false => client.restore_map(&name, file.into()).await?,
             };
             let voxels = info.levels.first().map_or(0, |level| level.voxels);
-            output.print(&Restored { map: name.to_string(), revision: info.state.revision, voxels })?;
+            output.print(&Restored { map: name.to_string(), revision: info.version.revision, voxels })?;
             output.step();
         }
         output.clear_bar();

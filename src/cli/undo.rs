@@ -10,7 +10,7 @@ use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
 use crate::map::{RequestId, RobotName};
-use crate::service::{Undo, UndoAnswer, UndoTarget};
+use crate::service::{self, UndoAnswer, UndoTarget};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -24,7 +24,7 @@ numbers may be used again. How far back this reaches, `mrol maps show` tells.";
 /// Take scans out of a map on a server again
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-pub(super) struct UndoScans {
+pub(super) struct Undo {
     #[command(flatten)]
     map: MapOptions,
     /// Who sent the scans
@@ -44,7 +44,7 @@ pub(super) struct UndoScans {
     request_id: Option<RequestId>,
 }
 
-impl UndoScans {
+impl Undo {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let target = match (self.robot, self.scan_id, self.since, self.revision) {
             (Some(robot), Some(scan_id), ..) => UndoTarget::Scan { robot, scan_id },
@@ -54,9 +54,9 @@ impl UndoScans {
                 return Err(CliError::usage("which scans? --robot with --scan-id or --since, or --revision"));
             }
         };
-        let undo = Undo { target, request_id: self.request_id };
+        let undo = service::Undo { target, request_id: self.request_id };
         let client = self.map.server.connect().await?;
-        let answer = client.undo_scans(&self.map.name, undo).await?;
+        let answer = client.undo(&self.map.name, undo).await?;
         output.print(&Undone::from(answer))
     }
 }
@@ -71,8 +71,8 @@ struct Undone {
 }
 
 impl From<UndoAnswer> for Undone {
-    fn from(UndoAnswer { scans, removed, state, replayed }: UndoAnswer) -> Self {
-        Self { scans, removed, replayed, revision: state.revision, map_uuid: state.map_uuid.to_string() }
+    fn from(UndoAnswer { scans, removed, version, replayed }: UndoAnswer) -> Self {
+        Self { scans, removed, replayed, revision: version.revision, map_uuid: version.map_uuid.to_string() }
     }
 }
 

@@ -238,9 +238,9 @@ impl Client {
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
-    pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ClientError> {
+    pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ClientError> {
         let request = self.request((map, undo));
-        self.domain(self.connection.mapping().undo_scans(request).await)
+        self.domain(self.connection.mapping().undo(request).await)
     }
 
     /// The poses of the accepted scans, of one robot or of all, as many as there are, all at one revision.

@@ -13,6 +13,14 @@ pub enum ConfigError {
     /// The file named on the command line is not there.
     #[error("configuration file {} cannot be read", .0.display())]
     File(PathBuf),
+    /// A setting that has another name since an earlier version.
+    #[error("{old} is called {new} now")]
+    Renamed {
+        /// The setting that was given.
+        old: &'static str,
+        /// Its name of today.
+        new: &'static str,
+    },
     /// A number out of its range.
     #[error("{key} must be {range}, got {value}")]
     Range {

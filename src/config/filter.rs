@@ -11,12 +11,12 @@ pub struct FilterConfig {
     /// Hash functions, k of eq. (1).
     pub hashes: u32,
     /// Bits of the plane a voxel, m / n of eq. (1).
-    pub bits_per_voxel: f64,
+    pub bits_per_key: f64,
 }
 
 impl Default for FilterConfig {
     fn default() -> Self {
         let FilterSettings { hashes, bits_per_key } = FilterSettings::default();
-        Self { hashes, bits_per_voxel: bits_per_key }
+        Self { hashes, bits_per_key }
     }
 }

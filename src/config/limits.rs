@@ -94,12 +94,12 @@ pub struct LimitsConfig {
     /// MiB free on the disk of the data folder below which changes are refused; 0 = never. 256.
     pub disk_free_low_mib: u64,
     /// MiB free from which on they are taken again. 512.
-    pub disk_free_back_mib: u64,
+    pub disk_free_resume_mib: u64,
     /// MiB of memory in use above which what makes maps grow is refused; 0 = 85 % of what the system or the control group
     /// allows. 0.
     pub memory_high_mib: u64,
     /// MiB at which it is taken again; 0 = 94 % of the high mark. 0.
-    pub memory_back_mib: u64,
+    pub memory_resume_mib: u64,
 }
 
 impl Default for LimitsConfig {
@@ -145,9 +145,9 @@ impl Default for LimitsConfig {
             localization_candidates_max: limits.localization_candidates_max,
             localization_grid_bytes_max: limits.localization_grid_bytes_max,
             disk_free_low_mib: limits.marks.disk_free_low_bytes >> 20,
-            disk_free_back_mib: limits.marks.disk_free_back_bytes >> 20,
+            disk_free_resume_mib: limits.marks.disk_free_resume_bytes >> 20,
             memory_high_mib: 0,
-            memory_back_mib: 0,
+            memory_resume_mib: 0,
         }
     }
 }
@@ -266,9 +266,9 @@ impl LimitsConfig {
         let given = |mib: u64| (mib > 0).then_some(mib << 20);
         Marks {
             disk_free_low_bytes: self.disk_free_low_mib << 20,
-            disk_free_back_bytes: self.disk_free_back_mib << 20,
+            disk_free_resume_bytes: self.disk_free_resume_mib << 20,
             memory_high_bytes: given(self.memory_high_mib),
-            memory_back_bytes: given(self.memory_back_mib),
+            memory_resume_bytes: given(self.memory_resume_mib),
         }
     }
 
@@ -277,25 +277,25 @@ impl LimitsConfig {
         let range = |key, range, value: u64| Err(ConfigError::Range { key, range, value: value.to_string() });
         for (key, mib) in [
             ("limits.disk_free_low_mib", self.disk_free_low_mib),
-            ("limits.disk_free_back_mib", self.disk_free_back_mib),
+            ("limits.disk_free_resume_mib", self.disk_free_resume_mib),
             ("limits.memory_high_mib", self.memory_high_mib),
-            ("limits.memory_back_mib", self.memory_back_mib),
+            ("limits.memory_resume_mib", self.memory_resume_mib),
         ] {
             if mib > 1 << 40 {
                 return range(key, "0 to 1099511627776", mib);
             }
         }
-        if self.disk_free_back_mib <= self.disk_free_low_mib {
+        if self.disk_free_resume_mib <= self.disk_free_low_mib {
             let more = "more than limits.disk_free_low_mib";
-            return range("limits.disk_free_back_mib", more, self.disk_free_back_mib);
+            return range("limits.disk_free_resume_mib", more, self.disk_free_resume_mib);
         }
-        match (self.memory_high_mib, self.memory_back_mib) {
+        match (self.memory_high_mib, self.memory_resume_mib) {
             (_, 0) => Ok(()),
             (0, _) => {
-                Err(ConfigError::Missing { needed: "limits.memory_high_mib", by: "limits.memory_back_mib" })
+                Err(ConfigError::Missing { needed: "limits.memory_high_mib", by: "limits.memory_resume_mib" })
             }
             (high, back) if back >= high => {
-                range("limits.memory_back_mib", "less than limits.memory_high_mib", back)
+                range("limits.memory_resume_mib", "less than limits.memory_high_mib", back)
             }
             _ => Ok(()),
         }

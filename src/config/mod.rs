@@ -18,7 +18,7 @@ pub use filter::FilterConfig;
 pub use limits::LimitsConfig;
 pub use listener::ListenerConfig;
 pub use log::LogConfig;
-pub use scans::{AlignmentConfig, MethodConfig, RobotConfig};
+pub use scans::{AlignmentConfig, RobotConfig};
 pub use store::StoreConfig;
 pub use threads::ThreadsConfig;
 pub use tls::TlsConfig;
@@ -124,11 +124,11 @@ impl Config {
         let overrides = serde_json::to_value(overrides)
             .map_err(|error| ConfigError::Value(Box::new(error.to_string().into())))?;
         let given = Serialized::globals(without_nulls(overrides));
-        let config: Self = figment
-            .merge(settings_of_environment())
-            .merge(given)
-            .extract()
-            .map_err(|e| ConfigError::Value(Box::new(e)))?;
+        let figment = figment.merge(settings_of_environment()).merge(given);
+        if let Some((old, new)) = RENAMED.into_iter().find(|(old, _)| figment.contains(old)) {
+            return Err(ConfigError::Renamed { old, new });
+        }
+        let config: Self = figment.extract().map_err(|e| ConfigError::Value(Box::new(e)))?;
         config.checked()
     }
 
@@ -173,7 +173,7 @@ impl Config {
 
     /// What to open the service with.
     pub fn service_settings(&self) -> ServiceSettings {
-        let FilterConfig { hashes, bits_per_voxel } = self.filter;
+        let FilterConfig { hashes, bits_per_key } = self.filter;
         ServiceSettings {
             data_dir: (!self.data_dir.as_os_str().is_empty()).then(|| self.data_dir.clone()),
             store: self.store.settings(),
@@ -183,13 +183,10 @@ impl Config {
             mapping_threads: self.threads.mapping,
             alignment_threads: self.threads.alignment,
             localization_threads: self.threads.localization,
-            alignment: AlignmentSettings {
-                method: self.alignment.method.into(),
-                ..AlignmentSettings::default()
-            },
+            alignment: AlignmentSettings { method: self.alignment.method.0, ..AlignmentSettings::default() },
             stationary: StationarySettings::default(),
             robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.filter())).collect(),
-            filter: FilterSettings { hashes, bits_per_key: bits_per_voxel },
+            filter: FilterSettings { hashes, bits_per_key },
         }
     }
 
@@ -203,6 +200,13 @@ impl Config {
         Duration::from_secs(self.drain_delay_s)
     }
 }
+
+/// Settings of earlier versions, and what they are called now.
+const RENAMED: [(&str, &str); 3] = [
+    ("filter.bits_per_voxel", "filter.bits_per_key"),
+    ("limits.disk_free_back_mib", "limits.disk_free_resume_mib"),
+    ("limits.memory_back_mib", "limits.memory_resume_mib"),
+];
 
 /// The variables that mean this program; see [`Config::load`].
 fn settings_of_environment() -> Env {
@@ -256,6 +260,15 @@ mod tests {
             assert!(error.contains(key), "{error}");
         }
         assert!(load("", json!({"http": {"port": 1}})).unwrap_err().to_string().contains("port"));
+    }
+
+    #[test]
+    fn a_setting_of_an_earlier_version_is_refused_with_its_name_of_today() {
+        for (old, new) in RENAMED {
+            let (section, name) = old.split_once('.').unwrap();
+            let error = load(&format!("[{section}]\n{name} = 14"), json!({})).unwrap_err().to_string();
+            assert!(error.contains(old) && error.contains(new), "{error}");
+        }
     }
 
     #[test]
@@ -317,19 +330,19 @@ mod tests {
         let error = |limits| load(&format!("[limits]\n{limits}"), json!({})).unwrap_err().to_string();
         let disk = error("disk_free_low_mib = 512");
         assert!(
-            disk.contains("limits.disk_free_back_mib must be more than limits.disk_free_low_mib, got 512"),
+            disk.contains("limits.disk_free_resume_mib must be more than limits.disk_free_low_mib, got 512"),
             "{disk}"
         );
-        let memory = error("memory_high_mib = 100\nmemory_back_mib = 100");
-        assert!(memory.contains("memory_back_mib must be less than limits.memory_high_mib"), "{memory}");
-        assert!(error("memory_back_mib = 100").contains("limits.memory_high_mib is missing"));
-        let beyond = error("disk_free_back_mib = 1099511627777");
-        assert!(beyond.contains("disk_free_back_mib must be 0 to 1099511627776"), "{beyond}");
+        let memory = error("memory_high_mib = 100\nmemory_resume_mib = 100");
+        assert!(memory.contains("memory_resume_mib must be less than limits.memory_high_mib"), "{memory}");
+        assert!(error("memory_resume_mib = 100").contains("limits.memory_high_mib is missing"));
+        let beyond = error("disk_free_resume_mib = 1099511627777");
+        assert!(beyond.contains("disk_free_resume_mib must be 0 to 1099511627776"), "{beyond}");
 
         let limits = load("[limits]\nmemory_high_mib = 3\ndisk_free_low_mib = 0", json!({})).unwrap();
         let marks = limits.service_settings().limits.marks;
-        assert_eq!((marks.memory_high_bytes, marks.memory_back_bytes), (Some(3 << 20), None));
-        assert_eq!((marks.disk_free_low_bytes, marks.disk_free_back_bytes), (0, 512 << 20));
+        assert_eq!((marks.memory_high_bytes, marks.memory_resume_bytes), (Some(3 << 20), None));
+        assert_eq!((marks.disk_free_low_bytes, marks.disk_free_resume_bytes), (0, 512 << 20));
     }
 
     #[test]

@@ -4,36 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::align::Method;
 use crate::scan::PointFilter;
+use crate::wire::ByKeyword;
 
 /// How scans are aligned.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AlignmentConfig {
-    /// `refined`, `overlap` or `weighted_sum`, for requests that do not say. `refined`.
-    pub method: MethodConfig,
-}
-
-/// See [`Method`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MethodConfig {
-    /// [`Method::Refined`].
-    #[default]
-    Refined,
-    /// [`Method::Overlap`].
-    Overlap,
-    /// [`Method::WeightedSum`].
-    WeightedSum,
-}
-
-impl From<MethodConfig> for Method {
-    fn from(method: MethodConfig) -> Self {
-        match method {
-            MethodConfig::Refined => Self::Refined,
-            MethodConfig::Overlap => Self::Overlap,
-            MethodConfig::WeightedSum => Self::WeightedSum,
-        }
-    }
+    /// How scans are aligned whose request does not say: `refined` or `overlap`. `refined`.
+    pub method: ByKeyword<Method>,
 }
 
 /// Which points of a robot's scans count; a request may say otherwise.

@@ -68,13 +68,10 @@ impl Mapping for Adapter {
         Ok(answered(answer.into()))
     }
 
-    async fn undo_scans(
-        &self,
-        request: Request<pb::UndoScansRequest>,
-    ) -> Result<Response<pb::UndoScansResponse>, Status> {
+    async fn undo(&self, request: Request<pb::UndoRequest>) -> Result<Response<pb::UndoResponse>, Status> {
         let service = service_of(&request)?;
         let (map, undo) = request.into_inner().try_into()?;
-        let answer = service.undo_scans(&map, undo).await?;
+        let answer = service.undo(&map, undo).await?;
         Ok(answered(answer.into()))
     }
 

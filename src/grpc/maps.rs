@@ -80,7 +80,8 @@ impl Maps for Adapter {
         let service = service.maps();
         let most = service.limits().map_file_bytes_max;
         let arrival = InboundBody::of(pieces.extensions())?.clone();
-        let (name, replace, file) = gather(pieces.into_inner(), &arrival, caller.reach(), most).await?;
+        let (name, replace, file) =
+            gather(pieces.into_inner(), &arrival, caller.allowed_maps(), most).await?;
         let info = service.restore_map(name, file, replace).await?;
         Ok(answered(pb::RestoreMapResponse { map: Some(info.into()) }))
     }
@@ -91,12 +92,12 @@ impl Maps for Adapter {
 async fn gather(
     mut pieces: Streaming<pb::RestoreMapRequest>,
     arrival: &InboundBody,
-    reach: &AllowedMaps,
+    allowed_maps: &AllowedMaps,
     most: usize,
 ) -> Result<(MapName, bool, Bytes), Status> {
     let mut piece = pieces.message().await?.unwrap_or_default();
     let (name, replace) = (map_name(&piece.map)?, piece.replace);
-    reach.permit(&name)?;
+    allowed_maps.permit(&name)?;
     let mut file = BytesMut::new();
     loop {
         if file.len() + piece.data.len() > most {

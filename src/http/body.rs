@@ -5,11 +5,12 @@ use axum::extract::{DefaultBodyLimit, FromRequest, Request};
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 
-use super::error::{HttpError, excerpt};
+use super::error::HttpError;
 use super::object::Object;
-use super::{Adapter, parameters, unreadable};
+use super::{Adapter, params, unreadable};
 use crate::admission::InboundBody;
 use crate::service::{ErrorCode, PointCloud, ServiceError};
+use crate::util::excerpt;
 use crate::wire::InField;
 
 const JSON: &str = "application/json";
@@ -53,7 +54,7 @@ where
         match content_type(request.headers()).as_str() {
             JSON => parse_all(request, adapter).await.map(Self::Json),
             OCTET_STREAM => {
-                let rest = parameters::from_query(request.uri())?;
+                let rest = params::from_query(request.uri())?;
                 let points = PointCloud::from_bytes(read(request, adapter).await?).in_field("body")?;
                 Ok(Self::Bytes(points, rest))
             }

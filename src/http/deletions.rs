@@ -5,21 +5,21 @@ use serde::{Deserialize, Serialize};
 
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonState};
+use super::json::{JsonPoints, JsonVersion};
 use super::middleware::Service;
 use super::object::Object;
-use super::parameters::{Map, request_id_of};
+use super::params::{Map, request_id_of};
 use crate::map::Region;
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct DeletionJson {
+pub(super) struct DeletionBody {
     points: Option<JsonPoints>,
     voxels: Option<Vec<[i32; 3]>>,
-    r#box: Option<Object<BoxJson>>,
-    sphere: Option<Object<SphereJson>>,
+    r#box: Option<Object<BoxBody>>,
+    sphere: Option<Object<SphereBody>>,
     #[serde(default)]
     level: u32,
     request_id: Option<String>,
@@ -27,55 +27,55 @@ pub(super) struct DeletionJson {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct BoxJson {
+struct BoxBody {
     min_m: [f64; 3],
     max_m: [f64; 3],
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct SphereJson {
+struct SphereBody {
     center_m: [f64; 3],
     radius_m: f64,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct DeletionQuery {
+pub(super) struct DeletionParams {
     #[serde(default)]
     level: u32,
     request_id: Option<String>,
 }
 
-type DeletionBody = Points<DeletionJson, DeletionQuery>;
+type DeletionPoints = Points<DeletionBody, DeletionParams>;
 
 #[derive(Serialize)]
-pub(super) struct DeletionOut {
+pub(super) struct DeletionResponse {
     removed: usize,
     replayed: bool,
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
 }
 
 pub(super) async fn delete(
     Service(service): Service,
     Map(map): Map,
-    deletion: DeletionBody,
-) -> Result<Json<DeletionOut>, HttpError> {
+    deletion: DeletionPoints,
+) -> Result<Json<DeletionResponse>, HttpError> {
     let answer = service.delete_voxels(&map, deletion.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 
-impl TryFrom<DeletionBody> for Deletion {
+impl TryFrom<DeletionPoints> for Deletion {
     type Error = ServiceError;
 
-    fn try_from(body: DeletionBody) -> Result<Self, ServiceError> {
+    fn try_from(body: DeletionPoints) -> Result<Self, ServiceError> {
         match body {
             Points::Json(mut json) => {
                 let request_id = request_id_of(json.request_id.take())?;
                 Ok(Self { level: json.level, request_id, target: json.try_into()? })
             }
-            Points::Bytes(points, DeletionQuery { level, request_id }) => {
+            Points::Bytes(points, DeletionParams { level, request_id }) => {
                 let request_id = request_id_of(request_id)?;
                 Ok(Self { level, request_id, target: DeletionTarget::Points(points) })
             }
@@ -83,17 +83,17 @@ impl TryFrom<DeletionBody> for Deletion {
     }
 }
 
-impl TryFrom<DeletionJson> for DeletionTarget {
+impl TryFrom<DeletionBody> for DeletionTarget {
     type Error = ServiceError;
 
-    fn try_from(json: DeletionJson) -> Result<Self, ServiceError> {
+    fn try_from(json: DeletionBody) -> Result<Self, ServiceError> {
         match (json.points, json.voxels, json.r#box, json.sphere) {
             (Some(points), None, None, None) => Ok(Self::Points(points.into())),
             (None, Some(voxels), None, None) => Ok(Self::Keys(keys_of(&voxels)?)),
-            (None, None, Some(Object(BoxJson { min_m, max_m })), None) => {
+            (None, None, Some(Object(BoxBody { min_m, max_m })), None) => {
                 Ok(Self::Region(Region::cuboid(min_m, max_m)?))
             }
-            (None, None, None, Some(Object(SphereJson { center_m, radius_m }))) => {
+            (None, None, None, Some(Object(SphereBody { center_m, radius_m }))) => {
                 Ok(Self::Region(Region::ball(center_m, radius_m)?))
             }
             _ => {
@@ -115,8 +115,8 @@ fn keys_of(voxels: &[[i32; 3]]) -> Result<Vec<VoxelKey>, ServiceError> {
     voxels.iter().enumerate().map(key).collect()
 }
 
-impl From<DeletionAnswer> for DeletionOut {
+impl From<DeletionAnswer> for DeletionResponse {
     fn from(answer: DeletionAnswer) -> Self {
-        Self { removed: answer.removed, replayed: answer.replayed, state: answer.state.into() }
+        Self { removed: answer.removed, replayed: answer.replayed, version: answer.version.into() }
     }
 }

@@ -1,5 +1,7 @@
-//! What a failure looks like in HTTP: a status and
-//! `{"error":{"code":"invalid_argument","reason":"bad_pose","message":"..."}}`.
+//! Failures as HTTP answers: a status, and a problem document (`application/problem+json`, RFC 9457).
+//!
+//! `{"title":"Bad Request","status":400,"detail":"...","code":"invalid_argument","reason":"bad_pose"}`. `type` is left
+//! out, which by the RFC means that the status says what kind of problem it is; `reason` is the stable word for programs.
 
 use axum::Json;
 use axum::extract::Request;
@@ -10,6 +12,7 @@ use serde_json::json;
 use crate::access::{HOST_NOT_ALLOWED, KEY_UNKNOWN, Operation};
 use crate::admission;
 use crate::service::{ErrorCode, ServiceError, Shortage};
+use crate::util::excerpt;
 
 /// A failed request.
 #[derive(Debug)]
@@ -19,6 +22,9 @@ pub(super) struct HttpError {
     /// The methods that the route takes, where the request's is none of them.
     allow: Option<String>,
 }
+
+/// The media type of a problem document (RFC 9457).
+const PROBLEM_JSON: HeaderValue = HeaderValue::from_static("application/problem+json");
 
 /// The status of a failure, and its code as a word.
 fn status_of(code: ErrorCode) -> (StatusCode, &'static str) {
@@ -60,8 +66,15 @@ impl IntoResponse for HttpError {
     fn into_response(self) -> Response {
         let ServiceError { code, reason, message, retry_after } = self.error;
         let (_, word) = status_of(code);
-        let body = json!({"error": {"code": word, "reason": reason, "message": message}});
+        let body = json!({
+            "title": self.status.canonical_reason().unwrap_or_default(),
+            "status": self.status.as_u16(),
+            "detail": message,
+            "code": word,
+            "reason": reason,
+        });
         let mut response = (self.status, Json(body)).into_response();
+        response.headers_mut().insert(header::CONTENT_TYPE, PROBLEM_JSON);
         response.extensions_mut().insert(Reason(reason));
         let headers = response.headers_mut();
         if let Some(wait) = retry_after {
@@ -116,14 +129,4 @@ pub(super) fn no_such_method(request: &Request, route: &str) -> HttpError {
     let message = format!("{} does not take {}", excerpt(request.uri().path()), request.method());
     let error = HttpError::with_status(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", message);
     HttpError { allow: Some(methods.join(",")), ..error }
-}
-
-/// What a client sent, short enough to be repeated to it.
-pub(super) fn excerpt(text: &str) -> String {
-    const LENGTH_MAX: usize = 80;
-    let mut start: String = text.chars().take(LENGTH_MAX).collect();
-    if start.len() < text.len() {
-        start.push('…');
-    }
-    start
 }

@@ -2,13 +2,13 @@
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 
-use crate::service::MapState;
+use crate::service::MapVersion;
 
 /// At which state of a map something was: its `mrol-revision` and `mrol-map-uuid`.
-pub(super) fn of_state(state: &MapState) -> HeaderMap {
+pub(super) fn of_version(version: &MapVersion) -> HeaderMap {
     let mut headers = HeaderMap::new();
-    headers.insert(HeaderName::from_static("mrol-revision"), state.revision.into());
-    if let Ok(uuid) = HeaderValue::try_from(state.map_uuid.to_string()) {
+    headers.insert(HeaderName::from_static("mrol-revision"), version.revision.into());
+    if let Ok(uuid) = HeaderValue::try_from(version.map_uuid.to_string()) {
         headers.insert(HeaderName::from_static("mrol-map-uuid"), uuid);
     }
     headers

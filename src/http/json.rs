@@ -1,12 +1,10 @@
 //! The pieces of JSON that several routes share.
 
-use serde::de::{Error, SeqAccess, Visitor};
+use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::error::excerpt;
 use crate::geometry::{self, Point, Pose, PoseError};
-use crate::map::Lookup;
-use crate::service::{MapState, PointCloud};
+use crate::service::{MapVersion, PointCloud};
 
 /// `[[x, y, z], ...]`; a coordinate may be `null`, which stands for "no return" (JSON has no NaN).
 #[derive(Debug)]
@@ -65,51 +63,16 @@ impl From<&Pose> for JsonPose {
     }
 }
 
-/// `"exact"` or `"bloom"`.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) enum JsonLookup {
-    #[default]
-    Exact,
-    Bloom,
-}
-
-impl<'de> Deserialize<'de> for JsonLookup {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        word_of(deserializer, &[("exact", Self::Exact), ("bloom", Self::Bloom)])
-    }
-}
-
-/// One of a few words, and what it stands for.
-pub(super) fn word_of<'de, D: Deserializer<'de>, T: Copy>(
-    deserializer: D,
-    words: &[(&str, T)],
-) -> Result<T, D::Error> {
-    let given = String::deserialize(deserializer)?;
-    words.iter().find(|(word, _)| *word == given).map(|(_, value)| *value).ok_or_else(|| {
-        let words: Vec<String> = words.iter().map(|(word, _)| format!("{word:?}")).collect();
-        D::Error::custom(format!("must be {}, got {:?}", words.join(" or "), excerpt(&given)))
-    })
-}
-
-impl From<JsonLookup> for Lookup {
-    fn from(lookup: JsonLookup) -> Self {
-        match lookup {
-            JsonLookup::Exact => Self::Exact,
-            JsonLookup::Bloom => Self::Bloom,
-        }
-    }
-}
-
 /// Which state of which map an answer speaks of; part of every answer's object.
 #[derive(Debug, Serialize)]
-pub(super) struct JsonState {
+pub(super) struct JsonVersion {
     revision: u64,
     map_uuid: String,
 }
 
-impl From<MapState> for JsonState {
-    fn from(state: MapState) -> Self {
-        Self { revision: state.revision, map_uuid: state.map_uuid.to_string() }
+impl From<MapVersion> for JsonVersion {
+    fn from(version: MapVersion) -> Self {
+        Self { revision: version.revision, map_uuid: version.map_uuid.to_string() }
     }
 }
 

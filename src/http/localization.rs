@@ -5,19 +5,19 @@ use serde::{Deserialize, Serialize};
 
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonPose, JsonState};
+use super::json::{JsonPoints, JsonPose, JsonVersion};
 use super::middleware::Service;
 use super::object::Object;
-use super::parameters::{self, Map};
+use super::params::{self, Map};
 use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use crate::service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, ServiceError};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct LocalizationJson {
+pub(super) struct LocalizationBody {
     points: JsonPoints,
-    gravity: Option<Object<GravityJson>>,
-    search_box: Option<Object<BoxJson>>,
+    gravity: Option<Object<GravityBody>>,
+    search_box: Option<Object<BoxBody>>,
     time_limit_s: Option<f64>,
     #[serde(default)]
     candidates: u32,
@@ -27,14 +27,14 @@ pub(super) struct LocalizationJson {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct GravityJson {
+struct GravityBody {
     in_sensor: [f64; 3],
     in_map: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct BoxJson {
+struct BoxBody {
     min_m: [f64; 3],
     max_m: [f64; 3],
 }
@@ -42,7 +42,7 @@ struct BoxJson {
 /// The same beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct LocalizationParameters {
+pub(super) struct LocalizationParams {
     gravity: Option<String>,
     map_gravity: Option<String>,
     search_box: Option<String>,
@@ -53,24 +53,24 @@ pub(super) struct LocalizationParameters {
     seed: u64,
 }
 
-type LocalizationBody = Points<LocalizationJson, LocalizationParameters>;
+type LocalizationPoints = Points<LocalizationBody, LocalizationParams>;
 
 #[derive(Serialize)]
-pub(super) struct LocalizationOut {
+pub(super) struct LocalizationResponse {
     accepted: bool,
     verdict: &'static str,
     reason: String,
-    candidates: Vec<CandidateOut>,
+    candidates: Vec<CandidateResponse>,
     exhaustive: bool,
     cut_short: bool,
     search_ms: f64,
     points_skipped: usize,
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
 }
 
 #[derive(Serialize)]
-struct CandidateOut {
+struct CandidateResponse {
     map_from_sensor: JsonPose,
     overlap: f64,
     inliers: f64,
@@ -82,16 +82,16 @@ struct CandidateOut {
 pub(super) async fn localize(
     Service(service): Service,
     Map(map): Map,
-    scan: LocalizationBody,
-) -> Result<Json<LocalizationOut>, HttpError> {
+    scan: LocalizationPoints,
+) -> Result<Json<LocalizationResponse>, HttpError> {
     let answer = service.maps().localize(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 
-impl TryFrom<LocalizationBody> for LocalizationRequest {
+impl TryFrom<LocalizationPoints> for LocalizationRequest {
     type Error = ServiceError;
 
-    fn try_from(body: LocalizationBody) -> Result<Self, ServiceError> {
+    fn try_from(body: LocalizationPoints) -> Result<Self, ServiceError> {
         match body {
             Points::Json(scan) => scan.try_into(),
             Points::Bytes(points, rest) => rest.with(points),
@@ -99,10 +99,10 @@ impl TryFrom<LocalizationBody> for LocalizationRequest {
     }
 }
 
-impl TryFrom<LocalizationJson> for LocalizationRequest {
+impl TryFrom<LocalizationBody> for LocalizationRequest {
     type Error = ServiceError;
 
-    fn try_from(scan: LocalizationJson) -> Result<Self, ServiceError> {
+    fn try_from(scan: LocalizationBody) -> Result<Self, ServiceError> {
         let gravity =
             scan.gravity.map(|Object(given)| Gravity::new(given.in_sensor, given.in_map.unwrap_or(MAP_DOWN)));
         let search_box = scan.search_box.map(|Object(given)| SearchBox::new(given.min_m, given.max_m));
@@ -119,14 +119,13 @@ impl TryFrom<LocalizationJson> for LocalizationRequest {
     }
 }
 
-impl LocalizationParameters {
+impl LocalizationParams {
     fn with(self, points: PointCloud) -> Result<LocalizationRequest, ServiceError> {
         let gravity = match (&self.gravity, &self.map_gravity) {
             (None, None) => None,
             (Some(in_sensor), in_map) => {
-                let in_map =
-                    in_map.as_ref().map(|text| parameters::numbers(text, "map_gravity")).transpose()?;
-                Some(Gravity::new(parameters::numbers(in_sensor, "gravity")?, in_map.unwrap_or(MAP_DOWN))?)
+                let in_map = in_map.as_ref().map(|text| params::numbers(text, "map_gravity")).transpose()?;
+                Some(Gravity::new(params::numbers(in_sensor, "gravity")?, in_map.unwrap_or(MAP_DOWN))?)
             }
             (None, Some(_)) => {
                 let message = "map_gravity says nothing without gravity, the direction in the sensor frame";
@@ -134,7 +133,7 @@ impl LocalizationParameters {
             }
         };
         let corners = |text: &String| -> Result<SearchBox, ServiceError> {
-            let [x0, y0, z0, x1, y1, z1] = parameters::numbers(text, "search_box")?;
+            let [x0, y0, z0, x1, y1, z1] = params::numbers(text, "search_box")?;
             Ok(SearchBox::new([x0, y0, z0], [x1, y1, z1])?)
         };
         Ok(LocalizationRequest {
@@ -150,23 +149,23 @@ impl LocalizationParameters {
     }
 }
 
-impl From<LocalizationAnswer> for LocalizationOut {
+impl From<LocalizationAnswer> for LocalizationResponse {
     fn from(answer: LocalizationAnswer) -> Self {
         Self {
             accepted: answer.accepted(),
             verdict: answer.verdict.as_str(),
             reason: answer.reason,
-            candidates: answer.candidates.iter().map(CandidateOut::from).collect(),
+            candidates: answer.candidates.iter().map(CandidateResponse::from).collect(),
             exhaustive: answer.exhaustive,
             cut_short: answer.cut_short,
             search_ms: answer.search_time.as_secs_f64() * 1e3,
             points_skipped: answer.points_skipped,
-            state: answer.state.into(),
+            version: answer.version.into(),
         }
     }
 }
 
-impl From<&CandidateAnswer> for CandidateOut {
+impl From<&CandidateAnswer> for CandidateResponse {
     fn from(candidate: &CandidateAnswer) -> Self {
         Self {
             map_from_sensor: (&candidate.map_from_sensor).into(),

@@ -9,9 +9,9 @@ use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 
 use super::error::HttpError;
-use super::maps::MapOut;
+use super::maps::MapResponse;
 use super::middleware::Service;
-use super::parameters::{Map, NoParameters, Parameters};
+use super::params::{Map, NoParams, Params};
 use super::{Adapter, body, headers};
 use crate::wire::snapshot_pieces;
 
@@ -19,10 +19,10 @@ pub(super) async fn take(
     State(adapter): State<Adapter>,
     Service(service): Service,
     Map(map): Map,
-    NoParameters: NoParameters,
+    NoParams: NoParams,
 ) -> Result<Response, HttpError> {
     let file = service.maps().snapshot_map(&map).await?;
-    let mut headers = headers::of_state(&file.state);
+    let mut headers = headers::of_version(&file.version);
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream"));
     headers.insert(header::CONTENT_LENGTH, file.bytes.len().into());
     let attachment = format!("attachment; filename=\"{map}.mrol\"");
@@ -40,7 +40,7 @@ pub(super) async fn take(
 /// The parameters of a restore.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RestoreIn {
+pub(super) struct RestoreParams {
     /// Take the place of the map of that name.
     #[serde(default)]
     replace: bool,
@@ -49,9 +49,9 @@ pub(super) struct RestoreIn {
 pub(super) async fn restore(
     Service(service): Service,
     Map(map): Map,
-    Parameters(RestoreIn { replace }): Parameters<RestoreIn>,
+    Params(RestoreParams { replace }): Params<RestoreParams>,
     request: Request,
-) -> Result<(StatusCode, Json<MapOut>), HttpError> {
+) -> Result<(StatusCode, Json<MapResponse>), HttpError> {
     let service = service.maps();
     let file = body::octets(request, service.limits().map_file_bytes_max, "map_file_bytes_max").await?;
     let info = service.restore_map(map, file, replace).await?;

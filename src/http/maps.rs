@@ -6,31 +6,31 @@ use serde::{Deserialize, Serialize};
 
 use super::body;
 use super::error::HttpError;
-use super::json::JsonState;
+use super::json::JsonVersion;
 use super::middleware::Service;
 use super::object::Object;
-use super::parameters::{Map, NoParameters};
+use super::params::{Map, NoParams};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapSettings};
 use crate::service::{MapInfo, MapStorage, UnavailableMap};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SettingsIn {
+pub(super) struct SettingsBody {
     resolution_m: f64,
     levels: Option<u32>,
     #[serde(default)]
-    filter: Object<FilterIn>,
+    filter: Object<FilterBody>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FilterIn {
+struct FilterBody {
     hashes: Option<u32>,
-    bits_per_voxel: Option<f64>,
+    bits_per_key: Option<f64>,
 }
 
-impl SettingsIn {
+impl SettingsBody {
     fn or(self, filter: FilterSettings) -> MapSettings {
         let Object(given) = self.filter;
         MapSettings {
@@ -38,29 +38,29 @@ impl SettingsIn {
             levels: self.levels.unwrap_or(LEVELS_DEFAULT),
             filter: FilterSettings {
                 hashes: given.hashes.unwrap_or(filter.hashes),
-                bits_per_key: given.bits_per_voxel.unwrap_or(filter.bits_per_key),
+                bits_per_key: given.bits_per_key.unwrap_or(filter.bits_per_key),
             },
         }
     }
 }
 
 #[derive(Serialize)]
-pub(super) struct MapOut {
+pub(super) struct MapResponse {
     map: String,
     #[serde(flatten)]
-    state: JsonState,
-    settings: SettingsOut,
-    levels: Vec<LevelOut>,
+    version: JsonVersion,
+    settings: SettingsResponse,
+    levels: Vec<LevelResponse>,
     scans: usize,
     robots: Vec<String>,
     set_bytes: usize,
     moment_bytes: usize,
     trajectory_bytes: usize,
-    storage: Option<StorageOut>,
+    storage: Option<StorageResponse>,
 }
 
 #[derive(Serialize)]
-struct StorageOut {
+struct StorageResponse {
     durable_revision: u64,
     snapshot_revision: u64,
     undo_from_revision: u64,
@@ -68,40 +68,40 @@ struct StorageOut {
 }
 
 #[derive(Serialize)]
-struct SettingsOut {
+struct SettingsResponse {
     resolution_m: f64,
     levels: u32,
-    filter: FilterOut,
+    filter: FilterResponse,
 }
 
 #[derive(Serialize)]
-struct FilterOut {
+struct FilterResponse {
     hashes: u32,
-    bits_per_voxel: f64,
+    bits_per_key: f64,
 }
 
 #[derive(Serialize)]
-struct LevelOut {
+struct LevelResponse {
     level: u32,
     resolution_m: f64,
     voxels: usize,
     plane_bytes: usize,
     counter_bytes: usize,
-    false_positives_expected: f64,
-    false_positives_equation_1: f64,
-    false_positives_measured: Option<f64>,
+    expected_false_positive_rate: f64,
+    ideal_false_positive_rate: f64,
+    measured_false_positive_rate: Option<f64>,
 }
 
 #[derive(Serialize)]
-pub(super) struct MapsOut {
-    maps: Vec<MapOut>,
+pub(super) struct MapsResponse {
+    maps: Vec<MapResponse>,
     /// Those that could not be opened.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    unavailable: Vec<UnavailableOut>,
+    unavailable: Vec<UnavailableResponse>,
 }
 
 #[derive(Serialize)]
-struct UnavailableOut {
+struct UnavailableResponse {
     map: String,
     reason: String,
 }
@@ -109,8 +109,8 @@ struct UnavailableOut {
 pub(super) async fn create(
     Service(service): Service,
     Map(name): Map,
-    body::Json(settings): body::Json<SettingsIn>,
-) -> Result<(StatusCode, Json<MapOut>), HttpError> {
+    body::Json(settings): body::Json<SettingsBody>,
+) -> Result<(StatusCode, Json<MapResponse>), HttpError> {
     let service = service.maps();
     let (info, created) = service.create_map(name, settings.or(service.default_filter())).await?;
     let status = if created { StatusCode::CREATED } else { StatusCode::OK };
@@ -120,37 +120,37 @@ pub(super) async fn create(
 pub(super) async fn describe(
     Service(service): Service,
     Map(name): Map,
-    NoParameters: NoParameters,
-) -> Result<Json<MapOut>, HttpError> {
+    NoParams: NoParams,
+) -> Result<Json<MapResponse>, HttpError> {
     let info = service.maps().map_info(&name).await?;
     Ok(Json(info.into()))
 }
 
 pub(super) async fn list(
     Service(service): Service,
-    NoParameters: NoParameters,
-) -> Result<Json<MapsOut>, HttpError> {
+    NoParams: NoParams,
+) -> Result<Json<MapsResponse>, HttpError> {
     let service = service.maps();
     let maps = service.list_maps().await?.into_iter().map(Into::into).collect();
     let unavailable = service.unavailable_maps().into_iter();
-    let out = |UnavailableMap { name, reason }| UnavailableOut { map: name.to_string(), reason };
-    Ok(Json(MapsOut { maps, unavailable: unavailable.map(out).collect() }))
+    let out = |UnavailableMap { name, reason }| UnavailableResponse { map: name.to_string(), reason };
+    Ok(Json(MapsResponse { maps, unavailable: unavailable.map(out).collect() }))
 }
 
 pub(super) async fn delete(
     Service(service): Service,
     Map(name): Map,
-    NoParameters: NoParameters,
+    NoParams: NoParams,
 ) -> Result<StatusCode, HttpError> {
     service.maps().delete_map(&name).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-impl From<MapInfo> for MapOut {
+impl From<MapInfo> for MapResponse {
     fn from(info: MapInfo) -> Self {
         Self {
             map: info.name.to_string(),
-            state: info.state.into(),
+            version: info.version.into(),
             settings: info.settings.into(),
             levels: info.levels.iter().map(Into::into).collect(),
             scans: info.scans,
@@ -163,7 +163,7 @@ impl From<MapInfo> for MapOut {
     }
 }
 
-impl From<MapStorage> for StorageOut {
+impl From<MapStorage> for StorageResponse {
     fn from(storage: MapStorage) -> Self {
         Self {
             durable_revision: storage.durable_revision,
@@ -174,14 +174,14 @@ impl From<MapStorage> for StorageOut {
     }
 }
 
-impl From<MapSettings> for SettingsOut {
+impl From<MapSettings> for SettingsResponse {
     fn from(MapSettings { resolution_m, levels, filter }: MapSettings) -> Self {
-        let filter = FilterOut { hashes: filter.hashes, bits_per_voxel: filter.bits_per_key };
+        let filter = FilterResponse { hashes: filter.hashes, bits_per_key: filter.bits_per_key };
         Self { resolution_m, levels, filter }
     }
 }
 
-impl From<&LevelInfo> for LevelOut {
+impl From<&LevelInfo> for LevelResponse {
     fn from(info: &LevelInfo) -> Self {
         Self {
             level: info.level,
@@ -189,9 +189,9 @@ impl From<&LevelInfo> for LevelOut {
             voxels: info.voxels,
             plane_bytes: info.plane_bytes,
             counter_bytes: info.counter_bytes,
-            false_positives_expected: info.expected_rate,
-            false_positives_equation_1: info.ideal_false_positive_rate,
-            false_positives_measured: info.measured_rate,
+            expected_false_positive_rate: info.expected_rate,
+            ideal_false_positive_rate: info.ideal_false_positive_rate,
+            measured_false_positive_rate: info.measured_rate,
         }
     }
 }

@@ -11,7 +11,7 @@ mod maps;
 mod middleware;
 mod object;
 mod occupancy;
-mod parameters;
+mod params;
 mod probes;
 mod routes;
 mod scans;

@@ -7,52 +7,53 @@ use serde::{Deserialize, Serialize};
 use super::body::Points;
 use super::error::HttpError;
 use super::headers;
-use super::json::{JsonLookup, JsonPoints, JsonPose, JsonState};
+use super::json::{JsonPoints, JsonPose, JsonVersion};
 use super::middleware::Service;
 use super::object::Object;
-use super::parameters::{self, Map};
+use super::params::{self, Map};
 use crate::geometry::Pose;
+use crate::map::Lookup;
 use crate::service::{PointAnswer, PointCloud, PointQuery, ServiceError};
-use crate::wire::{InField, uuid_from};
+use crate::wire::{ByKeyword, InField, uuid_from};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct QueryJson {
+pub(super) struct QueryBody {
     points: JsonPoints,
     map_from_points: Option<Object<JsonPose>>,
     #[serde(default)]
     level: u32,
     #[serde(default)]
-    lookup: JsonLookup,
+    lookup: ByKeyword<Lookup>,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct QueryParameters {
+pub(super) struct QueryParams {
     pose: Option<String>,
     #[serde(default)]
     level: u32,
     #[serde(default)]
-    lookup: JsonLookup,
+    lookup: ByKeyword<Lookup>,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
 }
 
 #[derive(Serialize)]
-struct AnswerJson {
+struct QueryResponse {
     occupied: Vec<bool>,
     points_occupied: usize,
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
 }
 
 /// Answers in the form of the question: JSON, or a bitmap.
 pub(super) async fn query(
     Service(service): Service,
     Map(map): Map,
-    body: Points<QueryJson, QueryParameters>,
+    body: Points<QueryBody, QueryParams>,
 ) -> Result<Response, HttpError> {
     let (query, answer_with): (_, fn(PointAnswer) -> Response) = match body {
         Points::Json(query) => (query.try_into()?, as_json),
@@ -62,29 +63,29 @@ pub(super) async fn query(
     Ok(answer_with(answer))
 }
 
-impl TryFrom<QueryJson> for PointQuery {
+impl TryFrom<QueryBody> for PointQuery {
     type Error = ServiceError;
 
-    fn try_from(query: QueryJson) -> Result<Self, ServiceError> {
+    fn try_from(query: QueryBody) -> Result<Self, ServiceError> {
         let pose = query.map_from_points.map(|Object(pose)| Pose::try_from(pose).in_field("map_from_points"));
         Ok(Self {
             points: query.points.into(),
             map_from_points: pose.transpose()?,
             level: query.level,
-            lookup: query.lookup.into(),
+            lookup: query.lookup.0,
             min_revision: query.min_revision,
             map_uuid: query.map_uuid.map(|uuid| uuid_from(&uuid)).transpose()?,
         })
     }
 }
 
-impl QueryParameters {
+impl QueryParams {
     fn with(self, points: PointCloud) -> Result<PointQuery, ServiceError> {
         Ok(PointQuery {
             points,
-            map_from_points: self.pose.map(|text| parameters::pose(&text, "pose")).transpose()?,
+            map_from_points: self.pose.map(|text| params::pose(&text, "pose")).transpose()?,
             level: self.level,
-            lookup: self.lookup.into(),
+            lookup: self.lookup.0,
             min_revision: self.min_revision,
             map_uuid: self.map_uuid.map(|uuid| uuid_from(&uuid)).transpose()?,
         })
@@ -93,10 +94,10 @@ impl QueryParameters {
 
 fn as_json(answer: PointAnswer) -> Response {
     let bit = |i: usize| answer.occupied[i / 8] >> (i % 8) & 1 == 1;
-    Json(AnswerJson {
+    Json(QueryResponse {
         occupied: (0..answer.points).map(bit).collect(),
         points_occupied: answer.points_occupied,
-        state: answer.state.into(),
+        version: answer.version.into(),
     })
     .into_response()
 }
@@ -108,6 +109,6 @@ fn as_bitmap(answer: PointAnswer) -> Response {
     let mut number = |name, value: usize| all.insert(HeaderName::from_static(name), value.into());
     number("mrol-points", answer.points);
     number("mrol-points-occupied", answer.points_occupied);
-    all.extend(headers::of_state(&answer.state));
+    all.extend(headers::of_version(&answer.version));
     response
 }

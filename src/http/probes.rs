@@ -9,14 +9,14 @@ use serde_json::{Value, json};
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::parameters::NoParameters;
+use super::params::NoParams;
 use crate::access::Authorized;
 use crate::map::MapName;
 use crate::service::{Shortage, UnavailableMap};
 use crate::telemetry::MeteredService;
 
 /// `GET /livez`: 200 while the process lives.
-pub(super) async fn live(NoParameters: NoParameters) -> &'static str {
+pub(super) async fn live(NoParams: NoParams) -> &'static str {
     "ok"
 }
 
@@ -27,7 +27,7 @@ pub(super) async fn live(NoParameters: NoParameters) -> &'static str {
 pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
-    NoParameters: NoParameters,
+    NoParams: NoParams,
 ) -> (StatusCode, Json<Value>) {
     if adapter.admission.lifecycle().is_leaving() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
@@ -55,11 +55,11 @@ pub(super) async fn ready(
 /// `GET /metrics`: Prometheus' text form. One text answers all scrapes of a second.
 pub(super) async fn metrics(
     State(adapter): State<Adapter>,
-    NoParameters: NoParameters,
+    NoParams: NoParams,
     request: Request,
 ) -> Result<impl IntoResponse, HttpError> {
     let Authorized { caller, service } = Authorized::of(request.extensions())?;
-    let text = adapter.scrapes.text(caller.reach(), async || scrape(service).await).await?;
+    let text = adapter.scrapes.text(caller.allowed_maps(), async || scrape(service).await).await?;
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text))
 }
 

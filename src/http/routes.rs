@@ -35,7 +35,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::Localize => on(method, localization::localize),
         Operation::QueryPoints => on(method, occupancy::query),
         Operation::DeleteVoxels => on(method, deletions::delete),
-        Operation::UndoScans => on(method, undo::undo),
+        Operation::Undo => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),
         Operation::ListVoxels => on(method, voxels::list),
         Operation::SnapshotMap => on(method, map_file::take),

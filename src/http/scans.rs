@@ -1,25 +1,26 @@
 //! `POST /v1/maps/{map}/scans` and `/alignment`: insert a scan, or only align it.
 
 use axum::response::Json;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonPose, JsonState, word_of};
+use super::json::{JsonPoints, JsonPose, JsonVersion};
 use super::middleware::Service;
 use super::object::Object;
-use super::parameters::{self, Map};
+use super::params::{self, Map};
 use crate::align::{Direction, Method};
 use crate::geometry::Pose;
 use crate::map::RobotName;
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{PointCloud, ScanAnswer, ScanRequest, ServiceError};
+use crate::wire::ByKeyword;
 use crate::wire::InField;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ScanJson {
+pub(super) struct ScanBody {
     robot: String,
     scan_id: Option<u64>,
     points: JsonPoints,
@@ -32,7 +33,7 @@ pub(super) struct ScanJson {
     align: bool,
     #[serde(default)]
     force: bool,
-    method: Option<JsonMethod>,
+    method: Option<ByKeyword<Method>>,
     foreground_level: Option<u32>,
     range_min_m: Option<f64>,
     range_max_m: Option<f64>,
@@ -41,35 +42,9 @@ pub(super) struct ScanJson {
     strict: bool,
 }
 
-/// `"refined"`, `"overlap"` or `"weighted_sum"`.
-#[derive(Clone, Copy)]
-enum JsonMethod {
-    Refined,
-    Overlap,
-    WeightedSum,
-}
-
-impl<'de> Deserialize<'de> for JsonMethod {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let words =
-            [("refined", Self::Refined), ("overlap", Self::Overlap), ("weighted_sum", Self::WeightedSum)];
-        word_of(deserializer, &words)
-    }
-}
-
-impl From<JsonMethod> for Method {
-    fn from(method: JsonMethod) -> Self {
-        match method {
-            JsonMethod::Refined => Self::Refined,
-            JsonMethod::Overlap => Self::Overlap,
-            JsonMethod::WeightedSum => Self::WeightedSum,
-        }
-    }
-}
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ScanQuery {
+pub(super) struct ScanParams {
     robot: String,
     scan_id: Option<u64>,
     timestamp_ns: Option<i64>,
@@ -81,7 +56,7 @@ pub(super) struct ScanQuery {
     align: bool,
     #[serde(default)]
     force: bool,
-    method: Option<JsonMethod>,
+    method: Option<ByKeyword<Method>>,
     foreground_level: Option<u32>,
     range_min_m: Option<f64>,
     range_max_m: Option<f64>,
@@ -90,10 +65,10 @@ pub(super) struct ScanQuery {
     strict: bool,
 }
 
-type ScanBody = Points<ScanJson, ScanQuery>;
+type ScanPoints = Points<ScanBody, ScanParams>;
 
 #[derive(Serialize)]
-pub(super) struct ScanOut {
+pub(super) struct ScanResponse {
     accepted: bool,
     verdict: &'static str,
     reason: String,
@@ -103,18 +78,18 @@ pub(super) struct ScanOut {
     inliers: f64,
     fitness: f64,
     information: Option<[[f64; 6]; 6]>,
-    undetermined: Vec<DirectionOut>,
+    undetermined: Vec<DirectionResponse>,
     iterations: u32,
     align_ms: f64,
     new_voxels: usize,
     points_skipped: usize,
     replayed: bool,
-    standing: bool,
+    stationary: bool,
     /// Places in the scan of the points that the map does not show.
     #[serde(skip_serializing_if = "Option::is_none")]
     foreground: Option<Vec<usize>>,
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
 }
 
 /// The places of the bits that are set, the lowest of each byte first.
@@ -124,12 +99,12 @@ fn places(bitmap: &[u8]) -> Vec<usize> {
 
 /// See [`Direction`]; `std_m` is null where nothing holds the pose.
 #[derive(Serialize)]
-struct DirectionOut {
+struct DirectionResponse {
     direction: [f64; 6],
     std_m: Option<f64>,
 }
 
-impl From<Direction> for DirectionOut {
+impl From<Direction> for DirectionResponse {
     fn from(open: Direction) -> Self {
         Self { direction: open.direction, std_m: Some(open.std_m).filter(|std_m| std_m.is_finite()) }
     }
@@ -138,8 +113,8 @@ impl From<Direction> for DirectionOut {
 pub(super) async fn insert(
     Service(service): Service,
     Map(map): Map,
-    scan: ScanBody,
-) -> Result<Json<ScanOut>, HttpError> {
+    scan: ScanPoints,
+) -> Result<Json<ScanResponse>, HttpError> {
     let answer = service.insert_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
@@ -147,16 +122,16 @@ pub(super) async fn insert(
 pub(super) async fn align(
     Service(service): Service,
     Map(map): Map,
-    scan: ScanBody,
-) -> Result<Json<ScanOut>, HttpError> {
+    scan: ScanPoints,
+) -> Result<Json<ScanResponse>, HttpError> {
     let answer = service.maps().align_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 
-impl TryFrom<ScanBody> for ScanRequest {
+impl TryFrom<ScanPoints> for ScanRequest {
     type Error = ServiceError;
 
-    fn try_from(body: ScanBody) -> Result<Self, ServiceError> {
+    fn try_from(body: ScanPoints) -> Result<Self, ServiceError> {
         match body {
             Points::Json(scan) => scan.try_into(),
             Points::Bytes(points, rest) => rest.with(points),
@@ -164,10 +139,10 @@ impl TryFrom<ScanBody> for ScanRequest {
     }
 }
 
-impl TryFrom<ScanJson> for ScanRequest {
+impl TryFrom<ScanBody> for ScanRequest {
     type Error = ServiceError;
 
-    fn try_from(scan: ScanJson) -> Result<Self, ServiceError> {
+    fn try_from(scan: ScanBody) -> Result<Self, ServiceError> {
         let guess = scan.guess.map(|Object(pose)| Pose::try_from(pose).in_field("guess")).transpose()?;
         let motion = scan.motion.map(|Object(pose)| Pose::try_from(pose).in_field("motion")).transpose()?;
         Ok(Self {
@@ -176,7 +151,7 @@ impl TryFrom<ScanJson> for ScanRequest {
             guess: guess_of(guess, motion, scan.constant_velocity)?,
             at_guess: !scan.align,
             force: scan.force,
-            method: scan.method.map(Method::from),
+            method: scan.method.map(|method| method.0),
             foreground_level: scan.foreground_level,
             filter: PointFilter {
                 range_min_m: scan.range_min_m,
@@ -189,9 +164,9 @@ impl TryFrom<ScanJson> for ScanRequest {
     }
 }
 
-impl ScanQuery {
+impl ScanParams {
     fn with(self, points: PointCloud) -> Result<ScanRequest, ServiceError> {
-        let pose = |text: Option<String>, field| text.map(|text| parameters::pose(&text, field)).transpose();
+        let pose = |text: Option<String>, field| text.map(|text| params::pose(&text, field)).transpose();
         Ok(ScanRequest {
             scan_id: self.scan_id,
             timestamp_ns: self.timestamp_ns,
@@ -202,7 +177,7 @@ impl ScanQuery {
             )?,
             at_guess: !self.align,
             force: self.force,
-            method: self.method.map(Method::from),
+            method: self.method.map(|method| method.0),
             foreground_level: self.foreground_level,
             filter: PointFilter {
                 range_min_m: self.range_min_m,
@@ -217,7 +192,7 @@ impl ScanQuery {
 
 /// A box as `x,y,z,x,y,z`.
 fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), ServiceError> {
-    let [x0, y0, z0, x1, y1, z1] = parameters::numbers(text, "body_m")?;
+    let [x0, y0, z0, x1, y1, z1] = params::numbers(text, "body_m")?;
     Ok(([x0, y0, z0], [x1, y1, z1]))
 }
 
@@ -238,7 +213,7 @@ fn guess_of(
     }
 }
 
-impl From<ScanAnswer> for ScanOut {
+impl From<ScanAnswer> for ScanResponse {
     fn from(answer: ScanAnswer) -> Self {
         Self {
             accepted: answer.accepted,
@@ -249,9 +224,9 @@ impl From<ScanAnswer> for ScanOut {
             new_voxels: answer.new_voxels,
             points_skipped: answer.points_skipped,
             replayed: answer.replayed,
-            standing: answer.standing,
+            stationary: answer.stationary,
             foreground: answer.foreground.map(|foreground| places(&foreground.bitmap)),
-            state: answer.state.into(),
+            version: answer.version.into(),
             align_ms: answer.align_time.as_secs_f64() * 1e3,
             inliers: answer.inliers,
             fitness: answer.fitness,

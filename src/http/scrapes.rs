@@ -29,7 +29,7 @@ struct Texts {
 
 #[derive(Debug)]
 struct Newest {
-    reach: AllowedMaps,
+    allowed_maps: AllowedMaps,
     made: Instant,
     text: Arc<String>,
 }
@@ -39,23 +39,23 @@ impl Scrapes {
         Self { kept_for, texts: Arc::default() }
     }
 
-    /// The text for a caller who may name the maps of `reach`, made by `make` where the last one is too old.
+    /// The text for a caller who may name the allowed maps, made by `make` where the last one is too old.
     ///
     /// # Errors
     /// `ResourceExhausted` where as many texts are being read as may be, and none of them is for the caller.
     pub(super) async fn text(
         &self,
-        reach: &AllowedMaps,
+        allowed_maps: &AllowedMaps,
         make: impl AsyncFnOnce() -> String,
     ) -> Result<Bytes, ServiceError> {
         // Whoever comes meanwhile waits for the same text.
         let mut texts = self.texts.lock().await;
-        if let Some(newest) = texts.newest.iter().find(|newest| newest.reach == *reach)
+        if let Some(newest) = texts.newest.iter().find(|newest| newest.allowed_maps == *allowed_maps)
             && (newest.made.elapsed() < self.kept_for || texts.is_full())
         {
             return Ok(shared(&newest.text));
         }
-        texts.forget(reach, self.kept_for);
+        texts.forget(allowed_maps, self.kept_for);
         if texts.is_full() {
             return Err(ServiceError::overloaded(format!(
                 "{TEXTS_MAX} scrapes are still being read: try again"
@@ -64,7 +64,7 @@ impl Scrapes {
         let (text, made) = (Arc::new(make().await), Instant::now());
         texts.alive.push(Arc::downgrade(&text));
         let answer = shared(&text);
-        texts.newest.push(Newest { reach: reach.clone(), made, text });
+        texts.newest.push(Newest { allowed_maps: allowed_maps.clone(), made, text });
         Ok(answer)
     }
 }
@@ -78,8 +78,8 @@ impl Texts {
     }
 
     /// Drops the caller's last text, and those that are too old for others.
-    fn forget(&mut self, reach: &AllowedMaps, kept_for: Duration) {
-        self.newest.retain(|newest| newest.reach != *reach && newest.made.elapsed() < kept_for);
+    fn forget(&mut self, allowed_maps: &AllowedMaps, kept_for: Duration) {
+        self.newest.retain(|newest| newest.allowed_maps != *allowed_maps && newest.made.elapsed() < kept_for);
         // As many as there may be of callers who ask at once.
         let many = self.newest.len().saturating_sub(TEXTS_MAX - 1);
         self.newest.drain(..many);

@@ -11,7 +11,7 @@ use axum::{Json, Router};
 use serde_json::json;
 
 use super::error::HttpError;
-use super::parameters::NoParameters;
+use super::params::NoParams;
 use super::probes;
 use crate::access::Access;
 use crate::service::{ErrorCode, ServiceError};
@@ -36,7 +36,7 @@ async fn named(State(access): State<Access>, request: Request, next: Next) -> Re
 }
 
 /// `GET /readyz`: 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.
-async fn ready(State(progress): State<Arc<OpeningProgress>>, NoParameters: NoParameters) -> Response {
+async fn ready(State(progress): State<Arc<OpeningProgress>>, NoParams: NoParams) -> Response {
     let Opened { bytes, bytes_read, maps, maps_open } = progress.opened();
     let body = json!({
         "ready": false, "reason": "starting",

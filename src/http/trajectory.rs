@@ -13,15 +13,15 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::Adapter;
 use super::error::HttpError;
-use super::json::{JsonPose, JsonState};
+use super::json::{JsonPose, JsonVersion};
 use super::middleware::Service;
-use super::parameters::{Map, Parameters};
+use super::params::{Map, Params};
 use crate::map::{MappedScan, RobotName};
 use crate::service::{ErrorCode, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct TrajectoryParameters {
+pub(super) struct TrajectoryParams {
     robot: Option<String>,
     #[serde(default)]
     since_revision: u64,
@@ -32,7 +32,7 @@ pub(super) struct TrajectoryParameters {
 #[derive(Serialize)]
 struct End {
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
     #[serde(skip_serializing_if = "Option::is_none")]
     next_since_revision: Option<u64>,
 }
@@ -40,13 +40,13 @@ struct End {
 /// A page, which is there as a whole.
 #[derive(Serialize)]
 struct Page {
-    poses: Vec<PoseOut>,
+    poses: Vec<PoseResponse>,
     #[serde(flatten)]
     end: End,
 }
 
 #[derive(Serialize)]
-struct PoseOut {
+struct PoseResponse {
     robot: String,
     scan_id: Option<u64>,
     timestamp_ns: Option<i64>,
@@ -60,16 +60,16 @@ pub(super) async fn get(
     State(adapter): State<Adapter>,
     Service(service): Service,
     Map(map): Map,
-    Parameters(query): Parameters<TrajectoryParameters>,
+    Params(query): Params<TrajectoryParams>,
 ) -> Result<Response, HttpError> {
-    let TrajectoryParameters { robot, since_revision, limit } = query;
+    let TrajectoryParams { robot, since_revision, limit } = query;
     let robot = robot.map(|name| RobotName::new(&name)).transpose().map_err(ServiceError::from)?;
     let query = TrajectoryQuery { robot, since_revision, limit };
     if query.limit.is_some() {
-        let TrajectoryAnswer { poses, next_since_revision, state } =
+        let TrajectoryAnswer { poses, next_since_revision, version } =
             service.maps().trajectory(&map, query).await?;
-        let end = End { state: state.into(), next_since_revision };
-        let poses = poses.iter().map(PoseOut::from).collect();
+        let end = End { version: version.into(), next_since_revision };
+        let poses = poses.iter().map(PoseResponse::from).collect();
         return Ok(Json(Page { poses, end }).into_response());
     }
     let mut pieces = service.maps().trajectory_pieces(&map, query).await?;
@@ -99,7 +99,7 @@ async fn write(
             next_since_revision = found.next_since_revision;
             for pose in &found.poses {
                 text.push_str(std::mem::replace(&mut comma, ","));
-                text.push_str(&json(&PoseOut::from(pose))?);
+                text.push_str(&json(&PoseResponse::from(pose))?);
             }
             Ok(std::mem::take(&mut text))
         });
@@ -109,7 +109,7 @@ async fn write(
         }
         piece = pieces.next().await;
     }
-    let end = json(&End { state: pieces.state().into(), next_since_revision });
+    let end = json(&End { version: pieces.version().into(), next_since_revision });
     let end = end.map(|end| format!("],{}", end.trim_start_matches('{')));
     drop(outbox.send(end).await);
 }
@@ -120,7 +120,7 @@ fn json(value: &impl Serialize) -> Result<String, ServiceError> {
     serde_json::to_string(value).map_err(not_written)
 }
 
-impl From<&MappedScan> for PoseOut {
+impl From<&MappedScan> for PoseResponse {
     fn from(pose: &MappedScan) -> Self {
         Self {
             robot: pose.robot.to_string(),

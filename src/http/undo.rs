@@ -5,16 +5,16 @@ use serde::{Deserialize, Serialize};
 
 use super::body;
 use super::error::HttpError;
-use super::json::JsonState;
+use super::json::JsonVersion;
 use super::middleware::Service;
-use super::parameters::{Map, request_id_of};
+use super::params::{Map, request_id_of};
 use crate::map::RobotName;
 use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};
 
 /// `{"robot", "scan_id"}`, `{"robot", "since_revision"}` or `{"revision"}`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct UndoIn {
+pub(super) struct UndoBody {
     robot: Option<String>,
     scan_id: Option<u64>,
     since_revision: Option<u64>,
@@ -23,27 +23,27 @@ pub(super) struct UndoIn {
 }
 
 #[derive(Serialize)]
-pub(super) struct UndoOut {
+pub(super) struct UndoResponse {
     scans: usize,
     removed: usize,
     replayed: bool,
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
 }
 
 pub(super) async fn undo(
     Service(service): Service,
     Map(map): Map,
-    body::Json(undo): body::Json<UndoIn>,
-) -> Result<Json<UndoOut>, HttpError> {
-    let answer = service.undo_scans(&map, undo.try_into()?).await?;
+    body::Json(undo): body::Json<UndoBody>,
+) -> Result<Json<UndoResponse>, HttpError> {
+    let answer = service.undo(&map, undo.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 
-impl TryFrom<UndoIn> for Undo {
+impl TryFrom<UndoBody> for Undo {
     type Error = ServiceError;
 
-    fn try_from(undo: UndoIn) -> Result<Self, ServiceError> {
+    fn try_from(undo: UndoBody) -> Result<Self, ServiceError> {
         let robot = undo.robot.map(|robot| RobotName::new(&robot)).transpose()?;
         let target = match (robot, undo.scan_id, undo.since_revision, undo.revision) {
             (Some(robot), Some(scan_id), None, None) => UndoTarget::Scan { robot, scan_id },
@@ -58,8 +58,8 @@ impl TryFrom<UndoIn> for Undo {
     }
 }
 
-impl From<UndoAnswer> for UndoOut {
-    fn from(UndoAnswer { scans, removed, state, replayed }: UndoAnswer) -> Self {
-        Self { scans, removed, replayed, state: state.into() }
+impl From<UndoAnswer> for UndoResponse {
+    fn from(UndoAnswer { scans, removed, version, replayed }: UndoAnswer) -> Self {
+        Self { scans, removed, replayed, version: version.into() }
     }
 }

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Adapter;
 use super::error::HttpError;
-use super::json::JsonState;
+use super::json::JsonVersion;
 use super::middleware::Service;
-use super::parameters::{Map, Parameters, numbers};
+use super::params::{Map, Params, numbers};
 use crate::map::Region;
 use crate::service::ServiceError;
 use crate::voxel::VoxelKey;
@@ -23,7 +23,7 @@ const VOXELS_PER_CHUNK: usize = 32_768;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct VoxelsQuery {
+pub(super) struct VoxelsParams {
     #[serde(default)]
     level: u32,
     min: Option<String>,
@@ -45,18 +45,18 @@ struct Head {
     level: u32,
     resolution_m: f64,
     #[serde(flatten)]
-    state: JsonState,
+    version: JsonVersion,
 }
 
 pub(super) async fn list(
     State(adapter): State<Adapter>,
     Service(service): Service,
     Map(map): Map,
-    Parameters(query): Parameters<VoxelsQuery>,
+    Params(query): Params<VoxelsParams>,
 ) -> Result<Response, HttpError> {
     let (level, region) = (query.level, query.region()?);
     let listing = service.maps().list_voxels(&map, level, region).await?;
-    let head = Head { level, resolution_m: listing.resolution_m, state: listing.state.into() };
+    let head = Head { level, resolution_m: listing.resolution_m, version: listing.version.into() };
     let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;
     let chunks = chunks(head, listing.keys)?.map(move |chunk| {
         let _until_sent = &kept;
@@ -66,7 +66,7 @@ pub(super) async fn list(
     Ok(([(header::CONTENT_TYPE, "application/json")], body).into_response())
 }
 
-impl VoxelsQuery {
+impl VoxelsParams {
     fn region(&self) -> Result<Option<Region>, ServiceError> {
         match (&self.min, &self.max) {
             (None, None) => Ok(None),
@@ -104,14 +104,14 @@ fn piece(keys: &[VoxelKey], first: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::MapState;
+    use crate::service::MapVersion;
 
     #[test]
     fn the_pieces_are_one_json_object() {
-        let state = MapState { revision: 3, map_uuid: uuid::Uuid::nil() };
+        let version = MapVersion { revision: 3, map_uuid: uuid::Uuid::nil() };
         for count in [0, 1, VOXELS_PER_CHUNK, VOXELS_PER_CHUNK + 2] {
             let keys: Vec<_> = (0..count as i32).map(|i| VoxelKey::new([i, -1, 2]).unwrap()).collect();
-            let head = Head { level: 1, resolution_m: 0.1, state: state.into() };
+            let head = Head { level: 1, resolution_m: 0.1, version: version.into() };
             let text: String = chunks(head, keys).unwrap().collect();
             let json: serde_json::Value = serde_json::from_str(&text).unwrap();
             let voxels = json["voxels"].as_array().unwrap();

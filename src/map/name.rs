@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::util::excerpt;
+
 /// Characters a name may have, at most.
 pub const NAME_LENGTH_MAX: usize = 64;
 
@@ -126,15 +128,6 @@ impl std::fmt::Display for RequestId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0)
     }
-}
-
-/// A hostile name need not be repeated in full.
-fn excerpt(text: &str) -> String {
-    let mut start: String = text.chars().take(NAME_LENGTH_MAX + 1).collect();
-    if start.len() < text.len() {
-        start.push('…');
-    }
-    start
 }
 
 #[cfg(test)]

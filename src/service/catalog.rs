@@ -11,10 +11,10 @@ use std::time::Duration;
 
 use uuid::Uuid;
 
+use super::allowed_maps::Reachable;
 use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
-use super::reach::Reachable;
 use super::{AllowedMaps, ErrorCode, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
@@ -79,14 +79,14 @@ impl Catalog {
     }
 
     /// The maps that a caller may name.
-    pub(super) fn within(&self, reach: &AllowedMaps) -> Vec<Arc<HostedMap>> {
-        self.maps.read().open.values().filter(|map| reach.covers(&map.name)).cloned().collect()
+    pub(super) fn within(&self, allowed_maps: &AllowedMaps) -> Vec<Arc<HostedMap>> {
+        self.maps.read().open.values().filter(|map| allowed_maps.covers(&map.name)).cloned().collect()
     }
 
     /// Those that could not be opened.
-    pub(super) fn unavailable_within(&self, reach: &AllowedMaps) -> Vec<UnavailableMap> {
+    pub(super) fn unavailable_within(&self, allowed_maps: &AllowedMaps) -> Vec<UnavailableMap> {
         let maps = self.maps.read();
-        let reachable = maps.unavailable.iter().filter(|(name, _)| reach.covers(name));
+        let reachable = maps.unavailable.iter().filter(|(name, _)| allowed_maps.covers(name));
         reachable
             .map(|(name, reason)| UnavailableMap { name: name.clone(), reason: reason.clone() })
             .collect()
@@ -341,7 +341,7 @@ fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<Hoste
     let describe = |s: &MapSettings| {
         let FilterSettings { hashes, bits_per_key } = s.filter;
         format!(
-            "resolution_m {}, levels {}, filter_hashes {hashes}, filter_bits_per_voxel {bits_per_key}",
+            "resolution_m {}, levels {}, filter_hashes {hashes}, filter_bits_per_key {bits_per_key}",
             s.resolution_m, s.levels
         )
     };

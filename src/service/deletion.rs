@@ -31,8 +31,8 @@ impl HostedMap {
         });
         let former = former_digest(deletion);
         if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref(), former)? {
-            let state = self.state(answered.revision);
-            return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, state, replayed: true }));
+            let version = self.version(answered.revision);
+            return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, version, replayed: true }));
         }
         room.check_to_shrink()?;
         let (map, deletion, room) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(room));
@@ -53,7 +53,7 @@ impl HostedMap {
         let map = Arc::clone(self);
         let answer = move |Committed { revision, voxels: removed }| DeletionAnswer {
             removed,
-            state: map.state(revision),
+            version: map.version(revision),
             replayed: false,
         };
         Ok(Step::Proposed(outcome, Box::new(answer)))

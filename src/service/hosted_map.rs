@@ -14,7 +14,7 @@ use super::map_file::snapshot_bytes;
 use super::resource_budget::ResourceBudget;
 use super::trajectory::thin;
 use super::{
-    ErrorCode, MapInfo, MapState, MapStorage, PointAnswer, PointQuery, ServiceError, VoxelListing,
+    ErrorCode, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, ServiceError, VoxelListing,
     check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
@@ -165,8 +165,8 @@ impl HostedMap {
         self.committing.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
     }
 
-    pub(super) fn state(&self, revision: u64) -> MapState {
-        MapState { revision, map_uuid: self.uuid }
+    pub(super) fn version(&self, revision: u64) -> MapVersion {
+        MapVersion { revision, map_uuid: self.uuid }
     }
 
     /// Waits until the robot's earlier scans are done.
@@ -262,7 +262,7 @@ impl HostedMap {
             check_not_stopped(stop)?;
             all_have_a_voxel &= view.query(points, &quantize, query.level, query.lookup, words);
         }
-        let state = self.state(view.revision());
+        let version = self.version(view.revision());
         drop(view);
         if !all_have_a_voxel {
             return Err(self.point_without_voxel(points, &quantize));
@@ -271,7 +271,7 @@ impl HostedMap {
             points: points.len(),
             points_occupied: occupied.iter().map(|word| word.count_ones() as usize).sum(),
             occupied: bitmap(occupied, points.len()),
-            state,
+            version,
         })
     }
 
@@ -311,7 +311,7 @@ impl HostedMap {
         copy.for_some(stop, |some| keys.extend_from_slice(some));
         check_not_stopped(stop)?;
         let resolution_m = self.map.lattice().resolution_m(level);
-        Ok(VoxelListing { resolution_m, keys, state: self.state(revision) })
+        Ok(VoxelListing { resolution_m, keys, version: self.version(revision) })
     }
 
     pub(super) fn describe(
@@ -325,7 +325,7 @@ impl HostedMap {
         let (storage, trajectory) = (self.storage(), self.map.trajectory());
         Ok(MapInfo {
             name: self.name.clone(),
-            state: self.state(described.revision),
+            version: self.version(described.revision),
             settings: *self.map.settings(),
             levels: described.levels,
             scans: trajectory.len(),

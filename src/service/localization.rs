@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
-use super::{ErrorCode, Limits, MapState, PointCloud, ServiceError, ServiceSettings, check_not_stopped};
+use super::{ErrorCode, Limits, MapVersion, PointCloud, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::Verdict;
 use crate::align::localize::{
     Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
@@ -49,7 +49,7 @@ pub struct LocalizationAnswer {
     /// Points that were not finite.
     pub points_skipped: usize,
     /// That was searched.
-    pub state: MapState,
+    pub version: MapVersion,
 }
 
 /// A place that a scan fits.
@@ -71,7 +71,12 @@ pub struct CandidateAnswer {
 
 impl LocalizationAnswer {
     /// The answer to a request of which `points_skipped` points were not finite.
-    pub fn of(found: Localization, points_skipped: usize, search_time: Duration, state: MapState) -> Self {
+    pub fn of(
+        found: Localization,
+        points_skipped: usize,
+        search_time: Duration,
+        version: MapVersion,
+    ) -> Self {
         Self {
             verdict: found.verdict,
             reason: found.reason,
@@ -80,7 +85,7 @@ impl LocalizationAnswer {
             cut_short: found.cut_short,
             search_time,
             points_skipped,
-            state,
+            version,
         }
     }
 
@@ -180,8 +185,8 @@ impl HostedMap {
         if stop.is_cancelled() {
             check_not_stopped(stop)?;
         }
-        let state = self.state(found.revision);
-        Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
+        let version = self.version(found.revision);
+        Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), version))
     }
 }
 
@@ -208,7 +213,7 @@ impl From<LocalizationError> for ServiceError {
     fn from(error: LocalizationError) -> Self {
         let (code, reason) = match error {
             LocalizationError::EmptyMap => (ErrorCode::FailedPrecondition, "map_empty"),
-            LocalizationError::NothingInReach { .. } => (ErrorCode::InvalidArgument, "scan_out_of_range"),
+            LocalizationError::NothingInRange { .. } => (ErrorCode::InvalidArgument, "scan_out_of_range"),
             LocalizationError::NothingThere { .. } => (ErrorCode::InvalidArgument, "nothing_there"),
             LocalizationError::NoMemory { .. } => (ErrorCode::ResourceExhausted, "memory_full"),
             LocalizationError::TooLarge { .. } => (ErrorCode::ResourceExhausted, "search_too_large"),

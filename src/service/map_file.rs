@@ -38,7 +38,7 @@ impl HostedMap {
             );
             return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_file_too_large", message));
         }
-        Ok(MapFile { bytes: bytes.into(), state: self.state(snapshot.contents.revision) })
+        Ok(MapFile { bytes: bytes.into(), version: self.version(snapshot.contents.revision) })
     }
 }
 

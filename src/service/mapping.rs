@@ -45,7 +45,7 @@ impl HostedMap {
         let scan_record = mapper.record(&scan.to_map(), &located.alignment)?;
         check_not_stopped(stop)?;
         if mapper.is_stationary(&scan.to_map(), &scan_record) {
-            return Ok(Step::Answered(ScanAnswer { accepted: true, standing: true, ..answer }));
+            return Ok(Step::Answered(ScanAnswer { accepted: true, stationary: true, ..answer }));
         }
         let ScanRecord { voxels, moments, .. } = &scan_record;
         let moments = moments.as_slice().len();
@@ -63,7 +63,7 @@ impl HostedMap {
     /// What to say of a scan that was committed.
     fn committed(&self, answer: ScanAnswer, committed: Committed) -> ScanAnswer {
         let Committed { revision, voxels: new_voxels } = committed;
-        ScanAnswer { accepted: true, new_voxels, state: self.state(revision), ..answer }
+        ScanAnswer { accepted: true, new_voxels, version: self.version(revision), ..answer }
     }
 
     /// Says what [`HostedMap::propose_scan`] would; changes nothing.
@@ -187,9 +187,9 @@ impl HostedMap {
             points_skipped: pose.points_skipped,
             new_voxels: pose.new_voxels,
             foreground: None,
-            state: self.state(pose.revision),
+            version: self.version(pose.revision),
             replayed: true,
-            standing: false,
+            stationary: false,
         }
     }
 
@@ -211,9 +211,9 @@ impl HostedMap {
             points_skipped: scan.skipped(),
             new_voxels: 0,
             foreground: None,
-            state: self.state(self.map.revision()),
+            version: self.version(self.map.revision()),
             replayed: false,
-            standing: false,
+            stationary: false,
         }
     }
 }

@@ -25,7 +25,7 @@ impl MapService {
         name: MapName,
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
-        let name = self.reach.check(&name)?;
+        let name = self.allowed_maps.check(&name)?;
         let is_new = self.inner.catalog.get(&name).is_err();
         let settings = settings.checked()?;
         if is_new {
@@ -53,7 +53,7 @@ impl MapService {
     /// # Errors
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
-        let maps = self.inner.catalog.within(&self.reach);
+        let maps = self.inner.catalog.within(&self.allowed_maps);
         let describe =
             move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
         self.inner.queries.run(describe).await?
@@ -61,18 +61,18 @@ impl MapService {
 
     /// The names of the maps that the caller may name.
     pub fn map_names(&self) -> Vec<MapName> {
-        self.inner.catalog.within(&self.reach).iter().map(|map| map.name.clone()).collect()
+        self.inner.catalog.within(&self.allowed_maps).iter().map(|map| map.name.clone()).collect()
     }
 
     /// The maps that take no changes since their journal failed, by name, with the reason.
     pub fn read_only_maps(&self) -> Vec<(MapName, String)> {
-        let maps = self.inner.catalog.within(&self.reach);
+        let maps = self.inner.catalog.within(&self.allowed_maps);
         maps.iter().filter_map(|map| Some((map.name.clone(), map.failure()?.to_owned()))).collect()
     }
 
     /// The maps that could not be opened, by name, with the reason and what helps. Their names are taken.
     pub fn unavailable_maps(&self) -> Vec<UnavailableMap> {
-        self.inner.catalog.unavailable_within(&self.reach)
+        self.inner.catalog.unavailable_within(&self.allowed_maps)
     }
 
     /// Takes a map out, in memory and on disk.
@@ -81,7 +81,7 @@ impl MapService {
     /// `NotFound` without such a map; `Internal` when its file cannot be removed; `Unavailable` with `outcome_unknown`
     /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
-        let (inner, name) = (Arc::clone(&self.inner), self.reach.check(name)?);
+        let (inner, name) = (Arc::clone(&self.inner), self.allowed_maps.check(name)?);
         run_to_completion(async move { inner.catalog.delete(&name).await }).await
     }
 
@@ -109,8 +109,8 @@ impl MapService {
         file: Bytes,
         replace: bool,
     ) -> Result<MapInfo, ServiceError> {
-        let name = self.reach.check(&name)?;
-        if replace && self.reach != AllowedMaps::Every {
+        let name = self.allowed_maps.check(&name)?;
+        if replace && self.allowed_maps != AllowedMaps::Every {
             let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
                            delete the map first, or ask with such a key";
             return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));

@@ -2,6 +2,8 @@
 //!
 //! Limits are checked here and before any work is done; every failure is a [`ServiceError`].
 
+mod allowed_maps;
+mod allowed_scans;
 mod catalog;
 mod committing;
 mod deletion;
@@ -21,10 +23,8 @@ mod maps;
 #[cfg(all(test, feature = "shuttle"))]
 mod modeled;
 mod pool;
-mod reach;
 mod request;
 mod resource_budget;
-mod scan_reach;
 mod settings;
 mod shortage;
 mod time_limit;
@@ -32,6 +32,8 @@ mod trajectory;
 mod undo;
 mod watermarks;
 
+pub use allowed_maps::AllowedMaps;
+pub use allowed_scans::AllowedScans;
 pub use error::{ErrorCode, ServiceError};
 pub use gauges::{Gauges, MemoryReading, Readings};
 pub use limits::Limits;
@@ -40,13 +42,11 @@ pub use localization::{
     TIME_LIMIT_DEFAULT,
 };
 pub use pool::PoolUse;
-pub use reach::AllowedMaps;
 pub use request::{
-    Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapState, MapStorage,
+    Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapStorage, MapVersion,
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery,
     UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
-pub use scan_reach::ScanReach;
 pub use settings::{EVERY_ROBOT, ServiceSettings};
 pub use shortage::Shortage;
 pub use trajectory::TrajectoryPieces;
@@ -70,8 +70,8 @@ use time_limit::{TimeLimit, check_not_stopped, ended_early};
 #[derive(Debug, Clone)]
 pub struct MapService {
     inner: Arc<Inner>,
-    reach: AllowedMaps,
-    scans: ScanReach,
+    allowed_maps: AllowedMaps,
+    scans: AllowedScans,
     /// Whose requests a map remembers under this name.
     caller: Option<CallerName>,
 }
@@ -125,16 +125,21 @@ impl MapService {
         };
         Ok(Self {
             inner: Arc::new(inner),
-            reach: AllowedMaps::Every,
-            scans: ScanReach::default(),
+            allowed_maps: AllowedMaps::Every,
+            scans: AllowedScans::default(),
             caller: None,
         })
     }
 
-    /// The same maps for a caller of a name, who may name no others than those of `reach`, and send and undo no others than
+    /// The same maps for a caller of a name, who may name no others than those of `allowed_maps`, and send and undo no others than
     /// the scans of `scans`.
-    pub fn limited_to(&self, caller: Option<CallerName>, reach: AllowedMaps, scans: ScanReach) -> Self {
-        Self { inner: Arc::clone(&self.inner), reach, scans, caller }
+    pub fn limited_to(
+        &self,
+        caller: Option<CallerName>,
+        allowed_maps: AllowedMaps,
+        scans: AllowedScans,
+    ) -> Self {
+        Self { inner: Arc::clone(&self.inner), allowed_maps, scans, caller }
     }
 
     /// The bounds on what callers may ask.
@@ -272,7 +277,7 @@ impl MapService {
     /// `NotFound` without such a map or scan; `FailedPrecondition` for a scan from before what undo reaches, or where
     /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full, or where there is no memory to
     /// find out in who holds which voxels; `DeadlineExceeded` with `time_limit` beyond `undo_time_max`.
-    pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
+    pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         self.scans.permit_undo(&undo.target)?;
         let (map, undo) = (self.map(map)?, Arc::new(undo));
         let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
@@ -331,7 +336,7 @@ impl MapService {
     }
 
     fn map(&self, name: &MapName) -> Result<Arc<HostedMap>, ServiceError> {
-        self.inner.catalog.get(&self.reach.check(name)?)
+        self.inner.catalog.get(&self.allowed_maps.check(name)?)
     }
 }
 

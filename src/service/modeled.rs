@@ -52,7 +52,7 @@ fn insert_three(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>, robot: &str, x
         let turn = Arc::new(block_on(map.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
         let step = map.propose_scan(&request, turn, &settings, room, StopSignal::NEVER);
-        newest = outcome(step).unwrap().state.revision;
+        newest = outcome(step).unwrap().version.revision;
     }
     newest
 }
@@ -71,7 +71,7 @@ fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
 fn delete_everything(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>) -> u64 {
     let region = Region::ball([0.0; 3], 100.0).unwrap();
     let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
-    outcome(map.propose_deletion(&Arc::new(deletion), None, room)).unwrap().state.revision
+    outcome(map.propose_deletion(&Arc::new(deletion), None, room)).unwrap().version.revision
 }
 
 fn crowd() {
@@ -90,9 +90,9 @@ fn crowd() {
         spawn(|map, room| insert_three(map, room, "two", 70.5)),
         spawn(delete_everything),
         spawn(|map, room| {
-            let revision = map.describe(8, StopSignal::NEVER).unwrap().state.revision;
+            let revision = map.describe(8, StopSignal::NEVER).unwrap().version.revision;
             map.save(Saving::Changed, room).unwrap();
-            map.describe(8, StopSignal::NEVER).unwrap().state.revision.max(revision)
+            map.describe(8, StopSignal::NEVER).unwrap().version.revision.max(revision)
         }),
     ];
     let newest = threads.into_iter().map(|thread| thread.join().unwrap()).max().unwrap_or_default();

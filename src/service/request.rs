@@ -77,7 +77,7 @@ impl std::fmt::Debug for PointCloud {
 
 /// Which state of which map an answer speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MapState {
+pub struct MapVersion {
     /// Committed changes so far.
     pub revision: u64,
     /// Of this incarnation of the map.
@@ -111,7 +111,7 @@ pub struct PointAnswer {
     /// How many of them are occupied.
     pub points_occupied: usize,
     /// At this state.
-    pub state: MapState,
+    pub version: MapVersion,
 }
 
 /// A scan to align or insert.
@@ -190,13 +190,13 @@ pub struct ScanAnswer {
     /// Finest voxels added; 0 where nothing was.
     pub new_voxels: usize,
     /// After it, or where it was refused, before.
-    pub state: MapState,
+    pub version: MapVersion,
     /// The points that the map does not show, where they were asked for.
     pub foreground: Option<Foreground>,
     /// It was accepted before, and this is that answer.
     pub replayed: bool,
     /// The robot stands where its last scan was taken and sees nothing new: it was accepted and not kept.
-    pub standing: bool,
+    pub stationary: bool,
 }
 
 /// What is in front of the background that a map is: the points of a scan in no occupied voxel (paper \[9\]).
@@ -243,7 +243,7 @@ pub struct DeletionAnswer {
     /// Finest voxels removed.
     pub removed: usize,
     /// After it.
-    pub state: MapState,
+    pub version: MapVersion,
     /// It was done before under its id, and this is that answer.
     pub replayed: bool,
 }
@@ -286,7 +286,7 @@ pub struct UndoAnswer {
     /// Finest voxels that went with them.
     pub removed: usize,
     /// After it.
-    pub state: MapState,
+    pub version: MapVersion,
     /// It was done before under its id, and this is that answer.
     pub replayed: bool,
 }
@@ -310,7 +310,7 @@ pub struct TrajectoryAnswer {
     /// Ask for those since this revision for the next; none where these are the last.
     pub next_since_revision: Option<u64>,
     /// At this state.
-    pub state: MapState,
+    pub version: MapVersion,
 }
 
 /// A map as a map file.
@@ -319,7 +319,7 @@ pub struct MapFile {
     /// What a `.mrol` file holds.
     pub bytes: Bytes,
     /// At this state.
-    pub state: MapState,
+    pub version: MapVersion,
 }
 
 /// The occupied voxels of a level.
@@ -330,7 +330,7 @@ pub struct VoxelListing {
     /// In no order.
     pub keys: Vec<VoxelKey>,
     /// At this state.
-    pub state: MapState,
+    pub version: MapVersion,
 }
 
 /// A description of a map.
@@ -339,7 +339,7 @@ pub struct MapInfo {
     /// Its name.
     pub name: MapName,
     /// Its state.
-    pub state: MapState,
+    pub version: MapVersion,
     /// What it was made with.
     pub settings: MapSettings,
     /// Finest first.

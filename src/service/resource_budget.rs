@@ -123,8 +123,8 @@ impl ResourceBudget {
 
     /// True where so little of the disk is free that nothing should be kept that can be spared. May block.
     pub(super) fn is_disk_scarce(&self) -> bool {
-        let Marks { disk_free_low_bytes, disk_free_back_bytes, .. } = self.marks;
-        disk_free_low_bytes > 0 && self.disk_free_bytes().is_some_and(|free| free < disk_free_back_bytes)
+        let Marks { disk_free_low_bytes, disk_free_resume_bytes, .. } = self.marks;
+        disk_free_low_bytes > 0 && self.disk_free_bytes().is_some_and(|free| free < disk_free_resume_bytes)
     }
 
     fn count(&self, bytes: u64) -> Reservation {

@@ -58,7 +58,7 @@ impl Display for Shortage {
             Self::Disk { free, low, back } => write!(
                 f,
                 "the disk of the data folder has {} MiB free: below limits.disk_free_low_mib, {}, changes are refused \
-                 until limits.disk_free_back_mib, {}, are free again; make room there, or delete a map",
+                 until limits.disk_free_resume_mib, {}, are free again; make room there, or delete a map",
                 mib(free),
                 mib(low),
                 mib(back)
@@ -66,7 +66,7 @@ impl Display for Shortage {
             Self::Memory { in_use, high, back } => write!(
                 f,
                 "the server has {} MiB in memory or on their way there: above limits.memory_high_mib, {}, what makes maps grow is refused \
-                 until it has limits.memory_back_mib, {}, or less; delete a map, or give the server more memory",
+                 until it has limits.memory_resume_mib, {}, or less; delete a map, or give the server more memory",
                 mib(in_use),
                 mib(high),
                 mib(back)

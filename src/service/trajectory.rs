@@ -6,7 +6,7 @@ use tokio_stream::Stream;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::hosted_map::HostedMap;
-use super::{ErrorCode, Limits, MapService, MapState, ServiceError, TrajectoryAnswer, TrajectoryQuery};
+use super::{ErrorCode, Limits, MapService, MapVersion, ServiceError, TrajectoryAnswer, TrajectoryQuery};
 use crate::map::{MapName, MultiResolutionMap, RobotName, Trajectory};
 use crate::store::MapFolder;
 use crate::util::StopSignal;
@@ -28,7 +28,7 @@ impl MapService {
         let (map, most) = (self.map(map)?, self.limits().page(query.limit)?);
         let page_of = move |_: StopSignal<'_>| {
             let (trajectory, revision) = map.map.trajectory_and_revision();
-            page(&trajectory, map.state(revision), &query, most)
+            page(&trajectory, map.version(revision), &query, most)
         };
         self.inner.queries.run(page_of).await
     }
@@ -48,8 +48,8 @@ impl MapService {
         let shared = Arc::clone(&map);
         let copy = self.inner.queries.run(move |_| shared.map.trajectory_and_revision()).await?;
         let (trajectory, revision) = copy;
-        let state = map.state(revision);
-        Ok(TrajectoryPieces { service: self.clone(), trajectory, state, query, left, ended: false })
+        let version = map.version(revision);
+        Ok(TrajectoryPieces { service: self.clone(), trajectory, version, query, left, ended: false })
     }
 }
 
@@ -58,7 +58,7 @@ impl MapService {
 pub struct TrajectoryPieces {
     service: MapService,
     trajectory: Trajectory,
-    state: MapState,
+    version: MapVersion,
     /// What is still to come.
     query: TrajectoryQuery,
     /// Poses that may still come, where that is bounded.
@@ -68,8 +68,8 @@ pub struct TrajectoryPieces {
 
 impl TrajectoryPieces {
     /// The state that all poses are of.
-    pub fn state(&self) -> MapState {
-        self.state
+    pub fn version(&self) -> MapVersion {
+        self.version
     }
 
     /// Bytes of memory that this may come to until the last piece is sent: the trajectory, which the map may cease to
@@ -89,8 +89,8 @@ impl TrajectoryPieces {
             return None;
         }
         let most = self.left.map_or(POSES_PER_PIECE, |left| left.min(POSES_PER_PIECE));
-        let (trajectory, state, query) = (self.trajectory.clone(), self.state, self.query.clone());
-        let piece = self.service.inner.queries.run(move |_| page(&trajectory, state, &query, most)).await;
+        let (trajectory, version, query) = (self.trajectory.clone(), self.version, self.query.clone());
+        let piece = self.service.inner.queries.run(move |_| page(&trajectory, version, &query, most)).await;
         Some(piece.map(|piece| self.follow(piece)).inspect_err(|_| self.ended = true))
     }
 
@@ -122,12 +122,17 @@ impl TrajectoryPieces {
 }
 
 /// At most `most` poses.
-fn page(trajectory: &Trajectory, state: MapState, query: &TrajectoryQuery, most: usize) -> TrajectoryAnswer {
+fn page(
+    trajectory: &Trajectory,
+    version: MapVersion,
+    query: &TrajectoryQuery,
+    most: usize,
+) -> TrajectoryAnswer {
     let mut wanted = trajectory.poses_after(query.since_revision, query.robot.as_ref());
     let poses: Vec<_> = wanted.by_ref().take(most).cloned().collect();
     let last = poses.last().map(|pose| pose.revision);
     let next_since_revision = last.filter(|_| wanted.next().is_some());
-    TrajectoryAnswer { poses, next_since_revision, state }
+    TrajectoryAnswer { poses, next_since_revision, version }
 }
 
 impl HostedMap {

@@ -85,15 +85,16 @@ impl HostedMap {
         });
         let former = former_digest(&undo.target);
         if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref(), former)? {
-            let (scans, removed, state) = (answered.scans, answered.voxels, self.state(answered.revision));
-            return Ok(Step::Answered(UndoAnswer { scans, removed, state, replayed: true }));
+            let (scans, removed, version) =
+                (answered.scans, answered.voxels, self.version(answered.revision));
+            return Ok(Step::Answered(UndoAnswer { scans, removed, version, replayed: true }));
         }
         room.check_to_shrink()?;
         let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
         let (scans, withdrawn) = self.targets_of_undo(&undo.target)?;
         if scans.is_empty() {
-            let state = self.state(self.map.revision());
-            return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, state, replayed: false }));
+            let version = self.version(self.map.revision());
+            return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, version, replayed: false }));
         }
         let count = scans.len();
         let planned = self.plan_undo(&folder, scans, &withdrawn, request.clone(), room, stop)?;
@@ -111,7 +112,7 @@ impl HostedMap {
         let answer = move |Committed { revision, voxels: removed }| UndoAnswer {
             scans: count,
             removed,
-            state: map.state(revision),
+            version: map.version(revision),
             replayed: false,
         };
         Ok(Step::Proposed(outcome, Box::new(answer)))
@@ -157,7 +158,7 @@ impl HostedMap {
             Ok(())
         };
         folder.observations(scans, withdrawn, reserve, stop).map_err(|why| match why {
-            NotObserved::OutOfReach => self.out_of_reach(folder, scans[0], withdrawn),
+            NotObserved::OutsideUndoWindow => self.outside_undo_window(folder, scans[0], withdrawn),
             NotObserved::Stopped => ended_early(stop),
             NotObserved::NoMemory(refusal) => refusal,
             NotObserved::Unreadable(error) => self.unreadable(&error),
@@ -180,7 +181,7 @@ impl HostedMap {
                 one(trajectory.find(robot, *scan_id), format!("of scan_id {scan_id} of robot {robot}"))?
             }
             UndoTarget::Revision(revision) => {
-                self.check_reach(&trajectory, *revision)?;
+                self.check_undo_window(&trajectory, *revision)?;
                 one(trajectory.at(*revision), format!("that made revision {revision}"))?
             }
             UndoTarget::RobotSince { robot, revision } => {
@@ -190,11 +191,12 @@ impl HostedMap {
         Ok((scans, trajectory.withdrawn().to_vec()))
     }
 
-    /// Refuses a scan that may be out of reach and is not kept.
-    fn check_reach(&self, trajectory: &Trajectory, revision: u64) -> Result<(), ServiceError> {
+    /// Refuses a scan that may be outside the undo window and is not kept.
+    fn check_undo_window(&self, trajectory: &Trajectory, revision: u64) -> Result<(), ServiceError> {
         let folder = self.folder.as_ref().filter(|_| trajectory.at(revision).is_none());
-        let out_of_reach = folder.filter(|folder| revision < folder.undo_from(trajectory.withdrawn()));
-        out_of_reach.map_or(Ok(()), |folder| Err(self.out_of_reach(folder, revision, trajectory.withdrawn())))
+        let outside_undo_window = folder.filter(|folder| revision < folder.undo_from(trajectory.withdrawn()));
+        outside_undo_window
+            .map_or(Ok(()), |folder| Err(self.outside_undo_window(folder, revision, trajectory.withdrawn())))
     }
 
     /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
@@ -211,7 +213,12 @@ impl HostedMap {
         ServiceError::new(ErrorCode::FailedPrecondition, "no_journal", message)
     }
 
-    fn out_of_reach(&self, folder: &MapFolder, first: u64, withdrawn: &[WithdrawnScan]) -> ServiceError {
+    fn outside_undo_window(
+        &self,
+        folder: &MapFolder,
+        first: u64,
+        withdrawn: &[WithdrawnScan],
+    ) -> ServiceError {
         let message = format!(
             "undo reaches back to revision {} of map {}, and the first of the scans made revision {first}: it takes a \
              snapshot from before it, without scans that were undone later, and the journal from there on, which are kept \
@@ -221,7 +228,7 @@ impl HostedMap {
             folder.settings().undo_revisions,
             folder.settings().undo_bytes_max
         );
-        ServiceError::new(ErrorCode::FailedPrecondition, "undo_out_of_reach", message)
+        ServiceError::new(ErrorCode::FailedPrecondition, "outside_undo_window", message)
     }
 }
 

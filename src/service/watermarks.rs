@@ -12,20 +12,20 @@ pub struct Marks {
     /// With fewer bytes free on the disk of the data folder, changes are refused; 0 = never. 256 MiB.
     pub disk_free_low_bytes: u64,
     /// With that many bytes free they are taken again. 512 MiB.
-    pub disk_free_back_bytes: u64,
+    pub disk_free_resume_bytes: u64,
     /// With more bytes of memory in use, what makes maps grow is refused; without, 85 % of what the process may use.
     pub memory_high_bytes: Option<u64>,
     /// With at most that many in use it is taken again; without, 94 % of the high mark.
-    pub memory_back_bytes: Option<u64>,
+    pub memory_resume_bytes: Option<u64>,
 }
 
 impl Default for Marks {
     fn default() -> Self {
         Self {
             disk_free_low_bytes: 256 << 20,
-            disk_free_back_bytes: 512 << 20,
+            disk_free_resume_bytes: 512 << 20,
             memory_high_bytes: None,
-            memory_back_bytes: None,
+            memory_resume_bytes: None,
         }
     }
 }
@@ -86,7 +86,7 @@ impl Watermarks {
 
 impl Marks {
     fn disk(&self, free: u64, is_short: bool) -> Option<Shortage> {
-        let (low, back) = (self.disk_free_low_bytes, self.disk_free_back_bytes);
+        let (low, back) = (self.disk_free_low_bytes, self.disk_free_resume_bytes);
         let least = if is_short { back } else { low };
         (free < least).then_some(Shortage::Disk { free, low, back })
     }
@@ -94,7 +94,7 @@ impl Marks {
     pub(super) fn memory(&self, memory: MemoryReading, is_short: bool) -> Option<Shortage> {
         let in_use = memory.resident_bytes;
         let high = self.memory_high_bytes.unwrap_or(memory.allowed_bytes / 100 * 85);
-        let back = self.memory_back_bytes.unwrap_or(high / 100 * 94);
+        let back = self.memory_resume_bytes.unwrap_or(high / 100 * 94);
         let most = if is_short { back } else { high };
         (in_use > most).then_some(Shortage::Memory { in_use, high, back })
     }
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn memory_is_full_above_the_high_mark_and_until_the_back_mark() {
         let (high, back) = (Some(100 * MIB), Some(80 * MIB));
-        let marks = Marks { memory_high_bytes: high, memory_back_bytes: back, ..Marks::default() };
+        let marks = Marks { memory_high_bytes: high, memory_resume_bytes: back, ..Marks::default() };
         let watermarks = Watermarks::new(marks);
         let resident = [90, 100, 101, 100, 81, 80, 100].map(|mib| memory(mib, 1000));
         assert_eq!(refused_after(&watermarks, resident), [false, false, true, true, true, false, false]);
@@ -187,7 +187,7 @@ mod tests {
         watermarks.note(&disk(100));
         let error = watermarks.check_to_grow().unwrap_err();
         assert_eq!((error.code, error.reason), (ErrorCode::ResourceExhausted, "disk_full"));
-        for part in ["100 MiB", "disk_free_low_mib, 256", "disk_free_back_mib, 512", "make room"] {
+        for part in ["100 MiB", "disk_free_low_mib, 256", "disk_free_resume_mib, 512", "make room"] {
             assert!(error.message.contains(part), "{part} is not in {}", error.message);
         }
         let error = watermarks.check_to_shrink().unwrap_err();
@@ -196,12 +196,12 @@ mod tests {
     }
 
     #[test]
-    fn what_gives_memory_back_is_taken_while_memory_is_full() {
+    fn what_gives_memory_resume_is_taken_while_memory_is_full() {
         let watermarks = Watermarks::new(Marks::default());
         watermarks.note(&memory(990, 1000));
         let error = watermarks.check_to_grow().unwrap_err();
         assert_eq!((error.code, error.reason), (ErrorCode::ResourceExhausted, "memory_full"));
-        for part in ["990 MiB", "memory_high_mib, 850", "memory_back_mib, 79", "delete a map"] {
+        for part in ["990 MiB", "memory_high_mib, 850", "memory_resume_mib, 79", "delete a map"] {
             assert!(error.message.contains(part), "{part} is not in {}", error.message);
         }
         assert!(watermarks.check_to_shrink().is_ok());

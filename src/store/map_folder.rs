@@ -26,7 +26,7 @@ use uuid::Uuid;
 
 use super::folder::FolderPath;
 use super::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
-use super::retention::UndoReach;
+use super::retention::UndoWindow;
 use super::snapshot_files::{Sizes, forget_damaged, snapshot_name};
 use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
 use crate::map::WithdrawnScan;
@@ -149,7 +149,7 @@ impl MapFolder {
         snapshot::set_head(&mut file, head.max(revision));
         folder::replace(&*self.files, &self.path.file(&snapshot_name(revision)), &file)?;
         self.facts.tell_saved(revision, appended);
-        self.forget(self.undo_reach(), snapshot.contents.trajectory.withdrawn())
+        self.forget(self.undo_window(), snapshot.contents.trajectory.withdrawn())
     }
 
     /// True when there is much journal since the last snapshot, or that is old; not just after one that failed.
@@ -169,22 +169,22 @@ impl MapFolder {
         let before = self.used().kept_from;
         let _writing = self.snapshots.lock();
         self.check_there()?;
-        let given_up = self.forget(UndoReach { bytes_max: 0, ..self.undo_reach() }, &[]);
+        let given_up = self.forget(UndoWindow { bytes_max: 0, ..self.undo_window() }, &[]);
         let gave_up = given_up.is_ok() && self.used().kept_from != before;
         self.facts.tell_given_up(gave_up);
         self.count_bytes();
         given_up.map(|()| gave_up)
     }
 
-    fn undo_reach(&self) -> UndoReach {
-        UndoReach { revisions: self.settings.undo_revisions, bytes_max: self.settings.undo_bytes_max }
+    fn undo_window(&self) -> UndoWindow {
+        UndoWindow { revisions: self.settings.undo_revisions, bytes_max: self.settings.undo_bytes_max }
     }
 
     /// Removes the snapshots and the journal that nobody needs; the lock of the snapshots is held.
-    fn forget(&self, reach: UndoReach, withdrawn: &[WithdrawnScan]) -> Result<(), StoreError> {
+    fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnScan]) -> Result<(), StoreError> {
         let path = self.path.get();
         let sizes = Sizes::of(&*self.files, &path)?;
-        let kept = self.facts.forget(reach, withdrawn, &sizes);
+        let kept = self.facts.forget(window, withdrawn, &sizes);
         // The journal first: a snapshot without the journal behind it would be a gap, one more is not.
         if let Some(base) = kept.first() {
             self.in_journal(|journal| journal.truncate_before(base + 1))?;

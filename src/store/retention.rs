@@ -24,9 +24,9 @@ pub(super) fn kept(
     withdrawn: &[WithdrawnScan],
 ) -> Vec<u64> {
     let can_be_base = |snapshot: &&u64| is_base(**snapshot, withdrawn);
-    let reach = head.saturating_sub(undo_revisions);
+    let oldest = head.saturating_sub(undo_revisions);
     // Where none is old enough, the oldest that undo can begin with: what is older is of no use to it.
-    let base = snapshots.iter().filter(|&&snapshot| snapshot <= reach).rfind(can_be_base);
+    let base = snapshots.iter().filter(|&&snapshot| snapshot <= oldest).rfind(can_be_base);
     let base = base.or_else(|| snapshots.iter().find(can_be_base));
     // So that the base can move on without all snapshots being kept until then.
     let next = snapshots.iter().filter(|&snapshot| Some(snapshot) > base).find(can_be_base);
@@ -39,7 +39,7 @@ pub(super) fn kept(
 
 /// How far back undo reaches, at most.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct UndoReach {
+pub(super) struct UndoWindow {
     pub(super) revisions: u64,
     /// Of snapshots and journal that nothing else needs.
     pub(super) bytes_max: u64,
@@ -49,14 +49,14 @@ pub(super) struct UndoReach {
 pub(super) fn kept_within(
     snapshots: &[u64],
     head: u64,
-    reach: UndoReach,
+    window: UndoWindow,
     withdrawn: &[WithdrawnScan],
     sizes: &Sizes,
 ) -> Vec<u64> {
     let mut candidates = snapshots;
     loop {
-        let kept = kept(candidates, head, reach.revisions, withdrawn);
-        if candidates.len() <= FOR_RECOVERY || undo_bytes(&kept, sizes) <= reach.bytes_max {
+        let kept = kept(candidates, head, window.revisions, withdrawn);
+        if candidates.len() <= FOR_RECOVERY || undo_bytes(&kept, sizes) <= window.bytes_max {
             return kept;
         }
         let after_base = candidates.partition_point(|&snapshot| snapshot <= kept[0]);
@@ -114,8 +114,8 @@ mod tests {
             segments: snapshots.iter().map(|&snapshot| (snapshot + 1, 100)).collect(),
         };
         let kept = |bytes_max| {
-            let reach = UndoReach { revisions: 1000, bytes_max };
-            kept_within(&snapshots, 95, reach, &[], &sizes)
+            let window = UndoWindow { revisions: 1000, bytes_max };
+            kept_within(&snapshots, 95, window, &[], &sizes)
         };
         // Two snapshots, and the segments from the first of them to that which recovery begins with.
         assert_eq!(kept(810), [0, 10, 80, 90]);

@@ -343,7 +343,7 @@ mod tests {
             resolution_m: snapshot.settings.resolution_m,
             levels: snapshot.settings.levels,
             filter_hashes: snapshot.settings.filter.hashes,
-            filter_bits_per_voxel: snapshot.settings.filter.bits_per_key,
+            filter_bits_per_key: snapshot.settings.filter.bits_per_key,
             revision: *revision,
             block_keys: Vec::new(),
             block_masks: Vec::new().into(),

@@ -81,7 +81,7 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     write_filters(text, maps);
     let mut family = Family::begin(text, "mrol_map_revision", Kind::Gauge, "Committed changes, by map");
     for map in maps {
-        family.sample(&[("map", &map.name)], map.state.revision);
+        family.sample(&[("map", &map.name)], map.version.revision);
     }
     let mut family =
         Family::begin(text, "mrol_map_scans", Kind::Gauge, "Accepted scans whose poses are kept, by map");
@@ -114,7 +114,7 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
     for (map, level) in levels(maps) {
         let rates = [
             ("expected", Some(level.expected_rate)),
-            ("equation_1", Some(level.ideal_false_positive_rate)),
+            ("ideal", Some(level.ideal_false_positive_rate)),
             ("measured", level.measured_rate),
         ];
         for (kind, rate) in rates {

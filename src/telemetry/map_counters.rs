@@ -1,6 +1,7 @@
 //! What is counted by map. It is kept here and not by the recorder, which forgets no series: a map that is gone leaves
 //! none behind.
 
+use crate::util::Keyword;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -50,11 +51,7 @@ pub(super) struct MapCounters(Arc<Mutex<BTreeMap<MapName, BTreeMap<Series, u64>>
 
 impl MapCounters {
     pub(super) fn points_queried(&self, map: &MapName, lookup: Lookup, points: usize) {
-        let lookup = match lookup {
-            Lookup::Exact => "exact",
-            Lookup::Bloom => "bloom",
-        };
-        self.count(map, (Family::PointsQueried, Some(("lookup", lookup))), points);
+        self.count(map, (Family::PointsQueried, Some(("lookup", lookup.as_str()))), points);
     }
 
     pub(super) fn scan(&self, map: &MapName, verdict: Verdict) {

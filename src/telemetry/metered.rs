@@ -3,8 +3,8 @@
 use super::Metrics;
 use crate::map::{CallerName, MapName};
 use crate::service::{
-    AllowedMaps, Deletion, DeletionAnswer, MapInfo, MapService, PointAnswer, PointQuery, ScanAnswer,
-    ScanReach, ScanRequest, ServiceError, Undo, UndoAnswer,
+    AllowedMaps, AllowedScans, Deletion, DeletionAnswer, MapInfo, MapService, PointAnswer, PointQuery,
+    ScanAnswer, ScanRequest, ServiceError, Undo, UndoAnswer,
 };
 
 /// A [`MapService`] whose queries, insertions and deletions are counted by map; what is not counted is asked of
@@ -21,9 +21,14 @@ impl MeteredService {
         Self { service, metrics }
     }
 
-    /// The same for a caller of a name, who may name no others than the maps of `reach`, nor send others than the scans of `scans`.
-    pub fn limited_to(&self, caller: Option<CallerName>, reach: AllowedMaps, scans: ScanReach) -> Self {
-        Self { service: self.service.limited_to(caller, reach, scans), metrics: self.metrics.clone() }
+    /// The same for a caller of a name, who may name no others than the allowed maps, nor send others than the scans of `scans`.
+    pub fn limited_to(
+        &self,
+        caller: Option<CallerName>,
+        allowed_maps: AllowedMaps,
+        scans: AllowedScans,
+    ) -> Self {
+        Self { service: self.service.limited_to(caller, allowed_maps, scans), metrics: self.metrics.clone() }
     }
 
     /// The service itself.
@@ -79,12 +84,12 @@ impl MeteredService {
         Ok(answer)
     }
 
-    /// [`MapService::undo_scans`], counted.
+    /// [`MapService::undo`], counted.
     ///
     /// # Errors
     /// Those of the service.
-    pub async fn undo_scans(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
-        let answer = self.service.undo_scans(map, undo).await?;
+    pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
+        let answer = self.service.undo(map, undo).await?;
         if !answer.replayed {
             self.metrics.scans_undone(map, answer.scans);
             self.metrics.voxels_removed(map, answer.removed);

@@ -3,11 +3,15 @@
 
 pub(crate) mod bits;
 mod durations;
+mod excerpt;
+mod keyword;
 mod prefetch;
 mod sorting;
 mod stop_signal;
 
 pub use durations::{Durations, SharedDurations};
+pub use excerpt::excerpt;
+pub use keyword::{Keyword, words};
 pub(crate) use prefetch::prefetch;
 pub(crate) use sorting::sort_by_key_until;
 pub use stop_signal::StopSignal;

@@ -59,7 +59,7 @@ impl Lattice {
     }
 
     /// How far apart two places of a map can be, meters.
-    pub fn reach_m(&self) -> f64 {
+    pub fn extent_m(&self) -> f64 {
         let (min_m, end_m) = self.range_m();
         (end_m - min_m) * 3f64.sqrt()
     }

@@ -38,8 +38,8 @@ impl From<(&MapName, Deletion)> for pb::DeleteVoxelsRequest {
 
 impl From<DeletionAnswer> for pb::DeleteVoxelsResponse {
     fn from(answer: DeletionAnswer) -> Self {
-        let DeletionAnswer { removed, state, replayed } = answer;
-        Self { removed: removed as u64, state: Some(state.into()), replayed }
+        let DeletionAnswer { removed, version, replayed } = answer;
+        Self { removed: removed as u64, version: Some(version.into()), replayed }
     }
 }
 
@@ -47,7 +47,7 @@ impl TryFrom<pb::DeleteVoxelsResponse> for DeletionAnswer {
     type Error = ServiceError;
 
     fn try_from(answer: pb::DeleteVoxelsResponse) -> Result<Self, ServiceError> {
-        let state = required(answer.state, "state")?.try_into()?;
-        Ok(Self { removed: count_from(answer.removed), state, replayed: answer.replayed })
+        let version = required(answer.version, "version")?.try_into()?;
+        Ok(Self { removed: count_from(answer.removed), version, replayed: answer.replayed })
     }
 }

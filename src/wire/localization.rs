@@ -71,7 +71,7 @@ impl From<LocalizationAnswer> for pb::LocalizeResponse {
             cut_short: answer.cut_short,
             search_ms: answer.search_time.as_secs_f64() * 1e3,
             points_skipped: answer.points_skipped as u64,
-            state: Some(answer.state.into()),
+            version: Some(answer.version.into()),
         }
     }
 }
@@ -102,7 +102,7 @@ impl TryFrom<pb::LocalizeResponse> for LocalizationAnswer {
             cut_short: answer.cut_short,
             search_time,
             points_skipped: count_from(answer.points_skipped),
-            state: required(answer.state, "state")?.try_into()?,
+            version: required(answer.version, "version")?.try_into()?,
         })
     }
 }

@@ -17,9 +17,9 @@ pub fn snapshot_bytes(file_bytes: usize) -> usize {
 
 /// A file as messages.
 pub fn snapshot_pieces(file: MapFile) -> impl Iterator<Item = pb::SnapshotMapResponse> + Send {
-    let MapFile { bytes, state } = file;
+    let MapFile { bytes, version } = file;
     let file_bytes = bytes.len() as u64;
-    pieces(bytes).map(move |data| pb::SnapshotMapResponse { data, state: Some(state.into()), file_bytes })
+    pieces(bytes).map(move |data| pb::SnapshotMapResponse { data, version: Some(version.into()), file_bytes })
 }
 
 /// The messages that make the map `map` of a file, in the place of the one of that name where `replace` says so.

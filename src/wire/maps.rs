@@ -29,7 +29,7 @@ fn settings_from(settings: &pb::MapSettings, default: FilterSettings) -> MapSett
         levels: settings.levels.unwrap_or(LEVELS_DEFAULT),
         filter: FilterSettings {
             hashes: filter.hashes.unwrap_or(default.hashes),
-            bits_per_key: filter.bits_per_voxel.unwrap_or(default.bits_per_key),
+            bits_per_key: filter.bits_per_key.unwrap_or(default.bits_per_key),
         },
     }
 }
@@ -38,7 +38,7 @@ impl From<MapSettings> for pb::MapSettings {
     fn from(settings: MapSettings) -> Self {
         let filter = pb::FilterSettings {
             hashes: Some(settings.filter.hashes),
-            bits_per_voxel: Some(settings.filter.bits_per_key),
+            bits_per_key: Some(settings.filter.bits_per_key),
         };
         Self { resolution_m: settings.resolution_m, levels: Some(settings.levels), filter: Some(filter) }
     }
@@ -120,7 +120,7 @@ impl From<MapInfo> for pb::MapInfo {
     fn from(info: MapInfo) -> Self {
         Self {
             map: info.name.to_string(),
-            state: Some(info.state.into()),
+            version: Some(info.version.into()),
             settings: Some(info.settings.into()),
             levels: info.levels.iter().map(Into::into).collect(),
             scans: info.scans as u64,
@@ -141,7 +141,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
         let robots = info.robots.iter().map(|robot| RobotName::new(robot)).collect::<Result<_, _>>();
         Ok(Self {
             name: MapName::new(&info.map)?,
-            state: required(info.state, "map.state")?.try_into()?,
+            version: required(info.version, "map.version")?.try_into()?,
             settings: settings_from(&settings, FilterSettings::default()),
             levels: info.levels.iter().map(Into::into).collect(),
             scans: count_from(info.scans),
@@ -189,9 +189,9 @@ impl From<&LevelInfo> for pb::LevelInfo {
             voxels: info.voxels as u64,
             plane_bytes: info.plane_bytes as u64,
             counter_bytes: info.counter_bytes as u64,
-            false_positives_expected: info.expected_rate,
-            false_positives_equation_1: info.ideal_false_positive_rate,
-            false_positives_measured: info.measured_rate,
+            expected_false_positive_rate: info.expected_rate,
+            ideal_false_positive_rate: info.ideal_false_positive_rate,
+            measured_false_positive_rate: info.measured_rate,
         }
     }
 }
@@ -204,9 +204,9 @@ impl From<&pb::LevelInfo> for LevelInfo {
             voxels: count_from(info.voxels),
             plane_bytes: count_from(info.plane_bytes),
             counter_bytes: count_from(info.counter_bytes),
-            expected_rate: info.false_positives_expected,
-            ideal_false_positive_rate: info.false_positives_equation_1,
-            measured_rate: info.false_positives_measured,
+            expected_rate: info.expected_false_positive_rate,
+            ideal_false_positive_rate: info.ideal_false_positive_rate,
+            measured_rate: info.measured_false_positive_rate,
         }
     }
 }

@@ -6,6 +6,8 @@
 
 mod deletion;
 mod field;
+#[cfg(feature = "server")]
+mod json;
 mod localization;
 mod map_file;
 mod maps;
@@ -18,6 +20,8 @@ mod types;
 mod undo;
 
 pub(crate) use field::{InField, required};
+#[cfg(feature = "server")]
+pub use json::ByKeyword;
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::create_map;
 pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};

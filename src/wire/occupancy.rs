@@ -48,7 +48,7 @@ impl From<PointAnswer> for pb::QueryPointsResponse {
             occupied: answer.occupied,
             points: answer.points as u64,
             points_occupied: answer.points_occupied as u64,
-            state: Some(answer.state.into()),
+            version: Some(answer.version.into()),
         }
     }
 }
@@ -61,7 +61,7 @@ impl TryFrom<pb::QueryPointsResponse> for PointAnswer {
             occupied: answer.occupied,
             points: count_from(answer.points),
             points_occupied: count_from(answer.points_occupied),
-            state: required(answer.state, "state")?.try_into()?,
+            version: required(answer.version, "version")?.try_into()?,
         })
     }
 }
@@ -90,14 +90,14 @@ pub fn listing_bytes(voxels: usize) -> usize {
 /// A listing as messages of at most [`KEYS_PER_CHUNK`] keys, each made when it is asked for; one without keys
 /// where there is no voxel, so that the state is told.
 pub fn voxel_chunks(listing: VoxelListing) -> impl Iterator<Item = pb::ListVoxelsResponse> + Send {
-    let VoxelListing { resolution_m, keys, state } = listing;
+    let VoxelListing { resolution_m, keys, version } = listing;
     let chunks = keys.len().div_ceil(KEYS_PER_CHUNK).max(1);
     (0..chunks).map(move |chunk| {
         let start = chunk * KEYS_PER_CHUNK;
         let end = keys.len().min(start + KEYS_PER_CHUNK);
         pb::ListVoxelsResponse {
             keys: keys[start..end].iter().map(|key| key.to_bits()).collect(),
-            state: Some(state.into()),
+            version: Some(version.into()),
             resolution_m,
         }
     })
@@ -110,7 +110,7 @@ impl TryFrom<pb::ListVoxelsResponse> for VoxelListing {
         Ok(Self {
             resolution_m: chunk.resolution_m,
             keys: keys_from(&chunk.keys)?,
-            state: required(chunk.state, "state")?.try_into()?,
+            version: required(chunk.version, "version")?.try_into()?,
         })
     }
 }
@@ -128,16 +128,16 @@ pub(super) fn keys_from(bits: &[u64]) -> Result<Vec<VoxelKey>, ServiceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::MapState;
+    use crate::service::MapVersion;
     use uuid::Uuid;
 
     #[test]
     fn a_listing_is_cut_into_chunks_that_hold_all_of_it() {
-        let state = MapState { revision: 3, map_uuid: Uuid::from_u128(7) };
+        let version = MapVersion { revision: 3, map_uuid: Uuid::from_u128(7) };
         for count in [0, 1, KEYS_PER_CHUNK, KEYS_PER_CHUNK + 1] {
             let keys: Vec<_> = (0..count as u64).map(|bits| VoxelKey::from_bits(bits).unwrap()).collect();
             let chunks: Vec<_> =
-                voxel_chunks(VoxelListing { resolution_m: 0.1, keys: keys.clone(), state }).collect();
+                voxel_chunks(VoxelListing { resolution_m: 0.1, keys: keys.clone(), version }).collect();
             assert_eq!(chunks.len(), count.div_ceil(KEYS_PER_CHUNK).max(1));
             let back = chunks.into_iter().flat_map(|chunk| VoxelListing::try_from(chunk).unwrap().keys);
             assert_eq!(back.collect::<Vec<_>>(), keys);

@@ -71,10 +71,8 @@ fn method_from(number: i32) -> Result<Option<Method>, ServiceError> {
         Ok(pb::Method::Unspecified) => Ok(None),
         Ok(pb::Method::Refined) => Ok(Some(Method::Refined)),
         Ok(pb::Method::Overlap) => Ok(Some(Method::Overlap)),
-        Ok(pb::Method::WeightedSum) => Ok(Some(Method::WeightedSum)),
         Err(_) => {
-            let message =
-                format!("method must be 0, 1 (refined), 2 (overlap) or 3 (weighted sum), got {number}");
+            let message = format!("method must be 0, 1 (refined) or 2 (overlap), got {number}");
             Err(ServiceError::invalid("bad_method", message))
         }
     }
@@ -86,7 +84,6 @@ impl From<Option<Method>> for pb::Method {
             None => Self::Unspecified,
             Some(Method::Refined) => Self::Refined,
             Some(Method::Overlap) => Self::Overlap,
-            Some(Method::WeightedSum) => Self::WeightedSum,
         }
     }
 }
@@ -235,9 +232,9 @@ impl From<ScanAnswer> for pb::InsertScanResponse {
             accepted: answer.accepted,
             alignment: Some((&answer).into()),
             new_voxels: answer.new_voxels as u64,
-            state: Some(answer.state.into()),
+            version: Some(answer.version.into()),
             replayed: answer.replayed,
-            standing: answer.standing,
+            stationary: answer.stationary,
         }
     }
 }
@@ -247,7 +244,7 @@ impl From<ScanAnswer> for pb::AlignScanResponse {
         Self {
             accepted: answer.accepted,
             alignment: Some((&answer).into()),
-            state: Some(answer.state.into()),
+            version: Some(answer.version.into()),
             foreground_points: answer.foreground.as_ref().map_or(0, |foreground| foreground.points as u64),
             foreground: answer.foreground.map_or_else(Bytes::new, |foreground| foreground.bitmap),
         }
@@ -261,13 +258,13 @@ impl TryFrom<pb::InsertScanResponse> for ScanAnswer {
         let judged = pb::AlignScanResponse {
             accepted: answer.accepted,
             alignment: answer.alignment,
-            state: answer.state,
+            version: answer.version,
             ..Default::default()
         };
         let judged = Self::try_from(judged)?;
-        let (new_voxels, replayed, standing) =
-            (count_from(answer.new_voxels), answer.replayed, answer.standing);
-        Ok(Self { new_voxels, replayed, standing, ..judged })
+        let (new_voxels, replayed, stationary) =
+            (count_from(answer.new_voxels), answer.replayed, answer.stationary);
+        Ok(Self { new_voxels, replayed, stationary, ..judged })
     }
 }
 
@@ -299,9 +296,9 @@ impl TryFrom<pb::AlignScanResponse> for ScanAnswer {
                 bitmap: answer.foreground,
                 points: count_from(answer.foreground_points),
             }),
-            state: required(answer.state, "state")?.try_into()?,
+            version: required(answer.version, "version")?.try_into()?,
             replayed: false,
-            standing: false,
+            stationary: false,
         })
     }
 }

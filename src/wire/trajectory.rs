@@ -49,7 +49,7 @@ impl From<TrajectoryAnswer> for pb::GetTrajectoryResponse {
     fn from(answer: TrajectoryAnswer) -> Self {
         Self {
             poses: answer.poses.iter().map(Into::into).collect(),
-            state: Some(answer.state.into()),
+            version: Some(answer.version.into()),
             next_since_revision: answer.next_since_revision,
         }
     }
@@ -57,7 +57,7 @@ impl From<TrajectoryAnswer> for pb::GetTrajectoryResponse {
 
 impl From<TrajectoryAnswer> for pb::StreamTrajectoryResponse {
     fn from(piece: TrajectoryAnswer) -> Self {
-        Self { poses: piece.poses.iter().map(Into::into).collect(), state: Some(piece.state.into()) }
+        Self { poses: piece.poses.iter().map(Into::into).collect(), version: Some(piece.version.into()) }
     }
 }
 
@@ -82,7 +82,7 @@ impl TryFrom<pb::GetTrajectoryResponse> for TrajectoryAnswer {
         Ok(Self {
             poses: answer.poses.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
             next_since_revision: answer.next_since_revision,
-            state: required(answer.state, "state")?.try_into()?,
+            version: required(answer.version, "version")?.try_into()?,
         })
     }
 }
@@ -91,8 +91,8 @@ impl TryFrom<pb::StreamTrajectoryResponse> for TrajectoryAnswer {
     type Error = ServiceError;
 
     fn try_from(piece: pb::StreamTrajectoryResponse) -> Result<Self, ServiceError> {
-        let pb::StreamTrajectoryResponse { poses, state } = piece;
-        pb::GetTrajectoryResponse { poses, state, next_since_revision: None }.try_into()
+        let pb::StreamTrajectoryResponse { poses, version } = piece;
+        pb::GetTrajectoryResponse { poses, version, next_since_revision: None }.try_into()
     }
 }
 

@@ -5,7 +5,7 @@ use uuid::Uuid;
 use super::{InField, pb, required};
 use crate::geometry::{self, Point, Pose};
 use crate::map::{Lookup, Region, RequestId};
-use crate::service::{MapState, PointCloud, ServiceError};
+use crate::service::{MapVersion, PointCloud, ServiceError};
 
 impl TryFrom<pb::Points> for PointCloud {
     type Error = ServiceError;
@@ -107,17 +107,17 @@ impl From<Region> for pb::Region {
     }
 }
 
-impl TryFrom<pb::MapState> for MapState {
+impl TryFrom<pb::MapVersion> for MapVersion {
     type Error = ServiceError;
 
-    fn try_from(state: pb::MapState) -> Result<Self, ServiceError> {
-        Ok(Self { revision: state.revision, map_uuid: uuid_from(&state.map_uuid)? })
+    fn try_from(version: pb::MapVersion) -> Result<Self, ServiceError> {
+        Ok(Self { revision: version.revision, map_uuid: uuid_from(&version.map_uuid)? })
     }
 }
 
-impl From<MapState> for pb::MapState {
-    fn from(state: MapState) -> Self {
-        Self { revision: state.revision, map_uuid: state.map_uuid.to_string() }
+impl From<MapVersion> for pb::MapVersion {
+    fn from(version: MapVersion) -> Self {
+        Self { revision: version.revision, map_uuid: version.map_uuid.to_string() }
     }
 }
 

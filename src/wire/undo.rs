@@ -5,11 +5,11 @@ use super::{InField, pb, required};
 use crate::map::{MapName, RobotName};
 use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};
 
-impl TryFrom<pb::UndoScansRequest> for (MapName, Undo) {
+impl TryFrom<pb::UndoRequest> for (MapName, Undo) {
     type Error = ServiceError;
 
-    fn try_from(request: pb::UndoScansRequest) -> Result<Self, ServiceError> {
-        use pb::undo_scans_request::Target;
+    fn try_from(request: pb::UndoRequest) -> Result<Self, ServiceError> {
+        use pb::undo_request::Target;
         let target = match required(request.target, "target")? {
             Target::Scan(pb::RobotScan { robot, scan_id }) => {
                 UndoTarget::Scan { robot: RobotName::new(&robot).in_field("scan.robot")?, scan_id }
@@ -23,9 +23,9 @@ impl TryFrom<pb::UndoScansRequest> for (MapName, Undo) {
     }
 }
 
-impl From<(&MapName, Undo)> for pb::UndoScansRequest {
+impl From<(&MapName, Undo)> for pb::UndoRequest {
     fn from((map, undo): (&MapName, Undo)) -> Self {
-        use pb::undo_scans_request::Target;
+        use pb::undo_request::Target;
         let target = match undo.target {
             UndoTarget::Scan { robot, scan_id } => {
                 Target::Scan(pb::RobotScan { robot: robot.to_string(), scan_id })
@@ -39,20 +39,20 @@ impl From<(&MapName, Undo)> for pb::UndoScansRequest {
     }
 }
 
-impl From<UndoAnswer> for pb::UndoScansResponse {
-    fn from(UndoAnswer { scans, removed, state, replayed }: UndoAnswer) -> Self {
-        Self { scans: scans as u64, removed: removed as u64, state: Some(state.into()), replayed }
+impl From<UndoAnswer> for pb::UndoResponse {
+    fn from(UndoAnswer { scans, removed, version, replayed }: UndoAnswer) -> Self {
+        Self { scans: scans as u64, removed: removed as u64, version: Some(version.into()), replayed }
     }
 }
 
-impl TryFrom<pb::UndoScansResponse> for UndoAnswer {
+impl TryFrom<pb::UndoResponse> for UndoAnswer {
     type Error = ServiceError;
 
-    fn try_from(answer: pb::UndoScansResponse) -> Result<Self, ServiceError> {
+    fn try_from(answer: pb::UndoResponse) -> Result<Self, ServiceError> {
         Ok(Self {
             scans: count_from(answer.scans),
             removed: count_from(answer.removed),
-            state: required(answer.state, "state")?.try_into()?,
+            version: required(answer.version, "version")?.try_into()?,
             replayed: answer.replayed,
         })
     }

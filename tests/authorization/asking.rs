@@ -44,10 +44,10 @@ pub(crate) async fn over_http(
     };
     assert_eq!(challenge, (status == StatusCode::UNAUTHORIZED).then_some(expected), "{operation:?}");
     let error: Value = answer.json().await.unwrap_or_default();
-    let text = |field: &str| error["error"][field].as_str().unwrap_or_default().to_owned();
+    let text = |field: &str| error[field].as_str().unwrap_or_default().to_owned();
     match status {
         StatusCode::UNAUTHORIZED => Outcome::Unknown { reason: text("reason") },
-        StatusCode::FORBIDDEN => Outcome::Denied { reason: text("reason"), message: text("message") },
+        StatusCode::FORBIDDEN => Outcome::Denied { reason: text("reason"), message: text("detail") },
         StatusCode::METHOD_NOT_ALLOWED => panic!("{operation:?} is not served"),
         _ if status.is_server_error() || text("reason") == "route_not_found" => {
             panic!("{operation:?} is not served: {status} {error}")

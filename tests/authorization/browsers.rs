@@ -30,8 +30,8 @@ async fn asked(
     let answer = request.send().await.unwrap();
     let status = answer.status().as_u16();
     let error: Value = answer.json().await.unwrap_or_default();
-    let text = |field: &str| error["error"][field].as_str().unwrap_or_default().to_owned();
-    (status, text("reason"), text("message"))
+    let text = |field: &str| error[field].as_str().unwrap_or_default().to_owned();
+    (status, text("reason"), text("detail"))
 }
 
 #[tokio::test(flavor = "multi_thread")]

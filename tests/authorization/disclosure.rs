@@ -99,7 +99,7 @@ async fn a_key_for_some_maps_replaces_none() {
     };
     let refused = replace(&key).await;
     assert_eq!(refused.status(), StatusCode::FORBIDDEN);
-    assert_eq!(refused.json::<Value>().await.unwrap()["error"]["reason"], "map_not_allowed");
+    assert_eq!(refused.json::<Value>().await.unwrap()["reason"], "map_not_allowed");
     let piece = pb::RestoreMapRequest { map: "own".into(), data: file.clone(), replace: true };
     let mut call = tonic::Request::new(tokio_stream::iter([piece]));
     call.metadata_mut().insert("authorization", format!("Bearer {}", key.reveal()).parse().unwrap());

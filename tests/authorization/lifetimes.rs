@@ -79,12 +79,12 @@ async fn a_key_is_refused_from_its_end_on_and_its_stream_ends() {
     assert!(answers.message().await.unwrap().is_some());
 
     let refused = until(&server, &past, StatusCode::UNAUTHORIZED).await;
-    assert_eq!(refused["error"]["reason"], "key_expired");
-    assert!(refused["error"]["message"].as_str().unwrap().contains("2020-01-31T00:00:00Z"));
+    assert_eq!(refused["reason"], "key_expired");
+    assert!(refused["detail"].as_str().unwrap().contains("2020-01-31T00:00:00Z"));
     let ended = tokio::time::timeout(PATIENCE, answers.message()).await.unwrap().unwrap_err();
     assert_eq!(ended.code(), Code::Unauthenticated);
     assert_eq!(ended.metadata().get("mrol-reason").unwrap(), "key_expired");
-    assert_eq!(until(&server, &near, StatusCode::UNAUTHORIZED).await["error"]["reason"], "key_expired");
+    assert_eq!(until(&server, &near, StatusCode::UNAUTHORIZED).await["reason"], "key_expired");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -107,7 +107,7 @@ async fn during_a_rotation_both_secrets_count_and_a_revoked_key_none() {
     let third = Secret::new(third);
     until(&server, &third, StatusCode::OK).await;
     for former in [&first, &second] {
-        assert_eq!(until(&server, former, StatusCode::UNAUTHORIZED).await["error"]["reason"], "key_unknown");
+        assert_eq!(until(&server, former, StatusCode::UNAUTHORIZED).await["reason"], "key_unknown");
     }
     assert!(key(&["revoke", "--name", "robot"], &file).0);
     until(&server, &third, StatusCode::UNAUTHORIZED).await;

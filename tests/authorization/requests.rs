@@ -32,10 +32,10 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             let target = points_pb(&POINTS).map(pb::delete_voxels_request::Target::Points);
             pb::DeleteVoxelsRequest { map, target, ..Default::default() }.encode_to_vec()
         }
-        Operation::UndoScans => {
+        Operation::Undo => {
             let scan = pb::RobotScan { robot: "r".into(), scan_id: 1 };
-            let target = Some(pb::undo_scans_request::Target::Scan(scan));
-            pb::UndoScansRequest { map, target, ..Default::default() }.encode_to_vec()
+            let target = Some(pb::undo_request::Target::Scan(scan));
+            pb::UndoRequest { map, target, ..Default::default() }.encode_to_vec()
         }
         Operation::GetTrajectory => pb::GetTrajectoryRequest { map, ..Default::default() }.encode_to_vec(),
         Operation::StreamTrajectory => {
@@ -70,7 +70,7 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         Operation::InsertScan | Operation::AlignScan => {
             Some(json!({"robot": "r", "points": POINTS, "guess": identity_json(), "align": false}))
         }
-        Operation::UndoScans => Some(json!({"robot": "r", "scan_id": 1})),
+        Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::CreateMap => Some(json!({"resolution_m": 0.1, "levels": 2})),
         _ => None,
     }
@@ -87,7 +87,7 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::AlignScan
         | Operation::Localize
         | Operation::DeleteVoxels
-        | Operation::UndoScans
+        | Operation::Undo
         | Operation::GetTrajectory
         | Operation::StreamTrajectory
         | Operation::CreateMap

@@ -31,7 +31,7 @@ async fn http(server: &Guarded, path: &str, body: Value, key: &Secret) -> Option
     let answer = server.http(Method::POST, &path, Some(key), Some(body)).await;
     let refused = answer.status() == reqwest::StatusCode::FORBIDDEN;
     let error: Value = answer.json().await.unwrap();
-    refused.then(|| error["error"]["reason"].as_str().unwrap().to_owned())
+    refused.then(|| error["reason"].as_str().unwrap().to_owned())
 }
 
 #[tokio::test(flavor = "multi_thread")]

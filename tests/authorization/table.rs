@@ -27,7 +27,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::SnapshotMap
         | Operation::Reflect
         | Operation::Metrics => Some(Scope::Read),
-        Operation::InsertScan | Operation::InsertScanStream | Operation::UndoScans => Some(Scope::Insert),
+        Operation::InsertScan | Operation::InsertScanStream | Operation::Undo => Some(Scope::Insert),
         Operation::DeleteVoxels => Some(Scope::Write),
         Operation::CreateMap | Operation::DeleteMap | Operation::RestoreMap => Some(Scope::Admin),
     }

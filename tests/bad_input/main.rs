@@ -44,8 +44,8 @@ pub(crate) fn assert_says(message: &str, words: &[&str]) {
 #[track_caller]
 pub(crate) fn assert_refused((status, error): (StatusCode, Value), words: &[&str]) {
     assert_eq!(status, StatusCode::BAD_REQUEST, "{error}");
-    assert_eq!(error["error"]["code"], "invalid_argument");
-    assert_says(error["error"]["message"].as_str().unwrap_or_default(), words);
+    assert_eq!(error["code"], "invalid_argument");
+    assert_says(error["detail"].as_str().unwrap_or_default(), words);
 }
 
 #[track_caller]

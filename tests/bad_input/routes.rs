@@ -27,7 +27,7 @@ fn body(operation: Operation) -> Body {
         Operation::Localize => Body::Points(json!({"points": row(1)}), ""),
         Operation::DeleteVoxels => Body::Points(json!({"points": [[9.0, 9.0, 9.0]]}), ""),
         Operation::InsertScan | Operation::AlignScan => Body::Points(scan(), "robot=r&"),
-        Operation::UndoScans => Body::Json(json!({"revision": 1})),
+        Operation::Undo => Body::Json(json!({"revision": 1})),
         Operation::CreateMap => Body::Json(json!({"resolution_m": 0.1})),
         Operation::RestoreMap => Body::File,
         Operation::ListMaps
@@ -73,7 +73,7 @@ const BYTES: &str = "application/octet-stream";
 /// Words that only who reads the source can know.
 #[track_caller]
 fn assert_no_rust(error: &Value) {
-    let message = error["error"]["message"].as_str().unwrap();
+    let message = error["detail"].as_str().unwrap();
     for word in [
         "struct",
         "enum",

@@ -137,8 +137,8 @@ async fn a_message_beyond_the_limit_is_refused_before_it_is_read() {
     let answer = daemon.post_bytes("/v1/maps/a/occupancy", bytes_of(&large)).await;
     assert_eq!(answer.status(), StatusCode::PAYLOAD_TOO_LARGE);
     let error = json_of(answer).await;
-    assert_eq!(error["error"]["reason"], "body_too_large");
-    assert_says(error["error"]["message"].as_str().unwrap_or_default(), &["20000", "24000"]);
+    assert_eq!(error["reason"], "body_too_large");
+    assert_says(error["detail"].as_str().unwrap_or_default(), &["20000", "24000"]);
     assert_unchanged(&daemon).await;
 }
 
@@ -151,7 +151,7 @@ async fn maps_that_are_none_are_named() {
     for route in ["", "/trajectory", "/voxels"] {
         let answer = daemon.get(&format!("/v1/maps/attic{route}")).await;
         assert_eq!(answer.status(), StatusCode::NOT_FOUND);
-        assert_says(json_of(answer).await["error"]["message"].as_str().unwrap_or_default(), &["attic"]);
+        assert_says(json_of(answer).await["detail"].as_str().unwrap_or_default(), &["attic"]);
     }
     // Names that would be paths, or none at all; the last two never reach a route.
     for name in ["..", "../a", "a/../../etc", "A", "a b", "", "ä", "a\0", &"x".repeat(65)] {
@@ -180,7 +180,7 @@ async fn settings_and_levels_out_of_range_are_named_with_the_range() {
         (json!({"resolution_m": 0.1, "levels": 13}), ["levels", "12"]),
         (json!({"resolution_m": 0.1, "levels": 0}), ["levels", "1..=12"]),
         (json!({"resolution_m": 0.1, "filter": {"hashes": 0}}), ["hashes", "1"]),
-        (json!({"resolution_m": 0.1, "filter": {"bits_per_voxel": 0}}), ["bits_per", "0"]),
+        (json!({"resolution_m": 0.1, "filter": {"bits_per_key": 0}}), ["bits_per", "0"]),
         (json!({"levels": 4}), ["missing field", "resolution_m"]),
         (json!({"resolution_m": 0.1, "color": 1}), ["unknown field", "color"]),
     ] {
@@ -276,7 +276,7 @@ async fn another_content_type_is_refused_naming_those_that_are_taken() {
             assert_eq!(answer.status(), StatusCode::UNSUPPORTED_MEDIA_TYPE);
             let error = json_of(answer).await;
             let words = ["application/json", "application/octet-stream", content_type];
-            assert_says(error["error"]["message"].as_str().unwrap_or_default(), &words);
+            assert_says(error["detail"].as_str().unwrap_or_default(), &words);
         }
     }
     let charset = client().post(daemon.url("/v1/maps/a/occupancy"));

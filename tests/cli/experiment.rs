@@ -97,7 +97,7 @@ fn a_simulation_has_the_exact_sets_poses_where_the_filter_is_ample() {
 
     let scans = folder.path().join("simulation.csv");
     for name in ["error_m", "error_deg", "voxels", "align_ms"] {
-        assert_eq!(column(&scans, name).len(), 2 * 4 * 4);
+        assert_eq!(column(&scans, name).len(), 2 * 4 * 5);
     }
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert_eq!(read("simulation.md").lines().count(), 2 + 2 * 4);
@@ -112,19 +112,19 @@ fn mapping_times_every_scan_in_every_map() {
     let [scans, truth, out] = ["scans", "poses.txt", "results"].map(|name| sequence.path(name));
     let mapping = ["experiment", "mapping", &scans, "--resolution", "0.05", "--out", &out];
     let lines = objects(&[&mapping[..], &["--truth", &truth]].concat());
-    let maps = ["bloom", "hash table", "bloom, refined", "odometry"];
+    let maps = ["bloom", "hash table", "bloom, refined", "weighted sum", "odometry"];
     assert_eq!(texts(&lines, "map"), maps);
     for line in &lines {
         assert!(number(line, "update_ms") > 0.0 && line["error_m"]["max"].as_f64().unwrap() < 0.2, "{line}");
     }
-    assert!(lines[..3].iter().all(|line| number(line, "align_ms") > 0.0), "{lines:?}");
-    assert!(lines[3].get("align_ms").is_none());
+    assert!(lines[..4].iter().all(|line| number(line, "align_ms") > 0.0), "{lines:?}");
+    assert!(lines[4].get("align_ms").is_none());
     let out = Path::new(&out);
     for name in ["align_ms", "update_ms", "voxels", "error_m", "error_deg"] {
-        assert_eq!(column(&out.join("mapping.csv"), name).len(), 4 * 4);
+        assert_eq!(column(&out.join("mapping.csv"), name).len(), 4 * 5);
     }
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
-    assert_eq!(read("mapping.md").lines().count(), 2 + 4);
+    assert_eq!(read("mapping.md").lines().count(), 2 + 5);
     assert!(maps.iter().all(|map| read("mapping.svg").contains(map)));
 }
 
@@ -133,10 +133,10 @@ fn odometry_is_found_beside_the_scans_and_left_out_where_there_is_none() {
     let sequence = Sequence::of(3);
     let [scans, truth, out] = ["scans", "poses.txt", "results"].map(|name| sequence.path(name));
     let mapping = ["experiment", "mapping", &scans, "--out", &out];
-    assert_eq!(texts(&objects(&mapping), "map"), ["bloom", "hash table", "bloom, refined"]);
+    assert_eq!(texts(&objects(&mapping), "map"), ["bloom", "hash table", "bloom, refined", "weighted sum"]);
 
     std::fs::copy(&truth, sequence.path("scans/poses_odometry.txt")).unwrap();
     let lines = objects(&[&mapping[..], &["--truth", &truth]].concat());
-    assert_eq!(texts(&lines, "map")[3], "odometry");
-    assert!(lines[3]["error_m"]["max"].as_f64().unwrap() < 1e-9, "{}", lines[3]);
+    assert_eq!(texts(&lines, "map")[4], "odometry");
+    assert!(lines[4]["error_m"]["max"].as_f64().unwrap() < 1e-9, "{}", lines[4]);
 }

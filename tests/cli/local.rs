@@ -106,11 +106,11 @@ fn ample_filters_are_told_from_small_ones_and_find_the_poses_of_the_exact_sets()
         let common = ["map", &scans, "--resolution", "0.1", "--lookup"];
         objects(&[&common, options].concat())
     };
-    let ample = run(&["bloom", "--filter-hashes", "10", "--filter-bits-per-voxel", "2000"]);
+    let ample = run(&["bloom", "--filter-hashes", "10", "--filter-bits-per-key", "2000"]);
     let filter = &ample[3]["summary"]["filter"];
     assert_eq!(filter["ample"], true, "{filter}");
     assert!(filter["lookups"].as_u64().unwrap() > 1_000_000);
-    let small = run(&["bloom", "--filter-bits-per-voxel", "8"]);
+    let small = run(&["bloom", "--filter-bits-per-key", "8"]);
     assert_eq!(small[3]["summary"]["filter"]["ample"], false);
     let exact = run(&["exact"]);
     assert!(exact[3]["summary"]["filter"].is_null());

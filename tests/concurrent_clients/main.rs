@@ -112,16 +112,16 @@ async fn grpc_client(url: String, seed: u64, end: Instant, heart: Beat) -> Histo
                     ..ScanRequest::new(RobotName::new(&format!("g{seed}")).unwrap(), points.clone().into())
                 };
                 let answer = client.insert_scan(&map, request).await.expect("an insertion");
-                if !answer.accepted || answer.standing {
+                if !answer.accepted || answer.stationary {
                     continue;
                 }
                 let (map_from_sensor, new_voxels) = (answer.map_from_sensor, answer.new_voxels);
-                (answer.state.revision, Event::Inserted { points, map_from_sensor, new_voxels })
+                (answer.version.revision, Event::Inserted { points, map_from_sensor, new_voxels })
             }
             3..5 => {
                 let deletion = deletion(&mut random);
                 let answer = client.delete_voxels(&map, deletion.clone()).await.expect("a deletion");
-                (answer.state.revision, Event::Deleted { deletion, removed: answer.removed })
+                (answer.version.revision, Event::Deleted { deletion, removed: answer.removed })
             }
             _ => {
                 let (points, level) = (questions(&mut random), random.random_range(0..LEVELS));
@@ -136,7 +136,7 @@ async fn grpc_client(url: String, seed: u64, end: Instant, heart: Beat) -> Histo
                 let answer = client.query_points(&map, query).await.expect("an answer");
                 let bit = |i: usize| answer.occupied[i / 8] >> (i % 8) & 1 == 1;
                 let occupied = (0..points.len()).map(bit).collect();
-                (answer.state.revision, Event::Queried { points, level, occupied })
+                (answer.version.revision, Event::Queried { points, level, occupied })
             }
         };
         history.push(event);
@@ -295,7 +295,7 @@ async fn what_eight_clients_were_told_is_a_serial_history() {
     let expected: VoxelSet = replayed.view().voxels();
     let client = Client::connect(&url).await.unwrap();
     let listing = client.list_voxels(&MapName::new(MAP).unwrap(), 0, None).await.unwrap();
-    assert_eq!(listing.state.revision, replayed.revision());
+    assert_eq!(listing.version.revision, replayed.revision());
     assert_eq!(listing.keys.into_iter().collect::<VoxelSet>(), expected);
     daemon.stop().await;
 }

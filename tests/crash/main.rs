@@ -112,7 +112,7 @@ impl Writer {
     /// Has a wish granted: notes the revision that it made.
     async fn grant(&mut self, client: &Client, wish: Wish) -> Result<(), ClientError> {
         self.pending = Some(wish.clone());
-        let (state, voxels) = match &wish {
+        let (version, voxels) = match &wish {
             Wish::Insert { scan_id, points } => {
                 let scan = ScanRequest {
                     scan_id: Some(*scan_id),
@@ -122,26 +122,26 @@ impl Writer {
                     ..ScanRequest::new(self.robot(), points.clone().into())
                 };
                 let answer = client.insert_scan(&office(), scan).await?;
-                (answer.state, answer.new_voxels)
+                (answer.version, answer.new_voxels)
             }
             Wish::Delete { request_id, keys } => {
                 let target = DeletionTarget::Keys(keys.clone());
                 let deletion = Deletion { target, level: 0, request_id: Some(request_id.clone()) };
                 let answer = client.delete_voxels(&office(), deletion).await?;
-                (answer.state, answer.removed)
+                (answer.version, answer.removed)
             }
             Wish::Undo { request_id, scan_id } => {
                 let target = UndoTarget::Scan { robot: self.robot(), scan_id: *scan_id };
                 let undo = Undo { target, request_id: Some(request_id.clone()) };
-                let answer = client.undo_scans(&office(), undo).await?;
+                let answer = client.undo(&office(), undo).await?;
                 assert_eq!(answer.scans, 1);
-                (answer.state, answer.removed)
+                (answer.version, answer.removed)
             }
         };
         self.pending = None;
         if voxels > 0 || !matches!(wish, Wish::Delete { .. }) {
             let done = Done { writer: self.number, wish, voxels };
-            assert!(self.done.insert(state.revision, done).is_none(), "a revision came twice");
+            assert!(self.done.insert(version.revision, done).is_none(), "a revision came twice");
         }
         Ok(())
     }
@@ -207,7 +207,7 @@ impl Model {
 
     async fn assert_equals(&self, client: &Client, round: usize) {
         let listing = client.list_voxels(&office(), 0, None).await.unwrap();
-        assert_eq!(listing.state.revision, self.revision, "round {round}");
+        assert_eq!(listing.version.revision, self.revision, "round {round}");
         let found: BTreeSet<VoxelKey> = listing.keys.into_iter().collect();
         let count = self.holders.len();
         assert!(found.iter().eq(self.holders.keys()), "round {round}: {} voxels, not {count}", found.len());

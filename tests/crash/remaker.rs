@@ -157,8 +157,8 @@ impl Remaker {
         };
         let answer = client.insert_scan(&depot(), scan).await?;
         let there = self.there.as_mut().expect("a map");
-        assert_eq!(answer.state.map_uuid, there.uuid, "another incarnation answered");
-        assert_eq!(answer.state.revision, there.revision + 1, "{scan_id}");
+        assert_eq!(answer.version.map_uuid, there.uuid, "another incarnation answered");
+        assert_eq!(answer.version.revision, there.revision + 1, "{scan_id}");
         let quantize = Lattice::new(RESOLUTION_M, LEVELS).unwrap().from_map();
         let before = there.voxels.len();
         there.voxels.extend(points.iter().map(|&point| quantize.key(point).unwrap()));
@@ -171,11 +171,11 @@ impl Remaker {
 
     /// Notes a map that was made, empty or of a file.
     fn begin(&mut self, info: &MapInfo, held: Option<Incarnation>) {
-        let uuid = info.state.map_uuid;
+        let uuid = info.version.map_uuid;
         assert!(self.uuids.insert(uuid), "{uuid} was there before");
         let empty = Incarnation { uuid, revision: 0, voxels: BTreeSet::new(), scan_ids: Vec::new() };
         let there = held.map_or(empty, |held| Incarnation { uuid, ..held });
-        assert_eq!(info.state.revision, there.revision);
+        assert_eq!(info.version.revision, there.revision);
         self.there = Some(there);
     }
 
@@ -256,8 +256,8 @@ impl Remaker {
         let listing = client.list_voxels(&depot(), 0, None).await.unwrap();
         let trajectory = client.trajectory(&depot(), None).await.unwrap();
         let found = Incarnation {
-            uuid: listing.state.map_uuid,
-            revision: listing.state.revision,
+            uuid: listing.version.map_uuid,
+            revision: listing.version.revision,
             voxels: listing.keys.into_iter().collect(),
             scan_ids: trajectory.poses.iter().filter_map(|pose| pose.scan_id).collect(),
         };

@@ -106,15 +106,15 @@ async fn a_scan_is_undone_and_what_others_saw_stays() {
     assert_eq!((&again["replayed"], &again["revision"]), (&json!(true), &first["revision"]));
     let missing = daemon.post("/v1/maps/a/undo", json!({"revision": bad})).await;
     assert_eq!(missing.status(), StatusCode::NOT_FOUND);
-    assert_eq!(json_of(missing).await["error"]["reason"], "scan_not_found");
+    assert_eq!(json_of(missing).await["reason"], "scan_not_found");
 
     let since = pb::RobotSince { robot: "bad".into(), revision: 0 };
-    let undo = pb::UndoScansRequest {
+    let undo = pb::UndoRequest {
         map: "a".into(),
-        target: Some(pb::undo_scans_request::Target::Since(since)),
+        target: Some(pb::undo_request::Target::Since(since)),
         ..Default::default()
     };
-    let answer = daemon.mapping().await.undo_scans(undo).await.unwrap().into_inner();
+    let answer = daemon.mapping().await.undo(undo).await.unwrap().into_inner();
     assert_eq!((answer.scans, answer.removed), (1, 8));
     assert_eq!(daemon.contents("a").await.1, good);
     let trajectory = json_of(daemon.get("/v1/maps/a/trajectory").await).await;
@@ -141,11 +141,11 @@ async fn what_is_out_of_reach_cannot_be_undone_and_the_error_says_how_far_it_rea
     let daemon = Daemon::start_in(data, |_| {}).await;
     let refused = daemon.post("/v1/maps/a/undo", json!({"revision": 1})).await;
     assert_eq!(refused.status(), StatusCode::PRECONDITION_FAILED);
-    let error = json_of(refused).await["error"].clone();
-    assert_eq!(error["reason"], "undo_out_of_reach");
+    let error = json_of(refused).await;
+    assert_eq!(error["reason"], "outside_undo_window");
     let reach = json_of(daemon.get("/v1/maps/a").await).await["storage"]["undo_from_revision"].clone();
     assert!(
-        error["message"].as_str().unwrap().contains(&format!("reaches back to revision {reach}")),
+        error["detail"].as_str().unwrap().contains(&format!("reaches back to revision {reach}")),
         "{error}"
     );
     assert_eq!(daemon.post("/v1/maps/a/undo", json!({"revision": reach})).await.status(), StatusCode::OK);
@@ -153,5 +153,5 @@ async fn what_is_out_of_reach_cannot_be_undone_and_the_error_says_how_far_it_rea
     let in_memory = Daemon::start_with(|config| config.data_dir = "".into()).await;
     in_memory.make_map("a").await;
     let refused = in_memory.post("/v1/maps/a/undo", json!({"revision": 1})).await;
-    assert_eq!(json_of(refused).await["error"]["reason"], "no_journal");
+    assert_eq!(json_of(refused).await["reason"], "no_journal");
 }

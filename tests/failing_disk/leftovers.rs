@@ -200,7 +200,7 @@ fn undo_reaches_what_it_is_said_to_reach() {
         let observe =
             |scan| folder.observations(&[scan], withdrawn, |_| Ok::<_, Infallible>(()), StopSignal::NEVER);
         assert!(from > map.revision() || observe(from).is_ok());
-        assert!(matches!(observe(from - 1), Err(NotObserved::OutOfReach)));
+        assert!(matches!(observe(from - 1), Err(NotObserved::OutsideUndoWindow)));
         from
     };
     // The snapshots of revisions 10 and 20 are left.

@@ -22,9 +22,9 @@ fn field(tag: u8, bytes: &[u8]) -> Vec<u8> {
 }
 
 /// The first fields of a body: uuid, resolution, levels, filter and revision.
-fn settings(levels: u8, bits_per_voxel: f64) -> Vec<u8> {
+fn settings(levels: u8, bits_per_key: f64) -> Vec<u8> {
     let number = |tag: u8, value: f64| [&[tag][..], &value.to_le_bytes()].concat();
-    let bits = number(0x29, bits_per_voxel);
+    let bits = number(0x29, bits_per_key);
     [&field(0x0a, &[7; 16])[..], &number(0x11, 0.05), &[0x18, levels, 0x20, 1], &bits, &[0x30, 1]].concat()
 }
 

@@ -188,7 +188,7 @@ impl Asker {
             scan.guess = crate::common::guess_pb([0.0; 3]);
             let insert = async |scan| self.calls.grpc.mapping().insert_scan(scan).await;
             if self.calls.call(&format!("insert {map}"), scan, insert).await.is_some() {
-                let undo = async |message| self.calls.grpc.mapping().undo_scans(message).await;
+                let undo = async |message| self.calls.grpc.mapping().undo(message).await;
                 self.calls.call(&format!("undo {map}"), requests::undo(map, "undone", i), undo).await;
             }
         }

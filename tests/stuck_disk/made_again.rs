@@ -35,8 +35,8 @@ async fn make(client: &Client, voxels: usize) -> Uuid {
         ..ScanRequest::new(RobotName::new("r1").unwrap(), points.into())
     };
     let answer = client.insert_scan(&depot(), scan).await.unwrap();
-    assert_eq!(answer.state.revision, 1);
-    answer.state.map_uuid
+    assert_eq!(answer.version.revision, 1);
+    answer.version.map_uuid
 }
 
 async fn wait_until(patience: Duration, mut there: impl FnMut() -> bool) -> bool {
@@ -86,7 +86,7 @@ async fn a_snapshot_that_hangs_does_not_bring_a_deleted_map_back() {
     let server = crate::server(&disk);
     let client = Client::connect(&server.grpc).await.unwrap();
     let listing = client.list_voxels(&depot(), 0, None).await.unwrap();
-    assert_eq!((listing.state.map_uuid, listing.state.revision), (uuid, 1), "another map");
+    assert_eq!((listing.version.map_uuid, listing.version.revision), (uuid, 1), "another map");
     let mut expected: Vec<VoxelKey> = (0..7).map(|x| VoxelKey::new([x, 0, 0]).unwrap()).collect();
     let mut found = listing.keys;
     expected.sort_unstable();

@@ -78,11 +78,11 @@ pub(crate) fn deletion(random: &mut ChaCha8Rng, map: &str) -> pb::DeleteVoxelsRe
     }
 }
 
-pub(crate) fn undo(map: &str, robot: &str, scan_id: u64) -> pb::UndoScansRequest {
+pub(crate) fn undo(map: &str, robot: &str, scan_id: u64) -> pb::UndoRequest {
     let scan = pb::RobotScan { robot: robot.into(), scan_id };
-    pb::UndoScansRequest {
+    pb::UndoRequest {
         map: map.into(),
-        target: Some(pb::undo_scans_request::Target::Scan(scan)),
+        target: Some(pb::undo_request::Target::Scan(scan)),
         ..Default::default()
     }
 }

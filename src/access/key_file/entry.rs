@@ -42,7 +42,7 @@ pub struct KeyEntry {
 impl KeyEntry {
     /// That of a key.
     pub(super) fn of(key: &Key) -> Self {
-        let maps = match &key.reach {
+        let maps = match &key.allowed_maps {
             AllowedMaps::Every => None,
             AllowedMaps::Only(names) => Some(names.iter().map(MapName::to_string).collect()),
         };
@@ -80,8 +80,8 @@ impl KeyEntry {
             Digest::parse(&self.sha256).ok_or("sha256 must be the 64 hexadecimal digits of a hash")?;
         let scope = Scope::ALL.into_iter().find(|scope| scope.as_str() == self.scope);
         let scope = scope.ok_or("scope must be read, insert, write or admin")?;
-        let reach = self.maps.as_deref().map_or(Ok(AllowedMaps::Every), reach_of)?;
-        let mut key = Key::new(name, digest, scope, reach).with_limits(self.limits()?);
+        let allowed_maps = self.maps.as_deref().map_or(Ok(AllowedMaps::Every), allowed_maps_of)?;
+        let mut key = Key::new(name, digest, scope, allowed_maps).with_limits(self.limits()?);
         if let Some(robots) = &self.robots {
             key = key.for_robots(robots_of(robots)?);
         }
@@ -129,7 +129,7 @@ impl KeyEntry {
 
 const BAD_EXPIRES: &str = "expires must be a date or a time with an offset: 2027-01-31T12:00:00Z";
 
-fn reach_of(maps: &[String]) -> Result<AllowedMaps, &'static str> {
+fn allowed_maps_of(maps: &[String]) -> Result<AllowedMaps, &'static str> {
     if maps.is_empty() {
         return Err("maps must name a map; without it the key is for every map");
     }

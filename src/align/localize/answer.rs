@@ -63,10 +63,10 @@ pub struct SearchProgress {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LocalizationError {
     /// Every point is too far away to be on any map.
-    #[error("no point of the scan is within {reach_m} m, farther than two places of the map can lie apart")]
-    NothingInReach {
+    #[error("no point of the scan is within {extent_m} m, farther than two places of the map can lie apart")]
+    NothingInRange {
         /// How far that is, meters.
-        reach_m: f64,
+        extent_m: f64,
     },
     /// There is no map yet.
     #[error("the map is empty: nothing to localize in")]

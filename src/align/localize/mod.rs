@@ -33,7 +33,7 @@ pub use query::{Gravity, LocalizationQuery, LocalizationQueryError, MAP_DOWN, Se
 pub use settings::LocalizationSettings;
 pub use supervision::Supervision;
 
-use super::reach::within_reach;
+use super::extent::within_extent;
 use super::{AlignmentSettings, Verdict};
 use crate::geometry::Point;
 use crate::map::MultiResolutionMap;
@@ -103,13 +103,13 @@ fn search_and_refine(
     alignment: &AlignmentSettings,
     supervision: &mut Supervision<'_>,
 ) -> Result<Localization, Unbuilt> {
-    let (stop, reach_m) = (supervision.stop, map.lattice().reach_m());
+    let (stop, extent_m) = (supervision.stop, map.lattice().extent_m());
     // A copy of the points, and what thinning them takes.
     supervision.take(size_of_val(points) + sample_bytes_max(points.len()))?;
-    let points: &[Point] = &within_reach(points, reach_m, stop);
+    let points: &[Point] = &within_extent(points, extent_m, stop);
     supervision::check(stop)?;
     if points.is_empty() {
-        return Err(LocalizationError::NothingInReach { reach_m }.into());
+        return Err(LocalizationError::NothingInRange { extent_m }.into());
     }
 
     // 1) Take a few hundred points, even over the surfaces that the scan shows.

@@ -19,7 +19,7 @@ use crate::client::Client;
 use crate::geometry::Point;
 use crate::map::{MapName, MultiResolutionMap};
 use crate::scan::{read_points, scan_files};
-use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapState, SEARCH_SHARE};
+use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
 use crate::store::{Disk, Snapshot};
 use crate::util::StopSignal;
 use report::Localized;
@@ -121,15 +121,15 @@ impl Localize {
 
 /// Where the map is.
 enum MapSource {
-    File(Box<MultiResolutionMap>, MapState),
+    File(Box<MultiResolutionMap>, MapVersion),
     Server(Client, MapName),
 }
 
 impl MapSource {
     fn open(file: &Path) -> Result<Self, CliError> {
         let snapshot = Snapshot::read(&Disk::default(), file)?;
-        let state = MapState { revision: snapshot.contents.revision, map_uuid: snapshot.uuid };
-        Ok(Self::File(Box::new(snapshot.restore().map_err(CliError::failed)?), state))
+        let version = MapVersion { revision: snapshot.contents.revision, map_uuid: snapshot.uuid };
+        Ok(Self::File(Box::new(snapshot.restore().map_err(CliError::failed)?), version))
     }
 
     async fn find(
@@ -138,7 +138,7 @@ impl MapSource {
         output: &Output,
     ) -> Result<LocalizationAnswer, CliError> {
         match self {
-            Self::File(map, state) => find_here(map, *state, &request, output),
+            Self::File(map, version) => find_here(map, *version, &request, output),
             Self::Server(client, name) => Ok(client.localize(name, request).await?),
         }
     }
@@ -150,7 +150,7 @@ const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 /// Searches in this process, and says how far that is.
 fn find_here(
     map: &MultiResolutionMap,
-    state: MapState,
+    version: MapVersion,
     request: &LocalizationRequest,
     output: &Output,
 ) -> Result<LocalizationAnswer, CliError> {
@@ -185,5 +185,5 @@ fn find_here(
         },
     )
     .map_err(CliError::failed)?;
-    Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), state))
+    Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), version))
 }

@@ -44,8 +44,8 @@ impl Localized {
             cut_short: answer.cut_short,
             search_ms: answer.search_time.as_secs_f64() * 1e3,
             points_skipped: answer.points_skipped,
-            revision: answer.state.revision,
-            map_uuid: answer.state.map_uuid.to_string(),
+            revision: answer.version.revision,
+            map_uuid: answer.version.map_uuid.to_string(),
         }
     }
 }

@@ -13,13 +13,13 @@ use uuid::Uuid;
 use super::alignment_options::{AlignmentOptions, GuessName, PointOptions};
 use super::error::CliError;
 use super::output::Output;
-use super::parse::{self, LookupName};
+use super::parse;
 use super::scan_report::name_of;
 use super::truth::true_poses;
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::geometry::{Point, Pose};
-use crate::map::{LEVELS_DEFAULT, MapSettings};
+use crate::map::{LEVELS_DEFAULT, Lookup, MapSettings};
 use crate::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
 use crate::store::{Disk, Snapshot};
 use ample::FalsePositives;
@@ -33,7 +33,7 @@ EXAMPLES:
   mrol map scans/ --resolution 0.1 --levels 6 --trajectory-out poses.txt --out hall.mrol
   mrol map scans/ --resolution 0.1 --truth true.txt          errors against known poses
   mrol map scans/ --resolution 0.1 --truth true.txt --at-truth --out hall.mrol
-  mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-voxel 4096
+  mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-key 4096
                                                              are the filters ample? (last line)
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
@@ -83,14 +83,14 @@ pub(super) struct Map {
     #[command(flatten)]
     points: PointOptions,
     /// What the alignment asks: the exact set, or the Bloom filter alone, as in the paper [default: bloom]
-    #[arg(long, value_enum)]
-    lookup: Option<LookupName>,
+    #[arg(long, value_parser = parse::keyword::<Lookup>())]
+    lookup: Option<Lookup>,
     /// Hash functions of the counting Bloom filters, k of eq. (1): 1 to 10
     #[arg(long, value_name = "K", default_value_t = FilterSettings::default().hashes)]
     filter_hashes: u32,
     /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
     #[arg(long, value_name = "BITS", default_value_t = FilterSettings::default().bits_per_key)]
-    filter_bits_per_voxel: f64,
+    filter_bits_per_key: f64,
 }
 
 impl Map {
@@ -121,7 +121,7 @@ impl Map {
     }
 
     fn map_settings(&self) -> MapSettings {
-        let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_voxel };
+        let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
         MapSettings { resolution_m: self.resolution, levels: self.levels, filter }
     }
 
@@ -130,7 +130,7 @@ impl Map {
         let settings = AlignmentSettings {
             method: self.alignment.method().unwrap_or(defaults.method),
             overlap_min: self.min_overlap.unwrap_or(defaults.overlap_min),
-            lookup: self.lookup.map_or(defaults.lookup, Into::into),
+            lookup: self.lookup.unwrap_or(defaults.lookup),
             ..defaults
         };
         settings.checked().map_err(CliError::usage)

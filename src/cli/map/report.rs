@@ -162,7 +162,7 @@ impl Display for FilterSummary {
         )?;
         match self.ample {
             true => write!(f, "ample (below 1), the poses are those of the exact sets"),
-            false => write!(f, "not ample (below 1); more --filter-hashes and --filter-bits-per-voxel are"),
+            false => write!(f, "not ample (below 1); more --filter-hashes and --filter-bits-per-key are"),
         }
     }
 }

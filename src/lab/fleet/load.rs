@@ -1,5 +1,6 @@
 //! Connections that ask again and again.
 
+use crate::util::Keyword;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

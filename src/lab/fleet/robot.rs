@@ -110,7 +110,7 @@ impl Robot {
         };
         let answer = self.client.insert_scan(map, scan).await?;
         match answer.accepted {
-            true => Ok(answer.state.revision),
+            true => Ok(answer.version.revision),
             false => Err(FleetError::failed(format!("a scan was refused: {}", answer.reason))),
         }
     }
@@ -129,7 +129,7 @@ impl Robot {
     /// Takes out what came in since half-way.
     async fn undo_half(&self) -> Result<(), FleetError> {
         let target = UndoTarget::RobotSince { robot: self.name.clone(), revision: self.half_way };
-        self.client.undo_scans(&self.own, Undo { target, request_id: None }).await?;
+        self.client.undo(&self.own, Undo { target, request_id: None }).await?;
         Ok(())
     }
 }

@@ -36,7 +36,7 @@ impl Target {
             resolution_m: settings.resolution_m,
             levels: Some(settings.levels),
             filter_hashes: Some(settings.filter.hashes),
-            filter_bits_per_voxel: Some(settings.filter.bits_per_key),
+            filter_bits_per_key: Some(settings.filter.bits_per_key),
         };
         client.create_map(&map, new_map).await?;
         let resolution_m = settings.resolution_m;

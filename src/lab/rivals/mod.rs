@@ -6,6 +6,7 @@ mod hash_set;
 mod hash_tables;
 mod ours;
 mod paper;
+mod weighted_sum;
 
 use std::fmt::{self, Display};
 
@@ -18,6 +19,7 @@ pub use hash_set::{HashSet, hash_set_bytes};
 pub use hash_tables::HashTables;
 pub use ours::{Kernel, ThroughMap};
 pub use paper::PaperFilter;
+pub use weighted_sum::WeightedSum;
 
 /// Which structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

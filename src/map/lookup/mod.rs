@@ -17,6 +17,7 @@ mod voxels;
 use super::OccupiedVoxelList;
 use super::sharding::SHARDS;
 use crate::geometry::Point;
+use crate::util::Keyword;
 use crate::voxel::{LatticeFromPoints, Slots};
 
 /// Which of the two structures of a level answers (paper II).
@@ -29,9 +30,10 @@ pub enum Lookup {
     Bloom,
 }
 
-impl Lookup {
-    /// `exact` or `bloom`.
-    pub fn as_str(self) -> &'static str {
+impl Keyword for Lookup {
+    const ALL: &'static [Self] = &[Self::Exact, Self::Bloom];
+
+    fn as_str(self) -> &'static str {
         match self {
             Self::Exact => "exact",
             Self::Bloom => "bloom",

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::map::WithdrawnScan;
 use crate::store::StoreSettings;
 use crate::store::journal::{Journal, JournalUse, SegmentedJournal};
-use crate::store::retention::{self, UndoReach};
+use crate::store::retention::{self, UndoWindow};
 use crate::store::snapshot_files::Sizes;
 use crate::sync::{Mutex, MutexGuard, Rank};
 
@@ -213,10 +213,10 @@ impl Facts {
     }
 
     /// Forgets the snapshots that nobody needs any more: nobody begins to read them from now on. Those that are kept.
-    pub(super) fn forget(&self, reach: UndoReach, withdrawn: &[WithdrawnScan], sizes: &Sizes) -> Vec<u64> {
+    pub(super) fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnScan], sizes: &Sizes) -> Vec<u64> {
         let mut known = self.lock();
         let head = known.snapshots.last().copied().unwrap_or_default();
-        let mut kept = retention::kept_within(&known.snapshots, head, reach, withdrawn, sizes);
+        let mut kept = retention::kept_within(&known.snapshots, head, window, withdrawn, sizes);
         kept.extend_from_slice(&known.pinned);
         kept.sort_unstable();
         kept.dedup();

@@ -23,7 +23,7 @@ pub struct Observed {
 pub enum NotObserved<E> {
     /// The journal does not reach back to the first of the scans.
     #[error("the journal does not reach back to the first of the scans")]
-    OutOfReach,
+    OutsideUndoWindow,
     /// Nobody waits for it any more, or its time is up.
     #[error("it was stopped")]
     Stopped,
@@ -50,7 +50,7 @@ impl MapFolder {
         mut reserve: impl FnMut(u64) -> Result<(), E>,
         stop: StopSignal<'_>,
     ) -> Result<Observed, NotObserved<E>> {
-        let pin = self.facts.pin_base_of(scans, withdrawn).ok_or(NotObserved::OutOfReach)?;
+        let pin = self.facts.pin_base_of(scans, withdrawn).ok_or(NotObserved::OutsideUndoWindow)?;
         let mut observations = VoxelOwnership::of(scans.to_vec(), withdrawn);
         self.touch(&mut observations, &mut reserve, stop)?;
         let (revision, path) = (pin.snapshot, self.path.file(&snapshot_name(pin.snapshot)));

@@ -25,7 +25,7 @@ pub(super) mod number {
     pub(in crate::store::snapshot) const RESOLUTION_M: u64 = 2;
     pub(in crate::store::snapshot) const LEVELS: u64 = 3;
     pub(in crate::store::snapshot) const FILTER_HASHES: u64 = 4;
-    pub(in crate::store::snapshot) const FILTER_BITS_PER_VOXEL: u64 = 5;
+    pub(in crate::store::snapshot) const FILTER_BITS_PER_KEY: u64 = 5;
     pub(in crate::store::snapshot) const REVISION: u64 = 6;
     pub(in crate::store::snapshot) const BLOCK_KEYS: u64 = 7;
     pub(in crate::store::snapshot) const BLOCK_MASKS: u64 = 8;
@@ -130,7 +130,7 @@ impl<'a> Body<'a> {
             (number::RESOLUTION_M, Fixed64(bits)) => self.settings[0] = f64::from_bits(bits),
             (number::LEVELS, Varint(levels)) => self.levels = small(levels, "levels")?,
             (number::FILTER_HASHES, Varint(hashes)) => self.hashes = small(hashes, "filter_hashes")?,
-            (number::FILTER_BITS_PER_VOXEL, Fixed64(bits)) => self.settings[1] = f64::from_bits(bits),
+            (number::FILTER_BITS_PER_KEY, Fixed64(bits)) => self.settings[1] = f64::from_bits(bits),
             (number::REVISION, Varint(revision)) => self.revision = revision,
             (number::BLOCK_KEYS, Bytes(keys)) if self.block_keys.is_empty() => self.block_keys = keys,
             (number::BLOCK_MASKS, Bytes(masks)) if self.block_masks.is_empty() => self.block_masks = masks,

@@ -25,7 +25,7 @@ pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
         resolution_m: settings.resolution_m,
         levels: settings.levels,
         filter_hashes: settings.filter.hashes,
-        filter_bits_per_voxel: settings.filter.bits_per_key,
+        filter_bits_per_key: settings.filter.bits_per_key,
         revision: *revision,
         ..pb::Snapshot::default()
     }

@@ -15,7 +15,7 @@ const METHODS: [&str; 18] = [
     "Mapping/AlignScan",
     "Mapping/Localize",
     "Mapping/DeleteVoxels",
-    "Mapping/UndoScans",
+    "Mapping/Undo",
     "Mapping/GetTrajectory",
     "Mapping/StreamTrajectory",
     "Maps/CreateMap",

@@ -92,7 +92,7 @@ impl Hosted {
     /// Changes of the map; none where it is gone.
     pub(super) fn revision(&self) -> Option<u64> {
         let state = self.runtime.block_on(self.service.maps().trajectory(&name(), Default::default()));
-        state.ok().map(|answer| answer.state.revision)
+        state.ok().map(|answer| answer.version.revision)
     }
 
     /// Makes the maps what they were at first, where a change was made.

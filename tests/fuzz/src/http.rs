@@ -54,8 +54,8 @@ fn check_refusal(answer: &Answer) {
     assert!(expected, "{}: {text}", answer.status);
     if !answer.body.is_empty() {
         let error: Value = serde_json::from_slice(&answer.body).expect("an error in JSON");
-        for field in ["code", "reason", "message"] {
-            assert!(error["error"][field].as_str().is_some_and(|text| !text.is_empty()), "{field}: {text}");
+        for field in ["code", "reason", "detail"] {
+            assert!(error[field].as_str().is_some_and(|text| !text.is_empty()), "{field}: {text}");
         }
     }
 }

@@ -1,5 +1,6 @@
 //! `mrol bench align`: how long an alignment takes.
 
+use crate::util::Keyword;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 

@@ -21,7 +21,7 @@ use crate::voxel::VoxelSet;
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol bench lookup --structures bloom,exact,hashset,dense,paper --json
-  mrol bench lookup --workload site --order scan --filter-bits-per-voxel 27
+  mrol bench lookup --workload site --order scan --filter-bits-per-key 27
   mrol bench lookup --voxels map.ply --points scan.f32 --resolution 0.05 --json
   mrol bench lookup --voxels map.ply --points scan.ply --resolution 0.05 --pose \"1 2 0 0 0 0 1\" --level 1
 

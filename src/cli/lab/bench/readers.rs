@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::workload::{MapOptions, WorkloadOptions, size_of};
 use crate::cli::error::CliError;
 use crate::cli::output::Output;
-use crate::cli::parse::LookupName;
+use crate::cli::parse;
 use crate::lab::measure::readers::{Crowd, Throughput, run};
-use crate::map::MultiResolutionMap;
+use crate::map::{Lookup, MultiResolutionMap};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -30,8 +30,8 @@ pub(super) struct Readers {
     #[command(flatten)]
     map: MapOptions,
     /// What is asked: the exact set, or the Bloom filter
-    #[arg(long, value_enum, default_value_t = LookupName::Bloom)]
-    lookup: LookupName,
+    #[arg(long, value_parser = parse::keyword::<Lookup>(), default_value = "bloom")]
+    lookup: Lookup,
     /// Readers at once
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
     readers: u16,
@@ -66,7 +66,7 @@ impl Readers {
         let mut rounds = vec![Vec::new(); crowds.len()];
         for _ in 0..self.rounds {
             for (crowd, rounds) in crowds.iter().zip(&mut rounds) {
-                rounds.push(run(map, &queries, self.lookup.into(), *crowd, time));
+                rounds.push(run(map, &queries, self.lookup, *crowd, time));
             }
         }
         rounds.into_iter().map(middle).collect()

@@ -103,12 +103,12 @@ pub(in crate::cli) struct MapOptions {
     filter_hashes: u32,
     /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
     #[arg(long, value_name = "BITS", default_value_t = FilterSettings::default().bits_per_key)]
-    filter_bits_per_voxel: f64,
+    filter_bits_per_key: f64,
 }
 
 impl MapOptions {
     pub(in crate::cli) fn settings(&self, resolution_m: f64) -> Result<MapSettings, CliError> {
-        let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_voxel };
+        let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
         MapSettings { resolution_m, levels: self.levels, filter }.checked().map_err(CliError::usage)
     }
 

@@ -64,7 +64,7 @@ impl Journal {
             error_deg: news.error.1,
             new_voxels: answer.new_voxels,
             voxels: self.voxels,
-            revision: answer.state.revision,
+            revision: answer.version.revision,
             planner_points_per_s: told.points_per_s(),
             planner_share_occupied: told.share_occupied(),
         }

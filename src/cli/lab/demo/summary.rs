@@ -81,7 +81,7 @@ impl Serialize for Summary<'_> {
         let voxels = self.info.levels.first().map(|finest| finest.voxels);
         let summary = json!({
             "robots": robots, "planner": planner, "voxels": voxels,
-            "revision": self.info.state.revision, "problems": self.checks.problems(),
+            "revision": self.info.version.revision, "problems": self.checks.problems(),
         });
         json!({ "summary": summary }).serialize(serializer)
     }

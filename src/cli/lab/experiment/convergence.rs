@@ -1,5 +1,6 @@
 //! `mrol experiment convergence`: from how far off a guess an alignment finds the pose.
 
+use crate::util::Keyword;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,6 @@
 //! `mrol experiment simulation`: poses with the filter and without, on a simulated sequence (paper IV-B).
 
+use crate::util::Keyword;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
@@ -25,7 +26,7 @@ use crate::mapping::Guess;
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol experiment simulation --out results/
-  mrol experiment simulation --out results/ --scans 200 --small-filter-bits-per-voxel 4 --json
+  mrol experiment simulation --out results/ --scans 200 --small-filter-bits-per-key 4 --json
 
 \"With a Bloom filter size of 6 x 10^6 the pose solutions obtained were identical however at 6 x 10^5 a position error of
 around 0.02m was introduced\" (IV-B). A depth camera goes through a furnished building; each scan is aligned from the
@@ -53,7 +54,7 @@ pub(super) struct Simulation {
     levels: u32,
     /// Bits of the planes a voxel of the filter that is too small: 1 to 4096
     #[arg(long, value_name = "BITS", default_value_t = 1.5)]
-    small_filter_bits_per_voxel: f64,
+    small_filter_bits_per_key: f64,
     /// Which simulated robot's tour
     #[arg(long, value_enum, default_value_t)]
     robot: RobotKind,
@@ -123,7 +124,7 @@ impl Simulation {
     /// The exact set first: the others are compared with it. The ample filter last: its curve is drawn on top.
     fn answers(&self) -> [Answers; 4] {
         let filter = FilterSettings::default();
-        let small = FilterSettings { bits_per_key: self.small_filter_bits_per_voxel, ..filter };
+        let small = FilterSettings { bits_per_key: self.small_filter_bits_per_key, ..filter };
         let ample = FilterSettings { hashes: 10, bits_per_key: 2048.0 };
         [
             Answers { name: "exact set", lookup: Lookup::Exact, filter },
@@ -211,7 +212,7 @@ fn unjudged(method: Method, lookup: Lookup) -> AlignmentSettings {
         lookup,
         overlap_min: 0.0,
         undetermined_std: f64::MAX,
-        refinement_reach: f64::MAX,
+        refinement_max_correction: f64::MAX,
         multi_start: MultiStartSettings {
             fitness_below: 0.0,
             std_above: f64::MAX,
@@ -295,7 +296,7 @@ fn write_runs(runs: &[(Run, Vec<Pose>)], path: &Path) -> Result<(), CliError> {
         table.push([
             line.method.to_owned(),
             line.answers.to_owned(),
-            line.filter_bits_per_voxel.map_or("-".to_owned(), |bits| bits.to_string()),
+            line.filter_bits_per_key.map_or("-".to_owned(), |bits| bits.to_string()),
             rate,
             millimeters(line.error_m_median, line.error_deg_median),
             millimeters(line.error_m_max, line.error_deg_max),
@@ -312,7 +313,7 @@ struct Line {
     method: &'static str,
     answers: &'static str,
     filter_hashes: Option<u32>,
-    filter_bits_per_voxel: Option<f64>,
+    filter_bits_per_key: Option<f64>,
     false_positive_rate: Option<f64>,
     /// At most, in all look-ups of the run.
     expected_false_positives: Option<f64>,
@@ -342,7 +343,7 @@ impl Line {
             method: run.method.as_str(),
             answers: run.answers.name,
             filter_hashes: filter.map(|filter| filter.hashes),
-            filter_bits_per_voxel: filter.map(|filter| filter.bits_per_key),
+            filter_bits_per_key: filter.map(|filter| filter.bits_per_key),
             false_positive_rate: filter.map(|_| run.filter.expected_false_positive_rate),
             expected_false_positives: filter.map(|_| run.filter.expected_false_positives),
             scans: run.scans.len(),
@@ -372,7 +373,7 @@ fn millimeters(meters: f64, degrees: f64) -> String {
 impl Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { method, answers, scans, .. } = self;
-        let bits = self.filter_bits_per_voxel.map_or("-".to_owned(), |bits| bits.to_string());
+        let bits = self.filter_bits_per_key.map_or("-".to_owned(), |bits| bits.to_string());
         let rate = self.false_positive_rate.map_or("none".to_owned(), |rate| format!("{rate:.1e}"));
         let median = millimeters(self.error_m_median, self.error_deg_median);
         let max = millimeters(self.error_m_max, self.error_deg_max);

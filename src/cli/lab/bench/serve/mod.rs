@@ -10,9 +10,11 @@ use super::workload::{MapOptions, WorkloadOptions};
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
-use crate::cli::parse::LookupName;
+use crate::cli::parse;
 use crate::cli::remote::CredentialOptions;
 use crate::lab::fleet::{Daemon, GrpcAddress, HttpAddress, Load, Question, Target};
+use crate::map::Lookup;
+use crate::util::Keyword;
 use report::Line;
 
 const EXAMPLES: &str = "\
@@ -59,8 +61,8 @@ pub(super) struct Serve {
     #[arg(long, value_name = "N", value_delimiter = ',', default_values = ["1000", "10000", "100000", "1000000"], value_parser = message_points)]
     points: Vec<usize>,
     /// What is asked: the exact set, or the Bloom filter
-    #[arg(long, value_enum, default_value_t = LookupName::Bloom)]
-    lookup: LookupName,
+    #[arg(long, value_parser = parse::keyword::<Lookup>(), default_value = "bloom")]
+    lookup: Lookup,
     /// Connections that ask at once
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     connections: u16,
@@ -114,12 +116,12 @@ impl Serve {
 
     async fn measure(&self, target: &Target, time: Duration, output: &Output) -> Result<(), CliError> {
         let (voxels, connections) = (count(target.voxels), self.connections);
-        let (workload, lookup) = (&self.workload, crate::map::Lookup::from(self.lookup).as_str());
+        let (workload, lookup) = (&self.workload, self.lookup.as_str());
         output.say(format!("{workload}: {voxels} voxels, {lookup} look-ups, {connections} connections"))?;
         output.say(Line::HEAD)?;
         let queries = self.workload.queries(1);
         for &points in &self.points {
-            let question = Question::of(&queries, points, self.lookup.into());
+            let question = Question::of(&queries, points, self.lookup);
             for &protocol in &self.protocols {
                 let Some(load) = self.load(protocol, target, &question) else { continue };
                 // Until connections, windows and caches are as they will be.

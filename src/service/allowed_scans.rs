@@ -8,21 +8,21 @@ use crate::map::RobotName;
 
 /// The robots in whose names a caller may send and undo scans, and how much more it may undo.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ScanReach {
+pub struct AllowedScans {
     /// The robots; none = every robot.
     pub robots: Option<Arc<BTreeSet<RobotName>>>,
     /// Whether changes may be undone whoever made them: scans of every robot since a revision, and deletions.
     pub undo_of_others: bool,
 }
 
-impl Default for ScanReach {
+impl Default for AllowedScans {
     /// Scans of every robot, and every undo.
     fn default() -> Self {
         Self { robots: None, undo_of_others: true }
     }
 }
 
-impl ScanReach {
+impl AllowedScans {
     /// Asks whether a scan of `robot` may be sent or undone.
     ///
     /// # Errors
@@ -48,7 +48,8 @@ impl ScanReach {
                 Err(robot_not_allowed(robots, "a revision, which may be another robot's or a deletion"))
             }
             (UndoTarget::Revision(_), None) if !self.undo_of_others => {
-                let message = "UndoScans of a revision takes scope write, the key has insert: name a robot and its scan";
+                let message =
+                    "Undo of a revision takes scope write, the key has insert: name a robot and its scan";
                 Err(ServiceError::new(ErrorCode::PermissionDenied, "scope_too_small", message))
             }
             (UndoTarget::Revision(_), None) => Ok(()),
@@ -69,17 +70,18 @@ mod tests {
     #[test]
     fn a_caller_undoes_scans_of_its_robots_and_nothing_else() {
         let robot = |name| RobotName::new(name).unwrap();
-        let reason = |reach: &ScanReach, target| reach.permit_undo(&target).err().map(|error| error.reason);
+        let reason =
+            |reach: &AllowedScans, target| reach.permit_undo(&target).err().map(|error| error.reason);
         let scan = |name| UndoTarget::Scan { robot: robot(name), scan_id: 1 };
         let since = |name| UndoTarget::RobotSince { robot: robot(name), revision: 1 };
-        let own = ScanReach { robots: Some(Arc::new([robot("r1")].into())), undo_of_others: false };
+        let own = AllowedScans { robots: Some(Arc::new([robot("r1")].into())), undo_of_others: false };
         assert_eq!([reason(&own, scan("r1")), reason(&own, since("r1"))], [None, None]);
         for other in [scan("r2"), since("r2"), UndoTarget::Revision(1)] {
             assert_eq!(reason(&own, other), Some("robot_not_allowed"));
         }
-        let inserting = ScanReach { robots: None, undo_of_others: false };
+        let inserting = AllowedScans { robots: None, undo_of_others: false };
         assert_eq!(reason(&inserting, scan("r2")), None);
         assert_eq!(reason(&inserting, UndoTarget::Revision(1)), Some("scope_too_small"));
-        assert_eq!(reason(&ScanReach::default(), UndoTarget::Revision(1)), None);
+        assert_eq!(reason(&AllowedScans::default(), UndoTarget::Revision(1)), None);
     }
 }

@@ -8,12 +8,13 @@ use axum::http::request::Parts;
 use serde::de::DeserializeOwned;
 
 use super::Adapter;
-use super::error::{HttpError, excerpt};
+use super::error::HttpError;
 use super::unreadable;
 use crate::access::Authorized;
 use crate::geometry::{self, Pose};
 use crate::map::{MapName, RequestId};
 use crate::service::ServiceError;
+use crate::util::excerpt;
 use crate::wire::InField;
 
 /// The `{map}` of a route, which the caller may name: who may not is told so before a body is read.
@@ -26,7 +27,7 @@ impl FromRequestParts<Adapter> for Map {
         let path = Path::<String>::from_request_parts(parts, adapter).await;
         let text = path.map_err(|rejection| ServiceError::invalid("bad_name", rejection.body_text()))?;
         let name = MapName::new(&text).map_err(ServiceError::from)?;
-        Authorized::of(&parts.extensions)?.caller.reach().permit(&name)?;
+        Authorized::of(&parts.extensions)?.caller.allowed_maps().permit(&name)?;
         Ok(Self(name))
     }
 }
@@ -37,9 +38,9 @@ pub(super) fn request_id_of(text: Option<String>) -> Result<Option<RequestId>, S
 }
 
 /// The parameters of a request without a body.
-pub(super) struct Parameters<T>(pub(super) T);
+pub(super) struct Params<T>(pub(super) T);
 
-impl<T: DeserializeOwned> FromRequestParts<Adapter> for Parameters<T> {
+impl<T: DeserializeOwned> FromRequestParts<Adapter> for Params<T> {
     type Rejection = HttpError;
 
     async fn from_request_parts(parts: &mut Parts, _: &Adapter) -> Result<Self, HttpError> {
@@ -48,9 +49,9 @@ impl<T: DeserializeOwned> FromRequestParts<Adapter> for Parameters<T> {
 }
 
 /// The parameters of a request that takes none: whoever gives one means something that would not happen.
-pub(super) struct NoParameters;
+pub(super) struct NoParams;
 
-impl<S: Sync> FromRequestParts<S> for NoParameters {
+impl<S: Sync> FromRequestParts<S> for NoParams {
     type Rejection = HttpError;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, HttpError> {

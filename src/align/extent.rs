@@ -8,11 +8,15 @@ use crate::util::StopSignal;
 /// Points that are looked at between two looks at the stop signal: far below a millisecond.
 const POINTS_PER_LOOK: usize = 64 << 10;
 
-/// The points within `reach_m` of the sensor: all of an ordinary scan, without a copy. Others, and what is not finite,
+/// The points within `extent_m` of the sensor: all of an ordinary scan, without a copy. Others, and what is not finite,
 /// fall on no map wherever the sensor is, and one of them would be all that ranges and sums of squares tell. Once stopped,
 /// some of them.
-pub(super) fn within_reach<'a>(points: &'a [Point], reach_m: f64, stop: StopSignal<'_>) -> Cow<'a, [Point]> {
-    let is_near = |point: &Point| point.to_f64().coords.norm() <= reach_m;
+pub(super) fn within_extent<'a>(
+    points: &'a [Point],
+    extent_m: f64,
+    stop: StopSignal<'_>,
+) -> Cow<'a, [Point]> {
+    let is_near = |point: &Point| point.to_f64().coords.norm() <= extent_m;
     let mut near: Option<Vec<Point>> = None;
     for (chunk, points_of_chunk) in points.chunks(POINTS_PER_LOOK).enumerate() {
         let before = &points[..chunk * POINTS_PER_LOOK];
@@ -34,20 +38,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_beyond_reach_goes_and_nothing_is_copied_where_all_is_within() {
+    fn what_is_beyond_the_extent_goes_and_nothing_is_copied_where_all_is_within() {
         let wall: Vec<Point> = (0..200_000).map(|i| Point::new(i as f32 * 1e-3, 0.0, 1.0)).collect();
         assert!(
-            matches!(within_reach(&wall, 1e3, StopSignal::NEVER), Cow::Borrowed(all) if all.len() == wall.len())
+            matches!(within_extent(&wall, 1e3, StopSignal::NEVER), Cow::Borrowed(all) if all.len() == wall.len())
         );
         let far = [1e30, f32::MAX, f32::INFINITY, f32::NAN, 1001.0].map(|x| Point::new(x, 0.0, 0.0));
         let mut mixed = wall.clone();
         for (i, point) in far.into_iter().enumerate() {
             mixed.insert(i * 40_000, point);
         }
-        assert_eq!(*within_reach(&mixed, 1e3, StopSignal::NEVER), *wall);
+        assert_eq!(*within_extent(&mixed, 1e3, StopSignal::NEVER), *wall);
         let looks = std::cell::Cell::new(0);
         let count = || looks.replace(looks.get() + 1) == usize::MAX;
-        within_reach(&mixed, 1e3, StopSignal::when(&count));
+        within_extent(&mixed, 1e3, StopSignal::when(&count));
         assert_eq!(looks.get(), mixed.len().div_ceil(POINTS_PER_LOOK));
     }
 }
