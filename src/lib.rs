@@ -60,12 +60,10 @@ pub mod grpc;
 pub mod http;
 #[cfg(feature = "simulate")]
 pub mod lab;
-#[cfg(feature = "server")]
-pub mod lifecycle;
 pub mod map;
 pub mod mapping;
 #[cfg(feature = "server")]
-pub mod reload;
+pub mod middleware;
 pub mod scan;
 #[cfg(feature = "server")]
 pub mod server;

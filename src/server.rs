@@ -36,12 +36,12 @@ use tokio::task::{JoinError, JoinSet};
 use tokio::time::{sleep, timeout};
 
 use crate::access::{Access, Gate};
-use crate::admission::Admission;
+use crate::admission::{Admission, Lifecycle};
 use crate::config::Config;
-use crate::lifecycle::Lifecycle;
-use crate::service::{Gauges, MapService, ServiceSettings};
+use crate::middleware::Middleware;
+use crate::service::{Gauges, MapService, Observer, ServiceSettings};
 use crate::store::OpeningProgress;
-use crate::telemetry::{MeteredService, Metrics};
+use crate::telemetry::{Audit, Metrics, RequestRecorder};
 use crate::{grpc, http};
 use background::keep_house;
 use endpoint::Endpoint;
@@ -69,7 +69,8 @@ pub struct Server {
     config: Config,
     access: Access,
     tls: Option<Tls>,
-    service: MeteredService,
+    service: MapService,
+    recorder: RequestRecorder,
     lifecycle: Lifecycle,
     http: TcpSocket,
     grpc: TcpSocket,
@@ -98,11 +99,12 @@ impl Server {
         let limits = rlimit::within_allowed(config.limits).within_memory(allowed_bytes);
         let config = Config { limits, ..config };
         let (access, tls) = (access_policy::access(&config)?, Tls::of(&config.tls)?);
-        let settings = ServiceSettings { gauges: Some(gauges), ..config.service_settings() };
+        let (metrics, audit) = (Metrics::new()?, Audit::default());
+        let observers: Vec<Arc<dyn Observer>> = vec![Arc::new(metrics.clone()), Arc::new(audit.clone())];
+        let settings = ServiceSettings { gauges: Some(gauges), observers, ..config.service_settings() };
         let http = TcpSocket::bind(Protocol::Http, config.http.listen)?;
         let progress = Arc::new(OpeningProgress::default());
         tracing::info!(http = %http.address, data_dir = ?settings.data_dir, "opening the maps");
-        let metrics = Metrics::new()?;
         let routes = http::starting(Arc::clone(&progress), access.clone());
         let starting = Starting::serve(&http, tls.clone(), routes, &config.limits, metrics.clone());
         let _until_open = CancelOpening(Arc::clone(&progress));
@@ -112,7 +114,8 @@ impl Server {
             .map_err(|panic| ServerError::Stopped("opening the maps", panic.to_string()))?
             .map_err(ServerError::Open)?;
         Ok(Self {
-            service: MeteredService::new(service, metrics),
+            service,
+            recorder: RequestRecorder::new(metrics, audit),
             access,
             tls,
             lifecycle: Lifecycle::default(),
@@ -155,7 +158,7 @@ impl Server {
             keys: self.config.access.expiry_warning(),
             certificates: self.config.tls.expiry_warning(),
         };
-        ReloadableFiles::new(self.access.clone(), self.tls.clone(), self.service.metrics().clone(), warnings)
+        ReloadableFiles::new(self.access.clone(), self.tls.clone(), self.recorder.metrics().clone(), warnings)
     }
 
     /// The time after which a server that was told to end is down, or has failed to be: the delay before draining, what
@@ -178,15 +181,16 @@ impl Server {
     /// of the runtime is then in its hands, so that the runtime has to be left behind
     /// ([`tokio::runtime::Runtime::shutdown_background`]).
     pub async fn run(self, shutdown: impl Future<Output = ()>) -> Result<(), ServerError> {
-        let Self { config, access, tls, service, lifecycle, .. } = &self;
+        let Self { config, access, tls, service, recorder, lifecycle, .. } = &self;
+        let metrics = recorder.metrics().clone();
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
         let admission = Admission::new(&config.limits.admission(), lifecycle.clone());
-        let (routes, health) = grpc::routes(gate.clone(), admission.clone(), bytes_max)?;
-        let router = http::router(gate, admission.clone(), bytes_max);
-        let endpoint = |protocol, router| {
-            Endpoint::new(protocol, router, tls.clone(), &config.limits, service.metrics().clone())
-        };
+        let middleware = Middleware::new(gate, admission.clone(), recorder.clone());
+        let (routes, health) = grpc::routes(&middleware, bytes_max)?;
+        let router = http::router(&middleware, bytes_max);
+        let endpoint =
+            |protocol, router| Endpoint::new(protocol, router, tls.clone(), &config.limits, metrics.clone());
         let grpc = endpoint(Protocol::Grpc, routes.into_axum_router());
         let http = endpoint(Protocol::Http, router);
 
@@ -194,16 +198,16 @@ impl Server {
         let files = self.files();
         let mut shutdown = pin!(shutdown);
         tokio::select! {
-            () = measure(&service) => {}
+            () = measure(&service, &metrics) => {}
             () = &mut shutdown => {
                 tracing::info!("told to end before it served: ends");
                 return Ok(());
             }
         }
         let mut accepting = self.accept(&grpc, &http);
-        let watching = tokio::spawn(watch(service.clone(), admission));
+        let watching = tokio::spawn(watch(service.clone(), metrics.clone(), admission));
         let looking = tokio::spawn(files.look_after(lifecycle.clone()));
-        let housekeeping = tokio::spawn(keep_house(service.clone(), lifecycle.clone()));
+        let housekeeping = tokio::spawn(keep_house(service.clone(), metrics, lifecycle.clone()));
         health.set_serving().await;
 
         let ended = tokio::select! {
@@ -237,7 +241,7 @@ impl Server {
         let saving = async {
             // They end by themselves when draining begins; waiting keeps the last saving of the one apart from this.
             let _ended = tokio::join!(housekeeping, watching);
-            service.maps().save().await
+            service.save().await
         };
         let most = saving_max(&config);
         let saved = timeout(most, saving).await;

@@ -5,15 +5,14 @@ use axum::http::{Extensions, HeaderMap, Request};
 
 use super::{Access, Caller, Operation, Secret};
 use crate::map::CallerName;
-use crate::service::{ErrorCode, ServiceError};
-use crate::telemetry::{MeteredService, Metrics};
+use crate::service::{ErrorCode, MapService, ServiceError};
 
 /// The only holder of a service that reaches every map. Handlers get theirs of [`Gate::authorize`], so that none can
 /// reach more than its caller may.
 #[derive(Debug, Clone)]
 pub struct Gate {
     access: Access,
-    service: MeteredService,
+    service: MapService,
 }
 
 /// What a request that was let in is answered with.
@@ -22,7 +21,7 @@ pub struct Authorized {
     /// Who asks.
     pub caller: Caller,
     /// The maps that the caller may name.
-    pub service: MeteredService,
+    pub service: MapService,
 }
 
 impl Authorized {
@@ -40,7 +39,7 @@ impl Authorized {
 
 impl Gate {
     /// Lets in to `service` whom `access` allows.
-    pub fn new(access: Access, service: MeteredService) -> Self {
+    pub fn new(access: Access, service: MapService) -> Self {
         Self { access, service }
     }
 
@@ -67,11 +66,6 @@ impl Gate {
     /// `PermissionDenied` where it does not.
     pub fn check_host<B>(&self, request: &Request<B>) -> Result<(), ServiceError> {
         self.access.check_host(request)
-    }
-
-    /// Where requests are counted.
-    pub fn metrics(&self) -> &Metrics {
-        self.service.metrics()
     }
 }
 

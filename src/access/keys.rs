@@ -8,8 +8,8 @@ use subtle::ConditionallySelectable;
 
 use super::key::Ended;
 use super::key_file::{self, KeyFileError};
+use super::reload::is_open_to_others;
 use super::{Expiry, Key, KeyName, Secret};
-use crate::reload::is_open_to_others;
 
 /// All keys of a file.
 #[derive(Debug)]

@@ -5,7 +5,6 @@
 //! every map and every robot that the key is not for.
 
 mod allowance;
-mod answer;
 mod caller;
 mod expiry;
 mod gate;
@@ -13,13 +12,13 @@ mod key;
 mod key_file;
 mod keys;
 mod operation;
+mod reload;
 mod rules;
 mod scope;
 mod secret;
 mod site;
 
 pub use allowance::{Allowance, InWork, KeyLimits};
-pub use answer::{Ending, revocable};
 pub use caller::Caller;
 pub use expiry::Expiry;
 pub use gate::{Authorized, Gate};
@@ -27,6 +26,7 @@ pub use key::{Key, KeyName};
 pub use key_file::{KeyEntry, KeyFileError, add_to_file, list_file, revoke_in_file, rotate_in_file, to_toml};
 pub use keys::Keys;
 pub use operation::{Operation, Route};
+pub use reload::{Reload, ReloadableFile, is_open_to_others};
 pub use rules::{Access, KEY_UNKNOWN};
 pub use scope::Scope;
 pub use secret::{Digest, Secret};

@@ -116,6 +116,11 @@ impl Operation {
         matches!(self, Self::QueryPointsStream | Self::InsertScanStream | Self::Reflect | Self::HealthWatch)
     }
 
+    /// True for streams whose messages are requests of their own, each counted when it is answered.
+    pub fn is_stream_of_requests(self) -> bool {
+        matches!(self, Self::QueryPointsStream | Self::InsertScanStream)
+    }
+
     /// The operation of a gRPC call.
     pub fn of_call(path: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|operation| operation.grpc() == Some(path))

@@ -6,9 +6,9 @@ use std::time::{Duration, SystemTime};
 
 use axum::http::Request;
 
+use super::reload::ReloadableFile;
 use super::site::{Hosts, check_origin};
 use super::{Caller, Expiry, Key, KeyFileError, KeyName, Keys, Operation, Scope, Secret};
-use crate::reload::ReloadableFile;
 use crate::service::{AllowedMaps, ErrorCode, ServiceError};
 
 /// The rules of a server. A clone is another handle on the same ones.

@@ -7,11 +7,11 @@ use std::time::Duration;
 use parking_lot::Mutex;
 use tokio_util::sync::CancellationToken;
 
-use super::InUse;
 use super::inbound_body::{Body, CloseConnection, InboundBody};
 use super::limits::AdmissionLimits;
 use super::quota::Quota;
 use crate::service::{ErrorCode, ServiceError};
+use crate::telemetry::InUse;
 
 /// A body of a request that was silent for less than this gives way to nobody: it may be on a slow path.
 const GRACE: Duration = Duration::from_secs(1);

@@ -13,9 +13,10 @@
 //! once (`probes_max`, `probe_body_bytes_max`, `probe_time_max`), few scrapes (`scrapes_max`) and few watches
 //! (`health_watches_max`).
 
+mod answer_body;
 mod bodies;
-mod held_body;
 mod inbound_body;
+mod lifecycle;
 mod limits;
 mod metered_body;
 mod of_connection;
@@ -23,8 +24,10 @@ mod probes;
 mod quota;
 mod rate;
 
+pub use answer_body::{Ending, Endings};
 pub use bodies::{BODY_SILENT, MemoryPermit};
 pub use inbound_body::{CloseConnection, InboundBody};
+pub use lifecycle::{Lifecycle, draining};
 pub use limits::AdmissionLimits;
 pub use of_connection::OfConnection;
 pub use rate::{Peer, RateLimitKey};
@@ -39,10 +42,10 @@ use axum::http::Method;
 use axum::response::Response;
 
 use crate::access::{Authorized, Operation};
-use crate::lifecycle::Lifecycle;
 use crate::service::ServiceError;
+use crate::telemetry::InUse;
+use answer_body::AnswerBody;
 use bodies::Bodies;
-use held_body::HeldBody;
 use metered_body::MeteredBody;
 use probes::Probes;
 use quota::Quota;
@@ -79,19 +82,6 @@ fn answer_bytes(response: &mut Response) -> usize {
     if bytes > SMALL_ANSWER_BYTES { bytes } else { 0 }
 }
 
-/// How much of what is limited is in use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct InUse {
-    /// Requests in work.
-    pub requests: usize,
-    /// Requests whose bodies are arriving.
-    pub arriving: usize,
-    /// Streams.
-    pub streams: usize,
-    /// Bytes of bodies and answers.
-    pub bytes: usize,
-}
-
 impl Admission {
     /// Nobody is in.
     pub fn new(limits: &AdmissionLimits, lifecycle: Lifecycle) -> Self {
@@ -105,7 +95,7 @@ impl Admission {
         }))
     }
 
-    /// Lets a request in and answers it by `handle`. It counts until its answer is sent.
+    /// Lets a request in and answers it by `handle`. It counts until its answer is sent, or was ended by `endings`.
     ///
     /// # Errors
     /// `ResourceExhausted` with the name of the limit that it would exceed; `Unavailable` when the server is going
@@ -114,6 +104,7 @@ impl Admission {
         &self,
         operation: Operation,
         request: Request,
+        endings: Endings,
         handle: impl FnOnce(Request) -> F,
     ) -> Result<Response, ServiceError>
     where
@@ -121,7 +112,7 @@ impl Admission {
     {
         self.check_connection(operation, &request)?;
         if operation.is_probe() {
-            return self.0.probes.answer(operation, request, handle).await;
+            return self.0.probes.answer(operation, request, endings, handle).await;
         }
         let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
         let asking = RateLimitKey::of(request.extensions());
@@ -142,8 +133,8 @@ impl Admission {
                 bytes => arrival.add(bytes)?,
             }
         }
-        Ok(response
-            .map(|body| Body::new(HeldBody::new(body, Some(arrival), (place, own_place, held, let_in)))))
+        let held = (place, own_place, held, let_in);
+        Ok(response.map(|body| Body::new(AnswerBody::new(body, Some(arrival), held, endings))))
     }
 
     /// Notes that a key came by a connection, and keeps to health what was taken for it.
@@ -189,11 +180,6 @@ impl Admission {
     /// How long the text of a scrape answers those that follow.
     pub fn scrape_kept(&self) -> Duration {
         self.0.probes.scrape_kept()
-    }
-
-    /// How long a health watch without a key lasts.
-    pub fn health_watch_max(&self) -> Duration {
-        self.0.probes.watch_max()
     }
 
     /// Ends what has been silent for too long, and forgets callers who have not come for a while; to be called now and

@@ -6,15 +6,15 @@ use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::Request;
 use axum::http::Method;
 use axum::response::Response;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
+use super::answer_body::{AnswerBody, Ending, Endings};
 use super::bodies::Bodies;
-use super::held_body::HeldBody;
 use super::inbound_body::InboundBody;
 use super::limits::AdmissionLimits;
 use super::of_connection::OfConnection;
 use super::quota::{Quota, Taken};
-use crate::access::Operation;
+use crate::access::{Authorized, Operation};
 use crate::service::{ErrorCode, ServiceError};
 
 /// What is asked without a key, or whatever else is done: each kind has places of its own.
@@ -48,12 +48,18 @@ impl Probes {
         &self,
         operation: Operation,
         request: Request,
+        mut endings: Endings,
         handle: impl FnOnce(Request) -> F,
     ) -> Result<Response, ServiceError>
     where
         F: Future<Output = Result<Response, ServiceError>>,
     {
         let watch = (operation == Operation::HealthWatch).then(|| self.watch(&request)).transpose()?;
+        let has_key =
+            Authorized::of(request.extensions()).is_ok_and(|authorized| authorized.caller.has_key());
+        if watch.is_some() && !has_key {
+            endings.when.push(self.watch_over());
+        }
         let places = if operation == Operation::Metrics { &self.scrapes } else { &self.checks };
         let arrival = places.begin(false, request.extensions().get().cloned())?;
         let let_in = request.extensions().get().map(OfConnection::let_in);
@@ -67,7 +73,7 @@ impl Probes {
             Some(arrival)
         };
         let response = handle(request).await?;
-        Ok(response.map(|body| Body::new(HeldBody::new(body, answered, (watch, let_in)))))
+        Ok(response.map(|body| Body::new(AnswerBody::new(body, answered, (watch, let_in), endings))))
     }
 
     fn watch(&self, request: &Request) -> Result<Watch, ServiceError> {
@@ -102,6 +108,19 @@ impl Probes {
         })
     }
 
+    /// Resolves when a watch of somebody without a key has lasted for as long as it may: places are few.
+    fn watch_over(&self) -> Ending {
+        let most = self.limits.health_watch_max;
+        Box::pin(async move {
+            sleep(most).await;
+            let message = format!(
+                "health_watch_max_s is {}: a watch without a key ends then, watch again",
+                most.as_secs_f64()
+            );
+            ServiceError::new(ErrorCode::DeadlineExceeded, "health_watch_over", message)
+        })
+    }
+
     fn late(&self) -> ServiceError {
         let most = self.limits.probe_time_max;
         let message =
@@ -112,11 +131,6 @@ impl Probes {
     /// How long the text of a scrape answers those that follow.
     pub(super) fn scrape_kept(&self) -> Duration {
         self.limits.scrape_kept
-    }
-
-    /// How long a watch without a key lasts.
-    pub(super) fn watch_max(&self) -> Duration {
-        self.limits.health_watch_max
     }
 }
 
@@ -141,7 +155,9 @@ mod tests {
     }
 
     async fn ask(probes: &Probes, operation: Operation, request: Request) -> Result<Response, ServiceError> {
-        probes.answer(operation, request, async |_| Ok(Response::new(Body::from("ok")))).await
+        probes
+            .answer(operation, request, Endings::none(), async |_| Ok(Response::new(Body::from("ok"))))
+            .await
     }
 
     #[tokio::test]

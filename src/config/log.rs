@@ -12,10 +12,12 @@ pub struct LogConfig {
     pub format: LogFormat,
     /// A level, or a list of `target=level`. `info`.
     pub level: String,
+    /// Whether changes and refused keys are written to the log, whatever the level. True.
+    pub audit: bool,
 }
 
 impl Default for LogConfig {
     fn default() -> Self {
-        Self { format: LogFormat::Text, level: "info".into() }
+        Self { format: LogFormat::Text, level: "info".into(), audit: true }
     }
 }

@@ -179,6 +179,7 @@ impl Config {
             store: self.store.settings(),
             limits: self.limits.service_limits(),
             gauges: None,
+            observers: Vec::new(),
             query_threads: self.threads.query,
             mapping_threads: self.threads.mapping,
             alignment_threads: self.threads.alignment,

@@ -44,7 +44,7 @@ impl Mapping for Adapter {
     ) -> Result<Response<pb::AlignScanResponse>, Status> {
         let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
-        let answer = service.maps().align_scan(&map, scan).await?;
+        let answer = service.align_scan(&map, scan).await?;
         Ok(answered(answer.into()))
     }
 
@@ -54,7 +54,7 @@ impl Mapping for Adapter {
     ) -> Result<Response<pb::LocalizeResponse>, Status> {
         let service = service_of(&request)?;
         let (map, scan) = request.into_inner().try_into()?;
-        let answer = service.maps().localize(&map, scan).await?;
+        let answer = service.localize(&map, scan).await?;
         Ok(answered(answer.into()))
     }
 
@@ -81,7 +81,7 @@ impl Mapping for Adapter {
     ) -> Result<Response<pb::GetTrajectoryResponse>, Status> {
         let service = service_of(&request)?;
         let (map, query) = request.into_inner().try_into()?;
-        let answer = service.maps().trajectory(&map, query).await?;
+        let answer = service.trajectory(&map, query).await?;
         Ok(answered(answer.into()))
     }
 
@@ -91,7 +91,7 @@ impl Mapping for Adapter {
     ) -> Result<Response<Self::StreamTrajectoryStream>, Status> {
         let service = service_of(&request)?;
         let (map, query) = request.into_inner().try_into()?;
-        let pieces = service.maps().trajectory_pieces(&map, query).await?;
+        let pieces = service.trajectory_pieces(&map, query).await?;
         let kept = self.admission.keep(pieces.memory_bytes())?;
         Ok(Response::new(Box::pin(pieces.into_stream().map(move |piece| {
             let _until_sent = &kept;

@@ -21,7 +21,6 @@ impl Maps for Adapter {
         request: Request<pb::CreateMapRequest>,
     ) -> Result<Response<pb::CreateMapResponse>, Status> {
         let service = service_of(&request)?;
-        let service = service.maps();
         let (name, settings) = wire::create_map(request.into_inner(), service.default_filter())?;
         let answer = service.create_map(name, settings).await?;
         Ok(answered(answer.into()))
@@ -33,7 +32,7 @@ impl Maps for Adapter {
     ) -> Result<Response<pb::GetMapResponse>, Status> {
         let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
-        let info = service.maps().map_info(&name).await?;
+        let info = service.map_info(&name).await?;
         Ok(answered(info.into()))
     }
 
@@ -42,7 +41,6 @@ impl Maps for Adapter {
         request: Request<pb::ListMapsRequest>,
     ) -> Result<Response<pb::ListMapsResponse>, Status> {
         let service = service_of(&request)?;
-        let service = service.maps();
         let (maps, unavailable) = (service.list_maps().await?, service.unavailable_maps());
         Ok(answered(MapList { maps, unavailable }.into()))
     }
@@ -53,7 +51,7 @@ impl Maps for Adapter {
     ) -> Result<Response<pb::DeleteMapResponse>, Status> {
         let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
-        service.maps().delete_map(&name).await?;
+        service.delete_map(&name).await?;
         Ok(Response::new(pb::DeleteMapResponse {}))
     }
 
@@ -63,7 +61,7 @@ impl Maps for Adapter {
     ) -> Result<Response<Self::SnapshotMapStream>, Status> {
         let service = service_of(&request)?;
         let name = map_name(&request.get_ref().map)?;
-        let file = service.maps().snapshot_map(&name).await?;
+        let file = service.snapshot_map(&name).await?;
         let kept = self.admission.keep(snapshot_bytes(file.bytes.len()))?;
         let pieces = snapshot_pieces(file).map(move |piece| {
             let _until_sent = &kept;
@@ -77,7 +75,6 @@ impl Maps for Adapter {
         pieces: Request<Streaming<pb::RestoreMapRequest>>,
     ) -> Result<Response<pb::RestoreMapResponse>, Status> {
         let Authorized { caller, service } = Authorized::of(pieces.extensions())?.clone();
-        let service = service.maps();
         let most = service.limits().map_file_bytes_max;
         let arrival = InboundBody::of(pieces.extensions())?.clone();
         let (name, replace, file) =

@@ -1,7 +1,6 @@
 //! The gRPC adapters: convert in, call the service, convert out.
 
 mod deadline;
-mod deadline_body;
 mod decompression;
 mod mapping;
 mod maps;
@@ -19,13 +18,14 @@ use tonic::{Request, Response};
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
-use crate::access::{Authorized, Gate};
+use crate::access::Authorized;
 use crate::admission::{Admission, AnswerBytes, InboundBody};
-use crate::service::ServiceError;
-use crate::telemetry::MeteredService;
+use crate::middleware::Middleware;
+use crate::service::{MapService, ServiceError};
+use crate::telemetry::RequestRecorder;
 use crate::wire::pb;
 use decompression::Inflation;
-use middleware::Around;
+use middleware::Grpc;
 use pb::mapping_server::{self, MappingServer};
 use pb::maps_server::{self, MapsServer};
 use pb::occupancy_server::{self, OccupancyServer};
@@ -34,12 +34,13 @@ use pb::occupancy_server::{self, OccupancyServer};
 #[derive(Debug, Clone)]
 struct Adapter {
     admission: Admission,
+    recorder: RequestRecorder,
     inflation: Inflation,
     message_bytes_max: usize,
 }
 
 /// What the caller of `request` may use. The message counts by its own size from now on: it may have been compressed.
-fn service_of<T: Message>(request: &Request<T>) -> Result<MeteredService, ServiceError> {
+fn service_of<T: Message>(request: &Request<T>) -> Result<MapService, ServiceError> {
     InboundBody::of(request.extensions())?.at_least(request.get_ref().encoded_len())?;
     Ok(Authorized::of(request.extensions())?.service.clone())
 }
@@ -57,12 +58,12 @@ fn answered<T: Message>(answer: T) -> Response<T> {
 /// # Errors
 /// When the contract that was compiled in cannot be read.
 pub fn routes(
-    gate: Gate,
-    admission: Admission,
+    middleware: &Middleware,
     message_bytes_max: usize,
 ) -> Result<(Routes, Health), tonic_reflection::server::Error> {
     let inflation = Inflation::default();
-    let adapter = Adapter { admission: admission.clone(), inflation: inflation.clone(), message_bytes_max };
+    let (admission, recorder) = (middleware.admission().clone(), middleware.recorder().clone());
+    let adapter = Adapter { admission, recorder, inflation: inflation.clone(), message_bytes_max };
     // Each generated server has the same methods, but no trait names them.
     macro_rules! configured {
         ($server:ident) => {
@@ -85,10 +86,9 @@ pub fn routes(
         .add_service(configured!(MapsServer))
         .add_service(health)
         .add_service(reflection);
-    Ok((
-        Around { gate, admission, inflation, message_bytes_max }.wrap(services.into_axum_router()).into(),
-        Health(reporter),
-    ))
+    let protocol = Grpc { inflation, message_bytes_max };
+    let services = middleware.wrap(protocol, services.into_axum_router());
+    Ok((services.into(), Health(reporter)))
 }
 
 /// Says by gRPC's health protocol whether the server serves: as a whole (the empty name) and each service.

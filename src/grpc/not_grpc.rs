@@ -8,8 +8,12 @@ use axum::response::Response;
 
 const CALL: &str = "application/grpc";
 
-/// The answer to a request that is no call, in HTTP's own words: calls are POST and of gRPC's own content type, which no
-/// page of another site can send unasked.
+/// True of a call: POST and of gRPC's own content type, which no page of another site can send unasked.
+pub(super) fn is_call(request: &Request) -> bool {
+    request.method() == Method::POST && has_calls_type(request.headers())
+}
+
+/// The answer to a request that is no call, in HTTP's own words.
 pub(super) fn refusal(request: &Request) -> Option<Response> {
     if request.method() != Method::POST {
         let mut answer = says(StatusCode::METHOD_NOT_ALLOWED, "this port speaks gRPC, which is POST alone");
@@ -17,12 +21,12 @@ pub(super) fn refusal(request: &Request) -> Option<Response> {
         return Some(answer);
     }
     let text = "this port speaks gRPC: content-type must be application/grpc or application/grpc+proto";
-    (!is_call(request.headers())).then(|| says(StatusCode::UNSUPPORTED_MEDIA_TYPE, text))
+    (!has_calls_type(request.headers())).then(|| says(StatusCode::UNSUPPORTED_MEDIA_TYPE, text))
 }
 
 /// True of `application/grpc`, alone or with `+` and a format or `;` and parameters behind it. gRPC-web is another
 /// protocol, which is not spoken here.
-fn is_call(headers: &HeaderMap) -> bool {
+fn has_calls_type(headers: &HeaderMap) -> bool {
     let mut types = headers.get_all(CONTENT_TYPE).iter();
     let is_grpc = |value: &HeaderValue| {
         let (start, rest) = value.as_bytes().split_at_checked(CALL.len())?;
@@ -51,7 +55,7 @@ mod tests {
             for (name, value) in types {
                 headers.append(name, value);
             }
-            super::is_call(&headers)
+            super::has_calls_type(&headers)
         };
         for call in ["application/grpc", "application/grpc+proto", "Application/gRPC; charset=utf-8"] {
             assert!(is_call(&[call]), "{call}");

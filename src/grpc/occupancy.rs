@@ -43,7 +43,7 @@ impl Occupancy for Adapter {
     ) -> Result<Response<Self::ListVoxelsStream>, Status> {
         let service = service_of(&request)?;
         let (map, level, region) = request.into_inner().try_into()?;
-        let listing = service.maps().list_voxels(&map, level, region).await?;
+        let listing = service.list_voxels(&map, level, region).await?;
         let kept = self.admission.keep(listing_bytes(listing.keys.len()))?;
         let chunks = voxel_chunks(listing).map(move |chunk| {
             let _until_sent = &kept;

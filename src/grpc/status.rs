@@ -4,7 +4,7 @@ use tonic::metadata::MetadataValue;
 use tonic::{Code, Status};
 
 use crate::service::{ErrorCode, ServiceError};
-use crate::telemetry::Metrics;
+use crate::telemetry::RequestOutcome;
 
 /// The metadata that holds the word for programs.
 pub(super) const REASON: &str = "mrol-reason";
@@ -60,16 +60,15 @@ pub(super) fn of_request(status: Status, message_bytes_max: usize) -> Status {
     }
 }
 
-/// Counts a refusal of a caller who may not ask for what was asked for; anything else counts for nothing here.
-pub(super) fn count_denial(metrics: &Metrics, code: Code, reason: Option<&[u8]>) {
-    if matches!(code, Code::Unauthenticated | Code::PermissionDenied) {
-        let reason = String::from_utf8_lossy(reason.unwrap_or(b"unknown")).into_owned();
-        metrics.denied("grpc", reason);
-    }
+/// How a call ended by `code`, with the `reason` of its metadata.
+pub(super) fn outcome(code: Code, reason: Option<&[u8]>) -> RequestOutcome {
+    let is_denied = matches!(code, Code::Unauthenticated | Code::PermissionDenied);
+    let denial = is_denied.then(|| String::from_utf8_lossy(reason.unwrap_or(b"unknown")).into_owned().into());
+    RequestOutcome { code: label(code).into(), is_ok: code == Code::Ok, denial }
 }
 
 /// A code as a metric's label.
-pub(super) fn label(code: Code) -> &'static str {
+fn label(code: Code) -> &'static str {
     match code {
         Code::Ok => "ok",
         Code::Cancelled => "cancelled",

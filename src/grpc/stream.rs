@@ -7,15 +7,17 @@ use std::time::Instant;
 use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio_stream::Stream;
 use tonic::{Code, Request, Status, Streaming};
+use tracing::Instrument;
 
 use super::decompression::{Compressed, Inflation};
+use super::middleware::Grpc;
 use super::{Adapter, status};
 use crate::access::{Authorized, Operation};
-use crate::admission::{Admission, InboundBody, MemoryPermit, RateLimitKey};
-use crate::lifecycle;
-use crate::service::ServiceError;
+use crate::admission::{Admission, InboundBody, MemoryPermit, RateLimitKey, draining};
+use crate::middleware::Protocol;
+use crate::service::{MapService, ServiceError};
 use crate::sync::polled_by_runtime;
-use crate::telemetry::MeteredService;
+use crate::telemetry::RequestRecorder;
 
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
 const MESSAGES_AHEAD_MAX: usize = 4;
@@ -71,15 +73,17 @@ impl Adapter {
     where
         M: Message,
         A: prost::Message + 'static,
-        H: Fn(MeteredService, M) -> F + Send + 'static,
+        H: Fn(MapService, M) -> F + Send + 'static,
         F: Future<Output = Result<A, ServiceError>> + Send,
     {
         let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let (outbox, answers) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let extensions = requests.extensions();
         let (arrival, asking) = (InboundBody::of(extensions)?.clone(), RateLimitKey::of(extensions));
-        let (admission, authorized) = (self.admission.clone(), Authorized::of(extensions)?.clone());
-        let worker = Worker { admission, asking, authorized, operation, handle, map: String::new() };
+        let (admission, recorder) = (self.admission.clone(), self.recorder.clone());
+        let authorized = Authorized::of(extensions)?.clone();
+        let worker =
+            Worker { admission, recorder, asking, authorized, operation, handle, map: String::new() };
         let compressed = extensions.get().copied().unwrap_or(Compressed(true));
         let reader = Reader {
             requests: requests.into_inner(),
@@ -89,7 +93,7 @@ impl Adapter {
             message_bytes_max: self.message_bytes_max,
         };
         let caller = outbox.clone();
-        tokio::spawn(polled_by_runtime(async move {
+        let answering = async move {
             tokio::select! {
                 // Nobody waits for the request in hand.
                 () = caller.closed() => {}
@@ -97,7 +101,8 @@ impl Adapter {
                 () = worker.run(read, outbox) => {}
                 () = reader.run(inbox) => {}
             }
-        }));
+        };
+        tokio::spawn(polled_by_runtime(answering.in_current_span()));
         Ok(Answers::new(answers))
     }
 }
@@ -144,6 +149,7 @@ impl<M: Message> Reader<M> {
 
 struct Worker<H> {
     admission: Admission,
+    recorder: RequestRecorder,
     asking: RateLimitKey,
     authorized: Authorized,
     operation: Operation,
@@ -157,13 +163,13 @@ impl<H> Worker<H> {
     where
         M: Message,
         A: prost::Message,
-        H: Fn(MeteredService, M) -> F,
+        H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         loop {
             let answer = tokio::select! {
                 biased;
-                () = self.admission.lifecycle().draining() => Err(lifecycle::draining().into()),
+                () = self.admission.lifecycle().draining() => Err(draining().into()),
                 withdrawn = self.authorized.caller.withdrawn() => Err(withdrawn.into()),
                 request = inbox.recv() => match request {
                     Some(request) => self.answer(request).await,
@@ -182,7 +188,7 @@ impl<H> Worker<H> {
     where
         M: Message,
         A: prost::Message,
-        H: Fn(MeteredService, M) -> F,
+        H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         let start = Instant::now();
@@ -191,10 +197,9 @@ impl<H> Worker<H> {
             Err(unreadable) => Err(unreadable),
         };
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
-        let metrics = self.authorized.service.metrics();
-        metrics.request("grpc", self.operation.name(), status::label(code), start.elapsed());
         let reason = answer.as_ref().err().and_then(|status| status.metadata().get(status::REASON));
-        status::count_denial(metrics, code, reason.map(|reason| reason.as_bytes()));
+        let outcome = status::outcome(code, reason.map(|reason| reason.as_bytes()));
+        self.recorder.answered(Grpc::NAME, self.operation.name(), outcome, start.elapsed());
         answer
     }
 
@@ -203,7 +208,7 @@ impl<H> Worker<H> {
     where
         M: Message,
         A: prost::Message,
-        H: Fn(MeteredService, M) -> F,
+        H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         let answer = self.handled(request).await?;
@@ -214,7 +219,7 @@ impl<H> Worker<H> {
     async fn handled<M, A, F>(&mut self, mut request: M) -> Result<A, ServiceError>
     where
         M: Message,
-        H: Fn(MeteredService, M) -> F,
+        H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         match request.map_mut() {
@@ -232,8 +237,7 @@ mod tests {
     use tokio_stream::StreamExt;
 
     use super::*;
-    use crate::admission::AdmissionLimits;
-    use crate::lifecycle::Lifecycle;
+    use crate::admission::{AdmissionLimits, Lifecycle};
 
     const BYTES: usize = 100_000;
 

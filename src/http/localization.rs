@@ -84,7 +84,7 @@ pub(super) async fn localize(
     Map(map): Map,
     scan: LocalizationPoints,
 ) -> Result<Json<LocalizationResponse>, HttpError> {
-    let answer = service.maps().localize(&map, scan.try_into()?).await?;
+    let answer = service.localize(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 

@@ -21,7 +21,7 @@ pub(super) async fn take(
     Map(map): Map,
     NoParams: NoParams,
 ) -> Result<Response, HttpError> {
-    let file = service.maps().snapshot_map(&map).await?;
+    let file = service.snapshot_map(&map).await?;
     let mut headers = headers::of_version(&file.version);
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream"));
     headers.insert(header::CONTENT_LENGTH, file.bytes.len().into());
@@ -52,7 +52,6 @@ pub(super) async fn restore(
     Params(RestoreParams { replace }): Params<RestoreParams>,
     request: Request,
 ) -> Result<(StatusCode, Json<MapResponse>), HttpError> {
-    let service = service.maps();
     let file = body::octets(request, service.limits().map_file_bytes_max, "map_file_bytes_max").await?;
     let info = service.restore_map(map, file, replace).await?;
     Ok((StatusCode::CREATED, Json(info.into())))

@@ -111,7 +111,6 @@ pub(super) async fn create(
     Map(name): Map,
     body::Json(settings): body::Json<SettingsBody>,
 ) -> Result<(StatusCode, Json<MapResponse>), HttpError> {
-    let service = service.maps();
     let (info, created) = service.create_map(name, settings.or(service.default_filter())).await?;
     let status = if created { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(info.into())))
@@ -122,7 +121,7 @@ pub(super) async fn describe(
     Map(name): Map,
     NoParams: NoParams,
 ) -> Result<Json<MapResponse>, HttpError> {
-    let info = service.maps().map_info(&name).await?;
+    let info = service.map_info(&name).await?;
     Ok(Json(info.into()))
 }
 
@@ -130,7 +129,6 @@ pub(super) async fn list(
     Service(service): Service,
     NoParams: NoParams,
 ) -> Result<Json<MapsResponse>, HttpError> {
-    let service = service.maps();
     let maps = service.list_maps().await?.into_iter().map(Into::into).collect();
     let unavailable = service.unavailable_maps().into_iter();
     let out = |UnavailableMap { name, reason }| UnavailableResponse { map: name.to_string(), reason };
@@ -142,7 +140,7 @@ pub(super) async fn delete(
     Map(name): Map,
     NoParams: NoParams,
 ) -> Result<StatusCode, HttpError> {
-    service.maps().delete_map(&name).await?;
+    service.delete_map(&name).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -1,95 +1,61 @@
-//! What happens around every request: whether its caller may ask for it, its span, the refusal while draining, its
-//! count.
+//! HTTP as a protocol of the middleware: routes and problem documents.
 
 use std::time::Instant;
 
-use axum::extract::{FromRequestParts, MatchedPath, Request, State};
+use axum::extract::{FromRequestParts, MatchedPath, Request};
 use axum::http::request::Parts;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use tower_http::request_id::RequestId;
-use tracing::Instrument;
 
 use super::error::{self, HttpError, Reason};
-use crate::access::{Authorized, Gate, Operation, revocable};
-use crate::admission::Admission;
-use crate::telemetry::MeteredService;
+use crate::access::{Authorized, Operation};
+use crate::admission::Endings;
+use crate::middleware::Protocol;
+use crate::service::{MapService, ServiceError};
+use crate::telemetry::RequestOutcome;
 
-/// What requests pass before a handler sees them.
-#[derive(Debug, Clone)]
-pub(super) struct Around {
-    pub(super) gate: Gate,
-    pub(super) admission: Admission,
-}
+/// HTTP/1 and HTTP/2.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Http;
 
-pub(super) async fn request(State(around): State<Around>, mut request: Request, next: Next) -> Response {
-    let start = Instant::now();
-    let operation = around.operation(&request);
-    // Whatever a client may send, it is one of few.
-    let name = operation.as_ref().map_or("unknown", |operation| operation.name());
-    let response = match operation.and_then(|operation| around.authorized(operation, &mut request)) {
-        Ok(operation) => around.answer(operation, request, next).await,
-        Err(refusal) => refusal.into_response(),
-    };
-    let (status, elapsed) = (response.status(), start.elapsed());
-    around.gate.metrics().request("http", name, status.as_str().to_owned(), elapsed);
-    if let Some(reason) = Reason::of_denial(&response) {
-        around.gate.metrics().denied("http", reason);
-    }
-    tracing::debug!(operation = name, status = status.as_u16(), ?elapsed, "http request");
-    response
-}
+impl Protocol for Http {
+    const NAME: &'static str = "http";
 
-impl Around {
-    /// Gives the request what its handler works with, if its caller may ask for it.
-    fn authorized(&self, operation: Operation, request: &mut Request) -> Result<Operation, HttpError> {
-        let authorized = self.gate.authorize(operation, request)?;
-        request.extensions_mut().insert(authorized);
-        Ok(operation)
+    fn operation(&self, request: &Request) -> Option<Operation> {
+        let route = request.extensions().get::<MatchedPath>()?;
+        Operation::of_request(request.method().as_str(), route.as_str())
     }
 
-    /// What the request asks for, or the answer where that is nothing there is.
-    fn operation(&self, request: &Request) -> Result<Operation, HttpError> {
-        let asked = operation(request);
-        if asked.is_err() {
-            self.gate.check_host(request)?;
-        }
-        asked
-    }
-
-    async fn answer(&self, operation: Operation, request: Request, next: Next) -> Response {
-        let authorized = request.extensions().get::<Authorized>().cloned();
-        let id = request.extensions().get::<RequestId>().and_then(|id| id.header_value().to_str().ok());
-        let key = request.extensions().get::<Authorized>().and_then(|authorized| authorized.caller.name());
-        let span = tracing::info_span!("http", operation = operation.name(), request_id = id, key);
-        if let Some(key) = key {
-            self.gate.metrics().key_used("http", key);
-        }
-        let handle = async |request| Ok(next.run(request).await);
-        let answer = self.admission.answer(operation, request, handle);
-        let answer = match &authorized {
-            Some(Authorized { caller, .. }) => {
-                // HTTP has no word for an answer that ends early: it is cut.
-                let answer = caller.while_valid(answer).instrument(span).await;
-                answer.map(|response| revocable(response, caller, |_| None))
-            }
-            None => answer.instrument(span).await,
+    fn no_operation(&self, request: &Request) -> Response {
+        let error = match request.extensions().get::<MatchedPath>() {
+            Some(route) => error::no_such_method(request, route.as_str()),
+            None => error::no_such_route(request),
         };
-        answer.unwrap_or_else(|refusal| HttpError::from(refusal).into_response())
+        error.into_response()
     }
-}
 
-/// What the request asks for, or the answer where that is nothing there is.
-fn operation(request: &Request) -> Result<Operation, HttpError> {
-    let Some(route) = request.extensions().get::<MatchedPath>() else {
-        return Err(error::no_such_route(request));
-    };
-    let operation = Operation::of_request(request.method().as_str(), route.as_str());
-    operation.ok_or_else(|| error::no_such_method(request, route.as_str()))
+    fn refusal(&self, error: ServiceError) -> Response {
+        HttpError::from(error).into_response()
+    }
+
+    fn endings(&self, _: &Request, _: Instant) -> Endings {
+        // HTTP has no word for an answer that ends early: it is cut.
+        Endings::none()
+    }
+
+    async fn handle(&self, request: Request, next: Next) -> Result<Response, ServiceError> {
+        Ok(next.run(request).await)
+    }
+
+    fn outcome(&self, response: &Response) -> RequestOutcome {
+        let status = response.status();
+        let denial = Reason::of_denial(response).map(Into::into);
+        RequestOutcome { code: status.as_str().to_owned().into(), is_ok: status.is_success(), denial }
+    }
 }
 
 /// The service, with the maps that the caller may name.
-pub(super) struct Service(pub(super) MeteredService);
+pub(super) struct Service(pub(super) MapService);
 
 impl<S: Sync> FromRequestParts<S> for Service {
     type Rejection = HttpError;

@@ -26,30 +26,26 @@ pub use starting::starting;
 
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
-use axum::middleware::from_fn_with_state;
-use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 
-use crate::access::Gate;
 use crate::admission::Admission;
-use middleware::Around;
+use crate::middleware::Middleware;
+use crate::telemetry::Metrics;
+use middleware::Http;
 use scrapes::Scrapes;
 
 /// What every handler has at hand, besides the service that its caller may use.
 #[derive(Debug, Clone)]
 struct Adapter {
     admission: Admission,
+    metrics: Metrics,
     message_bytes_max: usize,
     scrapes: Scrapes,
 }
 
 /// All routes. Bodies of more than `message_bytes_max` are refused.
-pub fn router(gate: Gate, admission: Admission, message_bytes_max: usize) -> Router {
-    let around = Around { gate, admission: admission.clone() };
+pub fn router(middleware: &Middleware, message_bytes_max: usize) -> Router {
+    let (admission, metrics) = (middleware.admission().clone(), middleware.recorder().metrics().clone());
     let scrapes = Scrapes::new(admission.scrape_kept());
-    routes::of_operations()
-        .layer(DefaultBodyLimit::max(message_bytes_max))
-        .layer(from_fn_with_state(around, middleware::request))
-        .layer(PropagateRequestIdLayer::x_request_id())
-        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
-        .with_state(Adapter { admission, message_bytes_max, scrapes })
+    let routes = routes::of_operations().layer(DefaultBodyLimit::max(message_bytes_max));
+    middleware.wrap(Http, routes).with_state(Adapter { admission, metrics, message_bytes_max, scrapes })
 }

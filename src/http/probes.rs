@@ -12,8 +12,8 @@ use super::middleware::Service;
 use super::params::NoParams;
 use crate::access::Authorized;
 use crate::map::MapName;
-use crate::service::{Shortage, UnavailableMap};
-use crate::telemetry::MeteredService;
+use crate::service::{MapService, Shortage, UnavailableMap};
+use crate::telemetry::Metrics;
 
 /// `GET /livez`: 200 while the process lives.
 pub(super) async fn live(NoParams: NoParams) -> &'static str {
@@ -32,19 +32,19 @@ pub(super) async fn ready(
     if adapter.admission.lifecycle().is_leaving() {
         (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
     } else {
-        let maps = service.maps().read_only_maps();
+        let maps = service.read_only_maps();
         let named = |(map, reason): &(MapName, String)| json!({"map": map.as_str(), "reason": reason});
         let read_only: Vec<Value> = maps.iter().map(named).collect();
         let mut body = json!({"ready": true});
         if !read_only.is_empty() {
             body["read_only"] = read_only.into();
         }
-        let maps = service.maps().unavailable_maps();
+        let maps = service.unavailable_maps();
         if !maps.is_empty() {
             let named = |map: &UnavailableMap| json!({"map": map.name.as_str(), "reason": map.reason});
             body["unavailable"] = maps.iter().map(named).collect();
         }
-        let shortages = service.maps().shortages();
+        let shortages = service.shortages();
         if !shortages.is_empty() {
             body["writes_refused"] = shortages.iter().map(Shortage::reason).collect();
         }
@@ -59,15 +59,16 @@ pub(super) async fn metrics(
     request: Request,
 ) -> Result<impl IntoResponse, HttpError> {
     let Authorized { caller, service } = Authorized::of(request.extensions())?;
-    let text = adapter.scrapes.text(caller.allowed_maps(), async || scrape(service).await).await?;
+    let text =
+        adapter.scrapes.text(caller.allowed_maps(), async || scrape(&adapter.metrics, service).await).await?;
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text))
 }
 
-async fn scrape(service: &MeteredService) -> String {
-    let maps = service.maps().list_maps().await.unwrap_or_else(|error| {
+async fn scrape(metrics: &Metrics, service: &MapService) -> String {
+    let maps = service.list_maps().await.unwrap_or_else(|error| {
         // The counters say most when the server is overloaded, so they are told without the maps.
         tracing::warn!(%error, "metrics without gauges of the maps");
         Vec::new()
     });
-    service.render(&maps)
+    metrics.render(&service.pools(), &service.map_names(), &maps, &service.unavailable_maps())
 }

@@ -56,26 +56,25 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
 mod tests {
     use super::*;
     use crate::access::{Access, Gate};
-    use crate::admission::{Admission, AdmissionLimits};
-    use crate::http::middleware::{self, Around};
-    use crate::lifecycle::Lifecycle;
+    use crate::admission::{Admission, AdmissionLimits, Lifecycle};
+    use crate::http::middleware::Http;
+    use crate::middleware::Middleware;
     use crate::service::{MapService, ServiceSettings};
     use crate::store::OpeningProgress;
-    use crate::telemetry::{MeteredService, Metrics};
+    use crate::telemetry::{Audit, Metrics, RequestRecorder};
     use axum::body::{Body, to_bytes};
     use axum::http::{Request, StatusCode};
-    use axum::middleware::from_fn_with_state;
     use axum::routing::get;
     use tower::ServiceExt;
 
     #[tokio::test]
     async fn what_somebody_serves_without_a_rule_is_refused_as_a_defect() {
         let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
-        let gate = Gate::new(Access::open(), MeteredService::new(service, Metrics::new().unwrap()));
-        let around =
-            Around { gate, admission: Admission::new(&AdmissionLimits::default(), Lifecycle::default()) };
+        let gate = Gate::new(Access::open(), service);
+        let admission = Admission::new(&AdmissionLimits::default(), Lifecycle::default());
+        let recorder = RequestRecorder::new(Metrics::new().unwrap(), Audit::default());
         let stray = Router::new().route("/stray", get(async || "open to all"));
-        let stray = stray.layer(from_fn_with_state(around, middleware::request));
+        let stray = Middleware::new(gate, admission, recorder).wrap(Http, stray);
         let answer = stray
             .oneshot(Request::get("/stray").header("host", "localhost").body(Body::empty()).unwrap())
             .await

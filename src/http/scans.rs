@@ -124,7 +124,7 @@ pub(super) async fn align(
     Map(map): Map,
     scan: ScanPoints,
 ) -> Result<Json<ScanResponse>, HttpError> {
-    let answer = service.maps().align_scan(&map, scan.try_into()?).await?;
+    let answer = service.align_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
 

@@ -67,12 +67,12 @@ pub(super) async fn get(
     let query = TrajectoryQuery { robot, since_revision, limit };
     if query.limit.is_some() {
         let TrajectoryAnswer { poses, next_since_revision, version } =
-            service.maps().trajectory(&map, query).await?;
+            service.trajectory(&map, query).await?;
         let end = End { version: version.into(), next_since_revision };
         let poses = poses.iter().map(PoseResponse::from).collect();
         return Ok(Json(Page { poses, end }).into_response());
     }
-    let mut pieces = service.maps().trajectory_pieces(&map, query).await?;
+    let mut pieces = service.trajectory_pieces(&map, query).await?;
     let kept = adapter.admission.keep(pieces.memory_bytes())?;
     // What fails at once is answered as such.
     let first = pieces.next().await.transpose()?;

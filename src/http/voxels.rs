@@ -55,7 +55,7 @@ pub(super) async fn list(
     Params(query): Params<VoxelsParams>,
 ) -> Result<Response, HttpError> {
     let (level, region) = (query.level, query.region()?);
-    let listing = service.maps().list_voxels(&map, level, region).await?;
+    let listing = service.list_voxels(&map, level, region).await?;
     let head = Head { level, resolution_m: listing.resolution_m, version: listing.version.into() };
     let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;
     let chunks = chunks(head, listing.keys)?.map(move |chunk| {

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::lifecycle::Lifecycle;
-use crate::telemetry::MeteredService;
+use crate::admission::Lifecycle;
+use crate::service::MapService;
+use crate::telemetry::Metrics;
 
 /// How often it is asked whether a snapshot is due.
 const SNAPSHOTS_DUE_INTERVAL: Duration = Duration::from_millis(250);
@@ -14,15 +15,18 @@ const METRICS_UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Writes snapshots of the maps whose turn it is, and keeps the metrics small, until the server is
 /// draining.
-pub(super) async fn keep_house(service: MeteredService, lifecycle: Lifecycle) {
+pub(super) async fn keep_house(service: MapService, metrics: Metrics, lifecycle: Lifecycle) {
     let mut saving = interval(SNAPSHOTS_DUE_INTERVAL);
     saving.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut upkeep = interval(METRICS_UPKEEP_INTERVAL);
     loop {
         tokio::select! {
             () = lifecycle.draining() => return,
-            _ = upkeep.tick() => service.upkeep(),
-            _ = saving.tick() => if let Err(error) = service.maps().save_due().await {
+            _ = upkeep.tick() => {
+                metrics.upkeep();
+                metrics.keep_maps(&service.map_names());
+            }
+            _ = saving.tick() => if let Err(error) = service.save_due().await {
                 tracing::error!(%error, "a snapshot cannot be written");
             },
         }

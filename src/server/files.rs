@@ -9,8 +9,8 @@ use super::expiry::Reminders;
 use super::protocol::Protocol;
 use super::tls::Tls;
 use crate::access::Access;
-use crate::lifecycle::Lifecycle;
-use crate::reload::{Reload, ReloadableFile};
+use crate::access::{Reload, ReloadableFile};
+use crate::admission::Lifecycle;
 use crate::telemetry::Metrics;
 
 /// How often files are looked at.

@@ -15,8 +15,8 @@ use x509_parser::parse_x509_certificate;
 
 use super::handshakes::FailedHandshakes;
 use super::protocol::Protocol;
+use crate::access::{ReloadableFile, is_open_to_others};
 use crate::config::TlsConfig;
-use crate::reload::{ReloadableFile, is_open_to_others};
 
 /// Why connections cannot be secured.
 #[derive(Debug, thiserror::Error)]

@@ -5,7 +5,8 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::admission::Admission;
-use crate::telemetry::MeteredService;
+use crate::service::MapService;
+use crate::telemetry::Metrics;
 
 /// How often.
 const INTERVAL: Duration = Duration::from_secs(1);
@@ -14,7 +15,7 @@ const LARGE_BLOCK: usize = 4 << 20;
 
 /// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of its
 /// own: a snapshot that takes long does not keep it from looking.
-pub(super) async fn watch(service: MeteredService, admission: Admission) {
+pub(super) async fn watch(service: MapService, metrics: Metrics, admission: Admission) {
     let mut looking = interval(INTERVAL);
     looking.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -23,17 +24,18 @@ pub(super) async fn watch(service: MeteredService, admission: Admission) {
             _ = looking.tick() => {}
         }
         admission.sweep();
-        service.metrics().in_use(&admission.in_use());
-        measure(&service).await;
+        metrics.in_use(&admission.in_use());
+        measure(&service, &metrics).await;
     }
 }
 
 /// Looks how full disk and memory are, on a thread that may block.
-pub(super) async fn measure(service: &MeteredService) {
-    let service = service.clone();
+pub(super) async fn measure(service: &MapService, metrics: &Metrics) {
+    let (service, metrics) = (service.clone(), metrics.clone());
     let measuring = move || {
         free_a_large_block();
-        service.measure();
+        let readings = service.measure();
+        metrics.room(&readings, &service.shortages());
     };
     if let Err(panic) = tokio::task::spawn_blocking(measuring).await {
         tracing::error!(%panic, "disk and memory cannot be measured");

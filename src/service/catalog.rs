@@ -15,7 +15,7 @@ use super::allowed_maps::Reachable;
 use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
-use super::{AllowedMaps, ErrorCode, ServiceError, UnavailableMap};
+use super::{AllowedMaps, ErrorCode, MapVersion, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
 use crate::store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
@@ -119,24 +119,26 @@ impl Catalog {
     }
 
     /// A map that was built of a map file under a name that is free; with `replace` under any, where the map that was
-    /// there is kept under another name.
+    /// there is kept under another name. Beside it the version of the map that had the name.
     pub(super) async fn restore(
         &self,
         name: Reachable,
         built: BuiltMap,
         maps_max: usize,
         replace: bool,
-    ) -> Result<Arc<HostedMap>, ServiceError> {
+    ) -> Result<(Option<MapVersion>, Arc<HostedMap>), ServiceError> {
         let _writing = self.turn_to_write().await?;
         self.check_free(&name, maps_max, replace)?;
         let old = self.find(&name)?;
+        let before = old.as_ref().map(|old| old.version(old.map.revision()));
         // `saving` is held until its snapshot is written.
         let BuiltMap { uuid, map, saving: _saving } = built;
         let build = move || Ok(map);
-        match old {
-            None => self.add(name.name(), uuid, build).await,
-            Some(old) => self.replace(old, uuid, build).await,
-        }
+        let map = match old {
+            None => self.add(name.name(), uuid, build).await?,
+            Some(old) => self.replace(old, uuid, build).await?,
+        };
+        Ok((before, map))
     }
 
     /// Refuses a map file for which there is no place, before any work is done for it.
@@ -251,7 +253,8 @@ impl Catalog {
         Ok(there)
     }
 
-    pub(super) async fn delete(&self, name: &Reachable) -> Result<(), ServiceError> {
+    /// Takes a map out; its last version.
+    pub(super) async fn delete(&self, name: &Reachable) -> Result<MapVersion, ServiceError> {
         let _writing = self.turn_to_write().await?;
         let map = self.get(name)?;
         let folder = map.folder.clone();
@@ -263,7 +266,8 @@ impl Catalog {
             // Who still holds the map may read it, but nothing is kept of it any more.
             map.committing.end();
         }
-        removed.map(drop).map_err(|error| match is_gone {
+        let version = map.version(map.map.revision());
+        removed.map(|_| version).map_err(|error| match is_gone {
             true => {
                 let message = format!(
                     "map {} is gone, but the disk did not say that this outlives a loss of power ({}): look whether it \

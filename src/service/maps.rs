@@ -6,7 +6,9 @@ use bytes::Bytes;
 
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
-use super::{AllowedMaps, ErrorCode, MapFile, MapInfo, MapService, ServiceError, UnavailableMap};
+use super::{
+    AllowedMaps, Change, ErrorCode, MapFile, MapInfo, MapService, Outcome, ServiceError, UnavailableMap,
+};
 use crate::map::{MapName, MapSettings};
 use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
@@ -25,19 +27,27 @@ impl MapService {
         name: MapName,
         settings: MapSettings,
     ) -> Result<(MapInfo, bool), ServiceError> {
-        let name = self.allowed_maps.check(&name)?;
-        let is_new = self.inner.catalog.get(&name).is_err();
-        let settings = settings.checked()?;
-        if is_new {
-            self.inner.room.check_to_grow()?;
-        }
-        let inner = Arc::clone(&self.inner);
-        let create = async move {
-            let _empty = is_new.then(|| inner.room.reserve(settings.empty_filter_bytes())).transpose()?;
-            inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
+        let map = &name.clone();
+        let work = async {
+            let name = self.allowed_maps.check(&name)?;
+            let is_new = self.inner.catalog.get(&name).is_err();
+            let settings = settings.checked()?;
+            if is_new {
+                self.inner.room.check_to_grow()?;
+            }
+            let inner = Arc::clone(&self.inner);
+            let create = async move {
+                let _empty = is_new.then(|| inner.room.reserve(settings.empty_filter_bytes())).transpose()?;
+                inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
+            };
+            let (map, created) = run_to_completion(create).await?;
+            Ok((self.describe(map).await?, created))
         };
-        let (map, created) = run_to_completion(create).await?;
-        Ok((self.describe(map).await?, created))
+        self.observed("CreateMap", Some(map), work, |(info, created)| {
+            let before = (!created).then_some(info.version);
+            Outcome::Changed(Change::of_map(before, Some(info.version)))
+        })
+        .await
     }
 
     /// Describes a map.
@@ -45,7 +55,8 @@ impl MapService {
     /// # Errors
     /// `NotFound` without such a map.
     pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
-        self.describe(self.map(name)?).await
+        let work = async { self.describe(self.map(name)?).await };
+        self.observed("GetMap", Some(name), work, |_| Outcome::Read).await
     }
 
     /// Describes all maps that the caller may name, by name.
@@ -53,10 +64,13 @@ impl MapService {
     /// # Errors
     /// `ResourceExhausted` when too many jobs wait.
     pub async fn list_maps(&self) -> Result<Vec<MapInfo>, ServiceError> {
-        let maps = self.inner.catalog.within(&self.allowed_maps);
-        let describe =
-            move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
-        self.inner.queries.run(describe).await?
+        let work = async {
+            let maps = self.inner.catalog.within(&self.allowed_maps);
+            let describe =
+                move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
+            self.inner.queries.run(describe).await?
+        };
+        self.observed("ListMaps", None, work, |_| Outcome::Read).await
     }
 
     /// The names of the maps that the caller may name.
@@ -81,8 +95,12 @@ impl MapService {
     /// `NotFound` without such a map; `Internal` when its file cannot be removed; `Unavailable` with `outcome_unknown`
     /// when it is gone, and a loss of power may bring it back.
     pub async fn delete_map(&self, name: &MapName) -> Result<(), ServiceError> {
-        let (inner, name) = (Arc::clone(&self.inner), self.allowed_maps.check(name)?);
-        run_to_completion(async move { inner.catalog.delete(&name).await }).await
+        let work = async {
+            let (inner, name) = (Arc::clone(&self.inner), self.allowed_maps.check(name)?);
+            run_to_completion(async move { inner.catalog.delete(&name).await }).await
+        };
+        let outcome = |version: &_| Outcome::Changed(Change::of_map(Some(*version), None));
+        self.observed("DeleteMap", Some(name), work, outcome).await.map(drop)
     }
 
     /// A map as a map file, at one revision.
@@ -91,8 +109,14 @@ impl MapService {
     /// `NotFound` without such a map; `ResourceExhausted` when too many jobs wait, there is no memory for it, or the file
     /// would be larger than `map_file_bytes_max`, so that nobody could restore it.
     pub async fn snapshot_map(&self, name: &MapName) -> Result<MapFile, ServiceError> {
-        let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
-        self.inner.map_files.run(move |stop| map.to_file(&inner.room, &inner.settings.limits, stop)).await?
+        let work = async {
+            let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
+            self.inner
+                .map_files
+                .run(move |stop| map.to_file(&inner.room, &inner.settings.limits, stop))
+                .await?
+        };
+        self.observed("SnapshotMap", Some(name), work, |_| Outcome::Read).await
     }
 
     /// Makes a map from a map file, under a uuid of its own. With `replace` it takes the place of the map of that name,
@@ -109,22 +133,29 @@ impl MapService {
         file: Bytes,
         replace: bool,
     ) -> Result<MapInfo, ServiceError> {
-        let name = self.allowed_maps.check(&name)?;
-        if replace && self.allowed_maps != AllowedMaps::Every {
-            let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
-                           delete the map first, or ask with such a key";
-            return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));
-        }
-        self.inner.room.check_to_grow()?;
-        self.inner.catalog.check_free(&name, self.limits().maps_max, replace)?;
-        let inner = Arc::clone(&self.inner);
-        let build = move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room, stop);
-        let built = self.inner.map_files.run(build).await??;
-        let inner = Arc::clone(&self.inner);
-        let maps_max = self.limits().maps_max;
-        let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
-        let map = run_to_completion(restore).await?;
-        self.describe(map).await
+        let map = &name.clone();
+        let work = async {
+            let name = self.allowed_maps.check(&name)?;
+            if replace && self.allowed_maps != AllowedMaps::Every {
+                let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
+                               delete the map first, or ask with such a key";
+                return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));
+            }
+            self.inner.room.check_to_grow()?;
+            self.inner.catalog.check_free(&name, self.limits().maps_max, replace)?;
+            let inner = Arc::clone(&self.inner);
+            let build =
+                move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room, stop);
+            let built = self.inner.map_files.run(build).await??;
+            let inner = Arc::clone(&self.inner);
+            let maps_max = self.limits().maps_max;
+            let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
+            let (before, map) = run_to_completion(restore).await?;
+            Ok((before, self.describe(map).await?))
+        };
+        let outcome =
+            |(before, info): &(_, MapInfo)| Outcome::Changed(Change::of_map(*before, Some(info.version)));
+        Ok(self.observed("RestoreMap", Some(map), work, outcome).await?.1)
     }
 
     /// Writes snapshots of the maps that changed since their last one; the number of them. Those for which there is no

@@ -22,6 +22,7 @@ mod mapping;
 mod maps;
 #[cfg(all(test, feature = "shuttle"))]
 mod modeled;
+mod observer;
 mod pool;
 mod request;
 mod resource_budget;
@@ -41,6 +42,7 @@ pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
     TIME_LIMIT_DEFAULT,
 };
+pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapStorage, MapVersion,
@@ -175,19 +177,27 @@ impl MapService {
     /// `NotFound`; `DeadlineExceeded` when `min_revision` does not come; `FailedPrecondition` when the map has
     /// another uuid.
     pub async fn query_points(&self, map: &MapName, query: PointQuery) -> Result<PointAnswer, ServiceError> {
-        let map = self.map(map)?;
-        self.limits().check_points(query.points.len())?;
-        map.check_level(query.level)?;
-        map.check_uuid(query.map_uuid)?;
-        if let Some(revision) = query.min_revision {
-            map.wait_for_revision(revision, self.limits().min_revision_wait_max).await?;
-        }
-        if query.points.len() <= pool::INLINE_POINTS
-            && let Some(answer) = map.try_query(&query)
-        {
-            return answer;
-        }
-        self.inner.queries.run(move |stop| map.query(&query, stop)).await?
+        let lookup = query.lookup;
+        let work = async {
+            let map = self.map(map)?;
+            self.limits().check_points(query.points.len())?;
+            map.check_level(query.level)?;
+            map.check_uuid(query.map_uuid)?;
+            if let Some(revision) = query.min_revision {
+                map.wait_for_revision(revision, self.limits().min_revision_wait_max).await?;
+            }
+            if query.points.len() <= pool::INLINE_POINTS
+                && let Some(answer) = map.try_query(&query)
+            {
+                return answer;
+            }
+            self.inner.queries.run(move |stop| map.query(&query, stop)).await?
+        };
+        self.observed("QueryPoints", Some(map), work, |answer| Outcome::Points {
+            lookup,
+            points: answer.points,
+        })
+        .await
     }
 
     /// Aligns a scan and, where it fits, adds it.
@@ -197,19 +207,28 @@ impl MapService {
     /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
     /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
-        self.scans.permit(&scan.robot)?;
-        let map = self.map(map)?;
-        self.limits().check_points(scan.points.len())?;
-        if map.is_new(&scan) {
-            self.inner.room.check_to_grow()?;
-        }
-        let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
-        let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
-        let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
-        self.submit_and_wait(&self.inner.mapping, None, move |stop| {
-            limit.run(stop, |stop| {
-                map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
+        let robot = scan.robot.clone();
+        let work = async {
+            self.scans.permit(&scan.robot)?;
+            let map = self.map(map)?;
+            self.limits().check_points(scan.points.len())?;
+            if map.is_new(&scan) {
+                self.inner.room.check_to_grow()?;
+            }
+            let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
+            let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
+            let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
+            self.submit_and_wait(&self.inner.mapping, None, move |stop| {
+                limit.run(stop, |stop| {
+                    map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
+                })
             })
+            .await
+        };
+        self.observed("InsertScan", Some(map), work, |answer| Outcome::Scan {
+            robot,
+            verdict: answer.verdict,
+            replayed: answer.replayed,
         })
         .await
     }
@@ -219,14 +238,18 @@ impl MapService {
     /// # Errors
     /// As for an insertion; the limit is `alignment_time_max`.
     pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
-        self.scans.permit(&scan.robot)?;
-        let map = self.map(map)?;
-        self.limits().check_points(scan.points.len())?;
-        let inner = Arc::clone(&self.inner);
-        let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max);
-        let align =
-            move |stop: StopSignal<'_>| limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop));
-        self.inner.alignment.run(align).await?
+        let work = async {
+            self.scans.permit(&scan.robot)?;
+            let map = self.map(map)?;
+            self.limits().check_points(scan.points.len())?;
+            let inner = Arc::clone(&self.inner);
+            let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max);
+            let align = move |stop: StopSignal<'_>| {
+                limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop))
+            };
+            self.inner.alignment.run(align).await?
+        };
+        self.observed("AlignScan", Some(map), work, |_| Outcome::Read).await
     }
 
     /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.
@@ -241,11 +264,15 @@ impl MapService {
         map: &MapName,
         request: LocalizationRequest,
     ) -> Result<LocalizationAnswer, ServiceError> {
-        let map = self.map(map)?;
-        let request = request.within(self.limits())?;
-        let inner = Arc::clone(&self.inner);
-        let search = move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.room, stop);
-        self.inner.localization.run(search).await?
+        let work = async {
+            let map = self.map(map)?;
+            let request = request.within(self.limits())?;
+            let inner = Arc::clone(&self.inner);
+            let search =
+                move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.room, stop);
+            self.inner.localization.run(search).await?
+        };
+        self.observed("Localize", Some(map), work, |_| Outcome::Read).await
     }
 
     /// Takes voxels out, with all their descendants.
@@ -258,16 +285,24 @@ impl MapService {
         map: &MapName,
         deletion: Deletion,
     ) -> Result<DeletionAnswer, ServiceError> {
-        let map = self.map(map)?;
-        map.check_level(deletion.level)?;
-        match &deletion.target {
-            DeletionTarget::Points(points) => self.limits().check_points(points.len())?,
-            DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
-            DeletionTarget::Region(_) => {}
-        }
-        let (inner, deletion, caller) = (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
-        let propose = move |_: StopSignal<'_>| map.propose_deletion(&deletion, caller.as_ref(), &inner.room);
-        self.submit_and_wait(&self.inner.mapping, None, propose).await
+        let work = async {
+            let map = self.map(map)?;
+            map.check_level(deletion.level)?;
+            match &deletion.target {
+                DeletionTarget::Points(points) => self.limits().check_points(points.len())?,
+                DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
+                DeletionTarget::Region(_) => {}
+            }
+            let (inner, deletion, caller) =
+                (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
+            let propose =
+                move |_: StopSignal<'_>| map.propose_deletion(&deletion, caller.as_ref(), &inner.room);
+            self.submit_and_wait(&self.inner.mapping, None, propose).await
+        };
+        self.observed("DeleteVoxels", Some(map), work, |answer| {
+            Outcome::Changed(Change::of_voxels(answer.version, answer.removed, 0, answer.replayed))
+        })
+        .await
     }
 
     /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
@@ -278,18 +313,25 @@ impl MapService {
     /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full, or where there is no memory to
     /// find out in who holds which voxels; `DeadlineExceeded` with `time_limit` beyond `undo_time_max`.
     pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
-        self.scans.permit_undo(&undo.target)?;
-        let (map, undo) = (self.map(map)?, Arc::new(undo));
-        let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
-        let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
-        // Until its outcome is known: what was withdrawn before it is then what it found.
-        let pool = &self.inner.undo;
-        let _turn = pool.in_turn(map.turn_of_undo()).await?;
-        // A thread first: the robot's scans wait for this undo, and not for those of other maps.
-        let thread = pool.thread().await?;
-        let _robot = map.turn_of_target(&undo.target).await;
-        self.submit_and_wait(pool, Some(thread), move |stop| {
-            limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
+        let work = async {
+            self.scans.permit_undo(&undo.target)?;
+            let (map, undo) = (self.map(map)?, Arc::new(undo));
+            let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
+            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
+            // Until its outcome is known: what was withdrawn before it is then what it found.
+            let pool = &self.inner.undo;
+            let _turn = pool.in_turn(map.turn_of_undo()).await?;
+            // A thread first: the robot's scans wait for this undo, and not for those of other maps.
+            let thread = pool.thread().await?;
+            let _robot = map.turn_of_target(&undo.target).await;
+            self.submit_and_wait(pool, Some(thread), move |stop| {
+                limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
+            })
+            .await
+        };
+        self.observed("Undo", Some(map), work, |answer| {
+            let UndoAnswer { version, removed, scans, replayed } = *answer;
+            Outcome::Changed(Change::of_voxels(version, removed, scans, replayed))
         })
         .await
     }
@@ -305,10 +347,13 @@ impl MapService {
         level: u32,
         region: Option<Region>,
     ) -> Result<VoxelListing, ServiceError> {
-        let map = self.map(map)?;
-        map.check_level(level)?;
-        let most = self.limits().listed_voxels_max;
-        self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
+        let work = async {
+            let map = self.map(map)?;
+            map.check_level(level)?;
+            let most = self.limits().listed_voxels_max;
+            self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
+        };
+        self.observed("ListVoxels", Some(map), work, |_| Outcome::Read).await
     }
 
     /// Prepares a change on a thread of `pool`, on `first` where there is one, waits until it is made, and prepares it again where the map has moved on

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::{Gauges, Limits};
+use super::{Gauges, Limits, Observer};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::map::RobotName;
@@ -23,6 +23,8 @@ pub struct ServiceSettings {
     pub limits: Limits,
     /// What disk and memory are measured with; without, nothing is refused for want of them.
     pub gauges: Option<Arc<dyn Gauges>>,
+    /// Who is told of every operation when it is over.
+    pub observers: Vec<Arc<dyn Observer>>,
     /// Threads for queries; 0 = one a core.
     pub query_threads: usize,
     /// Threads for insertions and deletions; 0 = one a core.

@@ -6,7 +6,9 @@ use tokio_stream::Stream;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::hosted_map::HostedMap;
-use super::{ErrorCode, Limits, MapService, MapVersion, ServiceError, TrajectoryAnswer, TrajectoryQuery};
+use super::{
+    ErrorCode, Limits, MapService, MapVersion, Outcome, ServiceError, TrajectoryAnswer, TrajectoryQuery,
+};
 use crate::map::{MapName, MultiResolutionMap, RobotName, Trajectory};
 use crate::store::MapFolder;
 use crate::util::StopSignal;
@@ -25,12 +27,15 @@ impl MapService {
         map: &MapName,
         query: TrajectoryQuery,
     ) -> Result<TrajectoryAnswer, ServiceError> {
-        let (map, most) = (self.map(map)?, self.limits().page(query.limit)?);
-        let page_of = move |_: StopSignal<'_>| {
-            let (trajectory, revision) = map.map.trajectory_and_revision();
-            page(&trajectory, map.version(revision), &query, most)
+        let work = async {
+            let (map, most) = (self.map(map)?, self.limits().page(query.limit)?);
+            let page_of = move |_: StopSignal<'_>| {
+                let (trajectory, revision) = map.map.trajectory_and_revision();
+                page(&trajectory, map.version(revision), &query, most)
+            };
+            self.inner.queries.run(page_of).await
         };
-        self.inner.queries.run(page_of).await
+        self.observed("GetTrajectory", Some(map), work, |_| Outcome::Read).await
     }
 
     /// The same in pieces, as many as it takes, all at one revision. Without a limit, all poses since the revision that is
@@ -43,13 +48,16 @@ impl MapService {
         map: &MapName,
         query: TrajectoryQuery,
     ) -> Result<TrajectoryPieces, ServiceError> {
-        let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
-        let map = self.map(map)?;
-        let shared = Arc::clone(&map);
-        let copy = self.inner.queries.run(move |_| shared.map.trajectory_and_revision()).await?;
-        let (trajectory, revision) = copy;
-        let version = map.version(revision);
-        Ok(TrajectoryPieces { service: self.clone(), trajectory, version, query, left, ended: false })
+        let work = async {
+            let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
+            let map = self.map(map)?;
+            let shared = Arc::clone(&map);
+            let copy = self.inner.queries.run(move |_| shared.map.trajectory_and_revision()).await?;
+            let (trajectory, revision) = copy;
+            let version = map.version(revision);
+            Ok(TrajectoryPieces { service: self.clone(), trajectory, version, query, left, ended: false })
+        };
+        self.observed("StreamTrajectory", Some(map), work, |_| Outcome::Read).await
     }
 }
 

@@ -1,9 +1,11 @@
 //! The log: one line an event on standard error, for people or for programs.
 
-use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
 
+use serde::{Deserialize, Serialize};
 use tracing_subscriber::EnvFilter;
+
+use super::AUDIT;
 
 /// How log lines are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -30,12 +32,17 @@ pub enum TelemetryError {
     Metrics(#[from] metrics_exporter_prometheus::BuildError),
 }
 
-/// Starts the process's log at `level`: a level or a list of `target=level`.
+/// The target of the spans of requests, whose fields (protocol, request id, key, peer) stand in every line within.
+pub const REQUEST: &str = "mrol::request";
+
+/// Starts the process's log at `level`: a level or a list of `target=level`. With `audit` the lines of the
+/// [audit](super::AUDIT) are written whatever the level, and without not at all.
 ///
 /// # Errors
 /// When `level` is no filter, or the log was started before.
-pub fn start_logging(format: LogFormat, level: &str) -> Result<(), TelemetryError> {
+pub fn start_logging(format: LogFormat, level: &str, audit: bool) -> Result<(), TelemetryError> {
     let filter = EnvFilter::try_new(level).map_err(|error| TelemetryError::Level(level.to_owned(), error))?;
+    let filter = with_audit(filter, audit);
     let colors = std::io::stderr().is_terminal();
     let lines =
         tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colors).with_writer(std::io::stderr);
@@ -46,13 +53,24 @@ pub fn start_logging(format: LogFormat, level: &str) -> Result<(), TelemetryErro
     started.map_err(|_| TelemetryError::Started)
 }
 
+fn with_audit(filter: EnvFilter, audit: bool) -> EnvFilter {
+    let directives = if audit {
+        // Without their requests' spans the lines would not say who asked.
+        vec![format!("{AUDIT}=info"), format!("{REQUEST}=info")]
+    } else {
+        vec![format!("{AUDIT}=off")]
+    };
+    let directives = directives.into_iter().filter_map(|directive| directive.parse().ok());
+    directives.fold(filter, EnvFilter::add_directive)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_level_that_is_none_is_named() {
-        let error = start_logging(LogFormat::Text, "mrol=loud").unwrap_err();
+        let error = start_logging(LogFormat::Text, "mrol=loud", true).unwrap_err();
         assert!(error.to_string().contains("mrol=loud"), "{error}");
     }
 }

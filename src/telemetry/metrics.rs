@@ -17,10 +17,11 @@ use super::families::{
 use super::log::TelemetryError;
 use super::map_counters::{Family, MapCounters};
 use super::{exposition, families};
-use crate::admission::InUse;
 use crate::align::Verdict;
-use crate::map::{Lookup, MapName, RobotName};
-use crate::service::{MapInfo, PoolUse, Readings, Shortage, UnavailableMap};
+use crate::map::{MapName, RobotName};
+use crate::service::{
+    Change, End, Ended, MapInfo, Observer, Outcome, PoolUse, Readings, Shortage, UnavailableMap,
+};
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
 /// beside a disk that hangs as long as that.
@@ -43,6 +44,19 @@ const COMMIT: &str = match option_env!("MROL_COMMIT") {
     Some(commit) if !commit.is_empty() => commit,
     _ => "unknown",
 };
+
+/// How much of what admission limits is in use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InUse {
+    /// Requests in work.
+    pub requests: usize,
+    /// Requests whose bodies are arriving.
+    pub arriving: usize,
+    /// Streams.
+    pub streams: usize,
+    /// Bytes of bodies and answers.
+    pub bytes: usize,
+}
 
 /// The metrics of one server. A clone is another handle on the same ones.
 ///
@@ -170,13 +184,8 @@ impl Metrics {
         });
     }
 
-    /// Counts points that were answered.
-    pub fn points_queried(&self, map: &MapName, lookup: Lookup, points: usize) {
-        self.0.maps.points_queried(map, lookup, points);
-    }
-
     /// Counts a scan of `robot` that was judged for insertion.
-    pub fn scan(&self, map: &MapName, robot: &RobotName, verdict: Verdict) {
+    fn scan(&self, map: &MapName, robot: &RobotName, verdict: Verdict) {
         self.0.maps.scan(map, verdict);
         let robot = self.label_of_robot(robot);
         self.record(|| {
@@ -194,16 +203,6 @@ impl Metrics {
             robots.insert(robot.clone());
         }
         robot.to_string()
-    }
-
-    /// Counts scans that were taken out again.
-    pub fn scans_undone(&self, map: &MapName, scans: usize) {
-        self.0.maps.count(map, (Family::ScansUndone, None), scans);
-    }
-
-    /// Counts finest voxels that a deletion or an undo removed.
-    pub fn voxels_removed(&self, map: &MapName, voxels: usize) {
-        self.0.maps.count(map, (Family::VoxelsRemoved, None), voxels);
     }
 
     /// Forgets what was counted of maps that are not among `names`.
@@ -270,17 +269,42 @@ fn features() -> String {
     compiled.collect::<Vec<_>>().join(",")
 }
 
+/// Counts what was done by map. Answers that were given before are not counted again.
+impl Observer for Metrics {
+    fn operation_ended(&self, ended: &Ended<'_>) {
+        let (Some(map), End::Done(outcome)) = (ended.map, &ended.end) else { return };
+        match outcome {
+            Outcome::Points { lookup, points } => self.0.maps.points_queried(map, *lookup, *points),
+            Outcome::Scan { robot, verdict, replayed: false } => self.scan(map, robot, *verdict),
+            Outcome::Changed(Change { voxels_removed, scans_undone, replayed: false, .. }) => {
+                self.0.maps.count(map, (Family::VoxelsRemoved, None), *voxels_removed);
+                if *scans_undone > 0 {
+                    self.0.maps.count(map, (Family::ScansUndone, None), *scans_undone);
+                }
+            }
+            Outcome::Read | Outcome::Scan { .. } | Outcome::Changed(_) => {}
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::Lookup;
+
+    /// Tells `metrics` that something was done to `map`.
+    fn tell(metrics: &Metrics, map: &MapName, outcome: Outcome) {
+        let end = End::Done(outcome);
+        metrics.operation_ended(&Ended { operation: "Any", caller: None, map: Some(map), end });
+    }
 
     #[test]
     fn what_was_counted_is_rendered_with_its_description() {
         let metrics = Metrics::new().unwrap();
         let map = MapName::new("a").unwrap();
         metrics.request("grpc", "QueryPoints", "ok", Duration::from_millis(3));
-        metrics.points_queried(&map, Lookup::Bloom, 7);
-        metrics.points_queried(&map, Lookup::Bloom, 5);
+        tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 7 });
+        tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 5 });
         metrics.scan(&map, &RobotName::new("r").unwrap(), Verdict::LowOverlap);
         let text = metrics.render(&[], &[map], &[], &[]);
         for line in [
@@ -303,10 +327,11 @@ mod tests {
         let metrics = Metrics::new().unwrap();
         let [kept, gone] = ["kept", "gone"].map(|name| MapName::new(name).unwrap());
         for map in [&kept, &gone] {
-            metrics.points_queried(map, Lookup::Exact, 1);
+            tell(&metrics, map, Outcome::Points { lookup: Lookup::Exact, points: 1 });
             metrics.scan(map, &RobotName::new("r").unwrap(), Verdict::Accepted);
-            metrics.scans_undone(map, 1);
-            metrics.voxels_removed(map, 1);
+            let undone =
+                Change { before: None, after: None, voxels_removed: 1, scans_undone: 1, replayed: false };
+            tell(&metrics, map, Outcome::Changed(undone));
         }
         let names = std::slice::from_ref(&kept);
         let text = metrics.render(&[], names, &[], &[]);

@@ -1,12 +1,14 @@
 //! What the daemon says of itself: log lines and Prometheus metrics.
 
+mod audit;
 mod exposition;
 mod families;
 mod log;
 mod map_counters;
-mod metered;
 mod metrics;
+mod requests;
 
-pub use log::{LogFormat, TelemetryError, start_logging};
-pub use metered::MeteredService;
-pub use metrics::{Metrics, OpenConnection};
+pub use audit::{AUDIT, Audit};
+pub use log::{LogFormat, REQUEST, TelemetryError, start_logging};
+pub use metrics::{InUse, Metrics, OpenConnection};
+pub use requests::{RequestOutcome, RequestRecorder};

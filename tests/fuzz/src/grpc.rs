@@ -35,8 +35,8 @@ const DEFECTS: [&str; 3] = ["2", "13", "15"];
 /// An input is a list of calls: a method, a length (u16, little-endian), and a message of so many bytes.
 pub(super) fn grpc(mut calls: &[u8]) {
     thread_local! {
-        static SERVED: Hosted = Hosted::new(|gate, admission| {
-            let (routes, _health) = routes(gate, admission, MESSAGE_BYTES_MAX).expect("routes");
+        static SERVED: Hosted = Hosted::new(|middleware| {
+            let (routes, _health) = routes(middleware, MESSAGE_BYTES_MAX).expect("routes");
             routes.into_axum_router()
         });
     }

@@ -1,6 +1,7 @@
 //! A service with one map, as it is behind both protocols.
 
 use std::cell::Cell;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
@@ -8,15 +9,15 @@ use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Request, StatusCode};
 use http_body_util::{BodyExt, Limited};
 use mrol::access::{Access, Gate};
-use mrol::admission::{Admission, AdmissionLimits};
+use mrol::admission::{Admission, AdmissionLimits, Lifecycle};
 use mrol::geometry::{Point, Pose};
-use mrol::lifecycle::Lifecycle;
 use mrol::map::{MapName, MapSettings, RobotName};
 use mrol::mapping::Guess;
+use mrol::middleware::Middleware;
 use mrol::scan::PointFilter;
 use mrol::service::{Limits, MapService, PointCloud, ScanRequest, ServiceSettings};
 use mrol::store::OpeningProgress;
-use mrol::telemetry::{MeteredService, Metrics};
+use mrol::telemetry::{Audit, Metrics, RequestRecorder};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use tower::ServiceExt;
@@ -35,7 +36,8 @@ const REVISIONS: u64 = 2;
 /// A service whose one map, `a`, has two scans of the robot `r1`, and a protocol in front of it.
 pub(super) struct Hosted {
     runtime: Runtime,
-    service: MeteredService,
+    service: MapService,
+    metrics: Metrics,
     router: Router,
     asked: Cell<u64>,
     _data: TempDir,
@@ -50,10 +52,12 @@ pub(super) struct Answer {
 }
 
 impl Hosted {
-    pub(super) fn new(protocol: impl FnOnce(Gate, Admission) -> Router) -> Self {
+    pub(super) fn new(protocol: impl FnOnce(&Middleware) -> Router) -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let data = tempfile::tempdir().expect("a folder");
+        let (metrics, audit) = (Metrics::new().expect("metrics"), Audit::default());
         let settings = ServiceSettings {
+            observers: vec![Arc::new(metrics.clone()), Arc::new(audit.clone())],
             data_dir: Some(data.path().to_owned()),
             limits: limits(),
             query_threads: 1,
@@ -63,10 +67,11 @@ impl Hosted {
             ..ServiceSettings::default()
         };
         let service = MapService::open(settings, &OpeningProgress::default()).expect("a service");
-        let service = MeteredService::new(service, Metrics::new().expect("metrics"));
         let gate = Gate::new(Access::open(), service.clone());
-        let router = protocol(gate, Admission::new(&AdmissionLimits::default(), Lifecycle::default()));
-        let hosted = Self { runtime, service, router, asked: Cell::new(0), _data: data };
+        let admission = Admission::new(&AdmissionLimits::default(), Lifecycle::default());
+        let recorder = RequestRecorder::new(metrics.clone(), audit);
+        let router = protocol(&Middleware::new(gate, admission, recorder));
+        let hosted = Self { runtime, service, metrics, router, asked: Cell::new(0), _data: data };
         hosted.runtime.block_on(hosted.make_map());
         hosted
     }
@@ -74,7 +79,7 @@ impl Hosted {
     /// The answer to one request.
     pub(super) fn ask(&self, request: Request<Body>) -> Answer {
         if self.asked.replace(self.asked.get() + 1).is_multiple_of(REQUESTS_AN_UPKEEP) {
-            self.service.metrics().upkeep();
+            self.metrics.upkeep();
         }
         self.runtime.block_on(async {
             let answered = tokio::time::timeout(PATIENCE, async {
@@ -91,7 +96,7 @@ impl Hosted {
 
     /// Changes of the map; none where it is gone.
     pub(super) fn revision(&self) -> Option<u64> {
-        let state = self.runtime.block_on(self.service.maps().trajectory(&name(), Default::default()));
+        let state = self.runtime.block_on(self.service.trajectory(&name(), Default::default()));
         state.ok().map(|answer| answer.version.revision)
     }
 
@@ -99,8 +104,8 @@ impl Hosted {
     pub(super) fn reset(&self, maps_changed: bool) {
         if maps_changed || self.revision() != Some(REVISIONS) {
             self.runtime.block_on(async {
-                for map in self.service.maps().list_maps().await.expect("a list") {
-                    self.service.maps().delete_map(&map.name).await.expect("a map that is gone");
+                for map in self.service.list_maps().await.expect("a list") {
+                    self.service.delete_map(&map.name).await.expect("a map that is gone");
                 }
                 self.make_map().await;
             });
@@ -108,8 +113,7 @@ impl Hosted {
     }
 
     async fn make_map(&self) {
-        let maps = self.service.maps();
-        maps.create_map(name(), MapSettings::new(0.1, 4)).await.expect("a map");
+        self.service.create_map(name(), MapSettings::new(0.1, 4)).await.expect("a map");
         for scan_id in 1..=REVISIONS {
             let answer = self.service.insert_scan(&name(), scan(scan_id)).await.expect("an answer");
             assert!(answer.accepted);

@@ -13,7 +13,7 @@ use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 pub(super) fn http(bytes: &[u8]) {
     thread_local! {
         static SERVED: Hosted =
-            Hosted::new(|gate, admission| router(gate, admission, MESSAGE_BYTES_MAX));
+            Hosted::new(|middleware| router(middleware, MESSAGE_BYTES_MAX));
     }
     let Some(request) = request(bytes) else { return };
     let changes_maps = ["PUT", "DELETE"].contains(&request.method().as_str());

@@ -27,7 +27,7 @@ impl Daemon {
         grpc: Option<SocketAddr>,
         output: &Output,
     ) -> Result<Self, CliError> {
-        start_logging(LogFormat::Text, LOG_LEVEL).map_err(CliError::failed)?;
+        start_logging(LogFormat::Text, LOG_LEVEL, false).map_err(CliError::failed)?;
         let data_dir = TempDir::new()
             .map_err(|error| CliError::failed(format!("no temporary folder can be made: {error}")))?;
         let mut config = Config { data_dir: data_dir.path().to_owned(), ..Config::default() };

@@ -1,0 +1,139 @@
+//! Observers of a service: who is told of each operation when it is over, for metrics and for the audit.
+
+use std::fmt::Debug;
+
+use super::{MapService, MapVersion, ServiceError};
+use crate::align::Verdict;
+use crate::map::{CallerName, Lookup, MapName, RobotName};
+
+/// Told of each operation of a service when it is over.
+///
+/// It is called on the task that answers the caller, so it must not block.
+pub trait Observer: Debug + Send + Sync {
+    /// An operation is over: answered, refused, or left by its caller.
+    fn operation_ended(&self, ended: &Ended<'_>);
+}
+
+/// An operation that is over.
+#[derive(Debug)]
+pub struct Ended<'a> {
+    /// Which operation.
+    pub operation: &'static str,
+    /// The name of the caller's key, where there is one.
+    pub caller: Option<&'a CallerName>,
+    /// The map that it was asked of; none of an operation on all maps.
+    pub map: Option<&'a MapName>,
+    /// What came of it.
+    pub end: End<'a>,
+}
+
+/// How an operation ended.
+#[derive(Debug)]
+pub enum End<'a> {
+    /// It was done.
+    Done(Outcome),
+    /// It was refused, or failed.
+    Failed(&'a ServiceError),
+    /// The caller went away first. A change that was decided on by then is made all the same.
+    CallerGone,
+}
+
+/// What an operation did.
+#[derive(Debug)]
+pub enum Outcome {
+    /// It read, and nothing of it is counted.
+    Read,
+    /// Points were looked up.
+    Points {
+        /// How.
+        lookup: Lookup,
+        /// How many.
+        points: usize,
+    },
+    /// A scan was judged, and inserted where the verdict or its sender said so.
+    Scan {
+        /// Who sent it.
+        robot: RobotName,
+        /// How it fits.
+        verdict: Verdict,
+        /// An answer that was given before.
+        replayed: bool,
+    },
+    /// The map, or which maps there are, was changed.
+    Changed(Change),
+}
+
+/// What a change by an operator did.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Change {
+    /// The map's version before: another uuid where another map was replaced; none of a map that was not there.
+    pub before: Option<MapVersion>,
+    /// The map's version after it; none of a map that was deleted.
+    pub after: Option<MapVersion>,
+    /// Voxels of level 0 that were removed.
+    pub voxels_removed: usize,
+    /// Scans that were taken out.
+    pub scans_undone: usize,
+    /// It had been done before under its request id, or had nothing to do.
+    pub replayed: bool,
+}
+
+impl Change {
+    /// A deletion or an undo that led to `after`, by a revision of its own unless it was `replayed` or had nothing to do.
+    pub(super) fn of_voxels(
+        after: MapVersion,
+        voxels_removed: usize,
+        scans_undone: usize,
+        replayed: bool,
+    ) -> Self {
+        let made_revision = !replayed && (voxels_removed > 0 || scans_undone > 0);
+        let before = MapVersion { revision: after.revision - u64::from(made_revision), ..after };
+        Self { before: Some(before), after: Some(after), voxels_removed, scans_undone, replayed }
+    }
+
+    /// A map was made, deleted or replaced.
+    pub(super) fn of_map(before: Option<MapVersion>, after: Option<MapVersion>) -> Self {
+        Self { before, after, voxels_removed: 0, scans_undone: 0, replayed: before == after }
+    }
+}
+
+impl MapService {
+    /// Does `work`, and tells the observers how the operation ended, with what `outcome` makes of the answer. They are
+    /// told where the caller goes away as well.
+    pub(super) async fn observed<A>(
+        &self,
+        operation: &'static str,
+        map: Option<&MapName>,
+        work: impl Future<Output = Result<A, ServiceError>>,
+        outcome: impl FnOnce(&A) -> Outcome,
+    ) -> Result<A, ServiceError> {
+        let pending = Pending { service: self, operation, map };
+        let answer = work.await;
+        std::mem::forget(pending);
+        let end = match &answer {
+            Ok(answer) => End::Done(outcome(answer)),
+            Err(error) => End::Failed(error),
+        };
+        self.tell(&Ended { operation, caller: self.caller.as_ref(), map, end });
+        answer
+    }
+
+    fn tell(&self, ended: &Ended<'_>) {
+        self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
+    }
+}
+
+/// An operation that is not over: dropped, its caller has gone.
+struct Pending<'a> {
+    service: &'a MapService,
+    operation: &'static str,
+    map: Option<&'a MapName>,
+}
+
+impl Drop for Pending<'_> {
+    fn drop(&mut self) {
+        let Self { service, operation, map } = *self;
+        let caller = service.caller.as_ref();
+        service.tell(&Ended { operation, caller, map, end: End::CallerGone });
+    }
+}
