@@ -7,7 +7,7 @@ use std::time::Duration;
 use parking_lot::Mutex;
 use tokio_util::sync::CancellationToken;
 
-use super::inbound_body::{Body, CloseConnection, InboundBody};
+use super::body_state::{Body, CloseConnection};
 use super::limits::AdmissionLimits;
 use super::quota::Quota;
 use crate::service::{ErrorCode, ServiceError};
@@ -17,7 +17,7 @@ use crate::telemetry::InUse;
 const GRACE: Duration = Duration::from_secs(1);
 
 /// The reason of a body that was ended for its silence.
-pub const BODY_SILENT: &str = "body_silent";
+pub const BODY_STALLED: &str = "body_stalled";
 
 /// The bodies of all requests, and what else lies in the same memory. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
@@ -90,7 +90,7 @@ impl Bodies {
         Self(Arc::new(Inner { requests: Quota::new(name, most), limits, known: Mutex::default() }))
     }
 
-    /// A body begins to arrive.
+    /// A body begins to arrive: its number, and what is cancelled when it is ended.
     ///
     /// # Errors
     /// When as many requests are arriving as may be, and none was silent.
@@ -98,7 +98,7 @@ impl Bodies {
         &self,
         is_stream: bool,
         hang_up: Option<CloseConnection>,
-    ) -> Result<InboundBody, ServiceError> {
+    ) -> Result<(u64, CancellationToken), ServiceError> {
         let mut known = self.0.known.lock();
         if !is_stream {
             let full = known.arriving >= self.0.limits.requests.1;
@@ -110,7 +110,7 @@ impl Bodies {
         let (number, ended) = (known.next, CancellationToken::new());
         known.next += 1;
         known.bodies.insert(number, Body::new(is_stream, ended.clone(), hang_up));
-        Ok(InboundBody::new(self.clone(), number, ended))
+        Ok((number, ended))
     }
 
     /// More of a body has come.
@@ -200,7 +200,7 @@ impl Bodies {
         let message = format!(
             "body_silence_max is {silence_max:?}, body_bytes_per_s_min is {least}: nothing more of the body came, or too slowly"
         );
-        let refusal = ServiceError::new(ErrorCode::DeadlineExceeded, BODY_SILENT, message);
+        let refusal = ServiceError::new(ErrorCode::DeadlineExceeded, BODY_STALLED, message);
         let mut known = self.0.known.lock();
         let silent = |body: &Body| body.silence().is_some_and(|silence| silence >= silence_max);
         let numbers: Vec<u64> =

@@ -15,6 +15,7 @@
 
 mod answer_body;
 mod bodies;
+mod body_state;
 mod inbound_body;
 mod lifecycle;
 mod limits;
@@ -25,8 +26,9 @@ mod quota;
 mod rate;
 
 pub use answer_body::{Ending, Endings};
-pub use bodies::{BODY_SILENT, MemoryPermit};
-pub use inbound_body::{CloseConnection, InboundBody};
+pub use bodies::{BODY_STALLED, MemoryPermit};
+pub use body_state::CloseConnection;
+pub use inbound_body::InboundBody;
 pub use lifecycle::{Lifecycle, draining};
 pub use limits::AdmissionLimits;
 pub use of_connection::OfConnection;
@@ -119,7 +121,7 @@ impl Admission {
         self.check_rate(&asking)?;
         let own_place = asking.begin(self.0.at_once_max)?;
         let hang_up = request.extensions().get().cloned();
-        let arrival = self.0.bodies.begin(operation.is_stream(), hang_up)?;
+        let arrival = InboundBody::begin(&self.0.bodies, operation.is_stream(), hang_up)?;
         let let_in = request.extensions().get().map(OfConnection::let_in);
         let request = Self::metered(request, &arrival)?;
         let answered = self.0.lifecycle.admit(handle(request)).await?;

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use parking_lot::Mutex;
 use tokio::time::Instant;
 
-use super::quota::{Quota, Taken};
+use super::quota::{Quota, QuotaSlot};
 use crate::service::ServiceError;
 
 /// What the requests of one connection share; to be found among their extensions. A clone is another handle on it.
@@ -81,7 +81,7 @@ impl OfConnection {
     ///
     /// # Errors
     /// Where it has one.
-    pub(super) fn watch(&self) -> Result<Taken, ServiceError> {
+    pub(super) fn watch(&self) -> Result<QuotaSlot, ServiceError> {
         self.0.watches.take()
     }
 }

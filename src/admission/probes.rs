@@ -13,7 +13,7 @@ use super::bodies::Bodies;
 use super::inbound_body::InboundBody;
 use super::limits::AdmissionLimits;
 use super::of_connection::OfConnection;
-use super::quota::{Quota, Taken};
+use super::quota::{Quota, QuotaSlot};
 use crate::access::{Authorized, Operation};
 use crate::service::{ErrorCode, ServiceError};
 
@@ -27,7 +27,7 @@ pub(super) struct Probes {
 }
 
 /// The places of a watch: of the server, and of its connection.
-type Watch = (Taken, Option<Taken>);
+type Watch = (QuotaSlot, Option<QuotaSlot>);
 
 impl Probes {
     pub(super) fn new(limits: &AdmissionLimits) -> Self {
@@ -61,7 +61,7 @@ impl Probes {
             endings.when.push(self.watch_over());
         }
         let places = if operation == Operation::Metrics { &self.scrapes } else { &self.checks };
-        let arrival = places.begin(false, request.extensions().get().cloned())?;
+        let arrival = InboundBody::begin(places, false, request.extensions().get().cloned())?;
         let let_in = request.extensions().get().map(OfConnection::let_in);
         let request = self.with_body(request, &arrival).await?;
         let answered = if watch.is_some() {

@@ -15,7 +15,7 @@ pub(super) struct Quota {
 }
 
 /// One of them, until it is dropped.
-pub(super) type Taken = OwnedSemaphorePermit;
+pub(super) type QuotaSlot = OwnedSemaphorePermit;
 
 impl Quota {
     pub(super) fn new(limit: &'static str, most: usize) -> Self {
@@ -24,7 +24,7 @@ impl Quota {
 
     /// # Errors
     /// Names the limit when there is none left.
-    pub(super) fn take(&self) -> Result<Taken, ServiceError> {
+    pub(super) fn take(&self) -> Result<QuotaSlot, ServiceError> {
         Arc::clone(&self.free).try_acquire_owned().map_err(|_| self.refusal())
     }
 

@@ -46,7 +46,7 @@ impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
         let status = match error.reason {
             HOST_NOT_ALLOWED => StatusCode::MISDIRECTED_REQUEST,
-            admission::BODY_SILENT => StatusCode::REQUEST_TIMEOUT,
+            admission::BODY_STALLED => StatusCode::REQUEST_TIMEOUT,
             Shortage::DISK_FULL => StatusCode::INSUFFICIENT_STORAGE,
             Shortage::MEMORY_FULL => StatusCode::SERVICE_UNAVAILABLE,
             _ => status_of(error.code).0,

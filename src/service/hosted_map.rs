@@ -10,9 +10,7 @@ use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
 use super::committing::{CommitQueue, CommitThread, Stop};
-use super::map_file::snapshot_bytes;
 use super::resource_budget::ResourceBudget;
-use super::trajectory::thin;
 use super::{
     ErrorCode, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, ServiceError, VoxelListing,
     check_not_stopped, ended_early,
@@ -380,4 +378,15 @@ pub(super) fn bitmap(words: Vec<u64>, points: usize) -> Bytes {
     }
     let words = if cfg!(target_endian = "big") { words.into_iter().map(u64::to_le).collect() } else { words };
     Bytes::from_owner(Owner(words)).slice(..points.div_ceil(8))
+}
+
+/// Bytes of memory that a snapshot of `map` takes while it is made: 55 to 70 % of the map's were measured.
+pub(super) fn snapshot_bytes(map: &MultiResolutionMap) -> u64 {
+    map.memory_bytes() as u64 / 4 * 3
+}
+
+/// Thins the poses of `map` that undo reaches no more. Waits for the turn to change the map.
+pub(super) fn thin(map: &MultiResolutionMap, folder: &MapFolder) {
+    let before = folder.used().kept_from;
+    map.committer().thin(before, &folder.settings().trajectory_spacing);
 }

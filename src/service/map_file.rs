@@ -3,7 +3,7 @@
 use uuid::Uuid;
 
 use super::growth::growth_bytes;
-use super::hosted_map::HostedMap;
+use super::hosted_map::{HostedMap, snapshot_bytes};
 use super::resource_budget::Reservation;
 use super::resource_budget::ResourceBudget;
 use super::{ErrorCode, Limits, MapFile, ServiceError, ended_early};
@@ -95,9 +95,4 @@ fn not_read(refusal: MapFileError<ServiceError>, stop: StopSignal<'_>) -> Servic
             ServiceError::new(ErrorCode::ResourceExhausted, "map_full", refusal.to_string())
         }
     }
-}
-
-/// Bytes of memory that a snapshot of `map` takes while it is made: 55 to 70 % of the map's were measured.
-pub(super) fn snapshot_bytes(map: &MultiResolutionMap) -> u64 {
-    map.memory_bytes() as u64 / 4 * 3
 }

@@ -9,8 +9,7 @@ use super::hosted_map::HostedMap;
 use super::{
     ErrorCode, Limits, MapService, MapVersion, Outcome, ServiceError, TrajectoryAnswer, TrajectoryQuery,
 };
-use crate::map::{MapName, MultiResolutionMap, RobotName, Trajectory};
-use crate::store::MapFolder;
+use crate::map::{MapName, RobotName, Trajectory};
 use crate::util::StopSignal;
 
 /// Poses of one piece of a streamed trajectory.
@@ -158,12 +157,6 @@ impl HostedMap {
         );
         Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_robots", message))
     }
-}
-
-/// Thins the poses of `map` that undo reaches no more. Waits for the turn to change the map.
-pub(super) fn thin(map: &MultiResolutionMap, folder: &MapFolder) {
-    let before = folder.used().kept_from;
-    map.committer().thin(before, &folder.settings().trajectory_spacing);
 }
 
 /// # Errors

@@ -17,10 +17,8 @@
 //! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted goes
 //! into its own folder, and never into that of the next map of its name.
 
-mod entry;
 mod stock;
 
-pub(super) use entry::Entry;
 pub use stock::Stock;
 
 use std::collections::BTreeSet;
@@ -31,6 +29,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::checked_files::CheckedFiles;
+use super::entry::Entry;
 use super::map_folder::{MapFolder, OpenedMap};
 use super::replacement::{self, REPLACES, Replacement};
 use super::snapshot_files::newest_good;

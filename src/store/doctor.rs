@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::data_dir::Entry;
+use super::entry::Entry;
 use super::folder::FolderPath;
 use super::journal::{self, Inspected};
 use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot, snapshot_files};

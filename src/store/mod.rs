@@ -21,6 +21,7 @@ mod checked_files;
 mod codec;
 mod data_dir;
 pub mod doctor;
+mod entry;
 mod error;
 mod file_system;
 mod folder;

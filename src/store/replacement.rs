@@ -13,7 +13,7 @@
 
 use std::path::Path;
 
-use super::data_dir::Entry;
+use super::entry::Entry;
 use super::{FileSystem, StoreError, folder};
 
 /// The file in the new map's folder.

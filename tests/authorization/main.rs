@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod asking;
+mod audit;
 mod browsers;
 #[path = "../common/mod.rs"]
 mod common;

@@ -7,8 +7,7 @@ use super::{Named, not_stored};
 use crate::map::MapName;
 use crate::service::ServiceError;
 use crate::service::committing::CommitThread;
-use crate::service::hosted_map::HostedMap;
-use crate::service::trajectory::thin;
+use crate::service::hosted_map::{HostedMap, thin};
 use crate::store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError, StoreSettings};
 
 /// Opens what can be opened.

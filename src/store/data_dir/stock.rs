@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use super::{DataDir, Entry};
+use super::DataDir;
 use crate::map::MapName;
+use crate::store::entry::Entry;
 use crate::store::replacement::{self, Replacement};
 use crate::store::{OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
 use crate::util::StopSignal;

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use uuid::Uuid;
 
+use super::folder::UNFINISHED;
 use crate::map::MapName;
-use crate::store::folder::UNFINISHED;
 
 const MAP_FILE_SUFFIX: &str = ".mrol";
 
 /// What a name in the folder of maps means. A map's name has no dot, so that each means one thing.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::store) enum Entry {
+pub(super) enum Entry {
     /// A map's folder.
     Map { name: MapName, uuid: Uuid },
     /// One of a former release.
@@ -25,7 +25,7 @@ pub(in crate::store) enum Entry {
 }
 
 impl Entry {
-    pub(in crate::store) fn of(entry: &str) -> Self {
+    pub(super) fn of(entry: &str) -> Self {
         if entry.starts_with(UNFINISHED) {
             return Self::Unfinished;
         }
@@ -41,12 +41,12 @@ impl Entry {
         }
     }
 
-    pub(in crate::store) fn of_path(path: &Path) -> Self {
+    pub(super) fn of_path(path: &Path) -> Self {
         Self::of(&path.file_name().unwrap_or_default().to_string_lossy())
     }
 
     /// The name of the map whose folder it is.
-    pub(in crate::store) fn into_map(self) -> Option<MapName> {
+    pub(super) fn into_map(self) -> Option<MapName> {
         match self {
             Self::Map { name, .. } | Self::OldMap(name) => Some(name),
             Self::MapFile(_) | Self::Unfinished | Self::Unknown => None,
@@ -54,12 +54,12 @@ impl Entry {
     }
 
     /// The name of a map's folder.
-    pub(in crate::store) fn folder_name(name: &MapName, uuid: Uuid) -> String {
+    pub(super) fn folder_name(name: &MapName, uuid: Uuid) -> String {
         format!("{name}.{uuid}")
     }
 
     /// The name of a map file.
-    pub(in crate::store) fn file_name(name: &MapName) -> String {
+    pub(super) fn file_name(name: &MapName) -> String {
         format!("{name}{MAP_FILE_SUFFIX}")
     }
 }
