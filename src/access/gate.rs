@@ -5,7 +5,7 @@ use axum::http::{Extensions, HeaderMap, Request};
 
 use super::{Access, Caller, Operation, Secret};
 use crate::map::CallerName;
-use crate::service::{ErrorCode, MapService, ServiceError};
+use crate::service::{MapService, Reason, ServiceError};
 
 /// The only holder of a service that reaches every map. Handlers get theirs of [`Gate::authorize`], so that none can
 /// reach more than its caller may.
@@ -32,7 +32,7 @@ impl Authorized {
     pub fn of(extensions: &Extensions) -> Result<&Self, ServiceError> {
         extensions.get().ok_or_else(|| {
             let message = "nobody asked who may do this: a defect of the server";
-            ServiceError::new(ErrorCode::Internal, "not_authorized", message)
+            ServiceError::new(Reason::NotAuthorized, message)
         })
     }
 }

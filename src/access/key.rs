@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Allowance, Digest, Expiry, KeyLimits, Scope};
 use crate::map::RobotName;
-use crate::service::{AllowedMaps, AllowedScans, ErrorCode, ServiceError};
+use crate::service::{AllowedMaps, AllowedScans, Reason, ServiceError};
 
 /// Characters of a key's name, at most.
 const NAME_LENGTH_MAX: usize = 64;
@@ -43,9 +43,6 @@ pub(super) enum Ended {
     Withdrawn,
     Expired,
 }
-
-/// The reason of a refusal where a key's time is up.
-pub(super) const KEY_EXPIRED: &str = "key_expired";
 
 impl Key {
     /// A key that counts, for every robot and for ever.
@@ -111,16 +108,16 @@ impl Key {
     pub(super) fn expired(&self, now: SystemTime) -> Option<ServiceError> {
         let expires = self.expires.filter(|_| self.is_expired(now))?;
         let message = format!("key {} expired at {expires}: ask for a new one", self.name);
-        Some(ServiceError::new(ErrorCode::Unauthenticated, KEY_EXPIRED, message))
+        Some(ServiceError::new(Reason::KeyExpired, message))
     }
 
     /// What to tell whoever was let in with it when it ended.
     pub(super) fn ended(&self) -> ServiceError {
         let (reason, what) = match self.end.reason.get() {
-            Some(Ended::Expired) => (KEY_EXPIRED, "expired"),
-            Some(Ended::Withdrawn) | None => ("key_withdrawn", "was withdrawn or changed"),
+            Some(Ended::Expired) => (Reason::KeyExpired, "expired"),
+            Some(Ended::Withdrawn) | None => (Reason::KeyWithdrawn, "was withdrawn or changed"),
         };
-        ServiceError::new(ErrorCode::Unauthenticated, reason, format!("key {} {what}", self.name))
+        ServiceError::new(reason, format!("key {} {what}", self.name))
     }
 }
 

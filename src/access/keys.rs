@@ -83,7 +83,7 @@ fn continued(key: Key, former: &[Arc<Key>]) -> Key {
 mod tests {
     use super::*;
     use crate::access::{KeyName, Scope};
-    use crate::service::AllowedMaps;
+    use crate::service::{AllowedMaps, Reason};
 
     fn key(name: &str, secret: &str, scope: Scope) -> Key {
         let name = KeyName::new(name).unwrap();
@@ -121,7 +121,7 @@ mod tests {
         assert!(!first.0[0].end.has_come());
         longer.end_expired(at(1_803_772_800));
         assert!(first.0[0].end.has_come());
-        assert_eq!(first.0[0].ended().reason, "key_expired");
+        assert_eq!(first.0[0].ended().reason, Reason::KeyExpired);
         // Prolonged after its end it is another beginning.
         let again = Keys::after(Some(&longer), until("2028-01-31"));
         assert!(!again.0[0].end.has_come());

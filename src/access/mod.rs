@@ -27,7 +27,7 @@ pub use key_file::{KeyEntry, KeyFileError, add_to_file, list_file, revoke_in_fil
 pub use keys::Keys;
 pub use operation::{Operation, Route};
 pub use reload::{Reload, ReloadableFile, is_open_to_others};
-pub use rules::{Access, KEY_UNKNOWN};
+pub use rules::Access;
 pub use scope::Scope;
 pub use secret::{Digest, Secret};
-pub use site::{CROSS_SITE, HOST_NOT_ALLOWED, ReachedAt, is_host};
+pub use site::{ReachedAt, is_host};

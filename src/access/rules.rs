@@ -9,7 +9,7 @@ use axum::http::Request;
 use super::reload::ReloadableFile;
 use super::site::{Hosts, check_origin};
 use super::{Caller, Expiry, Key, KeyFileError, KeyName, Keys, Operation, Scope, Secret};
-use crate::service::{AllowedMaps, ErrorCode, ServiceError};
+use crate::service::{AllowedMaps, Reason, ServiceError};
 
 /// The rules of a server. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
@@ -106,16 +106,13 @@ impl Access {
     }
 }
 
-/// The reason of a refusal where a key came that is none of ours.
-pub const KEY_UNKNOWN: &str = "key_unknown";
-
 fn no_key(operation: Operation, given: bool) -> ServiceError {
     let (reason, problem) = match given {
-        false => ("key_missing", "send one as `authorization: Bearer <secret>`"),
-        true => (KEY_UNKNOWN, "the one sent is not known here"),
+        false => (Reason::KeyMissing, "send one as `authorization: Bearer <secret>`"),
+        true => (Reason::KeyUnknown, "the one sent is not known here"),
     };
     let message = format!("{} needs a key: {problem}", operation.name());
-    ServiceError::new(ErrorCode::Unauthenticated, reason, message)
+    ServiceError::new(reason, message)
 }
 
 fn check_scope(operation: Operation, scope: Scope, key: &Key) -> Result<(), ServiceError> {
@@ -123,7 +120,7 @@ fn check_scope(operation: Operation, scope: Scope, key: &Key) -> Result<(), Serv
         return Ok(());
     }
     let message = format!("{} takes scope {scope}, key {} has {}", operation.name(), key.name, key.scope);
-    Err(ServiceError::new(ErrorCode::PermissionDenied, "scope_too_small", message))
+    Err(ServiceError::new(Reason::ScopeTooSmall, message))
 }
 
 /// Of what speaks of every map, a key for some may see nothing. Maps that a request names are checked by the service.
@@ -132,5 +129,5 @@ fn check_metrics_allowed(operation: Operation, key: &Key) -> Result<(), ServiceE
         return Ok(());
     }
     let message = format!("metrics speak of every map, key {} is for some", key.name);
-    Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message))
+    Err(ServiceError::new(Reason::MapNotAllowed, message))
 }

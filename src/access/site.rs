@@ -13,7 +13,7 @@ use axum::http::header::{HOST, ORIGIN};
 use axum::http::uri::Authority;
 use axum::http::{Extensions, HeaderMap, Request, Uri};
 
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 use crate::util::excerpt;
 
 /// Where a request came in; to be found among its extensions.
@@ -24,12 +24,6 @@ pub enum ReachedAt {
     /// A socket of this machine, which no browser reaches.
     UnixSocket,
 }
-
-/// The reason of a refusal to answer under a name that is none of the server's.
-pub const HOST_NOT_ALLOWED: &str = "host_not_allowed";
-
-/// The reason of a refusal to change something for a page of another site.
-pub const CROSS_SITE: &str = "cross_site";
 
 /// The names that a server without keys answers to, besides loopback's and the address that was connected to.
 #[derive(Debug, Clone, Default)]
@@ -134,12 +128,12 @@ fn not_allowed(what: &str) -> ServiceError {
         "{what} is none of this server's, which asks for no key: it answers to localhost, loopback addresses, the \
          address connected to and what access.hosts lists"
     );
-    ServiceError::new(ErrorCode::PermissionDenied, HOST_NOT_ALLOWED, message)
+    ServiceError::new(Reason::HostNotAllowed, message)
 }
 
 fn cross_site(what: &str) -> ServiceError {
     let message = format!("{what}: pages of other sites change nothing here");
-    ServiceError::new(ErrorCode::PermissionDenied, CROSS_SITE, message)
+    ServiceError::new(Reason::CrossSite, message)
 }
 
 #[cfg(test)]

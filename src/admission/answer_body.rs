@@ -151,7 +151,7 @@ impl<H: Send + Sync + 'static> HttpBody for AnswerBody<H> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::ErrorCode;
+    use crate::service::Reason;
     use http_body_util::BodyExt;
     use tokio_stream::StreamExt;
 
@@ -164,7 +164,7 @@ mod tests {
             nothing
         }));
         let (end, ended) = tokio::sync::oneshot::channel::<()>();
-        let late = ServiceError::new(ErrorCode::DeadlineExceeded, "deadline", "late");
+        let late = ServiceError::new(Reason::Deadline, "late");
         let when: Ending = Box::pin(async move {
             let _ = ended.await;
             late
@@ -182,7 +182,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_answer_without_trailers_is_cut() {
-        let cut: Ending = Box::pin(async { ServiceError::invalid("cut", "cut") });
+        let cut: Ending = Box::pin(async { ServiceError::new(Reason::Draining, "cut") });
         let endings = Endings { when: vec![cut], ..Endings::none() };
         let mut body = AnswerBody::new(Body::from("whole"), None, (), endings);
         assert!(body.frame().await.unwrap().is_err() && body.frame().await.is_none());

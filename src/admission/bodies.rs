@@ -10,14 +10,11 @@ use tokio_util::sync::CancellationToken;
 use super::body_state::{Body, CloseConnection};
 use super::limits::AdmissionLimits;
 use super::quota::Quota;
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 use crate::telemetry::InUse;
 
 /// A body of a request that was silent for less than this gives way to nobody: it may be on a slow path.
 const GRACE: Duration = Duration::from_secs(1);
-
-/// The reason of a body that was ended for its silence.
-pub const BODY_STALLED: &str = "body_stalled";
 
 /// The bodies of all requests, and what else lies in the same memory. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
@@ -200,7 +197,7 @@ impl Bodies {
         let message = format!(
             "body_silence_max is {silence_max:?}, body_bytes_per_s_min is {least}: nothing more of the body came, or too slowly"
         );
-        let refusal = ServiceError::new(ErrorCode::DeadlineExceeded, BODY_STALLED, message);
+        let refusal = ServiceError::new(Reason::BodyStalled, message);
         let mut known = self.0.known.lock();
         let silent = |body: &Body| body.silence().is_some_and(|silence| silence >= silence_max);
         let numbers: Vec<u64> =

@@ -7,7 +7,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::bodies::{Bodies, MemoryPermit};
 use super::body_state::CloseConnection;
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 
 /// A handle on a body, which is forgotten with the last of them.
 #[derive(Debug, Clone)]
@@ -41,7 +41,7 @@ impl InboundBody {
     pub fn of(request: &Extensions) -> Result<&Self, ServiceError> {
         request.get().ok_or_else(|| {
             let message = "the request was not admitted: a defect of the server";
-            ServiceError::new(ErrorCode::Internal, "not_admitted", message)
+            ServiceError::new(Reason::NotAdmitted, message)
         })
     }
 

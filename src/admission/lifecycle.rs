@@ -4,7 +4,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tokio_util::task::task_tracker::TaskTrackerToken;
 
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 
 /// The state of a server's life, shared by its listeners. A clone is another handle on the same state.
 ///
@@ -85,7 +85,7 @@ impl Lifecycle {
 
 /// The refusal of a server that is going down.
 pub fn draining() -> ServiceError {
-    ServiceError::new(ErrorCode::Unavailable, "draining", "server is draining")
+    ServiceError::new(Reason::Draining, "server is draining")
 }
 
 #[cfg(test)]

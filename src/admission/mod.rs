@@ -26,7 +26,7 @@ mod quota;
 mod rate;
 
 pub use answer_body::{Ending, Endings};
-pub use bodies::{BODY_STALLED, MemoryPermit};
+pub use bodies::MemoryPermit;
 pub use body_state::CloseConnection;
 pub use inbound_body::InboundBody;
 pub use lifecycle::{Lifecycle, draining};

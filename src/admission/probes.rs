@@ -15,7 +15,7 @@ use super::limits::AdmissionLimits;
 use super::of_connection::OfConnection;
 use super::quota::{Quota, QuotaSlot};
 use crate::access::{Authorized, Operation};
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 
 /// What is asked without a key, or whatever else is done: each kind has places of its own.
 #[derive(Debug)]
@@ -104,7 +104,7 @@ impl Probes {
             let message = format!(
                 "probe_body_bytes_max is {most}: the body of a health check is larger, or broke off ({error})"
             );
-            ServiceError::invalid("probe_body", message)
+            ServiceError::new(Reason::ProbeBody, message)
         })
     }
 
@@ -117,7 +117,7 @@ impl Probes {
                 "health_watch_max_s is {}: a watch without a key ends then, watch again",
                 most.as_secs_f64()
             );
-            ServiceError::new(ErrorCode::DeadlineExceeded, "health_watch_over", message)
+            ServiceError::new(Reason::HealthWatchOver, message)
         })
     }
 
@@ -125,7 +125,7 @@ impl Probes {
         let most = self.limits.probe_time_max;
         let message =
             format!("probe_time_max_s is {}: the health check did not come in full", most.as_secs_f64());
-        ServiceError::new(ErrorCode::DeadlineExceeded, "probe_late", message)
+        ServiceError::new(Reason::ProbeLate, message)
     }
 
     /// How long the text of a scrape answers those that follow.
@@ -167,14 +167,14 @@ mod tests {
         assert!(ask(&probes, Operation::HealthCheck, of(8)).await.is_ok());
         let refused = ask(&probes, Operation::HealthCheck, of(9)).await.unwrap_err();
         assert!(refused.message.contains("probe_body_bytes_max is 8"), "{refused}");
-        assert_eq!(refused.code, ErrorCode::InvalidArgument);
+        assert_eq!(refused.reason, Reason::ProbeBody);
     }
 
     #[tokio::test(start_paused = true)]
     async fn the_body_of_a_check_comes_in_time() {
         let start = tokio::time::Instant::now();
         let refused = ask(&probes(|_| {}), Operation::HealthCheck, endless()).await.unwrap_err();
-        assert_eq!((refused.code, start.elapsed().as_secs()), (ErrorCode::DeadlineExceeded, 5));
+        assert_eq!((refused.reason, start.elapsed().as_secs()), (Reason::ProbeLate, 5));
         assert!(refused.message.contains("probe_time_max_s is 5"), "{refused}");
     }
 

@@ -45,8 +45,8 @@ use tonic::{Request, Response, Status};
 use crate::map::{MapName, Region, RobotName};
 use crate::service::{
     Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, MapList, PointAnswer,
-    PointQuery, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo, UndoAnswer,
-    VoxelListing,
+    PointQuery, Reason, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo,
+    UndoAnswer, VoxelListing,
 };
 use crate::wire::{pb, restore_pieces};
 use connection::Connection;
@@ -294,5 +294,5 @@ impl Client {
 
 /// A listing has at least one message, so that its state is told.
 fn missing_message(what: &str) -> ClientError {
-    ClientError::Answer(ServiceError::invalid("missing_field", format!("the {what} has no message")))
+    ClientError::Answer(ServiceError::new(Reason::MissingField, format!("the {what} has no message")))
 }

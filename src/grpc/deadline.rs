@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use axum::http::HeaderMap;
 
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 
 const HEADER: &str = "grpc-timeout";
 /// How much earlier than the caller's deadline it is answered, at most, and at most this part of it.
@@ -29,7 +29,7 @@ pub(super) async fn within<T>(
 /// What to say of a call whose deadline has come.
 pub(super) fn reached(deadline: Duration) -> ServiceError {
     let message = format!("the call's deadline of {deadline:?} was reached");
-    ServiceError::new(ErrorCode::DeadlineExceeded, "deadline", message)
+    ServiceError::new(Reason::Deadline, message)
 }
 
 /// The deadline of a call: up to eight digits and a unit; none where there is none or it cannot be read.
@@ -70,7 +70,7 @@ mod tests {
     #[tokio::test]
     async fn a_call_that_takes_too_long_is_told_so() {
         let late = within(Some(Duration::from_millis(5)), std::future::pending::<()>()).await.unwrap_err();
-        assert_eq!(late.code, ErrorCode::DeadlineExceeded);
+        assert_eq!(late.reason, Reason::Deadline);
         assert_eq!(late.message, "the call's deadline of 5ms was reached");
     }
 }

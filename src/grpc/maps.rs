@@ -8,7 +8,7 @@ use super::{Adapter, answered, service_of};
 use crate::access::Authorized;
 use crate::admission::InboundBody;
 use crate::map::MapName;
-use crate::service::{AllowedMaps, MapList, ServiceError};
+use crate::service::{AllowedMaps, MapList, Reason, ServiceError};
 use crate::wire::{self, pb, snapshot_bytes, snapshot_pieces};
 use pb::maps_server::Maps;
 
@@ -99,7 +99,7 @@ async fn gather(
     loop {
         if file.len() + piece.data.len() > most {
             let message = format!("map_file_bytes_max is {most}: the map file is larger");
-            return Err(ServiceError::invalid("map_file_too_large", message).into());
+            return Err(ServiceError::new(Reason::MapFileTooLarge, message).into());
         }
         // Compressed, it came as less.
         arrival.at_least(file.len() + piece.data.len())?;

@@ -3,7 +3,7 @@
 use tonic::metadata::MetadataValue;
 use tonic::{Code, Status};
 
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{ErrorCode, Reason, ServiceError};
 use crate::telemetry::RequestOutcome;
 
 /// The metadata that holds the word for programs.
@@ -30,17 +30,14 @@ fn code(code: ErrorCode) -> Code {
 
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
-        let mut status = Self::new(code(error.code), error.message);
-        status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason));
+        let mut status = Self::new(code(error.code()), error.message);
+        status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason.as_str()));
         if let Some(wait) = error.retry_after {
             status.metadata_mut().insert(PUSHBACK, MetadataValue::from(wait.as_millis() as u64));
         }
         status
     }
 }
-
-/// The reason of a message that cannot be read.
-const BAD_MESSAGE: &str = "bad_message";
 
 /// tonic's own refusal of a message in our words, any other status as it is: one that is too large names the limit, and
 /// one that cannot be read (no protobuf, cut off, compressed in a way that nobody named) is the client's mistake, which
@@ -50,11 +47,11 @@ pub(super) fn of_request(status: Status, message_bytes_max: usize) -> Status {
     match status.code() {
         Code::OutOfRange | Code::ResourceExhausted if of_tonic => {
             let message = format!("message_bytes_max is {message_bytes_max}: {}", status.message());
-            ServiceError::new(ErrorCode::ResourceExhausted, "message_too_large", message).into()
+            ServiceError::new(Reason::MessageTooLarge, message).into()
         }
         Code::Internal if of_tonic => {
             let message = format!("the message cannot be read: {}", status.message());
-            ServiceError::invalid(BAD_MESSAGE, message).into()
+            ServiceError::new(Reason::BadMessage, message).into()
         }
         _ => status,
     }
@@ -96,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_failure_keeps_its_message_and_its_word() {
-        let error = ServiceError::new(ErrorCode::FailedPrecondition, "guess_required", "no guess");
+        let error = ServiceError::new(Reason::GuessRequired, "no guess");
         let status = Status::from(error);
         assert_eq!((status.code(), status.message()), (Code::FailedPrecondition, "no guess"));
         assert_eq!(status.metadata().get(REASON).unwrap(), "guess_required");
@@ -106,8 +103,8 @@ mod tests {
     fn what_cannot_be_read_is_the_clients_mistake_and_a_defect_stays_one() {
         let unreadable = of_request(Status::internal("Unexpected EOF decoding stream."), 1);
         assert_eq!(unreadable.code(), Code::InvalidArgument);
-        assert_eq!(unreadable.metadata().get(REASON).unwrap(), BAD_MESSAGE);
-        let defect = ServiceError::new(ErrorCode::Internal, "job_panicked", "a defect");
+        assert_eq!(unreadable.metadata().get(REASON).unwrap(), "bad_message");
+        let defect = ServiceError::new(Reason::JobPanicked, "a defect");
         assert_eq!(of_request(defect.into(), 1).code(), Code::Internal);
         let large = of_request(Status::out_of_range("too large"), 7);
         assert_eq!(

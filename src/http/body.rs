@@ -9,7 +9,7 @@ use super::error::HttpError;
 use super::object::Object;
 use super::{Adapter, params, unreadable};
 use crate::admission::InboundBody;
-use crate::service::{ErrorCode, PointCloud, ServiceError};
+use crate::service::{PointCloud, Reason, ServiceError};
 use crate::util::excerpt;
 use crate::wire::InField;
 
@@ -77,12 +77,12 @@ fn as_it_is(headers: &HeaderMap) -> Result<(), HttpError> {
         return Ok(());
     }
     let message = format!("content-encoding must be identity, got {:?}", excerpt(encoding));
-    Err(HttpError::with_status(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_content_encoding", message))
+    Err(HttpError::from(ServiceError::new(Reason::UnsupportedContentEncoding, message)))
 }
 
 fn unsupported(got: &str, supported: &str) -> HttpError {
     let message = format!("content-type must be {supported}, got {:?}", excerpt(got));
-    HttpError::with_status(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_content_type", message)
+    HttpError::from(ServiceError::new(Reason::UnsupportedContentType, message))
 }
 
 /// Parses a body that holds the whole request; parameters beside it would go unheard.
@@ -93,7 +93,7 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
     if let Some(query) = request.uri().query().filter(|query| !query.is_empty()) {
         let message =
             format!("with {JSON} the body holds everything, got the query {:?} too", excerpt(query));
-        return Err(ServiceError::invalid("unexpected_query", message).into());
+        return Err(ServiceError::new(Reason::UnexpectedQuery, message).into());
     }
     let arrival = InboundBody::of(request.extensions())?.clone();
     let body = read(request, adapter).await?;
@@ -107,12 +107,12 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
         parse(&body)
     });
     parsed.await.unwrap_or_else(|_| {
-        Err(ServiceError::new(ErrorCode::Internal, "parser_failed", "the body could not be parsed").into())
+        Err(ServiceError::new(Reason::ParserFailed, "the body could not be parsed").into())
     })
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
-    let not_json = |error| ServiceError::invalid("bad_json", unreadable::body::<T>(body, &error));
+    let not_json = |error| ServiceError::new(Reason::BadJson, unreadable::body::<T>(body, &error));
     let Object(parsed) = serde_json::from_slice(body).map_err(not_json)?;
     Ok(parsed)
 }
@@ -133,7 +133,7 @@ async fn read_most(mut request: Request, most: usize, limit: &str) -> Result<Byt
     as_it_is(request.headers())?;
     let too_large = |bytes: String| {
         let message = format!("body must be at most {most} bytes ({limit}), got {bytes}");
-        HttpError::with_status(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large", message)
+        HttpError::from(ServiceError::new(Reason::BodyTooLarge, message))
     };
     let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
     if let Some(bytes) = declared.and_then(|length| length.parse().ok()).filter(|&bytes: &usize| bytes > most)
@@ -145,7 +145,7 @@ async fn read_most(mut request: Request, most: usize, limit: &str) -> Result<Byt
         if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
             too_large("more".into())
         } else {
-            ServiceError::invalid("body_unreadable", format!("body: {}", rejection.body_text())).into()
+            ServiceError::new(Reason::BodyUnreadable, format!("body: {}", rejection.body_text())).into()
         }
     })
 }

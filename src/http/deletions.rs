@@ -10,7 +10,7 @@ use super::middleware::Service;
 use super::object::Object;
 use super::params::{Map, request_id_of};
 use crate::map::Region;
-use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
+use crate::service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
 
 #[derive(Deserialize)]
@@ -98,7 +98,7 @@ impl TryFrom<DeletionBody> for DeletionTarget {
             }
             _ => {
                 let message = "exactly one of points, voxels, box and sphere must be given";
-                Err(ServiceError::invalid("ambiguous_target", message))
+                Err(ServiceError::new(Reason::AmbiguousTarget, message))
             }
         }
     }
@@ -109,7 +109,7 @@ fn keys_of(voxels: &[[i32; 3]]) -> Result<Vec<VoxelKey>, ServiceError> {
         VoxelKey::new(voxel).ok_or_else(|| {
             let message =
                 format!("voxels[{i}] must lie in {INDEX_MIN}..={INDEX_MAX} in each axis, got {voxel:?}");
-            ServiceError::invalid("bad_key", message)
+            ServiceError::new(Reason::BadKey, message)
         })
     };
     voxels.iter().enumerate().map(key).collect()

@@ -10,7 +10,9 @@ use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
 use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
-use crate::service::{CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, ServiceError};
+use crate::service::{
+    CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, Reason, ServiceError,
+};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -129,7 +131,7 @@ impl LocalizationParams {
             }
             (None, Some(_)) => {
                 let message = "map_gravity says nothing without gravity, the direction in the sensor frame";
-                return Err(ServiceError::invalid("missing_field", message));
+                return Err(ServiceError::new(Reason::MissingField, message));
             }
         };
         let corners = |text: &String| -> Result<SearchBox, ServiceError> {

@@ -7,7 +7,7 @@ use axum::http::request::Parts;
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::error::{self, HttpError, Reason};
+use super::error::{self, HttpError};
 use crate::access::{Authorized, Operation};
 use crate::admission::Endings;
 use crate::middleware::Protocol;
@@ -49,7 +49,7 @@ impl Protocol for Http {
 
     fn outcome(&self, response: &Response) -> RequestOutcome {
         let status = response.status();
-        let denial = Reason::of_denial(response).map(Into::into);
+        let denial = error::denial(response).map(Into::into);
         RequestOutcome { code: status.as_str().to_owned().into(), is_ok: status.is_success(), denial }
     }
 }

@@ -13,7 +13,7 @@ use super::unreadable;
 use crate::access::Authorized;
 use crate::geometry::{self, Pose};
 use crate::map::{MapName, RequestId};
-use crate::service::ServiceError;
+use crate::service::{Reason, ServiceError};
 use crate::util::excerpt;
 use crate::wire::InField;
 
@@ -25,7 +25,7 @@ impl FromRequestParts<Adapter> for Map {
 
     async fn from_request_parts(parts: &mut Parts, adapter: &Adapter) -> Result<Self, HttpError> {
         let path = Path::<String>::from_request_parts(parts, adapter).await;
-        let text = path.map_err(|rejection| ServiceError::invalid("bad_name", rejection.body_text()))?;
+        let text = path.map_err(|rejection| ServiceError::new(Reason::BadName, rejection.body_text()))?;
         let name = MapName::new(&text).map_err(ServiceError::from)?;
         Authorized::of(&parts.extensions)?.caller.allowed_maps().permit(&name)?;
         Ok(Self(name))
@@ -60,7 +60,7 @@ impl<S: Sync> FromRequestParts<S> for NoParams {
             Some(query) => {
                 let message =
                     format!("{} takes no parameters, got {:?}", excerpt(parts.uri.path()), excerpt(query));
-                Err(ServiceError::invalid("bad_query", message).into())
+                Err(ServiceError::new(Reason::BadQuery, message).into())
             }
         }
     }
@@ -71,7 +71,7 @@ pub(super) fn from_query<T: DeserializeOwned>(uri: &Uri) -> Result<T, HttpError>
     let parsed = Query::try_from_uri(uri);
     let Query(parameters) = parsed.map_err(|rejection| {
         let said = rejection.source().map_or_else(|| rejection.body_text(), ToString::to_string);
-        ServiceError::invalid("bad_query", unreadable::query(&said))
+        ServiceError::new(Reason::BadQuery, unreadable::query(&said))
     })?;
     Ok(parameters)
 }
@@ -82,7 +82,7 @@ pub(super) fn numbers<const N: usize>(text: &str, field: &str) -> Result<[f64; N
     numbers.ok().and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
         let message =
             format!("{field} must be {N} numbers with commas between them, got {:?}", excerpt(text));
-        ServiceError::invalid("bad_numbers", message)
+        ServiceError::new(Reason::BadNumbers, message)
     })
 }
 

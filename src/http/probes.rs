@@ -12,7 +12,7 @@ use super::middleware::Service;
 use super::params::NoParams;
 use crate::access::Authorized;
 use crate::map::MapName;
-use crate::service::{MapService, Shortage, UnavailableMap};
+use crate::service::{MapService, UnavailableMap};
 use crate::telemetry::Metrics;
 
 /// `GET /livez`: 200 while the process lives.
@@ -46,7 +46,7 @@ pub(super) async fn ready(
         }
         let shortages = service.shortages();
         if !shortages.is_empty() {
-            body["writes_refused"] = shortages.iter().map(Shortage::reason).collect();
+            body["writes_refused"] = shortages.iter().map(|shortage| shortage.reason().as_str()).collect();
         }
         (StatusCode::OK, Json(body))
     }

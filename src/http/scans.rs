@@ -14,7 +14,7 @@ use crate::geometry::Pose;
 use crate::map::RobotName;
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
-use crate::service::{PointCloud, ScanAnswer, ScanRequest, ServiceError};
+use crate::service::{PointCloud, Reason, ScanAnswer, ScanRequest, ServiceError};
 use crate::wire::ByKeyword;
 use crate::wire::InField;
 
@@ -208,7 +208,7 @@ fn guess_of(
         (None, Some(last_from_sensor), false) => Ok(Guess::Motion(last_from_sensor)),
         _ => {
             let message = "one of guess, motion and constant_velocity can be given, got several";
-            Err(ServiceError::invalid("ambiguous_guess", message))
+            Err(ServiceError::new(Reason::AmbiguousGuess, message))
         }
     }
 }

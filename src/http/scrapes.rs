@@ -101,6 +101,7 @@ fn shared(text: &Arc<String>) -> Bytes {
 mod tests {
     use super::*;
     use crate::map::MapName;
+    use crate::service::Reason;
 
     const KEPT: Duration = Duration::from_secs(1);
 
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(held[3], "4");
         assert!(held[4..].iter().all(|text| text == "4"));
         let none = scrapes.text(&AllowedMaps::none(), async || "none".into()).await;
-        assert_eq!(none.unwrap_err().reason, "overloaded");
+        assert_eq!(none.unwrap_err().reason, Reason::Overloaded);
         held.clear();
         assert_eq!(scrape(&scrapes, 10).await, "10");
     }

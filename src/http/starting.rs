@@ -14,7 +14,7 @@ use super::error::HttpError;
 use super::params::NoParams;
 use super::probes;
 use crate::access::Access;
-use crate::service::{ErrorCode, ServiceError};
+use crate::service::{Reason, ServiceError};
 use crate::store::{Opened, OpeningProgress};
 
 /// The routes of a server that is starting.
@@ -47,5 +47,5 @@ async fn ready(State(progress): State<Arc<OpeningProgress>>, NoParams: NoParams)
 
 async fn refuse() -> HttpError {
     let message = "server is starting: /readyz tells how far it has come";
-    ServiceError::new(ErrorCode::Unavailable, "starting", message).into()
+    ServiceError::new(Reason::Starting, message).into()
 }

@@ -17,7 +17,7 @@ use super::json::{JsonPose, JsonVersion};
 use super::middleware::Service;
 use super::params::{Map, Params};
 use crate::map::{MappedScan, RobotName};
-use crate::service::{ErrorCode, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
+use crate::service::{Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -115,8 +115,7 @@ async fn write(
 }
 
 fn json(value: &impl Serialize) -> Result<String, ServiceError> {
-    let not_written =
-        |e: serde_json::Error| ServiceError::new(ErrorCode::Internal, "not_written", e.to_string());
+    let not_written = |e: serde_json::Error| ServiceError::new(Reason::NotWritten, e.to_string());
     serde_json::to_string(value).map_err(not_written)
 }
 

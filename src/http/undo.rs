@@ -9,7 +9,7 @@ use super::json::JsonVersion;
 use super::middleware::Service;
 use super::params::{Map, request_id_of};
 use crate::map::RobotName;
-use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};
+use crate::service::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget};
 
 /// `{"robot", "scan_id"}`, `{"robot", "since_revision"}` or `{"revision"}`.
 #[derive(Deserialize)]
@@ -51,7 +51,7 @@ impl TryFrom<UndoBody> for Undo {
             (None, None, None, Some(revision)) => UndoTarget::Revision(revision),
             _ => {
                 let message = "give robot and scan_id, robot and since_revision, or revision";
-                return Err(ServiceError::invalid("ambiguous_target", message));
+                return Err(ServiceError::new(Reason::AmbiguousTarget, message));
             }
         };
         Ok(Self { target, request_id: request_id_of(undo.request_id)? })

@@ -15,7 +15,7 @@ use super::json::JsonVersion;
 use super::middleware::Service;
 use super::params::{Map, Params, numbers};
 use crate::map::Region;
-use crate::service::ServiceError;
+use crate::service::{Reason, ServiceError};
 use crate::voxel::VoxelKey;
 
 /// Voxels that are written to JSON at once: about half a MiB.
@@ -71,7 +71,7 @@ impl VoxelsParams {
         match (&self.min, &self.max) {
             (None, None) => Ok(None),
             (Some(min), Some(max)) => Ok(Some(Region::cuboid(numbers(min, "min")?, numbers(max, "max")?)?)),
-            _ => Err(ServiceError::invalid("half_a_box", "min and max go together, got one of them")),
+            _ => Err(ServiceError::new(Reason::HalfABox, "min and max go together, got one of them")),
         }
     }
 }
@@ -79,9 +79,8 @@ impl VoxelsParams {
 /// `{<head>,"voxels":[[i,j,k],...]}` in pieces, each made when it is asked for: a listing may be larger than any
 /// other answer.
 fn chunks(head: Head, keys: Vec<VoxelKey>) -> Result<impl Iterator<Item = String> + Send, ServiceError> {
-    let head = serde_json::to_string(&head).map_err(|error| {
-        ServiceError::new(crate::service::ErrorCode::Internal, "not_written", error.to_string())
-    })?;
+    let head = serde_json::to_string(&head)
+        .map_err(|error| ServiceError::new(Reason::NotWritten, error.to_string()))?;
     let first = format!("{},\"voxels\":[", head.trim_end_matches('}'));
     let pieces = (0..keys.len()).step_by(VOXELS_PER_CHUNK).map(move |start| {
         let end = keys.len().min(start + VOXELS_PER_CHUNK);

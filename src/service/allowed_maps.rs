@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{ErrorCode, ServiceError};
+use super::{Reason, ServiceError};
 use crate::map::MapName;
 
 /// The maps that a caller may name: all, or some.
@@ -47,7 +47,7 @@ impl AllowedMaps {
             Self::Only(names) if !names.contains(name) => {
                 let names: Vec<_> = names.iter().map(MapName::as_str).collect();
                 let message = format!("the key is not for map {name}: it is for {}", names.join(", "));
-                Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message))
+                Err(ServiceError::new(Reason::MapNotAllowed, message))
             }
             _ => Ok(Reachable(name.clone())),
         }
@@ -76,7 +76,7 @@ mod tests {
         let some: AllowedMaps = [name("a"), name("b")].into_iter().collect();
         assert_eq!(some.check(&name("b")).unwrap().name(), &name("b"));
         let refused = some.check(&name("c")).unwrap_err();
-        assert_eq!((refused.code, refused.reason), (ErrorCode::PermissionDenied, "map_not_allowed"));
+        assert_eq!(refused.reason, Reason::MapNotAllowed);
         assert_eq!(refused.message, "the key is not for map c: it is for a, b");
         assert!(AllowedMaps::Every.covers(&name("c")) && !AllowedMaps::none().covers(&name("c")));
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{ErrorCode, ServiceError, UndoTarget};
+use super::{Reason, ServiceError, UndoTarget};
 use crate::map::RobotName;
 
 /// The robots in whose names a caller may send and undo scans, and how much more it may undo.
@@ -50,7 +50,7 @@ impl AllowedScans {
             (UndoTarget::Revision(_), None) if !self.undo_of_others => {
                 let message =
                     "Undo of a revision takes scope write, the key has insert: name a robot and its scan";
-                Err(ServiceError::new(ErrorCode::PermissionDenied, "scope_too_small", message))
+                Err(ServiceError::new(Reason::ScopeTooSmall, message))
             }
             (UndoTarget::Revision(_), None) => Ok(()),
         }
@@ -60,7 +60,7 @@ impl AllowedScans {
 fn robot_not_allowed(robots: &BTreeSet<RobotName>, what: &str) -> ServiceError {
     let names: Vec<_> = robots.iter().map(RobotName::as_str).collect();
     let message = format!("the key is not for {what}: it is for {}", names.join(", "));
-    ServiceError::new(ErrorCode::PermissionDenied, "robot_not_allowed", message)
+    ServiceError::new(Reason::RobotNotAllowed, message)
 }
 
 #[cfg(test)]
@@ -77,11 +77,11 @@ mod tests {
         let own = AllowedScans { robots: Some(Arc::new([robot("r1")].into())), undo_of_others: false };
         assert_eq!([reason(&own, scan("r1")), reason(&own, since("r1"))], [None, None]);
         for other in [scan("r2"), since("r2"), UndoTarget::Revision(1)] {
-            assert_eq!(reason(&own, other), Some("robot_not_allowed"));
+            assert_eq!(reason(&own, other), Some(Reason::RobotNotAllowed));
         }
         let inserting = AllowedScans { robots: None, undo_of_others: false };
         assert_eq!(reason(&inserting, scan("r2")), None);
-        assert_eq!(reason(&inserting, UndoTarget::Revision(1)), Some("scope_too_small"));
+        assert_eq!(reason(&inserting, UndoTarget::Revision(1)), Some(Reason::ScopeTooSmall));
         assert_eq!(reason(&AllowedScans::default(), UndoTarget::Revision(1)), None);
     }
 }

@@ -15,7 +15,7 @@ use super::allowed_maps::Reachable;
 use super::committing::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
-use super::{AllowedMaps, ErrorCode, MapVersion, ServiceError, UnavailableMap};
+use super::{AllowedMaps, ErrorCode, MapVersion, Reason, ServiceError, UnavailableMap};
 use crate::bloom::FilterSettings;
 use crate::map::{MapName, MapSettings, MultiResolutionMap, NAME_LENGTH_MAX};
 use crate::store::{DataDir, MapFolder, OpeningProgress, Snapshot, StoreError, StoreSettings};
@@ -63,7 +63,7 @@ impl Catalog {
             Some(reason) => unavailable(name, reason),
             None => {
                 let message = format!("map {name} does not exist: make it first, or list the maps there are");
-                ServiceError::new(ErrorCode::NotFound, "map_not_found", message)
+                ServiceError::new(Reason::MapNotFound, message)
             }
         };
         maps.open.get(name).cloned().ok_or_else(missing)
@@ -73,7 +73,7 @@ impl Catalog {
     fn find(&self, name: &Reachable) -> Result<Option<Arc<HostedMap>>, ServiceError> {
         match self.get(name) {
             Ok(map) => Ok(Some(map)),
-            Err(error) if error.code == ErrorCode::NotFound => Ok(None),
+            Err(error) if error.code() == ErrorCode::NotFound => Ok(None),
             Err(error) => Err(error),
         }
     }
@@ -152,7 +152,7 @@ impl Catalog {
             let name = name.name();
             let message =
                 format!("map {name} exists: delete it first, restore under another name, or replace it");
-            return Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message));
+            return Err(ServiceError::new(Reason::MapExists, message));
         }
         self.check_room(maps_max)
     }
@@ -165,7 +165,7 @@ impl Catalog {
                 "another map has been made, replaced or deleted for {TURN_MAX:?} and more: its disk hangs, or is slow; \
                  try again"
             );
-            ServiceError::new(ErrorCode::Unavailable, "catalog_busy", message).retry_after(TURN_MAX)
+            ServiceError::new(Reason::CatalogBusy, message).retry_after(TURN_MAX)
         })
     }
 
@@ -176,7 +176,7 @@ impl Catalog {
             return Ok(());
         }
         let message = format!("there are {count} maps, maps_max is {maps_max}: delete one first");
-        Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_maps", message))
+        Err(ServiceError::new(Reason::TooManyMaps, message))
     }
 
     /// Takes a map into the catalog, kept and named; the caller holds `writing`. It is built before it is kept: one that
@@ -274,7 +274,7 @@ impl Catalog {
                      is there after the next restart",
                     map.name, error.message
                 );
-                ServiceError::new(ErrorCode::Unavailable, "outcome_unknown", message)
+                ServiceError::new(Reason::OutcomeUnknown, message)
             }
             false => error,
         })
@@ -311,7 +311,7 @@ impl Catalog {
 
 fn unavailable(name: &MapName, reason: &str) -> ServiceError {
     let message = format!("map {name} could not be opened: {reason}; then restart the server");
-    ServiceError::new(ErrorCode::Unavailable, "map_unavailable", message)
+    ServiceError::new(Reason::MapUnavailable, message)
 }
 
 /// The name that a map gets whose name another takes: `NAME-replaced-REVISION`, cut to fit.
@@ -324,7 +324,7 @@ fn name_of_replaced(name: &MapName, revision: u64, taken: &[MapName]) -> Result<
     };
     let mut names = (1..=taken.len() as u32 + 1).map(candidate);
     let free = names.find(|name| name.as_ref().map_or(true, |name| !taken.contains(name)));
-    let none = || ServiceError::new(ErrorCode::Conflict, "map_exists", format!("no name is free for {name}"));
+    let none = || ServiceError::new(Reason::MapExists, format!("no name is free for {name}"));
     Ok(free.ok_or_else(none)??)
 }
 
@@ -333,7 +333,7 @@ async fn blocking<T: Send + 'static>(
     job: impl FnOnce() -> Result<T, ServiceError> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let done = tokio::task::spawn_blocking(job).await;
-    done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
+    done.unwrap_or_else(|e| Err(ServiceError::new(Reason::JobPanicked, e.to_string())))
 }
 
 /// Making a map again as it is changes nothing; as another it is a conflict.
@@ -351,11 +351,11 @@ fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<Hoste
     };
     let message =
         format!("map {} exists with {}, not with {}", map.name, describe(there), describe(&settings));
-    Err(ServiceError::new(ErrorCode::Conflict, "map_exists", message))
+    Err(ServiceError::new(Reason::MapExists, message))
 }
 
 fn not_stored(error: StoreError) -> ServiceError {
-    ServiceError::new(ErrorCode::Internal, "not_stored", error.to_string())
+    ServiceError::new(Reason::NotStored, error.to_string())
 }
 
 #[cfg(test)]

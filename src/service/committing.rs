@@ -20,7 +20,7 @@ use std::sync::{Arc, OnceLock};
 use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 
 use super::resource_budget::Reservation;
-use super::{ErrorCode, ServiceError};
+use super::{Reason, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::store::{MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -134,8 +134,7 @@ impl CommitThread {
                 worker.run(&waiting);
             }
         });
-        let no_threads =
-            |e: std::io::Error| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string());
+        let no_threads = |e: std::io::Error| ServiceError::new(Reason::NoThreads, e.to_string());
         started.map_err(no_threads).map(|_| Self(begin))
     }
 }
@@ -232,14 +231,12 @@ impl Stop {
                     "map {name} is read only since its journal failed ({reason}): restart the server when the disk \
                      is well"
                 );
-                ServiceError::new(ErrorCode::Unavailable, "map_read_only", message)
+                ServiceError::new(Reason::MapReadOnly, message)
             }
-            Self::Deleted => {
-                ServiceError::new(ErrorCode::NotFound, "map_not_found", format!("map {name} was deleted"))
-            }
+            Self::Deleted => ServiceError::new(Reason::MapNotFound, format!("map {name} was deleted")),
             Self::Replaced => {
                 let message = format!("map {name} was replaced by another: ask for its map_uuid");
-                ServiceError::new(ErrorCode::FailedPrecondition, "map_replaced", message)
+                ServiceError::new(Reason::MapReplaced, message)
             }
         }
     }
@@ -251,7 +248,7 @@ fn outcome_unknown(name: &MapName, error: &StoreError) -> ServiceError {
         "the journal of map {name} failed while this change was written ({error}): it may be there after the next \
          restart of the server; the same scan_id or request_id, sent again then, tells"
     );
-    ServiceError::new(ErrorCode::Unavailable, "outcome_unknown", message)
+    ServiceError::new(Reason::OutcomeUnknown, message)
 }
 
 /// What to say where the map has no revision left.
@@ -259,11 +256,10 @@ fn revisions_used_up(name: &MapName) -> ServiceError {
     let message = format!(
         "map {name} is at revision {REVISION_MAX}, the last that there is: make another map, and insert there"
     );
-    ServiceError::new(ErrorCode::FailedPrecondition, "revisions_used_up", message)
+    ServiceError::new(Reason::RevisionsUsedUp, message)
 }
 
 /// The record of a change.
 pub(super) fn record_of(change: &Change) -> Result<Record, ServiceError> {
-    Record::of(change)
-        .map_err(|reason| ServiceError::new(ErrorCode::ResourceExhausted, "record_too_large", reason))
+    Record::of(change).map_err(|reason| ServiceError::new(Reason::RecordTooLarge, reason))
 }

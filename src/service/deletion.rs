@@ -6,7 +6,7 @@ use super::committing::{Decided, Proposal, Refusal, Step};
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
-use super::{Deletion, DeletionAnswer, DeletionTarget, ErrorCode, ServiceError, check_not_stopped};
+use super::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError, check_not_stopped};
 use crate::geometry::Point;
 use crate::map::{
     CallerName, Change, Committed, CompletedRequest, DeletionRecord, MultiResolutionMap, Region, Request,
@@ -75,7 +75,7 @@ impl HostedMap {
                     "request_id {} was accepted at revision {} with other content: name new requests anew",
                     request.id, answered.revision
                 );
-                Err(ServiceError::new(ErrorCode::Conflict, "request_id_taken", message))
+                Err(ServiceError::new(Reason::RequestIdTaken, message))
             }
             answered => Ok(answered.cloned()),
         }
@@ -148,7 +148,7 @@ fn in_range(key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
         range.start(),
         range.end()
     );
-    Err(ServiceError::invalid("key_out_of_range", message))
+    Err(ServiceError::new(Reason::KeyOutOfRange, message))
 }
 
 /// Tells one request from another under the same id.

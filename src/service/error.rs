@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::reason::Reason;
 use crate::bloom::FilterSettingsError;
 use crate::geometry::PoseError;
 use crate::map::{MapSettingsError, NameError, RegionError};
@@ -32,14 +33,30 @@ pub enum ErrorCode {
     Internal,
 }
 
+impl ErrorCode {
+    /// The code as a word: `not_found`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::InvalidArgument => "invalid_argument",
+            Self::Unauthenticated => "unauthenticated",
+            Self::PermissionDenied => "permission_denied",
+            Self::NotFound => "not_found",
+            Self::Conflict => "conflict",
+            Self::FailedPrecondition => "failed_precondition",
+            Self::ResourceExhausted => "resource_exhausted",
+            Self::DeadlineExceeded => "deadline_exceeded",
+            Self::Unavailable => "unavailable",
+            Self::Internal => "internal",
+        }
+    }
+}
+
 /// A failed request: nothing was changed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct ServiceError {
-    /// What kind of failure.
-    pub code: ErrorCode,
-    /// A word for programs, stable: `guess_required`, `map_not_found`, ...
-    pub reason: &'static str,
+    /// Why, for programs.
+    pub reason: Reason,
     /// A sentence for people: the field, its value and the limit, in lower case.
     pub message: String,
     /// When the same request may be answered otherwise, where the server can tell.
@@ -47,59 +64,59 @@ pub struct ServiceError {
 }
 
 impl ServiceError {
-    /// A failure of kind `code`.
-    pub fn new(code: ErrorCode, reason: &'static str, message: impl Into<String>) -> Self {
-        Self { code, reason, message: message.into(), retry_after: None }
+    /// A failure for `reason`.
+    pub fn new(reason: Reason, message: impl Into<String>) -> Self {
+        Self { reason, message: message.into(), retry_after: None }
     }
 
     /// The server has too much to do: a limit, named in the message, would be exceeded.
     pub fn overloaded(message: impl Into<String>) -> Self {
-        Self::new(ErrorCode::ResourceExhausted, "overloaded", message).retry_after(Duration::from_secs(1))
+        Self::new(Reason::Overloaded, message).retry_after(Duration::from_secs(1))
+    }
+
+    /// What kind of failure it is.
+    pub fn code(&self) -> ErrorCode {
+        self.reason.code()
     }
 
     /// The same, with when to come again.
     pub fn retry_after(self, wait: Duration) -> Self {
         Self { retry_after: Some(wait), ..self }
     }
-
-    /// The request is wrong in itself.
-    pub fn invalid(reason: &'static str, message: impl Into<String>) -> Self {
-        Self::new(ErrorCode::InvalidArgument, reason, message)
-    }
 }
 
 impl From<NameError> for ServiceError {
     fn from(error: NameError) -> Self {
-        Self::invalid("bad_name", error.to_string())
+        Self::new(Reason::BadName, error.to_string())
     }
 }
 
 impl From<PoseError> for ServiceError {
     fn from(error: PoseError) -> Self {
-        Self::invalid("bad_pose", error.to_string())
+        Self::new(Reason::BadPose, error.to_string())
     }
 }
 
 impl From<SettingError> for ServiceError {
     fn from(error: SettingError) -> Self {
-        Self::invalid("bad_settings", error.to_string())
+        Self::new(Reason::BadSettings, error.to_string())
     }
 }
 
 impl From<FilterSettingsError> for ServiceError {
     fn from(error: FilterSettingsError) -> Self {
-        Self::invalid("bad_settings", error.to_string())
+        Self::new(Reason::BadSettings, error.to_string())
     }
 }
 
 impl From<MapSettingsError> for ServiceError {
     fn from(error: MapSettingsError) -> Self {
-        Self::invalid("bad_settings", error.to_string())
+        Self::new(Reason::BadSettings, error.to_string())
     }
 }
 
 impl From<RegionError> for ServiceError {
     fn from(error: RegionError) -> Self {
-        Self::invalid("bad_region", error.to_string())
+        Self::new(Reason::BadRegion, error.to_string())
     }
 }

@@ -1,6 +1,6 @@
 //! A scan request with the points that count.
 
-use super::{ErrorCode, ScanRequest, ServiceError, ServiceSettings};
+use super::{Reason, ScanRequest, ServiceError, ServiceSettings};
 use crate::geometry::{Point, rotation_xyzw, translation_m};
 use crate::mapping::{FilteredPoints, Guess, MappingError, Scan};
 
@@ -54,15 +54,13 @@ impl From<MappingError> for ServiceError {
     fn from(error: MappingError) -> Self {
         let message = error.to_string();
         match error {
-            MappingError::NotFinite { .. } => Self::invalid("point_not_finite", message),
-            MappingError::NoReturns { .. } => Self::invalid("no_returns", message),
-            MappingError::BadFilter(_) => Self::invalid("bad_filter", message),
-            MappingError::AllFiltered { .. } => Self::invalid("all_points_filtered", message),
-            MappingError::OutOfRange { .. } => Self::invalid("scan_out_of_range", message),
-            MappingError::GuessRequired(_) => {
-                Self::new(ErrorCode::FailedPrecondition, "guess_required", message)
-            }
-            MappingError::Stopped => Self::new(ErrorCode::DeadlineExceeded, "time_limit", message),
+            MappingError::NotFinite { .. } => Self::new(Reason::PointNotFinite, message),
+            MappingError::NoReturns { .. } => Self::new(Reason::NoReturns, message),
+            MappingError::BadFilter(_) => Self::new(Reason::BadFilter, message),
+            MappingError::AllFiltered { .. } => Self::new(Reason::AllPointsFiltered, message),
+            MappingError::OutOfRange { .. } => Self::new(Reason::ScanOutOfRange, message),
+            MappingError::GuessRequired(_) => Self::new(Reason::GuessRequired, message),
+            MappingError::Stopped => Self::new(Reason::TimeLimit, message),
         }
     }
 }

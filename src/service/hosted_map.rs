@@ -12,7 +12,7 @@ use uuid::Uuid;
 use super::committing::{CommitQueue, CommitThread, Stop};
 use super::resource_budget::ResourceBudget;
 use super::{
-    ErrorCode, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, ServiceError, VoxelListing,
+    MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing,
     check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
@@ -204,7 +204,7 @@ impl HostedMap {
             self.name,
             self.map.revision()
         );
-        Err(ServiceError::new(ErrorCode::DeadlineExceeded, "revision_not_reached", message))
+        Err(ServiceError::new(Reason::RevisionNotReached, message))
     }
 
     pub(super) fn check_level(&self, level: u32) -> Result<(), ServiceError> {
@@ -213,7 +213,7 @@ impl HostedMap {
             return Ok(());
         }
         let message = format!("level must lie in 0..={} of map {}, got {level}", levels - 1, self.name);
-        Err(ServiceError::invalid("level_out_of_range", message))
+        Err(ServiceError::new(Reason::LevelOutOfRange, message))
     }
 
     pub(super) fn check_uuid(&self, uuid: Option<Uuid>) -> Result<(), ServiceError> {
@@ -222,7 +222,7 @@ impl HostedMap {
         }
         let message =
             format!("map_uuid of map {} is {}: it was deleted and made again", self.name, self.uuid);
-        Err(ServiceError::new(ErrorCode::FailedPrecondition, "map_replaced", message))
+        Err(ServiceError::new(Reason::MapReplaced, message))
     }
 
     /// Answers a query. One of many points keeps changes from beginning meanwhile, so that no shorter one queues behind
@@ -279,10 +279,10 @@ impl HostedMap {
         let point = points[place];
         let (min_m, end_m) = self.map.lattice().range_m();
         let (reason, what) = match point.is_finite() {
-            true => ("point_out_of_range", format!("outside the map's range of {min_m} to {end_m} m")),
-            false => ("point_not_finite", "not finite".to_owned()),
+            true => (Reason::PointOutOfRange, format!("outside the map's range of {min_m} to {end_m} m")),
+            false => (Reason::PointNotFinite, "not finite".to_owned()),
         };
-        ServiceError::invalid(reason, format!("points[{place}] is {what}: {point:?}"))
+        ServiceError::new(reason, format!("points[{place}] is {what}: {point:?}"))
     }
 
     pub(super) fn list(
@@ -365,7 +365,7 @@ fn listing_too_large(level: u32, found: usize, most: usize) -> ServiceError {
     let message = format!(
         "level {level} has {found} voxels there or more, listed_voxels_max is {most}: ask for a region or a coarser level"
     );
-    ServiceError::new(ErrorCode::ResourceExhausted, "listing_too_large", message)
+    ServiceError::new(Reason::ListingTooLarge, message)
 }
 
 /// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.

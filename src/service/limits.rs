@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Marks, ServiceError};
+use super::{Marks, Reason, ServiceError};
 
 /// Bounds on what callers may ask. Each is named in the error of a request beyond it.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,7 +98,7 @@ impl Limits {
                     "limit must be 1 to trajectory_page_max, which is {most}, got {limit}: ask for the next page by \
                      since_revision"
                 );
-                Err(ServiceError::invalid("page_too_large", message))
+                Err(ServiceError::new(Reason::PageTooLarge, message))
             }
         }
     }
@@ -106,9 +106,9 @@ impl Limits {
 
 fn within(field: &str, limit: &str, count: usize, most: usize) -> Result<(), ServiceError> {
     match count {
-        0 => Err(ServiceError::invalid("empty_batch", format!("{field} must not be empty"))),
-        n if n > most => Err(ServiceError::invalid(
-            "batch_too_large",
+        0 => Err(ServiceError::new(Reason::EmptyBatch, format!("{field} must not be empty"))),
+        n if n > most => Err(ServiceError::new(
+            Reason::BatchTooLarge,
             format!("{field} has {n} entries, {limit} is {most}"),
         )),
         _ => Ok(()),

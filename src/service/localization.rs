@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
-use super::{ErrorCode, Limits, MapVersion, PointCloud, ServiceError, ServiceSettings, check_not_stopped};
+use super::{Limits, MapVersion, PointCloud, Reason, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::Verdict;
 use crate::align::localize::{
     Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
@@ -116,7 +116,7 @@ impl LocalizationRequest {
     pub fn time_limit_of(seconds: f64) -> Result<Duration, ServiceError> {
         Duration::try_from_secs_f64(seconds).map_err(|_| {
             let message = format!("time_limit_s must be a number of seconds from 0 on, got {seconds}");
-            ServiceError::invalid("bad_time_limit", message)
+            ServiceError::new(Reason::BadTimeLimit, message)
         })
     }
 
@@ -129,7 +129,7 @@ impl LocalizationRequest {
         let (wish, most) = (self.query.candidates, limits.localization_candidates_max);
         if wish > most {
             let message = format!("candidates is {wish}, localization_candidates_max is {most}");
-            return Err(ServiceError::invalid("too_many_candidates", message));
+            return Err(ServiceError::new(Reason::TooManyCandidates, message));
         }
         if wish == 0 {
             self.query.candidates = CANDIDATES_DEFAULT.min(most);
@@ -138,7 +138,7 @@ impl LocalizationRequest {
         let time_limit = self.time_limit.unwrap_or(TIME_LIMIT_DEFAULT.min(time_max));
         if time_limit > time_max {
             let message = format!("time_limit is {time_limit:?}, localization_time_max is {time_max:?}");
-            return Err(ServiceError::invalid("time_limit_too_long", message));
+            return Err(ServiceError::new(Reason::TimeLimitTooLong, message));
         }
         self.time_limit = Some(time_limit);
         Ok(self)
@@ -163,7 +163,7 @@ impl HostedMap {
         if points.is_empty() {
             let message =
                 format!("none of the scan's {} points is finite: nothing but no-returns", all.len());
-            return Err(ServiceError::invalid("no_returns", message));
+            return Err(ServiceError::new(Reason::NoReturns, message));
         }
         let search = search_settings(settings.limits.localization_grid_bytes_max);
         let mut lent: Vec<Reservation> = Vec::new();
@@ -205,19 +205,19 @@ const BYTES_PER_CELL: usize = 64;
 
 impl From<LocalizationQueryError> for ServiceError {
     fn from(error: LocalizationQueryError) -> Self {
-        Self::invalid("bad_query", error.to_string())
+        Self::new(Reason::BadQuery, error.to_string())
     }
 }
 
 impl From<LocalizationError> for ServiceError {
     fn from(error: LocalizationError) -> Self {
-        let (code, reason) = match error {
-            LocalizationError::EmptyMap => (ErrorCode::FailedPrecondition, "map_empty"),
-            LocalizationError::NothingInRange { .. } => (ErrorCode::InvalidArgument, "scan_out_of_range"),
-            LocalizationError::NothingThere { .. } => (ErrorCode::InvalidArgument, "nothing_there"),
-            LocalizationError::NoMemory { .. } => (ErrorCode::ResourceExhausted, "memory_full"),
-            LocalizationError::TooLarge { .. } => (ErrorCode::ResourceExhausted, "search_too_large"),
+        let reason = match error {
+            LocalizationError::EmptyMap => Reason::MapEmpty,
+            LocalizationError::NothingInRange { .. } => Reason::ScanOutOfRange,
+            LocalizationError::NothingThere { .. } => Reason::NothingThere,
+            LocalizationError::NoMemory { .. } => Reason::MemoryFull,
+            LocalizationError::TooLarge { .. } => Reason::SearchTooLarge,
         };
-        Self::new(code, reason, error.to_string())
+        Self::new(reason, error.to_string())
     }
 }

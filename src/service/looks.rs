@@ -9,7 +9,7 @@ use super::hosted_map::HostedMap;
 use super::map_file::from_file;
 use super::resource_budget::ResourceBudget;
 use super::{
-    ErrorCode, LocalizationRequest, Marks, PointCloud, PointQuery, ScanRequest, ServiceError, ServiceSettings,
+    LocalizationRequest, Marks, PointCloud, PointQuery, Reason, ScanRequest, ServiceError, ServiceSettings,
 };
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
@@ -81,7 +81,7 @@ fn a_listing_looks_at_the_signal_before_each_shard() {
         assert!(listing.keys.len() > 5000 && looks.get() >= SHARDS, "{} looks", looks.get());
         let gone = || true;
         let gone = map.list(0, region.as_ref(), usize::MAX, StopSignal::when(&gone)).unwrap_err();
-        assert_eq!(gone.reason, "caller_gone");
+        assert_eq!(gone.reason, Reason::CallerGone);
     }
 }
 
@@ -96,10 +96,10 @@ fn an_alignment_whose_time_is_up_says_so_and_one_whose_caller_has_gone_is_not_to
     for at_guess in [false, true] {
         let request = ScanRequest { at_guess, ..request.clone() };
         let late = map.align_scan(&request, &settings, now).unwrap_err();
-        assert_eq!((late.code, late.reason), (ErrorCode::DeadlineExceeded, "time_limit"));
+        assert_eq!(late.reason, Reason::TimeLimit);
         let gone = || true;
         let gone = map.align_scan(&request, &settings, StopSignal::when(&gone)).unwrap_err();
-        assert_eq!(gone.reason, "caller_gone");
+        assert_eq!(gone.reason, Reason::CallerGone);
     }
 }
 
@@ -116,7 +116,7 @@ fn a_search_whose_caller_has_gone_is_no_answer_and_one_whose_time_is_up_is() {
     assert!(answer.cut_short && !answer.accepted() && answer.candidates.is_empty());
     let gone = || true;
     let gone = map.localize(&request, &settings, &room, StopSignal::when(&gone)).unwrap_err();
-    assert_eq!(gone.reason, "caller_gone");
+    assert_eq!(gone.reason, Reason::CallerGone);
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn a_map_file_or_a_description_that_nobody_waits_for_is_given_up_at_the_next_loo
         let caller_gone = |error: Option<ServiceError>| {
             let taken = looks.replace(0);
             assert!(taken <= looks_max + 300, "{taken} looks after {looks_max}");
-            assert_eq!(error.map(|error| error.reason), (taken > looks_max).then_some("caller_gone"));
+            assert_eq!(error.map(|error| error.reason), (taken > looks_max).then_some(Reason::CallerGone));
         };
         caller_gone(map.to_file(&room, &limits, stop).err());
         caller_gone(from_file(&file, &limits, &room, stop).err());
@@ -171,6 +171,6 @@ fn a_deletion_finds_what_it_means_with_looks_in_proportion_to_the_map() {
         assert!(blocks / looks.get() <= 16 << 10, "{blocks} blocks, {} looks", looks.get());
         let gone = || true;
         let listed = map.list(0, Some(&everywhere), usize::MAX, StopSignal::when(&gone));
-        assert_eq!(listed.unwrap_err().reason, "caller_gone");
+        assert_eq!(listed.unwrap_err().reason, Reason::CallerGone);
     }
 }

@@ -6,7 +6,7 @@ use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, snapshot_bytes};
 use super::resource_budget::Reservation;
 use super::resource_budget::ResourceBudget;
-use super::{ErrorCode, Limits, MapFile, ServiceError, ended_early};
+use super::{Limits, MapFile, Reason, ServiceError, ended_early};
 use crate::map::MultiResolutionMap;
 use crate::store::{MapFileError, MapFileLimits, Snapshot, body_bytes};
 use crate::util::StopSignal;
@@ -26,8 +26,7 @@ impl HostedMap {
         let ended = || ended_early(stop);
         let snapshot = Snapshot::of_until(&self.map, self.uuid, stop).ok_or_else(ended)?;
         let encoded = snapshot.encode_until(stop);
-        let encoded =
-            encoded.map_err(|e| ServiceError::new(ErrorCode::Internal, "not_encoded", e.to_string()))?;
+        let encoded = encoded.map_err(|e| ServiceError::new(Reason::NotEncoded, e.to_string()))?;
         let bytes = encoded.ok_or_else(ended)?;
         let (size, most) = (body_bytes(&bytes).max(bytes.len() as u64), limits.map_file_bytes_max as u64);
         if size > most {
@@ -36,7 +35,7 @@ impl HostedMap {
                  limits.map_file_bytes_max here, and where the file is to be restored",
                 self.name
             );
-            return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_file_too_large", message));
+            return Err(ServiceError::new(Reason::MapFileTooLarge, message));
         }
         Ok(MapFile { bytes: bytes.into(), version: self.version(snapshot.contents.revision) })
     }
@@ -75,7 +74,7 @@ pub(super) fn from_file(
     let (robots, most) = (contents.trajectory.robots_known(), limits.robots_per_map_max);
     if robots > most {
         let message = format!("the map file has scans of {robots} robots, robots_per_map_max is {most}");
-        return Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message));
+        return Err(ServiceError::new(Reason::MapFull, message));
     }
     let moments = contents.moments.as_slice().len();
     reserve(settings.empty_filter_bytes() + growth_bytes(&settings, &contents.voxels, moments))?;
@@ -90,9 +89,7 @@ fn not_read(refusal: MapFileError<ServiceError>, stop: StopSignal<'_>) -> Servic
     match refusal {
         MapFileError::NoMemory(refusal) => refusal,
         MapFileError::Stopped => ended_early(stop),
-        MapFileError::Bad(reason) => ServiceError::invalid("bad_map_file", format!("map file: {reason}")),
-        MapFileError::TooLarge { .. } => {
-            ServiceError::new(ErrorCode::ResourceExhausted, "map_full", refusal.to_string())
-        }
+        MapFileError::Bad(reason) => ServiceError::new(Reason::BadMapFile, format!("map file: {reason}")),
+        MapFileError::TooLarge { .. } => ServiceError::new(Reason::MapFull, refusal.to_string()),
     }
 }

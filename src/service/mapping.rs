@@ -9,9 +9,7 @@ use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
 use super::resource_budget::ResourceBudget;
 use super::trajectory::check_not_forgotten;
-use super::{
-    ErrorCode, Foreground, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped,
-};
+use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::{AlignmentSettings, Verdict};
 use crate::geometry::{Point, Pose};
 use crate::map::{Change, Committed, Lookup, MappedScan, ScanRecord};
@@ -125,7 +123,7 @@ impl HostedMap {
             "scan_id {scan_id} of robot {} was accepted at revision {} with other content: number new scans anew",
             pose.robot, pose.revision
         );
-        Err(ServiceError::new(ErrorCode::Conflict, "scan_id_taken", message))
+        Err(ServiceError::new(Reason::ScanIdTaken, message))
     }
 
     /// How scans of this map are located and recorded, by the method that the request asks for.
@@ -155,7 +153,7 @@ impl HostedMap {
                     "guess required: robot {robot} has no accepted scan in map {}, which is not empty",
                     self.name
                 );
-                ServiceError::new(ErrorCode::FailedPrecondition, "guess_required", message)
+                ServiceError::new(Reason::GuessRequired, message)
             }
             other => other.into(),
         }
@@ -167,7 +165,7 @@ impl HostedMap {
             return Ok(());
         }
         let message = format!("map {} has {voxels} voxels, voxels_per_map_max is {most}", self.name);
-        Err(ServiceError::new(ErrorCode::ResourceExhausted, "map_full", message))
+        Err(ServiceError::new(Reason::MapFull, message))
     }
 
     /// The answer to a scan that was accepted before; what was only of its alignment's moment is not kept.

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::hosted_map::{HostedMap, Saving};
 use super::map_file::from_file;
 use super::{
-    AllowedMaps, Change, ErrorCode, MapFile, MapInfo, MapService, Outcome, ServiceError, UnavailableMap,
+    AllowedMaps, Change, MapFile, MapInfo, MapService, Outcome, Reason, ServiceError, UnavailableMap,
 };
 use crate::map::{MapName, MapSettings};
 use crate::sync::polled_by_runtime;
@@ -139,7 +139,7 @@ impl MapService {
             if replace && self.allowed_maps != AllowedMaps::Every {
                 let message = "replace keeps the map that was there under another name, which takes a key for all maps: \
                                delete the map first, or ask with such a key";
-                return Err(ServiceError::new(ErrorCode::PermissionDenied, "map_not_allowed", message));
+                return Err(ServiceError::new(Reason::MapNotAllowed, message));
             }
             self.inner.room.check_to_grow()?;
             self.inner.catalog.check_free(&name, self.limits().maps_max, replace)?;
@@ -194,5 +194,5 @@ async fn run_to_completion<T: Send + 'static>(
     change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let done = tokio::spawn(polled_by_runtime(change)).await;
-    done.unwrap_or_else(|e| Err(ServiceError::new(ErrorCode::Internal, "job_panicked", e.to_string())))
+    done.unwrap_or_else(|e| Err(ServiceError::new(Reason::JobPanicked, e.to_string())))
 }

@@ -24,6 +24,7 @@ mod maps;
 mod modeled;
 mod observer;
 mod pool;
+mod reason;
 mod request;
 mod resource_budget;
 mod settings;
@@ -44,6 +45,7 @@ pub use localization::{
 };
 pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
+pub use reason::{Reason, ToldBy};
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapStorage, MapVersion,
     PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery,
@@ -111,7 +113,7 @@ impl MapService {
     /// # Errors
     /// When a setting is out of range, or a map on disk cannot be read: the error names the file.
     pub fn open(settings: ServiceSettings, progress: &OpeningProgress) -> Result<Self, ServiceError> {
-        settings.alignment.checked().map_err(|e| ServiceError::invalid("bad_settings", e.to_string()))?;
+        settings.alignment.checked().map_err(|e| ServiceError::new(Reason::BadSettings, e.to_string()))?;
         settings.filter.checked()?;
         let waiting = settings.limits.jobs_waiting_max;
         let inner = Inner {
@@ -387,5 +389,5 @@ impl MapService {
 
 /// The map's thread is gone, by a defect.
 fn committing_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
-    ServiceError::new(ErrorCode::Internal, "job_panicked", "the change failed by a defect of the server")
+    ServiceError::new(Reason::JobPanicked, "the change failed by a defect of the server")
 }

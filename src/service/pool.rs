@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-use super::{ErrorCode, ServiceError};
+use super::{Reason, ServiceError};
 use crate::util::{Durations, SharedDurations, StopSignal};
 
 /// Queries of up to this many points, a tenth of a turn of a spinning sensor, are answered where they arrive: handing them
@@ -70,7 +70,7 @@ impl Pool {
             .num_threads(threads)
             .thread_name(move |i| format!("mrol-{name}-{i}"))
             .build()
-            .map_err(|e| ServiceError::new(ErrorCode::Internal, "no_threads", e.to_string()))?;
+            .map_err(|e| ServiceError::new(Reason::NoThreads, e.to_string()))?;
         let free = threads.current_num_threads();
         Ok(Self {
             name,
@@ -201,7 +201,7 @@ impl Drop for Unanswered {
 }
 
 fn failed() -> ServiceError {
-    ServiceError::new(ErrorCode::Internal, "job_panicked", "the job failed by a defect of the server")
+    ServiceError::new(Reason::JobPanicked, "the job failed by a defect of the server")
 }
 
 #[cfg(test)]
@@ -243,7 +243,7 @@ mod tests {
         let waiting = spawned(&pool, |_| 2);
         until(|| pool.in_use().waiting == 1).await;
         let refused = pool.run(|_| 3).await.unwrap_err();
-        assert_eq!(refused.code, ErrorCode::ResourceExhausted);
+        assert_eq!(refused.reason, Reason::Overloaded);
         assert!(refused.message.contains("jobs_waiting_max is 1"));
         release.send(()).unwrap();
         running.await.unwrap().unwrap();
@@ -309,7 +309,7 @@ mod tests {
     async fn a_job_that_panics_is_an_error_of_its_own() {
         let pool = pool(1);
         let failed = pool.run(|_| panic!("a defect")).await.map(|(): ()| ()).unwrap_err();
-        assert_eq!(failed.code, ErrorCode::Internal);
+        assert_eq!(failed.reason, Reason::JobPanicked);
         assert_eq!(pool.run(|_| 1).await.unwrap(), 1);
     }
 }

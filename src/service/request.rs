@@ -5,7 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use uuid::Uuid;
 
-use super::ServiceError;
+use super::{Reason, ServiceError};
 use crate::align::{Direction, Method, Verdict};
 use crate::geometry::{Point, Pose};
 use crate::map::{LevelInfo, Lookup, MapName, MapSettings, MappedScan, Region, RequestId, RobotName};
@@ -31,7 +31,7 @@ impl PointCloud {
                 Point::BYTES,
                 bytes.len()
             );
-            return Err(ServiceError::invalid("truncated_points", message));
+            return Err(ServiceError::new(Reason::TruncatedPoints, message));
         }
         Ok(Self(bytes))
     }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::shortage::{RETRY_AFTER, Shortage};
 use super::watermarks::Watermarks;
-use super::{ErrorCode, Gauges, Marks, MemoryReading, Readings, ServiceError};
+use super::{Gauges, Marks, MemoryReading, Readings, Reason, ServiceError};
 
 /// Of what the process may have in memory, the percentage up to which some is lent for a while.
 const LENT_PERCENT: u64 = 95;
@@ -108,7 +108,7 @@ impl ResourceBudget {
                     resident_bytes >> 20,
                     allowed_bytes >> 20
                 );
-                let error = ServiceError::new(ErrorCode::ResourceExhausted, Shortage::MEMORY_FULL, message);
+                let error = ServiceError::new(Reason::MemoryFull, message);
                 Err(error.retry_after(RETRY_AFTER))
             }
             _ => Ok(reservation),
@@ -178,7 +178,7 @@ mod tests {
         let room = room(700, 10_000);
         let (one, other) = (room.reserve_growth(100 * MIB).unwrap(), room.reserve_growth(50 * MIB).unwrap());
         let refused = room.reserve_growth(MIB).unwrap_err();
-        assert_eq!(refused.reason, "memory_full");
+        assert_eq!(refused.reason, Reason::MemoryFull);
         assert!(refused.message.contains("851 MiB"), "{}", refused.message);
         // The marks are 850 and 799 MiB: it takes more than the one that was refused to come back.
         drop(other);
@@ -191,7 +191,7 @@ mod tests {
     fn what_is_reserved_and_refused_keeps_nobody_from_growing() {
         let room = room(700, 10_000);
         let refused = room.reserve(200 * MIB).unwrap_err();
-        assert_eq!(refused.reason, "memory_full");
+        assert_eq!(refused.reason, Reason::MemoryFull);
         assert!(room.reserve(100 * MIB).is_ok() && room.reserve_growth(MIB).is_ok());
     }
 

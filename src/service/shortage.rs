@@ -3,7 +3,7 @@
 use std::fmt::{self, Display};
 use std::time::Duration;
 
-use super::{ErrorCode, ServiceError};
+use super::{Reason, ServiceError};
 
 /// When to come again: whoever makes room takes longer than the next look.
 pub(super) const RETRY_AFTER: Duration = Duration::from_secs(5);
@@ -32,22 +32,17 @@ pub enum Shortage {
 }
 
 impl Shortage {
-    /// The reason of a refusal where the disk is nearly full.
-    pub const DISK_FULL: &'static str = "disk_full";
-    /// The reason of a refusal where memory is nearly full.
-    pub const MEMORY_FULL: &'static str = "memory_full";
-
-    /// The word for programs.
-    pub fn reason(&self) -> &'static str {
+    /// The reason of refusals for it.
+    pub fn reason(&self) -> Reason {
         match self {
-            Self::Disk { .. } => Self::DISK_FULL,
-            Self::Memory { .. } => Self::MEMORY_FULL,
+            Self::Disk { .. } => Reason::DiskFull,
+            Self::Memory { .. } => Reason::MemoryFull,
         }
     }
 
     pub(super) fn refusal(&self, what_else: &str) -> ServiceError {
         let message = format!("{self}{what_else}");
-        ServiceError::new(ErrorCode::ResourceExhausted, self.reason(), message).retry_after(RETRY_AFTER)
+        ServiceError::new(self.reason(), message).retry_after(RETRY_AFTER)
     }
 }
 

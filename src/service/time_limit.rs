@@ -3,11 +3,8 @@
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use super::{ErrorCode, ServiceError};
+use super::{Reason, ServiceError};
 use crate::util::StopSignal;
-
-/// The reason of an error of work that was not done in time.
-pub(super) const TIME_LIMIT: &str = "time_limit";
 
 /// A named limit, counted from when a thread first takes the request in hand: what it waits for before, its caller's
 /// deadline bounds. A clone is the same limit of the same request.
@@ -35,7 +32,7 @@ impl TimeLimit {
 
     /// The error, and where it says that the time is up, which time.
     pub(super) fn named(&self, error: ServiceError) -> ServiceError {
-        if error.reason != TIME_LIMIT {
+        if error.reason != Reason::TimeLimit {
             return error;
         }
         let message = format!("the request took longer than {} allows, which is {:?}", self.name, self.most);
@@ -54,10 +51,10 @@ pub(super) fn check_not_stopped(stop: StopSignal<'_>) -> Result<(), ServiceError
 /// Why work ended that was stopped.
 pub(super) fn ended_early(stop: StopSignal<'_>) -> ServiceError {
     let (reason, message) = match stop.is_cancelled() {
-        true => ("caller_gone", "nobody waits for the answer"),
-        false => (TIME_LIMIT, "the request took too long"),
+        true => (Reason::CallerGone, "nobody waits for the answer"),
+        false => (Reason::TimeLimit, "the request took too long"),
     };
-    ServiceError::new(ErrorCode::DeadlineExceeded, reason, message)
+    ServiceError::new(reason, message)
 }
 
 #[cfg(test)]
@@ -68,11 +65,11 @@ mod tests {
     fn work_whose_time_is_up_is_told_which_limit_and_who_has_gone_is_not() {
         let limit = TimeLimit::new("alignment_time_max", Duration::ZERO);
         let error = limit.run(StopSignal::NEVER, check_not_stopped).unwrap_err();
-        assert_eq!((error.code, error.reason), (ErrorCode::DeadlineExceeded, TIME_LIMIT));
+        assert_eq!(error.reason, Reason::TimeLimit);
         assert!(error.message.contains("alignment_time_max allows, which is 0ns"), "{}", error.message);
         let gone = || true;
         let error = limit.run(StopSignal::when(&gone), check_not_stopped).unwrap_err();
-        assert_eq!(error.reason, "caller_gone");
+        assert_eq!(error.reason, Reason::CallerGone);
         let patient = TimeLimit::new("undo_time_max", Duration::from_secs(3600));
         assert_eq!(patient.run(StopSignal::NEVER, |stop| check_not_stopped(stop).map(|()| 1)).unwrap(), 1);
     }

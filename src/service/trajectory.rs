@@ -7,7 +7,7 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::hosted_map::HostedMap;
 use super::{
-    ErrorCode, Limits, MapService, MapVersion, Outcome, ServiceError, TrajectoryAnswer, TrajectoryQuery,
+    Limits, MapService, MapVersion, Outcome, Reason, ServiceError, TrajectoryAnswer, TrajectoryQuery,
 };
 use crate::map::{MapName, RobotName, Trajectory};
 use crate::util::StopSignal;
@@ -155,7 +155,7 @@ impl HostedMap {
             self.name,
             trajectory.robots_known()
         );
-        Err(ServiceError::new(ErrorCode::ResourceExhausted, "too_many_robots", message))
+        Err(ServiceError::new(Reason::TooManyRobots, message))
     }
 }
 
@@ -173,5 +173,5 @@ pub(super) fn check_not_forgotten(
         "scan_id {scan_id} of robot {robot} is too old: a scan of that id was accepted, or may have been, before what \
          undo reaches, and its answer is not kept; number new scans upwards"
     );
-    Err(ServiceError::new(ErrorCode::FailedPrecondition, "scan_id_too_old", message))
+    Err(ServiceError::new(Reason::ScanIdTooOld, message))
 }

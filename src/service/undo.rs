@@ -11,7 +11,7 @@ use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
 use super::time_limit::TimeLimit;
 use super::trajectory::check_not_forgotten;
-use super::{ErrorCode, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
+use super::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
 use crate::map::{
     CallerName, Change, Committed, Leaving, MappedScan, MultiResolutionMap, Request, RequestKind, Trajectory,
     UndoRecord, WithdrawnScan,
@@ -171,7 +171,7 @@ impl HostedMap {
         let one = |found: Option<&MappedScan>, what: String| {
             let missing = || {
                 let message = format!("map {} has no accepted scan {what}", self.name);
-                ServiceError::new(ErrorCode::NotFound, "scan_not_found", message)
+                ServiceError::new(Reason::ScanNotFound, message)
             };
             found.map(|pose| vec![pose.revision]).ok_or_else(missing)
         };
@@ -203,14 +203,14 @@ impl HostedMap {
     fn unreadable(&self, error: &StoreError) -> ServiceError {
         match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
             true => Stop::Deleted.refusal(&self.name),
-            false => ServiceError::new(ErrorCode::Internal, "journal_unreadable", error.to_string()),
+            false => ServiceError::new(Reason::JournalUnreadable, error.to_string()),
         }
     }
 
     fn no_observations(&self) -> ServiceError {
         let message =
             format!("map {} is kept in memory only: undo needs the journal of a data folder", self.name);
-        ServiceError::new(ErrorCode::FailedPrecondition, "no_journal", message)
+        ServiceError::new(Reason::NoJournal, message)
     }
 
     fn outside_undo_window(
@@ -228,7 +228,7 @@ impl HostedMap {
             folder.settings().undo_revisions,
             folder.settings().undo_bytes_max
         );
-        ServiceError::new(ErrorCode::FailedPrecondition, "outside_undo_window", message)
+        ServiceError::new(Reason::OutsideUndoWindow, message)
     }
 }
 

@@ -3,7 +3,7 @@
 //! Each gauge has two marks, so that a value that trembles about one of them does not open and shut the door at each
 //! look. Reads, alignments and searches go on meanwhile.
 
-use super::{MemoryReading, Readings, ServiceError, Shortage};
+use super::{MemoryReading, Readings, Reason, ServiceError, Shortage};
 use crate::sync::{Rank, RwLock};
 
 /// Where changes are refused, and where they are taken again.
@@ -53,12 +53,12 @@ impl Watermarks {
         let mut now = self.now.write();
         if let Some(free) = readings.disk_free_bytes {
             let disk = self.marks.disk(free, now.disk.is_some());
-            log_change(Shortage::DISK_FULL, now.disk, disk);
+            log_change(Reason::DiskFull, now.disk, disk);
             now.disk = disk;
         }
         if let Some(memory) = readings.memory {
             let memory = self.marks.memory(memory, now.memory.is_some());
-            log_change(Shortage::MEMORY_FULL, now.memory, memory);
+            log_change(Reason::MemoryFull, now.memory, memory);
             now.memory = memory;
         }
     }
@@ -100,10 +100,10 @@ impl Marks {
     }
 }
 
-fn log_change(reason: &'static str, before: Option<Shortage>, now: Option<Shortage>) {
+fn log_change(reason: Reason, before: Option<Shortage>, now: Option<Shortage>) {
     match (before, now) {
-        (None, Some(shortage)) => tracing::error!(reason, "{shortage}"),
-        (Some(_), None) => tracing::info!(reason, "there is room again, changes are taken"),
+        (None, Some(shortage)) => tracing::error!(%reason, "{shortage}"),
+        (Some(_), None) => tracing::info!(%reason, "there is room again, changes are taken"),
         _ => {}
     }
 }
@@ -111,7 +111,6 @@ fn log_change(reason: &'static str, before: Option<Shortage>, now: Option<Shorta
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::ErrorCode;
 
     const MIB: u64 = 1 << 20;
 
@@ -186,12 +185,12 @@ mod tests {
         let watermarks = Watermarks::new(Marks::default());
         watermarks.note(&disk(100));
         let error = watermarks.check_to_grow().unwrap_err();
-        assert_eq!((error.code, error.reason), (ErrorCode::ResourceExhausted, "disk_full"));
+        assert_eq!(error.reason, Reason::DiskFull);
         for part in ["100 MiB", "disk_free_low_mib, 256", "disk_free_resume_mib, 512", "make room"] {
             assert!(error.message.contains(part), "{part} is not in {}", error.message);
         }
         let error = watermarks.check_to_shrink().unwrap_err();
-        assert_eq!(error.reason, "disk_full");
+        assert_eq!(error.reason, Reason::DiskFull);
         assert!(error.message.contains("journal"), "{}", error.message);
     }
 
@@ -200,7 +199,7 @@ mod tests {
         let watermarks = Watermarks::new(Marks::default());
         watermarks.note(&memory(990, 1000));
         let error = watermarks.check_to_grow().unwrap_err();
-        assert_eq!((error.code, error.reason), (ErrorCode::ResourceExhausted, "memory_full"));
+        assert_eq!(error.reason, Reason::MemoryFull);
         for part in ["990 MiB", "memory_high_mib, 850", "memory_resume_mib, 79", "delete a map"] {
             assert!(error.message.contains(part), "{part} is not in {}", error.message);
         }

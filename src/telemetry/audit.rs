@@ -81,7 +81,7 @@ impl Observer for Audit {
             }
             End::Done(_) => {}
             End::Failed(error) if CHANGES.contains(operation) => {
-                let reason = error.reason;
+                let reason = error.reason.as_str();
                 if let Some(unwritten) = self.0.to_write() {
                     tracing::info!(
                         target: AUDIT, operation, map, outcome = "failed", reason, %error, unwritten, "change"

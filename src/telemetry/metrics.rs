@@ -20,7 +20,7 @@ use super::{exposition, families};
 use crate::align::Verdict;
 use crate::map::{MapName, RobotName};
 use crate::service::{
-    Change, End, Ended, MapInfo, Observer, Outcome, PoolUse, Readings, Shortage, UnavailableMap,
+    Change, End, Ended, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
 };
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
@@ -177,9 +177,9 @@ impl Metrics {
             if let Some(memory) = readings.memory {
                 gauge!(MEMORY_RESIDENT_BYTES).set(memory.resident_bytes as f64);
             }
-            for reason in [Shortage::DISK_FULL, Shortage::MEMORY_FULL] {
+            for reason in [Reason::DiskFull, Reason::MemoryFull] {
                 let refused = shortages.iter().any(|shortage| shortage.reason() == reason);
-                gauge!(WRITES_REFUSED, "reason" => reason).set(f64::from(u8::from(refused)));
+                gauge!(WRITES_REFUSED, "reason" => reason.as_str()).set(f64::from(u8::from(refused)));
             }
         });
     }

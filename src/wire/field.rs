@@ -1,6 +1,6 @@
 //! Errors that say which field of a request they speak of.
 
-use crate::service::ServiceError;
+use crate::service::{Reason, ServiceError};
 
 /// Puts a field's name before what is wrong with it.
 pub(crate) trait InField<T> {
@@ -20,5 +20,5 @@ impl<T, E: Into<ServiceError>> InField<T> for Result<T, E> {
 
 /// The value of a field that must be there.
 pub(crate) fn required<T>(value: Option<T>, field: &str) -> Result<T, ServiceError> {
-    value.ok_or_else(|| ServiceError::invalid("missing_field", format!("{field} is missing")))
+    value.ok_or_else(|| ServiceError::new(Reason::MissingField, format!("{field} is missing")))
 }

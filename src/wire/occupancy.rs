@@ -3,7 +3,7 @@
 use super::types::{count_from, lookup_from};
 use super::{InField, pb, required, uuid_from};
 use crate::map::{MapName, Region};
-use crate::service::{PointAnswer, PointQuery, ServiceError, VoxelListing};
+use crate::service::{PointAnswer, PointQuery, Reason, ServiceError, VoxelListing};
 use crate::voxel::VoxelKey;
 
 /// Keys of one message of a listing, at most: half a MiB.
@@ -119,7 +119,7 @@ impl TryFrom<pb::ListVoxelsResponse> for VoxelListing {
 pub(super) fn keys_from(bits: &[u64]) -> Result<Vec<VoxelKey>, ServiceError> {
     let key = |(i, &bits): (usize, &u64)| {
         VoxelKey::from_bits(bits).ok_or_else(|| {
-            ServiceError::invalid("bad_key", format!("keys[{i}] must have bit 63 clear, got {bits:#018x}"))
+            ServiceError::new(Reason::BadKey, format!("keys[{i}] must have bit 63 clear, got {bits:#018x}"))
         })
     };
     bits.iter().enumerate().map(key).collect()

@@ -10,7 +10,7 @@ use crate::align::{Direction, Method, Verdict};
 use crate::map::{MapName, RobotName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
-use crate::service::{Foreground, ScanAnswer, ScanRequest, ServiceError};
+use crate::service::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError};
 
 impl TryFrom<pb::InsertScanRequest> for (MapName, ScanRequest) {
     type Error = ServiceError;
@@ -73,7 +73,7 @@ fn method_from(number: i32) -> Result<Option<Method>, ServiceError> {
         Ok(pb::Method::Overlap) => Ok(Some(Method::Overlap)),
         Err(_) => {
             let message = format!("method must be 0, 1 (refined) or 2 (overlap), got {number}");
-            Err(ServiceError::invalid("bad_method", message))
+            Err(ServiceError::new(Reason::BadMethod, message))
         }
     }
 }
@@ -100,7 +100,7 @@ fn guess_from(guess: Option<pb::Guess>) -> Result<Guess, ServiceError> {
         pb::guess::Kind::ConstantVelocity(true) => Ok(Guess::ConstantVelocity),
         pb::guess::Kind::ConstantVelocity(false) => {
             let message = "guess.constant_velocity must be true: leave the guess out for the last pose";
-            Err(ServiceError::invalid("bad_guess", message))
+            Err(ServiceError::new(Reason::BadGuess, message))
         }
     }
 }
@@ -172,7 +172,7 @@ pub(super) fn verdict_from(number: i32) -> Result<Verdict, ServiceError> {
         Ok(pb::Verdict::Ambiguous) => Ok(Verdict::Ambiguous),
         Ok(pb::Verdict::Unspecified) | Err(_) => {
             let message = format!("alignment.verdict must lie in 1..=4, got {number}");
-            Err(ServiceError::invalid("bad_verdict", message))
+            Err(ServiceError::new(Reason::BadVerdict, message))
         }
     }
 }
@@ -208,7 +208,7 @@ impl TryFrom<pb::Direction> for Direction {
     fn try_from(open: pb::Direction) -> Result<Self, ServiceError> {
         let direction = <[f64; 6]>::try_from(open.direction).map_err(|numbers| {
             let message = format!("alignment.undetermined must be directions of 6, got {}", numbers.len());
-            ServiceError::invalid("bad_direction", message)
+            ServiceError::new(Reason::BadDirection, message)
         })?;
         Ok(Self { direction, std_m: open.std_m })
     }
@@ -221,7 +221,7 @@ fn information_from(numbers: &[f64]) -> Result<Option<[[f64; 6]; 6]>, ServiceErr
         (&[a, b, c, d, e, f], []) => Ok(Some([a, b, c, d, e, f])),
         _ => {
             let message = format!("alignment.information must have 36 numbers, got {}", numbers.len());
-            Err(ServiceError::invalid("bad_information", message))
+            Err(ServiceError::new(Reason::BadInformation, message))
         }
     }
 }

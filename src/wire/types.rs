@@ -5,7 +5,7 @@ use uuid::Uuid;
 use super::{InField, pb, required};
 use crate::geometry::{self, Point, Pose};
 use crate::map::{Lookup, Region, RequestId};
-use crate::service::{MapVersion, PointCloud, ServiceError};
+use crate::service::{MapVersion, PointCloud, Reason, ServiceError};
 
 impl TryFrom<pb::Points> for PointCloud {
     type Error = ServiceError;
@@ -14,14 +14,14 @@ impl TryFrom<pb::Points> for PointCloud {
         match (points.xyz_f32le.is_empty(), points.xyz.is_empty()) {
             (false, true) => Self::from_bytes(points.xyz_f32le),
             (true, false) => from_floats(&points.xyz),
-            (true, true) => Err(ServiceError::invalid("empty_batch", "must hold at least one point, got 0")),
+            (true, true) => Err(ServiceError::new(Reason::EmptyBatch, "must hold at least one point, got 0")),
             (false, false) => {
                 let message = format!(
                     "must fill one of xyz_f32le and xyz, got both ({} bytes and {} numbers)",
                     points.xyz_f32le.len(),
                     points.xyz.len()
                 );
-                Err(ServiceError::invalid("ambiguous_points", message))
+                Err(ServiceError::new(Reason::AmbiguousPoints, message))
             }
         }
     }
@@ -31,7 +31,7 @@ fn from_floats(numbers: &[f32]) -> Result<PointCloud, ServiceError> {
     let (points, rest) = numbers.as_chunks::<3>();
     if !rest.is_empty() {
         let message = format!("xyz must hold three numbers a point, got {} numbers", numbers.len());
-        return Err(ServiceError::invalid("truncated_points", message));
+        return Err(ServiceError::new(Reason::TruncatedPoints, message));
     }
     Ok(points.iter().copied().map(Point::from).collect::<Vec<_>>().into())
 }
@@ -128,7 +128,7 @@ pub(super) fn lookup_from(number: i32) -> Result<Lookup, ServiceError> {
         Ok(pb::Lookup::Bloom) => Ok(Lookup::Bloom),
         Err(_) => {
             let message = format!("lookup must be 0, 1 (exact) or 2 (bloom), got {number}");
-            Err(ServiceError::invalid("bad_lookup", message))
+            Err(ServiceError::new(Reason::BadLookup, message))
         }
     }
 }
@@ -146,7 +146,7 @@ impl From<Lookup> for pb::Lookup {
 pub(crate) fn uuid_from(text: &str) -> Result<Uuid, ServiceError> {
     Uuid::parse_str(text).map_err(|error| {
         let start: String = text.chars().take(64).collect();
-        ServiceError::invalid("bad_uuid", format!("map_uuid must be a uuid, got {start:?}: {error}"))
+        ServiceError::new(Reason::BadUuid, format!("map_uuid must be a uuid, got {start:?}: {error}"))
     })
 }
 
@@ -198,10 +198,10 @@ mod tests {
             xyz: vec![0.0; numbers],
         };
         let reason = |bytes, numbers| PointCloud::try_from(points(bytes, numbers)).unwrap_err().reason;
-        assert_eq!(reason(0, 0), "empty_batch");
-        assert_eq!(reason(12, 3), "ambiguous_points");
-        assert_eq!(reason(13, 0), "truncated_points");
-        assert_eq!(reason(0, 4), "truncated_points");
+        assert_eq!(reason(0, 0), Reason::EmptyBatch);
+        assert_eq!(reason(12, 3), Reason::AmbiguousPoints);
+        assert_eq!(reason(13, 0), Reason::TruncatedPoints);
+        assert_eq!(reason(0, 4), Reason::TruncatedPoints);
     }
 
     #[test]

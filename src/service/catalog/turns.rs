@@ -22,9 +22,9 @@ fn built(settings: MapSettings) -> BuiltMap {
 }
 
 /// What is told within ten times as long as anybody is to wait.
-async fn told<T>(waiting: impl Future<Output = Result<T, ServiceError>>) -> (ErrorCode, &'static str) {
+async fn told<T>(waiting: impl Future<Output = Result<T, ServiceError>>) -> Reason {
     let ended = tokio::time::timeout(10 * TURN_MAX, waiting).await.expect("it does not wait for ever");
-    ended.map(drop).map_err(|error| (error.code, error.reason)).expect_err("it has no turn")
+    ended.map(drop).map_err(|error| error.reason).expect_err("it has no turn")
 }
 
 #[tokio::test(start_paused = true)]
@@ -34,7 +34,7 @@ async fn who_waits_for_a_turn_that_does_not_come_is_told_so() {
     let settings = MapSettings::new(0.1, 4);
     catalog.create(named("there"), settings, MAPS_MAX).await.unwrap();
     let turn = catalog.writing.lock().await;
-    let busy = (ErrorCode::Unavailable, "catalog_busy");
+    let busy = Reason::CatalogBusy;
     assert_eq!(told(catalog.create(named("new"), settings, MAPS_MAX)).await, busy);
     assert_eq!(told(catalog.restore(named("new"), built(settings), MAPS_MAX, false)).await, busy);
     assert_eq!(told(catalog.delete(&named("there"))).await, busy);
