@@ -185,7 +185,7 @@ impl Server {
         let metrics = recorder.metrics().clone();
         let bytes_max = config.limits.message_bytes_max;
         let gate = Gate::new(access.clone(), service.clone());
-        let admission = Admission::new(&config.limits.admission(), lifecycle.clone());
+        let admission = Admission::new(&config.limits, lifecycle.clone());
         let middleware = Middleware::new(gate, admission.clone(), recorder.clone());
         let (routes, health) = grpc::routes(&middleware, bytes_max)?;
         let router = http::router(&middleware, bytes_max);

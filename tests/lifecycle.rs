@@ -13,8 +13,9 @@ use std::time::{Duration, Instant};
 
 use common::{Daemon, PATIENCE, bytes_of, client, identity_json, json_of, query_pb, row, scan_pb};
 use map_folders::folder_of;
-use mrol::config::{Config, LimitsConfig};
+use mrol::config::Config;
 use mrol::server::Server;
+use mrol::service::Limits;
 use mrol::wire::pb;
 use process::Process;
 use reqwest::StatusCode;
@@ -341,7 +342,7 @@ fn with_few_open_files_it_keeps_fewer_connections_and_says_so() {
     serve.stderr(File::create(&log).expect("a log"));
     Process::of(serve).stop();
     let said = fs::read_to_string(&log).expect("a log");
-    let LimitsConfig { connections_max, connections_reserved, .. } = LimitsConfig::default();
+    let Limits { connections_max, connections_reserved, .. } = Limits::default();
     let needed = format!("needed={}", 512 + 2 * (connections_max + connections_reserved));
     for part in ["fewer open files", "open_files=512", &needed, "connections_max=128"] {
         assert!(said.contains(part), "{part} is not in {said}");

@@ -8,9 +8,8 @@ use parking_lot::Mutex;
 use tokio_util::sync::CancellationToken;
 
 use super::body_state::{Body, CloseConnection};
-use super::limits::AdmissionLimits;
 use super::quota::Quota;
-use crate::service::{Reason, ServiceError};
+use crate::service::{Limits, Reason, ServiceError};
 use crate::telemetry::InUse;
 
 /// A body of a request that was silent for less than this gives way to nobody: it may be on a slow path.
@@ -60,11 +59,11 @@ pub struct MemoryPermit {
 
 impl Bodies {
     /// Those of requests that work is done for.
-    pub(super) fn new(limits: &AdmissionLimits) -> Self {
+    pub(super) fn new(limits: &Limits) -> Self {
         Self::within(Bounds {
             requests: ("requests_max", limits.requests_max),
             bytes_max: limits.body_bytes_max,
-            silence_max: limits.body_silence_max,
+            silence_max: Duration::from_secs_f64(limits.body_silence_max_s),
             bytes_per_s_min: limits.body_bytes_per_s_min,
             grace: GRACE,
         })
@@ -72,11 +71,11 @@ impl Bodies {
 
     /// Those of probes, of which the limit `name` allows `most`. Each is small and comes at once, so that the one that has
     /// waited for longest gives way, however short that was: nobody fills all places and keeps them.
-    pub(super) fn of_probes(limits: &AdmissionLimits, name: &'static str, most: usize) -> Self {
+    pub(super) fn of_probes(limits: &Limits, name: &'static str, most: usize) -> Self {
         Self::within(Bounds {
             requests: (name, most),
             bytes_max: usize::MAX,
-            silence_max: limits.probe_time_max,
+            silence_max: Duration::from_secs_f64(limits.probe_time_max_s),
             bytes_per_s_min: u32::MAX,
             grace: Duration::ZERO,
         })

@@ -18,7 +18,6 @@ mod bodies;
 mod body_state;
 mod inbound_body;
 mod lifecycle;
-mod limits;
 mod metered_body;
 mod of_connection;
 mod probes;
@@ -30,7 +29,6 @@ pub use bodies::MemoryPermit;
 pub use body_state::CloseConnection;
 pub use inbound_body::InboundBody;
 pub use lifecycle::{Lifecycle, draining};
-pub use limits::AdmissionLimits;
 pub use of_connection::OfConnection;
 pub use rate::{Peer, RateLimitKey};
 
@@ -44,7 +42,7 @@ use axum::http::Method;
 use axum::response::Response;
 
 use crate::access::{Authorized, Operation};
-use crate::service::ServiceError;
+use crate::service::{Limits, ServiceError};
 use crate::telemetry::InUse;
 use answer_body::AnswerBody;
 use bodies::Bodies;
@@ -86,7 +84,7 @@ fn answer_bytes(response: &mut Response) -> usize {
 
 impl Admission {
     /// Nobody is in.
-    pub fn new(limits: &AdmissionLimits, lifecycle: Lifecycle) -> Self {
+    pub fn new(limits: &Limits, lifecycle: Lifecycle) -> Self {
         Self(Arc::new(Inner {
             lifecycle,
             rates: Rates::new(limits),

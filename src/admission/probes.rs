@@ -11,16 +11,15 @@ use tokio::time::{sleep, timeout};
 use super::answer_body::{AnswerBody, Ending, Endings};
 use super::bodies::Bodies;
 use super::inbound_body::InboundBody;
-use super::limits::AdmissionLimits;
 use super::of_connection::OfConnection;
 use super::quota::{Quota, QuotaSlot};
 use crate::access::{Authorized, Operation};
-use crate::service::{Reason, ServiceError};
+use crate::service::{Limits, Reason, ServiceError};
 
 /// What is asked without a key, or whatever else is done: each kind has places of its own.
 #[derive(Debug)]
 pub(super) struct Probes {
-    limits: AdmissionLimits,
+    limits: Limits,
     checks: Bodies,
     scrapes: Bodies,
     watches: Quota,
@@ -30,7 +29,7 @@ pub(super) struct Probes {
 type Watch = (QuotaSlot, Option<QuotaSlot>);
 
 impl Probes {
-    pub(super) fn new(limits: &AdmissionLimits) -> Self {
+    pub(super) fn new(limits: &Limits) -> Self {
         Self {
             limits: limits.clone(),
             checks: Bodies::of_probes(limits, "probes_max", limits.probes_max),
@@ -99,7 +98,7 @@ impl Probes {
 
     async fn whole(&self, body: Body) -> Result<Bytes, ServiceError> {
         let most = self.limits.probe_body_bytes_max;
-        let whole = timeout(self.limits.probe_time_max, to_bytes(body, most));
+        let whole = timeout(Duration::from_secs_f64(self.limits.probe_time_max_s), to_bytes(body, most));
         whole.await.map_err(|_| self.late())?.map_err(|error| {
             let message = format!(
                 "probe_body_bytes_max is {most}: the body of a health check is larger, or broke off ({error})"
@@ -110,7 +109,7 @@ impl Probes {
 
     /// Resolves when a watch of somebody without a key has lasted for as long as it may: places are few.
     fn watch_over(&self) -> Ending {
-        let most = self.limits.health_watch_max;
+        let most = Duration::from_secs_f64(self.limits.health_watch_max_s);
         Box::pin(async move {
             sleep(most).await;
             let message = format!(
@@ -122,7 +121,7 @@ impl Probes {
     }
 
     fn late(&self) -> ServiceError {
-        let most = self.limits.probe_time_max;
+        let most = Duration::from_secs_f64(self.limits.probe_time_max_s);
         let message =
             format!("probe_time_max_s is {}: the health check did not come in full", most.as_secs_f64());
         ServiceError::new(Reason::ProbeLate, message)
@@ -130,7 +129,7 @@ impl Probes {
 
     /// How long the text of a scrape answers those that follow.
     pub(super) fn scrape_kept(&self) -> Duration {
-        self.limits.scrape_kept
+        Duration::from_secs_f64(self.limits.scrape_kept_s)
     }
 }
 
@@ -138,8 +137,8 @@ impl Probes {
 mod tests {
     use super::*;
 
-    fn probes(change: impl FnOnce(&mut AdmissionLimits)) -> Probes {
-        let mut limits = AdmissionLimits::default();
+    fn probes(change: impl FnOnce(&mut Limits)) -> Probes {
+        let mut limits = Limits::default();
         change(&mut limits);
         Probes::new(&limits)
     }

@@ -10,9 +10,8 @@ use governor::clock::{Clock, DefaultClock};
 use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 
-use super::limits::AdmissionLimits;
 use crate::access::{Allowance, Authorized, InWork};
-use crate::service::ServiceError;
+use crate::service::{Limits, ServiceError};
 
 /// Where a request came from; whom it counts for where there is no key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -78,7 +77,7 @@ pub(super) struct Rates {
 
 impl Rates {
     /// None where any number is fine.
-    pub(super) fn new(limits: &AdmissionLimits) -> Option<Self> {
+    pub(super) fn new(limits: &Limits) -> Option<Self> {
         let per_s_max = NonZeroU32::new(limits.caller_requests_per_s_max)?;
         let burst_max = NonZeroU32::new(limits.caller_burst_max).unwrap_or(NonZeroU32::MIN);
         let quota = Quota::per_second(per_s_max).allow_burst(burst_max);

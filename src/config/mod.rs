@@ -15,7 +15,6 @@ mod variables;
 pub use access::AccessConfig;
 pub use error::ConfigError;
 pub use filter::FilterConfig;
-pub use limits::LimitsConfig;
 pub use listener::ListenerConfig;
 pub use log::LogConfig;
 pub use scans::{AlignmentConfig, RobotConfig};
@@ -38,7 +37,7 @@ use serde::{Deserialize, Serialize};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::mapping::StationarySettings;
-use crate::service::ServiceSettings;
+use crate::service::{Limits, ServiceSettings};
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: u64 = 3600;
@@ -75,7 +74,7 @@ pub struct Config {
     /// Which points of whose scans count: a table a robot, `"*"` for every other.
     pub robots: BTreeMap<String, RobotConfig>,
     /// Bounds on what callers may ask.
-    pub limits: LimitsConfig,
+    pub limits: Limits,
 }
 
 impl Default for Config {
@@ -95,7 +94,7 @@ impl Default for Config {
             filter: FilterConfig::default(),
             alignment: AlignmentConfig::default(),
             robots: BTreeMap::new(),
-            limits: LimitsConfig::default(),
+            limits: Limits::default(),
         }
     }
 }
@@ -156,7 +155,7 @@ impl Config {
         if self.drain_delay_s > DRAIN_DELAY_MAX_S {
             return range("drain_delay_s", "0 to 3600", self.drain_delay_s.to_string());
         }
-        self.limits.check()?;
+        limits::check(&self.limits)?;
         self.access.check()?;
         access::check_warning("tls.expiry_warning_days", self.tls.expiry_warning_days)?;
         self.store.check()?;
@@ -177,7 +176,7 @@ impl Config {
         ServiceSettings {
             data_dir: (!self.data_dir.as_os_str().is_empty()).then(|| self.data_dir.clone()),
             store: self.store.settings(),
-            limits: self.limits.service_limits(),
+            limits: self.limits.clone(),
             gauges: None,
             observers: Vec::new(),
             query_threads: self.threads.query,
@@ -230,7 +229,6 @@ fn without_nulls(value: serde_json::Value) -> serde_json::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::Limits;
     use serde_json::json;
     use std::io::Write;
 
@@ -341,7 +339,7 @@ mod tests {
         assert!(beyond.contains("disk_free_resume_mib must be 0 to 1099511627776"), "{beyond}");
 
         let limits = load("[limits]\nmemory_high_mib = 3\ndisk_free_low_mib = 0", json!({})).unwrap();
-        let marks = limits.service_settings().limits.marks;
+        let marks = limits.service_settings().limits.marks();
         assert_eq!((marks.memory_high_bytes, marks.memory_resume_bytes), (Some(3 << 20), None));
         assert_eq!((marks.disk_free_low_bytes, marks.disk_free_resume_bytes), (0, 512 << 20));
     }

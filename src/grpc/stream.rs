@@ -237,13 +237,14 @@ mod tests {
     use tokio_stream::StreamExt;
 
     use super::*;
-    use crate::admission::{AdmissionLimits, Lifecycle};
+    use crate::admission::Lifecycle;
+    use crate::service::Limits;
 
     const BYTES: usize = 100_000;
 
     #[tokio::test]
     async fn an_answer_counts_until_the_next_one_is_asked_for() {
-        let limits = AdmissionLimits { body_bytes_max: 2 * BYTES, ..AdmissionLimits::default() };
+        let limits = Limits { body_bytes_max: 2 * BYTES, ..Limits::default() };
         let admission = Admission::new(&limits, Lifecycle::default());
         let (outbox, made) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let mut answers = Answers::new(made);

@@ -56,10 +56,10 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
 mod tests {
     use super::*;
     use crate::access::{Access, Gate};
-    use crate::admission::{Admission, AdmissionLimits, Lifecycle};
+    use crate::admission::{Admission, Lifecycle};
     use crate::http::middleware::Http;
     use crate::middleware::Middleware;
-    use crate::service::{MapService, ServiceSettings};
+    use crate::service::{Limits, MapService, ServiceSettings};
     use crate::store::OpeningProgress;
     use crate::telemetry::{Audit, Metrics, RequestRecorder};
     use axum::body::{Body, to_bytes};
@@ -71,7 +71,7 @@ mod tests {
     async fn what_somebody_serves_without_a_rule_is_refused_as_a_defect() {
         let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
         let gate = Gate::new(Access::open(), service);
-        let admission = Admission::new(&AdmissionLimits::default(), Lifecycle::default());
+        let admission = Admission::new(&Limits::default(), Lifecycle::default());
         let recorder = RequestRecorder::new(Metrics::new().unwrap(), Audit::default());
         let stray = Router::new().route("/stray", get(async || "open to all"));
         let stray = Middleware::new(gate, admission, recorder).wrap(Http, stray);

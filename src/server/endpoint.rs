@@ -15,7 +15,7 @@ use super::connection_slots::ConnectionSlots;
 use super::listener::Accepting;
 use super::protocol::{Protocol, RuntimeExecutor};
 use super::tls::Tls;
-use crate::config::LimitsConfig;
+use crate::service::Limits;
 use crate::telemetry::Metrics;
 
 /// A protocol with its connections, whatever sockets they come from. A clone is another handle on the same ones.
@@ -54,7 +54,7 @@ impl Endpoint {
         protocol: Protocol,
         router: Router,
         tls: Option<Tls>,
-        limits: &LimitsConfig,
+        limits: &Limits,
         metrics: Metrics,
     ) -> Self {
         let opening_max = Duration::from_secs_f64(limits.connection_opening_max_s);

@@ -6,7 +6,7 @@ use hyper::rt::Executor;
 use hyper_util::rt::TokioTimer;
 use hyper_util::server::conn::auto::Builder;
 
-use crate::config::LimitsConfig;
+use crate::service::Limits;
 use crate::sync::polled_by_runtime;
 use crate::wire::transport;
 
@@ -60,7 +60,7 @@ impl Protocol {
     }
 
     /// How long a connection without a request may stay.
-    pub(super) fn idle_max(self, limits: &LimitsConfig) -> Duration {
+    pub(super) fn idle_max(self, limits: &Limits) -> Duration {
         Duration::from_secs_f64(match self {
             Self::Http => limits.http_idle_max_s,
             Self::Grpc => limits.grpc_idle_max_s,
@@ -68,7 +68,7 @@ impl Protocol {
     }
 
     /// What serves its connections.
-    pub(super) fn builder(self, limits: &LimitsConfig) -> Builder<RuntimeExecutor> {
+    pub(super) fn builder(self, limits: &Limits) -> Builder<RuntimeExecutor> {
         let mut builder = Builder::new(RuntimeExecutor);
         builder
             .http1()

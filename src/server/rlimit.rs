@@ -2,7 +2,7 @@
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use crate::config::LimitsConfig;
+use crate::service::Limits;
 
 /// For maps, the log, threads and whatever else is no connection; half of what there is where that is less.
 const BESIDES_CONNECTIONS: usize = 512;
@@ -11,7 +11,7 @@ const BESIDES_CONNECTIONS: usize = 512;
 ///
 /// Asks the system for as many as `connections_max` takes, which is more than most give a process by themselves. Without
 /// a file nobody could connect, while idle connections do not give way before all their places are taken.
-pub(super) fn within_allowed(limits: LimitsConfig) -> LimitsConfig {
+pub(super) fn within_allowed(limits: Limits) -> Limits {
     let besides = BESIDES_CONNECTIONS + 2 * limits.connections_reserved;
     let needed = 2 * limits.connections_max + besides;
     let allowed = allowed(needed as u64).try_into().unwrap_or(usize::MAX);
@@ -25,7 +25,7 @@ pub(super) fn within_allowed(limits: LimitsConfig) -> LimitsConfig {
         connections_max,
         "the system allows fewer open files than limits.connections_max takes: fewer connections are kept"
     );
-    LimitsConfig { connections_max, ..limits }
+    Limits { connections_max, ..limits }
 }
 
 /// Asks for `needed` files; how many there may be.

@@ -11,7 +11,7 @@ use super::endpoint::Endpoint;
 use super::listener::{Accepting, TcpSocket};
 use super::protocol::Protocol;
 use super::tls::Tls;
-use crate::config::LimitsConfig;
+use crate::service::Limits;
 use crate::telemetry::Metrics;
 
 /// Answers until the maps are open.
@@ -26,7 +26,7 @@ impl Starting {
         socket: &TcpSocket,
         tls: Option<Tls>,
         routes: Router,
-        limits: &LimitsConfig,
+        limits: &Limits,
         metrics: Metrics,
     ) -> Self {
         let endpoint = Endpoint::new(Protocol::Http, routes, tls, limits, metrics);

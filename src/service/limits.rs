@@ -1,12 +1,64 @@
 //! Every limit of the server, by name, with its default.
 
-use std::time::Duration;
+#[cfg(feature = "server")]
+use serde::{Deserialize, Serialize};
 
 use super::{Marks, Reason, ServiceError};
 
-/// Bounds on what callers may ask. Each is named in the error of a request beyond it.
+/// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is named
+/// in the error of a request beyond it, and is a setting of the section `limits`.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "server", derive(Serialize, Deserialize), serde(default, deny_unknown_fields))]
 pub struct Limits {
+    /// Bytes of one HTTP body or one gRPC message. 32 MiB.
+    pub message_bytes_max: usize,
+    /// Connections of HTTP, and as many of gRPC. Where all are in use another is closed at once; where one is idle, it
+    /// gives way. More than twice `requests_max` and `streams_max`, so that there is always one. 2048.
+    pub connections_max: usize,
+    /// Connections of each protocol besides, where all of those are in use: for one health check each, and for
+    /// `probe_time_max_s` at most. Where all of these are taken too, one that has its answer gives way, or one of the peer that
+    /// has most. 128.
+    pub connections_reserved: usize,
+    /// Seconds until a connection has to be secure and to begin to speak. 10.
+    pub connection_opening_max_s: f64,
+    /// Seconds that an HTTP connection may stay without a request, or take for a request's headers. 30.
+    pub http_idle_max_s: f64,
+    /// Seconds that a gRPC connection may stay without a call. 600.
+    pub grpc_idle_max_s: f64,
+    /// Requests in work, and as many whose bodies are arriving. 512.
+    pub requests_max: usize,
+    /// Calls whose client streams messages. 256.
+    pub streams_max: usize,
+    /// Bytes of bodies that have arrived and of listings and files that are being sent. 1 GiB.
+    pub body_bytes_max: usize,
+    /// How long a body may be silent before its end. 30 s.
+    pub body_silence_max_s: f64,
+    /// Bytes a second of a body that comes in time; what comes more slowly counts as silent for the time that its bytes
+    /// do not account for. 0 = any byte will do. 1024.
+    pub body_bytes_per_s_min: u32,
+    /// Requests and messages of streams a second of one caller: of a key, or of an address where there is none;
+    /// 0 = any number. 0.
+    pub caller_requests_per_s_max: u32,
+    /// As many may come at once. 100.
+    pub caller_burst_max: u32,
+    /// Requests and streams in work at a time of one key that says nothing of that itself; 0 = any number. Less than half of
+    /// `requests_max`, so that no key keeps the others out. 192.
+    pub caller_requests_at_once_max: u32,
+    /// Health checks that are arriving, and as many that are answered, over each protocol. Where all places are taken,
+    /// the oldest gives way. 64.
+    pub probes_max: usize,
+    /// Bytes of the body of a health check, which comes as it is: nothing is inflated. 1 KiB.
+    pub probe_body_bytes_max: usize,
+    /// How long the body of a health check may take. 5 s.
+    pub probe_time_max_s: f64,
+    /// Scrapes of the metrics that wait or are being read. 16.
+    pub scrapes_max: usize,
+    /// How long the text of a scrape answers those that follow. 1 s.
+    pub scrape_kept_s: f64,
+    /// Calls of `grpc.health.v1.Health/Watch`, one a connection. 16.
+    pub health_watches_max: usize,
+    /// How long one of them lasts that came without a key. 600 s.
+    pub health_watch_max_s: f64,
     /// Points of one query, deletion or scan. 2,000,000.
     pub points_per_request_max: usize,
     /// Keys of one deletion. 2,000,000.
@@ -28,27 +80,55 @@ pub struct Limits {
     /// Scans of a map file that is restored, and as many that were taken out again. 20,000,000.
     pub map_file_scans_max: usize,
     /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
-    pub min_revision_wait_max: Duration,
+    pub min_revision_wait_max_s: f64,
     /// How long aligning a scan may take that is not inserted. 10 s.
-    pub alignment_time_max: Duration,
+    pub alignment_time_max_s: f64,
     /// How long aligning and preparing a scan may take that is to be inserted. 30 s.
-    pub insertion_time_max: Duration,
+    pub insertion_time_max_s: f64,
     /// How long finding out may take what an undo takes back. 60 s.
-    pub undo_time_max: Duration,
+    pub undo_time_max_s: f64,
     /// How long a search with no guess may take. 60 s.
-    pub localization_time_max: Duration,
+    pub localization_time_max_s: f64,
     /// Candidates of one search, which keeps that many places. 16.
     pub localization_candidates_max: usize,
     /// Memory for the dilated levels of one search; a map that takes more is searched at a coarser resolution, or in
     /// a box. 512 MiB.
     pub localization_grid_bytes_max: usize,
-    /// Of disk and memory, where changes are refused.
-    pub marks: Marks,
+    /// MiB free on the disk of the data folder below which changes are refused; 0 = never. 256.
+    pub disk_free_low_mib: u64,
+    /// MiB free from which on they are taken again. 512.
+    pub disk_free_resume_mib: u64,
+    /// MiB of memory in use above which what makes maps grow is refused; 0 = 85 % of what the system or the control group
+    /// allows. 0.
+    pub memory_high_mib: u64,
+    /// MiB at which it is taken again; 0 = 94 % of the high mark. 0.
+    pub memory_resume_mib: u64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
         Self {
+            message_bytes_max: Self::MESSAGE_BYTES_MAX,
+            connections_max: 2048,
+            connections_reserved: 128,
+            connection_opening_max_s: 10.0,
+            http_idle_max_s: 30.0,
+            grpc_idle_max_s: 600.0,
+            requests_max: 512,
+            streams_max: 256,
+            body_bytes_max: 1 << 30,
+            body_silence_max_s: 30.0,
+            body_bytes_per_s_min: 1024,
+            caller_requests_per_s_max: 0,
+            caller_burst_max: 100,
+            caller_requests_at_once_max: 192,
+            probes_max: 64,
+            probe_body_bytes_max: 1 << 10,
+            probe_time_max_s: 5.0,
+            scrapes_max: 16,
+            scrape_kept_s: 1.0,
+            health_watches_max: 16,
+            health_watch_max_s: 600.0,
             points_per_request_max: 2_000_000,
             keys_per_request_max: 2_000_000,
             maps_max: 64,
@@ -59,19 +139,49 @@ impl Default for Limits {
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
             map_file_scans_max: 20_000_000,
-            min_revision_wait_max: Duration::from_secs(10),
-            alignment_time_max: Duration::from_secs(10),
-            insertion_time_max: Duration::from_secs(30),
-            undo_time_max: Duration::from_secs(60),
-            localization_time_max: Duration::from_secs(60),
+            min_revision_wait_max_s: 10.0,
+            alignment_time_max_s: 10.0,
+            insertion_time_max_s: 30.0,
+            undo_time_max_s: 60.0,
+            localization_time_max_s: 60.0,
             localization_candidates_max: 16,
             localization_grid_bytes_max: 512 << 20,
-            marks: Marks::default(),
+            disk_free_low_mib: 256,
+            disk_free_resume_mib: 512,
+            memory_high_mib: 0,
+            memory_resume_mib: 0,
         }
     }
 }
 
 impl Limits {
+    /// Bytes of one message where nothing is set.
+    pub const MESSAGE_BYTES_MAX: usize = 32 << 20;
+
+    /// The same limits for a process that may have so many bytes in memory, if that is known: what may lie in bodies, be
+    /// restored or be searched in at once is an eighth of that at most.
+    pub fn within_memory(self, allowed_bytes: Option<u64>) -> Self {
+        let share =
+            allowed_bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes / 8).unwrap_or(usize::MAX));
+        Self {
+            body_bytes_max: self.body_bytes_max.min(share.max(self.message_bytes_max)),
+            map_file_bytes_max: self.map_file_bytes_max.min(share),
+            localization_grid_bytes_max: self.localization_grid_bytes_max.min(share),
+            ..self
+        }
+    }
+
+    /// Where changes are refused for want of disk or memory.
+    pub(crate) fn marks(&self) -> Marks {
+        let given = |mib: u64| (mib > 0).then_some(mib << 20);
+        Marks {
+            disk_free_low_bytes: self.disk_free_low_mib << 20,
+            disk_free_resume_bytes: self.disk_free_resume_mib << 20,
+            memory_high_bytes: given(self.memory_high_mib),
+            memory_resume_bytes: given(self.memory_resume_mib),
+        }
+    }
+
     /// # Errors
     /// When a request has no point, or more than `points_per_request_max`.
     pub(super) fn check_points(&self, points: usize) -> Result<(), ServiceError> {
@@ -139,5 +249,17 @@ mod tests {
         assert!(limits.check_points(0).unwrap_err().message.contains("points must not be empty"));
         let error = limits.check_points(11).unwrap_err();
         assert!(error.message.contains("11") && error.message.contains("points_per_request_max is 10"));
+    }
+
+    #[test]
+    fn what_lies_in_memory_for_a_while_is_an_eighth_of_what_there_is_at_most() {
+        let limits = Limits::default();
+        assert_eq!(limits.clone().within_memory(None), limits);
+        assert_eq!(limits.clone().within_memory(Some(16 << 30)), limits);
+        let small = limits.clone().within_memory(Some(512 << 20));
+        assert_eq!((small.body_bytes_max, small.map_file_bytes_max), (64 << 20, 64 << 20));
+        assert_eq!(small.localization_grid_bytes_max, 64 << 20);
+        // One message must have room.
+        assert_eq!(limits.clone().within_memory(Some(64 << 20)).body_bytes_max, limits.message_bytes_max);
     }
 }

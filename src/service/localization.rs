@@ -134,7 +134,7 @@ impl LocalizationRequest {
         if wish == 0 {
             self.query.candidates = CANDIDATES_DEFAULT.min(most);
         }
-        let time_max = limits.localization_time_max;
+        let time_max = Duration::from_secs_f64(limits.localization_time_max_s);
         let time_limit = self.time_limit.unwrap_or(TIME_LIMIT_DEFAULT.min(time_max));
         if time_limit > time_max {
             let message = format!("time_limit is {time_limit:?}, localization_time_max is {time_max:?}");

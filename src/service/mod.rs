@@ -57,6 +57,7 @@ pub use trajectory::TrajectoryPieces;
 pub use watermarks::Marks;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::map::{CallerName, MapName, Region};
 use crate::store::OpeningProgress;
@@ -124,7 +125,7 @@ impl MapService {
             undo: Pool::new("undo", UNDO_THREADS, waiting)?,
             map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
             localization: Pool::new("localization", settings.localization_threads, waiting)?,
-            room: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks.clone()).into(),
+            room: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
         };
         Ok(Self {
@@ -186,7 +187,11 @@ impl MapService {
             map.check_level(query.level)?;
             map.check_uuid(query.map_uuid)?;
             if let Some(revision) = query.min_revision {
-                map.wait_for_revision(revision, self.limits().min_revision_wait_max).await?;
+                map.wait_for_revision(
+                    revision,
+                    Duration::from_secs_f64(self.limits().min_revision_wait_max_s),
+                )
+                .await?;
             }
             if query.points.len() <= pool::INLINE_POINTS
                 && let Some(answer) = map.try_query(&query)
@@ -219,7 +224,7 @@ impl MapService {
             }
             let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
             let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
-            let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max);
+            let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
             self.submit_and_wait(&self.inner.mapping, None, move |stop| {
                 limit.run(stop, |stop| {
                     map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
@@ -245,7 +250,7 @@ impl MapService {
             let map = self.map(map)?;
             self.limits().check_points(scan.points.len())?;
             let inner = Arc::clone(&self.inner);
-            let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max);
+            let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max_s);
             let align = move |stop: StopSignal<'_>| {
                 limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop))
             };
@@ -319,7 +324,7 @@ impl MapService {
             self.scans.permit_undo(&undo.target)?;
             let (map, undo) = (self.map(map)?, Arc::new(undo));
             let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
-            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max);
+            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             // Until its outcome is known: what was withdrawn before it is then what it found.
             let pool = &self.inner.undo;
             let _turn = pool.in_turn(map.turn_of_undo()).await?;

@@ -16,9 +16,9 @@ pub(super) struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// The limit `name`, which is `most`.
-    pub(super) fn new(name: &'static str, most: Duration) -> Self {
-        Self { name, most, ends: Arc::default() }
+    /// The limit `name`, which is so many seconds.
+    pub(super) fn new(name: &'static str, most_s: f64) -> Self {
+        Self { name, most: Duration::from_secs_f64(most_s), ends: Arc::default() }
     }
 
     /// Runs `job` under `stop` and this limit. An error of a job that was stopped in time names the limit.
@@ -63,20 +63,20 @@ mod tests {
 
     #[test]
     fn work_whose_time_is_up_is_told_which_limit_and_who_has_gone_is_not() {
-        let limit = TimeLimit::new("alignment_time_max", Duration::ZERO);
+        let limit = TimeLimit::new("alignment_time_max", 0.0);
         let error = limit.run(StopSignal::NEVER, check_not_stopped).unwrap_err();
         assert_eq!(error.reason, Reason::TimeLimit);
         assert!(error.message.contains("alignment_time_max allows, which is 0ns"), "{}", error.message);
         let gone = || true;
         let error = limit.run(StopSignal::when(&gone), check_not_stopped).unwrap_err();
         assert_eq!(error.reason, Reason::CallerGone);
-        let patient = TimeLimit::new("undo_time_max", Duration::from_secs(3600));
+        let patient = TimeLimit::new("undo_time_max", 3600.0);
         assert_eq!(patient.run(StopSignal::NEVER, |stop| check_not_stopped(stop).map(|()| 1)).unwrap(), 1);
     }
 
     #[test]
     fn the_time_of_a_request_that_is_tried_again_goes_on() {
-        let limit = TimeLimit::new("undo_time_max", Duration::from_secs(3600));
+        let limit = TimeLimit::new("undo_time_max", 3600.0);
         let ends = |limit: &TimeLimit| {
             limit.run(StopSignal::NEVER, |_| Ok(())).unwrap();
             *limit.ends.get().unwrap()

@@ -3,7 +3,7 @@
 //! Each gauge has two marks, so that a value that trembles about one of them does not open and shut the door at each
 //! look. Reads, alignments and searches go on meanwhile.
 
-use super::{MemoryReading, Readings, Reason, ServiceError, Shortage};
+use super::{Limits, MemoryReading, Readings, Reason, ServiceError, Shortage};
 use crate::sync::{Rank, RwLock};
 
 /// Where changes are refused, and where they are taken again.
@@ -21,12 +21,7 @@ pub struct Marks {
 
 impl Default for Marks {
     fn default() -> Self {
-        Self {
-            disk_free_low_bytes: 256 << 20,
-            disk_free_resume_bytes: 512 << 20,
-            memory_high_bytes: None,
-            memory_resume_bytes: None,
-        }
+        Limits::default().marks()
     }
 }
 

@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
+use crate::service::Limits;
+
 /// Bytes of one message, at most, where nothing else is set. tonic's own limit for reading is 4 MB.
-pub const MESSAGE_BYTES_MAX: usize = 32 << 20;
+pub const MESSAGE_BYTES_MAX: usize = Limits::MESSAGE_BYTES_MAX;
 /// Bytes of one stream that may be under way unacknowledged; the reader's number counts.
 pub const STREAM_WINDOW_BYTES: u32 = 4 << 20;
 /// The same for all streams of a connection.

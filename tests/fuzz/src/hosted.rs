@@ -9,7 +9,7 @@ use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Request, StatusCode};
 use http_body_util::{BodyExt, Limited};
 use mrol::access::{Access, Gate};
-use mrol::admission::{Admission, AdmissionLimits, Lifecycle};
+use mrol::admission::{Admission, Lifecycle};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, MapSettings, RobotName};
 use mrol::mapping::Guess;
@@ -68,7 +68,7 @@ impl Hosted {
         };
         let service = MapService::open(settings, &OpeningProgress::default()).expect("a service");
         let gate = Gate::new(Access::open(), service.clone());
-        let admission = Admission::new(&AdmissionLimits::default(), Lifecycle::default());
+        let admission = Admission::new(&Limits::default(), Lifecycle::default());
         let recorder = RequestRecorder::new(metrics.clone(), audit);
         let router = protocol(&Middleware::new(gate, admission, recorder));
         let hosted = Self { runtime, service, metrics, router, asked: Cell::new(0), _data: data };
@@ -130,11 +130,11 @@ fn limits() -> Limits {
         voxels_per_map_max: 20_000,
         listed_voxels_max: 10_000,
         map_file_bytes_max: MESSAGE_BYTES_MAX,
-        min_revision_wait_max: Duration::from_millis(1),
-        alignment_time_max: Duration::from_millis(200),
-        insertion_time_max: Duration::from_millis(200),
-        undo_time_max: Duration::from_millis(200),
-        localization_time_max: Duration::from_millis(20),
+        min_revision_wait_max_s: 0.001,
+        alignment_time_max_s: 0.2,
+        insertion_time_max_s: 0.2,
+        undo_time_max_s: 0.2,
+        localization_time_max_s: 0.02,
         localization_candidates_max: 4,
         localization_grid_bytes_max: 4 << 20,
         ..Limits::default()
