@@ -8,13 +8,9 @@
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-#[path = "../disk/mod.rs"]
-mod disk;
-#[path = "../map_folders/mod.rs"]
-mod map_folders;
-#[path = "../process/mod.rs"]
-mod process;
 mod remaker;
+#[path = "../support/mod.rs"]
+mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -22,19 +18,20 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use disk::Disk;
-use map_folders::folder_of;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RequestId, RobotName};
 use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, ScanRequest, Undo, UndoTarget};
 use mrol::voxel::{Lattice, VoxelKey};
-use process::Process;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use remaker::Remaker;
 use tokio::sync::watch;
+
+use crate::support::disk::Disk;
+use crate::support::map_folders::folder_of;
+use crate::support::process::Process;
 
 const WRITERS: usize = 4;
 const RESOLUTION_M: f64 = 0.1;

@@ -7,7 +7,7 @@ use mrol::wire::pb;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::common::{Daemon, client, identity_json, json_of, row};
+use crate::support::daemon::{Daemon, client, identity_json, json_of, row};
 
 fn scan_of(robot: &str, scan_id: u64, points: &[[f32; 3]]) -> Value {
     json!({"robot": robot, "scan_id": scan_id, "points": points, "guess": identity_json(), "align": false})

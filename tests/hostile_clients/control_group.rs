@@ -6,11 +6,11 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-use crate::common::client;
-use crate::hostile_files::hostile_files;
 use crate::map_files::restore_all;
-use crate::process::Process;
 use crate::siege::MIB;
+use crate::support::daemon::client;
+use crate::support::hostile_files::hostile_files;
+use crate::support::process::Process;
 
 const LIMIT: usize = 512 * MIB;
 /// Where control groups are told.

@@ -5,9 +5,9 @@ use std::time::Duration;
 use mrol::wire::pb::occupancy_client::OccupancyClient;
 use tokio::task::JoinSet;
 
-use crate::common::{query_pb, row};
 use crate::frames::{Connection, DATA, call, data, frame, message_head, opening, was_answered};
 use crate::siege::{ATTACK, MIB, Siege};
+use crate::support::daemon::{query_pb, row};
 
 const CHECK: &str = "/grpc.health.v1.Health/Check";
 const WATCH: &str = "/grpc.health.v1.Health/Watch";

@@ -12,8 +12,8 @@ use mrol::service::ScanRequest;
 use mrol::voxel::VoxelKey;
 use uuid::Uuid;
 
-use crate::common::row;
-use crate::disk::Disk;
+use crate::support::daemon::row;
+use crate::support::disk::Disk;
 
 /// Of the scan that is in the old map. The new one's first file has another number.
 const OLD_SNAPSHOT: &str = "snapshot-00000000000000000001";

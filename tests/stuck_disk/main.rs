@@ -11,32 +11,27 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod calls;
-#[path = "../common/mod.rs"]
-mod common;
-#[path = "../disk/mod.rs"]
-mod disk;
 mod load;
 mod made_again;
 mod pace;
 mod plain;
 mod prober;
-#[path = "../process/mod.rs"]
-mod process;
 mod report;
 mod requests;
-#[path = "../watchdog/mod.rs"]
-mod watchdog;
+#[path = "../support/mod.rs"]
+mod support;
 
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use disk::Disk;
 use load::Load;
 use prober::Prober;
-use process::Process;
 use report::Report;
-use watchdog::Watchdog;
+
+use crate::support::disk::Disk;
+use crate::support::process::Process;
+use crate::support::watchdog::Watchdog;
 
 /// Of these two maps the disk of one hangs at times, that of the other only where the whole disk does.
 const MAPS: [&str; 2] = ["hung", "free"];
