@@ -37,6 +37,9 @@ fn large_scan(points: usize) -> Vec<[f32; 3]> {
     (0..points).map(place).collect()
 }
 
+/// Requests that were read and are not answered yet.
+const IN_WORK: &str = r#"mrol_requests_in_flight{state="in_work"}"#;
+
 async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
     let start = Instant::now();
     while !happened().await {
@@ -47,7 +50,8 @@ async fn wait_until<F: Future<Output = bool>>(mut happened: impl FnMut() -> F) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn idle_streams_and_half_open_connections_do_not_keep_it_from_going_down() {
-    let daemon = Daemon::start().await;
+    // Longer than the test has patience.
+    let daemon = Daemon::start_with(|config| config.drain_seconds = 3600).await;
     daemon.make_map("a").await;
     // A stream whose client stays, one that was never used, connections that say nothing or half a sentence,
     // and a watcher of its health.
@@ -66,14 +70,12 @@ async fn idle_streams_and_half_open_connections_do_not_keep_it_from_going_down()
     let mut watched = health.watch(watch).await.unwrap().into_inner();
     assert_eq!(watched.message().await.unwrap().unwrap().status, 1);
 
-    let start = Instant::now();
     let stopping = daemon.tell_to_stop();
     for answers in [answers.message().await.unwrap_err(), silent.message().await.unwrap_err()] {
         assert_eq!((answers.code(), answers.message()), (Code::Unavailable, "server is draining"));
     }
     assert_eq!(watched.message().await.unwrap(), Some(HealthCheckResponse { status: 2 }));
     stopping.stopped().await;
-    assert!(start.elapsed() < Duration::from_secs(3), "it took {:?}", start.elapsed());
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -84,7 +86,7 @@ async fn what_is_in_flight_is_finished_and_what_is_new_is_refused() {
     let waiting = json!({"points": row(1), "min_revision": 9});
     let (waiting, url) = (client().post(daemon.url("/v1/maps/a/occupancy")).json(&waiting), daemon.url(""));
     let waiting = tokio::spawn(waiting.send());
-    tokio::time::sleep(Duration::from_millis(300)).await;
+    wait_until(async || daemon.metric(IN_WORK).await == Some(1.0)).await;
 
     let stopping = daemon.tell_to_stop();
     let get = async |path: &str| client().get(format!("{url}{path}")).send().await.unwrap();
@@ -141,14 +143,15 @@ async fn what_takes_longer_than_the_bound_is_cut() {
     let forever = pb::QueryPointsRequest { min_revision: Some(9), ..query_pb("a", &row(1)) };
     let requests = tokio_stream::once(forever).chain(tokio_stream::pending());
     let mut stream = daemon.occupancy().await.query_points_stream(requests).await.unwrap().into_inner();
-    tokio::time::sleep(Duration::from_millis(300)).await;
+    wait_until(async || daemon.metric(IN_WORK).await == Some(2.0)).await;
 
     let start = Instant::now();
     let stopping = daemon.tell_to_stop();
     assert_eq!(unary.await.unwrap().unwrap_err().code(), Code::Unavailable);
     assert_eq!(stream.message().await.unwrap_err().code(), Code::Unavailable);
     stopping.stopped().await;
-    assert!(start.elapsed() < Duration::from_secs(4), "it took {:?}", start.elapsed());
+    // Less than the bound that is the default.
+    assert!(start.elapsed() < Duration::from_secs(9), "it took {:?}", start.elapsed());
 }
 
 #[tokio::test]
@@ -270,7 +273,7 @@ async fn probes_answer_while_every_pool_thread_is_busy() {
     let align = client().post(daemon.url("/v1/maps/a/alignment")).json(&scan);
     let busy: Vec<_> = (0..6).map(|_| tokio::spawn(align.try_clone().unwrap().send())).collect();
     let mut health = HealthClient::new(daemon.channel().await);
-    let mut slowest = Duration::ZERO;
+    let (begun, mut slowest) = (Instant::now(), Duration::ZERO);
     let mut asked = 0;
     while !busy.iter().all(|aligned| aligned.is_finished()) {
         let start = Instant::now();
@@ -281,11 +284,14 @@ async fn probes_answer_while_every_pool_thread_is_busy() {
         asked += 1;
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
+    let all = begun.elapsed();
     for aligned in busy {
         assert_eq!(aligned.await.unwrap().unwrap().status(), StatusCode::OK);
     }
     assert!(asked > 3, "the alignments were over before the probes were asked");
-    assert!(slowest < Duration::from_secs(1), "three probes took {slowest:?}");
+    // Who waited for a thread would wait for a third of all.
+    let bound = (all / 4).max(Duration::from_secs(1));
+    assert!(slowest < bound, "three probes took {slowest:?}, all alignments {all:?}");
 }
 
 #[tokio::test]
@@ -421,10 +427,10 @@ async fn a_hangup_with_nothing_to_read_again_ends_nothing() {
     for _ in 0..20 {
         let live = client().get(format!("{}/livez", server.http)).send().await.expect("a server that lives");
         assert_eq!(live.status(), StatusCode::OK);
-        tokio::time::sleep(Duration::from_millis(10)).await;
     }
     assert_eq!(server.stop(), Some(0));
 }
+
 #[tokio::test(flavor = "multi_thread")]
 async fn before_it_drains_it_says_that_it_is_not_ready_and_serves_on() {
     let daemon = Daemon::start_with(|config| config.drain_delay_s = 6).await;

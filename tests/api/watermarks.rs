@@ -15,6 +15,7 @@ use crate::support::daemon::{
     Daemon, PATIENCE, client, identity_json, json_of, points_pb, query_pb, row, scan_pb,
 };
 use crate::support::map_folders::folder_of;
+use crate::support::skipped::skipped;
 
 const MIB: u64 = 1 << 20;
 
@@ -282,7 +283,12 @@ async fn a_snapshot_without_room_is_put_off_and_scans_go_on() {
     let before = snapshot_revision(&daemon).await;
     for scan_id in 0..4 {
         assert_eq!(insert_numbered(&daemon, scan_id).await.status(), StatusCode::OK);
-        tokio::time::sleep(Duration::from_millis(500)).await;
+    }
+    // Two snapshots would have been written meanwhile.
+    let (start, age) = (Instant::now(), r#"mrol_map_snapshot_age_seconds{map="a"}"#);
+    while daemon.metric(age).await.expect("a gauge") < 2.5 {
+        assert!(start.elapsed() < PATIENCE, "snapshots are written");
+        tokio::time::sleep(Duration::from_millis(50)).await;
     }
     let with_them = json_of(daemon.get("/v1/maps/a").await).await["revision"].take();
     assert_eq!(ready(&daemon).await["writes_refused"], Value::Null);
@@ -366,7 +372,7 @@ async fn a_file_that_fills_the_real_disk_refuses_changes_until_it_is_removed() {
     let disk = statvfs(data.path()).unwrap();
     let free_mib = (disk.f_bavail * disk.f_frsize) >> 20;
     if free_mib < 4096 {
-        eprintln!("SKIPPED: {free_mib} MiB are free, of which this test fills 1536");
+        skipped(format!("{free_mib} MiB are free, of which this test fills 1536"));
         return;
     }
     let filler = data.path().join("filler");
@@ -379,7 +385,7 @@ async fn a_file_that_fills_the_real_disk_refuses_changes_until_it_is_removed() {
     assert_eq!(insert(&daemon).await.status(), StatusCode::OK);
     let file = std::fs::File::create(&filler).unwrap();
     if let Err(error) = fallocate(&file, FallocateFlags::empty(), 0, 1536 * MIB) {
-        eprintln!("SKIPPED: the file system cannot set room aside: {error}");
+        skipped(format!("the file system cannot set room aside: {error}"));
         return;
     }
     refuses_for(&daemon, &["disk_full"]).await;

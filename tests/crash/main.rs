@@ -32,6 +32,7 @@ use tokio::sync::watch;
 use crate::support::disk::Disk;
 use crate::support::map_folders::folder_of;
 use crate::support::process::Process;
+use crate::support::skipped::skipped_in_part;
 
 const WRITERS: usize = 4;
 const RESOLUTION_M: f64 = 0.1;
@@ -251,7 +252,7 @@ fn server(data: &Path, disk: Option<&Disk>, options: &[&str]) -> Process {
 async fn nothing_acknowledged_is_lost_by_kill_9() {
     let disk = Disk::build().map(Arc::new);
     if disk.is_none() {
-        eprintln!("SKIPPED in part: there is no `cc` to build a disk that fails with");
+        skipped_in_part("there is no `cc` to build a disk that fails with");
     }
     let temporary = tempfile::tempdir().unwrap();
     let data = disk.as_ref().map_or(temporary.path().to_owned(), |disk| disk.folder());

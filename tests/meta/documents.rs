@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::support::process::Process;
+use crate::support::skipped::skipped;
 
 /// Programs that the commands call, besides this one.
 const TOOLS: [&str; 5] = ["bash", "curl", "openssl", "od", "python3"];
@@ -84,7 +85,7 @@ fn run(page: &Path, blocks: &[&str]) {
 #[test]
 fn commands_of_the_documents_run_as_they_stand() {
     if let Some(lacking) = TOOLS.iter().find(|tool| !is_there(tool)) {
-        println!("SKIPPED: {lacking} is not there, which the commands of the documents call");
+        skipped(format!("{lacking} is not there, which the commands of the documents call"));
         return;
     }
     let mut found = 0;

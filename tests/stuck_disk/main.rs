@@ -31,6 +31,7 @@ use report::Report;
 
 use crate::support::disk::Disk;
 use crate::support::process::Process;
+use crate::support::skipped::skipped;
 use crate::support::watchdog::Watchdog;
 
 /// Of these two maps the disk of one hangs at times, that of the other only where the whole disk does.
@@ -83,7 +84,7 @@ fn server(disk: &Disk) -> Process {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_disk_that_hangs_keeps_nobody_from_being_answered() {
     let Some(disk) = Disk::build() else {
-        eprintln!("SKIPPED: there is no `cc` to build a disk that hangs with");
+        skipped("there is no `cc` to build a disk that hangs with");
         return;
     };
     let (times, server) = (Times::of_environment(), server(&disk));

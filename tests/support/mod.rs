@@ -17,4 +17,5 @@ pub mod process;
 pub mod shared_scans;
 #[cfg(feature = "client")]
 pub mod simulated_disk;
+pub mod skipped;
 pub mod watchdog;

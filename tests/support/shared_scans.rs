@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use mrol::geometry::{Point, Pose};
 use mrol::scan;
 
+use crate::support::skipped::skipped;
+
 /// The sets of scans with true poses.
 pub const SETS: [&str; 5] =
     ["uos_3dtk_dat", "icl_office_kt0", "icl_office_kt0_dense", "balm_hall_consecutive", "street_hdl64"];
@@ -32,7 +34,7 @@ pub fn open(name: &'static str) -> Option<ScanSet> {
     };
     let folder = folder.join(name);
     if !folder.is_dir() {
-        eprintln!("SKIPPED: no scans in {} (set MROL_SCANS to their folder)", folder.display());
+        skipped(format!("no scans in {} (set MROL_SCANS to their folder)", folder.display()));
         return None;
     }
     let poses = scan::read_trajectory(&folder.join("poses.txt")).expect("true poses");
