@@ -9,7 +9,7 @@
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-mod watchdog;
+mod support;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
@@ -25,7 +25,8 @@ use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uuid::Uuid;
-use watchdog::{Beat, Watchdog};
+
+use crate::support::watchdog::{Beat, Watchdog};
 
 const RESOLUTION_M: f64 = 0.1;
 /// The map is floors, one above the other, of so many voxels in x and in y.

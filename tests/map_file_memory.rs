@@ -3,17 +3,16 @@
 #![cfg(all(feature = "server", target_os = "linux"))]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-#[path = "hostile_clients/hostile_files.rs"]
-mod hostile_files;
-#[path = "hostile_clients/memory.rs"]
-mod memory;
+mod support;
 
-use memory::Memory;
 use mrol::geometry::Pose;
 use mrol::map::{MapContents, MapSettings, MappedScan, RobotName, Trajectory};
 use mrol::store::{MapFileLimits, Snapshot};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use uuid::Uuid;
+
+use crate::support::hostile_files::hostile_files;
+use crate::support::memory::Memory;
 
 const MIB: u64 = 1 << 20;
 /// More than that is refused.
@@ -43,7 +42,7 @@ fn honest_file() -> Vec<u8> {
 #[test]
 fn what_is_read_takes_no_more_memory_than_was_asked_for() {
     let memory = Memory::of(std::process::id());
-    let files = [vec![("an honest map", honest_file())], hostile_files::hostile_files()].concat();
+    let files = [vec![("an honest map", honest_file())], hostile_files()].concat();
     for (what, file) in files {
         memory.forget_peak();
         let before = memory.resident() as u64;

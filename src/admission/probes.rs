@@ -182,7 +182,7 @@ mod tests {
         let probes = probes(|limits| limits.probes_max = 1);
         let check = || ask(&probes, Operation::HealthCheck, endless());
         let newcomer = async {
-            tokio::time::sleep(Duration::from_millis(2)).await;
+            tokio::task::yield_now().await;
             ask(&probes, Operation::Live, Request::new(Body::empty())).await
         };
         let (old, new) = tokio::join!(check(), newcomer);

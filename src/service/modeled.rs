@@ -22,7 +22,7 @@ use crate::mapping::Guess;
 use crate::store::{DataDir, OpeningProgress, Snapshot, StoreSettings};
 use crate::util::StopSignal;
 
-#[path = "../../tests/failing_disk/simulated.rs"]
+#[path = "../../tests/support/simulated_disk.rs"]
 #[expect(dead_code, reason = "nothing fails here")]
 mod simulated;
 

@@ -5,9 +5,9 @@ use std::process::Stdio;
 
 use serde_json::json;
 
-use super::map_folders::folder_of;
-use super::process::Process;
 use super::{Sequence, complaint, mrol, objects};
+use crate::support::map_folders::folder_of;
+use crate::support::process::Process;
 
 /// A data folder whose server was killed after three scans.
 fn killed(sequence: &Sequence) -> String {

@@ -5,17 +5,14 @@
 mod bench;
 mod demo;
 mod doctor;
-mod documents;
 mod errors;
 mod experiment;
 mod help;
 mod local;
 mod localize;
-#[path = "../map_folders/mod.rs"]
-mod map_folders;
-#[path = "../process/mod.rs"]
-mod process;
 mod remote;
+#[path = "../support/mod.rs"]
+mod support;
 
 use assert_cmd::Command;
 use mrol::geometry::{Pose, rotation_xyzw, translation_m};

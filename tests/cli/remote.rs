@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::process::Process;
 use super::{Sequence, complaint, mrol, objects};
+use crate::support::process::Process;
 
 /// A daemon in a process of its own, which is called.
 struct Daemon(Process);

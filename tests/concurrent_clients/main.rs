@@ -7,16 +7,13 @@
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod newcomers;
-#[path = "../watchdog/mod.rs"]
-mod watchdog;
+#[path = "../support/mod.rs"]
+mod support;
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use common::{Daemon, json_of};
 use mrol::client::Client;
 use mrol::geometry::{self, Point, Pose};
 use mrol::map::{
@@ -28,7 +25,9 @@ use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
-use watchdog::{Beat, Watchdog};
+
+use crate::support::daemon::{Daemon, json_of};
+use crate::support::watchdog::{Beat, Watchdog};
 
 const MAP: &str = "shared";
 const RESOLUTION_M: f64 = 0.1;

@@ -11,8 +11,8 @@ use mrol::service::ScanRequest;
 use reqwest::StatusCode;
 use serde_json::json;
 
-use crate::common::{self, Daemon, json_of};
-use crate::watchdog::{Beat, Watchdog};
+use crate::support::daemon::{Daemon, client, json_of, row};
+use crate::support::watchdog::{Beat, Watchdog};
 use crate::{MAP, STILL_MAX, seconds};
 
 /// Scans before it begins: whoever looks for a robot's poses looks through all of these.
@@ -24,7 +24,7 @@ fn map() -> MapName {
 
 /// A few points; the map grows by little.
 fn scan(robot: &str, guess: Guess) -> ScanRequest {
-    let points: Vec<Point> = common::row(60).into_iter().map(Point::from).collect();
+    let points: Vec<Point> = row(60).into_iter().map(Point::from).collect();
     ScanRequest { guess, ..ScanRequest::new(RobotName::new(robot).unwrap(), points.into()) }
 }
 
@@ -58,10 +58,11 @@ async fn stranger(client: Client, end: Instant, heart: Beat) -> usize {
 
 /// A robot with one scan asks for alignments alone, so that it stays at one.
 async fn beginner(daemon_url: String, end: Instant, heart: Beat) -> usize {
-    let scan = json!({"robot": "beginner", "points": common::row(60), "constant_velocity": true, "method": "overlap"});
+    let scan =
+        json!({"robot": "beginner", "points": row(60), "constant_velocity": true, "method": "overlap"});
     let mut aligned = 0;
     while Instant::now() < end {
-        let ask = common::client().post(format!("{daemon_url}/v1/maps/{MAP}/alignment")).json(&scan).send();
+        let ask = client().post(format!("{daemon_url}/v1/maps/{MAP}/alignment")).json(&scan).send();
         let answer = ask.await.expect("an answer");
         let status = answer.status();
         let answer = json_of(answer).await;

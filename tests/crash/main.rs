@@ -8,13 +8,9 @@
 #![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-#[path = "../disk/mod.rs"]
-mod disk;
-#[path = "../map_folders/mod.rs"]
-mod map_folders;
-#[path = "../process/mod.rs"]
-mod process;
 mod remaker;
+#[path = "../support/mod.rs"]
+mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -22,19 +18,21 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use disk::Disk;
-use map_folders::folder_of;
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RequestId, RobotName};
 use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, ScanRequest, Undo, UndoTarget};
 use mrol::voxel::{Lattice, VoxelKey};
-use process::Process;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use remaker::Remaker;
 use tokio::sync::watch;
+
+use crate::support::disk::Disk;
+use crate::support::map_folders::folder_of;
+use crate::support::process::Process;
+use crate::support::skipped::skipped_in_part;
 
 const WRITERS: usize = 4;
 const RESOLUTION_M: f64 = 0.1;
@@ -254,7 +252,7 @@ fn server(data: &Path, disk: Option<&Disk>, options: &[&str]) -> Process {
 async fn nothing_acknowledged_is_lost_by_kill_9() {
     let disk = Disk::build().map(Arc::new);
     if disk.is_none() {
-        eprintln!("SKIPPED in part: there is no `cc` to build a disk that fails with");
+        skipped_in_part("there is no `cc` to build a disk that fails with");
     }
     let temporary = tempfile::tempdir().unwrap();
     let data = disk.as_ref().map_or(temporary.path().to_owned(), |disk| disk.folder());

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use tokio::sync::watch;
 use uuid::Uuid;
 
-use crate::disk::Disk;
+use crate::support::disk::Disk;
 use crate::{LEVELS, RESOLUTION_M};
 
 /// An incarnation that has seen so many scans is deleted, at the latest.

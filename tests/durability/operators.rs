@@ -10,9 +10,9 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
-use crate::common::{Daemon, json_of, row};
-use crate::map_folders::folder_of;
-use crate::put_file;
+use super::data_folders::put_file;
+use crate::support::daemon::{Daemon, json_of, row};
+use crate::support::map_folders::folder_of;
 
 #[tokio::test]
 async fn a_backup_beside_its_map_stays_and_the_map_is_served() {

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use mrol::wire::pb;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::common::{Daemon, client, identity_json, json_of, row};
+use crate::support::daemon::{Daemon, PATIENCE, client, identity_json, json_of, row};
 
 fn scan_of(robot: &str, scan_id: u64, points: &[[f32; 3]]) -> Value {
     json!({"robot": robot, "scan_id": scan_id, "points": points, "guess": identity_json(), "align": false})
@@ -68,9 +69,11 @@ async fn an_undo_of_all_scans_of_a_robot_leaves_none_from_before_it() {
             count.fetch_add(1, Ordering::Relaxed);
         }
     });
+    let start = Instant::now();
     for wait_for in [150, 200, 250] {
         while sent.load(Ordering::Relaxed) < wait_for {
-            tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+            assert!(start.elapsed() < 3 * PATIENCE, "scans are no longer answered");
+            tokio::time::sleep(Duration::from_millis(1)).await;
         }
         let undone = daemon.post("/v1/maps/a/undo", json!({"robot": "lost", "since_revision": 0})).await;
         let undone = json_of(undone).await;

@@ -6,9 +6,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use tokio::task::JoinSet;
 
-use crate::common::client;
 use crate::frames::{Connection, call, data, message_head};
 use crate::siege::{ATTACK, MESSAGE_BYTES_MAX, MIB, Siege};
+use crate::support::daemon::client;
 
 const QUERY: &str = "/mrol.v1.Occupancy/QueryPoints";
 const CONNECTIONS: usize = 8;

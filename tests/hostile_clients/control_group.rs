@@ -6,11 +6,12 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-use crate::common::client;
-use crate::hostile_files::hostile_files;
 use crate::map_files::restore_all;
-use crate::process::Process;
 use crate::siege::MIB;
+use crate::support::daemon::client;
+use crate::support::hostile_files::hostile_files;
+use crate::support::process::Process;
+use crate::support::skipped::skipped;
 
 const LIMIT: usize = 512 * MIB;
 /// Where control groups are told.
@@ -56,7 +57,7 @@ impl Drop for Group {
 #[tokio::test]
 async fn in_512_mib_no_map_file_ends_the_server_or_keeps_it_from_starting() {
     let Some(group) = Group::with_memory(LIMIT) else {
-        println!("SKIPPED: no memory control group can be made under {GROUPS}, which takes root");
+        skipped(format!("no memory control group can be made under {GROUPS}, which takes root"));
         return;
     };
     let data = tempfile::tempdir().unwrap();

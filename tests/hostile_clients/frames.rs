@@ -6,10 +6,10 @@ use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::net::tcp::OwnedWriteHalf;
-use tokio::task::JoinHandle;
+use tokio::sync::watch;
 use tokio::time::timeout;
 
-use crate::common::PATIENCE;
+use crate::support::daemon::PATIENCE;
 
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
@@ -100,13 +100,23 @@ pub(crate) fn message_head(compressed: bool, length: u32) -> Vec<u8> {
     [&[u8::from(compressed)][..], &length.to_be_bytes()].concat()
 }
 
+/// True where an answer to a stream was begun.
+pub(crate) fn is_answered(answers: &[u8], stream: u32) -> bool {
+    has_headers(answers, stream, 0)
+}
+
 /// True where an answer to a stream was begun and ended, and not the connection cut alone.
 pub(crate) fn was_answered(answers: &[u8], stream: u32) -> bool {
+    has_headers(answers, stream, END_STREAM)
+}
+
+/// True where the server sent headers of a stream with these flags.
+fn has_headers(answers: &[u8], stream: u32, flags: u8) -> bool {
     let mut rest = answers;
     while let Some((head, more)) = rest.split_at_checked(9) {
         let length = u32::from_be_bytes([0, head[0], head[1], head[2]]) as usize;
         let of_stream = head[5..9] == stream.to_be_bytes();
-        if of_stream && head[3] == HEADERS && head[4] & END_STREAM != 0 {
+        if of_stream && head[3] == HEADERS && head[4] & flags == flags {
             return true;
         }
         rest = more.get(length..).unwrap_or_default();
@@ -117,7 +127,8 @@ pub(crate) fn was_answered(answers: &[u8], stream: u32) -> bool {
 /// A connection whose answers are read, so that nothing keeps the server from sending them.
 pub(crate) struct Connection {
     send: OwnedWriteHalf,
-    answers: JoinHandle<Vec<u8>>,
+    /// All that the server has said; its sender is gone once the server has closed.
+    answers: watch::Receiver<Vec<u8>>,
 }
 
 impl Connection {
@@ -134,18 +145,20 @@ impl Connection {
     /// Without a word yet.
     pub(crate) async fn open_raw(server: SocketAddr) -> Self {
         let (mut read, send) = TcpStream::connect(server).await.unwrap().into_split();
-        let answers = tokio::spawn(async move {
-            let mut answers = Vec::new();
+        let (heard, answers) = watch::channel(Vec::new());
+        tokio::spawn(async move {
+            let mut piece = vec![0; 4096];
             // However it ends, that is its end.
-            let _ = read.read_to_end(&mut answers).await;
-            answers
+            while let Ok(bytes @ 1..) = read.read(&mut piece).await {
+                heard.send_modify(|answers| answers.extend_from_slice(&piece[..bytes]));
+            }
         });
         Self { send, answers }
     }
 
     /// True when it went out; false once the server has closed.
     pub(crate) async fn send(&mut self, bytes: &[u8]) -> bool {
-        !self.answers.is_finished() && self.send.write_all(bytes).await.is_ok()
+        self.answers.has_changed().is_ok() && self.send.write_all(bytes).await.is_ok()
     }
 
     /// Sends a byte at a time until the server has enough; all that it said.
@@ -159,8 +172,15 @@ impl Connection {
         self.closed().await
     }
 
+    /// Waits until what the server has said fulfills a condition, or the server closes.
+    pub(crate) async fn until(&mut self, said: impl FnMut(&Vec<u8>) -> bool) {
+        let heard = timeout(2 * PATIENCE, self.answers.wait_for(said)).await;
+        let _ = heard.expect("the server answers or closes the connection");
+    }
+
     /// Waits until the server closes; all that it said.
-    pub(crate) async fn closed(self) -> Vec<u8> {
-        timeout(2 * PATIENCE, self.answers).await.expect("the server closes the connection").unwrap()
+    pub(crate) async fn closed(mut self) -> Vec<u8> {
+        self.until(|_| false).await;
+        self.answers.borrow().clone()
     }
 }

@@ -5,9 +5,9 @@ use std::time::Duration;
 use mrol::wire::pb::occupancy_client::OccupancyClient;
 use tokio::task::JoinSet;
 
-use crate::common::{query_pb, row};
-use crate::frames::{Connection, DATA, call, data, frame, message_head, opening, was_answered};
+use crate::frames::{Connection, DATA, call, data, frame, is_answered, message_head, opening, was_answered};
 use crate::siege::{ATTACK, MIB, Siege};
+use crate::support::daemon::{query_pb, row};
 
 const CHECK: &str = "/grpc.health.v1.Health/Check";
 const WATCH: &str = "/grpc.health.v1.Health/Watch";
@@ -82,7 +82,9 @@ async fn watches_leave_streams_to_those_who_work() {
         }
         watching.push(connection);
     }
-    tokio::time::sleep(Duration::from_millis(200)).await;
+    for connection in &mut watching {
+        connection.until(|answers| is_answered(answers, 1)).await;
+    }
     let mut planner = OccupancyClient::connect(format!("http://{}", siege.grpc())).await.unwrap();
     let questions = tokio_stream::iter([query_pb("hall", &row(10))]);
     let mut answers = planner.query_points_stream(questions).await.unwrap().into_inner();

@@ -10,7 +10,7 @@ use mrol::wire::pb::occupancy_client::OccupancyClient;
 use serde_json::json;
 use tonic::transport::{Channel, Endpoint};
 
-use crate::common::{PATIENCE, bytes_of, client, query_pb, row, scan_pb};
+use crate::support::daemon::{PATIENCE, bytes_of, client, query_pb, row, scan_pb};
 
 /// So many that they are answered by a pool.
 const POINTS: usize = 3000;

@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use mrol::wire::transport::FRAME_BYTES_MAX;
+use tokio::time::timeout;
 
 use crate::frames::{ACK, Connection, HEADERS, SETTINGS, frame};
 use crate::siege::{ATTACK, Siege};
 
 const CONNECTIONS: usize = 1000;
-/// For the server's settings to come, which say how large a frame may be.
+/// At most, for the server's settings to come, which say how large a frame may be.
 const SETTLED: Duration = Duration::from_millis(500);
 
 #[tokio::test]
@@ -19,7 +20,13 @@ async fn connections_that_hold_most_of_a_frame() {
         begun.push(Connection::open(siege.http()).await);
         begun.push(Connection::open(siege.grpc()).await);
     }
-    tokio::time::sleep(SETTLED).await;
+    let all_heard = async {
+        for connection in &mut begun {
+            connection.until(|said| !said.is_empty()).await;
+        }
+    };
+    // Those that nobody accepts hear nothing.
+    let _ = timeout(SETTLED, all_heard).await;
     let mut most = frame(HEADERS, 0, 1, &vec![0; FRAME_BYTES_MAX as usize]);
     most.pop();
     let settled = frame(SETTINGS, ACK, 0, &[]);

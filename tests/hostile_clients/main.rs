@@ -8,23 +8,19 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod bombs;
-#[path = "../common/mod.rs"]
-mod common;
 mod control_group;
 mod floods;
 mod frames;
 mod headers;
 mod health;
 mod honest;
-mod hostile_files;
 mod idle;
 mod map_files;
-mod memory;
 mod metrics;
 mod probe;
-#[path = "../process/mod.rs"]
-mod process;
 mod siege;
 mod silence;
 mod slowness;
+#[path = "../support/mod.rs"]
+mod support;
 mod unread;

@@ -1,8 +1,8 @@
 //! Small map files that become much when they are restored.
 
-use crate::common::client;
-use crate::hostile_files::hostile_files;
 use crate::siege::{MIB, Siege};
+use crate::support::daemon::client;
+use crate::support::hostile_files::hostile_files;
 
 /// Above this mark a map does not grow, whatever it is restored from.
 const HIGH_MIB: usize = 256;

@@ -7,9 +7,9 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpSocket, TcpStream};
 use tokio::time::timeout;
 
-use crate::common::{PATIENCE, client};
 use crate::frames::{END_HEADERS, END_STREAM, HEADERS, frame, literal, opening};
 use crate::siege::{ATTACK, MIB, Siege};
+use crate::support::daemon::{PATIENCE, client};
 
 const CONNECTIONS: usize = 8;
 /// HTTP/2's name for how much of an answer may be on its way.

@@ -8,9 +8,9 @@ use tempfile::TempDir;
 use tokio::sync::{Mutex, MutexGuard};
 
 use crate::honest::Honest;
-use crate::memory::Memory;
 use crate::probe::Probe;
-use crate::process::Process;
+use crate::support::memory::Memory;
+use crate::support::process::Process;
 
 pub(crate) const MIB: usize = 1 << 20;
 

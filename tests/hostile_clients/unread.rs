@@ -7,9 +7,9 @@ use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
-use crate::common::scan_pb;
 use crate::frames::{call, data, message_head, opening};
 use crate::siege::{ATTACK, BODY_BYTES_MAX, MIB, Siege};
+use crate::support::daemon::scan_pb;
 
 const CONNECTIONS: usize = 50;
 /// HTTP/2's name for how much of an answer may be on its way.

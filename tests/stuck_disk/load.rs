@@ -10,10 +10,10 @@ use tokio::task::JoinSet;
 
 use crate::MAPS;
 use crate::calls::{Calls, DEADLINE};
-use crate::common::{bytes_of, query_pb, row};
 use crate::pace::Pace;
 use crate::report::{Bound, Report};
 use crate::requests;
+use crate::support::daemon::{bytes_of, query_pb, row};
 
 /// The robots that map.
 const ROBOTS: [&str; 3] = ["r1", "r2", "r3"];
@@ -185,7 +185,7 @@ impl Asker {
         while let Some(map) = self.next(&mut i).await {
             let mut scan = requests::scan(&mut random, map, "undone", i);
             scan.at_guess = true;
-            scan.guess = crate::common::guess_pb([0.0; 3]);
+            scan.guess = crate::support::daemon::guess_pb([0.0; 3]);
             let insert = async |scan| self.calls.grpc.mapping().insert_scan(scan).await;
             if self.calls.call(&format!("insert {map}"), scan, insert).await.is_some() {
                 let undo = async |message| self.calls.grpc.mapping().undo(message).await;
@@ -254,7 +254,7 @@ impl Asker {
             self.calls.call("create", requests::creation(&map), create).await;
             let mut scan = requests::scan(&mut random, &map, "r1", i);
             scan.at_guess = true;
-            scan.guess = crate::common::guess_pb([0.0; 3]);
+            scan.guess = crate::support::daemon::guess_pb([0.0; 3]);
             let insert = async |scan| self.calls.grpc.mapping().insert_scan(scan).await;
             self.calls.call("insert in new map", scan, insert).await;
             self.forget(&map).await;

@@ -12,8 +12,9 @@ use mrol::service::ScanRequest;
 use mrol::voxel::VoxelKey;
 use uuid::Uuid;
 
-use crate::common::row;
-use crate::disk::Disk;
+use crate::support::daemon::row;
+use crate::support::disk::Disk;
+use crate::support::skipped::skipped;
 
 /// Of the scan that is in the old map. The new one's first file has another number.
 const OLD_SNAPSHOT: &str = "snapshot-00000000000000000001";
@@ -58,7 +59,7 @@ fn has_snapshot(maps: &Path) -> bool {
 #[tokio::test]
 async fn a_snapshot_that_hangs_does_not_bring_a_deleted_map_back() {
     let Some(disk) = Disk::build() else {
-        eprintln!("SKIPPED: there is no `cc` to build a disk that hangs with");
+        skipped("there is no `cc` to build a disk that hangs with");
         return;
     };
     let server = crate::server(&disk);

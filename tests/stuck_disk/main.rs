@@ -11,32 +11,28 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod calls;
-#[path = "../common/mod.rs"]
-mod common;
-#[path = "../disk/mod.rs"]
-mod disk;
 mod load;
 mod made_again;
 mod pace;
 mod plain;
 mod prober;
-#[path = "../process/mod.rs"]
-mod process;
 mod report;
 mod requests;
-#[path = "../watchdog/mod.rs"]
-mod watchdog;
+#[path = "../support/mod.rs"]
+mod support;
 
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use disk::Disk;
 use load::Load;
 use prober::Prober;
-use process::Process;
 use report::Report;
-use watchdog::Watchdog;
+
+use crate::support::disk::Disk;
+use crate::support::process::Process;
+use crate::support::skipped::skipped;
+use crate::support::watchdog::Watchdog;
 
 /// Of these two maps the disk of one hangs at times, that of the other only where the whole disk does.
 const MAPS: [&str; 2] = ["hung", "free"];
@@ -88,7 +84,7 @@ fn server(disk: &Disk) -> Process {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_disk_that_hangs_keeps_nobody_from_being_answered() {
     let Some(disk) = Disk::build() else {
-        eprintln!("SKIPPED: there is no `cc` to build a disk that hangs with");
+        skipped("there is no `cc` to build a disk that hangs with");
         return;
     };
     let (times, server) = (Times::of_environment(), server(&disk));

@@ -9,9 +9,9 @@ use std::thread::{JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
 use crate::MAPS;
-use crate::common::{bytes_of, row};
 use crate::report::{Bound, Report};
-use crate::watchdog::Beat;
+use crate::support::daemon::{bytes_of, row};
+use crate::support::watchdog::Beat;
 
 const ADDRESS: &str = "MROL_STUCK_DISK_PROBE";
 const MARK: &str = "answered";

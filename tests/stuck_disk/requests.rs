@@ -4,7 +4,7 @@ use mrol::wire::pb;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::common::{corner, guess_pb, points_pb, pose_pb};
+use crate::support::daemon::{corner, guess_pb, points_pb, pose_pb};
 
 /// Points of a hall about a robot, other ones each time: every scan adds to the map.
 fn hall(random: &mut ChaCha8Rng) -> Vec<[f32; 3]> {

@@ -1,5 +1,5 @@
 //! What is fuzzed: functions of bytes that panic where a promise is broken. The fuzzers call them with what they make
-//! up, `tests/fuzz_corpus.rs` with the inputs that are kept.
+//! up, `tests/security/fuzz_corpus.rs` with the inputs that are kept.
 
 mod frames;
 mod grpc;
@@ -11,7 +11,7 @@ mod map_state;
 mod record;
 mod scan_files;
 mod settings_files;
-#[path = "../../failing_disk/simulated.rs"]
+#[path = "../../support/simulated_disk.rs"]
 #[allow(dead_code, unreachable_pub, reason = "it is used in part")]
 mod simulated;
 

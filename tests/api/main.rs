@@ -1,0 +1,19 @@
+//! What a running server promises: both protocols, bad input, its beginning, its limits and its end.
+
+#![cfg(feature = "server")]
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod bad_input;
+mod callers_gone;
+mod grpc;
+mod http;
+mod lifecycle;
+#[cfg(feature = "lab")]
+mod localize;
+mod memory_returns;
+mod scan_requests;
+#[path = "../support/mod.rs"]
+mod support;
+mod trajectory;
+mod unix_socket;
+mod watermarks;

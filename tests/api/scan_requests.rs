@@ -1,0 +1,151 @@
+//! What a robot can say with a scan, and what it is told: guesses, points that do not count, force, foreground, and
+//! standing still.
+
+use mrol::config::RobotConfig;
+use mrol::wire::pb;
+use serde_json::json;
+
+use crate::support::daemon::{Daemon, bits_of, bytes_of, corner, guess_pb, json_of, scan_pb};
+
+/// The corner as a sensor sees it that stands at `at`, and a scan of it that is to be aligned.
+fn seen_from(at: [f32; 3]) -> Vec<[f32; 3]> {
+    corner().into_iter().map(|point| [0, 1, 2].map(|axis| point[axis] - at[axis])).collect()
+}
+
+fn to_align(robot: &str, points: &[[f32; 3]], guess: Option<pb::Guess>) -> pb::InsertScanRequest {
+    pb::InsertScanRequest { guess, at_guess: false, ..scan_pb("a", robot, points) }
+}
+
+fn place(answer: &pb::InsertScanResponse) -> [f64; 3] {
+    let pose = answer.alignment.as_ref().unwrap().map_from_sensor.unwrap();
+    pose.translation_m.unwrap().into()
+}
+
+fn is_near(found: [f64; 3], expected: [f64; 3]) -> bool {
+    found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.01)
+}
+
+#[tokio::test]
+async fn a_constant_velocity_goes_on_as_the_last_two_scans_went() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    let mut robot = daemon.mapping().await;
+    for x in [0.0, 0.3] {
+        robot
+            .insert_scan(pb::InsertScanRequest {
+                guess: guess_pb([x, 0.0, 0.0]),
+                ..scan_pb("a", "r", &corner())
+            })
+            .await
+            .unwrap();
+    }
+    let guess = pb::Guess { kind: Some(pb::guess::Kind::ConstantVelocity(true)) };
+    // Taken at its guess, so that the answer is the guess.
+    let request = pb::InsertScanRequest { guess: Some(guess), ..scan_pb("a", "r", &corner()) };
+    let answer = robot.insert_scan(request).await.unwrap().into_inner();
+    assert!(is_near(place(&answer), [0.6, 0.0, 0.0]), "{answer:?}");
+
+    let route = "/v1/maps/a/scans?robot=r&align=false&constant_velocity=true";
+    let answer = json_of(daemon.post_bytes(route, bytes_of(&corner())).await).await;
+    assert!((answer["map_from_sensor"]["translation_m"][0].as_f64().unwrap() - 0.9).abs() < 1e-9, "{answer}");
+}
+
+#[tokio::test]
+async fn points_out_of_range_or_of_the_robots_body_do_not_count() {
+    let daemon = Daemon::start_with(|config| {
+        let far = RobotConfig { range_max_m: Some(5.0), ..RobotConfig::default() };
+        config.robots.insert("short".into(), far);
+    })
+    .await;
+    daemon.make_map("a").await;
+    let mut robot = daemon.mapping().await;
+    let mut points = corner();
+    points.extend([[0.3, 0.3, 0.3], [9.0, 9.0, 9.0]]);
+    let body = pb::Box { min_m: Some([0.2; 3].into()), max_m: Some([0.4; 3].into()) };
+    let mut request = scan_pb("a", "r", &points);
+    request.scan.as_mut().unwrap().body = Some(body);
+    request.scan.as_mut().unwrap().range_max_m = Some(6.0);
+    let answer = robot.insert_scan(request).await.unwrap().into_inner();
+    assert_eq!(answer.alignment.unwrap().points_skipped, 2);
+    // The settings speak where the request does not.
+    let answer = robot.insert_scan(scan_pb("a", "short", &points)).await.unwrap().into_inner();
+    assert_eq!(answer.alignment.unwrap().points_skipped, 1);
+
+    let mut nothing = scan_pb("a", "r", &points);
+    nothing.scan.as_mut().unwrap().range_min_m = Some(100.0);
+    let refused = robot.insert_scan(nothing).await.unwrap_err();
+    assert!(refused.message().contains("range_min_m"), "{refused}");
+    let route = "/v1/maps/a/scans?robot=r&range_min_m=3&range_max_m=2";
+    let refused = json_of(daemon.post_bytes(route, bytes_of(&points)).await).await;
+    assert_eq!(refused["reason"], "bad_filter", "{refused}");
+}
+
+#[tokio::test]
+async fn a_scan_that_is_not_accepted_is_added_by_force_alone() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &corner()).await;
+    let mut robot = daemon.mapping().await;
+    let elsewhere = to_align("r", &corner(), guess_pb([40.0, 0.0, 0.0]));
+    let refused = robot.insert_scan(elsewhere.clone()).await.unwrap().into_inner();
+    assert!(!refused.accepted && refused.new_voxels == 0);
+    let forced = pb::InsertScanRequest { force: true, ..elsewhere };
+    let forced = robot.insert_scan(forced).await.unwrap().into_inner();
+    assert!(forced.accepted && forced.new_voxels > 0);
+    assert_eq!(forced.alignment.unwrap().verdict, i32::from(pb::Verdict::LowOverlap));
+    assert_eq!(forced.version.unwrap().revision, 2);
+}
+
+#[tokio::test]
+async fn what_is_in_front_of_the_map_is_told_point_by_point() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &corner()).await;
+    let mut points = seen_from([0.1, 0.0, 0.0]);
+    let newcomers = [[0.93f32, 0.95, 0.95], [f32::NAN, 0.0, 0.0], [0.93, 0.95, 1.05]];
+    let walls = points.len();
+    points.extend(newcomers);
+    let pb::InsertScanRequest { map, scan, guess, .. } = to_align("r", &points, guess_pb([0.08, 0.0, 0.0]));
+    let request = pb::AlignScanRequest { map, scan, guess, foreground_level: Some(0), ..Default::default() };
+    let mut robot = daemon.mapping().await;
+    let answer = robot.align_scan(request).await.unwrap().into_inner();
+    let bits = bits_of(&answer.foreground, points.len());
+    let new: Vec<usize> = (0..points.len()).filter(|&i| bits[i]).collect();
+    assert!(new.ends_with(&[walls, walls + 2]) && !bits[walls + 1], "{new:?}");
+    assert_eq!(answer.foreground_points, new.len() as u64);
+    // A wall's points next to a voxel's border may fall beyond it; no more than a few.
+    assert!(new.len() < walls / 20, "{}", new.len());
+
+    let json: Vec<_> = points.iter().map(|p| p.map(|c| c.is_finite().then_some(c))).collect();
+    let guess = json!({"translation_m": [0.08, 0.0, 0.0], "rotation_xyzw": [0.0, 0.0, 0.0, 1.0]});
+    let body = json!({"robot": "r", "points": json, "guess": guess, "foreground_level": 0});
+    let answer = json_of(daemon.post("/v1/maps/a/alignment", body).await).await;
+    let told: Vec<usize> = serde_json::from_value(answer["foreground"].clone()).unwrap();
+    assert_eq!(told, new);
+    let body = json!({"robot": "r", "points": json, "foreground_level": 9});
+    let refused = json_of(daemon.post("/v1/maps/a/alignment", body).await).await;
+    assert_eq!(refused["reason"], "level_out_of_range", "{refused}");
+}
+
+#[tokio::test]
+async fn a_robot_that_stands_still_does_not_grow_its_trajectory() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    let mut robot = daemon.mapping().await;
+    let first = robot.insert_scan(to_align("r", &corner(), None)).await.unwrap().into_inner();
+    assert!(first.accepted && !first.stationary);
+    for _ in 0..5 {
+        let again = robot.insert_scan(to_align("r", &corner(), None)).await.unwrap().into_inner();
+        assert!(again.accepted && again.stationary && again.new_voxels == 0, "{again:?}");
+        assert_eq!(again.version.unwrap().revision, 1);
+    }
+    // Something new before it is worth keeping, and so is another place.
+    let mut with_box = corner();
+    with_box.extend((0..400).map(|i| [1.0 + (i % 20) as f32 * 0.02, 1.0 + (i / 20) as f32 * 0.02, 0.5]));
+    let changed = robot.insert_scan(to_align("r", &with_box, None)).await.unwrap().into_inner();
+    assert!(changed.accepted && !changed.stationary && changed.new_voxels > 10, "{changed:?}");
+    let moved = to_align("r", &seen_from([0.2, 0.0, 0.0]), guess_pb([0.2, 0.0, 0.0]));
+    let moved = robot.insert_scan(moved).await.unwrap().into_inner();
+    assert!(moved.accepted && !moved.stationary && is_near(place(&moved), [0.2, 0.0, 0.0]), "{moved:?}");
+    assert_eq!(moved.version.unwrap().revision, 3);
+}

@@ -1,0 +1,11 @@
+//! What the repository says of itself: layers of the code, the contract of the last release, commands of the documents.
+
+#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+#[cfg(feature = "server")]
+mod documents;
+mod layering;
+#[cfg(feature = "client")]
+mod proto_compatibility;
+#[path = "../support/mod.rs"]
+mod support;

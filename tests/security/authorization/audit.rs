@@ -1,0 +1,169 @@
+//! The audit: who changed which map, from where, and which keys were refused.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use mrol::access::{Operation, Scope, Secret};
+use reqwest::{Method, Response, StatusCode};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use tonic::transport::Channel;
+
+use super::asking::first_answer;
+use super::keyring::Keyring;
+use super::requests::message;
+use crate::support::daemon::client;
+use crate::support::process::Process;
+
+/// A server that writes JSON into a log, of which `level` lets next to nothing through.
+struct Audited {
+    server: Process,
+    log: PathBuf,
+    operator: Secret,
+    _folder: TempDir,
+    _keyring: Keyring,
+}
+
+impl Audited {
+    fn start(options: &[&str]) -> Self {
+        let (folder, keyring) = (tempfile::tempdir().unwrap(), Keyring::empty());
+        let operator = keyring.add("operator", Scope::Admin, None);
+        let (file, log) = (keyring.file(), folder.path().join("log"));
+        let options = [&["--keys-file", file.to_str().unwrap(), "--log-format", "json"], options].concat();
+        let server = Process::start_with_log("", &options, "error", File::create(&log).unwrap().into());
+        Self { server, log, operator, _folder: folder, _keyring: keyring }
+    }
+
+    async fn http(
+        &self,
+        method: Method,
+        path: &str,
+        id: &str,
+        key: Option<&Secret>,
+        body: Value,
+    ) -> Response {
+        let request = client().request(method, format!("{}{path}", self.server.http));
+        let request = request.header("x-request-id", id).json(&body);
+        let request = key.into_iter().fold(request, |request, key| request.bearer_auth(key.reveal()));
+        request.send().await.unwrap()
+    }
+
+    /// Ends the server; the lines of its audit.
+    fn ended(self) -> Vec<Value> {
+        assert_eq!(self.server.stop(), Some(0));
+        audit(&self.log)
+    }
+}
+
+fn audit(log: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(log).unwrap();
+    let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("a JSON object"));
+    lines.filter(|line| line["target"] == "mrol::audit").collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_change_is_written_with_who_asked_for_it_and_what_it_did() {
+    let audited = Audited::start(&[]);
+    let key = Some(&audited.operator);
+    let settings = json!({"resolution_m": 0.1, "levels": 3});
+    let map = "/v1/maps/a";
+    assert_eq!(
+        audited.http(Method::PUT, map, "made", key, settings.clone()).await.status(),
+        StatusCode::CREATED
+    );
+    // Again: nothing is changed, and a reader changes nothing anyway.
+    assert_eq!(audited.http(Method::PUT, map, "made-again", key, settings).await.status(), StatusCode::OK);
+    assert_eq!(audited.http(Method::GET, map, "read", key, Value::Null).await.status(), StatusCode::OK);
+    let scan = json!({
+        "robot": "r1", "points": [[1.0, 2.0, 0.5], [3.0, 2.0, 0.5]], "align": false,
+        "guess": {"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]},
+    });
+    let inserted = audited.http(Method::POST, "/v1/maps/a/scans", "scan", key, scan).await;
+    assert_eq!(inserted.status(), StatusCode::OK, "{}", inserted.text().await.unwrap());
+    let deletion = json!({"points": [[1.0, 2.0, 0.5]]});
+    let deleted = audited.http(Method::POST, "/v1/maps/a/deletions", "deleted", key, deletion).await;
+    assert_eq!(deleted.status(), StatusCode::OK, "{}", deleted.text().await.unwrap());
+    let undo = json!({"robot": "r1", "since_revision": 0});
+    let undone = audited.http(Method::POST, "/v1/maps/a/undo", "undone", key, undo).await;
+    assert_eq!(undone.status(), StatusCode::OK, "{}", undone.text().await.unwrap());
+    assert_eq!(
+        audited.http(Method::DELETE, map, "gone", key, Value::Null).await.status(),
+        StatusCode::NO_CONTENT
+    );
+    let again = audited.http(Method::DELETE, map, "gone-already", key, Value::Null).await;
+    assert_eq!(again.status(), StatusCode::NOT_FOUND);
+
+    let lines = audited.ended();
+    let fields = |line: &Value| {
+        let span = &line["span"];
+        assert_eq!(
+            (&span["protocol"], &span["key"], &span["peer"]),
+            (&"http".into(), &"operator".into(), &"127.0.0.1".into())
+        );
+        let names =
+            ["operation", "map", "outcome", "revision_before", "revision", "voxels_removed", "scans_undone"];
+        [vec![span["request_id"].clone()], names.map(|name| line[name].clone()).to_vec()].concat()
+    };
+    let told: Vec<_> = lines.iter().map(fields).collect();
+    let expected = json!([
+        ["made", "CreateMap", "a", "done", null, 0, 0, 0],
+        ["made-again", "CreateMap", "a", "unchanged", 0, 0, 0, 0],
+        ["deleted", "DeleteVoxels", "a", "done", 1, 2, 1, 0],
+        ["undone", "Undo", "a", "done", 2, 3, 1, 1],
+        ["gone", "DeleteMap", "a", "done", 3, null, 0, 0],
+        ["gone-already", "DeleteMap", "a", "failed", null, null, null, null],
+    ]);
+    assert_eq!(Value::from(told), expected);
+    assert_eq!(lines[5]["reason"], "map_not_found");
+    let uuid = &lines[0]["uuid"];
+    assert!(uuid.is_string() && lines[1..5].iter().all(|line| line["uuid"] == *uuid), "{lines:#?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn refused_keys_are_written_and_a_flood_of_them_is_counted() {
+    let audited = Audited::start(&[]);
+    let unknown = Secret::random().unwrap();
+    let create = json!({"resolution_m": 0.1});
+    let refused = audited.http(Method::PUT, "/v1/maps/a", "http-1", Some(&unknown), create.clone()).await;
+    assert_eq!(refused.status(), StatusCode::UNAUTHORIZED);
+    let channel = Channel::from_shared(audited.server.grpc.clone()).unwrap().connect().await.unwrap();
+    let call = Operation::DeleteMap.grpc().unwrap();
+    let refused = first_answer(channel, call, message(Operation::DeleteMap, "a"), None).await;
+    assert!(refused.is_err());
+    for _ in 0..100 {
+        audited.http(Method::PUT, "/v1/maps/a", "flood", None, create.clone()).await;
+    }
+    // One of these is written, when the second of the flood is over, with the number of those that were not.
+    tokio::time::sleep(std::time::Duration::from_millis(1100)).await;
+    audited.http(Method::PUT, "/v1/maps/a", "after", None, create).await;
+
+    let lines = audited.ended();
+    assert!(lines.iter().all(|line| line["outcome"] == "denied"), "{lines:#?}");
+    let of =
+        |line: &Value| ["protocol", "operation", "request_id", "key"].map(|name| line["span"][name].clone());
+    assert_eq!(of(&lines[0]), ["http".into(), "CreateMap".into(), "http-1".into(), Value::Null]);
+    assert_eq!(lines[0]["reason"], "key_unknown");
+    assert_eq!(of(&lines[1])[..2], ["grpc", "DeleteMap"]);
+    assert_eq!(lines[1]["reason"], "key_missing");
+    assert!((3..60).contains(&lines.len()), "{} lines", lines.len());
+    let unwritten: u64 = lines.iter().map(|line| line["unwritten"].as_u64().unwrap()).sum();
+    assert_eq!(unwritten as usize + lines.len(), 103);
+    assert_eq!(lines.last().unwrap()["span"]["request_id"], "after");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_audit_can_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("mrol.toml");
+    fs::write(&config, "[log]\naudit = false\n").unwrap();
+    let audited = Audited::start(&["--config", config.to_str().unwrap()]);
+    let made = audited.http(
+        Method::PUT,
+        "/v1/maps/a",
+        "made",
+        Some(&audited.operator),
+        json!({"resolution_m": 0.1}),
+    );
+    assert_eq!(made.await.status(), StatusCode::CREATED);
+    assert_eq!(audited.ended(), Vec::<Value>::new());
+}

@@ -1,0 +1,12 @@
+//! Where a server keeps a map: a folder of the map's name and uuid.
+
+use std::path::{Path, PathBuf};
+
+/// The folder of the map `map` in the data folder `data`.
+pub fn folder_of(data: &Path, map: &str) -> PathBuf {
+    let entries = std::fs::read_dir(data.join("maps")).expect("a data folder");
+    let name = |path: &PathBuf| path.file_name().expect("a name").to_string_lossy().into_owned();
+    let mut folders = entries.map(|entry| entry.expect("an entry").path());
+    let is_its = |path: &PathBuf| path.is_dir() && name(path).split('.').next() == Some(map);
+    folders.find(is_its).unwrap_or_else(|| panic!("no folder of map {map}"))
+}
