@@ -5,9 +5,10 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mrol::lab::rivals::StructureName;
 use mrol::lab::workload::{Order, Room, Site, Workload};
-use mrol::map::lookup::stages;
+use mrol::map::lookup;
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap};
 use mrol::util::Keyword;
+use mrol::voxel::quantize;
 
 const POINTS: usize = 100_000;
 const STRUCTURES: [StructureName; 7] = [
@@ -54,12 +55,12 @@ fn parts(criterion: &mut Criterion) {
     let quantize = map.lattice().from_points(&queries.map_from_points);
     let (mut keys, mut occupied) = (vec![0; POINTS], vec![0; POINTS.div_ceil(64)]);
     group.bench_function("transform", |bencher| {
-        bencher.iter(|| stages::keys(&queries.points, &quantize, 0, black_box(&mut keys)));
+        bencher.iter(|| quantize::keys(&queries.points, &quantize, 0, black_box(&mut keys)));
     });
     let view = map.view();
     let view = view.level_view(0);
     group.bench_function("filter alone", |bencher| {
-        bencher.iter(|| stages::filter_contains(&keys, &view, black_box(&mut occupied)));
+        bencher.iter(|| lookup::filter_contains(&keys, &view, black_box(&mut occupied)));
     });
     group.finish();
 }
@@ -76,7 +77,7 @@ fn scalar(group: &mut Group<'_>, map: &MultiResolutionMap) {
         group.bench_function(format!("{} scalar", lookup.as_str()), |bencher| {
             let points = &queries.points;
             bencher
-                .iter(|| stages::occupied_scalar(points, &quantize, &view, lookup, black_box(&mut occupied)));
+                .iter(|| lookup::occupied_scalar(points, &quantize, &view, lookup, black_box(&mut occupied)));
         });
     }
 }

@@ -7,15 +7,17 @@ mod avx512;
 
 use super::Probe;
 use super::counters::Counters;
+#[cfg(target_arch = "x86_64")]
+use crate::util::cpu::{Avx2, Avx512};
 use crate::util::prefetch;
 
 /// Counts `keys`, which are absent, with `hashes` hashes each and sets their bits of the plane.
 pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
     #[cfg(target_arch = "x86_64")]
-    if avx512::is_available() {
-        return avx512::fill(plane, counters, hashes, keys);
-    } else if avx2::is_available() {
-        return avx2::fill(plane, counters, hashes, keys);
+    if let Some(cpu) = Avx512::detect() {
+        return avx512::fill(cpu, plane, counters, hashes, keys);
+    } else if let Some(cpu) = Avx2::detect() {
+        return avx2::fill(cpu, plane, counters, hashes, keys);
     }
     fill_scalar(plane, counters, hashes, keys);
 }
@@ -50,8 +52,10 @@ mod tests {
     fn wide_kernels() -> Vec<Kernel> {
         let mut kernels: Vec<Kernel> = vec![fill];
         #[cfg(target_arch = "x86_64")]
-        if avx2::is_available() {
-            kernels.push(avx2::fill);
+        if Avx2::detect().is_some() {
+            kernels.push(|plane, counters, hashes, keys| {
+                avx2::fill(Avx2::detect().expect("AVX2"), plane, counters, hashes, keys);
+            });
         }
         kernels
     }

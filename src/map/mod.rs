@@ -5,6 +5,7 @@
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
 mod addition;
+mod bounds;
 mod bulk;
 mod capacity_schedule;
 mod change;

@@ -1,6 +1,6 @@
 //! Which shard a voxel belongs to.
 
-use super::lookup::bounds::{Bounds, bounds};
+use super::bounds::{Bounds, bounds};
 use crate::geometry::{Point, Pose};
 use crate::voxel::Lattice;
 

@@ -2,6 +2,8 @@
 //! stop signal of long work.
 
 pub(crate) mod bits;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod cpu;
 mod durations;
 mod excerpt;
 mod keyword;

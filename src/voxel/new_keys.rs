@@ -10,6 +10,8 @@ mod avx512;
 use super::block::OFFSETS;
 use super::{BLOCK_LEVELS, BlockMask, VoxelKey};
 use crate::util::bits::for_each_bit;
+#[cfg(target_arch = "x86_64")]
+use crate::util::cpu::{Avx2, Avx512};
 
 impl BlockMask {
     /// Appends to `keys` those of the voxels of `block`, `up` (0, 1 or 2) levels up in it, that are occupied with the
@@ -18,10 +20,10 @@ impl BlockMask {
     pub(crate) fn keys_gained(&self, added: &Self, block: VoxelKey, up: u32, keys: &mut Vec<u64>) {
         let first = block.first_within(BLOCK_LEVELS - up).to_bits();
         #[cfg(target_arch = "x86_64")]
-        if avx512::is_available() {
-            return avx512::keys_gained(self, added, first, up, keys);
-        } else if avx2::is_available() {
-            return avx2::keys_gained(self, added, first, up, keys);
+        if let Some(cpu) = Avx512::detect() {
+            return avx512::keys_gained(cpu, self, added, first, up, keys);
+        } else if let Some(cpu) = Avx2::detect() {
+            return avx2::keys_gained(cpu, self, added, first, up, keys);
         }
         keys_gained_scalar(self, added, first, up, keys);
     }
@@ -80,9 +82,9 @@ mod tests {
                 keys_gained_scalar(&mask, &added_mask, first, up, &mut scalar);
                 prop_assert_eq!(&keys, &scalar);
                 #[cfg(target_arch = "x86_64")]
-                if avx2::is_available() {
+                if let Some(cpu) = Avx2::detect() {
                     let mut keys = vec![7];
-                    avx2::keys_gained(&mask, &added_mask, first, up, &mut keys);
+                    avx2::keys_gained(cpu, &mask, &added_mask, first, up, &mut keys);
                     prop_assert_eq!(keys, scalar);
                 }
             }

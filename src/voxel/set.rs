@@ -1,7 +1,10 @@
 //! A set of finest voxels as sorted blocks: what a scan touches, a deletion takes, a snapshot keeps.
 
 use super::block_sort::blocks_of;
-use super::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, MOMENT_LEVEL, VoxelKey};
+use super::{
+    BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL, VoxelKey, quantize,
+};
+use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_until};
 
 /// Blocks that are worked on between two looks at the stop signal: some milliseconds.
@@ -23,6 +26,16 @@ impl std::fmt::Debug for BlockMask {
 }
 
 impl VoxelSet {
+    /// The voxels that `points` fall in. Points without a voxel (not finite, out of range) are left out and
+    /// counted.
+    pub fn of_points(points: &[Point], lattice_from_points: &LatticeFromPoints) -> (Self, usize) {
+        let mut keys = vec![0; points.len()];
+        quantize::keys(points, lattice_from_points, 0, &mut keys);
+        let voxels: Vec<_> = keys.into_iter().filter_map(VoxelKey::from_bits).collect();
+        let skipped = points.len() - voxels.len();
+        (voxels.into_iter().collect(), skipped)
+    }
+
     /// The key of a block from its packed form; none when no finest voxel can lie in it.
     pub fn block_key(bits: u64) -> Option<VoxelKey> {
         let blocks = INDEX_MIN >> BLOCK_LEVELS..=INDEX_MAX >> BLOCK_LEVELS;
@@ -94,5 +107,34 @@ impl FromIterator<VoxelKey> for VoxelSet {
     /// The set of `keys`, in any order, repeated or not.
     fn from_iter<I: IntoIterator<Item = VoxelKey>>(keys: I) -> Self {
         Self { blocks: blocks_of(&keys.into_iter().collect::<Vec<_>>()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::voxel::Lattice;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn a_set_of_points_is_the_set_of_their_keys(points: Vec<[i8; 3]>) {
+            let points: Vec<Point> = points.iter().map(|p| Point::from(p.map(f32::from))).collect();
+            let quantize = Lattice::new(2.5, 1).unwrap().from_map();
+            let keys: BTreeSet<VoxelKey> = points.iter().map(|&p| quantize.key(p).unwrap()).collect();
+            let (set, skipped) = VoxelSet::of_points(&points, &quantize);
+            prop_assert_eq!(skipped, 0);
+            prop_assert_eq!(set.len(), keys.len());
+            prop_assert_eq!(&set.iter().collect::<BTreeSet<_>>(), &keys);
+            prop_assert_eq!(set, keys.into_iter().collect::<VoxelSet>());
+        }
+    }
+
+    #[test]
+    fn points_without_a_voxel_are_counted() {
+        let points = [Point::new(f32::NAN, 0.0, 0.0), Point::new(0.1, 0.1, 0.1), Point::new(1e9, 0.0, 0.0)];
+        let (set, skipped) = VoxelSet::of_points(&points, &Lattice::new(1.0, 1).unwrap().from_map());
+        assert_eq!((set.len(), skipped), (1, 2));
     }
 }

@@ -146,7 +146,10 @@ async fn what_takes_longer_than_the_bound_is_cut() {
     let forever = pb::QueryPointsRequest { min_revision: Some(9), ..query_pb("a", &row(1)) };
     let requests = tokio_stream::once(forever).chain(tokio_stream::pending());
     let mut stream = daemon.occupancy().await.query_points_stream(requests).await.unwrap().into_inner();
-    wait_until(async || daemon.metric(IN_WORK).await == Some(2.0)).await;
+    let both_wait = async || {
+        daemon.metric(IN_WORK).await == Some(1.0) && daemon.metric("mrol_streams_open").await == Some(1.0)
+    };
+    wait_until(both_wait).await;
 
     let start = Instant::now();
     let stopping = daemon.tell_to_stop();

@@ -97,7 +97,7 @@ fn a_simulation_has_the_exact_sets_poses_where_the_filter_is_ample() {
 
     let scans = folder.path().join("simulation.csv");
     for name in ["error_m", "error_deg", "voxels", "align_ms"] {
-        assert_eq!(column(&scans, name).len(), 2 * 4 * 5);
+        assert_eq!(column(&scans, name).len(), 2 * 4 * 4);
     }
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert_eq!(read("simulation.md").lines().count(), 2 + 2 * 4);

@@ -34,8 +34,16 @@ const CORE: usize = 5;
 /// Crates that the core must not know.
 const NOT_IN_THE_CORE: [&str; 7] = ["tokio", "tonic", "axum", "prost", "serde", "hyper", "tower"];
 
-/// What is written for wide instructions: look-ups, filling a filter, taking a block apart; and the prefetch.
-const KERNELS: [&str; 4] = ["map/lookup", "bloom/fill", "voxel/new_keys", "util/prefetch.rs"];
+/// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart; and the prefetch.
+const KERNELS: [&str; 7] = [
+    "voxel/quantize",
+    "voxel/new_keys",
+    "bloom/fill",
+    "map/bounds.rs",
+    "map/lookup",
+    "lab/rivals/dense/offsets",
+    "util/prefetch.rs",
+];
 
 /// A path in the crate, from its root: `["map", "lookup", "Lookup"]`.
 type CratePath = Vec<String>;

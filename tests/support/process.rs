@@ -13,19 +13,17 @@ pub struct Process {
 }
 
 impl Process {
-    /// With its maps in `data_dir`, and more options.
+    /// With its maps in `data_dir`, and more options. What it says of changes, which are a test's own, is left out.
     pub fn start(data_dir: &str, options: &[&str]) -> Self {
-        Self::start_with_log(data_dir, options, "error", Stdio::inherit())
+        let mut command = serve(data_dir, options, "error");
+        command.env("MROL_LOG__AUDIT", "false");
+        Self::of(command)
     }
 
-    /// The same with its log, of `level` and above, in `log`.
+    /// The same with its log, of `level` and above and of all changes, in `log`.
     pub fn start_with_log(data_dir: &str, options: &[&str], level: &str, log: Stdio) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
-        command
-            .args(["serve", "--json", "--data-dir", data_dir, "--log-level", level])
-            .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
-            .args(options)
-            .stderr(log);
+        let mut command = serve(data_dir, options, level);
+        command.stderr(log);
         Self::of(command)
     }
 
@@ -68,6 +66,15 @@ impl Process {
         self.child.kill().expect("a process that runs");
         self.child.wait().expect("its end");
     }
+}
+
+fn serve(data_dir: &str, options: &[&str], level: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mrol"));
+    command
+        .args(["serve", "--json", "--data-dir", data_dir, "--log-level", level])
+        .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"])
+        .args(options);
+    command
 }
 
 impl Drop for Process {

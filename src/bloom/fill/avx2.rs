@@ -6,22 +6,17 @@ use std::arch::x86_64::*;
 use super::AT_ONCE;
 use crate::bloom::Probe;
 use crate::bloom::counters::{COUNTER_MAX, Counters};
+use crate::util::cpu::Avx2;
 use crate::util::prefetch;
 
-/// True when the machine can run this module.
-pub(super) fn is_available() -> bool {
-    is_x86_feature_detected!("avx2")
-}
-
-/// See [`super::fill`]. Must only be called where [`is_available`].
-pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
+/// See [`super::fill`].
+pub(super) fn fill(_: Avx2, plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
     #[target_feature(enable = "avx2")]
     fn with_avx2(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
         // SAFETY: the feature is there.
         unsafe { fill_inline(plane, counters, hashes, keys) }
     }
-    debug_assert!(is_available());
-    // SAFETY: the caller checked for the feature.
+    // SAFETY: the token says that the CPU has the feature.
     unsafe { with_avx2(plane, counters, hashes, keys) }
 }
 

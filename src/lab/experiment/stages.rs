@@ -6,8 +6,9 @@ use crate::lab::measure::stopwatch::Runs;
 use crate::lab::rivals::{Dense, DenseTooLarge, HashSet, Kernel, Structure, bits};
 use crate::lab::workload::Queries;
 use crate::map::MultiResolutionMap;
-use crate::map::lookup::{Lookup, stages};
+use crate::map::lookup::{self, Lookup};
 use crate::voxel::LatticeFromPoints;
+use crate::voxel::quantize;
 
 /// A stage and how long it took, nanoseconds a point, run by run.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,8 +71,8 @@ impl<'a> Bench<'a> {
         let (points, quantize) = (&queries.points, map.lattice().from_points(&queries.map_from_points));
         let dense = Dense::of(map, 0)?;
         let (mut keys, mut offsets) = (vec![0; points.len()], vec![0; points.len()]);
-        stages::keys(points, &quantize, 0, &mut keys);
-        stages::offsets(points, &quantize, 0, dense.grid(), &mut offsets);
+        quantize::keys(points, &quantize, 0, &mut keys);
+        crate::lab::rivals::offsets(points, &quantize, 0, dense.grid(), &mut offsets);
         Ok(Self {
             queries,
             quantize,
@@ -89,7 +90,7 @@ impl<'a> Bench<'a> {
     fn run(&mut self, stage: usize, runs: &mut Runs) {
         let points = self.queries.points.len();
         runs.time(points, || match stage {
-            0 => stages::filter_contains(&self.keys, &self.map.view().level_view(0), &mut self.occupied),
+            0 => lookup::filter_contains(&self.keys, &self.map.view().level_view(0), &mut self.occupied),
             1 => self.dense.contains(&self.offsets, &mut self.occupied),
             2 => bits(&self.keys, &mut self.occupied, |key| self.set.keys().contains(key)),
             3 => drop(black_box(self.intersection())),
@@ -110,7 +111,7 @@ impl<'a> Bench<'a> {
     fn transform(&self) {
         let mut keys = [0; 1024];
         for points in self.queries.points.chunks(keys.len()) {
-            stages::keys(points, &self.quantize, 0, &mut keys[..points.len()]);
+            quantize::keys(points, &self.quantize, 0, &mut keys[..points.len()]);
             black_box(&mut keys);
         }
     }

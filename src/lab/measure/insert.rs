@@ -3,8 +3,8 @@
 use super::stopwatch::Runs;
 use crate::geometry::{Point, Pose};
 use crate::lab::workload::{Queries, add};
-use crate::map::lookup::stages;
 use crate::map::{MapDescription, MapSettings, MapSettingsError, MultiResolutionMap};
+use crate::voxel::quantize;
 use crate::voxel::{Lattice, VoxelSet};
 
 /// What insertion took: nanoseconds a point, run by run.
@@ -87,8 +87,8 @@ pub fn into_hash_set(
 
 fn insert_keys(set: &mut hashbrown::HashSet<u64>, scan: &[Point], lattice: &Lattice, map_from_points: &Pose) {
     let mut keys = vec![0; scan.len()];
-    stages::keys(scan, &lattice.from_points(map_from_points), 0, &mut keys);
-    set.extend(keys.into_iter().filter(|&key| key != stages::NO_KEY));
+    quantize::keys(scan, &lattice.from_points(map_from_points), 0, &mut keys);
+    set.extend(keys.into_iter().filter(|&key| key != quantize::NO_KEY));
 }
 
 /// Takes all voxels of `points` out of a map that holds them, scan by scan, `repeats` times: nanoseconds a point.

@@ -4,7 +4,7 @@ use super::count_by_key;
 use crate::align::OccupiedVoxels;
 use crate::geometry::{Point, Pose};
 use crate::map::Lookup;
-use crate::map::lookup::stages;
+use crate::voxel::quantize;
 use crate::voxel::{Lattice, VoxelKey};
 
 /// hashbrown's sets of keys with their default hasher, one a level, behind the same transform as our own map.
@@ -22,8 +22,8 @@ impl HashTables {
 
     /// Adds the voxels of `points`, at every level.
     pub fn insert(&mut self, points: &[Point], map_from_points: &Pose) {
-        let mut keys = vec![stages::NO_KEY; points.len()];
-        stages::keys(points, &self.lattice.from_points(map_from_points), 0, &mut keys);
+        let mut keys = vec![quantize::NO_KEY; points.len()];
+        quantize::keys(points, &self.lattice.from_points(map_from_points), 0, &mut keys);
         for voxel in keys.into_iter().filter_map(VoxelKey::from_bits) {
             // A coarse voxel is there where one of its children is.
             let mut ancestors = (0..).map(|up| voxel.ancestor(up).to_bits());

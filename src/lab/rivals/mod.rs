@@ -11,10 +11,10 @@ mod weighted_sum;
 use std::fmt::{self, Display};
 
 use crate::geometry::{Point, Pose};
-use crate::map::lookup::stages;
 use crate::map::{Lookup, MapView, MultiResolutionMap};
+use crate::voxel::quantize;
 use crate::voxel::{LatticeFromPoints, VoxelKey};
-pub use dense::{DENSE_BYTES_MAX, Dense, DenseTooLarge};
+pub use dense::{DENSE_BYTES_MAX, Dense, DenseTooLarge, Grid, offsets};
 pub use hash_set::{HashSet, hash_set_bytes};
 pub use hash_tables::HashTables;
 pub use ours::{Kernel, ThroughMap};
@@ -105,7 +105,7 @@ fn voxels<'a>(view: &'a MapView<'_>, level: u32) -> impl Iterator<Item = VoxelKe
     view.lists(level).flat_map(|list| list.iter())
 }
 
-/// Answers by key: transform a chunk, then ask of each key. `contains` is never true of [`stages::NO_KEY`].
+/// Answers by key: transform a chunk, then ask of each key. `contains` is never true of [`quantize::NO_KEY`].
 #[inline(always)]
 fn occupied_by_key(
     points: &[Point],
@@ -117,7 +117,7 @@ fn occupied_by_key(
     let mut keys = [0; CHUNK];
     for (points, words) in points.chunks(CHUNK).zip(occupied.chunks_mut(CHUNK / 64)) {
         let keys = &mut keys[..points.len()];
-        stages::keys(points, lattice_from_points, level, keys);
+        quantize::keys(points, lattice_from_points, level, keys);
         bits(keys, words, |&key| contains(key));
     }
 }
@@ -133,7 +133,7 @@ fn count_by_key(
     let mut keys = [0; CHUNK];
     let count = |points: &[Point]| {
         let keys = &mut keys[..points.len()];
-        stages::keys(points, lattice_from_points, level, keys);
+        quantize::keys(points, lattice_from_points, level, keys);
         keys.iter().filter(|&&key| contains(key)).count()
     };
     points.chunks(CHUNK).map(count).sum()

@@ -3,8 +3,8 @@
 use super::{Structure, occupied_by_key, voxels};
 use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
-use crate::map::lookup::stages::NO_KEY;
 use crate::voxel::Lattice;
+use crate::voxel::quantize::NO_KEY;
 
 /// "the Bloom filter used two hash functions and had 6 million elements" (IV), a byte each.
 const COUNTERS: u64 = 6_000_000;

@@ -5,45 +5,40 @@
 #![expect(unsafe_code, reason = "vector intrinsics and gathers from raw addresses")]
 
 mod bloom;
+pub(super) mod by_key;
 mod exact;
-mod place;
-pub(super) mod stages;
+mod locate;
 
 use std::arch::x86_64::*;
 
 use super::{LevelView, Lookup};
 use crate::geometry::Point;
 use crate::util;
+use crate::util::cpu::Avx2;
 use crate::voxel::LatticeFromPoints;
-use place::Quantizer;
+use crate::voxel::quantize::avx2::{LANES, pack_four};
+use locate::Locator;
 
-/// Points of one f32 register.
-const LANES: usize = 8;
 /// Points that take each step together: two words of answers.
 const BATCH: usize = 128;
 
-/// True when the machine can run this module.
-pub(super) fn is_available() -> bool {
-    is_x86_feature_detected!("avx2")
-}
-
-/// See [`super::occupied`]. Must only be called where [`is_available`].
+/// See [`super::occupied`].
 pub(super) fn occupied(
+    _: Avx2,
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
     lookup: Lookup,
     occupied: &mut [u64],
 ) -> bool {
-    debug_assert!(is_available());
-    // SAFETY: the caller checked for the feature; `occupied` holds a bit a point (asserted by our caller).
+    // SAFETY: the token says that the CPU has the feature; `occupied` holds a bit a point (asserted by our caller).
     unsafe {
         match lookup {
             Lookup::Bloom => {
-                run(points, &Quantizer::load(lattice_from_points, view), &bloom::Planes::of(view), occupied)
+                run(points, &Locator::load(lattice_from_points, view), &bloom::Planes::of(view), occupied)
             }
             Lookup::Exact => {
-                run(points, &Quantizer::load(lattice_from_points, view), &exact::Tables::of(view), occupied)
+                run(points, &Locator::load(lattice_from_points, view), &exact::Tables::of(view), occupied)
             }
         }
     }
@@ -71,14 +66,13 @@ trait LookupKernel {
 /// # Safety
 /// Needs AVX2, and a word of `occupied` for each 64 points.
 #[target_feature(enable = "avx2")]
-unsafe fn run(points: &[Point], place: &Quantizer, probe: &impl LookupKernel, occupied: &mut [u64]) -> bool {
+unsafe fn run(points: &[Point], locator: &Locator, probe: &impl LookupKernel, occupied: &mut [u64]) -> bool {
     let mut batch = Batch::EMPTY;
     let mut all_have_a_voxel = true;
     for (points, words) in points.chunks(BATCH).zip(occupied.chunks_mut(BATCH / 64)) {
         let mut has_voxel = [0u64; BATCH / 64];
         for (group, points) in points.chunks(LANES).enumerate() {
-            // SAFETY: the feature is there.
-            let valid = unsafe { place.of(points, group * LANES, &mut batch) };
+            let valid = locator.locate(points, group * LANES, &mut batch);
             let present = ((1u32 << points.len()) - 1) as u8;
             all_have_a_voxel &= valid & present == present;
             has_voxel[group / LANES] |= u64::from(valid & present) << (group % LANES * LANES);
@@ -96,14 +90,8 @@ unsafe fn run(points: &[Point], place: &Quantizer, probe: &impl LookupKernel, oc
 #[inline]
 #[target_feature(enable = "avx2")]
 fn pack(index: &[[i32; BATCH]; 3], at: usize) -> __m256i {
-    let field = _mm256_set1_epi64x(0x1f_ffff);
-    let axis = |axis: usize| {
-        // SAFETY: four i32 from `at` on; `at` is a multiple of four below the batch's size.
-        let i = unsafe { _mm_loadu_si128(index[axis][at..at + 4].as_ptr().cast()) };
-        _mm256_and_si256(_mm256_cvtepu32_epi64(i), field)
-    };
-    let (x, y, z) = (axis(0), axis(1), axis(2));
-    _mm256_or_si256(x, _mm256_or_si256(_mm256_slli_epi64::<21>(y), _mm256_slli_epi64::<42>(z)))
+    // SAFETY: four i32 from `at` on; `at` is a multiple of four below the batch's size.
+    pack_four([0, 1, 2].map(|axis| unsafe { _mm_loadu_si128(index[axis][at..at + 4].as_ptr().cast()) }))
 }
 
 /// The low 64 bits of each product; AVX2 multiplies 32 bits by 32 bits.

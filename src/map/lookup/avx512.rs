@@ -6,44 +6,34 @@
 #![expect(unsafe_code, reason = "vector intrinsics and gathers from raw addresses")]
 
 mod bloom;
+pub(super) mod by_key;
 mod exact;
-mod place;
+mod locate;
 mod registers;
-pub(super) mod stages;
 
 use std::arch::x86_64::*;
 
 use super::{LevelView, Lookup};
 use crate::geometry::Point;
+use crate::util::cpu::Avx512;
 use crate::util::prefetch;
 use crate::voxel::LatticeFromPoints;
+use crate::voxel::quantize::avx512::LANES;
 use bloom::Bloom;
 use exact::Exact;
-use place::Quantizer;
+use locate::Locator;
 
-/// Points a step: one f32 register an axis.
-const LANES: usize = 16;
-
-/// True when the machine can run this module.
-pub(super) fn is_available() -> bool {
-    is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512cd")
-        && is_x86_feature_detected!("popcnt")
-}
-
-/// See [`super::occupied`]. Must only be called where [`is_available`].
+/// See [`super::occupied`].
 pub(super) fn occupied(
+    _: Avx512,
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
     lookup: Lookup,
     occupied: &mut [u64],
 ) -> bool {
-    debug_assert!(is_available());
     let far = view.bytes(lookup) > NEAR_BYTES;
-    // SAFETY: the caller checked for the features; `occupied` holds a bit a point (asserted by our caller).
+    // SAFETY: the token says that the CPU has the features; `occupied` holds a bit a point (asserted by our caller).
     unsafe {
         match (lookup, view.hashes, far) {
             (Lookup::Exact, _, false) => {
@@ -197,7 +187,7 @@ impl<W> Word<W> {
 
 /// The steps of a look-up, and what they keep in registers.
 struct Steps<'a, P: LookupKernel> {
-    place: Quantizer,
+    locator: Locator,
     registers: P::Registers<'a>,
     memory: P::Memory,
 }
@@ -209,7 +199,7 @@ impl<'a, P: LookupKernel> Steps<'a, P> {
         let memory = P::Memory::default();
         // SAFETY: the features are there.
         unsafe {
-            Self { place: Quantizer::load(lattice_from_points, view), registers: P::load(view), memory }
+            Self { locator: Locator::load(lattice_from_points, view), registers: P::load(view), memory }
         }
     }
 
@@ -230,7 +220,7 @@ impl<'a, P: LookupKernel> Steps<'a, P> {
         let mut locate = |points: &[Point; LANES]| {
             // SAFETY: the features are there, and the view lives.
             unsafe {
-                let (index, shard, valid) = self.place.of(points);
+                let (index, shard, valid) = self.locator.locate(points);
                 has_voxel |= u64::from(valid) << (group * LANES);
                 group += 1;
                 P::locate(&self.registers, index, shard, valid)

@@ -7,17 +7,19 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
-pub(super) mod bounds;
+mod by_key;
 mod scalar;
-pub mod stages;
 #[cfg(test)]
 mod tests;
-mod voxels;
+
+pub use by_key::filter_contains;
 
 use super::OccupiedVoxelList;
 use super::sharding::SHARDS;
 use crate::geometry::Point;
 use crate::util::Keyword;
+#[cfg(target_arch = "x86_64")]
+use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::{LatticeFromPoints, Slots};
 
 /// Which of the two structures of a level answers (paper II).
@@ -149,13 +151,28 @@ fn look_up(
     occupied: &mut [u64],
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if avx512::is_available() {
-        return avx512::occupied(points, lattice_from_points, view, lookup, occupied);
+    if let Some(cpu) = Avx512::detect() {
+        return avx512::occupied(cpu, points, lattice_from_points, view, lookup, occupied);
     }
     #[cfg(target_arch = "x86_64")]
-    if avx2::is_available() {
-        return avx2::occupied(points, lattice_from_points, view, lookup, occupied);
+    if let Some(cpu) = Avx2::detect() {
+        return avx2::occupied(cpu, points, lattice_from_points, view, lookup, occupied);
     }
+    scalar::occupied(points, lattice_from_points, view, lookup, occupied)
+}
+
+/// [`occupied`] as CPUs without SIMD instructions run it: the reference implementation.
+///
+/// # Panics
+/// As there.
+pub fn occupied_scalar(
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    view: &LevelView<'_>,
+    lookup: Lookup,
+    occupied: &mut [u64],
+) -> bool {
+    assert_eq!(occupied.len(), points.len().div_ceil(64), "one word of answers for each 64 points");
     scalar::occupied(points, lattice_from_points, view, lookup, occupied)
 }
 

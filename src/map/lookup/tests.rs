@@ -6,6 +6,8 @@ use super::{LevelView, Lookup, scalar};
 use crate::bloom::{FilterSettings, HASHES_MAX};
 use crate::geometry::{Point, Pose};
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+#[cfg(target_arch = "x86_64")]
+use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::{
     BLOCK_LEVELS, CLUSTER_LEVELS, INDEX_MAX, INDEX_MIN, LatticeFromPoints, VoxelKey, VoxelSet,
 };
@@ -16,12 +18,16 @@ type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64
 fn wide_kernels() -> Vec<(&'static str, Kernel)> {
     let mut kernels: Vec<(&'static str, Kernel)> = vec![("dispatched", super::occupied)];
     #[cfg(target_arch = "x86_64")]
-    if super::avx512::is_available() {
-        kernels.push(("avx512", super::avx512::occupied));
+    if Avx512::detect().is_some() {
+        kernels.push(("avx512", |points, quantize, view, lookup, occupied| {
+            super::avx512::occupied(Avx512::detect().expect("it"), points, quantize, view, lookup, occupied)
+        }));
     }
     #[cfg(target_arch = "x86_64")]
-    if super::avx2::is_available() {
-        kernels.push(("avx2", super::avx2::occupied));
+    if Avx2::detect().is_some() {
+        kernels.push(("avx2", |points, quantize, view, lookup, occupied| {
+            super::avx2::occupied(Avx2::detect().expect("it"), points, quantize, view, lookup, occupied)
+        }));
     }
     kernels
 }

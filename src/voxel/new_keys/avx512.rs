@@ -7,24 +7,23 @@ use super::super::BlockMask;
 use super::super::block::{CELLS, OFFSETS};
 use super::append::append;
 use crate::util::bits::for_each_bit;
+use crate::util::cpu::Avx512;
 
 /// Cells a step: one register of keys.
 const LANES: usize = 8;
 
-/// True when the machine can run this module.
+/// See [`super::keys_gained_scalar`].
 #[inline]
-pub(super) fn is_available() -> bool {
-    is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("popcnt")
-}
-
-/// See [`super::keys_gained_scalar`]. Must only be called where [`is_available`].
-#[inline]
-pub(super) fn keys_gained(before: &BlockMask, added: &BlockMask, first: u64, up: u32, keys: &mut Vec<u64>) {
-    debug_assert!(is_available());
+pub(super) fn keys_gained(
+    _: Avx512,
+    before: &BlockMask,
+    added: &BlockMask,
+    first: u64,
+    up: u32,
+    keys: &mut Vec<u64>,
+) {
     // Each step writes a whole register, however few keys it keeps.
-    // SAFETY: the caller checked for the features; a key a cell is written at most, and a register behind them.
+    // SAFETY: the token says that the CPU has the features; a key a cell is written at most, and a register behind them.
     unsafe { append(keys, LANES, |keys| write_keys_gained(before, added, first, up, keys)) }
 }
 

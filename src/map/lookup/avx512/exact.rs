@@ -4,9 +4,10 @@ mod tables;
 
 use std::arch::x86_64::*;
 
-use super::registers::{eight_of, gather_now, lanes, load, pack, prefetch_now, store, widen};
+use super::registers::{eight_of, gather_now, load, prefetch_now, store, widen};
 use super::{GROUPS, LANES, LookupKernel, WORD};
 use crate::map::lookup::LevelView;
+use crate::voxel::quantize::avx512::{lanes, pack};
 use crate::voxel::{BLOCK_LEVELS, CLUSTER_LEVELS, Cell};
 use tables::{CELL_BITS, Found, Tables, within_shard};
 

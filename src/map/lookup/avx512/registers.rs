@@ -5,6 +5,7 @@ use std::arch::x86_64::*;
 use super::LANES;
 use crate::map::sharding::SHARDS;
 use crate::util;
+use crate::voxel::quantize::avx512::lanes;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
 
@@ -12,33 +13,6 @@ const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two regis
 pub(super) const fn eight_of(value: u64) -> __m512i {
     // SAFETY: eight u64 are one register.
     unsafe { std::mem::transmute::<[u64; 8], __m512i>([value; 8]) }
-}
-
-#[inline]
-#[target_feature(enable = "avx512f")]
-pub(super) fn lanes(values: &[i32; LANES]) -> __m512i {
-    // SAFETY: sixteen i32 are one register.
-    unsafe { _mm512_loadu_si512(values.as_ptr().cast()) }
-}
-
-/// Low and high halves of sixteen packed keys (`VoxelKey::pack`).
-#[inline]
-#[target_feature(enable = "avx512f")]
-pub(super) fn halves(index: [__m512i; 3]) -> [__m512i; 2] {
-    let field = _mm512_set1_epi32(0x1f_ffff);
-    let [x, y, z] = index.map(|i| _mm512_and_si512(i, field));
-    let low = _mm512_or_si512(x, _mm512_slli_epi32::<21>(y));
-    [low, _mm512_or_si512(_mm512_srli_epi32::<11>(y), _mm512_slli_epi32::<10>(z))]
-}
-
-/// Sixteen packed keys, eight a register.
-#[inline]
-#[target_feature(enable = "avx512f")]
-pub(super) fn pack(index: [__m512i; 3]) -> [__m512i; 2] {
-    let [low, high] = halves(index);
-    const FIRST: [i32; LANES] = [0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23];
-    const SECOND: [i32; LANES] = [8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31];
-    [FIRST, SECOND].map(|index| _mm512_permutex2var_epi32(low, lanes(&index), high))
 }
 
 /// The inverse of [`halves`] and [`pack`]: halves of sixteen keys.

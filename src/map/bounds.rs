@@ -2,16 +2,17 @@
 #![expect(unsafe_code, reason = "instructions that not every machine has")]
 
 use crate::geometry::Point;
+#[cfg(target_arch = "x86_64")]
+use crate::util::cpu::Avx2;
 
 /// Smallest and largest coordinates of some points.
-pub(in crate::map) type Bounds = ([f32; 3], [f32; 3]);
+pub(super) type Bounds = ([f32; 3], [f32; 3]);
 
 /// Smallest and largest coordinates of the points; NaN is passed over. None without a point that has any.
-pub(in crate::map) fn bounds(points: &[Point]) -> Option<Bounds> {
+pub(super) fn bounds(points: &[Point]) -> Option<Bounds> {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: the feature is there.
-        return unsafe { bounds_avx2(points) };
+    if let Some(cpu) = Avx2::detect() {
+        return bounds_avx2(cpu, points);
     }
     bounds_of::<LANES>(points)
 }
@@ -21,9 +22,13 @@ const LANES: usize = 24;
 
 /// The same with registers of twice the size.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn bounds_avx2(points: &[Point]) -> Option<Bounds> {
-    bounds_of::<{ 2 * LANES }>(points)
+fn bounds_avx2(_: Avx2, points: &[Point]) -> Option<Bounds> {
+    #[target_feature(enable = "avx2")]
+    fn with_avx2(points: &[Point]) -> Option<Bounds> {
+        bounds_of::<{ 2 * LANES }>(points)
+    }
+    // SAFETY: the token says that the CPU has the feature.
+    unsafe { with_avx2(points) }
 }
 
 #[inline(always)]

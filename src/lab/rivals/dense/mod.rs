@@ -1,9 +1,14 @@
 //! A dense array: the paper's upper limit to query speed.
 
+mod grid;
+mod offsets;
+
+pub use grid::Grid;
+pub use offsets::offsets;
+
 use super::{CHUNK, Structure, bits, voxels};
 use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
-use crate::map::lookup::stages::{self, Grid};
 use crate::voxel::Lattice;
 
 /// Bytes that an array may have at most.
@@ -57,11 +62,11 @@ impl Dense {
 impl Structure for Dense {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
         let quantize = self.lattice.from_points(map_from_points);
-        let mut offsets = [0; CHUNK];
+        let mut chunk = [0; CHUNK];
         for (points, words) in points.chunks(CHUNK).zip(occupied.chunks_mut(CHUNK / 64)) {
-            let offsets = &mut offsets[..points.len()];
-            stages::offsets(points, &quantize, self.level, &self.grid, offsets);
-            self.contains(offsets, words);
+            let chunk = &mut chunk[..points.len()];
+            offsets(points, &quantize, self.level, &self.grid, chunk);
+            self.contains(chunk, words);
         }
     }
 
