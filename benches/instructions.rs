@@ -11,8 +11,8 @@ use std::hint::black_box;
 use bytes::Bytes;
 use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
+use mrol::lab::rivals::query_scalar;
 use mrol::lab::workload::{Order, Queries, Room, Workload, add};
-use mrol::map::lookup::occupied_scalar;
 use mrol::map::{Lookup, MapName, MapSettings, MultiResolutionMap};
 use mrol::service::{MapVersion, PointAnswer, PointQuery};
 use mrol::voxel::VoxelSet;
@@ -62,7 +62,7 @@ fn scalar((map, queries, lookup): (MultiResolutionMap, Queries, Lookup)) -> [u64
     let mut occupied = [0; POINTS / 64];
     let quantize = map.lattice().from_points(&queries.map_from_points);
     let view = map.view();
-    occupied_scalar(&queries.points, &quantize, &view.level_view(0), lookup, &mut occupied);
+    query_scalar(&view, &queries.points, &quantize, 0, lookup, &mut occupied);
     drop(view);
     std::mem::forget((map, queries));
     occupied

@@ -4,8 +4,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mrol::lab::rivals::StructureName;
+use mrol::lab::rivals::{filter_contains, query_scalar};
 use mrol::lab::workload::{Order, Room, Site, Workload};
-use mrol::map::lookup;
 use mrol::map::{Lookup, MapSettings, MultiResolutionMap};
 use mrol::util::Keyword;
 use mrol::voxel::quantize;
@@ -58,9 +58,8 @@ fn parts(criterion: &mut Criterion) {
         bencher.iter(|| quantize::keys(&queries.points, &quantize, 0, black_box(&mut keys)));
     });
     let view = map.view();
-    let view = view.level_view(0);
     group.bench_function("filter alone", |bencher| {
-        bencher.iter(|| lookup::filter_contains(&keys, &view, black_box(&mut occupied)));
+        bencher.iter(|| filter_contains(&view, &keys, 0, black_box(&mut occupied)));
     });
     group.finish();
 }
@@ -72,12 +71,10 @@ fn scalar(group: &mut Group<'_>, map: &MultiResolutionMap) {
     let quantize = map.lattice().from_points(&queries.map_from_points);
     let mut occupied = vec![0; POINTS.div_ceil(64)];
     let view = map.view();
-    let view = view.level_view(0);
     for lookup in [Lookup::Bloom, Lookup::Exact] {
         group.bench_function(format!("{} scalar", lookup.as_str()), |bencher| {
             let points = &queries.points;
-            bencher
-                .iter(|| lookup::occupied_scalar(points, &quantize, &view, lookup, black_box(&mut occupied)));
+            bencher.iter(|| query_scalar(&view, points, &quantize, 0, lookup, black_box(&mut occupied)));
         });
     }
 }

@@ -15,7 +15,7 @@ mod filter_room;
 mod idempotency_log;
 mod info;
 mod level_voxels;
-pub mod lookup;
+pub(crate) mod lookup;
 mod moments;
 mod name;
 mod occupied_voxel_list;

@@ -94,7 +94,7 @@ impl<'a> MapView<'a> {
     }
 
     /// What the look-up kernels read of `level`.
-    pub fn level_view(&self, level: u32) -> LevelView<'_> {
+    pub(crate) fn level_view(&self, level: u32) -> LevelView<'_> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
         let (_, up) = tier_of(level);
         LevelView::new(level, up, self.map.sharding.shift_at(level), self.map.settings.filter.hashes, list)

@@ -3,7 +3,7 @@
 #[cfg(feature = "server")]
 use serde::{Deserialize, Serialize};
 
-use super::{Marks, Reason, ServiceError};
+use super::{Reason, ServiceError};
 
 /// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is named
 /// in the error of a request beyond it, and is a setting of the section `limits`.
@@ -211,6 +211,25 @@ impl Limits {
                 Err(ServiceError::new(Reason::PageTooLarge, message))
             }
         }
+    }
+}
+
+/// Where changes are refused, and where they are taken again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Marks {
+    /// With fewer bytes free on the disk of the data folder, changes are refused; 0 = never. 256 MiB.
+    pub disk_free_low_bytes: u64,
+    /// With that many bytes free they are taken again. 512 MiB.
+    pub disk_free_resume_bytes: u64,
+    /// With more bytes of memory in use, what makes maps grow is refused; without, 85 % of what the process may use.
+    pub memory_high_bytes: Option<u64>,
+    /// With at most that many in use it is taken again; without, 94 % of the high mark.
+    pub memory_resume_bytes: Option<u64>,
+}
+
+impl Default for Marks {
+    fn default() -> Self {
+        Limits::default().marks()
     }
 }
 

@@ -9,6 +9,7 @@ mod committing;
 mod deletion;
 mod digest;
 mod error;
+mod error_code;
 mod filtered_scan;
 mod gauges;
 mod growth;
@@ -36,9 +37,10 @@ mod watermarks;
 
 pub use allowed_maps::AllowedMaps;
 pub use allowed_scans::AllowedScans;
-pub use error::{ErrorCode, ServiceError};
+pub use error::ServiceError;
+pub use error_code::ErrorCode;
 pub use gauges::{Gauges, MemoryReading, Readings};
-pub use limits::Limits;
+pub use limits::{Limits, Marks};
 pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
     TIME_LIMIT_DEFAULT,
@@ -54,7 +56,6 @@ pub use request::{
 pub use settings::{EVERY_ROBOT, ServiceSettings};
 pub use shortage::Shortage;
 pub use trajectory::TrajectoryPieces;
-pub use watermarks::Marks;
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -2,7 +2,7 @@
 //!
 //! The list of reasons in `docs/guide/api.md` is made from this table; a test says so.
 
-use super::error::ErrorCode;
+use super::error_code::ErrorCode;
 
 /// Where a reason is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

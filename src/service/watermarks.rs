@@ -3,27 +3,8 @@
 //! Each gauge has two marks, so that a value that trembles about one of them does not open and shut the door at each
 //! look. Reads, alignments and searches go on meanwhile.
 
-use super::{Limits, MemoryReading, Readings, Reason, ServiceError, Shortage};
+use super::{Marks, MemoryReading, Readings, Reason, ServiceError, Shortage};
 use crate::sync::{Rank, RwLock};
-
-/// Where changes are refused, and where they are taken again.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Marks {
-    /// With fewer bytes free on the disk of the data folder, changes are refused; 0 = never. 256 MiB.
-    pub disk_free_low_bytes: u64,
-    /// With that many bytes free they are taken again. 512 MiB.
-    pub disk_free_resume_bytes: u64,
-    /// With more bytes of memory in use, what makes maps grow is refused; without, 85 % of what the process may use.
-    pub memory_high_bytes: Option<u64>,
-    /// With at most that many in use it is taken again; without, 94 % of the high mark.
-    pub memory_resume_bytes: Option<u64>,
-}
-
-impl Default for Marks {
-    fn default() -> Self {
-        Limits::default().marks()
-    }
-}
 
 /// What there is too little of, by the marks and the readings so far.
 #[derive(Debug)]

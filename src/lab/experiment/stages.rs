@@ -3,10 +3,10 @@
 use std::hint::black_box;
 
 use crate::lab::measure::stopwatch::Runs;
-use crate::lab::rivals::{Dense, DenseTooLarge, HashSet, Kernel, Structure, bits};
+use crate::lab::rivals::{Dense, DenseTooLarge, HashSet, Kernel, Structure, bits, filter_contains};
 use crate::lab::workload::Queries;
+use crate::map::Lookup;
 use crate::map::MultiResolutionMap;
-use crate::map::lookup::{self, Lookup};
 use crate::voxel::LatticeFromPoints;
 use crate::voxel::quantize;
 
@@ -90,7 +90,7 @@ impl<'a> Bench<'a> {
     fn run(&mut self, stage: usize, runs: &mut Runs) {
         let points = self.queries.points.len();
         runs.time(points, || match stage {
-            0 => lookup::filter_contains(&self.keys, &self.map.view().level_view(0), &mut self.occupied),
+            0 => filter_contains(&self.map.view(), &self.keys, 0, &mut self.occupied),
             1 => self.dense.contains(&self.offsets, &mut self.occupied),
             2 => bits(&self.keys, &mut self.occupied, |key| self.set.keys().contains(key)),
             3 => drop(black_box(self.intersection())),

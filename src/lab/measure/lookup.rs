@@ -3,8 +3,8 @@
 use super::stopwatch::Runs;
 use crate::lab::rivals::{Structure, StructureName};
 use crate::lab::workload::Queries;
+use crate::map::Lookup;
 use crate::map::MultiResolutionMap;
-use crate::map::lookup::{self, Lookup};
 
 /// What a structure did.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +69,7 @@ fn truth(map: &MultiResolutionMap, level: u32, queries: &Queries) -> Vec<u64> {
     let mut occupied = vec![0; queries.points.len().div_ceil(64)];
     let quantize = map.lattice().from_points(&queries.map_from_points);
     let view = map.view();
-    lookup::occupied(&queries.points, &quantize, &view.level_view(level), Lookup::Exact, &mut occupied);
+    view.query(&queries.points, &quantize, level, Lookup::Exact, &mut occupied);
     occupied
 }
 

@@ -17,7 +17,7 @@ use crate::voxel::{LatticeFromPoints, VoxelKey};
 pub use dense::{DENSE_BYTES_MAX, Dense, DenseTooLarge, Grid, offsets};
 pub use hash_set::{HashSet, hash_set_bytes};
 pub use hash_tables::HashTables;
-pub use ours::{Kernel, ThroughMap};
+pub use ours::{Kernel, ThroughMap, filter_contains, query_scalar};
 pub use paper::PaperFilter;
 pub use weighted_sum::WeightedSum;
 

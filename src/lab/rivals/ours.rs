@@ -2,8 +2,9 @@
 
 use super::Structure;
 use crate::geometry::{Point, Pose};
-use crate::map::MultiResolutionMap;
 use crate::map::lookup::{self, Lookup};
+use crate::map::{MapView, MultiResolutionMap};
+use crate::voxel::LatticeFromPoints;
 
 /// A level of a map as its users ask it: through the sharded map and its locks.
 #[derive(Debug)]
@@ -57,12 +58,36 @@ impl Structure for Kernel<'_> {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
         let quantize = self.map.lattice().from_points(map_from_points);
         let view = self.map.view();
-        lookup::occupied(points, &quantize, &view.level_view(self.level), self.lookup, occupied);
+        view.query(points, &quantize, self.level, self.lookup, occupied);
     }
 
     fn bytes(&self) -> usize {
         bytes(self.map, self.level, self.lookup)
     }
+}
+
+/// [`MapView::query`] as CPUs without SIMD instructions run it: the reference implementation.
+///
+/// # Panics
+/// When `occupied` is not one word for each 64 points.
+pub fn query_scalar(
+    view: &MapView<'_>,
+    points: &[Point],
+    lattice_from_points: &LatticeFromPoints,
+    level: u32,
+    lookup: Lookup,
+    occupied: &mut [u64],
+) -> bool {
+    lookup::occupied_scalar(points, lattice_from_points, &view.level_view(level), lookup, occupied)
+}
+
+/// The look-up in the filter of `level` alone, of voxels whose packed keys are known: key i is bit i % 64 of
+/// `occupied[i / 64]`.
+///
+/// # Panics
+/// When `occupied` is not one word for each 64 keys.
+pub fn filter_contains(view: &MapView<'_>, keys: &[u64], level: u32, occupied: &mut [u64]) {
+    lookup::filter_contains(keys, &view.level_view(level), occupied);
 }
 
 /// Of a filter its plane and its counters; of the exact set the tables of all levels, since three levels share one.

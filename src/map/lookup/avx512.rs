@@ -6,6 +6,7 @@
 #![expect(unsafe_code, reason = "vector intrinsics and gathers from raw addresses")]
 
 mod bloom;
+#[cfg(feature = "lab")]
 pub(super) mod by_key;
 mod exact;
 mod locate;

@@ -11,7 +11,7 @@ use crate::voxel::VoxelKey;
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.
-pub fn filter_contains(keys: &[u64], view: &LevelView<'_>, occupied: &mut [u64]) {
+pub(crate) fn filter_contains(keys: &[u64], view: &LevelView<'_>, occupied: &mut [u64]) {
     assert_eq!(occupied.len(), keys.len().div_ceil(64), "one word of answers for each 64 keys");
     #[cfg(target_arch = "x86_64")]
     if let Some(cpu) = Avx512::detect() {

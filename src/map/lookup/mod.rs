@@ -7,12 +7,14 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(feature = "lab")]
 mod by_key;
 mod scalar;
 #[cfg(test)]
 mod tests;
 
-pub use by_key::filter_contains;
+#[cfg(feature = "lab")]
+pub(crate) use by_key::filter_contains;
 
 use super::OccupiedVoxelList;
 use super::sharding::SHARDS;
@@ -45,7 +47,7 @@ impl Keyword for Lookup {
 
 /// What a look-up at one level reads: plain slices, shard by shard.
 #[derive(Debug, Clone)]
-pub struct LevelView<'a> {
+pub(crate) struct LevelView<'a> {
     /// Bit planes of the level's filters.
     planes: [&'a [u64]; SHARDS],
     /// Slots of the tables that serve the level.
@@ -97,7 +99,7 @@ const COUNT_CHUNK: usize = 2048;
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 points.
-pub fn occupied(
+pub(super) fn occupied(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
@@ -165,7 +167,8 @@ fn look_up(
 ///
 /// # Panics
 /// As there.
-pub fn occupied_scalar(
+#[cfg(feature = "lab")]
+pub(crate) fn occupied_scalar(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,
@@ -177,7 +180,7 @@ pub fn occupied_scalar(
 }
 
 /// Number of points whose voxel is occupied.
-pub fn count(
+pub(super) fn count(
     points: &[Point],
     lattice_from_points: &LatticeFromPoints,
     view: &LevelView<'_>,

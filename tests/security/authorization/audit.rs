@@ -30,7 +30,10 @@ impl Audited {
         let operator = keyring.add("operator", Scope::Admin, None);
         let (file, log) = (keyring.file(), folder.path().join("log"));
         let options = [&["--keys-file", file.to_str().unwrap(), "--log-format", "json"], options].concat();
-        let server = Process::start_with_log("", &options, "error", File::create(&log).unwrap().into());
+        // Undo takes a journal.
+        let data = folder.path().join("data");
+        let log_file = File::create(&log).unwrap().into();
+        let server = Process::start_with_log(data.to_str().unwrap(), &options, "off", log_file);
         Self { server, log, operator, _folder: folder, _keyring: keyring }
     }
 

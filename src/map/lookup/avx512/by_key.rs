@@ -3,12 +3,12 @@
 use std::arch::x86_64::*;
 
 use super::bloom::{BloomRegisters, Located};
-use super::registers::halves_of;
 use super::{GROUPS, LANES, WORD};
 use crate::map::lookup::LevelView;
 use crate::map::sharding::SHARDS;
 use crate::util::cpu::Avx512;
 use crate::voxel::quantize::NO_KEY;
+use crate::voxel::quantize::avx512::lanes;
 
 /// See `lookup::filter_contains`.
 pub(in crate::map::lookup) fn filter_contains(
@@ -88,4 +88,13 @@ fn shard([x, y, z]: [__m512i; 3]) -> __m512i {
     let color = _mm512_slli_epi64::<2>(_mm512_add_epi64(y, z));
     let color = _mm512_add_epi64(color, _mm512_add_epi64(x, z));
     _mm512_and_si512(color, _mm512_set1_epi64(SHARDS as i64 - 1))
+}
+
+/// Low and high halves of sixteen keys.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn halves_of([a, b]: [__m512i; 2]) -> [__m512i; 2] {
+    const LOW: [i32; LANES] = [0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30];
+    const HIGH: [i32; LANES] = [1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31];
+    [LOW, HIGH].map(|index| _mm512_permutex2var_epi32(a, lanes(&index), b))
 }

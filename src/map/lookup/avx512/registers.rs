@@ -5,7 +5,6 @@ use std::arch::x86_64::*;
 use super::LANES;
 use crate::map::sharding::SHARDS;
 use crate::util;
-use crate::voxel::quantize::avx512::lanes;
 
 const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two registers of eight");
 
@@ -13,15 +12,6 @@ const _: () = assert!(SHARDS == LANES, "descriptors of all shards fill two regis
 pub(super) const fn eight_of(value: u64) -> __m512i {
     // SAFETY: eight u64 are one register.
     unsafe { std::mem::transmute::<[u64; 8], __m512i>([value; 8]) }
-}
-
-/// The inverse of [`halves`] and [`pack`]: halves of sixteen keys.
-#[inline]
-#[target_feature(enable = "avx512f")]
-pub(super) fn halves_of([a, b]: [__m512i; 2]) -> [__m512i; 2] {
-    const LOW: [i32; LANES] = [0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30];
-    const HIGH: [i32; LANES] = [1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31];
-    [LOW, HIGH].map(|index| _mm512_permutex2var_epi32(a, lanes(&index), b))
 }
 
 /// low * by[0] + high * by[1], in 32 bits.
