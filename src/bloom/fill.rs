@@ -25,7 +25,7 @@ pub(super) fn fill(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys
 /// Keys whose words and counters are fetched at once: their cache misses are under way together.
 const AT_ONCE: usize = 16;
 
-/// The scalar twin of what the wide ones do.
+/// The reference implementation.
 fn fill_scalar(plane: &mut [u64], counters: &mut Counters, hashes: u32, keys: &[u64]) {
     for keys in keys.chunks(AT_ONCE) {
         let mut probes = [Probe::default(); AT_ONCE];

@@ -1,9 +1,9 @@
 //! How much room a shard makes as it grows.
 
-/// Room grows by this factor. The rest of what a map holds beyond its voxels is empty: half the factor's excess
+/// Capacity grows by this factor. The rest of what a map holds beyond its voxels is empty: half the factor's excess
 /// on average. The smaller it is, the more often keys are put into a larger filter: 1 / (1 - 1 / factor) times.
 pub(super) const FACTOR: f64 = 1.4;
-/// Room at first.
+/// Capacity at first.
 pub(super) const FIRST: f64 = 64.0;
 /// Shards grow in so many different places.
 const PHASES: usize = 16;

@@ -4,7 +4,7 @@ use super::bounds::{Bounds, bounds};
 use crate::geometry::{Point, Pose};
 use crate::voxel::Lattice;
 
-/// Number of shards of a map; a power of two, so that the wide kernels keep all descriptors in registers.
+/// Number of shards of a map; a power of two, so that the SIMD kernels keep all descriptors in registers.
 pub const SHARDS: usize = 16;
 
 /// Side of a region is at least 2^6 = 64 voxels: a scan then touches few shards, and a block lies in one.
@@ -14,7 +14,7 @@ const REGION_SHIFT_MIN: u32 = 6;
 ///
 /// A region is at least as large as a coarsest voxel, so that parents share their children's shard. Shards are
 /// dealt out as colors, (x + z + 4 (y + z)) mod 16 of the region's indices: neighbors never share a lock,
-/// any 4 x 4 regions of a horizontal plane lie in 16 shards, and the wide kernels need no multiplication.
+/// any 4 x 4 regions of a horizontal plane lie in 16 shards, and the SIMD kernels need no multiplication.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sharding {
     region_shift: u32,

@@ -1,4 +1,4 @@
-//! Room on disk and in memory.
+//! The budget of disk and memory that changes are made within.
 //!
 //! The watermarks see what is there. What was let in and is not there yet is reserved, and counts as if it were: many
 //! scans at once do not pass a mark together that each of them keeps.

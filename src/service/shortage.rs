@@ -11,7 +11,7 @@ pub(super) const RETRY_AFTER: Duration = Duration::from_secs(5);
 /// What there is too little of: the value that was measured last, and the marks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shortage {
-    /// Room on the disk of the data folder.
+    /// Free space on the disk of the data folder.
     Disk {
         /// Bytes that are free.
         free: u64,

@@ -17,9 +17,9 @@
 //! The uuid in the folder's name keeps maps of one name apart: whatever is still written for a map that was deleted goes
 //! into its own folder, and never into that of the next map of its name.
 
-mod stock;
+mod contents;
 
-pub use stock::Stock;
+pub use contents::DataDirContents;
 
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};

@@ -169,11 +169,11 @@ impl MapFolder {
         let before = self.used().kept_from;
         let _writing = self.snapshots.lock();
         self.check_there()?;
-        let given_up = self.forget(UndoWindow { bytes_max: 0, ..self.undo_window() }, &[]);
-        let gave_up = given_up.is_ok() && self.used().kept_from != before;
+        let forgotten = self.forget(UndoWindow { bytes_max: 0, ..self.undo_window() }, &[]);
+        let gave_up = forgotten.is_ok() && self.used().kept_from != before;
         self.facts.tell_given_up(gave_up);
         self.count_bytes();
-        given_up.map(|()| gave_up)
+        forgotten.map(|()| gave_up)
     }
 
     fn undo_window(&self) -> UndoWindow {

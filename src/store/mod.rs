@@ -36,7 +36,7 @@ mod settings;
 mod snapshot;
 mod snapshot_files;
 
-pub use data_dir::{DataDir, Stock};
+pub use data_dir::{DataDir, DataDirContents};
 pub use error::StoreError;
 pub use file_system::{Appending, Disk, FileSystem};
 pub use journal::{

@@ -454,7 +454,7 @@ mod tests {
             body.read(&MapFileLimits::OWN, &mut Memory(|_| Ok::<_, Infallible>(())))
         };
         assert!(read(&message).is_ok());
-        let older = pb::AnsweredRequest { revision: 41, ..message.requests[0].clone() };
+        let older = pb::CompletedRequest { revision: 41, ..message.requests[0].clone() };
         message.requests.insert(0, older);
         let refused = read(&message).unwrap_err().to_string();
         assert!(refused.contains("their ids must differ"), "{refused}");

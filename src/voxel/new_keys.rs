@@ -29,7 +29,7 @@ impl BlockMask {
     }
 }
 
-/// The scalar twin of what the wide ones do; `first` is the key of the block's first voxel of the level.
+/// The reference implementation; `first` is the key of the block's first voxel of the level.
 fn keys_gained_scalar(before: &BlockMask, added: &BlockMask, first: u64, up: u32, keys: &mut Vec<u64>) {
     let gained = before.union(added).coarsened(up).difference(&before.coarsened(up));
     for (word, offsets) in gained.0.into_iter().zip(OFFSETS.chunks_exact(u64::BITS as usize)) {

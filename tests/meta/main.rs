@@ -9,3 +9,4 @@ mod layering;
 mod proto_compatibility;
 #[path = "../support/mod.rs"]
 mod support;
+mod vocabulary;

@@ -1,6 +1,6 @@
 //! The look-up eight points at a time, for machines with AVX2 and without AVX-512.
 //!
-//! Every step is the twin of one of [`super::scalar`]. A batch of points takes each step together: where the
+//! Every step does the same as one of [`super::scalar`]. A batch of points takes each step together: where the
 //! voxels are, what to fetch for them, what is there; so the misses of a whole batch are on their way at once.
 #![expect(unsafe_code, reason = "vector intrinsics and gathers from raw addresses")]
 

@@ -1,6 +1,6 @@
 //! The critical path of everything (paper II): rotate, translate, quantize, look up.
 //!
-//! One operation: points and a pose in, a bit a point out. `scalar` defines it; the wide twins agree with it
+//! One operation: points and a pose in, a bit a point out. `scalar` defines it; the SIMD variants agree with it
 //! bit for bit and are chosen at run time.
 
 #[cfg(target_arch = "x86_64")]

@@ -1,5 +1,5 @@
-//! The look-up as it is defined, point by point; the oracle of its wide twins, and their stand-in where the
-//! machine has none.
+//! The look-up as it is defined, point by point; the reference implementation, which runs where the CPU has no
+//! SIMD instructions.
 
 use super::{LevelView, Lookup};
 use crate::bloom::Probe;

@@ -1,4 +1,4 @@
-//! Every wide path against its scalar twin, bit for bit.
+//! Every SIMD variant against the reference implementation, bit for bit.
 
 use proptest::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::voxel::{
 
 type Kernel = fn(&[Point], &LatticeFromPoints, &LevelView<'_>, Lookup, &mut [u64]) -> bool;
 
-/// The wide kernels that this machine can run.
+/// The SIMD variants that this machine can run.
 fn wide_kernels() -> Vec<(&'static str, Kernel)> {
     let mut kernels: Vec<(&'static str, Kernel)> = vec![("dispatched", super::occupied)];
     #[cfg(target_arch = "x86_64")]
@@ -32,7 +32,7 @@ fn wide_kernels() -> Vec<(&'static str, Kernel)> {
     kernels
 }
 
-fn assert_twins(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
+fn assert_variants_agree(map: &MultiResolutionMap, points: &[Point], pose: &Pose) {
     let quantize = map.lattice().from_points(pose);
     let view = map.view();
     for (name, kernel) in wide_kernels() {
@@ -93,7 +93,7 @@ proptest! {
             true => Pose::new([0.3, -7.0, 1.0].into(), [0.4, -0.2, 2.0].into()),
             false => Pose::identity(),
         };
-        assert_twins(&map, &points, &pose);
+        assert_variants_agree(&map, &points, &pose);
     }
 }
 
@@ -110,7 +110,7 @@ fn exact_answers_are_exact_whichever_way_they_are_found() {
         .chain((0..20_000).map(|i| at(i, 0.5)))
         .chain((0..19_999).map(sparse))
         .collect();
-    assert_twins(&map, &points, &Pose::identity());
+    assert_variants_agree(&map, &points, &Pose::identity());
 }
 
 /// So many that tags agree by chance, and buckets overflow.
@@ -122,7 +122,7 @@ fn clusters_that_are_not_where_their_tags_say_are_found() {
     // In clusters that are there, and in those below, which are not.
     let asked = first_voxels(0).zip(first_voxels(-1)).flat_map(|(above, below)| [above, below]);
     let points: Vec<_> = asked.map(|index| Point::from(index.map(|i| i as f32 + 0.5))).collect();
-    assert_twins(&map, &points, &Pose::identity());
+    assert_variants_agree(&map, &points, &Pose::identity());
 }
 
 #[test]

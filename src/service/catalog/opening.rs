@@ -16,16 +16,16 @@ pub(super) fn open_all(
     settings: &StoreSettings,
     progress: &OpeningProgress,
 ) -> Result<Named, ServiceError> {
-    let stock = data_dir.take_stock_until(progress).map_err(not_stored)?;
-    for path in stock.not_understood {
+    let contents = data_dir.import_map_files_until(progress).map_err(not_stored)?;
+    for path in contents.not_understood {
         tracing::warn!(path = %path.display(), "not understood, and left alone: no map");
     }
-    data_dir.expect(&stock.maps, progress);
-    if let Some(error) = &stock.not_swept {
+    data_dir.expect(&contents.maps, progress);
+    if let Some(error) = &contents.not_swept {
         tracing::warn!(%error, "what a crash left unfinished cannot be swept away: the next start tries again");
     }
     let mut maps = Named::default();
-    for name in stock.maps {
+    for name in contents.maps {
         tracing::info!(map = %name, "opening");
         let start = Instant::now();
         match data_dir.map(&name, progress) {
@@ -42,7 +42,7 @@ pub(super) fn open_all(
             Err(error) => maps.set_unavailable(name, &error),
         }
     }
-    for (name, error) in stock.refused {
+    for (name, error) in contents.refused {
         // The map that is there is served; the rest waits for somebody, or for the next start.
         if maps.open.contains_key(&name) || maps.unavailable.contains_key(&name) {
             tracing::error!(map = %name, %error, "what the data folder has for this map is not put right");

@@ -95,7 +95,7 @@ impl TryFrom<pb::Request> for Request {
     }
 }
 
-impl From<&CompletedRequest> for pb::AnsweredRequest {
+impl From<&CompletedRequest> for pb::CompletedRequest {
     fn from(answered: &CompletedRequest) -> Self {
         let CompletedRequest { id, digest, caller, .. } = answered.clone();
         let request = Request { id, digest, caller };
@@ -108,10 +108,10 @@ impl From<&CompletedRequest> for pb::AnsweredRequest {
     }
 }
 
-impl TryFrom<pb::AnsweredRequest> for CompletedRequest {
+impl TryFrom<pb::CompletedRequest> for CompletedRequest {
     type Error = Unreadable;
 
-    fn try_from(message: pb::AnsweredRequest) -> Result<Self, Unreadable> {
+    fn try_from(message: pb::CompletedRequest) -> Result<Self, Unreadable> {
         let Request { id, digest, caller } = required(message.request, "requests.request")?.try_into()?;
         Ok(Self {
             id,

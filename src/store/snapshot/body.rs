@@ -333,7 +333,7 @@ impl<'a> Body<'a> {
 }
 
 fn request(record: Result<&[u8], Unreadable>) -> Result<CompletedRequest, Unreadable> {
-    decoded::<pb::AnsweredRequest>(record?, "a request")?.try_into()
+    decoded::<pb::CompletedRequest>(record?, "a request")?.try_into()
 }
 
 fn decoded<M: Message + Default>(bytes: &[u8], what: &str) -> Result<M, Unreadable> {

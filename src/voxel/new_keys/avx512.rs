@@ -58,7 +58,7 @@ unsafe fn write_keys_gained(
     written
 }
 
-/// The twin of [`BlockMask::coarsened`].
+/// The SIMD variant of [`BlockMask::coarsened`].
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 fn coarsened(mask: __m512i, up: u32) -> __m512i {

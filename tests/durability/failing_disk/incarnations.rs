@@ -116,7 +116,7 @@ fn a_map_whose_deletion_failed_acknowledges_nothing_that_the_next_start_sweeps_a
         ));
         let appended = folder.append(&[&Record::of(&change).unwrap()]).and_then(|_| folder.sync());
         let again = data_dir(&disk.copy());
-        let names = again.take_stock().unwrap().maps;
+        let names = again.import_map_files().unwrap().maps;
         if appended.is_ok() {
             assert_eq!(names, [office()], "failed at {at}: what was acknowledged since is swept away");
         }
@@ -201,7 +201,7 @@ fn kept() -> MapName {
 /// The maps that a start finds.
 fn found(disk: &SimulatedDisk) -> Vec<(MapName, OpenedMap)> {
     let data = data_dir(disk);
-    let stock = data.take_stock().unwrap();
+    let stock = data.import_map_files().unwrap();
     assert!(stock.refused.is_empty() && stock.not_understood.is_empty(), "{stock:?}");
     let open = |name: MapName| {
         let opened = data.map(&name, &OpeningProgress::default());

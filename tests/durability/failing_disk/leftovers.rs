@@ -20,7 +20,7 @@ fn put(disk: &SimulatedDisk, path: &Path, bytes: &[u8]) {
 
 /// The names of the maps that a start finds.
 fn maps(disk: &SimulatedDisk) -> Vec<String> {
-    let stock = data_dir(disk).take_stock().unwrap();
+    let stock = data_dir(disk).import_map_files().unwrap();
     stock.maps.iter().map(ToString::to_string).collect()
 }
 
@@ -89,7 +89,7 @@ fn a_map_that_could_not_be_taken_in_is_not_served_meanwhile() {
         put(&disk, &Path::new(MAPS).join("office.mrol"), &file);
         // What failed cannot be taken back either.
         disk.set_fault(Some(Fault::Crash(at)));
-        let stock = data.take_stock();
+        let stock = data.import_map_files();
         disk.set_fault(None);
         let Some((_, error)) = stock.ok().and_then(|mut stock| stock.refused.pop()) else { continue };
         let folders = disk.list(Path::new(MAPS)).unwrap();
@@ -112,7 +112,7 @@ fn a_folder_without_a_snapshot_is_reported_and_stays() {
     let bare = Path::new(MAPS).join(format!("bare.{}", Uuid::from_u128(7)));
     disk.create_folder(&bare).unwrap();
     let data = data_dir(&disk);
-    let stock = data.take_stock().unwrap();
+    let stock = data.import_map_files().unwrap();
     assert_eq!(stock.maps.len(), 2);
     let error = data.map(&stock.maps[0], &OpeningProgress::default()).unwrap_err().to_string();
     assert!(error.contains("bare."), "{error}");
@@ -137,7 +137,7 @@ fn what_somebody_put_beside_a_map_is_reported_and_never_removed() {
     for bytes in [&backup[..], &other, b"no map file"] {
         put(&disk, &file, bytes);
         let data = data_dir(&disk);
-        let stock = data.take_stock().unwrap();
+        let stock = data.import_map_files().unwrap();
         assert_eq!((stock.refused.len(), &stock.refused[0].0), (1, &office()));
         assert!(stock.refused[0].1.to_string().contains("office.mrol"), "{}", stock.refused[0].1);
         let mut reported = stock.not_understood;

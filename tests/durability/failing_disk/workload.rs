@@ -43,7 +43,7 @@ fn office() -> MapName {
 /// Opens the map, where there is one.
 pub fn open(disk: &SimulatedDisk) -> Result<Option<OpenedMap>, StoreError> {
     let data_dir = DataDir::on(Arc::new(disk.clone()), Path::new("data"), settings())?;
-    let names = data_dir.take_stock()?.maps;
+    let names = data_dir.import_map_files()?.maps;
     names.first().map(|name| data_dir.map(name, &OpeningProgress::default())).transpose()
 }
 

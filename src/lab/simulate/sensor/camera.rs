@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use super::{cast, gaussian, is_lost, point};
+use super::{cast, drops_out, gaussian, point};
 use crate::geometry::{Point, Pose};
 use crate::lab::simulate::Scene;
 
@@ -59,7 +59,7 @@ impl DepthCamera {
 
     fn measure(&self, direction: Vector3<f64>, scene: &Scene, pose: &Pose, rng: &mut ChaCha8Rng) -> Point {
         let depth = cast(scene, pose, direction, (self.range_min_m, self.range_max_m));
-        let depth = depth.filter(|_| !is_lost(self.dropout, rng));
+        let depth = depth.filter(|_| !drops_out(self.dropout, rng));
         point(direction, depth.map(|depth| depth + self.noise_at_1m_m * depth * depth * gaussian(rng)))
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use super::{cast, gaussian, is_lost, point};
+use super::{cast, drops_out, gaussian, point};
 use crate::geometry::{Point, Pose};
 use crate::lab::simulate::Scene;
 
@@ -62,7 +62,7 @@ impl SpinningLidar {
 
     fn measure(&self, direction: Vector3<f64>, scene: &Scene, pose: &Pose, rng: &mut ChaCha8Rng) -> Point {
         let range = cast(scene, pose, direction, (self.range_min_m, self.range_max_m));
-        let range = range.filter(|_| !is_lost(self.dropout, rng));
+        let range = range.filter(|_| !drops_out(self.dropout, rng));
         point(direction, range.map(|range| range + self.noise_m * gaussian(rng)))
     }
 }

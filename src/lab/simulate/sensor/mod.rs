@@ -46,7 +46,7 @@ fn point(direction: Vector3<f64>, distance: Option<f64>) -> Point {
 }
 
 /// True for a share of `dropout` of all calls.
-fn is_lost(dropout: f64, rng: &mut ChaCha8Rng) -> bool {
+fn drops_out(dropout: f64, rng: &mut ChaCha8Rng) -> bool {
     rng.random::<f64>() < dropout
 }
 

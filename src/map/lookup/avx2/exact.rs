@@ -99,7 +99,7 @@ fn four(cells: &[i32; BATCH], at: usize) -> __m256i {
     unsafe { _mm256_cvtepu32_epi64(_mm_loadu_si128(cells[at..at + 4].as_ptr().cast())) }
 }
 
-/// Addresses of the words of masks that hold four cells of clusters: the twin of `Cluster::get`.
+/// Addresses of the words of masks that hold four cells of clusters: the SIMD variant of `Cluster::get`.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn word(present: __m256i, masks: __m256i, cells: __m256i) -> __m256i {
@@ -154,7 +154,7 @@ fn find(slots: Slots<'_>, key: u64, bucket: usize) -> Option<usize> {
 /// Bits of a cell's number in its block, behind which that of the block in its cluster begins.
 const CELL_BITS: u32 = 3 * BLOCK_LEVELS;
 
-/// The twin of [`Cell::of`] and `Place::of`: cluster indices, and numbers of cells within clusters, of the voxels of a
+/// The SIMD variant of [`Cell::of`] and `BlockInCluster::of`: cluster indices, and numbers of cells within clusters, of the voxels of a
 /// level `up` levels up in its blocks.
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -190,7 +190,7 @@ fn split(index: &[[i32; BATCH]; 3], up: u32) -> ([[i32; BATCH]; 3], [i32; BATCH]
     (clusters, cells)
 }
 
-/// The twin of `BlockMask::within`.
+/// The SIMD variant of `BlockMask::within`.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn within(cells: __m256i, up: u32) -> __m256i {

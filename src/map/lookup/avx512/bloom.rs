@@ -89,7 +89,7 @@ impl BloomRegisters {
         }
     }
 
-    /// The twin of `bloom::Probe::of` for sixteen keys, given by halves.
+    /// The SIMD variant of `bloom::Probe::of` for sixteen keys, given by halves.
     #[inline]
     #[target_feature(enable = "avx512f")]
     pub(super) fn locate(&self, halves: [__m512i; 2], shard: __m512i) -> Located {

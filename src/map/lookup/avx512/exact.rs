@@ -218,7 +218,7 @@ fn latest_of(heads: u8) -> __m512i {
     _mm512_cvtepu8_epi64(_mm_cvtsi64_si128(i64::from_le_bytes(LATEST[usize::from(heads)])))
 }
 
-/// The twin of [`Cell::of`] and `Place::of`, for sixteen indices: numbers of cells within clusters.
+/// The SIMD variant of [`Cell::of`] and `BlockInCluster::of`, for sixteen indices: numbers of cells within clusters.
 ///
 /// ```text
 /// | place of the block (6 bits) | cell (9 bits) |
@@ -247,7 +247,7 @@ fn cell(index: [__m512i; 3]) -> __m512i {
     _mm512_or_si512(_mm512_or_si512(x, y), z)
 }
 
-/// The twin of `BlockMask::within`.
+/// The SIMD variant of `BlockMask::within`.
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn within(cell: __m512i, up: u32) -> __m512i {

@@ -94,7 +94,7 @@ impl<'a> Tables<'a> {
 }
 
 impl Found {
-    /// Addresses of the words of masks that hold `cells` of these clusters: the twin of `Cluster::get`.
+    /// Addresses of the words of masks that hold `cells` of these clusters: the SIMD variant of `Cluster::get`.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw")]
     pub(super) fn words(&self, cells: __m512i) -> __m512i {
@@ -165,7 +165,7 @@ fn ones(words: __m512i) -> __m512i {
 }
 
 /// The top bit of each byte of `tags` that is the tag of a key with hash `h`; of bytes beyond the first such, it may be
-/// set without reason. The twin of `Slots::tag`.
+/// set without reason. The SIMD variant of `Slots::tag`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq")]
 fn fitting(tags: __m512i, h: __m512i) -> __m512i {

@@ -12,7 +12,7 @@ use crate::util::StopSignal;
 
 /// What a data folder holds.
 #[derive(Debug, Default)]
-pub struct Stock {
+pub struct DataDirContents {
     /// The names of the maps that are kept, in order.
     pub maps: Vec<MapName>,
     /// Those of map files that could not become maps, and why. Nobody is to take their names meanwhile.
@@ -24,37 +24,37 @@ pub struct Stock {
 }
 
 impl DataDir {
-    /// Takes stock: sweeps away what a crash left unfinished, ends what it came between, and makes maps of the map files
+    /// Makes the folder ready: sweeps away what a crash left unfinished, ends what it came between, and makes maps of the map files
     /// that lie about.
     ///
     /// # Errors
     /// When the folder cannot be read, or the system refuses. What is wrong with one map keeps no other from being
     /// opened.
-    pub fn take_stock(&self) -> Result<Stock, StoreError> {
-        self.take_stock_until(&OpeningProgress::default())
+    pub fn import_map_files(&self) -> Result<DataDirContents, StoreError> {
+        self.import_map_files_until(&OpeningProgress::default())
     }
 
     /// The same, for as long as somebody wants the maps.
     ///
     /// # Errors
     /// As there; `Cancelled` where nobody wants them any more.
-    pub fn take_stock_until(&self, progress: &OpeningProgress) -> Result<Stock, StoreError> {
+    pub fn import_map_files_until(&self, progress: &OpeningProgress) -> Result<DataDirContents, StoreError> {
         let not_swept = folder::sweep(&*self.files, &self.maps).err();
-        let mut stock = Stock { not_swept, ..Stock::default() };
-        self.end_replacements(&mut stock)?;
+        let mut contents = DataDirContents { not_swept, ..DataDirContents::default() };
+        self.end_replacements(&mut contents)?;
         for entry in self.entries()? {
             match Entry::of(&entry) {
                 Entry::MapFile(name) => match self.take_in(&name, progress) {
                     Ok(()) => {}
                     Err(StoreError::Cancelled) => return Err(StoreError::Cancelled),
-                    Err(error) => stock.refused.push((name, error)),
+                    Err(error) => contents.refused.push((name, error)),
                 },
-                Entry::Unknown => stock.not_understood.push(self.maps.join(entry)),
+                Entry::Unknown => contents.not_understood.push(self.maps.join(entry)),
                 Entry::Map { .. } | Entry::OldMap(_) | Entry::Unfinished => {}
             }
         }
-        stock.maps = self.names()?;
-        Ok(stock)
+        contents.maps = self.names()?;
+        Ok(contents)
     }
 
     /// Files and folders that nobody understands.
@@ -76,7 +76,7 @@ impl DataDir {
 
     /// Ends the replacements of maps that a crash came between. Where one cannot be ended, neither map of the name can be
     /// told from the other: it is refused, and the next start tries again.
-    fn end_replacements(&self, stock: &mut Stock) -> Result<(), StoreError> {
+    fn end_replacements(&self, contents: &mut DataDirContents) -> Result<(), StoreError> {
         for entry in self.entries()? {
             let Entry::Map { name, .. } = Entry::of(&entry) else { continue };
             let new = self.maps.join(&entry);
@@ -84,7 +84,7 @@ impl DataDir {
             let Ok(Some(replacement)) = Replacement::in_folder(&*self.files, &new) else { continue };
             let ended = replacement.keep_old(&*self.files, &self.maps);
             if let Err(error) = ended.and_then(|()| replacement::finish(&*self.files, &new)) {
-                stock.refused.push((name, error));
+                contents.refused.push((name, error));
             }
         }
         Ok(())
