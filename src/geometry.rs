@@ -37,7 +37,7 @@ impl Point {
         Self([x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes()])
     }
 
-    /// Its coordinates \[x, y, z\], meters.
+    /// The coordinates \[x, y, z\], meters.
     #[inline]
     pub fn xyz(self) -> [f32; 3] {
         self.0.map(f32::from_le_bytes)

@@ -18,7 +18,7 @@ pub struct Gate {
 /// What a request that was let in is answered with.
 #[derive(Debug, Clone)]
 pub struct Authorized {
-    /// Who asks.
+    /// The caller.
     pub caller: Caller,
     /// The maps that the caller may name.
     pub service: MapService,

@@ -59,22 +59,22 @@ impl Key {
         }
     }
 
-    /// The same for the scans of `robots` alone.
+    /// This key, for the scans of `robots` alone.
     pub fn for_robots(self, robots: impl IntoIterator<Item = RobotName>) -> Self {
         Self { robots: Some(Arc::new(robots.into_iter().collect())), ..self }
     }
 
-    /// The same until `expires`.
+    /// This key, which counts until `expires`.
     pub fn until(self, expires: Expiry) -> Self {
         Self { expires: Some(expires), ..self }
     }
 
-    /// The same with bounds of its own.
+    /// This key, with limits of its own.
     pub fn with_limits(self, limits: KeyLimits) -> Self {
         Self { allowance: Arc::new(Allowance::new(limits)), ..self }
     }
 
-    /// The same for another secret, with an end of its own: during a rotation both count.
+    /// The key's former secret during a rotation, with an end of its own: until then both secrets count.
     pub(super) fn former(&self, digest: Digest, expires: Option<Expiry>) -> Self {
         Self {
             name: self.name.clone(),

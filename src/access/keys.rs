@@ -58,7 +58,7 @@ impl Keys {
         ends.filter(|(_, expires)| expires.is_near(now, warning)).collect()
     }
 
-    /// How many there are, the former secrets of keys that are being rotated among them.
+    /// The number of keys, with the former secrets of keys that are being rotated.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -69,8 +69,8 @@ impl Keys {
     }
 }
 
-/// The same key as it was before, where it was there: what was begun with it goes on, and what its limits have left
-/// stays.
+/// The key as it was before the file was read again, where it was there: what was begun with it goes on, and what its
+/// limits have left stays.
 fn continued(key: Key, former: &[Arc<Key>]) -> Key {
     let same = former.iter().find(|other| other.is_same_as(&key) && !other.end.has_come());
     let end = same.map_or_else(|| Arc::clone(&key.end), |same| Arc::clone(&same.end));

@@ -36,7 +36,7 @@ macro_rules! operations {
         }
 
         impl Operation {
-            /// All of them.
+            /// All operations.
             pub const ALL: &[Self] = &[$(Self::$name),+];
 
             fn row(self) -> Row {
@@ -81,7 +81,7 @@ operations! {
 }
 
 impl Operation {
-    /// Its name for metrics and the log, the same in both protocols.
+    /// The operation's name in metrics and the log, the same in both protocols.
     pub fn name(self) -> &'static str {
         self.row().name
     }

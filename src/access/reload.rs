@@ -39,11 +39,11 @@ struct Appearance {
 /// What came of another look at the files.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Reload<E> {
-    /// They are as they were.
+    /// The files are as they were.
     Unchanged,
     /// The value is new.
     Anew,
-    /// They cannot be used, for a reason that was not told before; the former value stays.
+    /// The files cannot be used, for a reason that was not told before; the former value stays.
     Refused(E),
 }
 

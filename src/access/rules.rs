@@ -14,7 +14,7 @@ use crate::service::{AllowedMaps, Reason, ServiceError};
 /// The rules of a server. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]
 pub struct Access {
-    /// Without them anybody may do anything.
+    /// The keys; without them anybody may do anything.
     keys: Option<Arc<ReloadableFile<Keys, KeyFileError>>>,
     /// Whether [`Operation::Metrics`] asks for no key.
     metrics_open: bool,
@@ -28,7 +28,7 @@ impl Access {
         Self { keys: None, metrics_open: true, hosts: Hosts::default() }
     }
 
-    /// The same for requests to these names as well, where there are no keys.
+    /// This access, which without keys answers requests to these host names too.
     pub fn at_hosts<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
         Self { hosts: Hosts::new(names), ..self }
     }
@@ -123,7 +123,8 @@ fn check_scope(operation: Operation, scope: Scope, key: &Key) -> Result<(), Serv
     Err(ServiceError::new(Reason::ScopeTooSmall, message))
 }
 
-/// Of what speaks of every map, a key for some may see nothing. Maps that a request names are checked by the service.
+/// Refuses the metrics, which speak of every map, to a key for some maps. Maps that a request names are checked by the
+/// service.
 fn check_metrics_allowed(operation: Operation, key: &Key) -> Result<(), ServiceError> {
     if operation != Operation::Metrics || key.allowed_maps == AllowedMaps::Every {
         return Ok(());

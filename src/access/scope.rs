@@ -22,7 +22,7 @@ impl Scope {
     /// All, the least first.
     pub const ALL: [Self; 4] = [Self::Read, Self::Insert, Self::Write, Self::Admin];
 
-    /// Its word in files, errors and on the command line.
+    /// The scope's word in files, errors and on the command line.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Read => "read",

@@ -30,7 +30,7 @@ pub enum ReachedAt {
 pub(super) struct Hosts(Arc<BTreeSet<String>>);
 
 impl Hosts {
-    /// Those of `access.hosts`.
+    /// The names of `access.hosts`.
     pub(super) fn new<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         Self(Arc::new(names.into_iter().map(normalized).collect()))
     }

@@ -34,7 +34,7 @@ struct Bounds {
 #[derive(Debug)]
 struct Inner {
     limits: Bounds,
-    /// Of requests whose bodies have arrived.
+    /// Slots of requests whose bodies have arrived.
     requests: Quota,
     known: Mutex<Known>,
 }
@@ -44,9 +44,9 @@ struct Known {
     /// By the order in which they began.
     bodies: BTreeMap<u64, Body>,
     next: u64,
-    /// Of requests, and not there yet.
+    /// Requests whose bodies have not arrived yet; streams do not count.
     arriving: usize,
-    /// Of bodies and of charges.
+    /// Bytes of bodies and of memory permits.
     bytes: usize,
 }
 
@@ -58,7 +58,7 @@ pub struct MemoryPermit {
 }
 
 impl Bodies {
-    /// Those of requests that work is done for.
+    /// The bodies of requests that work is done for.
     pub(super) fn new(limits: &Limits) -> Self {
         Self::within(Bounds {
             requests: ("requests_max", limits.requests_max),
@@ -69,8 +69,8 @@ impl Bodies {
         })
     }
 
-    /// Those of probes, of which the limit `name` allows `most`. Each is small and comes at once, so that the one that has
-    /// waited for longest gives way, however short that was: nobody fills all places and keeps them.
+    /// The bodies of probes, of which the limit `name` allows `most`. Each is small and comes at once, so that the one
+    /// that has waited for longest gives way, however short that was: nobody fills all places and keeps them.
     pub(super) fn of_probes(limits: &Limits, name: &'static str, most: usize) -> Self {
         Self::within(Bounds {
             requests: (name, most),
@@ -274,7 +274,7 @@ impl Known {
 }
 
 impl MemoryPermit {
-    /// The same for something larger.
+    /// This permit, for at least `bytes`.
     ///
     /// # Errors
     /// When there is no room for the rest.

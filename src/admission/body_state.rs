@@ -12,7 +12,7 @@ use crate::service::ServiceError;
 #[derive(Debug)]
 pub(super) struct Body {
     is_stream: bool,
-    /// That are in memory.
+    /// Bytes of the body that are in memory.
     bytes: usize,
     /// Up to when they came in time: each accounts for a part of a second, and none for time to come.
     in_time: Instant,
@@ -30,13 +30,13 @@ pub struct CloseConnection(pub CancellationToken);
 #[derive(Debug)]
 enum State {
     Arriving,
-    /// It counts as a request in work.
+    /// All of the body has come: it counts as a request in work.
     Complete {
         _slot: QuotaSlot,
         /// Since when its answer waits to be read.
         unread: Option<Instant>,
     },
-    /// It was ended before it was complete.
+    /// The body was ended before it was complete.
     Ended(ServiceError),
 }
 
@@ -66,7 +66,7 @@ impl Body {
         }
     }
 
-    /// Its answer waits to be read, or is being read.
+    /// Notes whether the answer waits to be read.
     pub(super) fn set_unread(&mut self, waits: bool) {
         if let State::Complete { unread, .. } = &mut self.state {
             *unread = waits.then(Instant::now);

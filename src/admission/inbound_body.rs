@@ -34,7 +34,7 @@ impl InboundBody {
         Ok(Self(Arc::new(Held { bodies: bodies.clone(), number, ended })))
     }
 
-    /// That of a request, which admission has put among its extensions.
+    /// The body of a request, which admission has put among its extensions.
     ///
     /// # Errors
     /// `Internal` where the request was never admitted.
@@ -74,17 +74,18 @@ impl InboundBody {
         self.0.bodies.complete(self.0.number)
     }
 
-    /// Its answer waits for its client to read it, or for more of it.
+    /// The answer waits: for its client to read it, or for more of the answer.
     pub(super) fn answer_waits(&self) {
         self.0.bodies.set_unread(self.0.number, true);
     }
 
-    /// Its client reads on in the answer.
+    /// The client reads on in the answer.
     pub(super) fn answer_is_read(&self) {
         self.0.bodies.set_unread(self.0.number, false);
     }
 
-    /// Its bytes in memory, which are given back when the charge is dropped: of a message that was read from it.
+    /// Takes over the body's bytes in memory for a message that was read from it; they are given back when the permit
+    /// is dropped.
     pub fn take(&self) -> MemoryPermit {
         self.0.bodies.take(self.0.number)
     }

@@ -14,7 +14,7 @@ use crate::service::ServiceError;
 pub(super) struct MeteredBody {
     body: Body,
     arrival: InboundBody,
-    /// Its reader has asked for a piece that has not come.
+    /// True while the reader waits for a piece that has not come.
     awaited: bool,
     ended: Pin<Box<WaitForCancellationFutureOwned>>,
 }

@@ -16,7 +16,7 @@ pub struct OfConnection(Arc<Shared>);
 struct Shared {
     /// The name of the first key that was shown.
     key: OnceLock<String>,
-    /// It was taken when all places were in use: for health checks alone.
+    /// True of a connection that was accepted when all slots were in use: it is for health checks alone.
     is_reserved: bool,
     admitted: Mutex<Admitted>,
     watches: Quota,
@@ -35,7 +35,7 @@ struct Admitted {
 pub(crate) struct LetIn(OfConnection);
 
 impl OfConnection {
-    /// Of a new connection; `is_reserved` where it may ask for nothing but health.
+    /// The state of a new connection; `is_reserved` where it may ask for nothing but health.
     pub fn new(is_reserved: bool) -> Self {
         let watches = Quota::new("health watches of one connection", 1);
         let admitted = Mutex::new(Admitted { requests: 0, last: Instant::now() });

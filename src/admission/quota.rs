@@ -14,7 +14,7 @@ pub(super) struct Quota {
     free: Arc<Semaphore>,
 }
 
-/// One of them, until it is dropped.
+/// One slot of a quota, until it is dropped.
 pub(super) type QuotaSlot = OwnedSemaphorePermit;
 
 impl Quota {

@@ -75,7 +75,7 @@ impl std::fmt::Display for Direction {
     }
 }
 
-/// Of `points` from the sensor, meters; 0 without points.
+/// The root mean square range of `points` from the sensor, meters; 0 without points.
 pub(super) fn root_mean_square_range_m(points: &[Point]) -> f64 {
     let squares: f64 = points.iter().map(|point| point.to_f64().coords.norm_squared()).sum();
     (squares / points.len().max(1) as f64).sqrt()

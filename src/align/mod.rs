@@ -70,7 +70,7 @@ pub fn align(
     align_until(map, points, guess, settings, StopSignal::NEVER)
 }
 
-/// The same, which ends where it stands once it is stopped: what it returns then means nothing.
+/// [`align`], which ends where it stands once `stop` says so: what it returns then means nothing.
 pub fn align_until(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -98,7 +98,7 @@ pub fn evaluate_at(
     judge_until(map, points, map_from_sensor, settings, StopSignal::NEVER)
 }
 
-/// The same, which means nothing once it is stopped.
+/// [`judge`], whose answer means nothing once it is stopped.
 pub fn judge_until(
     map: &MultiResolutionMap,
     points: &[Point],

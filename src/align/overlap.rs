@@ -7,7 +7,7 @@ use crate::voxel::Lattice;
 
 /// What alignment by overlap asks: of a map, or of another structure that is compared with it.
 pub trait OccupiedVoxels: std::fmt::Debug {
-    /// Its lattices.
+    /// The lattices of the levels.
     fn lattice(&self) -> &Lattice;
 
     /// Number of `points` in occupied voxels of `level`, for each of `poses` (map_from_points).
@@ -102,7 +102,7 @@ pub fn level_overlaps(map: &MultiResolutionMap, points: &[Point], map_from_senso
     level_overlaps_until(map, points, map_from_sensor, StopSignal::NEVER)
 }
 
-/// The same, which means nothing once it is stopped.
+/// The overlaps of all levels, which mean nothing once stopped.
 pub(super) fn level_overlaps_until(
     map: &MultiResolutionMap,
     points: &[Point],

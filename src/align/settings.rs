@@ -31,7 +31,7 @@ pub struct AlignmentSettings {
     pub method: Method,
     /// Points of the volumetric sample, about. 1000 (paper III-A).
     pub sample_points: usize,
-    /// Of the choice of sample points. 0.
+    /// Seed of the choice of sample points. 0.
     pub seed: u64,
     /// Translation step of a level, as a fraction of its resolution. 1.
     pub translation_step: f64,
@@ -64,7 +64,7 @@ pub struct AlignmentSettings {
     pub refinement_max_correction: f64,
     /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 48.
     pub max_correction: f64,
-    /// The same of its rotation, degrees. 60.
+    /// The largest rotation of a correction, degrees. 60.
     pub max_correction_deg: f64,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").
@@ -99,11 +99,12 @@ pub struct MultiStartSettings {
     /// Fitness below which the end of the first ascent is not believed, and others are tried. 0.85; 0 never tries. A scan
     /// of what the map shows has 0.9 or more, one that shows much new ground less: it pays a few times as long.
     pub fitness_below: f64,
-    /// The same of a pose that is held to no better than this fraction of r_0 in some direction. 0.1.
+    /// Starts again from more guesses where a pose is held to no better than this fraction of r_0 in some direction.
+    /// 0.1.
     pub std_above: f64,
-    /// The same of a pose farther from its guess than this many r_0. 12.
+    /// Starts again from more guesses where a pose is farther from its guess than this many r_0. 12.
     pub motion_above: f64,
-    /// The same of a pose that is turned by more than this against its guess, degrees. 30.
+    /// Starts again from more guesses where a pose is turned by more than this against its guess, degrees. 30.
     pub motion_above_deg: f64,
     /// Ascents of the guesses that look best, at most. 8; 0 believes every end.
     pub ascents: usize,

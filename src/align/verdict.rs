@@ -12,8 +12,8 @@ pub enum Verdict {
     Accepted,
     /// Too few of its points fall in occupied voxels.
     LowOverlap,
-    /// It fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves a
-    /// direction open.
+    /// The scan fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves
+    /// a direction open.
     Undetermined,
     /// Several starts ended at different poses that fit about equally well, or it lies too far from the guess for others to
     /// have been looked for.
@@ -21,7 +21,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// All of them.
+    /// All verdicts.
     pub const ALL: [Self; 4] = [Self::Accepted, Self::LowOverlap, Self::Undetermined, Self::Ambiguous];
 
     /// `accepted`, `low_overlap`, `undetermined` or `ambiguous`.
@@ -109,7 +109,7 @@ impl Alignment {
         self.but(Verdict::Ambiguous, reason)
     }
 
-    /// The same with another verdict, and why.
+    /// This alignment with another verdict, and why.
     pub(super) fn but(self, verdict: Verdict, reason: String) -> Self {
         Self { verdict, reason, ..self }
     }
@@ -183,7 +183,7 @@ impl Alignment {
         }
     }
 
-    /// The same, accepted on the caller's word.
+    /// This alignment, accepted because the caller says so.
     pub fn accepted_by_caller(self) -> Self {
         self.but(Verdict::Accepted, "the caller's word".into())
     }

@@ -64,18 +64,18 @@ impl Counters {
         self.0[word][part].load(Ordering::Relaxed) >> shift & COUNTER_MAX
     }
 
-    /// All of them, in order.
+    /// All counters, in order.
     pub(super) fn iter(&self) -> impl Iterator<Item = u64> {
         (0..self.0.len()).flat_map(move |word| (0..u64::BITS).map(move |bit| self.of_bit(word, bit)))
     }
 
-    /// Those of a word of the plane.
+    /// The counters of a word of the plane.
     #[inline]
     pub(super) fn of_word(&self, word: usize) -> &CountersOfWord {
         &self.0[word]
     }
 
-    /// The same, of counters that nobody else reads.
+    /// The counters of a word of the plane, to be changed.
     #[inline]
     pub(super) fn of_word_mut(&mut self, word: usize) -> &mut CountersOfWord {
         &mut self.0[word]

@@ -74,7 +74,7 @@ impl CountingBloomFilter {
         probe
     }
 
-    /// The second one.
+    /// The second step of an insertion: sets the bits of the plane that look-ups read.
     #[inline]
     pub(crate) fn set_bits(&mut self, probe: Probe) {
         self.keys += 1;
@@ -88,15 +88,15 @@ impl CountingBloomFilter {
         Probe { mask: self.counters.count_out(probe), ..probe }
     }
 
-    /// The second one: clears what no other key sets.
+    /// The second step of a removal: clears the bits of the plane that no other key sets.
     #[inline]
     pub(crate) fn clear_bits(&mut self, cleared: Probe) {
         self.keys -= 1;
         self.plane[cleared.word] &= !cleared.mask;
     }
 
-    /// The second step for many keys at once: a plane without the bits that none but `keys_lost` keys set, all of them
-    /// counted out, takes the place of the present one.
+    /// The second step of a removal of many keys at once: a plane without the bits that none but `keys_lost` keys set,
+    /// all of them counted out, takes the place of the present one.
     pub(crate) fn set_plane(&mut self, plane: Vec<u64>, keys_lost: usize) {
         debug_assert_eq!(plane.len(), self.plane.len(), "the plane of another filter");
         self.keys -= keys_lost;
@@ -109,7 +109,7 @@ impl CountingBloomFilter {
         &self.plane[probe.word]
     }
 
-    /// Its counters.
+    /// The counters of the word that a probe looks at.
     #[inline]
     pub(crate) fn counters_at(&self, probe: Probe) -> &CountersOfWord {
         self.counters.of_word(probe.word)
@@ -136,7 +136,7 @@ impl CountingBloomFilter {
         self.capacity
     }
 
-    /// Its size and shape.
+    /// The size and shape of the filter.
     pub fn settings(&self) -> FilterSettings {
         self.settings
     }

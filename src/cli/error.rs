@@ -15,7 +15,7 @@ use crate::store::StoreError;
 pub(super) enum CliError {
     /// The command line makes no sense: exit code 2.
     Usage(String),
-    /// It could not be done: exit code 1.
+    /// The command could not be done: exit code 1.
     Failed(String),
     /// Nobody reads the output any more (`mrol ... | head`): no failure, and nothing to say.
     OutputClosed,

@@ -14,7 +14,7 @@ use super::maps::OptionalSettings;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
-use super::scan_report::{PLACE_HEAD, name_of, name_width, place, seven};
+use super::scan_report::{PLACE_HEAD, name_of, name_width, place};
 use super::truth::true_poses;
 use crate::align::Method;
 use crate::client::{Client, ClientError};
@@ -23,6 +23,7 @@ use crate::map::RobotName;
 use crate::mapping::Guess;
 use crate::scan::{PointFilter, read_points, scan_files};
 use crate::service::{ScanAnswer, ScanRequest};
+use crate::wire::json::JsonScan;
 
 /// Scans read ahead of the one that is being sent.
 const SCANS_AHEAD: usize = 2;
@@ -213,44 +214,15 @@ impl Plan {
 #[derive(Serialize)]
 struct ScanLine {
     scan: String,
-    accepted: bool,
-    verdict: &'static str,
-    reason: String,
-    map_from_sensor: [f64; 7],
-    overlap: f64,
-    inliers: f64,
-    information: Option<[[f64; 6]; 6]>,
-    align_ms: f64,
-    new_voxels: usize,
-    points_skipped: usize,
-    revision: u64,
-    map_uuid: String,
-    replayed: bool,
-    stationary: bool,
+    #[serde(flatten)]
+    answer: JsonScan,
     #[serde(skip)]
     width: usize,
 }
 
 impl ScanLine {
     fn of(scan: String, answer: &ScanAnswer, width: usize) -> Self {
-        Self {
-            scan,
-            accepted: answer.accepted,
-            verdict: answer.verdict.as_str(),
-            reason: answer.reason.clone(),
-            map_from_sensor: seven(&answer.map_from_sensor),
-            overlap: answer.overlap(),
-            inliers: answer.inliers,
-            information: answer.information,
-            align_ms: answer.align_time.as_secs_f64() * 1e3,
-            new_voxels: answer.new_voxels,
-            points_skipped: answer.points_skipped,
-            revision: answer.version.revision,
-            map_uuid: answer.version.map_uuid.to_string(),
-            replayed: answer.replayed,
-            stationary: answer.stationary,
-            width,
-        }
+        Self { scan, answer: answer.clone().into(), width }
     }
 
     fn head(width: usize) -> String {
@@ -264,18 +236,18 @@ impl Display for ScanLine {
             f,
             "{:<width$}  {:<12}  {:>7.3}  {}  {:>10}  {:>8}",
             self.scan,
-            self.verdict,
-            self.overlap,
-            place(&self.map_from_sensor),
-            count(self.new_voxels),
-            self.revision,
+            self.answer.verdict,
+            self.answer.overlap,
+            place(&self.answer.map_from_sensor),
+            count(self.answer.new_voxels),
+            self.answer.version.revision,
             width = self.width
         )?;
-        match self {
-            Self { replayed: true, .. } => write!(f, "  (was there already)"),
-            Self { stationary: true, .. } => write!(f, "  (nothing new from where it stands)"),
-            Self { verdict: "accepted", .. } => Ok(()),
-            Self { reason, .. } => write!(f, "  {reason}"),
+        match &self.answer {
+            JsonScan { replayed: true, .. } => write!(f, "  (was there already)"),
+            JsonScan { stationary: true, .. } => write!(f, "  (nothing new from where it stands)"),
+            JsonScan { verdict: "accepted", .. } => Ok(()),
+            JsonScan { reason, .. } => write!(f, "  {reason}"),
         }
     }
 }

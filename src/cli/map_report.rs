@@ -5,58 +5,13 @@ use std::fmt::{self, Display};
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
-use crate::map::LevelInfo;
-use crate::service::{MapInfo, MapStorage};
+use crate::service::MapInfo;
+use crate::wire::json::{JsonFilter, JsonLevel, JsonMap, JsonStorage, JsonVersion};
 
-/// A map's description.
+/// A map's description, to be printed.
 #[derive(Serialize)]
-pub(super) struct MapReport {
-    map: String,
-    revision: u64,
-    map_uuid: String,
-    settings: Settings,
-    levels: Vec<Level>,
-    scans: usize,
-    robots: Vec<String>,
-    set_bytes: usize,
-    moment_bytes: usize,
-    trajectory_bytes: usize,
-    storage: Option<Storage>,
-}
-
-/// What lies on disk.
-#[derive(Serialize)]
-struct Storage {
-    durable_revision: u64,
-    snapshot_revision: u64,
-    undo_from_revision: u64,
-    read_only: Option<String>,
-}
-
-#[derive(Serialize)]
-struct Settings {
-    resolution_m: f64,
-    levels: u32,
-    filter: Filter,
-}
-
-#[derive(Serialize)]
-struct Filter {
-    hashes: u32,
-    bits_per_key: f64,
-}
-
-#[derive(Serialize)]
-struct Level {
-    level: u32,
-    resolution_m: f64,
-    voxels: usize,
-    plane_bytes: usize,
-    counter_bytes: usize,
-    expected_false_positive_rate: f64,
-    ideal_false_positive_rate: f64,
-    measured_false_positive_rate: Option<f64>,
-}
+#[serde(transparent)]
+pub(super) struct MapReport(JsonMap);
 
 impl MapReport {
     /// A map in one line of a list.
@@ -76,91 +31,51 @@ impl MapReport {
 
 impl From<&MapInfo> for MapReport {
     fn from(info: &MapInfo) -> Self {
-        let filter =
-            Filter { hashes: info.settings.filter.hashes, bits_per_key: info.settings.filter.bits_per_key };
-        let settings =
-            Settings { resolution_m: info.settings.resolution_m, levels: info.settings.levels, filter };
-        Self {
-            map: info.name.to_string(),
-            revision: info.version.revision,
-            map_uuid: info.version.map_uuid.to_string(),
-            settings,
-            levels: info.levels.iter().map(Level::from).collect(),
-            scans: info.scans,
-            robots: info.robots.iter().map(ToString::to_string).collect(),
-            set_bytes: info.set_bytes,
-            moment_bytes: info.moment_bytes,
-            trajectory_bytes: info.trajectory_bytes,
-            storage: info.storage.clone().map(Storage::from),
-        }
-    }
-}
-
-impl From<MapStorage> for Storage {
-    fn from(storage: MapStorage) -> Self {
-        let MapStorage { durable_revision, snapshot_revision, undo_from_revision, failure, .. } = storage;
-        Self { durable_revision, snapshot_revision, undo_from_revision, read_only: failure }
-    }
-}
-
-impl From<&LevelInfo> for Level {
-    fn from(info: &LevelInfo) -> Self {
-        Self {
-            level: info.level,
-            resolution_m: info.resolution_m,
-            voxels: info.voxels,
-            plane_bytes: info.plane_bytes,
-            counter_bytes: info.counter_bytes,
-            expected_false_positive_rate: info.expected_rate,
-            ideal_false_positive_rate: info.ideal_false_positive_rate,
-            measured_false_positive_rate: info.measured_rate,
-        }
+        Self(info.clone().into())
     }
 }
 
 impl Display for MapReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "map {} at revision {}, uuid {}", self.map, self.revision, self.map_uuid)?;
-        let robots = if self.robots.is_empty() { "nobody".into() } else { self.robots.join(", ") };
-        let (sets, moments) = (bytes(self.set_bytes), bytes(self.moment_bytes));
-        let (scans, poses) = (count(self.scans), bytes(self.trajectory_bytes));
+        let Self(map) = self;
+        let JsonVersion { revision, map_uuid } = &map.version;
+        writeln!(f, "map {} at revision {revision}, uuid {map_uuid}", map.map)?;
+        let robots = if map.robots.is_empty() { "nobody".into() } else { map.robots.join(", ") };
+        let (sets, moments) = (bytes(map.set_bytes), bytes(map.moment_bytes));
+        let (scans, poses) = (count(map.scans), bytes(map.trajectory_bytes));
         writeln!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}")?;
-        match &self.storage {
-            Some(storage) => writeln!(f, "{storage}")?,
+        match &map.storage {
+            Some(storage) => write_storage(f, storage)?,
             None => writeln!(f, "in memory only: it ends with the server")?,
         }
-        let Filter { hashes, bits_per_key } = self.settings.filter;
+        let JsonFilter { hashes, bits_per_key } = map.settings.filter;
         writeln!(f, "filters of {hashes} hashes, {bits_per_key} bits a voxel at least\n")?;
         write!(f, "level  resolution          voxels   filter plane      counters   false positives:")?;
         write!(f, " expected   eq. (1)   measured")?;
-        self.levels.iter().try_for_each(|level| write!(f, "\n{level}"))
+        map.levels.iter().try_for_each(|level| write_level(f, level))
     }
 }
 
-impl Display for Storage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { durable_revision, snapshot_revision, undo_from_revision, read_only } = self;
-        write!(f, "synced up to revision {durable_revision}, snapshot at {snapshot_revision}; ")?;
-        write!(f, "scans from revision {undo_from_revision} on can be undone")?;
-        read_only.iter().try_for_each(|reason| write!(f, "\nREAD ONLY since its journal failed: {reason}"))
-    }
+fn write_storage(f: &mut fmt::Formatter<'_>, storage: &JsonStorage) -> fmt::Result {
+    let JsonStorage { durable_revision, snapshot_revision, undo_from_revision, read_only } = storage;
+    write!(f, "synced up to revision {durable_revision}, snapshot at {snapshot_revision}; ")?;
+    writeln!(f, "scans from revision {undo_from_revision} on can be undone")?;
+    read_only.iter().try_for_each(|reason| writeln!(f, "READ ONLY since its journal failed: {reason}"))
 }
 
-impl Display for Level {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let measured = self.measured_false_positive_rate.map_or("-".into(), percent);
-        write!(
-            f,
-            "{:>5} {:>9} m {:>15} {:>14} {:>13} {:>26} {:>9} {measured:>10}",
-            self.level,
-            self.resolution_m,
-            count(self.voxels),
-            bytes(self.plane_bytes),
-            bytes(self.counter_bytes),
-            percent(self.expected_false_positive_rate),
-            percent(self.ideal_false_positive_rate),
-        )
-    }
+fn write_level(f: &mut fmt::Formatter<'_>, level: &JsonLevel) -> fmt::Result {
+    let measured = level.measured_false_positive_rate.map_or("-".into(), percent);
+    write!(
+        f,
+        "\n{:>5} {:>9} m {:>15} {:>14} {:>13} {:>26} {:>9} {measured:>10}",
+        level.level,
+        level.resolution_m,
+        count(level.voxels),
+        bytes(level.plane_bytes),
+        bytes(level.counter_bytes),
+        percent(level.expected_false_positive_rate),
+        percent(level.ideal_false_positive_rate),
+    )
 }
 
 /// `1,234,567`.

@@ -20,12 +20,12 @@ impl Output {
         Self { json, bar: ProgressBar::hidden() }
     }
 
-    /// The same with a bar of `steps` scans on standard error, if that is a terminal.
+    /// This output, with a bar of `steps` scans on standard error, if that is a terminal.
     pub(super) fn with_bar(self, steps: usize) -> Self {
         self.with_bar_of(steps, "scans")
     }
 
-    /// The same with a bar of `steps` of what is counted.
+    /// This output, with a bar of `steps` of what is counted.
     pub(super) fn with_bar_of(self, steps: usize, counted: &str) -> Self {
         let bar = ProgressBar::new(steps as u64);
         let template = format!("{{bar:40}} {{pos}}/{{len}} {counted}, {{elapsed}} gone, {{eta}} to go");
@@ -35,7 +35,7 @@ impl Output {
         Self { bar, ..self }
     }
 
-    /// The same with a line on standard error that says what goes on, if that is a terminal.
+    /// This output, with a line on standard error that says what goes on, if that is a terminal.
     pub(super) fn with_spinner(self) -> Self {
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {

@@ -117,7 +117,7 @@ struct Answer {
     occupied: usize,
     /// Share of the points that are occupied.
     share: f64,
-    /// Of the last batch.
+    /// The revision of the last batch.
     revision: u64,
     map_uuid: String,
     seconds: f64,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::geometry::{Pose, rotation_xyzw, translation_m};
+use crate::wire::json::JsonPose;
 
 /// A scan file's name, for a column.
 pub(super) fn name_of(file: &Path) -> String {
@@ -14,15 +14,10 @@ pub(super) fn name_width(files: &[PathBuf]) -> usize {
     files.iter().map(|file| name_of(file).chars().count()).max().unwrap_or(0).max("scan".len())
 }
 
-/// A pose as x y z (meters) qx qy qz qw.
-pub(super) fn seven(pose: &Pose) -> [f64; 7] {
-    let ([x, y, z], [qx, qy, qz, qw]) = (translation_m(pose), rotation_xyzw(pose));
-    [x, y, z, qx, qy, qz, qw]
-}
-
 /// The translation of a pose, for a column: `   1.234   -0.010    2.000`.
-pub(super) fn place(pose: &[f64; 7]) -> String {
-    format!("{:>9.3} {:>8.3} {:>8.3}", pose[0], pose[1], pose[2])
+pub(super) fn place(pose: &JsonPose) -> String {
+    let [x, y, z] = pose.translation_m;
+    format!("{x:>9.3} {y:>8.3} {z:>8.3}")
 }
 
 /// The head of the column of [`place`].

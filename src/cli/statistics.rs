@@ -14,7 +14,7 @@ pub(super) struct Statistics {
 }
 
 impl Statistics {
-    /// Of `errors`; none of an empty series.
+    /// The statistics of `errors`; none of an empty series.
     pub(super) fn of(mut errors: Vec<f64>) -> Option<Self> {
         errors.sort_unstable_by(f64::total_cmp);
         let (max, middle, n) = (*errors.last()?, errors.len() / 2, errors.len());

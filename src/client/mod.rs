@@ -68,7 +68,7 @@ impl Client {
         Self::connect_with(url, &Credentials::default()).await
     }
 
-    /// The same, with a key to show or a certificate to trust or show.
+    /// [`Client::connect`], with a key to show or a certificate to trust or show.
     ///
     /// # Errors
     /// When the address is none, nobody listens there, or the two do not trust each other.
@@ -81,8 +81,8 @@ impl Client {
         self.connection.channel()
     }
 
-    /// The same connection, with a deadline for every call that is not a stream: the server gives up at it, and
-    /// waits for a `min_revision` until it.
+    /// This connection, with a deadline for every call that is not a stream: the server gives up at it, and waits for a
+    /// `min_revision` until it.
     pub fn with_timeout(self, timeout: Duration) -> Self {
         Self { timeout: Some(timeout), ..self }
     }
@@ -147,8 +147,8 @@ impl Client {
         self.restore(map, file, false).await
     }
 
-    /// The same in the place of the map of that name, if there is one, which is kept as `NAME-replaced-REVISION` until it
-    /// is deleted.
+    /// Restores a map in the place of the map of that name, if there is one, which is kept as `NAME-replaced-REVISION`
+    /// until it is deleted.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.

@@ -18,7 +18,7 @@ pub enum ConfigError {
     Renamed {
         /// The setting that was given.
         old: &'static str,
-        /// Its name of today.
+        /// The setting's name of today.
         new: &'static str,
     },
     /// A number out of its range.
@@ -44,7 +44,7 @@ pub enum ConfigError {
     Contradiction {
         /// The one.
         one: &'static str,
-        /// The other.
+        /// The setting that it contradicts.
         other: &'static str,
     },
     /// A variable that would be a setting if it were spelled otherwise.
@@ -60,7 +60,7 @@ pub enum ConfigError {
     /// Numbers of a robot's table that make no filter.
     #[error("robots.{name}: {error}")]
     Robot {
-        /// Of the table.
+        /// The name of the table.
         name: String,
         /// What is wrong.
         error: PointFilterError,

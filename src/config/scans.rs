@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::align::Method;
 use crate::scan::PointFilter;
-use crate::wire::ByKeyword;
+use crate::wire::json::ByKeyword;
 
 /// How scans are aligned.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct TlsConfig {
     /// The server's certificate, PEM, its signers after it.
     pub certificate: Option<PathBuf>,
-    /// Its private key, PEM.
+    /// The certificate's private key, PEM.
     pub key: Option<PathBuf>,
     /// Certificates, PEM, of who may sign those of clients: without one of theirs nobody may connect.
     pub client_ca: Option<PathBuf>,

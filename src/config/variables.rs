@@ -21,7 +21,7 @@ enum Meaning {
     Setting,
     /// Not for the settings.
     Other,
-    /// It would be a setting if it were spelled so.
+    /// The variable would be a setting if it were spelled so.
     Misspelled(String),
     Unknown,
 }

@@ -23,7 +23,7 @@ type Piece = Result<Frame<Bytes>, axum::Error>;
 pub(super) struct WholeMessages {
     body: Body,
     message_bytes_max: usize,
-    /// Of messages that are not complete, in order.
+    /// Bytes of messages that are not complete, in order.
     kept: VecDeque<Bytes>,
     /// The last of it, where that came in small pieces.
     tail: BytesMut,

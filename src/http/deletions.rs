@@ -5,13 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonVersion};
+use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{Map, request_id_of};
 use crate::map::Region;
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
+use crate::wire::json::JsonVersion;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

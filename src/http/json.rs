@@ -1,10 +1,10 @@
-//! The pieces of JSON that several routes share.
+//! Points in JSON.
 
 use serde::de::{SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer};
 
-use crate::geometry::{self, Point, Pose, PoseError};
-use crate::service::{MapVersion, PointCloud};
+use crate::geometry::Point;
+use crate::service::PointCloud;
 
 /// `[[x, y, z], ...]`; a coordinate may be `null`, which stands for "no return" (JSON has no NaN).
 #[derive(Debug)]
@@ -38,41 +38,6 @@ impl<'de> Visitor<'de> for PointsVisitor {
             points.push(coordinates.map(|c| c.unwrap_or(f32::NAN)).into());
         }
         Ok(JsonPoints(points))
-    }
-}
-
-/// A rigid transform.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct JsonPose {
-    translation_m: [f64; 3],
-    rotation_xyzw: [f64; 4],
-}
-
-impl TryFrom<JsonPose> for Pose {
-    type Error = PoseError;
-
-    fn try_from(pose: JsonPose) -> Result<Self, PoseError> {
-        geometry::pose(pose.translation_m, pose.rotation_xyzw)
-    }
-}
-
-impl From<&Pose> for JsonPose {
-    fn from(pose: &Pose) -> Self {
-        Self { translation_m: geometry::translation_m(pose), rotation_xyzw: geometry::rotation_xyzw(pose) }
-    }
-}
-
-/// Which state of which map an answer speaks of; part of every answer's object.
-#[derive(Debug, Serialize)]
-pub(super) struct JsonVersion {
-    revision: u64,
-    map_uuid: String,
-}
-
-impl From<MapVersion> for JsonVersion {
-    fn from(version: MapVersion) -> Self {
-        Self { revision: version.revision, map_uuid: version.map_uuid.to_string() }
     }
 }
 

@@ -1,18 +1,17 @@
 //! `POST /v1/maps/{map}/localize`: where a scan was taken, with no guess.
 
 use axum::response::Json;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonPose, JsonVersion};
+use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
 use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
-use crate::service::{
-    CandidateAnswer, LocalizationAnswer, LocalizationRequest, PointCloud, Reason, ServiceError,
-};
+use crate::service::{LocalizationRequest, PointCloud, Reason, ServiceError};
+use crate::wire::json::JsonLocalization;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -41,7 +40,7 @@ struct BoxBody {
     max_m: [f64; 3],
 }
 
-/// The same beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
+/// The parameters of a localization beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LocalizationParams {
@@ -57,35 +56,11 @@ pub(super) struct LocalizationParams {
 
 type LocalizationPoints = Points<LocalizationBody, LocalizationParams>;
 
-#[derive(Serialize)]
-pub(super) struct LocalizationResponse {
-    accepted: bool,
-    verdict: &'static str,
-    reason: String,
-    candidates: Vec<CandidateResponse>,
-    exhaustive: bool,
-    cut_short: bool,
-    search_ms: f64,
-    points_skipped: usize,
-    #[serde(flatten)]
-    version: JsonVersion,
-}
-
-#[derive(Serialize)]
-struct CandidateResponse {
-    map_from_sensor: JsonPose,
-    overlap: f64,
-    inliers: f64,
-    blocked: f64,
-    fit: f64,
-    margin: Option<f64>,
-}
-
 pub(super) async fn localize(
     Service(service): Service,
     Map(map): Map,
     scan: LocalizationPoints,
-) -> Result<Json<LocalizationResponse>, HttpError> {
+) -> Result<Json<JsonLocalization>, HttpError> {
     let answer = service.localize(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
@@ -148,34 +123,5 @@ impl LocalizationParams {
             },
             time_limit: self.time_limit_s.map(LocalizationRequest::time_limit_of).transpose()?,
         })
-    }
-}
-
-impl From<LocalizationAnswer> for LocalizationResponse {
-    fn from(answer: LocalizationAnswer) -> Self {
-        Self {
-            accepted: answer.accepted(),
-            verdict: answer.verdict.as_str(),
-            reason: answer.reason,
-            candidates: answer.candidates.iter().map(CandidateResponse::from).collect(),
-            exhaustive: answer.exhaustive,
-            cut_short: answer.cut_short,
-            search_ms: answer.search_time.as_secs_f64() * 1e3,
-            points_skipped: answer.points_skipped,
-            version: answer.version.into(),
-        }
-    }
-}
-
-impl From<&CandidateAnswer> for CandidateResponse {
-    fn from(candidate: &CandidateAnswer) -> Self {
-        Self {
-            map_from_sensor: (&candidate.map_from_sensor).into(),
-            overlap: candidate.overlap,
-            inliers: candidate.inliers,
-            blocked: candidate.blocked,
-            fit: candidate.fit,
-            margin: candidate.margin,
-        }
     }
 }

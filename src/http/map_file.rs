@@ -9,10 +9,10 @@ use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 
 use super::error::HttpError;
-use super::maps::MapResponse;
 use super::middleware::Service;
 use super::params::{Map, NoParams, Params};
 use super::{Adapter, body, headers};
+use crate::wire::json::JsonMap;
 use crate::wire::snapshot_pieces;
 
 pub(super) async fn take(
@@ -51,7 +51,7 @@ pub(super) async fn restore(
     Map(map): Map,
     Params(RestoreParams { replace }): Params<RestoreParams>,
     request: Request,
-) -> Result<(StatusCode, Json<MapResponse>), HttpError> {
+) -> Result<(StatusCode, Json<JsonMap>), HttpError> {
     let file = body::octets(request, service.limits().map_file_bytes_max, "map_file_bytes_max").await?;
     let info = service.restore_map(map, file, replace).await?;
     Ok((StatusCode::CREATED, Json(info.into())))

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use super::body;
 use super::error::HttpError;
-use super::json::JsonVersion;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{Map, NoParams};
 use crate::bloom::FilterSettings;
-use crate::map::{LEVELS_DEFAULT, LevelInfo, MapSettings};
-use crate::service::{MapInfo, MapStorage, UnavailableMap};
+use crate::map::{LEVELS_DEFAULT, MapSettings};
+use crate::service::UnavailableMap;
+use crate::wire::json::JsonMap;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -45,57 +45,9 @@ impl SettingsBody {
 }
 
 #[derive(Serialize)]
-pub(super) struct MapResponse {
-    map: String,
-    #[serde(flatten)]
-    version: JsonVersion,
-    settings: SettingsResponse,
-    levels: Vec<LevelResponse>,
-    scans: usize,
-    robots: Vec<String>,
-    set_bytes: usize,
-    moment_bytes: usize,
-    trajectory_bytes: usize,
-    storage: Option<StorageResponse>,
-}
-
-#[derive(Serialize)]
-struct StorageResponse {
-    durable_revision: u64,
-    snapshot_revision: u64,
-    undo_from_revision: u64,
-    read_only: Option<String>,
-}
-
-#[derive(Serialize)]
-struct SettingsResponse {
-    resolution_m: f64,
-    levels: u32,
-    filter: FilterResponse,
-}
-
-#[derive(Serialize)]
-struct FilterResponse {
-    hashes: u32,
-    bits_per_key: f64,
-}
-
-#[derive(Serialize)]
-struct LevelResponse {
-    level: u32,
-    resolution_m: f64,
-    voxels: usize,
-    plane_bytes: usize,
-    counter_bytes: usize,
-    expected_false_positive_rate: f64,
-    ideal_false_positive_rate: f64,
-    measured_false_positive_rate: Option<f64>,
-}
-
-#[derive(Serialize)]
 pub(super) struct MapsResponse {
-    maps: Vec<MapResponse>,
-    /// Those that could not be opened.
+    maps: Vec<JsonMap>,
+    /// The maps that could not be opened.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unavailable: Vec<UnavailableResponse>,
 }
@@ -110,7 +62,7 @@ pub(super) async fn create(
     Service(service): Service,
     Map(name): Map,
     body::Json(settings): body::Json<SettingsBody>,
-) -> Result<(StatusCode, Json<MapResponse>), HttpError> {
+) -> Result<(StatusCode, Json<JsonMap>), HttpError> {
     let (info, created) = service.create_map(name, settings.or(service.default_filter())).await?;
     let status = if created { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, Json(info.into())))
@@ -120,7 +72,7 @@ pub(super) async fn describe(
     Service(service): Service,
     Map(name): Map,
     NoParams: NoParams,
-) -> Result<Json<MapResponse>, HttpError> {
+) -> Result<Json<JsonMap>, HttpError> {
     let info = service.map_info(&name).await?;
     Ok(Json(info.into()))
 }
@@ -142,54 +94,4 @@ pub(super) async fn delete(
 ) -> Result<StatusCode, HttpError> {
     service.delete_map(&name).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-impl From<MapInfo> for MapResponse {
-    fn from(info: MapInfo) -> Self {
-        Self {
-            map: info.name.to_string(),
-            version: info.version.into(),
-            settings: info.settings.into(),
-            levels: info.levels.iter().map(Into::into).collect(),
-            scans: info.scans,
-            robots: info.robots.iter().map(ToString::to_string).collect(),
-            set_bytes: info.set_bytes,
-            moment_bytes: info.moment_bytes,
-            trajectory_bytes: info.trajectory_bytes,
-            storage: info.storage.map(Into::into),
-        }
-    }
-}
-
-impl From<MapStorage> for StorageResponse {
-    fn from(storage: MapStorage) -> Self {
-        Self {
-            durable_revision: storage.durable_revision,
-            snapshot_revision: storage.snapshot_revision,
-            undo_from_revision: storage.undo_from_revision,
-            read_only: storage.failure,
-        }
-    }
-}
-
-impl From<MapSettings> for SettingsResponse {
-    fn from(MapSettings { resolution_m, levels, filter }: MapSettings) -> Self {
-        let filter = FilterResponse { hashes: filter.hashes, bits_per_key: filter.bits_per_key };
-        Self { resolution_m, levels, filter }
-    }
-}
-
-impl From<&LevelInfo> for LevelResponse {
-    fn from(info: &LevelInfo) -> Self {
-        Self {
-            level: info.level,
-            resolution_m: info.resolution_m,
-            voxels: info.voxels,
-            plane_bytes: info.plane_bytes,
-            counter_bytes: info.counter_bytes,
-            expected_false_positive_rate: info.expected_rate,
-            ideal_false_positive_rate: info.ideal_false_positive_rate,
-            measured_false_positive_rate: info.measured_rate,
-        }
-    }
 }

@@ -7,14 +7,16 @@ use serde::{Deserialize, Serialize};
 use super::body::Points;
 use super::error::HttpError;
 use super::headers;
-use super::json::{JsonPoints, JsonPose, JsonVersion};
+use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
 use crate::geometry::Pose;
 use crate::map::Lookup;
 use crate::service::{PointAnswer, PointCloud, PointQuery, ServiceError};
-use crate::wire::{ByKeyword, InField, uuid_from};
+use crate::wire::json::ByKeyword;
+use crate::wire::json::{JsonPose, JsonVersion};
+use crate::wire::{InField, uuid_from};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,22 +1,23 @@
 //! `POST /v1/maps/{map}/scans` and `/alignment`: insert a scan, or only align it.
 
 use axum::response::Json;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::body::Points;
 use super::error::HttpError;
-use super::json::{JsonPoints, JsonPose, JsonVersion};
+use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
-use crate::align::{Direction, Method};
+use crate::align::Method;
 use crate::geometry::Pose;
 use crate::map::RobotName;
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
-use crate::service::{PointCloud, Reason, ScanAnswer, ScanRequest, ServiceError};
-use crate::wire::ByKeyword;
+use crate::service::{PointCloud, Reason, ScanRequest, ServiceError};
 use crate::wire::InField;
+use crate::wire::json::ByKeyword;
+use crate::wire::json::{JsonPose, JsonScan};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,54 +68,11 @@ pub(super) struct ScanParams {
 
 type ScanPoints = Points<ScanBody, ScanParams>;
 
-#[derive(Serialize)]
-pub(super) struct ScanResponse {
-    accepted: bool,
-    verdict: &'static str,
-    reason: String,
-    map_from_sensor: JsonPose,
-    overlap: f64,
-    level_overlaps: Vec<f64>,
-    inliers: f64,
-    fitness: f64,
-    information: Option<[[f64; 6]; 6]>,
-    undetermined: Vec<DirectionResponse>,
-    iterations: u32,
-    align_ms: f64,
-    new_voxels: usize,
-    points_skipped: usize,
-    replayed: bool,
-    stationary: bool,
-    /// Places in the scan of the points that the map does not show.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    foreground: Option<Vec<usize>>,
-    #[serde(flatten)]
-    version: JsonVersion,
-}
-
-/// The places of the bits that are set, the lowest of each byte first.
-fn places(bitmap: &[u8]) -> Vec<usize> {
-    (0..bitmap.len() * 8).filter(|i| bitmap[i / 8] >> (i % 8) & 1 == 1).collect()
-}
-
-/// See [`Direction`]; `std_m` is null where nothing holds the pose.
-#[derive(Serialize)]
-struct DirectionResponse {
-    direction: [f64; 6],
-    std_m: Option<f64>,
-}
-
-impl From<Direction> for DirectionResponse {
-    fn from(open: Direction) -> Self {
-        Self { direction: open.direction, std_m: Some(open.std_m).filter(|std_m| std_m.is_finite()) }
-    }
-}
-
 pub(super) async fn insert(
     Service(service): Service,
     Map(map): Map,
     scan: ScanPoints,
-) -> Result<Json<ScanResponse>, HttpError> {
+) -> Result<Json<JsonScan>, HttpError> {
     let answer = service.insert_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
@@ -123,7 +81,7 @@ pub(super) async fn align(
     Service(service): Service,
     Map(map): Map,
     scan: ScanPoints,
-) -> Result<Json<ScanResponse>, HttpError> {
+) -> Result<Json<JsonScan>, HttpError> {
     let answer = service.align_scan(&map, scan.try_into()?).await?;
     Ok(Json(answer.into()))
 }
@@ -209,31 +167,6 @@ fn guess_of(
         _ => {
             let message = "one of guess, motion and constant_velocity can be given, got several";
             Err(ServiceError::new(Reason::AmbiguousGuess, message))
-        }
-    }
-}
-
-impl From<ScanAnswer> for ScanResponse {
-    fn from(answer: ScanAnswer) -> Self {
-        Self {
-            accepted: answer.accepted,
-            verdict: answer.verdict.as_str(),
-            map_from_sensor: (&answer.map_from_sensor).into(),
-            overlap: answer.overlap(),
-            iterations: answer.iterations,
-            new_voxels: answer.new_voxels,
-            points_skipped: answer.points_skipped,
-            replayed: answer.replayed,
-            stationary: answer.stationary,
-            foreground: answer.foreground.map(|foreground| places(&foreground.bitmap)),
-            version: answer.version.into(),
-            align_ms: answer.align_time.as_secs_f64() * 1e3,
-            inliers: answer.inliers,
-            fitness: answer.fitness,
-            information: answer.information,
-            undetermined: answer.undetermined.into_iter().map(Into::into).collect(),
-            level_overlaps: answer.level_overlaps,
-            reason: answer.reason,
         }
     }
 }

@@ -13,11 +13,11 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::Adapter;
 use super::error::HttpError;
-use super::json::{JsonPose, JsonVersion};
 use super::middleware::Service;
 use super::params::{Map, Params};
 use crate::map::{MappedScan, RobotName};
 use crate::service::{Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
+use crate::wire::json::{JsonPose, JsonVersion};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

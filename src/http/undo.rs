@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use super::body;
 use super::error::HttpError;
-use super::json::JsonVersion;
 use super::middleware::Service;
 use super::params::{Map, request_id_of};
 use crate::map::RobotName;
 use crate::service::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget};
+use crate::wire::json::JsonVersion;
 
 /// `{"robot", "scan_id"}`, `{"robot", "since_revision"}` or `{"revision"}`.
 #[derive(Deserialize)]

@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Adapter;
 use super::error::HttpError;
-use super::json::JsonVersion;
 use super::middleware::Service;
 use super::params::{Map, Params, numbers};
 use crate::map::Region;
 use crate::service::{Reason, ServiceError};
 use crate::voxel::VoxelKey;
+use crate::wire::json::JsonVersion;
 
 /// Voxels that are written to JSON at once: about half a MiB.
 const VOXELS_PER_CHUNK: usize = 32_768;

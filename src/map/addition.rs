@@ -23,9 +23,9 @@ pub(super) struct Addition {
 /// What becomes of a level's filter.
 #[derive(Debug)]
 enum OfLevel {
-    /// It has room.
+    /// The filter has capacity for the new keys: their probes.
     Gains(Vec<Probe>),
-    /// It gives way to a larger one, which has the new voxels already.
+    /// The filter gives way to a larger one, which has the new voxels already.
     Grown(CountingBloomFilter),
 }
 

@@ -20,7 +20,7 @@ pub(super) fn bounds(points: &[Point]) -> Option<Bounds> {
 /// Coordinates that are compared at once: those of eight points, so that both bounds stay in registers.
 const LANES: usize = 24;
 
-/// The same with registers of twice the size.
+/// [`bounds`] with registers of twice the size.
 #[cfg(target_arch = "x86_64")]
 fn bounds_avx2(_: Avx2, points: &[Point]) -> Option<Bounds> {
     #[target_feature(enable = "avx2")]

@@ -5,7 +5,7 @@ use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::prefetch;
 use crate::voxel::{BlockInCluster, BlockMask, ClusterTable, VoxelKey};
 
-/// How many misses are under way at once.
+/// Cache misses that are under way at once.
 const AT_ONCE: usize = 32;
 
 /// Calls `f(block, voxels there)` for each block: what leads to the next of them is fetched in three steps.

@@ -19,7 +19,7 @@ pub(super) struct CapacitySchedule {
 }
 
 impl CapacitySchedule {
-    /// Of one level of a shard.
+    /// The schedule of one level of a shard.
     pub(super) fn of(shard: usize, level: usize) -> Self {
         // Five has no divisor in common with sixteen: levels of one shard are far apart.
         Self { phase: ((shard + 5 * level) % PHASES) as f64 / PHASES as f64 }

@@ -44,9 +44,9 @@ pub struct UndoRecord {
 pub struct Request {
     /// Chosen by the caller.
     pub id: RequestId,
-    /// Of what was asked for, so that the same request sent again is told from another under its id.
+    /// A digest of what was asked for, so that the same request sent again is told from another under its id.
     pub digest: u64,
-    /// Who asked for it; none without a key, and in what was written before this was noted.
+    /// The caller who asked for it; none without a key, and in what was written before this was noted.
     pub caller: Option<CallerName>,
 }
 

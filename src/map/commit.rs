@@ -53,7 +53,7 @@ impl<'a> Committer<'a> {
         self.apply_until(change, StopSignal::NEVER).unwrap_or(unchanged)
     }
 
-    /// The same; none once stopped, and the map is of no use then.
+    /// [`Committer::apply`] under a stop signal; none once stopped, and the map is of no use then.
     pub fn apply_until(self, change: &Change, stop: StopSignal<'_>) -> Option<Committed> {
         match change {
             Change::Insertion(scan) => self.insert(scan, stop),

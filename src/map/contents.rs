@@ -34,7 +34,7 @@ pub struct MapContents {
     pub revision: u64,
     /// The finest voxels.
     pub voxels: VoxelSet,
-    /// Of the points in them.
+    /// Moments of the points in the voxels.
     pub moments: MomentSet,
     /// The accepted scans.
     pub trajectory: Trajectory,
@@ -79,7 +79,7 @@ impl MultiResolutionMap {
         self.taken_until(StopSignal::NEVER)
     }
 
-    /// The same; none once stopped.
+    /// [`MultiResolutionMap::contents`] under a stop signal; none once stopped.
     pub fn contents_until(&self, stop: StopSignal<'_>) -> Option<MapContents> {
         Some(self.taken_until(stop)).filter(|_| !stop.is_stopped())
     }
@@ -105,7 +105,7 @@ impl MultiResolutionMap {
         Ok(map)
     }
 
-    /// The same; none once stopped.
+    /// [`MultiResolutionMap::restore`] under a stop signal; none once stopped.
     ///
     /// # Errors
     /// When a setting is out of range.

@@ -16,9 +16,9 @@ pub const REQUESTS_PER_CALLER_KEPT: usize = 8_192;
 pub struct CompletedRequest {
     /// Chosen by the caller.
     pub id: RequestId,
-    /// Of what was asked for.
+    /// A digest of what was asked for.
     pub digest: u64,
-    /// Who asked for it, where that is known.
+    /// The caller who asked for it, where that is known.
     pub caller: Option<CallerName>,
     /// The revision that it made.
     pub revision: u64,
@@ -55,7 +55,7 @@ pub enum RequestKind {
 }
 
 impl CompletedRequest {
-    /// Its kind: an undo takes out a scan at least, a deletion none.
+    /// The request's kind: an undo takes out a scan at least, a deletion none.
     pub fn kind(&self) -> RequestKind {
         if self.scans > 0 { RequestKind::Undo } else { RequestKind::Deletion }
     }
@@ -78,7 +78,7 @@ impl IdempotencyLog {
         self.answered.get(of(caller.cloned()).or_else(|| of(None))?)
     }
 
-    /// All of them, in the order of their revisions.
+    /// All completed requests, in the order of their revisions.
     pub fn iter(&self) -> impl Iterator<Item = &CompletedRequest> {
         self.answered.values()
     }
@@ -102,7 +102,7 @@ impl IdempotencyLog {
         }
     }
 
-    /// How many of a caller's are remembered.
+    /// How many requests of a caller are remembered.
     fn of(&self, caller: &Option<CallerName>) -> usize {
         self.by_caller.get(caller).map_or(0, VecDeque::len)
     }

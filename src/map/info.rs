@@ -23,7 +23,7 @@ pub struct LevelInfo {
     pub counter_bytes: usize,
     /// False positive rate by the closed form of the filter's layout: the mean over shards, weighted by voxels.
     pub expected_rate: f64,
-    /// The same by eq. (1) of the paper.
+    /// The false-positive rate by eq. (1) of the paper.
     pub ideal_false_positive_rate: f64,
     /// The share of absent neighbors of occupied voxels that the filter lets through; none of an empty level.
     pub measured_rate: Option<f64>,
@@ -52,12 +52,13 @@ impl MultiResolutionMap {
         self.described_until(samples, seed, StopSignal::NEVER)
     }
 
-    /// The same, with a look at the stop signal before each shard of each level; none once stopped.
+    /// [`MultiResolutionMap::describe`], with a look at the stop signal before each shard of each level; none once
+    /// stopped.
     pub fn describe_until(&self, samples: usize, seed: u64, stop: StopSignal<'_>) -> Option<MapDescription> {
         Some(self.described_until(samples, seed, stop)).filter(|_| !stop.is_stopped())
     }
 
-    /// Of no use once stopped.
+    /// The description, which is of no use once stopped.
     fn described_until(&self, samples: usize, seed: u64, stop: StopSignal<'_>) -> MapDescription {
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());

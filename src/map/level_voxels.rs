@@ -17,7 +17,7 @@ pub struct LevelVoxels {
     /// Levels up in the blocks.
     up: u32,
     blocks: Vec<(VoxelKey, BlockMask)>,
-    /// Of blocks with a few voxels.
+    /// Keys of the voxels of blocks with a few voxels.
     voxels: Vec<VoxelKey>,
     len: usize,
 }

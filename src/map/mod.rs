@@ -107,7 +107,7 @@ impl MultiResolutionMap {
         &self.settings
     }
 
-    /// Its lattices.
+    /// The lattices of the map's levels.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
@@ -167,7 +167,8 @@ impl MultiResolutionMap {
         MapView::lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
     }
 
-    /// The same where all its locks are to be had at once, for threads that may not wait.
+    /// [`MultiResolutionMap::view_of`] where no lock has to be waited for; none elsewhere. For threads that may not
+    /// wait.
     pub fn try_view_of(&self, points: &[Point], map_from_points: &Pose) -> Option<MapView<'_>> {
         MapView::try_lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))
     }

@@ -20,7 +20,7 @@ pub(super) struct ShardedMoments {
     shards: [RwLock<MomentShard>; SHARDS],
 }
 
-/// Those of one shard.
+/// The moments of one shard.
 #[derive(Debug, Default)]
 pub(super) struct MomentShard(HashMap<VoxelKey, Moments>);
 
@@ -40,7 +40,7 @@ pub(super) type MomentsOfShard = Vec<(VoxelKey, Moments)>;
 /// What becomes of the moments of one shard's voxels that lose descendants.
 #[derive(Debug)]
 pub(super) enum MomentsLost {
-    /// All of them go.
+    /// All moments go.
     Everything,
     /// Some go, others are rebuilt from the voxels that stay.
     Some { gone: Vec<VoxelKey>, rebuilt: MomentsOfShard },
@@ -147,12 +147,12 @@ impl MomentsView<'_> {
         self.shards[self.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].0.get(&voxel)
     }
 
-    /// All of them.
+    /// All moments.
     pub fn to_set(&self) -> MomentSet {
         self.to_set_until(StopSignal::NEVER)
     }
 
-    /// The same; once stopped, some of them.
+    /// All moments; once stopped, some of them.
     pub(super) fn to_set_until(&self, stop: StopSignal<'_>) -> MomentSet {
         let mut all = Vec::with_capacity(self.shards.iter().map(|shard| shard.0.len()).sum());
         let entries = stop.paced(self.shards.iter().flat_map(|shard| &shard.0), VOXELS_PER_LOOK);

@@ -87,7 +87,7 @@ impl RequestId {
     }
 }
 
-/// Who asks for changes, by the name of a key: 1 to 64 of `[A-Za-z0-9_.-]`.
+/// The name of the key of who asks for changes: 1 to 64 of `[A-Za-z0-9_.-]`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CallerName(Arc<str>);
 

@@ -28,7 +28,7 @@ impl<'a> OccupiedVoxelList<'a> {
         Self { level, blocks, filter }
     }
 
-    /// Its level, 0 the finest.
+    /// The list's level, 0 the finest.
     pub fn level(&self) -> u32 {
         self.level
     }

@@ -12,9 +12,9 @@ pub enum Region {
     },
     /// A ball, meters.
     Sphere {
-        /// Its center.
+        /// The center, meters, map frame.
         center_m: [f64; 3],
-        /// Its radius.
+        /// The radius, meters.
         radius_m: f64,
     },
 }

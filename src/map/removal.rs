@@ -33,9 +33,9 @@ enum Left {
 /// What becomes of the bit plane of a level's filter.
 #[derive(Debug)]
 enum OfLevel {
-    /// It loses these bits.
+    /// The filter loses these bits.
     Loses(Vec<Probe>),
-    /// It gives way to one without the bits of so many keys.
+    /// The filter's plane gives way to one without the bits of so many keys.
     Plane { plane: Vec<u64>, keys_lost: usize },
 }
 
@@ -107,7 +107,7 @@ struct Tier<'a> {
     tier: usize,
     /// The blocks that lose a voxel, as they are afterwards.
     losses: Vec<Block>,
-    /// Those of them that lose their last one.
+    /// The voxels that lose their last descendant.
     emptied: Vec<VoxelKey>,
     /// What goes, level by level.
     keys: Vec<Vec<u64>>,

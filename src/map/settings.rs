@@ -21,10 +21,10 @@ pub const LEVELS_DEFAULT: u32 = 6;
 /// Why settings cannot make a map.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum MapSettingsError {
-    /// Of the lattice.
+    /// An error in the settings of the lattice.
     #[error(transparent)]
     Lattice(#[from] SettingError),
-    /// Of the filter.
+    /// An error in the settings of the filter.
     #[error(transparent)]
     Filter(#[from] FilterSettingsError),
 }

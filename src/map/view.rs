@@ -48,7 +48,7 @@ impl<'a> MapView<'a> {
         Self { map, shards, revision: map.revision() }
     }
 
-    /// The same where no lock has to be waited for.
+    /// A view where no lock has to be waited for; none elsewhere.
     pub(super) fn try_lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Option<Self> {
         let mut shards = [const { None }; SHARDS];
         for i in (0..SHARDS).filter(|&i| touched.contains(i)) {
@@ -133,7 +133,7 @@ impl<'a> MapView<'a> {
         self.voxels_until(StopSignal::NEVER)
     }
 
-    /// The same; once stopped, some of them.
+    /// All finest voxels that the view covers; once stopped, some of them.
     pub(super) fn voxels_until(&self, stop: StopSignal<'_>) -> VoxelSet {
         let mut all = Vec::with_capacity(self.lists(0).map(|list| list.blocks().len()).sum());
         all.extend(
@@ -176,7 +176,7 @@ impl<'a> MapView<'a> {
         self.finest_in_until(region, level, StopSignal::NEVER)
     }
 
-    /// The same; once stopped, some of them.
+    /// [`MapView::finest_in`] under a stop signal; once stopped, some of the voxels.
     pub fn finest_in_until(&self, region: &Region, level: u32, stop: StopSignal<'_>) -> VoxelSet {
         let (tier, _) = tier_of(level);
         let mut found = Vec::new();

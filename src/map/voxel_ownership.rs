@@ -60,7 +60,7 @@ pub struct Leaving {
 const ENTRIES_PER_LOOK: usize = 16 << 10;
 
 impl VoxelOwnership {
-    /// Of scans that are to be undone, by revision; those of `withdrawn` hold nothing any more.
+    /// The ownership of scans that are to be undone, by revision; those of `withdrawn` hold nothing any more.
     pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan]) -> Self {
         targets.sort_unstable();
         let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();

@@ -11,7 +11,7 @@ pub enum MappingError {
     NotFinite {
         /// The first such point.
         index: usize,
-        /// How many there are.
+        /// How many points there are.
         count: usize,
     },
     /// No point is finite.

@@ -10,7 +10,7 @@ use crate::scan::PointFilter;
 pub struct FilteredPoints {
     /// The points, sensor frame.
     pub points: Vec<Point>,
-    /// How many were left out.
+    /// How many points were left out.
     pub skipped: usize,
     filter: PointFilter,
 }

@@ -64,9 +64,9 @@ pub struct Scan<'a> {
     pub robot: &'a RobotName,
     /// The robot's own number of the scan.
     pub scan_id: Option<u64>,
-    /// When it was taken, nanoseconds since the Unix epoch.
+    /// When the scan was taken, nanoseconds since the Unix epoch.
     pub timestamp_ns: Option<i64>,
-    /// Its points in the sensor frame, all of them finite.
+    /// The scan's points in the sensor frame, meters, all of them finite.
     pub points: &'a [Point],
     /// Points that were left out before, see [`FilteredPoints`].
     pub points_skipped: usize,
@@ -74,7 +74,7 @@ pub struct Scan<'a> {
     pub guess: Guess,
     /// The guess is taken as it is, without aligning.
     pub at_guess: bool,
-    /// It is inserted where it was found even if it does not fit there.
+    /// Insert the scan where it was found even if it does not fit there.
     pub force: bool,
     /// Digest of the request, which tells the same scan sent again from another one under its id.
     pub digest: u64,

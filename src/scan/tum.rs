@@ -39,7 +39,7 @@ pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ReadError> {
     parse_trajectory(path, &read_file(path)?)
 }
 
-/// The same of a file's `bytes`, wherever they came from; `path` is what errors name.
+/// The trajectory in a file's `bytes`, wherever they came from; `path` is what errors name.
 ///
 /// # Errors
 /// When a line is no pose, as there.

@@ -43,7 +43,7 @@ pub(super) struct Endpoint {
 pub(super) struct Bounds {
     /// Until it is secure and has begun to speak.
     pub(super) opening_max: Duration,
-    /// Without a request.
+    /// How long a connection may stay without a request.
     pub(super) idle_max: Duration,
     /// In all, where it was taken for a health check while all places were in use.
     pub(super) reserved_max: Duration,

@@ -36,7 +36,7 @@ pub enum ServerError {
         /// Why.
         error: io::Error,
     },
-    /// Without keys, other machines could do everything.
+    /// Other machines could do everything, since there are no keys.
     #[error(
         "{protocol} would let whoever reaches {address} do everything: name a file of keys (access.keys_file or \
          --keys-file; `mrol key new` makes keys), listen on loopback, or say that this is meant (access.open or \

@@ -38,7 +38,7 @@ impl FailedHandshakes {
         }
     }
 
-    /// How many there were.
+    /// How many handshakes of a protocol have failed.
     pub(super) fn count(&self, protocol: Protocol) -> u64 {
         self.of(protocol).load(Ordering::Relaxed)
     }

@@ -133,7 +133,8 @@ impl Certificates {
 }
 
 impl Expiry {
-    /// That of the certificate which expires first; none where none can be read, which rustls says in its own words.
+    /// The expiry of the certificate which expires first; none where none can be read, which rustls says in its own
+    /// words.
     fn of(setting: &'static str, certificates: &[CertificateDer<'_>]) -> Option<Self> {
         let not_after = |certificate: &CertificateDer<'_>| {
             let (_, certificate) = parse_x509_certificate(certificate).ok()?;

@@ -10,7 +10,7 @@ use crate::telemetry::Metrics;
 
 /// How often.
 const INTERVAL: Duration = Duration::from_secs(1);
-/// So large that the allocator has it from the system, and not from what it keeps for small ones.
+/// The size of a block so large that the allocator has it from the system, and not from what it keeps for small ones.
 const LARGE_BLOCK: usize = 4 << 20;
 
 /// Measures disk and memory, ends what is silent, and tells the metrics, until the server is draining. It is a task of its

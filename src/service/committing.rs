@@ -62,7 +62,7 @@ pub(super) struct Prepared {
     pub(super) change: Change,
     /// Where there is a journal.
     pub(super) record: Option<Record>,
-    /// It was decided on an empty map, and holds for no other.
+    /// True of a change that was decided on an empty map, and holds for no other.
     pub(super) if_empty: bool,
     pub(super) turn: Turn,
     /// The memory that it takes.
@@ -74,7 +74,7 @@ pub(super) struct Prepared {
 pub(super) enum Refusal {
     /// The map has changed since it was decided on: decide again.
     Stale,
-    /// It cannot be made.
+    /// The change cannot be made.
     Failed(ServiceError),
 }
 
@@ -88,7 +88,7 @@ pub(super) type Outcome = Result<Committed, Refusal>;
 
 /// A request that is answered, or on its way into the map.
 pub(super) enum Step<A> {
-    /// It changes nothing, or was done before.
+    /// The request changes nothing, or was done before: its answer.
     Answered(A),
     /// What becomes of it will be known, and then what to say.
     Proposed(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
@@ -214,9 +214,9 @@ impl CommitQueue {
 /// Why a map takes no more changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// Its journal could not be written: what the disk holds is unknown.
+    /// The map's journal could not be written: what the disk holds is unknown.
     Failed(String),
-    /// It was deleted.
+    /// The map was deleted.
     Deleted,
     /// Another has its name now.
     Replaced,

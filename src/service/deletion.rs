@@ -81,7 +81,7 @@ impl HostedMap {
         }
     }
 
-    /// The same request may have come twice, and the other one first.
+    /// Refuses or answers a request that came twice, where the other one was first.
     pub(super) fn still_unanswered(
         &self,
         kind: RequestKind,

@@ -8,7 +8,7 @@ use sha2::{Digest as _, Sha256};
 pub(super) struct Digest(Sha256);
 
 impl Digest {
-    /// Of a request of that kind.
+    /// The digest of a request of that kind, with none of its fields yet.
     pub(super) fn new(kind: &str) -> Self {
         Self(Sha256::new()).bytes(kind.as_bytes())
     }

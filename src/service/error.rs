@@ -37,7 +37,7 @@ impl ServiceError {
         self.reason.code()
     }
 
-    /// The same, with when to come again.
+    /// This failure, with when to come again.
     pub fn retry_after(self, wait: Duration) -> Self {
         Self { retry_after: Some(wait), ..self }
     }

@@ -11,7 +11,7 @@ pub enum ErrorCode {
     PermissionDenied,
     /// No such map.
     NotFound,
-    /// It exists already and is not the same.
+    /// What was to be made exists already and is not the same.
     Conflict,
     /// The state of the map does not allow it; `reason` says which.
     FailedPrecondition,

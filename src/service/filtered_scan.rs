@@ -8,7 +8,7 @@ use crate::mapping::{FilteredPoints, Guess, MappingError, Scan};
 pub(super) struct FilteredScan<'a> {
     pub(super) request: &'a ScanRequest,
     filtered: FilteredPoints,
-    /// Of the request.
+    /// The digest of the request.
     pub(super) digest: u64,
 }
 

@@ -25,9 +25,9 @@ use crate::voxel::LatticeFromPoints;
 /// Which maps to write snapshots of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Saving {
-    /// Those that changed since their last one.
+    /// Maps that changed since their last snapshot.
     Changed,
-    /// Of those, the ones with much journal or an old snapshot.
+    /// Maps that changed, with much journal or an old snapshot.
     Due,
 }
 
@@ -55,7 +55,7 @@ const TURNS_KEPT: usize = 1024;
 /// Points that are looked up before it is asked whether somebody waits for the answer: a millisecond or less. A multiple
 /// of the bits in a word.
 const POINTS_PER_STEP: usize = 64 << 10;
-/// Of the sample on which false positives are measured: the same map gives the same figures.
+/// Seed of the sample on which false positives are measured: the same map gives the same figures.
 const RATE_SEED: u64 = 1;
 
 impl HostedMap {
@@ -71,7 +71,7 @@ impl HostedMap {
         Self::of_shared(thread, name, uuid, map.into(), folder.map(Arc::new), settings)
     }
 
-    /// The same map under the name `name`, once this one has ended.
+    /// This map under the name `name`, once it has ended under its own.
     pub(super) fn again_as(&self, thread: CommitThread, name: MapName, settings: &StoreSettings) -> Self {
         Self::of_shared(thread, name, self.uuid, Arc::clone(&self.map), self.folder.clone(), settings)
     }

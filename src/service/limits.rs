@@ -57,7 +57,7 @@ pub struct Limits {
     pub scrape_kept_s: f64,
     /// Calls of `grpc.health.v1.Health/Watch`, one a connection. 16.
     pub health_watches_max: usize,
-    /// How long one of them lasts that came without a key. 600 s.
+    /// How long a health watch lasts that came without a key, seconds. 600.
     pub health_watch_max_s: f64,
     /// Points of one query, deletion or scan. 2,000,000.
     pub points_per_request_max: usize,
@@ -158,7 +158,7 @@ impl Limits {
     /// Bytes of one message where nothing is set.
     pub const MESSAGE_BYTES_MAX: usize = 32 << 20;
 
-    /// The same limits for a process that may have so many bytes in memory, if that is known: what may lie in bodies, be
+    /// These limits for a process that may have so many bytes in memory, if that is known: what may lie in bodies, be
     /// restored or be searched in at once is an eighth of that at most.
     pub fn within_memory(self, allowed_bytes: Option<u64>) -> Self {
         let share =
@@ -219,7 +219,7 @@ impl Limits {
 pub struct Marks {
     /// With fewer bytes free on the disk of the data folder, changes are refused; 0 = never. 256 MiB.
     pub disk_free_low_bytes: u64,
-    /// With that many bytes free they are taken again. 512 MiB.
+    /// With that many bytes free, changes are taken again. 512 MiB.
     pub disk_free_resume_bytes: u64,
     /// With more bytes of memory in use, what makes maps grow is refused; without, 85 % of what the process may use.
     pub memory_high_bytes: Option<u64>,

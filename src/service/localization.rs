@@ -48,7 +48,7 @@ pub struct LocalizationAnswer {
     pub search_time: Duration,
     /// Points that were not finite.
     pub points_skipped: usize,
-    /// That was searched.
+    /// The version of the map that was searched.
     pub version: MapVersion,
 }
 
@@ -65,7 +65,7 @@ pub struct CandidateAnswer {
     pub blocked: f64,
     /// Overlap times the fraction of the rays that are not blocked: what candidates are ranked by.
     pub fit: f64,
-    /// Its fit less that of the best other candidate; none where there is no other.
+    /// The candidate's fit less that of the best other candidate; none where there is no other.
     pub margin: Option<f64>,
 }
 

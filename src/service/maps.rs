@@ -167,7 +167,7 @@ impl MapService {
         self.save_maps(Saving::Changed).await
     }
 
-    /// The same for the maps with much journal or an old snapshot; to be called every now and then.
+    /// Writes snapshots of the maps with much journal or an old snapshot; to be called every now and then.
     ///
     /// # Errors
     /// As for [`MapService::save`].

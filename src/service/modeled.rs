@@ -26,7 +26,8 @@ use crate::util::StopSignal;
 #[expect(dead_code, reason = "nothing fails here")]
 mod simulated;
 
-/// Of each modeled thread: what a change plans and a snapshot encodes takes more than the checker gives by itself.
+/// Stack of each modeled thread: what a change plans and a snapshot encodes takes more than the checker gives by
+/// itself.
 const STACK_BYTES: usize = 2 << 20;
 
 fn name() -> MapName {

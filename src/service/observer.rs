@@ -30,9 +30,9 @@ pub struct Ended<'a> {
 /// How an operation ended.
 #[derive(Debug)]
 pub enum End<'a> {
-    /// It was done.
+    /// The operation was done.
     Done(Outcome),
-    /// It was refused, or failed.
+    /// The operation was refused, or failed.
     Failed(&'a ServiceError),
     /// The caller went away first. A change that was decided on by then is made all the same.
     CallerGone,
@@ -41,18 +41,18 @@ pub enum End<'a> {
 /// What an operation did.
 #[derive(Debug)]
 pub enum Outcome {
-    /// It read, and nothing of it is counted.
+    /// The operation read, and nothing of it is counted.
     Read,
     /// Points were looked up.
     Points {
         /// How.
         lookup: Lookup,
-        /// How many.
+        /// How many points.
         points: usize,
     },
     /// A scan was judged, and inserted where the verdict or its sender said so.
     Scan {
-        /// Who sent it.
+        /// The robot that sent the scan.
         robot: RobotName,
         /// How it fits.
         verdict: Verdict,
@@ -74,7 +74,7 @@ pub struct Change {
     pub voxels_removed: usize,
     /// Scans that were taken out.
     pub scans_undone: usize,
-    /// It had been done before under its request id, or had nothing to do.
+    /// True of a change that was done before under its request id, or had nothing to do.
     pub replayed: bool,
 }
 

@@ -34,7 +34,7 @@ pub(super) struct Pool {
     counts: Arc<Counts>,
 }
 
-/// Of jobs, since the start.
+/// Numbers of jobs, since the start.
 #[derive(Debug, Default)]
 struct Counts {
     begun: AtomicU64,

@@ -80,7 +80,7 @@ impl std::fmt::Debug for PointCloud {
 pub struct MapVersion {
     /// Committed changes so far.
     pub revision: u64,
-    /// Of this incarnation of the map.
+    /// The uuid of this incarnation of the map.
     pub map_uuid: Uuid,
 }
 
@@ -108,7 +108,7 @@ pub struct PointAnswer {
     pub occupied: Bytes,
     /// Number of points answered.
     pub points: usize,
-    /// How many of them are occupied.
+    /// How many of the points are occupied.
     pub points_occupied: usize,
     /// At this state.
     pub version: MapVersion,
@@ -117,13 +117,13 @@ pub struct PointAnswer {
 /// A scan to align or insert.
 #[derive(Debug, Clone)]
 pub struct ScanRequest {
-    /// Who sends it.
+    /// The robot that sends the scan.
     pub robot: RobotName,
     /// The robot's own number of the scan; makes insertion idempotent.
     pub scan_id: Option<u64>,
     /// In the sensor frame; not finite = no return.
     pub points: PointCloud,
-    /// When it was taken, nanoseconds since the Unix epoch.
+    /// When the scan was taken, nanoseconds since the Unix epoch.
     pub timestamp_ns: Option<i64>,
     /// Where it is thought to have been taken.
     pub guess: Guess,
@@ -193,7 +193,7 @@ pub struct ScanAnswer {
     pub version: MapVersion,
     /// The points that the map does not show, where they were asked for.
     pub foreground: Option<Foreground>,
-    /// It was accepted before, and this is that answer.
+    /// True of a scan that was accepted before: this is that answer.
     pub replayed: bool,
     /// The robot stands where its last scan was taken and sees nothing new: it was accepted and not kept.
     pub stationary: bool,
@@ -229,11 +229,11 @@ pub struct Deletion {
 /// The ways to name voxels.
 #[derive(Debug, Clone)]
 pub enum DeletionTarget {
-    /// Those that these points (map frame) fall in.
+    /// The voxels that these points (map frame, meters) fall in.
     Points(PointCloud),
     /// By key, of the deletion's level.
     Keys(Vec<VoxelKey>),
-    /// Those whose centers lie inside.
+    /// The voxels whose centers lie inside.
     Region(Region),
 }
 
@@ -244,7 +244,7 @@ pub struct DeletionAnswer {
     pub removed: usize,
     /// After it.
     pub version: MapVersion,
-    /// It was done before under its id, and this is that answer.
+    /// True of a deletion that was done before under its id: this is that answer.
     pub replayed: bool,
 }
 
@@ -262,16 +262,16 @@ pub struct Undo {
 pub enum UndoTarget {
     /// One, by the robot's own number.
     Scan {
-        /// Who sent it.
+        /// The robot that sent the scan.
         robot: RobotName,
-        /// Its number.
+        /// The scan's number.
         scan_id: u64,
     },
     /// One, by the revision that it made.
     Revision(u64),
     /// All of a robot's that made a revision after this one.
     RobotSince {
-        /// Who sent them.
+        /// The robot that sent the scans.
         robot: RobotName,
         /// The last revision to keep.
         revision: u64,
@@ -287,16 +287,16 @@ pub struct UndoAnswer {
     pub removed: usize,
     /// After it.
     pub version: MapVersion,
-    /// It was done before under its id, and this is that answer.
+    /// True of an undo that was done before under its id: this is that answer.
     pub replayed: bool,
 }
 
 /// Which of the accepted scans' poses.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TrajectoryQuery {
-    /// Of this robot; of all where none.
+    /// Poses of this robot alone; of all robots where none.
     pub robot: Option<RobotName>,
-    /// Those of scans that made a revision after this one.
+    /// Poses of scans that made a revision after this one.
     pub since_revision: u64,
     /// At most so many; where none, what an answer may hold.
     pub limit: Option<usize>,
@@ -325,7 +325,7 @@ pub struct MapFile {
 /// The occupied voxels of a level.
 #[derive(Debug, Clone)]
 pub struct VoxelListing {
-    /// Their side, meters.
+    /// The side of the voxels, meters.
     pub resolution_m: f64,
     /// In no order.
     pub keys: Vec<VoxelKey>,
@@ -336,9 +336,9 @@ pub struct VoxelListing {
 /// A description of a map.
 #[derive(Debug, Clone)]
 pub struct MapInfo {
-    /// Its name.
+    /// The map's name.
     pub name: MapName,
-    /// Its state.
+    /// The map's uuid and revision.
     pub version: MapVersion,
     /// What it was made with.
     pub settings: MapSettings,
@@ -346,7 +346,7 @@ pub struct MapInfo {
     pub levels: Vec<LevelInfo>,
     /// Accepted scans whose poses are kept.
     pub scans: usize,
-    /// Who sent them, by name.
+    /// The robots that sent the scans, by name.
     pub robots: Vec<RobotName>,
     /// Bytes of memory of the exact sets of all levels.
     pub set_bytes: usize,
@@ -366,7 +366,7 @@ pub struct MapInfo {
 pub struct MapStorage {
     /// The last revision that is known to be synced.
     pub durable_revision: u64,
-    /// Of the newest snapshot.
+    /// The revision of the newest snapshot.
     pub snapshot_revision: u64,
     /// Scans of this revision and later can be undone.
     pub undo_from_revision: u64,
@@ -385,16 +385,16 @@ pub struct MapStorage {
 /// The maps that a caller may name, by name.
 #[derive(Debug, Clone, Default)]
 pub struct MapList {
-    /// Those that are served.
+    /// The maps that are served.
     pub maps: Vec<MapInfo>,
-    /// Those that could not be opened.
+    /// The maps that could not be opened.
     pub unavailable: Vec<UnavailableMap>,
 }
 
 /// A map that could not be opened. Nothing can be done with it but to put its files right, and to start again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnavailableMap {
-    /// Its name, which is taken.
+    /// The map's name, which is taken.
     pub name: MapName,
     /// Why, and the command that helps.
     pub reason: String,

@@ -10,7 +10,7 @@ use super::shortage::{RETRY_AFTER, Shortage};
 use super::watermarks::Watermarks;
 use super::{Gauges, Marks, MemoryReading, Readings, Reason, ServiceError};
 
-/// Of what the process may have in memory, the percentage up to which some is lent for a while.
+/// Percentage of what the process may have in memory up to which some is lent for a while.
 const LENT_PERCENT: u64 = 95;
 
 /// What there is of disk and memory, and what of it is reserved. Without gauges there is room for everything.

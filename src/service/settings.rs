@@ -23,7 +23,7 @@ pub struct ServiceSettings {
     pub limits: Limits,
     /// What disk and memory are measured with; without, nothing is refused for want of them.
     pub gauges: Option<Arc<dyn Gauges>>,
-    /// Who is told of every operation when it is over.
+    /// Observers, which are told of every operation when it is over.
     pub observers: Vec<Arc<dyn Observer>>,
     /// Threads for queries; 0 = one a core.
     pub query_threads: usize,
@@ -33,13 +33,13 @@ pub struct ServiceSettings {
     pub alignment_threads: usize,
     /// Threads for searches with no guess; 0 = one a core.
     pub localization_threads: usize,
-    /// Of every alignment.
+    /// Settings of every alignment.
     pub alignment: AlignmentSettings,
     /// When a robot counts as standing still.
     pub stationary: StationarySettings,
     /// Which points of whose scans count; the name `*` stands for every other robot.
     pub robots: BTreeMap<String, PointFilter>,
-    /// Of maps whose makers do not say.
+    /// Filter settings of maps whose makers do not say.
     pub filter: FilterSettings,
 }
 

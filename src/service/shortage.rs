@@ -17,7 +17,7 @@ pub enum Shortage {
         free: u64,
         /// Fewer are too few.
         low: u64,
-        /// That many are enough again.
+        /// Free bytes that are enough again.
         back: u64,
     },
     /// Memory of the process.

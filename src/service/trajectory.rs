@@ -37,8 +37,8 @@ impl MapService {
         self.observed("GetTrajectory", Some(map), work, |_| Outcome::Read).await
     }
 
-    /// The same in pieces, as many as it takes, all at one revision. Without a limit, all poses since the revision that is
-    /// asked for.
+    /// [`MapService::trajectory`] in pieces, as many as it takes, all at one revision. Without a limit, all poses since
+    /// the revision that is asked for.
     ///
     /// # Errors
     /// As for a page.

@@ -70,7 +70,7 @@ impl DataDir {
         }
     }
 
-    /// The same on another file system, where nobody else is.
+    /// [`DataDir::open`] on another file system, where nobody else is.
     ///
     /// # Errors
     /// When the file system refuses.

@@ -14,7 +14,7 @@ use crate::map::{MapContents, MapName, MappedScan, MultiResolutionMap};
 /// What was found of a map.
 #[derive(Debug, Default)]
 pub struct Diagnosis {
-    /// Of its snapshots that can be read, ascending.
+    /// Revisions of the map's snapshots that can be read, ascending.
     pub snapshots: Vec<u64>,
     /// Segments of the journal.
     pub segments: usize,
@@ -46,9 +46,9 @@ impl Diagnosis {
 /// A file that nobody reads any more.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AsideFile {
-    /// Its name in the map's folder.
+    /// The file's name in the map's folder.
     pub name: String,
-    /// Its size.
+    /// The file's size, bytes.
     pub bytes: u64,
 }
 
@@ -155,7 +155,7 @@ fn read_snapshots(
 /// A map that is made again from its oldest snapshot.
 struct Replay {
     map: MultiResolutionMap,
-    /// Those that were not reached yet, newest first.
+    /// Snapshots that were not reached yet, newest first.
     snapshots: Vec<Snapshot>,
     problems: Vec<String>,
 }

@@ -80,7 +80,7 @@ pub enum StoreError {
     TwoFolders {
         /// The map.
         name: MapName,
-        /// One of them.
+        /// The first of the folders.
         first: PathBuf,
         /// Another.
         second: PathBuf,
@@ -102,7 +102,7 @@ pub enum StoreError {
         "a snapshot of {bytes} bytes does not fit on the disk, at most {bytes_max} leave enough for the journal"
     )]
     NoRoom {
-        /// Its size.
+        /// The record's size, bytes.
         bytes: u64,
         /// The most that it may have.
         bytes_max: u64,

@@ -118,7 +118,7 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// The same, where files and folders are made with the permissions `mode`, not with those of the process.
+    /// The file system, where files and folders are made with the permissions `mode`, not with those of the process.
     pub fn of_mode(mode: StoreMode) -> Self {
         Self { mode: Some(mode) }
     }

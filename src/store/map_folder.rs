@@ -45,7 +45,7 @@ pub struct MapFolder {
     journal: Mutex<SegmentedJournal>,
     /// Held while a snapshot is written, or old ones are removed.
     snapshots: Mutex<()>,
-    /// It was taken away. Changed while both locks are held.
+    /// True once the folder was taken away. Changed while both locks are held.
     is_gone: AtomicBool,
     facts: Facts,
 }

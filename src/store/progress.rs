@@ -19,11 +19,11 @@ pub struct OpeningProgress {
 pub struct Opened {
     /// Bytes of the snapshots and journals that have to be read.
     pub bytes: u64,
-    /// Those that were.
+    /// Bytes that were read.
     pub bytes_read: u64,
     /// Maps there are.
     pub maps: u64,
-    /// Those that are open.
+    /// Maps that are open.
     pub maps_open: u64,
 }
 

@@ -41,11 +41,11 @@ pub(super) fn kept(
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UndoWindow {
     pub(super) revisions: u64,
-    /// Of snapshots and journal that nothing else needs.
+    /// Bytes of snapshots and journal that nothing else needs, at most.
     pub(super) bytes_max: u64,
 }
 
-/// The same within a number of bytes: where what undo alone needs is more, it reaches less far back.
+/// What is kept within a number of bytes: where what undo alone needs is more, it reaches less far back.
 pub(super) fn kept_within(
     snapshots: &[u64],
     head: u64,

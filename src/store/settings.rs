@@ -10,11 +10,11 @@ use crate::map::TrajectorySpacing;
 /// When a change may be acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Durability {
-    /// When it is synced: what was acknowledged survives the loss of power.
+    /// A change is acknowledged when it is synced: what was acknowledged survives the loss of power.
     #[default]
     Always,
-    /// When it is written; synced at this interval. What was acknowledged survives the end of the process at any
-    /// moment; the loss of power takes the last interval.
+    /// A change is acknowledged when it is written, and synced at this interval. What was acknowledged survives the end
+    /// of the process at any moment; the loss of power takes the last interval.
     Interval(Duration),
 }
 

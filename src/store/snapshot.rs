@@ -52,7 +52,7 @@ const CHECKED_FROM: usize = 16;
 /// A map at one revision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot {
-    /// Of this incarnation of the map.
+    /// The uuid of this incarnation of the map.
     pub uuid: Uuid,
     /// What it was made with.
     pub settings: MapSettings,
@@ -66,7 +66,7 @@ impl Snapshot {
         Self { uuid, settings: *map.settings(), contents: map.contents() }
     }
 
-    /// The same; none once stopped.
+    /// [`Snapshot::of`] under a stop signal; none once stopped.
     pub fn of_until(map: &MultiResolutionMap, uuid: Uuid, stop: StopSignal<'_>) -> Option<Self> {
         Some(Self { uuid, settings: *map.settings(), contents: map.contents_until(stop)? })
     }
@@ -87,7 +87,7 @@ impl Snapshot {
         self.write_until(files, path, StopSignal::NEVER)
     }
 
-    /// The same, unless it is stopped before there is anything on the disk.
+    /// [`Snapshot::write`], unless it is stopped before there is anything on the disk.
     ///
     /// # Errors
     /// As there; `Cancelled` once stopped.
@@ -109,7 +109,7 @@ impl Snapshot {
         Self::read_until(files, path, StopSignal::NEVER)
     }
 
-    /// The same, for as long as somebody wants it.
+    /// [`Snapshot::read`], for as long as somebody wants it.
     ///
     /// # Errors
     /// As there; `Cancelled` once stopped.
@@ -127,7 +127,7 @@ impl Snapshot {
         self.encode_until(StopSignal::NEVER).map(Option::unwrap_or_default)
     }
 
-    /// The same; none once stopped.
+    /// [`Snapshot::encode`] under a stop signal; none once stopped.
     ///
     /// # Errors
     /// As there.
@@ -173,7 +173,7 @@ impl Snapshot {
         Self::decode_until(bytes, limits, reserve, StopSignal::NEVER)
     }
 
-    /// The same, for as long as somebody wants it.
+    /// [`Snapshot::decode`], for as long as somebody wants it.
     ///
     /// # Errors
     /// As there; `Stopped` once stopped.

@@ -28,7 +28,7 @@ pub struct Audit(Arc<Refusals>);
 #[derive(Debug)]
 struct Refusals {
     rate: DefaultDirectRateLimiter,
-    /// That were not written since the last that was.
+    /// Refusals that were not written since the last that was.
     unwritten: AtomicU64,
 }
 
@@ -49,7 +49,7 @@ impl Audit {
 }
 
 impl Refusals {
-    /// How many were not written since the last that was, where the next one is to be.
+    /// How many refusals were not written since the last that was; none where this one is not written either.
     fn to_write(&self) -> Option<u64> {
         if self.rate.check().is_err() {
             self.unwritten.fetch_add(1, Ordering::Relaxed);

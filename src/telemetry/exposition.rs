@@ -191,7 +191,7 @@ enum Kind {
     Gauge,
     /// Counts since the start; its name ends with `_total`.
     Counter,
-    /// How many took how long.
+    /// A distribution of times.
     Histogram,
 }
 

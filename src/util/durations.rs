@@ -24,7 +24,7 @@ impl Durations {
         self.sum += took;
     }
 
-    /// How many were counted.
+    /// How many durations were counted.
     pub fn count(&self) -> u64 {
         self.counts.iter().sum()
     }

@@ -52,7 +52,7 @@ impl<'a> StopSignal<'a> {
         items.into_iter().enumerate().take_while(move |(at, _)| goes_on(*at)).map(|(_, item)| item)
     }
 
-    /// The same of the pieces of a slice, with a look before each.
+    /// The pieces of a slice, with a look at the signal before each; they end once stopped.
     pub fn pieces<T>(
         self,
         items: &[T],

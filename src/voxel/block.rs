@@ -57,7 +57,7 @@ impl Cell {
         u32::from(self.0 & 63)
     }
 
-    /// Its number.
+    /// The cell's number within its block.
     #[inline(always)]
     pub(crate) fn to_bits(self) -> u16 {
         self.0
@@ -103,7 +103,7 @@ impl BlockMask {
     /// Bytes of a mask.
     pub const BYTES: usize = WORDS * 8;
 
-    /// Its words, each little-endian.
+    /// The mask's words, each little-endian.
     pub fn to_le_bytes(self) -> [u8; Self::BYTES] {
         bytemuck::cast(self.0.map(u64::to_le_bytes))
     }

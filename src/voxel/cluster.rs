@@ -40,7 +40,7 @@ impl BlockInCluster {
         cluster.first_within(CLUSTER_LEVELS).offset_by(axis(0) | axis(1) | axis(2))
     }
 
-    /// Its bit among those of a cluster.
+    /// The block's bit among those of a cluster.
     #[inline(always)]
     pub(crate) fn bit(self) -> u64 {
         1 << self.0

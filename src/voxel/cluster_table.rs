@@ -36,7 +36,7 @@ pub struct ClusterTable {
 }
 
 impl Default for ClusterTable {
-    /// Without a block.
+    /// A table without a block.
     fn default() -> Self {
         Self::with_room_for(0)
     }
@@ -130,7 +130,7 @@ impl ClusterTable {
         self.add_in_room(key)
     }
 
-    /// The same, where there is a vacant slot.
+    /// Adds a cluster where there is a vacant slot.
     fn add_in_room(&mut self, key: u64) -> usize {
         self.used += 1;
         let mut bucket = Slots::home(key, self.keys.len());

@@ -13,8 +13,8 @@ use crate::util::StopSignal;
 pub(crate) struct ClusterUpdate(Vec<(VoxelKey, Cluster)>);
 
 impl ClusterUpdate {
-    /// Of the clusters of `table`, once each of `blocks`, none of which comes twice, has got these voxels: none takes
-    /// the block out. Once stopped, what comes of it is not to be applied.
+    /// The clusters of `table` that change once each of `blocks`, none of which comes twice, has got these voxels: none
+    /// takes the block out. Once stopped, what comes of it is not to be applied.
     pub(crate) fn plan(table: &ClusterTable, blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Self {
         let mut touched = Touched::default();
         let mut numbers = Vec::with_capacity(blocks.len());

@@ -15,7 +15,7 @@ const STEPS: i64 = Moments::UNITS / Moments::STEP;
 pub struct MomentSet(Vec<(VoxelKey, Moments)>);
 
 impl MomentSet {
-    /// Of `points`; those without a voxel (not finite, out of range) are left out.
+    /// The moments of `points`, voxel by voxel; those without a voxel (not finite, out of range) are left out.
     pub fn of_points(points: &[Point], lattice_from_points: &LatticeFromPoints) -> Self {
         let mut moments = HashMap::<VoxelKey, Moments>::with_capacity(points.len() / 16);
         // Neighbors in a scan share voxels: one probe serves a run of points.
@@ -40,18 +40,18 @@ impl MomentSet {
         moments.into_iter().collect()
     }
 
-    /// Of the centers of `voxels`, where points are not known.
+    /// The moments of the centers of `voxels`, where points are not known.
     pub fn of_centers(voxels: &VoxelSet) -> Self {
         Self::of_centers_until(voxels, StopSignal::NEVER)
     }
 
-    /// The same; once stopped, some of them.
+    /// [`MomentSet::of_centers`] under a stop signal; once stopped, some of them.
     pub(crate) fn of_centers_until(voxels: &VoxelSet, stop: StopSignal<'_>) -> Self {
         let blocks = stop.pieces(voxels.blocks(), BLOCKS_PER_LOOK).flatten();
         Self::of_voxels_until(blocks.flat_map(|(block, mask)| mask.moments(*block)).collect(), stop)
     }
 
-    /// Of distinct voxels, in any order; once stopped, in any order.
+    /// A set of distinct voxels' moments, given in any order; once stopped, in any order.
     pub(crate) fn of_voxels_until(mut moments: Vec<(VoxelKey, Moments)>, stop: StopSignal<'_>) -> Self {
         sort_by_key_until(&mut moments, |(key, _)| *key, stop);
         Self(moments)
@@ -70,7 +70,7 @@ impl MomentSet {
 }
 
 impl FromIterator<(VoxelKey, Moments)> for MomentSet {
-    /// Of distinct voxels, in any order.
+    /// A set of distinct voxels' moments, given in any order.
     fn from_iter<I: IntoIterator<Item = (VoxelKey, Moments)>>(moments: I) -> Self {
         Self::of_voxels_until(moments.into_iter().collect(), StopSignal::NEVER)
     }

@@ -26,13 +26,13 @@ impl Moments {
     /// whatever center it is taken.
     pub const COUNT_MAX: i64 = 1 << 32;
 
-    /// Of one point at an offset from the center.
+    /// The moments of one point at an offset from the center.
     pub fn of_offset([x, y, z]: [i64; 3]) -> Self {
         Self([1, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z])
     }
 
-    /// Of the centers of a voxel's descendants two levels down, which `word` holds in Morton order: what stays known
-    /// when points were deleted.
+    /// The moments of the centers of a voxel's descendants two levels down, which `word` holds in Morton order: what
+    /// stays known when points were deleted.
     pub(crate) fn of_descendants(word: u64) -> Self {
         let axis = |bit: u32, axis: u32| i64::from(bit >> axis & 1 | bit >> (axis + 2) & 2);
         let mut moments = Self::default();
@@ -69,7 +69,7 @@ impl Moments {
         self.count() == 0
     }
 
-    /// The same points about a center that lies `by` units away: each offset grows by that.
+    /// The moments of the same points about a center that lies `by` units away: each offset grows by that.
     pub fn about(&self, [x, y, z]: [i64; 3]) -> Self {
         let [n, sx, sy, sz, xx, xy, xz, yy, yz, zz] = self.0;
         Self([

@@ -39,8 +39,8 @@ pub fn volumetric_sample(points: &[Point], wish: usize, seed: u64) -> Volumetric
     volumetric_sample_until(points, wish, seed, StopSignal::NEVER)
 }
 
-/// The same, which once it is stopped takes the best of the trials so far; without one, points at even distances in the
-/// order of the scan.
+/// [`volumetric_sample`], which once it is stopped takes the best of the trials so far; without one, points at even
+/// distances in the order of the scan.
 pub fn volumetric_sample_until(
     points: &[Point],
     wish: usize,

@@ -68,7 +68,7 @@ impl VoxelSet {
         self.moment_voxels_until(StopSignal::NEVER)
     }
 
-    /// The same; once stopped, some of them.
+    /// [`VoxelSet::moment_voxels`] under a stop signal; once stopped, some of them.
     pub(crate) fn moment_voxels_until(&self, stop: StopSignal<'_>) -> Vec<VoxelKey> {
         let of_block = |(block, mask): &(VoxelKey, BlockMask)| {
             let block = *block;

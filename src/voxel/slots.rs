@@ -25,7 +25,7 @@ pub(crate) struct Slots<'a> {
 }
 
 impl Slots<'static> {
-    /// Those of a table without a block: there is no cluster where no key is.
+    /// The slots of a table without a block: there is no cluster where no key is.
     pub(crate) const NONE: Self = Self { tags: &[0], keys: &[VACANT_BUCKET], clusters: &[], mask_bytes: 0 };
 }
 

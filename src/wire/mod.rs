@@ -7,7 +7,7 @@
 mod deletion;
 mod field;
 #[cfg(feature = "server")]
-mod json;
+pub mod json;
 mod localization;
 mod map_file;
 mod maps;
@@ -20,8 +20,6 @@ mod types;
 mod undo;
 
 pub(crate) use field::{InField, required};
-#[cfg(feature = "server")]
-pub use json::ByKeyword;
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::create_map;
 pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};

@@ -37,7 +37,7 @@ impl From<(&MapName, TrajectoryQuery)> for pb::GetTrajectoryRequest {
     }
 }
 
-/// Of a stream nobody limits the poses.
+/// The request for a stream, of which nobody limits the poses.
 impl From<(&MapName, TrajectoryQuery)> for pb::StreamTrajectoryRequest {
     fn from(request: (&MapName, TrajectoryQuery)) -> Self {
         let pb::GetTrajectoryRequest { map, robot, since_revision, .. } = request.into();

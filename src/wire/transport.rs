@@ -8,7 +8,7 @@ use crate::service::Limits;
 pub const MESSAGE_BYTES_MAX: usize = Limits::MESSAGE_BYTES_MAX;
 /// Bytes of one stream that may be under way unacknowledged; the reader's number counts.
 pub const STREAM_WINDOW_BYTES: u32 = 4 << 20;
-/// The same for all streams of a connection.
+/// Bytes of all streams of a connection that may be under way unacknowledged.
 pub const CONNECTION_WINDOW_BYTES: u32 = 16 << 20;
 /// Bytes of one frame: a connection may hold as many for one that never ends.
 pub const FRAME_BYTES_MAX: u32 = 64 << 10;

@@ -17,10 +17,10 @@ fn a_scan_of_a_map_file_is_found_where_it_was_taken() {
     assert_eq!(found.len(), 1);
     assert_eq!((found[0]["scan"].as_str(), found[0]["cut_short"].as_bool()), (Some("0001.ply"), Some(false)));
     assert!(found[0]["candidates"].as_array().unwrap().len() <= 2);
-    let numbers: [f64; 7] =
-        serde_json::from_value(found[0]["candidates"][0]["map_from_sensor"].clone()).unwrap();
-    let [x, y, z, qx, qy, qz, qw] = numbers;
-    let (meters, degrees) = pose_difference(&pose([x, y, z], [qx, qy, qz, qw]).unwrap(), &sequence.poses[1]);
+    let place = &found[0]["candidates"][0]["map_from_sensor"];
+    let translation_m = serde_json::from_value(place["translation_m"].clone()).unwrap();
+    let rotation_xyzw = serde_json::from_value(place["rotation_xyzw"].clone()).unwrap();
+    let (meters, degrees) = pose_difference(&pose(translation_m, rotation_xyzw).unwrap(), &sequence.poses[1]);
     assert!(meters < 0.05 && degrees < 1.0, "{meters} m, {degrees} degrees: {}", found[0]["reason"]);
 
     let output = mrol(&arguments).assert().success();

@@ -13,7 +13,7 @@ use crate::service::AllowedMaps;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeyEntry {
-    /// Who it is for.
+    /// The name of the key's holder.
     pub name: String,
     /// The hash of its secret.
     pub(super) sha256: String,
@@ -40,7 +40,7 @@ pub struct KeyEntry {
 }
 
 impl KeyEntry {
-    /// That of a key.
+    /// The entry of a key.
     pub(super) fn of(key: &Key) -> Self {
         let maps = match &key.allowed_maps {
             AllowedMaps::Every => None,

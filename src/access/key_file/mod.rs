@@ -42,7 +42,7 @@ pub enum KeyFileError {
         /// Why.
         error: io::Error,
     },
-    /// It is not made of keys.
+    /// The file has something else than keys.
     #[error(
         "{}: line {line} must belong to a [[key]] of name, sha256, scope and, where they are meant, maps, robots, expires, \
          requests_per_s_max, burst_max, requests_at_once_max, former_sha256 and former_expires",

@@ -18,7 +18,7 @@ pub struct Localization {
     pub cut_short: bool,
     /// Cells of poses whose bound was taken.
     pub cells: u64,
-    /// Of the map that was searched.
+    /// The revision of the map that was searched.
     pub revision: u64,
 }
 
@@ -31,7 +31,7 @@ pub struct Candidate {
     pub search_overlap: f64,
     /// Fraction of the scan's rays that pass through what the map holds.
     pub blocked: f64,
-    /// Its fit less that of the best other candidate; none where there is no other.
+    /// The candidate's fit less that of the best other candidate; none where there is no other.
     pub margin: Option<f64>,
 }
 
@@ -77,7 +77,7 @@ pub enum LocalizationError {
         /// The scan's largest range.
         range_m: f64,
     },
-    /// Whoever started the search has no memory for it.
+    /// The search takes more memory than its caller allows.
     #[error("there is no memory for {bytes} bytes more of the search")]
     NoMemory {
         /// What it asked for.

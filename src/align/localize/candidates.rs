@@ -79,7 +79,8 @@ impl Refinement<'_> {
         align_until(self.map, points, guess, &alignment, self.stop)
     }
 
-    /// Without those that a better one is the same place as; that one takes over what their search found.
+    /// The candidates without those that are the same place as a better one; that one takes over what their search
+    /// found.
     fn distinct(&self, ranked: Vec<Candidate>) -> Vec<Candidate> {
         let radius_m = self.settings.basin_voxels * self.levels.finest().resolution_m();
         let mut distinct: Vec<Candidate> = Vec::with_capacity(ranked.len());

@@ -16,7 +16,7 @@ pub(super) struct DilatedLevels {
     fields: Vec<DistanceField>,
     /// Where the sensor is searched.
     pub(super) domain: SearchBox,
-    /// Of the map that they were taken from.
+    /// The revision of the map that the levels were taken from.
     pub(super) revision: u64,
 }
 

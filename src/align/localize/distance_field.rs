@@ -166,8 +166,8 @@ impl DistanceField {
         (coordinate.max(0.0) as usize).min(self.size[axis] - 1)
     }
 
-    /// How many points are within reach of an occupied voxel, for the eight translations `grid_from_sensor` + {0,
-    /// `side`} an axis (x fastest). Zeros when none of them can exceed `floor`.
+    /// How many points are near an occupied voxel, for the eight translations `grid_from_sensor` + {0, `side`} an axis
+    /// (x fastest). Zeros when none of them can exceed `floor`.
     ///
     /// This is where a search spends its time: rotate, translate, quantize, look up, as everywhere in this map, eight
     /// look-ups a point.
@@ -243,7 +243,7 @@ fn whole(place: f32, last: f32) -> u32 {
 /// Cells of a grid between two looks at the stop signal: a fraction of a millisecond.
 const CELLS_PER_LOOK: usize = 1 << 20;
 
-/// So many cells with nothing near.
+/// Makes a field of so many cells with nothing near.
 fn far_everywhere(cells: usize, stop: StopSignal<'_>) -> Result<Vec<u8>, Unbuilt> {
     let mut distances = Vec::with_capacity(cells);
     while distances.len() < cells {

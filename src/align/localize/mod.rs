@@ -75,8 +75,8 @@ pub fn localize(
     localize_supervised(map, points, query, settings, alignment, alone)
 }
 
-/// The same under supervision. Once it is stopped, which every phase looks at every few milliseconds, the answer is the
-/// best so far, refined by what was left of the time: cut short, and never accepted.
+/// [`localize`] under supervision. Once it is stopped, which every phase looks at every few milliseconds, the answer is
+/// the best so far, refined by what was left of the time: cut short, and never accepted.
 ///
 /// # Errors
 /// As for [`localize`]; when memory is refused.
@@ -150,7 +150,7 @@ fn search_and_refine(
 }
 
 impl Localization {
-    /// Of a search that was stopped before there was anything to search in.
+    /// The answer of a search that was stopped before there was anything to search in.
     fn cut_short_at_once(revision: u64) -> Self {
         Self {
             verdict: Verdict::Ambiguous,

@@ -11,7 +11,7 @@ pub struct LocalizationQuery {
     pub search_box: Option<SearchBox>,
     /// Candidates wanted, at most.
     pub candidates: usize,
-    /// Of the choice of the scan's points: the same seed gives the same answer, on every machine.
+    /// Seed of the choice of the scan's points: the same seed gives the same answer, on every machine.
     pub seed: u64,
 }
 

@@ -21,8 +21,8 @@ pub(super) struct Found {
 /// A cell that waits to be divided, ordered by what is expected of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Waiting {
-    /// Its bound less what it is expected to lose until the finest depth: deep cells come first among equals, and so
-    /// good poses are found early, which prune the rest.
+    /// The cell's bound less what it is expected to lose until the finest depth: deep cells come first among equals,
+    /// and so good poses are found early, which prune the rest.
     promise: i32,
     bound: u16,
     cell: PoseCell,

@@ -23,7 +23,7 @@ pub struct LocalizationSettings {
     pub search_share_of_best: f64,
     /// Poses that differ by less than so many voxels of the search are one place. 5.
     pub basin_voxels: f64,
-    /// And by less than so many degrees. 10.
+    /// Two poses are the same place where they also differ by less than so many degrees. 10.
     pub basin_deg: f64,
     /// Places of which the search keeps the best. 16.
     pub basins_max: usize,

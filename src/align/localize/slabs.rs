@@ -20,7 +20,7 @@ pub(super) struct Slabs {
 }
 
 impl Slabs {
-    /// Of the blocks of a map, at least one.
+    /// The slabs of the blocks of a map, of which there is at least one.
     pub(super) fn of(blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Result<Self, Unbuilt> {
         let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
         for blocks in blocks.chunks(BLOCKS_PER_LOOK) {

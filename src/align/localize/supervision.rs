@@ -24,9 +24,9 @@ impl std::fmt::Debug for Supervision<'_> {
 /// Why what a search reads was not built.
 #[derive(Debug)]
 pub(super) enum Unbuilt {
-    /// It was stopped: there is nothing to search in.
+    /// Building was stopped: there is nothing to search in.
     Stopped,
-    /// It cannot be built.
+    /// What is searched in cannot be built.
     Refused(LocalizationError),
 }
 

@@ -31,9 +31,9 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// Of `points` (sensor frame) at `pose`, each against its Gaussian, with the weights of Geman and McClure at
-    /// `robust_scale` (a Mahalanobis distance), so that points of what the map does not show have no say. They mean
-    /// nothing once stopped.
+    /// The normal equations of `points` (sensor frame) at `pose`, each against its Gaussian, with the weights of Geman
+    /// and McClure at `robust_scale` (a Mahalanobis distance), so that points of what the map does not show have no
+    /// say. They mean nothing once stopped.
     pub(super) fn of(
         points: &[Point],
         pose: &Pose,

@@ -7,9 +7,9 @@ use crate::voxel::Moments;
 
 /// Points that make a Gaussian, at least: fewer say nothing of a surface.
 const POINTS_MIN: i64 = 6;
-/// The second largest variance must reach this fraction of the voxel's side squared. A single scan line in a voxel is
-/// a line, not a surface: to align to it would be to align to the sensor's pattern (paper III-B: the voxels "have to be
-/// large enough to cover gaps in the point cloud due to scan line spacing").
+/// A Gaussian is used where the second largest variance is at least this fraction of the voxel's side squared. A single
+/// scan line in a voxel is a line, not a surface: to align to it would be to align to the sensor's pattern (paper
+/// III-B: the voxels "have to be large enough to cover gaps in the point cloud due to scan line spacing").
 const SPREAD_MIN: f64 = 0.005;
 /// How much a Gaussian holds its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,8 +36,8 @@ pub(super) struct Gaussian {
 }
 
 impl Gaussian {
-    /// Of the points in a voxel around `center_m`, whose moments are in units of `unit_m`; none where they do not make
-    /// a surface.
+    /// The Gaussian of the points in a voxel around `center_m`, whose moments are in units of `unit_m`; none where they
+    /// do not make a surface.
     pub(super) fn of(moments: &Moments, center_m: Vector3<f64>, side_m: f64, unit_m: f64) -> Option<Self> {
         if moments.count() < POINTS_MIN {
             return None;

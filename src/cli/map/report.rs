@@ -8,7 +8,8 @@ use super::ample::FilterSummary;
 use super::mapper::Mapped;
 use super::truth_errors::ErrorSummary;
 use crate::cli::map_report::count;
-use crate::cli::scan_report::{PLACE_HEAD, place, seven};
+use crate::cli::scan_report::{PLACE_HEAD, place};
+use crate::wire::json::JsonPose;
 
 /// What became of a scan.
 #[derive(Serialize)]
@@ -17,7 +18,7 @@ pub(super) struct ScanLine {
     accepted: bool,
     verdict: &'static str,
     reason: String,
-    map_from_sensor: [f64; 7],
+    map_from_sensor: JsonPose,
     overlap: f64,
     inliers: f64,
     information: [[f64; 6]; 6],
@@ -41,7 +42,7 @@ impl ScanLine {
             accepted: mapped.accepted(),
             verdict: mapped.alignment.verdict.as_str(),
             reason: mapped.alignment.reason.clone(),
-            map_from_sensor: seven(&mapped.alignment.map_from_sensor),
+            map_from_sensor: (&mapped.alignment.map_from_sensor).into(),
             overlap: mapped.alignment.overlap(),
             inliers: mapped.alignment.inliers,
             information: mapped.alignment.information.rows(),

@@ -13,11 +13,11 @@ use crate::map::MultiResolutionMap;
 
 /// How far off guesses are at most, meters.
 pub const OFFSET_MAX_M: f64 = 2.0;
-/// The same of turns, degrees.
+/// The largest rotation of a guess from the truth, degrees.
 pub const OFFSET_MAX_DEG: f64 = 40.0;
 /// An alignment converged that ends this near to the truth, meters.
 pub const CONVERGED_M: f64 = 0.1;
-/// The same of turns, degrees.
+/// An alignment has converged within this rotation of the truth, degrees.
 pub const CONVERGED_DEG: f64 = 1.0;
 
 /// A guess, and how far it is off.

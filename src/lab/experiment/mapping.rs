@@ -18,7 +18,7 @@ pub trait GrowingMap {
 /// Our own map, as a robot called `bench` makes it grow.
 #[derive(Debug)]
 pub struct OwnMap {
-    /// Its voxels, their filters and the moments of their points.
+    /// The map: voxels, their filters and the moments of their points.
     pub map: MultiResolutionMap,
     /// Whose scans they are.
     pub robot: RobotName,

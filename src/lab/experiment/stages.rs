@@ -60,7 +60,7 @@ struct Bench<'a> {
     filter: Kernel<'a>,
     dense: Dense,
     set: HashSet,
-    /// Of all points: what the look-ups by themselves begin with.
+    /// Keys of all points: what the look-ups by themselves begin with.
     keys: Vec<u64>,
     offsets: Vec<u32>,
     occupied: Vec<u64>,

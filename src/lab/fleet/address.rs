@@ -5,14 +5,14 @@ use axum::http::HeaderValue;
 use super::FleetError;
 use crate::client::{Client, Credentials};
 
-/// Of gRPC.
+/// The gRPC address of a server.
 #[derive(Debug, Clone)]
 pub(crate) struct GrpcAddress {
     pub(crate) url: String,
     pub(crate) credentials: Credentials,
 }
 
-/// Of HTTP, in the clear.
+/// The HTTP address of a server, without TLS.
 #[derive(Debug, Clone)]
 pub(crate) struct HttpAddress {
     pub(crate) url: String,
@@ -21,7 +21,7 @@ pub(crate) struct HttpAddress {
 }
 
 impl GrpcAddress {
-    /// Of a server that asks for no key.
+    /// The address of a server that asks for no key.
     pub(crate) fn open(url: impl Into<String>) -> Self {
         Self { url: url.into(), credentials: Credentials::default() }
     }
@@ -32,7 +32,7 @@ impl GrpcAddress {
 }
 
 impl HttpAddress {
-    /// Of a server that asks for no key.
+    /// The address of a server that asks for no key.
     pub(crate) fn open(url: impl Into<String>) -> Self {
         Self { url: url.into(), authorization: None }
     }

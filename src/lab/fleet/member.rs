@@ -10,7 +10,7 @@ use super::FleetError;
 use super::pace::Pace;
 use super::tally::Tally;
 
-/// Who carries out operations.
+/// A member of a fleet, which carries out operations.
 pub(crate) trait Member: Send + 'static {
     /// Carries out the operation with a number, which no other has.
     fn carry_out(&mut self, number: u64) -> impl Future<Output = Result<(), FleetError>> + Send;
@@ -19,11 +19,11 @@ pub(crate) trait Member: Send + 'static {
 /// Members of one kind between two spells of work.
 pub(crate) struct Fleet<M> {
     members: Vec<M>,
-    /// Of the next operation.
+    /// The number of the next operation.
     number: u64,
 }
 
-/// The same at work.
+/// A member at work.
 pub(crate) struct Working<M> {
     members: JoinSet<M>,
     pace: Arc<Pace>,

@@ -16,14 +16,14 @@ pub(crate) fn resident_bytes(pid: u32) -> Result<u64, FleetError> {
 /// A line through measurements, by least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Trend {
-    /// Of all measurements.
+    /// The mean of all measurements.
     pub(crate) mean: f64,
     /// A second.
     pub(crate) slope: f64,
 }
 
 impl Trend {
-    /// Of measurements (seconds, value); none where there are fewer than two moments.
+    /// The line through measurements (seconds, value); none where there are fewer than two moments.
     pub(crate) fn of(measured: &[(f64, f64)]) -> Option<Self> {
         let count = measured.len() as f64;
         let mean_of = |value: fn(&(f64, f64)) -> f64| measured.iter().map(value).sum::<f64>() / count;

@@ -38,7 +38,7 @@ pub(crate) enum FleetError {
     /// The daemon cannot serve.
     #[error(transparent)]
     Server(#[from] ServerError),
-    /// Whoever called for it asked for something that makes no sense.
+    /// What was asked for makes no sense.
     #[error("{0}")]
     Usage(String),
     /// Anything else.

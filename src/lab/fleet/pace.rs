@@ -19,7 +19,7 @@ pub(crate) struct Pace {
 /// An operation that is to be carried out.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Due {
-    /// Its number.
+    /// The operation's number.
     pub(crate) number: u64,
     /// When it was due. At a rate, who comes late to it makes it wait: that is part of what it took.
     pub(crate) since: Instant,

@@ -17,7 +17,7 @@ use super::memory::resident_bytes;
 /// How long it may take to go down, beyond the ten seconds of its drain.
 const STOPPING_MAX: Duration = Duration::from_secs(30);
 
-/// Of undo nothing is asked but within short missions; more would fill the disk.
+/// Revisions within which undo works: missions are short, and more would fill the disk.
 const UNDO_REVISIONS: &str = "1000";
 
 /// This same program as a daemon, on free ports. It is killed where it was not stopped.
@@ -57,12 +57,12 @@ impl ServerProcess {
         Ok(Self { child, pid, serving })
     }
 
-    /// Its gRPC address.
+    /// The server's gRPC address.
     pub(crate) fn grpc(&self) -> GrpcAddress {
         GrpcAddress::open(&self.serving.grpc)
     }
 
-    /// Its HTTP address.
+    /// The server's HTTP address.
     pub(crate) fn http(&self) -> HttpAddress {
         HttpAddress::open(format!("http://{}", self.serving.http))
     }

@@ -16,11 +16,11 @@ pub struct Aligned {
     pub method: Method,
     /// What answered the ascent's look-ups.
     pub lookup: Lookup,
-    /// Of each scan but the first, milliseconds: the quickest of the repeats.
+    /// Time of each scan but the first, milliseconds: the quickest of the repeats.
     pub ms: Vec<f64>,
     /// Look-ups of all alignments.
     pub lookups: u64,
-    /// Of each scan but the first, meters and degrees from where it was taken; empty where that is not known.
+    /// Error of each scan but the first, meters and degrees from where it was taken; empty where that is not known.
     pub errors: Vec<(f64, f64)>,
 }
 

@@ -60,7 +60,7 @@ pub(super) fn filter_bytes(map: &MultiResolutionMap) -> usize {
     levels.iter().map(|level| level.plane_bytes + level.counter_bytes).sum()
 }
 
-/// The same into a hash set of packed keys, which has one level and no filter.
+/// Times insertion into a hash set of packed keys, which has one level and no filter.
 ///
 /// # Errors
 /// When the settings' resolution is out of range.

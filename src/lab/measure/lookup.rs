@@ -11,7 +11,7 @@ use crate::map::MultiResolutionMap;
 pub struct Measured {
     /// Which.
     pub name: StructureName,
-    /// Of each pass over all points, nanoseconds a point.
+    /// Time of each pass over all points, nanoseconds a point.
     pub runs: Runs,
     /// Points asked about.
     pub points: usize,
@@ -26,10 +26,10 @@ pub struct Measured {
 /// A structure gave an answer that cannot be: its time is worth nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Disagreement {
-    /// It denies an occupied voxel.
+    /// A structure denies an occupied voxel.
     #[error("{0} says of {1} points in occupied voxels that they are free")]
     Denies(&'static str, usize),
-    /// It is exact and yet says "occupied" of a free voxel.
+    /// A structure that is exact says "occupied" of a free voxel.
     #[error("{0} says of {1} points in free voxels that they are occupied")]
     Invents(&'static str, usize),
 }

@@ -8,7 +8,7 @@ use crate::lab::workload::{Queries, add};
 use crate::map::{Lookup, MultiResolutionMap};
 use crate::voxel::VoxelSet;
 
-/// Who uses the map.
+/// Readers and writers that use the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crowd {
     /// Threads that ask.
@@ -83,7 +83,7 @@ fn write(map: &MultiResolutionMap, queries: &Queries, over: &AtomicBool, commits
     }
 }
 
-/// Those of `voxels` that are in the map.
+/// The voxels of `voxels` that are in the map.
 fn present(map: &MultiResolutionMap, voxels: &VoxelSet) -> VoxelSet {
     let view = map.view();
     voxels.iter().filter(|&voxel| view.contains(voxel, 0)).collect()

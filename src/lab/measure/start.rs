@@ -14,9 +14,9 @@ use crate::voxel::MomentSet;
 /// Bytes of snapshot and journal in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kept {
-    /// Of the snapshot, as a file.
+    /// Bytes of the snapshot, as a file.
     pub snapshot_bytes: usize,
-    /// Of the journal after it.
+    /// Bytes of the journal after the snapshot.
     pub journal_bytes: u64,
     /// Records in that.
     pub records: u64,

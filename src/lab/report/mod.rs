@@ -16,7 +16,7 @@ pub enum ReportError {
     /// The file or folder cannot be written.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
-        /// Of the file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
         /// What the system said.
         source: io::Error,
@@ -24,7 +24,7 @@ pub enum ReportError {
     /// The plot cannot be drawn.
     #[error("{}: cannot be drawn: {reason}", path.display())]
     Draw {
-        /// Of the plot.
+        /// Path of the plot.
         path: PathBuf,
         /// What the plotting library said.
         reason: String,

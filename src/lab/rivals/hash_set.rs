@@ -21,7 +21,7 @@ impl HashSet {
         Self { keys, lattice: *map.lattice(), level }
     }
 
-    /// Its keys.
+    /// The packed keys.
     pub fn keys(&self) -> &hashbrown::HashSet<u64> {
         &self.keys
     }

@@ -15,7 +15,7 @@ pub struct HashTables {
 }
 
 impl HashTables {
-    /// Without a voxel.
+    /// Tables without a voxel.
     pub fn new(lattice: Lattice) -> Self {
         Self { lattice, levels: vec![hashbrown::HashSet::new(); lattice.levels() as usize] }
     }

@@ -90,7 +90,8 @@ pub fn filter_contains(view: &MapView<'_>, keys: &[u64], level: u32, occupied: &
     lookup::filter_contains(keys, &view.level_view(level), occupied);
 }
 
-/// Of a filter its plane and its counters; of the exact set the tables of all levels, since three levels share one.
+/// Bytes of a structure: of a filter its plane and its counters; of the exact set the tables of all levels, since three
+/// levels share one.
 fn bytes(map: &MultiResolutionMap, level: u32, lookup: Lookup) -> usize {
     let described = map.describe(0, 0);
     match lookup {

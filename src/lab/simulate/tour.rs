@@ -10,7 +10,7 @@ use crate::geometry::Pose;
 pub struct Tour {
     /// The robot's name: `lidar` or `camera`.
     pub name: &'static str,
-    /// Its sensor.
+    /// The robot's sensor.
     pub sensor: Sensor,
     /// Where the sensor stands for each scan, map_from_sensor.
     pub poses: Vec<Pose>,

@@ -88,7 +88,7 @@ impl Workload {
         }
     }
 
-    /// Its voxels in pieces of some hundred thousand at most, as parts of one whole: no voxel comes twice.
+    /// The workload's voxels in pieces of some hundred thousand at most, as parts of one whole: no voxel comes twice.
     pub fn pieces(self) -> Box<dyn Iterator<Item = VoxelSet>> {
         match self {
             Self::Room(room) => Box::new(std::iter::once(room.voxels())),

@@ -29,7 +29,7 @@ impl Room {
         self.indices().filter_map(VoxelKey::new).collect()
     }
 
-    /// Its voxels, row by row.
+    /// The room's voxels, row by row.
     pub(super) fn indices(self) -> impl Iterator<Item = [i32; 3]> {
         let [nx, ny, nz] = HALF.map(|half| 2 * half);
         let index = move |n: i32| [n % nx - HALF[0], n / nx % ny - HALF[1], n / (nx * ny) - HALF[2]];

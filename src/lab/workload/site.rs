@@ -66,7 +66,7 @@ impl Site {
         HILLS_M[0] * (WAVES[0] * x + px).sin() + HILLS_M[1] * (WAVES[1] * y + py).sin()
     }
 
-    /// Its steepest slope, meters up a meter.
+    /// The terrain's steepest slope, meters up a meter.
     fn slope_max() -> f64 {
         (HILLS_M[0] * WAVES[0]).hypot(HILLS_M[1] * WAVES[1])
     }
@@ -75,7 +75,7 @@ impl Site {
         self.starts().map(move |start| self.piece(start).filter_map(VoxelKey::new).collect())
     }
 
-    /// Its voxels, piece by piece, row by row.
+    /// The site's voxels, piece by piece, row by row.
     pub(super) fn indices(self) -> impl Iterator<Item = [i32; 3]> {
         self.starts().flat_map(move |start| self.piece(start))
     }

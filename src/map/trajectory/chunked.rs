@@ -28,7 +28,7 @@ impl Keyed for (u64, u64) {
 /// original changes, which then copies the pieces that it changes, and no others.
 #[derive(Debug, Clone)]
 pub(super) struct Chunked<T> {
-    /// None of them empty.
+    /// The chunks, none of them empty.
     chunks: Arc<Vec<Arc<Vec<T>>>>,
     len: usize,
 }

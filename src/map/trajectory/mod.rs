@@ -43,7 +43,7 @@ pub struct Trajectory {
     /// With those that are marked.
     poses: Chunked<MappedScan>,
     robots: Arc<BTreeMap<RobotName, Arc<RobotScans>>>,
-    /// Of `poses`, those that were taken out again.
+    /// Revisions of the scans of `poses` that were taken out again.
     marked: Arc<BTreeSet<u64>>,
     withdrawn: Arc<Vec<WithdrawnScan>>,
     /// Bytes that poses point to.
@@ -133,7 +133,7 @@ impl Trajectory {
         self.robots.contains_key(robot)
     }
 
-    /// How many robots did.
+    /// How many robots have scans here, or have had.
     pub fn robots_known(&self) -> usize {
         self.robots.len()
     }
@@ -177,7 +177,7 @@ impl Trajectory {
         trajectory
     }
 
-    /// The same where the scans of a robot with the ids `ranges`, both ends within, are not kept.
+    /// This trajectory, where the scans of a robot with the ids `ranges`, both ends within, are not kept.
     pub fn with_forgotten(mut self, robot: &RobotName, ranges: impl IntoIterator<Item = (u64, u64)>) -> Self {
         let robots = Arc::make_mut(&mut self.robots);
         let robot = Arc::make_mut(robots.entry(robot.clone()).or_default());

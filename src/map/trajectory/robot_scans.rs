@@ -8,11 +8,11 @@ use super::thinning::Seen;
 /// Where the poses of one robot are, and which of its ids are known.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RobotScans {
-    /// Of its accepted scans that are kept.
+    /// Revisions of the robot's accepted scans that are kept.
     pub(super) revisions: Chunked<u64>,
-    /// Their ids, with the revisions.
+    /// Ids of these scans, with their revisions.
     ids: Chunked<(u64, u64)>,
-    /// Of its thinned scans.
+    /// Ids of the robot's thinned scans.
     pub(super) forgotten: IdRanges,
     pub(super) seen: Seen,
 }

@@ -26,7 +26,7 @@ impl ScanRecord {
         Self { pose, voxels, moments: MomentSet::of_points(points, &quantize) }
     }
 
-    /// The same of voxels whose points are not known: the refinement of alignments learns nothing from it.
+    /// A record of voxels whose points are not known: the refinement of alignments learns nothing from it.
     pub fn of_voxels(pose: MappedScan, voxels: VoxelSet) -> Self {
         Self { pose, voxels, moments: MomentSet::default() }
     }
@@ -35,11 +35,11 @@ impl ScanRecord {
 /// One accepted scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MappedScan {
-    /// Who sent it.
+    /// The robot that sent the scan.
     pub robot: RobotName,
     /// The robot's own number of the scan.
     pub scan_id: Option<u64>,
-    /// When it was taken, nanoseconds since the Unix epoch.
+    /// When the scan was taken, nanoseconds since the Unix epoch.
     pub timestamp_ns: Option<i64>,
     /// Where it was taken.
     pub map_from_sensor: Pose,
@@ -53,7 +53,7 @@ pub struct MappedScan {
     pub points_skipped: usize,
     /// Finest voxels that it added.
     pub new_voxels: usize,
-    /// Of the request, so that the same scan sent again is told from another under its id.
+    /// A digest of the request, so that the same scan sent again is told from another under its id.
     pub digest: u64,
 }
 

@@ -70,7 +70,7 @@ impl Seen {
     }
 }
 
-/// The same on every machine and at every start.
+/// The cell of a pose, the same on every machine and at every start.
 fn cell_of(pose: &Pose, spacing: &TrajectorySpacing) -> u64 {
     let [x, y, z] = pose.translation.vector.into();
     let (roll, pitch, yaw) = pose.rotation.euler_angles();

@@ -26,7 +26,7 @@ pub enum ReadError {
     Extension {
         /// The file.
         path: PathBuf,
-        /// Its extension without the dot; empty when it has none.
+        /// The file's extension without the dot; empty when it has none.
         extension: String,
     },
     /// The file is larger than a scan may be.

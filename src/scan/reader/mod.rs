@@ -42,7 +42,7 @@ pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
     format.points(&bytes).map_err(|problem| problem.in_file(path))
 }
 
-/// The same of a file's `bytes`, wherever they came from; `path` says the format, and is what errors name.
+/// The points in a file's `bytes`, wherever they came from; `path` says the format, and is what errors name.
 ///
 /// # Errors
 /// When the bytes are of another format, broken or truncated.

@@ -22,7 +22,7 @@ pub(super) struct Reserved(BTreeMap<u64, Guest>);
 struct Guest {
     peer: Peer,
     stage: Stage,
-    /// When it came, or its one request began.
+    /// When the connection came, or its one request began.
     news: Instant,
     lost: CancellationToken,
 }

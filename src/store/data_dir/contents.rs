@@ -15,7 +15,7 @@ use crate::util::StopSignal;
 pub struct DataDirContents {
     /// The names of the maps that are kept, in order.
     pub maps: Vec<MapName>,
-    /// Those of map files that could not become maps, and why. Nobody is to take their names meanwhile.
+    /// Names of map files that could not become maps, and why. Nobody is to take their names meanwhile.
     pub refused: Vec<(MapName, StoreError)>,
     /// Files and folders that nobody understands.
     pub not_understood: Vec<PathBuf>,
@@ -34,7 +34,7 @@ impl DataDir {
         self.import_map_files_until(&OpeningProgress::default())
     }
 
-    /// The same, for as long as somebody wants the maps.
+    /// [`DataDir::import_map_files`], for as long as somebody wants the maps.
     ///
     /// # Errors
     /// As there; `Cancelled` where nobody wants them any more.

@@ -44,7 +44,7 @@ pub(super) struct Frame<'a> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct BadFrame {
     pub(super) reason: String,
-    /// It looks as if it had never been written to its end.
+    /// True of a frame that looks as if it had never been written to its end.
     pub(super) torn: bool,
 }
 

@@ -231,7 +231,7 @@ impl SegmentFolder {
         self.files.read(path).map_err(StoreError::io(path))
     }
 
-    /// The same, for as long as somebody wants the maps.
+    /// Reads the journal, for as long as somebody wants the maps.
     pub(super) fn read_until(&self, path: &Path, progress: &OpeningProgress) -> Result<Vec<u8>, StoreError> {
         folder::read_until(&*self.files, path, StopSignal::when(&|| progress.is_cancelled()))
     }

@@ -47,7 +47,7 @@ struct Known {
     segments: Vec<u64>,
     /// Revisions of the snapshots, ascending.
     snapshots: Vec<u64>,
-    /// Those that somebody reads the journal from just now.
+    /// Revisions that somebody reads the journal from just now.
     pinned: Vec<u64>,
     saved: Saved,
     /// When nothing could be given up though there was something.
@@ -66,7 +66,7 @@ struct Saved {
     appended: u64,
     /// When the next one could not be written.
     failed: Option<Instant>,
-    /// How many could not be, since the start.
+    /// How many snapshots could not be written, since the start.
     failures: u64,
 }
 
@@ -146,7 +146,7 @@ impl Facts {
             || kept.is_some_and(|base| known.segments.partition_point(|first| *first <= base + 1) > 1)
     }
 
-    /// It was tried to give up what is kept for undo alone.
+    /// Notes whether what is kept for undo alone could be given up.
     pub(super) fn tell_given_up(&self, gave_up: bool) {
         self.lock().gave_up_in_vain = (!gave_up).then(Instant::now);
     }

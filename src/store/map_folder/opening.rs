@@ -19,7 +19,7 @@ use crate::util::StopSignal;
 pub struct OpenedMap {
     /// Where it is kept.
     pub folder: MapFolder,
-    /// Of this incarnation of the map.
+    /// The uuid of this incarnation of the map.
     pub uuid: Uuid,
     /// At the revision of the last durable change.
     pub map: MultiResolutionMap,
@@ -71,7 +71,8 @@ impl MapFolder {
         Self::open_at(files, path, uuid, settings, progress, true)
     }
 
-    /// The same, where the loss of revisions of which there is no trace but that they had been acknowledged may be taken.
+    /// Opens a map's folder, where the loss of revisions of which there is no trace but that they had been acknowledged
+    /// may be taken.
     pub(in crate::store) fn open_at(
         files: Arc<dyn FileSystem>,
         path: PathBuf,

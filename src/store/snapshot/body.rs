@@ -57,17 +57,17 @@ const ROBOTS_PER_LOOK: usize = 16;
 const RECORD_BYTES_MAX: usize = 4096;
 /// Bytes of memory of a number that is read one by one into a list, which doubles its room: the old and the new one.
 const NUMBER_BYTES: usize = 3 * size_of::<u64>();
-/// Of a scan in the trajectory: itself as it was read and in a list that doubles its room, its overlaps and name, and its
-/// places by robot and id.
+/// Bytes in memory of a scan in the trajectory: itself as it was read and in a list that doubles its room, its overlaps
+/// and name, and its places by robot and id.
 const SCAN_BYTES: usize = 3 * size_of::<MappedScan>() + 12 * size_of::<f64>() + 240;
-/// Of a request, which is found by its id, its revision and its caller, each with a text of its own.
+/// Bytes in memory of a request, which is found by its id, its revision and its caller, each with a text of its own.
 const REQUEST_BYTES: usize = 3 * size_of::<CompletedRequest>() + 320;
 /// Robots whose forgotten scans a file may list.
 const ROBOTS_MAX: usize = 1 << 20;
-/// Of a robot whose scans were forgotten, besides their ids: its name, and its place by name.
+/// Bytes in memory of a robot whose scans were forgotten, besides their ids: its name, and its place by name.
 const FORGOTTEN_BYTES: usize = 480;
 const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
-/// Of a voxel's moments: its key twice, the moments by themselves and with their key.
+/// Bytes in memory of a voxel's moments: its key twice, the moments by themselves and with their key.
 const MOMENT_BYTES: usize =
     2 * size_of::<VoxelKey>() + size_of::<Moments>() + size_of::<(VoxelKey, Moments)>();
 

@@ -12,13 +12,13 @@ const BYTES_PER_LOOK: usize = 1 << 20;
 /// The value of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Value<'a> {
-    /// Of wire type 0.
+    /// A varint (wire type 0).
     Varint(u64),
-    /// Of wire type 1.
+    /// A fixed 64-bit number (wire type 1).
     Fixed64(u64),
-    /// Of wire type 2: bytes, a text, a message, or packed numbers.
+    /// Bytes, a text, a message, or packed numbers (wire type 2).
     Bytes(&'a [u8]),
-    /// Of wire type 5.
+    /// A fixed 32-bit number (wire type 5).
     Fixed32,
 }
 

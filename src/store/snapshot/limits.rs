@@ -14,17 +14,18 @@ pub struct MapFileLimits {
 }
 
 impl MapFileLimits {
-    /// Of files that are known to be a server's own: bodies beyond 8 GiB, 4 billion voxels of a surface, are refused.
+    /// Limits of files that are known to be a server's own: bodies beyond 8 GiB, 4 billion voxels of a surface, are
+    /// refused.
     pub const OWN: Self = Self { body_bytes_max: 8 << 30, voxels_max: usize::MAX, scans_max: usize::MAX };
 }
 
 /// Why a map file was not read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MapFileError<E> {
-    /// It is none, is damaged, or was written by a newer version.
+    /// The file is no map file, is damaged, or was written by a newer version.
     #[error("{0}")]
     Bad(Unreadable),
-    /// It holds more than a limit allows.
+    /// The file holds more than a limit allows.
     #[error("the map file has {count} {what}, {limit} is {most}")]
     TooLarge {
         /// What it has too much of.

@@ -117,7 +117,7 @@ struct Packed<'a, T> {
     number: u64,
     values: &'a [T],
     varint: fn(&T) -> u64,
-    /// Of the values.
+    /// Bytes of the values.
     bytes: usize,
 }
 

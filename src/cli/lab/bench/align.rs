@@ -85,7 +85,7 @@ impl Align {
     }
 }
 
-/// Of one method.
+/// The result of one method.
 #[derive(Serialize)]
 struct Line {
     method: &'static str,

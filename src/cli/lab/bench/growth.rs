@@ -61,7 +61,7 @@ struct Report {
     reads_us: Waits,
 }
 
-/// Of several times.
+/// Statistics of several times.
 #[derive(Serialize)]
 struct Waits {
     number: usize,
@@ -71,7 +71,7 @@ struct Waits {
 }
 
 impl Waits {
-    /// Of ascending times.
+    /// The statistics of ascending times.
     fn of(times: &[f64]) -> Self {
         let at = |share: f64| {
             let place = (share * times.len().saturating_sub(1) as f64).round() as usize;

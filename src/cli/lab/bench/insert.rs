@@ -87,7 +87,7 @@ impl Insert {
     }
 }
 
-/// Of one structure and one kind of points.
+/// The result of one structure and one kind of points.
 #[derive(Serialize)]
 struct Line {
     structure: &'static str,
@@ -95,7 +95,7 @@ struct Line {
     ns_per_point: f64,
     points_per_s: f64,
     points: usize,
-    /// Of the structure when it holds all points.
+    /// Bytes of the structure when it holds all points.
     bytes: usize,
     bytes_per_voxel: f64,
 }

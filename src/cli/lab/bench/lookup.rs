@@ -139,7 +139,7 @@ impl Lookup {
     }
 }
 
-/// Of one structure.
+/// The result of one structure.
 #[derive(Serialize)]
 struct Line {
     structure: &'static str,

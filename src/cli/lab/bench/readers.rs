@@ -79,7 +79,7 @@ fn middle(mut rounds: Vec<Throughput>) -> Throughput {
     rounds[rounds.len() / 2]
 }
 
-/// Of one crowd.
+/// The result of one crowd.
 #[derive(Serialize)]
 struct Line {
     readers: usize,

@@ -43,7 +43,7 @@ pub(in crate::cli) struct WorkloadOptions {
 }
 
 impl WorkloadOptions {
-    /// The same in the order `usual`, where none was asked for.
+    /// This workload in the order `usual`, where none was asked for.
     pub(in crate::cli) fn usually(self, usual: Order) -> Self {
         Self { order: self.order.or(Some(usual)), ..self }
     }

@@ -22,7 +22,7 @@ pub(super) struct Journal {
     voxels: usize,
 }
 
-/// Of one robot.
+/// The journal of one robot.
 #[derive(Default)]
 pub(super) struct RobotJournal {
     name: &'static str,

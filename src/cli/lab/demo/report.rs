@@ -58,7 +58,7 @@ impl Display for Beginning {
     }
 }
 
-/// Of one scan.
+/// The line of one scan.
 #[derive(Serialize)]
 pub(super) struct Line {
     pub(super) seconds: f64,

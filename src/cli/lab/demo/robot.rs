@@ -21,7 +21,7 @@ const SCANS_AHEAD: usize = 2;
 pub(super) struct Robot {
     tour: Tour,
     scene: Arc<Scene>,
-    /// Of the sensor's noise.
+    /// Random numbers of the sensor's noise.
     rng: ChaCha8Rng,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct News {
     pub(super) scan: usize,
     pub(super) scans: usize,
     pub(super) answer: ScanAnswer,
-    /// Of the pose found against the true one, meters and degrees.
+    /// The error of the pose found against the true one, meters and degrees.
     pub(super) error: (f64, f64),
 }
 

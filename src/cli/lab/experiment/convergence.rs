@@ -209,7 +209,7 @@ impl Display for Bin {
     }
 }
 
-/// Of one method.
+/// The result of one method.
 #[derive(Serialize)]
 struct Line {
     method: &'static str,

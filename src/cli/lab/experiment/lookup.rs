@@ -71,7 +71,7 @@ impl Lookup {
     }
 }
 
-/// Of one stage, nanoseconds a point.
+/// The result of one stage, nanoseconds a point.
 #[derive(Serialize)]
 struct Line {
     stage: &'static str,

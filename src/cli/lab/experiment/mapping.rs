@@ -174,7 +174,7 @@ impl Series {
         self.map != ODOMETRY
     }
 
-    /// Of every scan but the first, which is aligned to nothing.
+    /// The median over every scan but the first, which is aligned to nothing.
     fn median(&self, of: fn(&Mapped) -> f64) -> f64 {
         let values = self.scans.iter().skip(1).map(of).collect();
         Statistics::of(values).map_or(0.0, |statistics| statistics.median)
@@ -265,7 +265,7 @@ fn write_maps(
     Ok(table.write_markdown(path)?)
 }
 
-/// Of one map.
+/// The result of one map.
 #[derive(Serialize)]
 struct Line {
     map: &'static str,

@@ -149,7 +149,7 @@ fn markdown(curves: &[Curve]) -> Table {
     table
 }
 
-/// Of one structure, size and order.
+/// The result of one structure, size and order.
 #[derive(Serialize)]
 struct Line {
     voxels: usize,

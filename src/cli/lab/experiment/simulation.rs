@@ -307,7 +307,7 @@ fn write_runs(runs: &[(Run, Vec<Pose>)], path: &Path) -> Result<(), CliError> {
     Ok(table.write_markdown(path)?)
 }
 
-/// Of one map.
+/// The result of one map.
 #[derive(Serialize)]
 struct Line {
     method: &'static str,

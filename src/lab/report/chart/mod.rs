@@ -14,7 +14,7 @@ pub use panel::{Axis, Curve, Panel, Scale, Style, panels};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Of one plot; panels lie side by side.
+/// Width and height of one plot; panels lie side by side.
 const SIZE_PX: (u32, u32) = (900, 480);
 const TITLE_PX: i32 = 18;
 const LABEL_PX: i32 = 14;

@@ -113,7 +113,8 @@ fn wall(
     pieces
 }
 
-/// Without these a corridor looks the same from every place along it, and no alignment could tell them apart.
+/// Pilasters: without these a corridor looks the same from every place along it, and no alignment could tell them
+/// apart.
 fn pilasters() -> Vec<Shape> {
     let pilaster = |x: f64, y: f64| Shape::cuboid([x, y, 0.0], [0.3, 0.16, CEILING_M]);
     let north = [0.9, 4.4, 8.1, 12.7].map(|x| pilaster(x, CORRIDOR.y.1 - 0.08));

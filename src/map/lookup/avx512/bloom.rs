@@ -21,7 +21,7 @@ pub(super) struct BloomRegisters {
 /// Sixteen keys on their way: those of even lanes first, where it is eight.
 #[derive(Clone, Copy)]
 pub(super) struct Located {
-    /// Of words of the planes.
+    /// Addresses of words of the planes.
     addresses: [Addresses; 2],
     /// Hashes from which the bits follow that count there.
     bits: __m512i,

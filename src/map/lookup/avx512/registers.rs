@@ -90,8 +90,9 @@ pub(super) struct Addresses([u64; 8]);
 impl Addresses {
     pub(super) const NONE: Self = Self([0; 8]);
 
-    /// One of them, loaded. The compiler would rather take it out of the register that it was stored from, which is
-    /// sooner known (so where one look-up waits for the other, [`gather_now`]) and is more work for the vectors.
+    /// One of the addresses, loaded. The compiler would rather take it out of the register that it was stored from,
+    /// which is sooner known (so where one look-up waits for the other, [`gather_now`]) and is more work for the
+    /// vectors.
     #[inline(always)]
     fn loaded<T>(&self, i: usize) -> *const T {
         // SAFETY: what is referred to may be read.
@@ -112,7 +113,7 @@ pub(super) fn prefetch(addresses: &Addresses) {
     (0..8).for_each(|i| util::prefetch(addresses.loaded::<u64>(i)));
 }
 
-/// The same, at once.
+/// Starts fetching the lines at eight addresses, which are taken from the register at once.
 #[inline]
 #[target_feature(enable = "avx512f")]
 pub(super) fn prefetch_now(addresses: __m512i) {
@@ -133,7 +134,7 @@ pub(super) unsafe fn gather(addresses: &Addresses) -> __m512i {
     unsafe { gather_from(|i| addresses.loaded(i)) }
 }
 
-/// The same, at once.
+/// [`gather`], with the addresses taken from the register at once.
 ///
 /// # Safety
 /// As for that.

@@ -5,7 +5,7 @@ use crate::voxel::Moments;
 
 /// Units in a step. [`Moments::STEP`] had better be a multiple, or nothing gets shorter.
 const STEP: i64 = Moments::UNITS / 256;
-/// Of each number: the count has none, products have two.
+/// Steps of each number: the count has none, products have two.
 const UNITS: Numbers = {
     const PRODUCT: i64 = STEP * STEP;
     [1, STEP, STEP, STEP, PRODUCT, PRODUCT, PRODUCT, PRODUCT, PRODUCT, PRODUCT]

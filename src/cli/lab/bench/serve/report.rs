@@ -9,7 +9,7 @@ use super::Protocol;
 use crate::cli::map_report::{count, percent};
 use crate::lab::fleet::Answered;
 
-/// Of one protocol and one size of messages.
+/// The result of one protocol and one size of messages.
 #[derive(Serialize)]
 pub(super) struct Line {
     protocol: String,

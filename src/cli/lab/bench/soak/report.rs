@@ -66,7 +66,7 @@ impl Display for Line {
 pub(super) struct Verdict {
     seconds: f64,
     load: f64,
-    /// Of what was due, what was not done in time.
+    /// The share of what was due that was not done in time.
     left: f64,
     queries: Done,
     changes: Done,
@@ -78,7 +78,7 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// Of `seconds` at a load that meant `due` operations a second.
+    /// The report of `seconds` at a load that meant `due` operations a second.
     pub(super) fn of(
         seconds: f64,
         load: f64,

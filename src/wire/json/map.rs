@@ -1,0 +1,137 @@
+//! The description of a map in JSON.
+
+use serde::Serialize;
+
+use super::version::JsonVersion;
+use crate::map::{LevelInfo, MapSettings};
+use crate::service::{MapInfo, MapStorage};
+
+/// A map's description.
+#[derive(Debug, Serialize)]
+pub struct JsonMap {
+    /// The name.
+    pub map: String,
+    /// The uuid and the revision.
+    #[serde(flatten)]
+    pub version: JsonVersion,
+    /// The settings.
+    pub settings: JsonSettings,
+    /// The levels, finest first.
+    pub levels: Vec<JsonLevel>,
+    /// Scans that were accepted and not undone.
+    pub scans: usize,
+    /// The robots that sent them, by name.
+    pub robots: Vec<String>,
+    /// Bytes of the exact sets.
+    pub set_bytes: usize,
+    /// Bytes of the moments of points.
+    pub moment_bytes: usize,
+    /// Bytes of the trajectory.
+    pub trajectory_bytes: usize,
+    /// What lies on disk; null where nothing does.
+    pub storage: Option<JsonStorage>,
+}
+
+/// What of a map lies on disk.
+#[derive(Debug, Serialize)]
+pub struct JsonStorage {
+    /// Changes up to this revision survive the loss of power.
+    pub durable_revision: u64,
+    /// The revision of the newest snapshot.
+    pub snapshot_revision: u64,
+    /// Scans from this revision on can be undone.
+    pub undo_from_revision: u64,
+    /// Why no changes are taken; null where they are.
+    pub read_only: Option<String>,
+}
+
+/// The settings of a map.
+#[derive(Debug, Serialize)]
+pub struct JsonSettings {
+    /// Side of a voxel, meters.
+    pub resolution_m: f64,
+    /// The number of levels.
+    pub levels: u32,
+    /// The filters.
+    pub filter: JsonFilter,
+}
+
+/// The settings of filters.
+#[derive(Debug, Serialize)]
+pub struct JsonFilter {
+    /// Hash functions.
+    pub hashes: u32,
+    /// Bits of a plane a voxel, just before growth.
+    pub bits_per_key: f64,
+}
+
+/// One level of a map.
+#[derive(Debug, Serialize)]
+pub struct JsonLevel {
+    /// The level, 0 the finest.
+    pub level: u32,
+    /// Side of a voxel, meters.
+    pub resolution_m: f64,
+    /// Occupied voxels.
+    pub voxels: usize,
+    /// Bytes of the bit planes.
+    pub plane_bytes: usize,
+    /// Bytes of the counters.
+    pub counter_bytes: usize,
+    /// The false-positive rate by the closed form of blocked filters.
+    pub expected_false_positive_rate: f64,
+    /// The false-positive rate by eq. (1) of the paper.
+    pub ideal_false_positive_rate: f64,
+    /// The false-positive rate measured on absent neighbors of occupied voxels; null where there are none.
+    pub measured_false_positive_rate: Option<f64>,
+}
+
+impl From<MapInfo> for JsonMap {
+    fn from(info: MapInfo) -> Self {
+        Self {
+            map: info.name.to_string(),
+            version: info.version.into(),
+            settings: info.settings.into(),
+            levels: info.levels.iter().map(Into::into).collect(),
+            scans: info.scans,
+            robots: info.robots.iter().map(ToString::to_string).collect(),
+            set_bytes: info.set_bytes,
+            moment_bytes: info.moment_bytes,
+            trajectory_bytes: info.trajectory_bytes,
+            storage: info.storage.map(Into::into),
+        }
+    }
+}
+
+impl From<MapStorage> for JsonStorage {
+    fn from(storage: MapStorage) -> Self {
+        Self {
+            durable_revision: storage.durable_revision,
+            snapshot_revision: storage.snapshot_revision,
+            undo_from_revision: storage.undo_from_revision,
+            read_only: storage.failure,
+        }
+    }
+}
+
+impl From<MapSettings> for JsonSettings {
+    fn from(MapSettings { resolution_m, levels, filter }: MapSettings) -> Self {
+        let filter = JsonFilter { hashes: filter.hashes, bits_per_key: filter.bits_per_key };
+        Self { resolution_m, levels, filter }
+    }
+}
+
+impl From<&LevelInfo> for JsonLevel {
+    fn from(info: &LevelInfo) -> Self {
+        Self {
+            level: info.level,
+            resolution_m: info.resolution_m,
+            voxels: info.voxels,
+            plane_bytes: info.plane_bytes,
+            counter_bytes: info.counter_bytes,
+            expected_false_positive_rate: info.expected_rate,
+            ideal_false_positive_rate: info.ideal_false_positive_rate,
+            measured_false_positive_rate: info.measured_rate,
+        }
+    }
+}
