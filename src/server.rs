@@ -1,7 +1,6 @@
 //! The daemon: its sockets, and going down within a bound.
 
 mod access_policy;
-mod answer_body;
 mod background;
 mod connection;
 mod connection_slots;
@@ -19,6 +18,7 @@ mod starting;
 mod stream;
 mod system_readings;
 mod tls;
+mod tracked_body;
 mod watch;
 
 pub use error::ServerError;

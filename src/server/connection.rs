@@ -16,11 +16,11 @@ use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt;
 
 use super::CLOSING_MAX;
-use super::answer_body::AnswerBody;
 use super::connection_slots::ConnectionSlot;
 use super::endpoint::Endpoint;
 use super::listener::Accepted;
 use super::stream::{Count, Counted, secure};
+use super::tracked_body::TrackedBody;
 use crate::admission::{CloseConnection, Peer};
 use crate::sync::polled_by_runtime;
 
@@ -100,5 +100,5 @@ async fn answer(
     request.extensions_mut().insert(CloseConnection(place.hang_up()));
     request.extensions_mut().insert(place.shared());
     let response = router.oneshot(request).await?;
-    Ok(response.map(|body| Body::new(AnswerBody::new(body, used))))
+    Ok(response.map(|body| Body::new(TrackedBody::new(body, used))))
 }

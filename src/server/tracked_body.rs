@@ -10,12 +10,12 @@ use super::connection_slots::InUse;
 
 /// A body that keeps its connection in use until it is sent, and tells whether the client reads it: the next piece is
 /// asked for when there is room for it on the way.
-pub(super) struct AnswerBody {
+pub(super) struct TrackedBody {
     body: Body,
     used: InUse,
 }
 
-impl AnswerBody {
+impl TrackedBody {
     pub(super) fn new(body: Body, used: InUse) -> Self {
         // A client that leaves no room for the first piece does not read either.
         used.handed_over();
@@ -23,7 +23,7 @@ impl AnswerBody {
     }
 }
 
-impl HttpBody for AnswerBody {
+impl HttpBody for TrackedBody {
     type Data = Bytes;
     type Error = axum::Error;
 

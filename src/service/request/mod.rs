@@ -1,0 +1,19 @@
+//! Requests and answers of the service, in domain types; a file for each kind of operation.
+
+mod deletion;
+mod map;
+mod occupancy;
+mod point_cloud;
+mod scan;
+mod trajectory;
+mod undo;
+mod version;
+
+pub use deletion::{Deletion, DeletionAnswer, DeletionTarget};
+pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
+pub use occupancy::{PointAnswer, PointQuery, VoxelListing};
+pub use point_cloud::PointCloud;
+pub use scan::{Foreground, ScanAnswer, ScanRequest};
+pub use trajectory::{TrajectoryAnswer, TrajectoryQuery};
+pub use undo::{Undo, UndoAnswer, UndoTarget};
+pub use version::MapVersion;

@@ -1,0 +1,114 @@
+//! Scans to insert or align, and their answers.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use super::point_cloud::PointCloud;
+use super::version::MapVersion;
+use crate::align::{Direction, Method, Verdict};
+use crate::geometry::Pose;
+use crate::map::RobotName;
+use crate::mapping::Guess;
+use crate::scan::PointFilter;
+
+/// A scan to align or insert.
+#[derive(Debug, Clone)]
+pub struct ScanRequest {
+    /// The robot that sends the scan.
+    pub robot: RobotName,
+    /// The robot's own number of the scan; makes insertion idempotent.
+    pub scan_id: Option<u64>,
+    /// In the sensor frame; not finite = no return.
+    pub points: PointCloud,
+    /// When the scan was taken, nanoseconds since the Unix epoch.
+    pub timestamp_ns: Option<i64>,
+    /// Where it is thought to have been taken.
+    pub guess: Guess,
+    /// Take the guess as it is, without aligning.
+    pub at_guess: bool,
+    /// Add the scan where it was found even if the verdict is not `accepted`.
+    pub force: bool,
+    /// How to align; the server's own where none.
+    pub method: Option<Method>,
+    /// Say too which points fall in no occupied voxel of this level; of an alignment only.
+    pub foreground_level: Option<u32>,
+    /// Which points count, before what the server is set to for this robot.
+    pub filter: PointFilter,
+    /// Refuse the scan instead of skipping points that are not finite.
+    pub strict: bool,
+}
+
+impl ScanRequest {
+    /// A robot's scan, of which nothing else is said.
+    pub fn new(robot: RobotName, points: PointCloud) -> Self {
+        Self {
+            robot,
+            scan_id: None,
+            points,
+            timestamp_ns: None,
+            guess: Guess::Last,
+            at_guess: false,
+            force: false,
+            method: None,
+            foreground_level: None,
+            filter: PointFilter::default(),
+            strict: false,
+        }
+    }
+}
+
+/// What became of a scan, or would have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanAnswer {
+    /// True when the map took it, or would.
+    pub accepted: bool,
+    /// What its alignment is worth.
+    pub verdict: Verdict,
+    /// Why, in a sentence.
+    pub reason: String,
+    /// Where it was taken.
+    pub map_from_sensor: Pose,
+    /// Fraction of its points in occupied voxels, level by level, finest first; before it was added.
+    pub level_overlaps: Vec<f64>,
+    /// Fraction of a sample of its points that lie on the map's surfaces.
+    pub inliers: f64,
+    /// How closely they do, 0 to 1.
+    pub fitness: f64,
+    /// Rows of the information matrix, see [`crate::align::PoseInformation`]; none of an answer that is given again.
+    pub information: Option<[[f64; 6]; 6]>,
+    /// Directions of the pose that the map's surfaces leave open.
+    pub undetermined: Vec<Direction>,
+    /// Steps of the alignment.
+    pub iterations: u32,
+    /// Time that it took.
+    pub align_time: Duration,
+    /// Points that were not finite, out of the robot's range, on its body, or out of the map's range.
+    pub points_skipped: usize,
+    /// Finest voxels added; 0 where nothing was.
+    pub new_voxels: usize,
+    /// After it, or where it was refused, before.
+    pub version: MapVersion,
+    /// The points that the map does not show, where they were asked for.
+    pub foreground: Option<Foreground>,
+    /// True of a scan that was accepted before: this is that answer.
+    pub replayed: bool,
+    /// The robot stands where its last scan was taken and sees nothing new: it was accepted and not kept.
+    pub stationary: bool,
+}
+
+/// What is in front of the background that a map is: the points of a scan in no occupied voxel (paper \[9\]).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Foreground {
+    /// Point i is bit i % 8 (lowest first) of byte i / 8; points that do not count are not of it.
+    pub bitmap: Bytes,
+    /// Number of its points.
+    pub points: usize,
+}
+
+impl ScanAnswer {
+    /// Fraction of the points in occupied voxels of level 0.
+    pub fn overlap(&self) -> f64 {
+        self.level_overlaps.first().copied().unwrap_or(0.0)
+    }
+}

@@ -1,0 +1,47 @@
+//! Undo, and its answers.
+
+use super::version::MapVersion;
+use crate::map::{RequestId, RobotName};
+
+/// Which scans to take out again.
+#[derive(Debug, Clone)]
+pub struct Undo {
+    /// Which.
+    pub target: UndoTarget,
+    /// The caller's own id of this undo; makes it idempotent.
+    pub request_id: Option<RequestId>,
+}
+
+/// The ways to name accepted scans.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum UndoTarget {
+    /// One, by the robot's own number.
+    Scan {
+        /// The robot that sent the scan.
+        robot: RobotName,
+        /// The scan's number.
+        scan_id: u64,
+    },
+    /// One, by the revision that it made.
+    Revision(u64),
+    /// All of a robot's that made a revision after this one.
+    RobotSince {
+        /// The robot that sent the scans.
+        robot: RobotName,
+        /// The last revision to keep.
+        revision: u64,
+    },
+}
+
+/// What an undo did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UndoAnswer {
+    /// Scans taken out.
+    pub scans: usize,
+    /// Finest voxels that went with them.
+    pub removed: usize,
+    /// After it.
+    pub version: MapVersion,
+    /// True of an undo that was done before under its id: this is that answer.
+    pub replayed: bool,
+}
