@@ -28,6 +28,9 @@ use crate::telemetry::{REQUEST, RequestRecorder};
 /// The name of what is no operation, in metrics and the log: whatever a client sends, it is one of few.
 const UNKNOWN: &str = "unknown";
 
+/// Characters of a request's id that the log repeats: a caller may send any.
+const REQUEST_ID_LENGTH_MAX: usize = 64;
+
 /// What requests of every protocol pass before a handler sees them. A clone is another handle on the same one.
 #[derive(Debug, Clone)]
 pub struct Middleware {
@@ -120,6 +123,8 @@ async fn serve<P: Protocol>(
 fn span(protocol: &'static str, operation: &'static str, request: &Request) -> Span {
     let extensions = request.extensions();
     let request_id = extensions.get::<RequestId>().and_then(|id| id.header_value().to_str().ok());
+    // Visible ASCII, so that any length is a border of characters.
+    let request_id = request_id.map(|id| &id[..id.len().min(REQUEST_ID_LENGTH_MAX)]);
     let peer = extensions.get::<Peer>().map(display);
     info_span!(target: REQUEST, "request", protocol, operation, request_id, peer, key = Empty)
 }

@@ -133,7 +133,9 @@ async fn refused_keys_are_written_and_a_flood_of_them_is_counted() {
     let call = Operation::DeleteMap.grpc().unwrap();
     let refused = first_answer(channel, call, message(Operation::DeleteMap, "a"), None).await;
     assert!(refused.is_err());
-    for _ in 0..100 {
+    let long = "x".repeat(20_000);
+    audited.http(Method::PUT, "/v1/maps/a", &long, None, create.clone()).await;
+    for _ in 0..99 {
         audited.http(Method::PUT, "/v1/maps/a", "flood", None, create.clone()).await;
     }
     // One of these is written, when the second of the flood is over, with the number of those that were not.
@@ -148,6 +150,7 @@ async fn refused_keys_are_written_and_a_flood_of_them_is_counted() {
     assert_eq!(lines[0]["reason"], "key_unknown");
     assert_eq!(of(&lines[1])[..2], ["grpc", "DeleteMap"]);
     assert_eq!(lines[1]["reason"], "key_missing");
+    assert_eq!(lines[2]["span"]["request_id"], "x".repeat(64));
     assert!((3..60).contains(&lines.len()), "{} lines", lines.len());
     let unwritten: u64 = lines.iter().map(|line| line["unwritten"].as_u64().unwrap()).sum();
     assert_eq!(unwritten as usize + lines.len(), 103);
