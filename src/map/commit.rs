@@ -38,7 +38,7 @@ pub struct Committed {
 
 impl<'a> Committer<'a> {
     pub(super) fn begin(map: &'a MultiResolutionMap) -> Self {
-        Self { map, _turn: map.committing.lock() }
+        Self { map, _turn: map.commit_queue.lock() }
     }
 
     /// The map, which nobody else changes meanwhile.

@@ -76,7 +76,7 @@ pub struct MultiResolutionMap {
     trajectory: RwLock<Trajectory>,
     requests: RwLock<IdempotencyLog>,
     revision: AtomicU64,
-    committing: Mutex<()>,
+    commit_queue: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
     long_reads: RwLock<()>,
 }
@@ -97,7 +97,7 @@ impl MultiResolutionMap {
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
             revision: AtomicU64::new(0),
-            committing: Mutex::new(Rank::Commit, ()),
+            commit_queue: Mutex::new(Rank::Commit, ()),
             long_reads: RwLock::new(Rank::LongRead, ()),
         })
     }

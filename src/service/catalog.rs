@@ -12,7 +12,7 @@ use std::time::Duration;
 use uuid::Uuid;
 
 use super::allowed_maps::Reachable;
-use super::committing::CommitThread;
+use super::commit_queue::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::BuiltMap;
 use super::{AllowedMaps, ErrorCode, MapVersion, Reason, ServiceError, UnavailableMap};
@@ -215,7 +215,7 @@ impl Catalog {
             let map = build()?;
             let [thread, thread_of_old] = [CommitThread::start(&old.name)?, CommitThread::start(&old.name)?];
             // Its revision, and so its new name, is known from now on.
-            old.committing.end_replaced();
+            old.commit_queue.end_replaced();
             let synced = old.folder.as_ref().map_or(Ok(()), |folder| folder.sync()).map_err(not_stored);
             let kept = name_of_replaced(&old.name, old.map.revision(), &taken);
             let exchange = || {
@@ -264,7 +264,7 @@ impl Catalog {
         if is_gone {
             self.maps.write().open.remove(&map.name);
             // Who still holds the map may read it, but nothing is kept of it any more.
-            map.committing.end();
+            map.commit_queue.end();
         }
         let version = map.version(map.map.revision());
         removed.map(|_| version).map_err(|error| match is_gone {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::committing::{Decided, Proposal, Refusal, Step};
+use super::commit_queue::{Decided, Refusal, Step, Submission};
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
@@ -17,11 +17,11 @@ use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey, VoxelSet};
 
 impl HostedMap {
     /// Sets a deletion on its way, unless it was done before.
-    pub(super) fn propose_deletion(
+    pub(super) fn submit_deletion(
         self: &Arc<Self>,
         deletion: &Arc<Deletion>,
         caller: Option<&CallerName>,
-        room: &Arc<ResourceBudget>,
+        budget: &Arc<ResourceBudget>,
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request {
@@ -34,29 +34,29 @@ impl HostedMap {
             let version = self.version(answered.revision);
             return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, version, replayed: true }));
         }
-        room.check_to_shrink()?;
-        let (map, deletion, room) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(room));
+        budget.check_to_shrink()?;
+        let (map, deletion, budget) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(budget));
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Deletion, request.as_ref(), former)?;
-            let lent = room.reserve_transient(search_bytes(core, &deletion), "a deletion")?;
+            let lent = budget.reserve_transient(search_bytes(core, &deletion), "a deletion")?;
             let voxels = map.targets_of(&deletion, stop)?;
             if voxels.is_empty() {
                 return Ok(None);
             }
             drop(lent);
-            let lent = vec![room.reserve_transient(removal_bytes(core, &voxels), "a deletion")?];
+            let lent = vec![budget.reserve_transient(removal_bytes(core, &voxels), "a deletion")?];
             let change = Change::Deletion(DeletionRecord { voxels, request });
             Ok(Some(Decided { change, record: None, lent, pin: None }))
         };
-        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)))?;
+        let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |Committed { revision, voxels: removed }| DeletionAnswer {
             removed,
             version: map.version(revision),
             replayed: false,
         };
-        Ok(Step::Proposed(outcome, Box::new(answer)))
+        Ok(Step::Submitted(outcome, Box::new(answer)))
     }
 
     /// What came of a request the first time.

@@ -9,7 +9,7 @@ use bytes::Bytes;
 use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
-use super::committing::{CommitQueue, CommitThread, Stop};
+use super::commit_queue::{CommitQueue, CommitThread, Stop};
 use super::resource_budget::ResourceBudget;
 use super::{
     MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing,
@@ -39,7 +39,7 @@ pub(super) struct HostedMap {
     pub(super) map: Arc<MultiResolutionMap>,
     /// What keeps it across restarts, where anything does.
     pub(super) folder: Option<Arc<MapFolder>>,
-    pub(super) committing: CommitQueue,
+    pub(super) commit_queue: CommitQueue,
     /// The last revision that was published.
     announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
@@ -85,14 +85,14 @@ impl HostedMap {
         settings: &StoreSettings,
     ) -> Self {
         let (announcing, announced) = watch::channel(map.revision());
-        let committing =
+        let commit_queue =
             CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), announcing, settings);
         Self {
             name,
             uuid,
             map,
             folder,
-            committing,
+            commit_queue,
             announced,
             turns: Mutex::new(Rank::Brief, HashMap::new()),
             undo_turn: Arc::default(),
@@ -102,21 +102,22 @@ impl HostedMap {
 
     /// Writes a snapshot where there is need and room for one; true when it did. A map whose journal failed is left as
     /// it is.
-    pub(super) fn save(&self, which: Saving, room: &ResourceBudget) -> Result<bool, StoreError> {
-        let Some(folder) = self.folder.as_ref().filter(|_| self.committing.stopped().is_none()) else {
+    pub(super) fn save(&self, which: Saving, budget: &ResourceBudget) -> Result<bool, StoreError> {
+        let Some(folder) = self.folder.as_ref().filter(|_| self.commit_queue.stopped().is_none()) else {
             return Ok(false);
         };
         let changed = self.map.revision() != folder.used().snapshot;
         if !changed || which == Saving::Due && !folder.snapshot_is_due() {
             return Ok(false);
         }
-        let lent =
-            room.check_to_shrink().and_then(|()| room.reserve_transient(self.snapshot_bytes(), "a snapshot"));
+        let lent = budget
+            .check_to_shrink()
+            .and_then(|()| budget.reserve_transient(self.snapshot_bytes(), "a snapshot"));
         let Ok(_lent) = lent.inspect_err(|no_room| self.put_off(&no_room.message)) else {
             return Ok(false);
         };
         let (start, snapshot) = (Instant::now(), Snapshot::of(&self.map, self.uuid));
-        let saved = folder.save(&snapshot, room.file_bytes_max());
+        let saved = folder.save(&snapshot, budget.file_bytes_max());
         // Its folder may go while it is written.
         if matches!(saved, Err(StoreError::Gone)) {
             return Ok(false);
@@ -133,8 +134,8 @@ impl HostedMap {
     }
 
     /// Gives up what is kept for undo alone, where the disk is so full that changes will be refused next.
-    pub(super) fn make_room(&self, room: &ResourceBudget) -> Result<(), StoreError> {
-        let Some(folder) = self.folder.as_ref().filter(|_| room.is_disk_scarce()) else { return Ok(()) };
+    pub(super) fn make_room(&self, budget: &ResourceBudget) -> Result<(), StoreError> {
+        let Some(folder) = self.folder.as_ref().filter(|_| budget.is_disk_scarce()) else { return Ok(()) };
         match folder.give_up_undo() {
             Ok(true) => {
                 tracing::warn!(map = %self.name, "the disk is nearly full: what was kept for undo is given up")
@@ -160,7 +161,7 @@ impl HostedMap {
 
     /// Refuses changes that would be refused in the end, before any work is done for them.
     pub(super) fn check_writable(&self) -> Result<(), ServiceError> {
-        self.committing.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
+        self.commit_queue.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
     }
 
     pub(super) fn version(&self, revision: u64) -> MapVersion {
@@ -190,13 +191,13 @@ impl HostedMap {
             tokio::select! {
                 biased;
                 reached = async { announced.wait_for(|announced| *announced >= revision).await.is_ok() } => reached,
-                () = self.committing.ended() => false,
+                () = self.commit_queue.ended() => false,
             }
         };
         if let Ok(true) = tokio::time::timeout(wait_max, reached).await {
             return Ok(());
         }
-        if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.committing.stopped() {
+        if let Some(stop @ (Stop::Deleted | Stop::Replaced)) = self.commit_queue.stopped() {
             return Err(stop.refusal(&self.name));
         }
         let message = format!(
@@ -330,7 +331,7 @@ impl HostedMap {
             robots: trajectory.robots(),
             set_bytes: described.set_bytes,
             moment_bytes: described.moment_bytes,
-            commits: self.committing.durations(),
+            commits: self.commit_queue.durations(),
             trajectory_bytes: described.trajectory_bytes,
             storage,
         })
@@ -338,7 +339,7 @@ impl HostedMap {
 
     /// Why the map takes no changes.
     pub(super) fn failure(&self) -> Option<&str> {
-        match self.committing.stopped()? {
+        match self.commit_queue.stopped()? {
             Stop::Failed(reason) => Some(reason),
             Stop::Deleted | Stop::Replaced => None,
         }

@@ -151,14 +151,14 @@ impl HostedMap {
         &self,
         request: &LocalizationRequest,
         settings: &ServiceSettings,
-        room: &ResourceBudget,
+        budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<LocalizationAnswer, ServiceError> {
         let start = Instant::now();
         let limit = request.time_limit.unwrap_or(TIME_LIMIT_DEFAULT);
         let stop = stop.by(start + limit);
         let all = request.points.as_slice();
-        let _copy = room.reserve_transient(size_of_val(all) as u64, WHOM)?;
+        let _copy = budget.reserve_transient(size_of_val(all) as u64, WHOM)?;
         let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
         if points.is_empty() {
             let message =
@@ -174,7 +174,7 @@ impl HostedMap {
             progress: &mut |_| (),
             reserve: &mut |bytes| {
                 let more =
-                    room.reserve_transient(bytes as u64, WHOM).map(|reservation| lent.push(reservation));
+                    budget.reserve_transient(bytes as u64, WHOM).map(|reservation| lent.push(reservation));
                 more.map_err(|error| refused = Some(error)).is_ok()
             },
         };

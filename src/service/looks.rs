@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use uuid::Uuid;
 
-use super::committing::CommitThread;
+use super::commit_queue::CommitThread;
 use super::hosted_map::HostedMap;
 use super::map_file::from_file;
 use super::resource_budget::ResourceBudget;
@@ -106,31 +106,31 @@ fn an_alignment_whose_time_is_up_says_so_and_one_whose_caller_has_gone_is_not_to
 #[test]
 fn a_search_whose_caller_has_gone_is_no_answer_and_one_whose_time_is_up_is() {
     let (map, settings) = (hosted(), ServiceSettings::default());
-    let room = ResourceBudget::new(None, Marks::default());
+    let budget = ResourceBudget::new(None, Marks::default());
     let request = LocalizationRequest {
         points: PointCloud::from(wall(10_000)),
         query: LocalizationQuery { candidates: 1, ..LocalizationQuery::default() },
         time_limit: Some(std::time::Duration::ZERO),
     };
-    let answer = map.localize(&request, &settings, &room, StopSignal::NEVER).unwrap();
+    let answer = map.localize(&request, &settings, &budget, StopSignal::NEVER).unwrap();
     assert!(answer.cut_short && !answer.accepted() && answer.candidates.is_empty());
     let gone = || true;
-    let gone = map.localize(&request, &settings, &room, StopSignal::when(&gone)).unwrap_err();
+    let gone = map.localize(&request, &settings, &budget, StopSignal::when(&gone)).unwrap_err();
     assert_eq!(gone.reason, Reason::CallerGone);
 }
 
 #[test]
 fn a_map_file_is_made_and_read_and_a_map_described_with_looks_in_proportion_to_its_size() {
-    let (room, limits) = (ResourceBudget::new(None, Marks::default()), ServiceSettings::default().limits);
+    let (budget, limits) = (ResourceBudget::new(None, Marks::default()), ServiceSettings::default().limits);
     for side in [40, 160, 320] {
         let (map, bytes) = sheet(side);
         let looks = Cell::new(0);
         let count_look = || looks.replace(looks.get() + 1) == u64::MAX;
         let stop = StopSignal::when(&count_look);
-        let file = map.to_file(&room, &limits, stop).unwrap();
+        let file = map.to_file(&budget, &limits, stop).unwrap();
         let at_file = looks.replace(0);
         assert!(bytes / at_file <= 4 << 20, "{bytes} bytes of map, {at_file} looks");
-        assert!(from_file(&file.bytes, &limits, &room, stop).is_ok());
+        assert!(from_file(&file.bytes, &limits, &budget, stop).is_ok());
         let at_map = looks.replace(0);
         assert!(bytes / at_map <= 4 << 20, "{bytes} bytes of map, {at_map} looks");
         map.describe(100, stop).unwrap();
@@ -140,9 +140,9 @@ fn a_map_file_is_made_and_read_and_a_map_described_with_looks_in_proportion_to_i
 
 #[test]
 fn a_map_file_or_a_description_that_nobody_waits_for_is_given_up_at_the_next_look() {
-    let (room, limits) = (ResourceBudget::new(None, Marks::default()), ServiceSettings::default().limits);
+    let (budget, limits) = (ResourceBudget::new(None, Marks::default()), ServiceSettings::default().limits);
     let (map, _) = sheet(100);
-    let file = map.to_file(&room, &limits, StopSignal::NEVER).unwrap().bytes;
+    let file = map.to_file(&budget, &limits, StopSignal::NEVER).unwrap().bytes;
     for looks_max in (0..20).chain([50, 100]) {
         let looks = Cell::new(0u64);
         let is_gone = || looks.replace(looks.get() + 1) >= looks_max;
@@ -152,8 +152,8 @@ fn a_map_file_or_a_description_that_nobody_waits_for_is_given_up_at_the_next_loo
             assert!(taken <= looks_max + 300, "{taken} looks after {looks_max}");
             assert_eq!(error.map(|error| error.reason), (taken > looks_max).then_some(Reason::CallerGone));
         };
-        caller_gone(map.to_file(&room, &limits, stop).err());
-        caller_gone(from_file(&file, &limits, &room, stop).err());
+        caller_gone(map.to_file(&budget, &limits, stop).err());
+        caller_gone(from_file(&file, &limits, &budget, stop).err());
         caller_gone(map.describe(100, stop).err());
     }
 }

@@ -18,11 +18,11 @@ impl HostedMap {
     /// `ResourceExhausted` for one that [`from_file`] would refuse: a backup that cannot be restored is none.
     pub(super) fn to_file(
         &self,
-        room: &ResourceBudget,
+        budget: &ResourceBudget,
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<MapFile, ServiceError> {
-        let _lent = room.reserve_transient(self.snapshot_bytes(), "a map file")?;
+        let _lent = budget.reserve_transient(self.snapshot_bytes(), "a map file")?;
         let ended = || ended_early(stop);
         let snapshot = Snapshot::of_until(&self.map, self.uuid, stop).ok_or_else(ended)?;
         let encoded = snapshot.encode_until(stop);
@@ -54,7 +54,7 @@ pub(super) struct BuiltMap {
 pub(super) fn from_file(
     file: &[u8],
     limits: &Limits,
-    room: &ResourceBudget,
+    budget: &ResourceBudget,
     stop: StopSignal<'_>,
 ) -> Result<BuiltMap, ServiceError> {
     let bounds = MapFileLimits {
@@ -66,7 +66,7 @@ pub(super) fn from_file(
     let mut part = None;
     let mut reserve = |bytes| {
         drop(part.take());
-        part = Some(room.reserve(bytes)?);
+        part = Some(budget.reserve(bytes)?);
         Ok(())
     };
     let decoded = Snapshot::decode_until(file, &bounds, &mut reserve, stop);
@@ -81,7 +81,7 @@ pub(super) fn from_file(
     let map =
         MultiResolutionMap::restore_until(settings, contents, stop)?.ok_or_else(|| ended_early(stop))?;
     drop(part.take());
-    let saving = room.reserve(snapshot_bytes(&map))?;
+    let saving = budget.reserve(snapshot_bytes(&map))?;
     Ok(BuiltMap { uuid: Uuid::new_v4(), map, saving })
 }
 

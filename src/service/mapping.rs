@@ -1,9 +1,9 @@
-//! How a scan enters a map: align, quantize, propose (paper III).
+//! How a scan enters a map: align, quantize, submit (paper III).
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::committing::{Prepared, Proposal, Step, Turn, record_of};
+use super::commit_queue::{Prepared, Step, Submission, Turn, record_of};
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
@@ -18,12 +18,12 @@ use crate::util::StopSignal;
 
 impl HostedMap {
     /// Aligns the scan, and where it fits sets it on its way into the map.
-    pub(super) fn propose_scan(
+    pub(super) fn submit_scan(
         self: &Arc<Self>,
         request: &ScanRequest,
         turn: Turn,
         settings: &ServiceSettings,
-        room: &ResourceBudget,
+        budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<Step<ScanAnswer>, ServiceError> {
         self.check_writable()?;
@@ -33,7 +33,7 @@ impl HostedMap {
         }
         self.check_voxels(settings)?;
         self.check_robots(&request.robot, &settings.limits)?;
-        room.check_to_grow()?;
+        budget.check_to_grow()?;
         let mapper = self.mapper(request, settings);
         let located = self.locate(&scan, &mapper, stop)?;
         let answer = self.answer(&scan, &located);
@@ -47,15 +47,15 @@ impl HostedMap {
         }
         let ScanRecord { voxels, moments, .. } = &scan_record;
         let moments = moments.as_slice().len();
-        let reservation = room.reserve_growth(growth_bytes(self.map.settings(), voxels, moments))?;
+        let reservation = budget.reserve_growth(growth_bytes(self.map.settings(), voxels, moments))?;
         let points_skipped = scan_record.pose.points_skipped;
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
         let prepared = Prepared { change, record, if_empty: located.is_first, turn, reservation };
-        let outcome = self.committing.propose(Proposal::Prepared(prepared.into()))?;
+        let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let answer = ScanAnswer { points_skipped, ..answer };
-        Ok(Step::Proposed(outcome, Box::new(move |committed| map.committed(answer, committed))))
+        Ok(Step::Submitted(outcome, Box::new(move |committed| map.committed(answer, committed))))
     }
 
     /// What to say of a scan that was committed.
@@ -64,7 +64,7 @@ impl HostedMap {
         ScanAnswer { accepted: true, new_voxels, version: self.version(revision), ..answer }
     }
 
-    /// Says what [`HostedMap::propose_scan`] would; changes nothing.
+    /// Says what [`HostedMap::submit_scan`] would; changes nothing.
     pub(super) fn align_scan(
         &self,
         request: &ScanRequest,

@@ -33,11 +33,12 @@ impl MapService {
             let is_new = self.inner.catalog.get(&name).is_err();
             let settings = settings.checked()?;
             if is_new {
-                self.inner.room.check_to_grow()?;
+                self.inner.budget.check_to_grow()?;
             }
             let inner = Arc::clone(&self.inner);
             let create = async move {
-                let _empty = is_new.then(|| inner.room.reserve(settings.empty_filter_bytes())).transpose()?;
+                let _empty =
+                    is_new.then(|| inner.budget.reserve(settings.empty_filter_bytes())).transpose()?;
                 inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
             };
             let (map, created) = run_to_completion(create).await?;
@@ -113,7 +114,7 @@ impl MapService {
             let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
             self.inner
                 .map_files
-                .run(move |stop| map.to_file(&inner.room, &inner.settings.limits, stop))
+                .run(move |stop| map.to_file(&inner.budget, &inner.settings.limits, stop))
                 .await?
         };
         self.observed("SnapshotMap", Some(name), work, |_| Outcome::Read).await
@@ -141,11 +142,11 @@ impl MapService {
                                delete the map first, or ask with such a key";
                 return Err(ServiceError::new(Reason::MapNotAllowed, message));
             }
-            self.inner.room.check_to_grow()?;
+            self.inner.budget.check_to_grow()?;
             self.inner.catalog.check_free(&name, self.limits().maps_max, replace)?;
             let inner = Arc::clone(&self.inner);
             let build =
-                move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.room, stop);
+                move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
             let built = self.inner.map_files.run(build).await??;
             let inner = Arc::clone(&self.inner);
             let maps_max = self.limits().maps_max;
@@ -173,7 +174,8 @@ impl MapService {
     /// As for [`MapService::save`].
     pub async fn save_due(&self) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        let made_room = self.inner.catalog.save(move |map| map.make_room(&inner.room).map(|()| false)).await;
+        let made_room =
+            self.inner.catalog.save(move |map| map.make_room(&inner.budget).map(|()| false)).await;
         // The others are saved all the same: their journals grow just where there is no room.
         let saved = self.save_maps(Saving::Due).await;
         made_room.and(saved)
@@ -181,7 +183,7 @@ impl MapService {
 
     async fn save_maps(&self, which: Saving) -> Result<usize, ServiceError> {
         let inner = Arc::clone(&self.inner);
-        self.inner.catalog.save(move |map| map.save(which, &inner.room)).await
+        self.inner.catalog.save(move |map| map.save(which, &inner.budget)).await
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {

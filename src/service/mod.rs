@@ -5,7 +5,7 @@
 mod allowed_maps;
 mod allowed_scans;
 mod catalog;
-mod committing;
+mod commit_queue;
 mod deletion;
 mod digest;
 mod error;
@@ -64,7 +64,7 @@ use crate::map::{CallerName, MapName, Region};
 use crate::store::OpeningProgress;
 use crate::util::StopSignal;
 use catalog::Catalog;
-use committing::{Refusal, Step};
+use commit_queue::{Refusal, Step};
 use hosted_map::HostedMap;
 use pool::{FreeThread, Pool};
 use resource_budget::ResourceBudget;
@@ -105,7 +105,7 @@ struct Inner {
     map_files: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
-    room: Arc<ResourceBudget>,
+    budget: Arc<ResourceBudget>,
 }
 
 impl MapService {
@@ -126,7 +126,7 @@ impl MapService {
             undo: Pool::new("undo", UNDO_THREADS, waiting)?,
             map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
             localization: Pool::new("localization", settings.localization_threads, waiting)?,
-            room: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
+            budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
         };
         Ok(Self {
@@ -160,12 +160,12 @@ impl MapService {
 
     /// Looks how full disk and memory are; to be called every second or so. May block: not for an async thread.
     pub fn measure(&self) -> Readings {
-        self.inner.room.look()
+        self.inner.budget.look()
     }
 
     /// What there is too little of, and changes are refused for.
     pub fn shortages(&self) -> Vec<Shortage> {
-        self.inner.room.shortages()
+        self.inner.budget.shortages()
     }
 
     /// What the threads for work that uses the CPU are doing.
@@ -221,14 +221,14 @@ impl MapService {
             let map = self.map(map)?;
             self.limits().check_points(scan.points.len())?;
             if map.is_new(&scan) {
-                self.inner.room.check_to_grow()?;
+                self.inner.budget.check_to_grow()?;
             }
             let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
             let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
             let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
             self.submit_and_wait(&self.inner.mapping, None, move |stop| {
                 limit.run(stop, |stop| {
-                    map.propose_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.room, stop)
+                    map.submit_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.budget, stop)
                 })
             })
             .await
@@ -277,7 +277,7 @@ impl MapService {
             let request = request.within(self.limits())?;
             let inner = Arc::clone(&self.inner);
             let search =
-                move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.room, stop);
+                move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.budget, stop);
             self.inner.localization.run(search).await?
         };
         self.observed("Localize", Some(map), work, |_| Outcome::Read).await
@@ -303,9 +303,9 @@ impl MapService {
             }
             let (inner, deletion, caller) =
                 (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
-            let propose =
-                move |_: StopSignal<'_>| map.propose_deletion(&deletion, caller.as_ref(), &inner.room);
-            self.submit_and_wait(&self.inner.mapping, None, propose).await
+            let submit =
+                move |_: StopSignal<'_>| map.submit_deletion(&deletion, caller.as_ref(), &inner.budget);
+            self.submit_and_wait(&self.inner.mapping, None, submit).await
         };
         self.observed("DeleteVoxels", Some(map), work, |answer| {
             Outcome::Changed(Change::of_voxels(answer.version, answer.removed, 0, answer.replayed))
@@ -333,7 +333,7 @@ impl MapService {
             let thread = pool.thread().await?;
             let _robot = map.turn_of_target(&undo.target).await;
             self.submit_and_wait(pool, Some(thread), move |stop| {
-                limit.run(stop, |stop| map.propose_undo(&undo, caller.as_ref(), &inner.room, &limit, stop))
+                limit.run(stop, |stop| map.submit_undo(&undo, caller.as_ref(), &inner.budget, &limit, stop))
             })
             .await
         };
@@ -364,22 +364,22 @@ impl MapService {
         self.observed("ListVoxels", Some(map), work, |_| Outcome::Read).await
     }
 
-    /// Prepares a change on a thread of `pool`, on `first` where there is one, waits until it is made, and prepares it again where the map has moved on
-    /// meanwhile. Whoever goes before it is decided on takes it along; after that it is made.
+    /// Prepares a change on a thread of `pool`, or on `first` where there is one, and waits until it is made. Prepares it
+    /// again where the map has moved on meanwhile. A caller who goes away before the change is submitted cancels it.
     async fn submit_and_wait<A: Send + 'static>(
         &self,
         pool: &Pool,
         mut first: Option<FreeThread>,
-        propose: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
+        submit: impl Fn(StopSignal<'_>) -> Result<Step<A>, ServiceError> + Clone + Send + 'static,
     ) -> Result<A, ServiceError> {
         loop {
             let thread = match first.take() {
                 Some(thread) => thread,
                 None => pool.thread().await?,
             };
-            match pool.run_on(thread, propose.clone()).await?? {
+            match pool.run_on(thread, submit.clone()).await?? {
                 Step::Answered(answer) => return Ok(answer),
-                Step::Proposed(outcome, answer) => match outcome.await.map_err(committing_ended)? {
+                Step::Submitted(outcome, answer) => match outcome.await.map_err(commit_thread_ended)? {
                     Ok(committed) => return Ok(answer(committed)),
                     Err(Refusal::Failed(error)) => return Err(error),
                     Err(Refusal::Stale) => {}
@@ -394,6 +394,6 @@ impl MapService {
 }
 
 /// The map's thread is gone, by a defect.
-fn committing_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
+fn commit_thread_ended(_: tokio::sync::oneshot::error::RecvError) -> ServiceError {
     ServiceError::new(Reason::JobPanicked, "the change failed by a defect of the server")
 }

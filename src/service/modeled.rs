@@ -12,7 +12,7 @@ use shuttle::scheduler::{PctScheduler, RandomScheduler};
 use shuttle::{Config, Runner, thread};
 use uuid::Uuid;
 
-use super::committing::{CommitThread, Step};
+use super::commit_queue::{CommitThread, Step};
 use super::hosted_map::{HostedMap, Saving};
 use super::resource_budget::ResourceBudget;
 use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
@@ -40,7 +40,7 @@ fn data_dir(disk: &simulated::SimulatedDisk) -> DataDir {
 
 /// Three scans of a robot, at their guesses; the last one guesses by constant velocity. The newest revision that it was
 /// told.
-fn insert_three(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>, robot: &str, x: f32) -> u64 {
+fn insert_three(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>, robot: &str, x: f32) -> u64 {
     let mut newest = 0;
     for (scan_id, guess) in (0..).zip([Guess::Pose(Pose::identity()), Guess::Last, Guess::ConstantVelocity]) {
         let points = vec![Point::new(x, scan_id as f32, 0.5)].into();
@@ -52,7 +52,7 @@ fn insert_three(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>, robot: &str, x
         };
         let turn = Arc::new(block_on(map.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
-        let step = map.propose_scan(&request, turn, &settings, room, StopSignal::NEVER);
+        let step = map.submit_scan(&request, turn, &settings, budget, StopSignal::NEVER);
         newest = outcome(step).unwrap().version.revision;
     }
     newest
@@ -62,17 +62,17 @@ fn insert_three(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>, robot: &str, x
 fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
     match step? {
         Step::Answered(answer) => Ok(answer),
-        Step::Proposed(outcome, answer) => match block_on(outcome) {
+        Step::Submitted(outcome, answer) => match block_on(outcome) {
             Ok(Ok(committed)) => Ok(answer(committed)),
             Ok(Err(_)) | Err(_) => Err(ServiceError::overloaded("refused")),
         },
     }
 }
 
-fn delete_everything(map: &Arc<HostedMap>, room: &Arc<ResourceBudget>) -> u64 {
+fn delete_everything(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>) -> u64 {
     let region = Region::ball([0.0; 3], 100.0).unwrap();
     let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
-    outcome(map.propose_deletion(&Arc::new(deletion), None, room)).unwrap().version.revision
+    outcome(map.submit_deletion(&Arc::new(deletion), None, budget)).unwrap().version.revision
 }
 
 fn crowd() {
@@ -81,18 +81,18 @@ fn crowd() {
     let folder = data_dir(&disk).create(&name(), &Snapshot::of(&core, uuid)).unwrap();
     let thread = CommitThread::start(&name()).unwrap();
     let map = HostedMap::new(thread, name(), uuid, core, Some(folder), &StoreSettings::default());
-    let (map, room) = (Arc::new(map), Arc::new(ResourceBudget::new(None, Marks::default())));
+    let (map, budget) = (Arc::new(map), Arc::new(ResourceBudget::new(None, Marks::default())));
     let spawn = |work: fn(&Arc<HostedMap>, &Arc<ResourceBudget>) -> u64| {
-        let (map, room) = (Arc::clone(&map), Arc::clone(&room));
-        thread::spawn(move || work(&map, &room))
+        let (map, budget) = (Arc::clone(&map), Arc::clone(&budget));
+        thread::spawn(move || work(&map, &budget))
     };
     let threads = [
-        spawn(|map, room| insert_three(map, room, "one", 0.5)),
-        spawn(|map, room| insert_three(map, room, "two", 70.5)),
+        spawn(|map, budget| insert_three(map, budget, "one", 0.5)),
+        spawn(|map, budget| insert_three(map, budget, "two", 70.5)),
         spawn(delete_everything),
-        spawn(|map, room| {
+        spawn(|map, budget| {
             let revision = map.describe(8, StopSignal::NEVER).unwrap().version.revision;
-            map.save(Saving::Changed, room).unwrap();
+            map.save(Saving::Changed, budget).unwrap();
             map.describe(8, StopSignal::NEVER).unwrap().version.revision.max(revision)
         }),
     ];

@@ -169,56 +169,57 @@ mod tests {
         }
     }
 
-    fn room(resident_mib: u64, disk_free_mib: u64) -> ResourceBudget {
+    fn budget(resident_mib: u64, disk_free_mib: u64) -> ResourceBudget {
         ResourceBudget::new(Some(Arc::new(Fixed { resident_mib, disk_free_mib })), Marks::default())
     }
 
     #[test]
     fn what_is_promised_counts_as_if_it_were_there_until_it_is() {
-        let room = room(700, 10_000);
-        let (one, other) = (room.reserve_growth(100 * MIB).unwrap(), room.reserve_growth(50 * MIB).unwrap());
-        let refused = room.reserve_growth(MIB).unwrap_err();
+        let budget = budget(700, 10_000);
+        let (one, other) =
+            (budget.reserve_growth(100 * MIB).unwrap(), budget.reserve_growth(50 * MIB).unwrap());
+        let refused = budget.reserve_growth(MIB).unwrap_err();
         assert_eq!(refused.reason, Reason::MemoryFull);
         assert!(refused.message.contains("851 MiB"), "{}", refused.message);
         // The marks are 850 and 799 MiB: it takes more than the one that was refused to come back.
         drop(other);
-        assert!(room.reserve_growth(0).is_err());
+        assert!(budget.reserve_growth(0).is_err());
         drop(one);
-        assert!(room.reserve_growth(0).is_ok());
+        assert!(budget.reserve_growth(0).is_ok());
     }
 
     #[test]
     fn what_is_reserved_and_refused_keeps_nobody_from_growing() {
-        let room = room(700, 10_000);
-        let refused = room.reserve(200 * MIB).unwrap_err();
+        let budget = budget(700, 10_000);
+        let refused = budget.reserve(200 * MIB).unwrap_err();
         assert_eq!(refused.reason, Reason::MemoryFull);
-        assert!(room.reserve(100 * MIB).is_ok() && room.reserve_growth(MIB).is_ok());
+        assert!(budget.reserve(100 * MIB).is_ok() && budget.reserve_growth(MIB).is_ok());
     }
 
     #[test]
     fn what_is_lent_may_lie_above_the_mark_and_not_above_what_there_is() {
-        let room = room(900, 10_000);
-        let lent = room.reserve_transient(50 * MIB, "a snapshot").unwrap();
-        let refused = room.reserve_transient(MIB, "a snapshot").unwrap_err();
+        let budget = budget(900, 10_000);
+        let lent = budget.reserve_transient(50 * MIB, "a snapshot").unwrap();
+        let refused = budget.reserve_transient(MIB, "a snapshot").unwrap_err();
         assert!(refused.message.contains("a snapshot takes 1 MiB"), "{}", refused.message);
         drop(lent);
-        assert!(room.reserve_transient(MIB, "a snapshot").is_ok());
+        assert!(budget.reserve_transient(MIB, "a snapshot").is_ok());
     }
 
     #[test]
     fn a_file_leaves_the_journal_what_is_below_the_mark() {
-        assert_eq!(room(1, 300).file_bytes_max(), 44 * MIB);
-        assert_eq!(room(1, 200).file_bytes_max(), 0);
+        assert_eq!(budget(1, 300).file_bytes_max(), 44 * MIB);
+        assert_eq!(budget(1, 200).file_bytes_max(), 0);
     }
 
     #[test]
     fn without_gauges_there_is_room_for_everything() {
-        let room = ResourceBudget::new(None, Marks::default());
-        assert_eq!(room.look(), Readings::default());
+        let budget = ResourceBudget::new(None, Marks::default());
+        assert_eq!(budget.look(), Readings::default());
         assert!(
-            room.reserve_growth(u64::MAX / 2).is_ok()
-                && room.reserve_transient(u64::MAX / 2, "a search").is_ok()
+            budget.reserve_growth(u64::MAX / 2).is_ok()
+                && budget.reserve_transient(u64::MAX / 2, "a search").is_ok()
         );
-        assert_eq!(room.file_bytes_max(), u64::MAX);
+        assert_eq!(budget.file_bytes_max(), u64::MAX);
     }
 }

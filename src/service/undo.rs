@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::OwnedMutexGuard;
 
-use super::committing::{Decided, Proposal, Refusal, Step, Stop, record_of};
+use super::commit_queue::{Decided, Refusal, Step, Stop, Submission, record_of};
 use super::deletion::removal_bytes;
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
@@ -69,11 +69,11 @@ impl HostedMap {
     ///
     /// Who holds which voxels is read from the journal while scans go on coming in; the last of them are looked at when
     /// nobody else can change the map.
-    pub(super) fn propose_undo(
+    pub(super) fn submit_undo(
         self: &Arc<Self>,
         undo: &Undo,
         caller: Option<&CallerName>,
-        room: &ResourceBudget,
+        budget: &ResourceBudget,
         limit: &TimeLimit,
         stop: StopSignal<'_>,
     ) -> Result<Step<UndoAnswer>, ServiceError> {
@@ -89,7 +89,7 @@ impl HostedMap {
                 (answered.scans, answered.voxels, self.version(answered.revision));
             return Ok(Step::Answered(UndoAnswer { scans, removed, version, replayed: true }));
         }
-        room.check_to_shrink()?;
+        budget.check_to_shrink()?;
         let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
         let (scans, withdrawn) = self.targets_of_undo(&undo.target)?;
         if scans.is_empty() {
@@ -97,7 +97,7 @@ impl HostedMap {
             return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, version, replayed: false }));
         }
         let count = scans.len();
-        let planned = self.plan_undo(&folder, scans, &withdrawn, request.clone(), room, stop)?;
+        let planned = self.plan_undo(&folder, scans, &withdrawn, request.clone(), budget, stop)?;
         let (map, limit) = (Arc::clone(self), limit.clone());
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Undo, request.as_ref(), former)?;
@@ -107,7 +107,7 @@ impl HostedMap {
             // What came meanwhile is shown while the map waits: that ends with the request's time as well.
             Ok(Some(limit.run(stop, |stop| planned.decided(&map, &folder, stop))?))
         };
-        let outcome = self.committing.propose(Proposal::Undecided(Box::new(decide)))?;
+        let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |Committed { revision, voxels: removed }| UndoAnswer {
             scans: count,
@@ -115,7 +115,7 @@ impl HostedMap {
             version: map.version(revision),
             replayed: false,
         };
-        Ok(Step::Proposed(outcome, Box::new(answer)))
+        Ok(Step::Submitted(outcome, Box::new(answer)))
     }
 
     /// What leaves with `scans`, as the map is now: what takes long is done here, on a thread of its own.
@@ -125,17 +125,17 @@ impl HostedMap {
         scans: Vec<u64>,
         withdrawn: &[WithdrawnScan],
         request: Option<Request>,
-        room: &ResourceBudget,
+        budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<PlannedUndo, ServiceError> {
-        let mut observed = self.observe(folder, &scans, withdrawn, room, stop)?;
-        let finding_out = room.reserve_transient(observed.observations.leaving_bytes() as u64, UNDO)?;
+        let mut observed = self.observe(folder, &scans, withdrawn, budget, stop)?;
+        let finding_out = budget.reserve_transient(observed.observations.leaving_bytes() as u64, UNDO)?;
         let leaving = observed.observations.leaving(stop).ok_or_else(|| ended_early(stop))?;
         let Leaving { mut voxels, mut moments } = leaving;
         folder.observe(&mut observed, stop).map_err(|e| self.unreadable(&e))?;
         check_not_stopped(stop)?;
         observed.observations.renew(&mut voxels, &mut moments);
-        let removal = room.reserve_transient(removal_bytes(&self.map, &voxels), UNDO)?;
+        let removal = budget.reserve_transient(removal_bytes(&self.map, &voxels), UNDO)?;
         let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
         let record = record_of(&change)?;
         Ok(PlannedUndo { change, record, observed, lent: vec![finding_out, removal] })
@@ -147,14 +147,14 @@ impl HostedMap {
         folder: &MapFolder,
         scans: &[u64],
         withdrawn: &[WithdrawnScan],
-        room: &ResourceBudget,
+        budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<Observed, ServiceError> {
         // What was lent before lies in memory by the time more is asked for, and is measured there.
         let mut part = None;
         let reserve = |bytes| {
             drop(part.take());
-            part = Some(room.reserve_transient(bytes, UNDO)?);
+            part = Some(budget.reserve_transient(bytes, UNDO)?);
             Ok(())
         };
         folder.observations(scans, withdrawn, reserve, stop).map_err(|why| match why {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A word that is not used any more, as a whole word, and what is said instead.
-const REPLACED: [(&str, &str); 78] = [
+const REPLACED: [(&str, &str); 80] = [
     ("ahead::fetch", "prefetch"),
     ("Interest", "StopSignal"),
     ("LASTING", "StopSignal::NEVER"),
@@ -25,6 +25,8 @@ const REPLACED: [(&str, &str); 78] = [
     ("MapState", "MapVersion"),
     ("UsableScan", "FilteredScan"),
     ("Committing", "CommitQueue"),
+    ("propose", "submit"),
+    ("committing", "commit_queue"),
     ("carry_through", "submit_and_wait"),
     ("to_its_end", "run_to_completion"),
     ("turn_of", "lock_robot"),

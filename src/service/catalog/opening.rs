@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::{Named, not_stored};
 use crate::map::MapName;
 use crate::service::ServiceError;
-use crate::service::committing::CommitThread;
+use crate::service::commit_queue::CommitThread;
 use crate::service::hosted_map::{HostedMap, thin};
 use crate::store::{Cut, DataDir, OpenedMap, OpeningProgress, StoreError, StoreSettings};
 

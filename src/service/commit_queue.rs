@@ -50,7 +50,7 @@ pub(super) struct Decided {
 }
 
 /// A change on its way into the map.
-pub(super) enum Proposal {
+pub(super) enum Submission {
     /// Known.
     Prepared(Box<Prepared>),
     /// To be decided on.
@@ -91,12 +91,12 @@ pub(super) enum Step<A> {
     /// The request changes nothing, or was done before: its answer.
     Answered(A),
     /// What becomes of it will be known, and then what to say.
-    Proposed(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
+    Submitted(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
 }
 
-/// A proposal with the one who waits for it.
+/// A submission with the one who waits for it.
 struct Waiting {
-    proposal: Proposal,
+    submission: Submission,
     answer: oneshot::Sender<Outcome>,
 }
 
@@ -165,9 +165,9 @@ impl CommitQueue {
     ///
     /// # Errors
     /// `ResourceExhausted` where the queue is full.
-    pub(super) fn propose(&self, proposal: Proposal) -> Result<oneshot::Receiver<Outcome>, ServiceError> {
+    pub(super) fn submit(&self, submission: Submission) -> Result<oneshot::Receiver<Outcome>, ServiceError> {
         let (answer, outcome) = oneshot::channel();
-        match self.inbox.try_send(Waiting { proposal, answer }) {
+        match self.inbox.try_send(Waiting { submission, answer }) {
             // Where the thread is gone, so is the sender of the outcome.
             Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(outcome),
             Err(TrySendError::Full(_)) => Err(ServiceError::overloaded(format!(
@@ -202,9 +202,9 @@ impl CommitQueue {
     pub(super) fn end_replaced(&self) {
         self.stopped.get_or_init(|| Stop::Replaced);
         let (answer, behind_all) = oneshot::channel();
-        let proposal = Proposal::Undecided(Box::new(|_, _| Ok(None)));
+        let submission = Submission::Undecided(Box::new(|_, _| Ok(None)));
         // Waits for a place in the queue; where the thread is gone, so are its changes.
-        if self.inbox.send(Waiting { proposal, answer }).is_ok() {
+        if self.inbox.send(Waiting { submission, answer }).is_ok() {
             drop(behind_all.blocking_recv());
         }
         self.ended.send_replace(true);

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use tokio::sync::{oneshot, watch};
 
 use super::{
-    Decided, Decision, GROUP_MAX, Outcome, Prepared, Proposal, Refusal, Stop, Turn, Waiting, outcome_unknown,
-    record_of, revisions_used_up,
+    Decided, Decision, GROUP_MAX, Outcome, Prepared, Refusal, Stop, Submission, Turn, Waiting,
+    outcome_unknown, record_of, revisions_used_up,
 };
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
@@ -87,9 +87,9 @@ impl Worker {
     /// Makes the changes that wait, in order; a run of known ones shares one sync.
     fn commit(&mut self, waiting: Vec<Waiting>) {
         let mut group = Vec::new();
-        for Waiting { proposal, answer } in waiting {
-            match proposal {
-                Proposal::Prepared(prepared) => {
+        for Waiting { submission, answer } in waiting {
+            match submission {
+                Submission::Prepared(prepared) => {
                     let Prepared { change, record, if_empty, turn, reservation } = *prepared;
                     if if_empty {
                         self.commit_group(&mut group);
@@ -101,7 +101,7 @@ impl Worker {
                     let (_turn, _memory) = (Some(turn), vec![reservation]);
                     group.push(Pending { change, record, answer, _turn, _memory, _pin: None });
                 }
-                Proposal::Undecided(decide) => {
+                Submission::Undecided(decide) => {
                     self.commit_group(&mut group);
                     self.decide(decide, answer, &mut group);
                     self.commit_group(&mut group);
