@@ -140,20 +140,39 @@ impl Insert {
     ) -> Result<usize, CliError> {
         let width = name_width(files);
         let mut answers = client.insert_scans(&self.map.name, ReceiverStream::new(scans)).await?;
-        let mut answered = 0;
+        let (mut answered, mut failed) = (0, 0);
         while let Some(answer) = answers.next().await {
             let name = files.get(answered).map(|file| name_of(file)).unwrap_or_default();
-            let answer = answer.map_err(|error| not_inserted(&name, &error))?;
-            if answered == 0 {
+            if answered == 0 && answer.is_ok() {
                 output.say(ScanLine::head(width))?;
             }
-            output.print(&ScanLine::of(name, &answer, width))?;
+            match answer {
+                Ok(answer) => output.print(&ScanLine::of(name, &answer, width))?,
+                Err(error @ ClientError::Refused { .. }) if !concerns_all(&error) => {
+                    output.print(&FailedLine { scan: name, error: error.to_string() })?;
+                    failed += 1;
+                }
+                Err(error) => return Err(not_inserted(&name, &error)),
+            }
             output.step();
             answered += 1;
         }
         output.clear_bar();
-        Ok(answered)
+        match failed {
+            0 => Ok(answered),
+            _ => Err(CliError::failed(format!(
+                "{failed} of {answered} scans failed; the others were answered"
+            ))),
+        }
     }
+}
+
+/// True of a failure that all scans after it would share.
+fn concerns_all(error: &ClientError) -> bool {
+    matches!(
+        error.reason(),
+        Some("guess_required" | "map_not_found" | "map_not_allowed" | "robot_not_allowed")
+    )
 }
 
 fn not_inserted(name: &str, error: &ClientError) -> CliError {
@@ -208,6 +227,19 @@ impl Plan {
             (None, 0) => self.first,
             (None, _) => (self.next, false),
         }
+    }
+}
+
+/// A scan that the server failed to insert.
+#[derive(Serialize)]
+struct FailedLine {
+    scan: String,
+    error: String,
+}
+
+impl Display for FailedLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}  {}", self.scan, self.error)
     }
 }
 

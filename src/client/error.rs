@@ -5,6 +5,7 @@ use std::error::Error;
 use tonic::{Code, Status};
 
 use crate::service::ServiceError;
+use crate::wire::pb;
 
 /// The metadata that holds the server's word for programs.
 const REASON: &str = "mrol-reason";
@@ -107,6 +108,13 @@ impl ClientError {
                 Self::Refused { code, reason: reason.map(str::to_owned), message: message.to_owned() }
             }
         }
+    }
+}
+
+impl From<pb::Failure> for ClientError {
+    fn from(pb::Failure { code, reason, message, .. }: pb::Failure) -> Self {
+        let reason = Some(reason).filter(|reason| !reason.is_empty());
+        Self::Refused { code: Code::from_i32(code), reason, message }
     }
 }
 

@@ -4,15 +4,16 @@ use tokio_stream::{Stream, StreamExt};
 
 use super::{Answers, Client, ClientError};
 use crate::map::MapName;
-use crate::service::{PointAnswer, PointQuery, ScanAnswer, ScanRequest};
+use crate::service::{PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError};
 use crate::wire::pb;
 
 impl Client {
     /// Inserts scans one after the other, an answer a scan: as [`Client::insert_scan`] without a round trip
-    /// between two. `scans` is read as fast as the server takes them.
+    /// between two. `scans` is read as fast as the server takes them. A scan that the server refuses is an error among
+    /// the answers, [`ClientError::Refused`], and the next answer is that of the next scan.
     ///
     /// # Errors
-    /// When the server cannot be reached; a refused request ends the answers.
+    /// When the server cannot be reached.
     pub async fn insert_scans(
         &self,
         map: &MapName,
@@ -21,7 +22,8 @@ impl Client {
         let map = map.clone();
         let requests = scans.map(move |scan| pb::InsertScanRequest::from((&map, scan)));
         let answers = self.connection.mapping().insert_scan_stream(requests).await;
-        self.connection.answers(answers)
+        let answers: Answers<Inserted> = self.connection.answers(answers)?;
+        Ok(Answers::new(answers.map(|inserted| inserted?.0)))
     }
 
     /// Asks batch after batch, an answer a batch: as [`Client::query_points`] without a round trip between two.
@@ -38,5 +40,19 @@ impl Client {
         let requests = queries.map(move |query| pb::QueryPointsRequest::from((&map, query)));
         let answers = self.connection.occupancy().query_points_stream(requests).await;
         self.connection.answers(answers)
+    }
+}
+
+/// An answer of a stream of scans: what became of the scan, or why it failed.
+struct Inserted(Result<ScanAnswer, ClientError>);
+
+impl TryFrom<pb::InsertScanResponse> for Inserted {
+    type Error = ServiceError;
+
+    fn try_from(mut answer: pb::InsertScanResponse) -> Result<Self, ServiceError> {
+        Ok(Self(match answer.error.take() {
+            Some(failure) => Err(failure.into()),
+            None => Ok(answer.try_into()?),
+        }))
     }
 }

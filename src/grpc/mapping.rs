@@ -7,6 +7,7 @@ use tonic::{Request, Response, Status, Streaming};
 use super::stream::{Answers, Message};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
+use crate::service::MapService;
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
 
@@ -29,12 +30,13 @@ impl Mapping for Adapter {
         &self,
         requests: Request<Streaming<pb::InsertScanRequest>>,
     ) -> Result<Response<Self::InsertScanStreamStream>, Status> {
-        let answers =
-            self.answer_in_order(Operation::InsertScanStream, requests, |service, request| async move {
-                let (map, scan) = request.try_into()?;
-                let answer = service.insert_scan(&map, scan).await?;
-                Ok(answer.into())
-            })?;
+        let failed = Some(pb::InsertScanResponse::from as fn(pb::Failure) -> pb::InsertScanResponse);
+        let insert = |service: MapService, request: pb::InsertScanRequest| async move {
+            let (map, scan) = request.try_into()?;
+            let answer = service.insert_scan(&map, scan).await?;
+            Ok(answer.into())
+        };
+        let answers = self.answer_in_order(Operation::InsertScanStream, requests, failed, insert)?;
         Ok(Response::new(answers))
     }
 

@@ -28,12 +28,16 @@ impl Occupancy for Adapter {
         &self,
         requests: Request<Streaming<pb::QueryPointsRequest>>,
     ) -> Result<Response<Self::QueryPointsStreamStream>, Status> {
-        let answers =
-            self.answer_in_order(Operation::QueryPointsStream, requests, |service, request| async move {
+        let answers = self.answer_in_order(
+            Operation::QueryPointsStream,
+            requests,
+            None,
+            |service, request| async move {
                 let (map, query) = request.try_into()?;
                 let answer = service.query_points(&map, query).await?;
                 Ok(answer.into())
-            })?;
+            },
+        )?;
         Ok(Response::new(answers))
     }
 

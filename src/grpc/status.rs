@@ -5,6 +5,7 @@ use tonic::{Code, Status};
 
 use crate::service::{ErrorCode, Reason, ServiceError};
 use crate::telemetry::RequestOutcome;
+use crate::wire::pb;
 
 /// The metadata that holds the word for programs.
 pub(super) const REASON: &str = "mrol-reason";
@@ -37,6 +38,21 @@ impl From<ServiceError> for Status {
         }
         status
     }
+}
+
+/// A failure as an answer of a stream that goes on.
+pub(super) fn failure(error: &ServiceError) -> pb::Failure {
+    pb::Failure {
+        code: code(error.code()) as i32,
+        reason: error.reason.as_str().to_owned(),
+        message: error.message.clone(),
+        retry_after_s: error.retry_after.map(|wait| wait.as_secs_f64()),
+    }
+}
+
+/// True of a failure that concerns the stream and not one of its requests.
+pub(super) fn ends_stream(error: &ServiceError) -> bool {
+    error.code() == ErrorCode::Unauthenticated || error.reason == Reason::Draining
 }
 
 /// tonic's own refusal of a message in our words, any other status as it is: one that is too large names the limit, and

@@ -18,6 +18,7 @@ use crate::middleware::Protocol;
 use crate::service::{MapService, ServiceError};
 use crate::sync::polled_by_runtime;
 use crate::telemetry::RequestRecorder;
+use crate::wire::pb;
 
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
 const MESSAGES_AHEAD_MAX: usize = 4;
@@ -61,13 +62,15 @@ pub(super) trait Message: prost::Message + 'static {
 }
 
 impl Adapter {
-    /// Answers each request by `handle`, in order, while the next ones are read. The stream ends with the first
-    /// failure's status, or `Unavailable` once the server is going down and the request in hand is answered; likewise
-    /// `Unauthenticated` once the caller's key counts no longer.
+    /// Answers each request by `handle`, in order, while the next ones are read. A request that fails is told by
+    /// `failed`, and the stream goes on; without, it ends with the first failure's status. It ends with `Unavailable` once
+    /// the server is going down and the request in hand is answered, and with `Unauthenticated` once the caller's key
+    /// counts no longer.
     pub(super) fn answer_in_order<M, A, H, F>(
         &self,
         operation: Operation,
         requests: Request<Streaming<M>>,
+        failed: Option<fn(pb::Failure) -> A>,
         handle: H,
     ) -> Result<Answers<A>, Status>
     where
@@ -82,8 +85,8 @@ impl Adapter {
         let (arrival, asking) = (InboundBody::of(extensions)?.clone(), RateLimitKey::of(extensions));
         let (admission, recorder) = (self.admission.clone(), self.recorder.clone());
         let authorized = Authorized::of(extensions)?.clone();
-        let worker =
-            Worker { admission, recorder, asking, authorized, operation, handle, map: String::new() };
+        let map = String::new();
+        let worker = Worker { admission, recorder, asking, authorized, operation, failed, handle, map };
         let compressed = extensions.get().copied().unwrap_or(Compressed(true));
         let reader = Reader {
             requests: requests.into_inner(),
@@ -147,22 +150,22 @@ impl<M: Message> Reader<M> {
     }
 }
 
-struct Worker<H> {
+struct Worker<A, H> {
     admission: Admission,
     recorder: RequestRecorder,
     asking: RateLimitKey,
     authorized: Authorized,
     operation: Operation,
+    failed: Option<fn(pb::Failure) -> A>,
     handle: H,
     /// The last request's.
     map: String,
 }
 
-impl<H> Worker<H> {
-    async fn run<M, A, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Made<A>>)
+impl<A: prost::Message, H> Worker<A, H> {
+    async fn run<M, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Made<A>>)
     where
         M: Message,
-        A: prost::Message,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
@@ -184,30 +187,35 @@ impl<H> Worker<H> {
     }
 
     /// Answers one request, timed and counted as a request of its own.
-    async fn answer<M, A, F>(&mut self, request: Read<M>) -> Made<A>
+    async fn answer<M, F>(&mut self, request: Read<M>) -> Made<A>
     where
         M: Message,
-        A: prost::Message,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         let start = Instant::now();
+        let mut told = None;
         let answer = match request {
-            Ok((request, _until_answered)) => self.kept(request).await.map_err(Status::from),
+            Ok((request, _until_answered)) => self.kept(request).await.map_err(|error| {
+                told = self
+                    .failed
+                    .filter(|_| !status::ends_stream(&error))
+                    .map(|failed| failed(status::failure(&error)));
+                Status::from(error)
+            }),
             Err(unreadable) => Err(unreadable),
         };
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
         let reason = answer.as_ref().err().and_then(|status| status.metadata().get(status::REASON));
         let outcome = status::outcome(code, reason.map(|reason| reason.as_bytes()));
         self.recorder.answered(Grpc::NAME, self.operation.name(), outcome, start.elapsed());
-        answer
+        told.map_or(answer, |told| Ok((told, None)))
     }
 
     /// The answer, with room for it.
-    async fn kept<M, A, F>(&mut self, request: M) -> Result<(A, Option<MemoryPermit>), ServiceError>
+    async fn kept<M, F>(&mut self, request: M) -> Result<(A, Option<MemoryPermit>), ServiceError>
     where
         M: Message,
-        A: prost::Message,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
@@ -216,7 +224,7 @@ impl<H> Worker<H> {
         Ok((answer, unsent))
     }
 
-    async fn handled<M, A, F>(&mut self, mut request: M) -> Result<A, ServiceError>
+    async fn handled<M, F>(&mut self, mut request: M) -> Result<A, ServiceError>
     where
         M: Message,
         H: Fn(MapService, M) -> F,

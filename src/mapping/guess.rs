@@ -1,6 +1,7 @@
 //! Where a scan is thought to have been taken.
 
 use super::MappingError;
+use super::sightings::Sightings;
 use crate::geometry::{Pose, extrapolate};
 use crate::map::{MappedScan, RobotName, Trajectory};
 
@@ -22,7 +23,8 @@ pub enum Guess {
 impl Guess {
     /// The pose that the guess stands for: map_from_sensor.
     ///
-    /// A robot without an accepted scan is at the origin of an empty map.
+    /// A robot without an accepted scan is at the origin of an empty map. The last accepted pose of a robot that stands
+    /// still is where it was seen last, though that scan is not kept.
     ///
     /// # Errors
     /// The guess needs an accepted scan of the robot, there is none, and the map is not empty.
@@ -31,10 +33,12 @@ impl Guess {
         robot: &RobotName,
         timestamp_ns: Option<i64>,
         trajectory: &Trajectory,
+        sightings: &Sightings,
         map_is_empty: bool,
     ) -> Result<Pose, MappingError> {
+        let seen = |last: &MappedScan| sightings.since(last);
         let last_or_origin = || match trajectory.last_of(robot) {
-            Some(pose) => Ok(pose.map_from_sensor),
+            Some(last) => Ok(seen(last).map_or(last.map_from_sensor, |seen| seen.map_from_sensor)),
             None if map_is_empty => Ok(Pose::identity()),
             None => Err(MappingError::GuessRequired(robot.clone())),
         };
@@ -42,24 +46,40 @@ impl Guess {
             Self::Pose(map_from_sensor) => Ok(*map_from_sensor),
             Self::Last => last_or_origin(),
             Self::Motion(last_from_sensor) => Ok(last_or_origin()? * last_from_sensor),
-            Self::ConstantVelocity => match trajectory.last_two_of(robot) {
-                Some((last, before)) => Ok(constant_velocity(before, last, timestamp_ns)),
-                None => last_or_origin(),
-            },
+            Self::ConstantVelocity => {
+                let last = trajectory.last_of(robot);
+                if let Some((last, seen)) = last.and_then(|last| Some((last, seen(last)?))) {
+                    let seen = (&seen.map_from_sensor, seen.timestamp_ns);
+                    return Ok(constant_velocity(stamped(last), seen, timestamp_ns));
+                }
+                match trajectory.last_two_of(robot) {
+                    Some((last, before)) => {
+                        Ok(constant_velocity(stamped(before), stamped(last), timestamp_ns))
+                    }
+                    None => last_or_origin(),
+                }
+            }
         }
     }
 }
 
+/// A pose and its time, nanoseconds since the Unix epoch.
+type Stamped<'a> = (&'a Pose, Option<i64>);
+
+fn stamped(scan: &MappedScan) -> Stamped<'_> {
+    (&scan.map_from_sensor, scan.timestamp_ns)
+}
+
 /// The pose of a robot that goes on as it went from `before` to `last`.
-fn constant_velocity(before: &MappedScan, last: &MappedScan, timestamp_ns: Option<i64>) -> Pose {
-    let share = match [before.timestamp_ns, last.timestamp_ns, timestamp_ns] {
+fn constant_velocity(before: Stamped<'_>, last: Stamped<'_>, timestamp_ns: Option<i64>) -> Pose {
+    let share = match [before.1, last.1, timestamp_ns] {
         // Of timestamps as far apart as the numbers go, the difference is no i64.
         [Some(t0), Some(t1), Some(t2)] if t1 > t0 && t2 > t1 => {
             t2.abs_diff(t1) as f64 / t1.abs_diff(t0) as f64
         }
         _ => 1.0,
     };
-    extrapolate(&before.map_from_sensor, &last.map_from_sensor, share)
+    extrapolate(before.0, last.0, share)
 }
 
 #[cfg(test)]
@@ -74,7 +94,10 @@ mod tests {
     #[test]
     fn a_motion_goes_on_in_proportion_to_the_time_whatever_the_timestamps() {
         let x = |before, last, now| {
-            constant_velocity(&at(0.0, before), &at(1.0, last), Some(now)).translation.vector.x
+            constant_velocity(stamped(&at(0.0, before)), stamped(&at(1.0, last)), Some(now))
+                .translation
+                .vector
+                .x
         };
         assert_eq!(x(0, 2, 3), 1.5);
         assert!((x(i64::MIN, 0, i64::MAX) - 2.0).abs() < 1e-9);

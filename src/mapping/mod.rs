@@ -3,16 +3,18 @@
 //! [`ScanMapper::map_scan`] is the whole loop, and reads like the paper: the scan is located by aligning it to the map
 //! from a guess, judged, turned into a record of voxels and moments, and inserted with its pose. A server, which has to
 //! make the record durable before it is visible, calls [`ScanMapper::locate`], [`ScanMapper::record`] and
-//! [`ScanMapper::is_stationary`] by themselves and inserts through its commit queue.
+//! [`ScanMapper::note_stationary`] by themselves and inserts through its commit queue.
 
 mod error;
 mod filtered_points;
 mod guess;
+mod sightings;
 mod stationary;
 
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
 pub use guess::Guess;
+pub use sightings::Sightings;
 pub use stationary::StationarySettings;
 
 use std::time::{Duration, Instant};
@@ -27,7 +29,7 @@ use crate::util::StopSignal;
 /// ```
 /// use mrol::geometry::{Point, Pose};
 /// use mrol::map::{MapSettings, MultiResolutionMap, RobotName};
-/// use mrol::mapping::{MappingSettings, Scan, ScanMapper};
+/// use mrol::mapping::{MappingSettings, Scan, ScanMapper, Sightings};
 /// use mrol::util::StopSignal;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -35,7 +37,8 @@ use crate::util::StopSignal;
 /// let robot = RobotName::new("r1")?;
 /// let points: Vec<_> = (0..200).map(|i| Point::new(2.0, 0.02 * i as f32, 0.5)).collect();
 ///
-/// let mapper = ScanMapper::new(&map, MappingSettings::default());
+/// let sightings = Sightings::default();
+/// let mapper = ScanMapper::new(&map, &sightings, MappingSettings::default());
 /// let mapped = mapper.map_scan(&Scan::new(&robot, &points), StopSignal::NEVER)?;
 /// assert!(mapped.is_inserted());
 /// assert_eq!(mapped.located.alignment.map_from_sensor, Pose::identity());
@@ -45,6 +48,7 @@ use crate::util::StopSignal;
 #[derive(Debug, Clone, Copy)]
 pub struct ScanMapper<'a> {
     map: &'a MultiResolutionMap,
+    sightings: &'a Sightings,
     settings: MappingSettings,
 }
 
@@ -137,9 +141,9 @@ impl ScanOutcome {
 }
 
 impl<'a> ScanMapper<'a> {
-    /// A mapper of scans into `map`.
-    pub fn new(map: &'a MultiResolutionMap, settings: MappingSettings) -> Self {
-        Self { map, settings }
+    /// A mapper of scans into `map`, whose robots were seen as `sightings` tells.
+    pub fn new(map: &'a MultiResolutionMap, sightings: &'a Sightings, settings: MappingSettings) -> Self {
+        Self { map, sightings, settings }
     }
 
     /// Maps one scan: aligns it to the map from its guess and, where it fits, adds all its points (paper III-B).
@@ -156,7 +160,7 @@ impl<'a> ScanMapper<'a> {
         }
         let start = Instant::now();
         let record = self.record(scan, &located.alignment)?;
-        let is_new = !self.is_stationary(scan, &record);
+        let is_new = !self.note_stationary(scan, &record);
         let committed = is_new.then(|| self.map.committer().insert_scan(record));
         Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
     }
@@ -169,10 +173,11 @@ impl<'a> ScanMapper<'a> {
     /// # Errors
     /// The guess needs a pose that is not there, or `stop` said so.
     pub fn locate(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<LocatedScan, MappingError> {
-        let Self { map, settings: MappingSettings { alignment: settings, .. } } = self;
+        let Self { map, sightings, settings: MappingSettings { alignment: settings, .. } } = self;
         let start = Instant::now();
         let map_is_empty = map.is_empty();
-        let guess = scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), map_is_empty)?;
+        let guess =
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, map_is_empty)?;
         let alignment = if map_is_empty {
             Alignment::trusted(guess, map.settings().levels, scan.points)
         } else if scan.at_guess {
@@ -211,11 +216,19 @@ impl<'a> ScanMapper<'a> {
         Ok(record)
     }
 
-    /// True of a scan that shows again what its robot's last one showed, from where that was taken.
+    /// True of a scan that shows again what its robot's last one showed, from where that was taken. That the robot was
+    /// seen there is noted for its next guess.
     ///
-    /// Never true of a scan that the caller wants at its guess.
-    pub fn is_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
-        let settings = self.settings.stationary.filter(|_| !scan.at_guess);
-        settings.is_some_and(|settings| settings.is_stationary(self.map, record))
+    /// Never true of a scan that the caller wants at its guess, or in the map whatever it shows (`force`).
+    pub fn note_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
+        let Some(settings) = self.settings.stationary.filter(|_| !scan.at_guess && !scan.force) else {
+            return false;
+        };
+        let Some(last) = self.map.trajectory().last_of(scan.robot).cloned() else { return false };
+        let is_stationary = settings.is_stationary(self.map, &last, record);
+        if is_stationary {
+            self.sightings.note(&last, record.pose.map_from_sensor, scan.timestamp_ns);
+        }
+        is_stationary
     }
 }

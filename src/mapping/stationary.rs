@@ -1,7 +1,7 @@
 //! Robots that stand still.
 
 use crate::geometry::pose_difference;
-use crate::map::{MultiResolutionMap, ScanRecord};
+use crate::map::{MappedScan, MultiResolutionMap, ScanRecord};
 
 /// When a scan counts as one of a robot that stands still with its view known already. Such a scan is accepted and not
 /// kept, so that a robot that sends scan after scan from its dock does not grow trajectory and storage without bound.
@@ -23,14 +23,14 @@ impl Default for StationarySettings {
 }
 
 impl StationarySettings {
-    /// True of a scan that shows again what its robot's last one showed, from where that was taken.
-    pub(super) fn is_stationary(&self, map: &MultiResolutionMap, record: &ScanRecord) -> bool {
-        let trajectory = map.trajectory();
-        let Some(last) = trajectory.last_of(&record.pose.robot) else {
-            return false;
-        };
+    /// True of a scan that shows again what `last`, its robot's last one that was kept, showed, from where that was taken.
+    pub(super) fn is_stationary(
+        &self,
+        map: &MultiResolutionMap,
+        last: &MappedScan,
+        record: &ScanRecord,
+    ) -> bool {
         let (meters, degrees) = pose_difference(&last.map_from_sensor, &record.pose.map_from_sensor);
-        drop(trajectory);
         meters <= self.distance * map.lattice().resolution_m(0)
             && degrees <= self.rotation_deg
             && map.view().absent(&record.voxels) as f64 <= self.new_voxels * record.voxels.len() as f64

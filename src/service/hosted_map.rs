@@ -17,6 +17,7 @@ use super::{
 };
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
+use crate::mapping::Sightings;
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
@@ -44,6 +45,8 @@ pub(super) struct HostedMap {
     announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
+    /// Where robots were seen that stand still.
+    pub(super) sightings: Sightings,
     /// One undo is found out and made before the next is looked at.
     pub(super) undo_turn: Arc<tokio::sync::Mutex<()>>,
     /// A snapshot is due, and there is no room for it.
@@ -95,6 +98,7 @@ impl HostedMap {
             commit_queue,
             announced,
             turns: Mutex::new(Rank::Brief, HashMap::new()),
+            sightings: Sightings::default(),
             undo_turn: Arc::default(),
             is_put_off: AtomicBool::default(),
         }

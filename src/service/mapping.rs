@@ -42,7 +42,7 @@ impl HostedMap {
         }
         let scan_record = mapper.record(&scan.to_map(), &located.alignment)?;
         check_not_stopped(stop)?;
-        if mapper.is_stationary(&scan.to_map(), &scan_record) {
+        if mapper.note_stationary(&scan.to_map(), &scan_record) {
             return Ok(Step::Answered(ScanAnswer { accepted: true, stationary: true, ..answer }));
         }
         let ScanRecord { voxels, moments, .. } = &scan_record;
@@ -130,7 +130,11 @@ impl HostedMap {
     fn mapper(&self, request: &ScanRequest, settings: &ServiceSettings) -> ScanMapper<'_> {
         let method = request.method.unwrap_or(settings.alignment.method);
         let alignment = AlignmentSettings { method, ..settings.alignment };
-        ScanMapper::new(&self.map, MappingSettings { alignment, stationary: Some(settings.stationary) })
+        ScanMapper::new(
+            &self.map,
+            &self.sightings,
+            MappingSettings { alignment, stationary: Some(settings.stationary) },
+        )
     }
 
     /// Finds where the scan was taken.

@@ -219,6 +219,7 @@ impl MapService {
         let work = async {
             self.scans.permit(&scan.robot)?;
             let map = self.map(map)?;
+            scan.check_insertion()?;
             self.limits().check_points(scan.points.len())?;
             if map.is_new(&scan) {
                 self.inner.budget.check_to_grow()?;
@@ -249,6 +250,7 @@ impl MapService {
         let work = async {
             self.scans.permit(&scan.robot)?;
             let map = self.map(map)?;
+            scan.check_alignment()?;
             self.limits().check_points(scan.points.len())?;
             let inner = Arc::clone(&self.inner);
             let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max_s);

@@ -105,6 +105,7 @@ reasons! {
         TimeLimitTooLong "time_limit_too_long" Both: "`time_limit_s` exceeds `localization_time_max_s`", "ask for less";
         TooManyCandidates "too_many_candidates" Both: "`candidates` exceeds `localization_candidates_max`", "ask for fewer";
         TruncatedPoints "truncated_points" Both: "the bytes are no whole points", "send 12 bytes a point";
+        UnexpectedField "unexpected_field" Both: "a field that the operation does not take", "leave it out";
         UnexpectedQuery "unexpected_query" Http: "parameters beside a JSON body", "put them into the body";
         UnsupportedContentEncoding "unsupported_content_encoding" Http 415: "a compressed body", "send it as it is";
         UnsupportedContentType "unsupported_content_type" Http 415: "neither JSON nor bytes, where they are taken", "set `content-type`";

@@ -235,7 +235,14 @@ impl From<ScanAnswer> for pb::InsertScanResponse {
             version: Some(answer.version.into()),
             replayed: answer.replayed,
             stationary: answer.stationary,
+            error: None,
         }
+    }
+}
+
+impl From<pb::Failure> for pb::InsertScanResponse {
+    fn from(failure: pb::Failure) -> Self {
+        Self { error: Some(failure), ..Self::default() }
     }
 }
 

@@ -8,6 +8,7 @@ mod alignment_verdicts;
 mod localization;
 #[cfg(feature = "client")]
 mod map_history;
+mod stationary_robots;
 #[path = "../support/mod.rs"]
 mod support;
 mod trajectory_growth;

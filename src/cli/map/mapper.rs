@@ -6,7 +6,7 @@ use crate::align::{Alignment, AlignmentSettings, Verdict};
 use crate::cli::error::CliError;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
-use crate::mapping::{Guess, MappingError, MappingSettings, Scan, ScanMapper};
+use crate::mapping::{Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings};
 use crate::util::StopSignal;
 
 /// Whose scans they are, in the map's trajectory.
@@ -18,6 +18,7 @@ pub(in crate::cli) struct Mapper {
     settings: MappingSettings,
     robot: RobotName,
     guess: Guess,
+    sightings: Sightings,
 }
 
 /// What became of a scan.
@@ -51,6 +52,7 @@ impl Mapper {
             settings: MappingSettings { alignment, stationary: None },
             robot: RobotName::new(ROBOT).map_err(CliError::failed)?,
             guess,
+            sightings: Sightings::default(),
         })
     }
 
@@ -80,7 +82,7 @@ impl Mapper {
             at_guess: known.is_some(),
             ..Scan::new(&self.robot, points)
         };
-        let mapper = ScanMapper::new(&self.map, self.settings);
+        let mapper = ScanMapper::new(&self.map, &self.sightings, self.settings);
         let outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
         Ok(Mapped {
             new_voxels: outcome.committed.map_or(0, |committed| committed.voxels),

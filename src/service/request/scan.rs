@@ -11,6 +11,7 @@ use crate::geometry::Pose;
 use crate::map::RobotName;
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
+use crate::service::{Reason, ServiceError};
 
 /// A scan to align or insert.
 #[derive(Debug, Clone)]
@@ -40,6 +41,21 @@ pub struct ScanRequest {
 }
 
 impl ScanRequest {
+    /// # Errors
+    /// For what an insertion does not take.
+    pub(in crate::service) fn check_insertion(&self) -> Result<(), ServiceError> {
+        let message = "foreground_level is for an alignment, which changes nothing: an insertion does not tell the \
+                       foreground; ask for the alignment first, or leave it out";
+        self.foreground_level.map_or(Ok(()), |_| Err(ServiceError::new(Reason::UnexpectedField, message)))
+    }
+
+    /// # Errors
+    /// For what an alignment does not take.
+    pub(in crate::service) fn check_alignment(&self) -> Result<(), ServiceError> {
+        let message = "force is for an insertion: an alignment changes nothing, leave it out";
+        if self.force { Err(ServiceError::new(Reason::UnexpectedField, message)) } else { Ok(()) }
+    }
+
     /// A robot's scan, of which nothing else is said.
     pub fn new(robot: RobotName, points: PointCloud) -> Self {
         Self {
