@@ -95,11 +95,11 @@ pub fn evaluate_at(
     map_from_sensor: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    judge_until(map, points, map_from_sensor, settings, StopSignal::NEVER)
+    evaluate_at_until(map, points, map_from_sensor, settings, StopSignal::NEVER)
 }
 
-/// [`judge`], whose answer means nothing once it is stopped.
-pub fn judge_until(
+/// [`evaluate_at`], whose answer means nothing once it is stopped.
+pub fn evaluate_at_until(
     map: &MultiResolutionMap,
     points: &[Point],
     map_from_sensor: &Pose,

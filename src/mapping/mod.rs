@@ -19,7 +19,7 @@ pub use stationary::StationarySettings;
 
 use std::time::{Duration, Instant};
 
-use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, judge_until};
+use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
 use crate::geometry::Point;
 use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::util::StopSignal;
@@ -181,7 +181,7 @@ impl<'a> ScanMapper<'a> {
         let alignment = if map_is_empty {
             Alignment::trusted(guess, map.settings().levels, scan.points)
         } else if scan.at_guess {
-            judge_until(map, scan.points, &guess, settings, stop).accepted_by_caller()
+            evaluate_at_until(map, scan.points, &guess, settings, stop).accepted_by_caller()
         } else {
             align_until(map, scan.points, &guess, settings, stop)
         };

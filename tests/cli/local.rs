@@ -61,7 +61,7 @@ fn errors_are_against_the_first_pose_wherever_the_map_begins() {
     assert_eq!(lines[0]["error_m"], 0.0);
     assert_eq!(
         lines[0]["map_from_sensor"],
-        serde_json::json!({"translation_m": [0.0; 3], "rotation_xyzw": [0.0, 0.0, 0.0, 1.0]})
+        serde_json::json!({"translation_m": [0.0, 0.0, 0.0], "rotation_xyzw": [0.0, 0.0, 0.0, 1.0]})
     );
     let summary = &lines[SCANS]["summary"];
     let errors = lines[..SCANS].iter().map(|line| line["error_m"].as_f64().unwrap());
