@@ -116,25 +116,61 @@ async fn a_stream_of_queries_is_answered_in_order() {
 }
 
 #[tokio::test]
-async fn a_stream_of_scans_ends_with_the_first_failure() {
+async fn a_scan_that_fails_is_an_answer_and_its_stream_goes_on() {
     let daemon = Daemon::start().await;
     daemon.make_map("a").await;
+    let numbered = |id: u64, points: &[[f32; 3]]| {
+        let mut request = scan_pb("a", "r", points);
+        request.scan.as_mut().unwrap().scan_id = Some(id);
+        request
+    };
     let scans = [
-        scan_pb("a", "r", &row(1)),
-        scan_pb("", "r", &row(2)),
-        scan_pb("", "r 1", &row(3)),
-        scan_pb("", "r", &row(4)),
+        numbered(1, &row(1)),
+        // The number is another scan's.
+        numbered(1, &row(2)),
+        scan_pb("a", "r 1", &row(3)),
+        scan_pb("nowhere", "r", &row(3)),
+        scan_pb("a", "r", &[[f32::NAN; 3]]),
+        numbered(2, &row(2)),
     ];
     let mut robot = daemon.mapping().await;
-    let mut answers = robot.insert_scan_stream(tokio_stream::iter(scans)).await.unwrap().into_inner();
-    for revision in 1..=2 {
-        let answer = answers.message().await.unwrap().unwrap();
-        assert_eq!((answer.version.unwrap().revision, answer.new_voxels), (revision, 1));
-    }
-    let failed = answers.message().await.unwrap_err();
-    assert_eq!((failed.code(), reason(&failed).as_str()), (Code::InvalidArgument, "bad_name"));
-    assert!(failed.message().contains("scan.robot"), "{failed}");
+    let answers = robot.insert_scan_stream(tokio_stream::iter(scans)).await.unwrap().into_inner();
+    let answers: Vec<_> = answers.map(|answer| answer.unwrap()).collect().await;
+    let failures: Vec<_> = answers
+        .iter()
+        .map(|answer| answer.error.as_ref().map(|error| (Code::from(error.code), error.reason.as_str())))
+        .collect();
+    let expected = [
+        None,
+        Some((Code::AlreadyExists, "scan_id_taken")),
+        Some((Code::InvalidArgument, "bad_name")),
+        Some((Code::NotFound, "map_not_found")),
+        Some((Code::InvalidArgument, "no_returns")),
+        None,
+    ];
+    assert_eq!(failures, expected);
+    assert!(answers[2].error.as_ref().unwrap().message.contains("scan.robot"));
+    assert!(answers[1].alignment.is_none() && answers[1].version.is_none());
+    assert_eq!(answers[5].version.as_ref().unwrap().revision, 2);
     assert_eq!(daemon.contents("a").await.0, 2);
+    for (code, count) in [("ok", 2.0), ("already_exists", 1.0), ("invalid_argument", 2.0), ("not_found", 1.0)]
+    {
+        let series =
+            format!(r#"mrol_requests_total{{protocol="grpc",operation="InsertScanStream",code="{code}"}}"#);
+        assert_eq!(daemon.metric(&series).await, Some(count), "{code}");
+    }
+}
+
+#[tokio::test]
+async fn a_message_that_cannot_be_read_ends_a_stream_of_scans() {
+    let daemon = Daemon::start_with(|config| config.limits.message_bytes_max = 4096).await;
+    daemon.make_map("a").await;
+    let scans = [scan_pb("a", "r", &row(1)), scan_pb("a", "r", &row(1000)), scan_pb("a", "r", &row(2))];
+    let mut robot = daemon.mapping().await;
+    let mut answers = robot.insert_scan_stream(tokio_stream::iter(scans)).await.unwrap().into_inner();
+    assert!(answers.message().await.unwrap().unwrap().accepted);
+    let failed = answers.message().await.unwrap_err();
+    assert_eq!((failed.code(), reason(&failed).as_str()), (Code::ResourceExhausted, "message_too_large"));
 }
 
 #[tokio::test]

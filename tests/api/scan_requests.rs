@@ -149,3 +149,20 @@ async fn a_robot_that_stands_still_does_not_grow_its_trajectory() {
     assert!(moved.accepted && !moved.stationary && is_near(place(&moved), [0.2, 0.0, 0.0]), "{moved:?}");
     assert_eq!(moved.version.unwrap().revision, 3);
 }
+
+#[tokio::test]
+async fn what_an_operation_does_not_take_is_refused_and_not_passed_over() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    let scan = json!({"robot": "r", "points": row(3)});
+    for (path, field) in [("scans", "foreground_level"), ("alignment", "force")] {
+        let mut body = scan.clone();
+        body[field] = if field == "force" { true.into() } else { 0.into() };
+        let refused = daemon.post(&format!("/v1/maps/a/{path}"), body).await;
+        assert_eq!(refused.status(), StatusCode::BAD_REQUEST);
+        let refused = json_of(refused).await;
+        assert_eq!(refused["reason"], "unexpected_field");
+        assert!(refused["detail"].as_str().unwrap().contains(field), "{refused}");
+    }
+    assert_eq!(daemon.contents("a").await.0, 0);
+}
