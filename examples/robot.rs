@@ -32,7 +32,12 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
     let client = Client::connect_with(&url, &credentials()?).await?;
     client.create_map(&map, NewMap::of(0.05)).await?;
-    let requests = scans.into_iter().map(move |points| ScanRequest::new(robot.clone(), points.into()));
+    // The number makes a retry safe: a scan that the map has already is answered again, and not added twice. Other scans
+    // of the same robot need other numbers.
+    let requests = scans.into_iter().zip(1..).map(move |(points, scan_id)| ScanRequest {
+        scan_id: Some(scan_id),
+        ..ScanRequest::new(robot.clone(), points.into())
+    });
     let mut answers = client.insert_scans(&map, tokio_stream::iter(requests)).await?;
     while let Some(answer) = answers.next().await {
         let answer = answer?;

@@ -1,4 +1,4 @@
-//! Why a command failed, and with which exit code.
+//! Errors of a command, and their exit codes.
 
 use std::fmt::{self, Display};
 use std::io::{self, ErrorKind, Write};
@@ -17,6 +17,8 @@ pub(super) enum CliError {
     Usage(String),
     /// The command could not be done: exit code 1.
     Failed(String),
+    /// Every scan was answered, and at least one was not accepted: exit code 3.
+    NotAccepted(String),
     /// Nobody reads the output any more (`mrol ... | head`): no failure, and nothing to say.
     OutputClosed,
 }
@@ -28,6 +30,14 @@ impl CliError {
 
     pub(super) fn failed(message: impl Display) -> Self {
         Self::Failed(message.to_string())
+    }
+
+    /// `refused` of `scans` scans were answered with a verdict other than `accepted`; success where none was.
+    pub(super) fn unless_accepted(refused: usize, scans: usize) -> Result<(), Self> {
+        match refused {
+            0 => Ok(()),
+            _ => Err(Self::NotAccepted(format!("{refused} of {scans} scans not accepted"))),
+        }
     }
 
     /// A file could not be written.
@@ -43,11 +53,12 @@ impl CliError {
         }
     }
 
-    /// Says it on standard error; the process's exit code.
+    /// Writes the error to standard error and returns the exit code of the process.
     pub(super) fn report(self) -> ExitCode {
         let code = match self {
             Self::Usage(_) => 2,
             Self::Failed(_) => 1,
+            Self::NotAccepted(_) => 3,
             Self::OutputClosed => return ExitCode::SUCCESS,
         };
         // Where standard error is closed too, the exit code says it all.
@@ -59,7 +70,7 @@ impl CliError {
 impl Display for CliError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message) | Self::Failed(message) => f.write_str(message),
+            Self::Usage(message) | Self::Failed(message) | Self::NotAccepted(message) => f.write_str(message),
             Self::OutputClosed => f.write_str("nobody reads the output any more"),
         }
     }

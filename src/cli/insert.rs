@@ -36,7 +36,8 @@ EXAMPLES:
   mrol insert scans/ --map office --json | jq .verdict
 
 Each scan is aligned to the map from the robot's last accepted pose; the first from --guess. The first scan of
-an empty map goes in at its guess, or at the origin. A scan that does not align is reported, and left out.";
+an empty map goes in at its guess, or at the origin. A scan that does not align is reported, and left out; the
+other scans are sent all the same, and the exit code is then 3. It is 1 where scans were not answered.";
 
 /// Send scans to a map on a server, which aligns and adds them
 #[derive(Debug, clap::Args)]
@@ -109,10 +110,10 @@ impl Insert {
             move || plan.send(&files, &sender)
         });
         let output = output.with_bar(files.len());
-        let answered = self.print_answers(&client, scans, &files, &output).await?;
+        let Answers { answered, refused } = self.print_answers(&client, scans, &files, &output).await?;
         reader.await.map_err(CliError::failed)??;
         match answered == files.len() {
-            true => Ok(()),
+            true => CliError::unless_accepted(refused, answered),
             false => {
                 Err(CliError::failed(format!("the server answered {answered} of {} scans", files.len())))
             }
@@ -130,17 +131,17 @@ impl Insert {
         (self.guess.map_or(Guess::Last, Guess::Pose), self.at_guess)
     }
 
-    /// Prints a line for each scan; the number of them.
+    /// Prints a line for each answer of the server, and counts the answers.
     async fn print_answers(
         &self,
         client: &Client,
         scans: mpsc::Receiver<ScanRequest>,
         files: &[PathBuf],
         output: &Output,
-    ) -> Result<usize, CliError> {
+    ) -> Result<Answers, CliError> {
         let width = name_width(files);
         let mut answers = client.insert_scans(&self.map.name, ReceiverStream::new(scans)).await?;
-        let mut answered = 0;
+        let (mut answered, mut refused) = (0, 0);
         while let Some(answer) = answers.next().await {
             let name = files.get(answered).map(|file| name_of(file)).unwrap_or_default();
             let answer = answer.map_err(|error| not_inserted(&name, &error))?;
@@ -150,10 +151,19 @@ impl Insert {
             output.print(&ScanLine::of(name, &answer, width))?;
             output.step();
             answered += 1;
+            refused += usize::from(!answer.accepted);
         }
         output.clear_bar();
-        Ok(answered)
+        Ok(Answers { answered, refused })
     }
+}
+
+/// Numbers of scans that the server answered.
+struct Answers {
+    /// All of them.
+    answered: usize,
+    /// Those that are not in the map because their verdict is not `accepted`.
+    refused: usize,
 }
 
 fn not_inserted(name: &str, error: &ClientError) -> CliError {

@@ -10,10 +10,10 @@
 //! * With [`Durability::Always`], the default, every acknowledged change is there afterwards. With
 //!   [`Durability::Interval`] that holds after the end of the process; a loss of power takes the last interval.
 //! * After a start the map is that of one revision; no change is applied in part.
-//! * A torn end of the journal, which was never written completely, is cut off and reported. Everything else that cannot
-//!   be read is an error that names the file, the offset and the remedy; nothing is skipped silently.
-//! * When the journal cannot be written or synced, the map accepts no more changes, and can still be read. A sync is not
-//!   repeated after it failed.
+//! * A torn end of the journal, which was never written completely, is cut off and reported. Everything else that
+//!   cannot be read is an error that names the file, the offset and the remedy; nothing is skipped silently.
+//! * When the journal cannot be written or synced, the map accepts no more changes, and can still be read. A sync is
+//!   not repeated after it failed.
 //!
 //! Byte layouts: `snapshot.rs`, `journal/segment.rs`, `journal/frame.rs`, `proto/mrol/store/v1`.
 

@@ -32,10 +32,10 @@ EXAMPLES:
   mrol localize --map hall.mrol scan.ply --box \"-5 -5 0 5 5 2\" --candidates 3
   mrol localize --name hall new/*.ply --json | jq .verdict    on a server
 
-Accepted is a place only where the scan fits it and no other place is as good; a scan that fits nowhere, or in several
-places, is an answer too, with the places it fits best. Without --gravity, rotations are tried that bring surfaces of
-the scan parallel to the map's dominant ones, and the search is not exhaustive. What --gravity says may be 2 degrees
-off.";
+A place is accepted only where the scan fits it and no other place is as good. A scan that fits nowhere, or in several
+places, is answered with the places it fits best, and the exit code is then 3. Without --gravity, only rotations are
+tried that bring surfaces of the scan parallel to the map's dominant ones, and the search is not exhaustive. --gravity
+may be 2 degrees off.";
 
 /// Find where in a map a scan was taken, with no guess
 #[derive(Debug, clap::Args)]
@@ -89,6 +89,7 @@ impl Localize {
             (None, None) => return Err(CliError::usage("one of --map and --name is needed")),
         };
         let output = output.with_spinner();
+        let mut refused = 0;
         for file in &files {
             let request = LocalizationRequest {
                 points: read_points(file)?.into(),
@@ -98,9 +99,10 @@ impl Localize {
             output.tell(format!("{}: searching", name_of(file)));
             let answer = place.find(request, &output).await?;
             output.print(&Localized::of(name_of(file), &answer))?;
+            refused += usize::from(!answer.accepted());
         }
         output.clear_bar();
-        Ok(())
+        CliError::unless_accepted(refused, files.len())
     }
 
     fn query(&self) -> Result<LocalizationQuery, CliError> {
