@@ -1,4 +1,4 @@
-//! A robot: streams scans into a map and says what became of each. The scans are those of a folder, or simulated.
+//! A robot: streams scans into a map and prints the answers. The scans are those of a folder, or simulated.
 //!
 //! ```text
 //! mrol serve
@@ -51,7 +51,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A server on loopback may ask for no key; others do, and to make a map for one of scope admin.
+/// Reads the key from `MROL_KEY`. A server on loopback may need none; others do, of scope admin to make a map.
 fn credentials() -> Result<Credentials, Box<dyn Error>> {
     match std::env::var("MROL_KEY") {
         Ok(secret) => Ok(Credentials::default().with_key(&secret)?),

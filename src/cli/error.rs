@@ -13,13 +13,13 @@ use crate::store::StoreError;
 /// A command that did not succeed.
 #[derive(Debug)]
 pub(super) enum CliError {
-    /// The command line makes no sense: exit code 2.
+    /// The command line is not valid: exit code 2.
     Usage(String),
-    /// The command could not be done: exit code 1.
+    /// The command failed: exit code 1.
     Failed(String),
     /// Every scan was answered, and at least one was not accepted: exit code 3.
     NotAccepted(String),
-    /// Nobody reads the output any more (`mrol ... | head`): no failure, and nothing to say.
+    /// Standard output was closed (`mrol ... | head`): no failure, and nothing to report.
     OutputClosed,
 }
 
@@ -40,12 +40,12 @@ impl CliError {
         }
     }
 
-    /// A file could not be written.
+    /// The error of a file that cannot be written.
     pub(super) fn writing(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| Self::Failed(format!("{}: cannot be written: {error}", path.display()))
     }
 
-    /// Standard output could not be written.
+    /// The error of standard output that cannot be written.
     pub(super) fn printing(error: io::Error) -> Self {
         match error.kind() {
             ErrorKind::BrokenPipe => Self::OutputClosed,

@@ -1,4 +1,4 @@
-//! `mrol insert`: scans into a map of a server.
+//! `mrol insert`: sends scans to a map of a server.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -48,7 +48,7 @@ pub(super) struct Insert {
     scans: Vec<PathBuf>,
     #[command(flatten)]
     map: MapOptions,
-    /// Who sends them
+    /// Name of the robot that sends the scans
     #[arg(long, value_name = "NAME", default_value = "mrol", value_parser = parse::robot_name)]
     robot: RobotName,
     /// Where the first scan was taken: "x y z qx qy qz qw"
@@ -60,8 +60,7 @@ pub(super) struct Insert {
     /// Add scans where they were found even if their verdict is not accepted
     #[arg(long)]
     force: bool,
-    /// Where each next scan is thought to have been taken: at the last accepted pose, or as far on as that is from the
-    /// one before it
+    /// Guess of every scan but the first: the last accepted pose, or one as far on as that is from the pose before
     #[arg(long, value_enum, value_name = "GUESS", default_value_t)]
     next_guess: GuessName,
     #[command(flatten)]
@@ -71,7 +70,7 @@ pub(super) struct Insert {
     /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
     #[arg(long, value_name = "FILE", conflicts_with = "guess")]
     truth: Option<PathBuf>,
-    /// Number the scans from here on: sent again, they are not added twice
+    /// Number the scans from N on, so that a scan that is sent again is not added twice
     #[arg(long, value_name = "N")]
     first_scan_id: Option<u64>,
     /// Make the map first
@@ -175,16 +174,16 @@ fn not_inserted(name: &str, error: &ClientError) -> CliError {
     CliError::failed(format!("{name}: {error}{advice}"))
 }
 
-/// How the scans of files are sent.
+/// How the scans of the files are sent.
 struct Plan {
     robot: RobotName,
     /// Guess of the first scan, and whether to take it as it is.
     first: (Guess, bool),
-    /// Where each scan goes, if that is known.
+    /// Poses of the scans, map_from_sensor, if they are known.
     poses: Option<Vec<Pose>>,
     /// Number of the first scan, if they are numbered.
     ids: Option<u64>,
-    /// How the others begin.
+    /// Guess of the other scans.
     next: Guess,
     method: Option<Method>,
     filter: PointFilter,
@@ -192,7 +191,7 @@ struct Plan {
 }
 
 impl Plan {
-    /// Reads the files one by one, until nobody takes the scans any more.
+    /// Reads the files one by one and sends them, until the receiver is closed.
     fn send(&self, files: &[PathBuf], sender: &mpsc::Sender<ScanRequest>) -> Result<(), CliError> {
         for (k, file) in files.iter().enumerate() {
             let (guess, at_guess) = self.guess(k);

@@ -1,4 +1,4 @@
-//! `mrol localize`: where in a map a scan was taken, with no guess.
+//! `mrol localize`: finds where in a map a scan was taken, without a guess.
 
 mod report;
 
@@ -52,10 +52,10 @@ pub(super) struct Localize {
     name: Option<MapName>,
     #[command(flatten)]
     server: ServerOptions,
-    /// Which way things fall in the sensor frame
+    /// Direction of gravity in the sensor frame
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
     gravity: Option<[f64; 3]>,
-    /// Which way things fall in the map frame
+    /// Direction of gravity in the map frame
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -74,7 +74,7 @@ pub(super) struct Localize {
     /// Candidates to print, at most
     #[arg(long, value_name = "COUNT", default_value_t = CANDIDATES_DEFAULT)]
     candidates: usize,
-    /// Of the choice of the scan's points
+    /// Seed of the choice of the scan's points
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
 }
@@ -121,7 +121,7 @@ impl Localize {
     }
 }
 
-/// Where the map is.
+/// Source of the map.
 enum MapSource {
     File(Box<MultiResolutionMap>, MapVersion),
     Server(Client, MapName),
@@ -146,10 +146,10 @@ impl MapSource {
     }
 }
 
-/// A time limit that no search waits for: a year.
+/// A time limit beyond any search: a year.
 const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 
-/// Searches in this process, and says how far that is.
+/// Searches in this process, with progress reports.
 fn find_here(
     map: &MultiResolutionMap,
     version: MapVersion,
