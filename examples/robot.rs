@@ -1,4 +1,4 @@
-//! A robot: streams scans into a map and says what became of each. The scans are those of a folder, or simulated.
+//! A robot: streams scans into a map and prints the answers. The scans are those of a folder, or simulated.
 //!
 //! ```text
 //! mrol serve
@@ -32,7 +32,12 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
     let client = Client::connect_with(&url, &credentials()?).await?;
     client.create_map(&map, NewMap::of(0.05)).await?;
-    let requests = scans.into_iter().map(move |points| ScanRequest::new(robot.clone(), points.into()));
+    // The number makes a retry safe: a scan that the map has already is answered again, and not added twice. Other scans
+    // of the same robot need other numbers.
+    let requests = scans.into_iter().zip(1..).map(move |(points, scan_id)| ScanRequest {
+        scan_id: Some(scan_id),
+        ..ScanRequest::new(robot.clone(), points.into())
+    });
     let mut answers = client.insert_scans(&map, tokio_stream::iter(requests)).await?;
     while let Some(answer) = answers.next().await {
         let answer = answer?;
@@ -46,7 +51,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A server on loopback may ask for no key; others do, and to make a map for one of scope admin.
+/// Reads the key from `MROL_KEY`. A server on loopback may need none; others do, of scope admin to make a map.
 fn credentials() -> Result<Credentials, Box<dyn Error>> {
     match std::env::var("MROL_KEY") {
         Ok(secret) => Ok(Credentials::default().with_key(&secret)?),

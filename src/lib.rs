@@ -13,7 +13,20 @@
 //!   `http`, `client`: adapters. `server`, `cli`: the daemon and the program.
 //! * `lab`: what simulates, measures and compares. Nothing but `cli` names it.
 //!
-//! The first four lines know no runtime, no protocol and no serialization, and are there without any feature:
+//! Where to find what:
+//!
+//! * Where a scan is aligned: [`align::align`]; without a guess, [`align::localize`]. The whole loop of a scan is
+//!   [`mapping::ScanMapper::map_scan`].
+//! * What *overlap* and *undetermined* mean: [`align`]. All verdicts: [`align::Verdict`].
+//! * Where a point is quantized and looked up: [`voxel`], [`map::MapView`].
+//! * What is there after `kill -9` or a loss of power: `store`. With the default durability, every acknowledged change.
+//! * Where a limit is: `service::Limits` for those of the server, each a setting of the section `limits`;
+//!   [`map::MapSettings`] for the ranges of a map's settings.
+//! * Where a benchmark is: `lab::measure` for `mrol bench`, `lab::experiment` for the paper's experiments, `benches/` for
+//!   single kernels.
+//!
+//! The first three items of the reading order know no runtime, no protocol and no serialization, and are there without
+//! any feature:
 //!
 //! ```
 //! use mrol::geometry::{Point, Pose};

@@ -8,7 +8,7 @@ use crate::geometry::Pose;
 use crate::util::StopSignal;
 use crate::voxel::Lattice;
 
-/// How far one move shifts or turns the sensor.
+/// Step sizes of the ascent: how far one move shifts the sensor (meters) and turns it (radians).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Steps {
     translation_m: f64,
@@ -16,7 +16,7 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// dx = r_n and dtheta = 0.5 deg * 2^n by default.
+    /// The steps of `level` n: by default dx = r_n and dtheta = 0.5 deg * 2^n.
     pub(super) fn of_level(level: u32, lattice: &Lattice, settings: &AlignmentSettings) -> Self {
         Self {
             translation_m: settings.translation_step * lattice.resolution_m(level),
@@ -24,7 +24,7 @@ impl Steps {
         }
     }
 
-    /// dx = r_0 / 2 and dtheta = 0.25 deg by default.
+    /// The first steps of the sub-voxel stage: by default dx = r_0 / 2 and dtheta = 0.25 deg.
     pub(super) fn sub_voxel(lattice: &Lattice, settings: &AlignmentSettings) -> Self {
         Self {
             translation_m: settings.sub_voxel_translation_step * lattice.resolution_m(0),
@@ -38,11 +38,11 @@ impl Steps {
     }
 }
 
-/// Moves along and about one axis, both ways.
+/// The six directions of a single-axis move: plus and minus along x, y and z.
 const SINGLE_AXIS: [[f64; 3]; 6] =
     [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
 
-/// The state of a climb.
+/// State of a steepest ascent: the pose that it stands at, and what it has cost so far.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ascent {
     pub(super) pose: Pose,
@@ -57,8 +57,8 @@ impl From<Pose> for Ascent {
 }
 
 impl Ascent {
-    /// Moves to the neighbor of highest overlap until none is higher than where it stands (a tie keeps the
-    /// pose), `iterations_max` moves were made, or nobody wants to know.
+    /// Climbs: moves to the neighbor of highest overlap until none is higher than the present pose (a tie keeps the
+    /// pose), `iterations_max` moves were made, or the ascent is stopped.
     pub(super) fn climb(
         &mut self,
         overlap: &Overlap<'_>,
@@ -88,7 +88,7 @@ impl Ascent {
     }
 }
 
-/// The first of the highest.
+/// Index of the largest of `heights`; of equal ones the first.
 fn highest(heights: &[usize]) -> Option<usize> {
     (0..heights.len()).rev().max_by_key(|&i| heights[i])
 }

@@ -1,16 +1,17 @@
-//! The points of a scan that can be on a map at all.
+//! The points of a scan that are near enough to the sensor to lie on any map.
 
 use std::borrow::Cow;
 
 use crate::geometry::Point;
 use crate::util::StopSignal;
 
-/// Points that are looked at between two looks at the stop signal: far below a millisecond.
+/// Points between two checks of the stop signal: far below a millisecond.
 const POINTS_PER_LOOK: usize = 64 << 10;
 
-/// The points within `extent_m` of the sensor: all of an ordinary scan, without a copy. Others, and what is not finite,
-/// fall on no map wherever the sensor is, and one of them would be all that ranges and sums of squares tell. Once stopped,
-/// some of them.
+/// The points within `extent_m` of the sensor. An ordinary scan has no others and is returned without a copy.
+///
+/// Points that are farther away or not finite lie on no map wherever the sensor is, and a single one of them would
+/// dominate ranges and sums of squares. Once stopped, the result is incomplete.
 pub(super) fn within_extent<'a>(
     points: &'a [Point],
     extent_m: f64,

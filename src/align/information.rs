@@ -1,4 +1,4 @@
-//! What an alignment knows of a pose, direction by direction.
+//! How certain an alignment is of a pose, direction by direction.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -14,33 +14,35 @@ pub struct PoseInformation {
     lever_m: f64,
 }
 
-/// A direction in which a pose may move without the scan telling.
+/// A direction in which the scan does not fix the pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
     /// A unit vector: x y z along the map's axes, then rotations about them through the sensor, each times the scan's
     /// mean range, so that both are lengths.
     pub direction: [f64; 6],
-    /// Standard deviation along it, meters; infinite where nothing holds it.
+    /// Standard deviation of the pose along `direction`, meters; infinite where nothing fixes it.
     pub std_m: f64,
 }
 
 impl PoseInformation {
-    /// `matrix` of a pose found with `points` (sensor frame); their root mean square range makes rotations lengths.
+    /// The information `matrix` of a pose that was found with `points` (sensor frame). The root mean square range of
+    /// the points converts rotations to lengths.
     pub(super) fn new(matrix: Matrix6<f64>, points: &[Point]) -> Self {
         Self { matrix, lever_m: root_mean_square_range_m(points).max(f64::MIN_POSITIVE) }
     }
 
-    /// Nothing known.
+    /// The information of a pose that nothing is known of: zero.
     pub(super) fn none(points: &[Point]) -> Self {
         Self::new(Matrix6::zeros(), points)
     }
 
-    /// Row by row: 1 / m^2, 1 / (m rad), 1 / rad^2.
+    /// Rows of the information matrix; entries are in 1 / m^2, 1 / (m rad) and 1 / rad^2.
     pub fn rows(&self) -> [[f64; 6]; 6] {
         std::array::from_fn(|row| std::array::from_fn(|column| self.matrix[(row, column)]))
     }
 
-    /// All six principal directions, the least known first; of numbers that have none the axes, all open.
+    /// All six principal directions of the pose, the least certain first. A matrix without finite eigenvalues gives the
+    /// axes, all open.
     pub fn directions(&self) -> Vec<Direction> {
         let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / self.lever_m });
         let scaled = Matrix6::from_diagonal(&scale) * self.matrix * Matrix6::from_diagonal(&scale);
@@ -58,13 +60,13 @@ impl PoseInformation {
         directions
     }
 
-    /// The directions that are known to no better than `std_m`.
+    /// The principal directions whose standard deviation is `std_m` (meters) or more.
     pub fn undetermined(&self, std_m: f64) -> Vec<Direction> {
         self.directions().into_iter().filter(|direction| direction.std_m > std_m).collect()
     }
 }
 
-/// In this direction: "x 0.97 z -0.24 (std 0.031 m)".
+/// Formats as `x 0.97 z -0.24 (std 0.031 m)`.
 impl std::fmt::Display for Direction {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let parts = ["x", "y", "z", "turn x", "turn y", "turn z"].into_iter().zip(self.direction);

@@ -1,8 +1,13 @@
-//! Scan to map alignment (paper III-A, III-B).
+//! Alignment of a scan to the map (paper III-A, III-B), from a guess. Without a guess: [`localize`].
 //!
-//! [`align`] reads like the paper's summary: a volumetric sample, an ascent on overlap at each level from
-//! coarse to fine, and a sub-voxel stage, which is the paper's ascent with all points or a refinement on what the
-//! map's surfaces look like. `verdict` says whether to believe the end of it.
+//! [`align`] reads like the paper's summary: a volumetric sample, an ascent on overlap at each level from coarse to
+//! fine, and a sub-voxel stage. The last is the paper's ascent with all points, or a refinement on the surfaces of the
+//! map.
+//!
+//! *Overlap* is the share of all the scan's points that fall in occupied voxels of level 0 by the exact set, before the
+//! scan is added ([`overlap`](fn@overlap)). [`Verdict`] says whether to believe the pose. It is *undetermined* where the
+//! scan would fit as well at poses nearby: what it sees of the map, such as one blank wall, leaves a direction of the
+//! pose open ([`PoseInformation`]).
 
 mod ascent;
 mod extent;
@@ -32,16 +37,16 @@ use overlap::{Overlap, level_overlaps_until};
 use refine::{refine, surface_fit};
 use verdict::Fit;
 
-/// A scan with the samples that its alignment looks at.
+/// A scan and the samples that its alignment reads.
 #[derive(Debug)]
 struct SampledScan<'a> {
-    /// Sensor frame, finite.
+    /// All points of the scan: sensor frame, meters, finite.
     points: &'a [Point],
-    /// The paper's about 1000 points.
+    /// Volumetric sample of about 1000 points, for the ascent (paper III-A).
     sample: Vec<Point>,
-    /// More of them, for the refinement and the verdict.
+    /// Volumetric sample of about 5000 points, for the refinement and the verdict.
     surface_sample: Vec<Point>,
-    /// In its pose: whoever climbs asks.
+    /// Ends the alignment early; every climb checks it.
     stop: StopSignal<'a>,
 }
 
@@ -57,10 +62,11 @@ impl<'a> SampledScan<'a> {
     }
 }
 
-/// Finds the pose of a scan by sequential multi-resolution alignment (paper III-B), from a guess.
+/// Finds the pose of a scan by sequential multi-resolution alignment (paper III-B), from the guess `guess`
+/// (map_from_sensor).
 ///
-/// `points` are in the sensor frame and finite. The map may change meanwhile: each step sees one revision of it, of
-/// scans of more than 262,144 points a few.
+/// `points` are in the sensor frame, meters, and finite. The map may change meanwhile: each step reads one revision of
+/// it, and a step with more than 262,144 points may read several.
 pub fn align(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -70,7 +76,7 @@ pub fn align(
     align_until(map, points, guess, settings, StopSignal::NEVER)
 }
 
-/// [`align`], which ends where it stands once `stop` says so: what it returns then means nothing.
+/// [`align`] under a stop signal. Once `stop` is set, it returns early, and the result is meaningless.
 pub fn align_until(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -88,7 +94,7 @@ pub fn align_until(
     found.within_max_correction(guess, map, settings)
 }
 
-/// Says how a scan fits the map where it is thought to be, without moving it.
+/// Judges how a scan fits the map at the pose `map_from_sensor`, without moving it.
 pub fn evaluate_at(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -98,7 +104,7 @@ pub fn evaluate_at(
     evaluate_at_until(map, points, map_from_sensor, settings, StopSignal::NEVER)
 }
 
-/// [`evaluate_at`], whose answer means nothing once it is stopped.
+/// [`evaluate_at`] under a stop signal. Once `stop` is set, the result is meaningless.
 pub fn evaluate_at_until(
     map: &MultiResolutionMap,
     points: &[Point],
@@ -110,7 +116,8 @@ pub fn evaluate_at_until(
     fit(map, &scan, Ascent::from(*map_from_sensor), 0.0, settings).judged(map, settings)
 }
 
-/// The paper's method by itself (III-B, steps 1 to 5), on whatever knows occupied voxels: where it ends, not judged.
+/// Runs the paper's ascent alone (III-B, steps 1 to 5) on any structure of occupied voxels, and returns the pose where
+/// it ends, without a verdict.
 pub fn ascend(
     voxels: &dyn OccupiedVoxels,
     points: &[Point],
@@ -181,7 +188,7 @@ fn finish(
     .judged(map, settings)
 }
 
-/// How a scan fits at the end of an ascent, which the last stage moved by `refined_by_m`.
+/// Measures how a scan fits at the end of an ascent, which the last stage moved by `refined_by_m`.
 fn fit(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,

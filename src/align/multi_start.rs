@@ -1,4 +1,4 @@
-//! More guesses, where the ascent from the first one ends badly.
+//! Multiple starts: ascents from more guesses, where the one from the first guess ends badly.
 
 use std::cmp::Reverse;
 
@@ -13,15 +13,15 @@ use crate::util::StopSignal;
 
 /// Turns of the further guesses about each axis, degrees: the basin of a coarsest level's ascent is some 20 wide.
 const TURNS_DEG: [f64; 4] = [-40.0, -20.0, 20.0, 40.0];
-/// Ends nearer than this many r_0 and [`SAME_DEG`] are one.
+/// Poses that differ by less than this many r_0 and less than [`SAME_DEG`] count as the same.
 const SAME_VOXELS: f64 = 4.0;
 const SAME_DEG: f64 = 5.0;
-/// Ends that are finished and judged.
+/// Number of the best ascents that are refined and judged.
 const FINISHED: usize = 2;
 
-/// Climbs from the most promising of many guesses around `guess`, and takes the better of them and `first`.
+/// Ascends from the most promising of many guesses around `guess`, and returns the better of their result and `first`.
 ///
-/// Ambiguous where an end elsewhere fits about as well.
+/// The verdict is ambiguous where a different pose fits about equally well.
 pub(super) fn align(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
@@ -52,7 +52,7 @@ pub(super) fn align(
         }
     }
 
-    // Of a small step the guess itself may be the best of all: the coarse levels lead away from it.
+    // After a small motion the guess itself may be the best of all: the coarse levels lead away from it.
     ends.push(*guess);
     let mut found: Vec<_> =
         ends.into_iter().map(|end| finish(map, scan, Ascent::from(end), settings)).collect();
@@ -65,7 +65,7 @@ pub(super) fn align(
     };
     let best = Alignment { lookups, ..found.iter().fold(first.clone(), better) };
     found.push(first);
-    // Where starts far apart end at one pose, it is held, however far the refinement had to carry it.
+    // Where starts far apart end at one pose, that pose is determined, however far the refinement moved it.
     let ended_there =
         found.iter().filter(|found| is_same(&found.map_from_sensor, &best.map_from_sensor)).count();
     let best = match best.verdict {

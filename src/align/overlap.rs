@@ -5,7 +5,8 @@ use crate::map::{Lookup, MultiResolutionMap};
 use crate::util::StopSignal;
 use crate::voxel::Lattice;
 
-/// What alignment by overlap asks: of a map, or of another structure that is compared with it.
+/// A set of occupied voxels at several levels that alignment by overlap can climb on: a map, or a structure that is
+/// compared with it.
 pub trait OccupiedVoxels: std::fmt::Debug {
     /// The lattices of the levels.
     fn lattice(&self) -> &Lattice;
@@ -14,7 +15,7 @@ pub trait OccupiedVoxels: std::fmt::Debug {
     fn hits(&self, points: &[Point], poses: &[Pose], level: u32, lookup: Lookup) -> Vec<usize>;
 }
 
-/// Look-ups made under one set of locks: well below a millisecond, so that a committer never waits long.
+/// Look-ups made while the locks are held once: well below a millisecond, so that a committer never waits long.
 const LOOKUPS_PER_LOCK: usize = 50_000;
 
 impl OccupiedVoxels for MultiResolutionMap {
@@ -34,10 +35,11 @@ impl OccupiedVoxels for MultiResolutionMap {
     }
 }
 
-/// Look-ups between two looks at the stop signal: a few milliseconds where every one misses all caches.
+/// Look-ups between two checks of the stop signal: a few milliseconds where every one misses all caches.
 pub(super) const LOOKUPS_PER_LOOK: usize = 1 << 18;
 
-/// The overlap of some points with one level of a map, as a function of their pose.
+/// The objective function of the ascent: the overlap of some points with one level of a map, as a function of their
+/// pose.
 #[derive(Debug, Clone)]
 pub(super) struct Overlap<'a> {
     voxels: &'a dyn OccupiedVoxels,
@@ -47,7 +49,7 @@ pub(super) struct Overlap<'a> {
 }
 
 impl<'a> Overlap<'a> {
-    /// At one level.
+    /// The overlap of `points` (sensor frame) with one level of `map`.
     pub(super) fn new(
         voxels: &'a dyn OccupiedVoxels,
         points: &'a [Point],
@@ -57,7 +59,8 @@ impl<'a> Overlap<'a> {
         Self { voxels, points, level, lookup }
     }
 
-    /// Points whose voxel is occupied, for each candidate pose; once it is stopped, fewer of them.
+    /// For each of `poses` (map_from_sensor), the number of points whose voxel is occupied. Once stopped, the numbers
+    /// are too small.
     pub(super) fn at(&self, poses: &[Pose], stop: StopSignal<'_>) -> Vec<usize> {
         let mut heights = vec![0; poses.len()];
         let poses_per_look = (LOOKUPS_PER_LOOK / self.points.len().max(1)).max(1);
@@ -73,7 +76,7 @@ impl<'a> Overlap<'a> {
         heights
     }
 
-    /// Look-ups that one pose costs.
+    /// Number of look-ups that evaluating one pose takes.
     pub(super) fn lookups(&self) -> u64 {
         self.points.len() as u64
     }
@@ -102,7 +105,7 @@ pub fn level_overlaps(map: &MultiResolutionMap, points: &[Point], map_from_senso
     level_overlaps_until(map, points, map_from_sensor, StopSignal::NEVER)
 }
 
-/// The overlaps of all levels, which mean nothing once stopped.
+/// [`level_overlaps`] under a stop signal. Once `stop` is set, the result is meaningless.
 pub(super) fn level_overlaps_until(
     map: &MultiResolutionMap,
     points: &[Point],

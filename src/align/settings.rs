@@ -1,4 +1,4 @@
-//! The constants of the method, by name.
+//! Settings of the alignment.
 
 use crate::map::Lookup;
 use crate::util::Keyword;
@@ -27,9 +27,9 @@ impl Keyword for Method {
 /// Settings of the alignment; the defaults are the original implementation's where it had them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignmentSettings {
-    /// Which steps are taken.
+    /// The method of alignment. [`Method::Refined`].
     pub method: Method,
-    /// Points of the volumetric sample, about. 1000 (paper III-A).
+    /// Approximate number of points of the volumetric sample. 1000 (paper III-A).
     pub sample_points: usize,
     /// Seed of the choice of sample points. 0.
     pub seed: u64,
@@ -74,11 +74,11 @@ pub struct AlignmentSettings {
 /// Settings of the refinement on the Gaussians of voxels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RefinementSettings {
-    /// Points of the volumetric sample, about. 5000: from there on more of them gain nothing.
+    /// Approximate number of points of the volumetric sample. 5000: more points gain nothing.
     pub sample_points: usize,
-    /// By how much points are uncertain beyond the spread of the surface, as a fraction of r_0. 0.1.
+    /// Standard deviation of a point beyond the spread of its surface, as a fraction of r_0, in the last stage. 0.1.
     pub std: f64,
-    /// Stages, each with half the uncertainty of the one before. 4: the first begins at 0.8 r_0.
+    /// Number of stages, each with half the uncertainty of the one before. 4: the first begins at 0.8 r_0.
     pub stages: u32,
     /// Gauss-Newton steps of a stage, at most. 10.
     pub iterations_per_stage_max: u32,
@@ -87,17 +87,17 @@ pub struct RefinementSettings {
 }
 
 impl RefinementSettings {
-    /// The last stage's uncertainty of a point, meters.
+    /// Standard deviation of a point in the last stage, meters; see [`RefinementSettings::std`].
     pub(super) fn std_m(&self, resolution_m: f64) -> f64 {
         self.std * resolution_m
     }
 }
 
-/// Settings of the wide start: more guesses around the first one.
+/// Settings of the multiple starts: more guesses around the first one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MultiStartSettings {
-    /// Fitness below which the end of the first ascent is not believed, and others are tried. 0.85; 0 never tries. A scan
-    /// of what the map shows has 0.9 or more, one that shows much new ground less: it pays a few times as long.
+    /// Starts again from more guesses where the fitness of the first result is below this. 0.85; 0 never does. A scan
+    /// of what the map shows has 0.9 or more; one that shows much new ground has less, and takes a few times as long.
     pub fitness_below: f64,
     /// Starts again from more guesses where a pose is held to no better than this fraction of r_0 in some direction.
     /// 0.1.
@@ -108,7 +108,8 @@ pub struct MultiStartSettings {
     pub motion_above_deg: f64,
     /// Ascents of the guesses that look best, at most. 8; 0 believes every end.
     pub ascents: usize,
-    /// Two ends are equally good where the worse fits at least this fraction as well as the better. 0.95.
+    /// Two results are equally good where the fitness of the worse is at least this fraction of that of the better.
+    /// 0.95.
     pub ambiguous_fitness: f64,
 }
 
@@ -156,16 +157,16 @@ impl Default for MultiStartSettings {
     }
 }
 
-/// Why numbers cannot steer an alignment.
+/// Why alignment settings are not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum AlignmentSettingsError {
-    /// The sample would be empty.
+    /// A number that must not be 0 is 0; the payload names the setting.
     #[error("{0} must be at least 1, got 0")]
     Zero(&'static str),
-    /// A step that does not step.
+    /// A step that is not positive; the payload is the setting and its value.
     #[error("{0} must be positive and finite, got {1}")]
     NotPositive(&'static str, f64),
-    /// Not a fraction.
+    /// A value outside 0 to 1; the payload is the setting and its value.
     #[error("{0} must lie in 0..=1, got {1}")]
     NotAFraction(&'static str, f64),
 }

@@ -1,11 +1,11 @@
-//! Whether to believe an alignment, and why not.
+//! Verdicts: whether to believe an alignment, and why not.
 
 use super::refine::SurfaceFit;
 use super::{AlignmentSettings, Direction, PoseInformation};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 
-/// What an alignment is worth.
+/// Whether to believe the pose that an alignment found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The scan fits the map.
@@ -15,8 +15,8 @@ pub enum Verdict {
     /// The scan fits, but would fit elsewhere too: what it sees of the map (one blank wall, a straight corridor) leaves
     /// a direction open.
     Undetermined,
-    /// Several starts ended at different poses that fit about equally well, or it lies too far from the guess for others to
-    /// have been looked for.
+    /// Several starts ended at different poses that fit about equally well, or the pose lies farther from the guess
+    /// than other poses were looked for.
     Ambiguous,
 }
 
@@ -24,7 +24,7 @@ impl Verdict {
     /// All verdicts.
     pub const ALL: [Self; 4] = [Self::Accepted, Self::LowOverlap, Self::Undetermined, Self::Ambiguous];
 
-    /// `accepted`, `low_overlap`, `undetermined` or `ambiguous`.
+    /// The verdict's name: `accepted`, `low_overlap`, `undetermined` or `ambiguous`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Accepted => "accepted",
@@ -35,31 +35,32 @@ impl Verdict {
     }
 }
 
-/// Where a scan was taken, and how it fits the map there.
+/// Result of an alignment: where a scan was taken, and how it fits the map there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alignment {
-    /// The pose found.
+    /// The pose that was found, map_from_sensor.
     pub map_from_sensor: Pose,
     /// Whether to believe it.
     pub verdict: Verdict,
-    /// Why, in a sentence with the figures.
+    /// Reason for the verdict, a sentence with the figures.
     pub reason: String,
     /// Fraction of all points in occupied voxels by the exact set, level by level, finest first.
     pub level_overlaps: Vec<f64>,
     /// Fraction of a volumetric sample of the points that lie on the map's surfaces.
     pub inliers: f64,
-    /// How closely they do, 0 to 1: the mean robust weight, where a point off every surface counts 0.
+    /// Mean robust weight of the sample's points, 0 to 1; a point off every surface counts 0.
     pub fitness: f64,
-    /// What the map's surfaces say of the pose.
+    /// Information that the map's surfaces give about the pose.
     pub information: PoseInformation,
-    /// Directions of the pose that they leave open.
+    /// Directions of the pose that the map's surfaces leave open, the least certain first.
     pub undetermined: Vec<Direction>,
-    /// How far the refinement moved the end of the ascent, meters; turns count by the scan's root mean square range.
+    /// Distance that the refinement moved the end of the ascent, meters; rotations count by the scan's root mean square
+    /// range.
     pub refined_by_m: f64,
-    /// Steps that moved the pose, over all stages.
+    /// Number of steps that moved the pose, over all stages.
     pub iterations: u32,
-    /// Look-ups made, one a point and candidate pose; their expected number of false positives is what "the
-    /// filter is ample" is about (paper IV-B).
+    /// Number of look-ups, one for each point and candidate pose. Times the false positive rate it is the expected
+    /// number of wrong answers, which is below one where the filter is ample (paper IV-B).
     pub lookups: u64,
 }
 
@@ -89,7 +90,8 @@ impl Alignment {
             || degrees > multi_start.motion_above_deg
     }
 
-    /// Ambiguous where it would be accepted and lies farther from the guess than was searched.
+    /// Changes the verdict from accepted to ambiguous where the pose lies farther from the guess than other poses were
+    /// looked for.
     pub(super) fn within_max_correction(
         self,
         guess: &Pose,
@@ -119,7 +121,7 @@ impl Alignment {
 #[derive(Debug)]
 pub(super) struct Fit {
     pub(super) map_from_sensor: Pose,
-    /// How far the refinement moved the pose, meters; turns count by the points' range.
+    /// Distance that the refinement moved the pose, meters; rotations count by the points' range.
     pub(super) refined_by_m: f64,
     pub(super) level_overlaps: Vec<f64>,
     pub(super) surfaces: SurfaceFit,
@@ -128,7 +130,8 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// The verdict on it: enough overlap, held in every direction, and found where the ascent had led.
+    /// Turns the fit into an alignment with a verdict: accepted with enough overlap, determined in every direction, and
+    /// where the ascent had led.
     pub(super) fn judged(self, map: &MultiResolutionMap, settings: &AlignmentSettings) -> Alignment {
         let resolution_m = map.lattice().resolution_m(0);
         let (overlap, overlap_min) = (self.level_overlaps[0], settings.overlap_min);
@@ -166,7 +169,7 @@ impl Fit {
 }
 
 impl Alignment {
-    /// An alignment that nobody had to find: the caller's word, or the first scan of a map.
+    /// An alignment at a pose that was not searched for: the caller's word, or the first scan of a map.
     pub fn trusted(map_from_sensor: Pose, levels: u32, points: &[Point]) -> Self {
         Self {
             map_from_sensor,

@@ -7,7 +7,7 @@ use crate::align::Method;
 use crate::mapping::Guess;
 use crate::scan::{PointFilter, PointFilterError};
 
-/// How scans are aligned.
+/// Options of the alignment.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct AlignmentOptions {
     /// How to align: the ascent on overlap and a refinement on the points' Gaussians (refined), or the ascent alone as in
@@ -16,7 +16,7 @@ pub(super) struct AlignmentOptions {
     method: Option<Method>,
 }
 
-/// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one before.
+/// Guess of a scan's pose: the last accepted pose, or one as far on as that is from the pose before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(super) enum GuessName {
     #[default]
@@ -39,7 +39,7 @@ impl AlignmentOptions {
     }
 }
 
-/// Which points of scans count.
+/// Options that filter the points of scans.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct PointOptions {
     /// Skip points nearer to the sensor than this

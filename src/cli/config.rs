@@ -1,4 +1,4 @@
-//! `mrol config`: the settings that count.
+//! `mrol config`: prints the effective settings.
 
 use clap::Subcommand;
 

@@ -1,4 +1,4 @@
-//! `mrol delete`: take voxels out of a map.
+//! `mrol delete`: deletes voxels from a map.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -17,14 +17,14 @@ use crate::service::{Deletion, DeletionAnswer, DeletionTarget};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
-  mrol delete --map office --box \"0 0 0 2.5 2.5 2\"              what was there before the wall came down
+  mrol delete --map office --box \"0 0 0 2.5 2.5 2\"              all voxels in a box
   mrol delete --map office --sphere \"1.5 2 0.8 0.4\"
   mrol delete --map office --point 1.0,2.5,0.3 --level 2        a coarse voxel with all it contains
   mrol delete --map office --points gone.ply
 
-A box or sphere takes the voxels whose centers lie inside. Voxels that are not there are no error.";
+A box or sphere deletes the voxels whose centers are inside. Voxels that do not exist are no error.";
 
-/// Take voxels out of a map on a server
+/// Delete voxels from a map on a server
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Delete {
@@ -32,10 +32,10 @@ pub(super) struct Delete {
     map: MapOptions,
     #[command(flatten)]
     target: Target,
-    /// Level of the voxels that are meant: all their descendants go
+    /// Level of the voxels; all their descendants are deleted too
     #[arg(long, default_value_t = 0)]
     level: u32,
-    /// An id of this deletion: sent again, it is not done again
+    /// An id of this deletion, which makes it safe to send again
     #[arg(long, value_name = "ID", value_parser = parse::request_id)]
     request_id: Option<RequestId>,
 }

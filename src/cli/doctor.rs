@@ -1,4 +1,4 @@
-//! `mrol doctor`: look a data folder through.
+//! `mrol doctor`: checks a data folder.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -19,12 +19,12 @@ EXAMPLES:
   mrol doctor mrol-data --set-aside office         get a map with a damaged journal to start again
 
 No server may use the folder meanwhile. Every snapshot and every record of the journals is read, the journal is
-replayed from the oldest snapshot, and the map compared with each snapshot on the way. The exit code is 1 where
+replayed from the oldest snapshot, and the map is compared with each snapshot on the way. The exit code is 1 where
 something is wrong.
 
---set-aside keeps what can be read before the damage and moves the rest to files named .damaged: nothing is deleted,
-and what is lost to the map is said. Those files stay, and are told, until you remove them; damaged snapshots, which a
-server sets aside by itself, go with the snapshots of their age.";
+--set-aside keeps what can be read before the damage and moves the rest to files named .damaged. Nothing is deleted,
+and the command prints what the map loses. Those files stay, and are reported, until you remove them. Damaged snapshots,
+which a server sets aside by itself, are removed together with the snapshots of their age.";
 
 /// Check a data folder, file by file, while no server uses it
 #[derive(Debug, clap::Args)]
@@ -33,7 +33,7 @@ pub(super) struct Doctor {
     /// The data folder of a server
     #[arg(value_name = "DATA_DIR")]
     data_dir: PathBuf,
-    /// Take the damaged end of this map's journal out of the way
+    /// Set aside the damaged end of this map's journal, so that the map can be opened
     #[arg(long, value_name = "MAP", value_parser = parse::map_name)]
     set_aside: Option<MapName>,
 }

@@ -1,4 +1,4 @@
-//! Why a command failed, and with which exit code.
+//! Errors of a command, and their exit codes.
 
 use std::fmt::{self, Display};
 use std::io::{self, ErrorKind, Write};
@@ -13,11 +13,13 @@ use crate::store::StoreError;
 /// A command that did not succeed.
 #[derive(Debug)]
 pub(super) enum CliError {
-    /// The command line makes no sense: exit code 2.
+    /// The command line is not valid: exit code 2.
     Usage(String),
-    /// The command could not be done: exit code 1.
+    /// The command failed: exit code 1.
     Failed(String),
-    /// Nobody reads the output any more (`mrol ... | head`): no failure, and nothing to say.
+    /// Every scan was answered, and at least one was not accepted: exit code 3.
+    NotAccepted(String),
+    /// Standard output was closed (`mrol ... | head`): no failure, and nothing to report.
     OutputClosed,
 }
 
@@ -30,12 +32,20 @@ impl CliError {
         Self::Failed(message.to_string())
     }
 
-    /// A file could not be written.
+    /// `refused` of `scans` scans were answered with a verdict other than `accepted`; success where none was.
+    pub(super) fn unless_accepted(refused: usize, scans: usize) -> Result<(), Self> {
+        match refused {
+            0 => Ok(()),
+            _ => Err(Self::NotAccepted(format!("{refused} of {scans} scans not accepted"))),
+        }
+    }
+
+    /// The error of a file that cannot be written.
     pub(super) fn writing(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| Self::Failed(format!("{}: cannot be written: {error}", path.display()))
     }
 
-    /// Standard output could not be written.
+    /// The error of standard output that cannot be written.
     pub(super) fn printing(error: io::Error) -> Self {
         match error.kind() {
             ErrorKind::BrokenPipe => Self::OutputClosed,
@@ -43,11 +53,12 @@ impl CliError {
         }
     }
 
-    /// Says it on standard error; the process's exit code.
+    /// Writes the error to standard error and returns the exit code of the process.
     pub(super) fn report(self) -> ExitCode {
         let code = match self {
             Self::Usage(_) => 2,
             Self::Failed(_) => 1,
+            Self::NotAccepted(_) => 3,
             Self::OutputClosed => return ExitCode::SUCCESS,
         };
         // Where standard error is closed too, the exit code says it all.
@@ -59,7 +70,7 @@ impl CliError {
 impl Display for CliError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message) | Self::Failed(message) => f.write_str(message),
+            Self::Usage(message) | Self::Failed(message) | Self::NotAccepted(message) => f.write_str(message),
             Self::OutputClosed => f.write_str("nobody reads the output any more"),
         }
     }

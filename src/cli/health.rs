@@ -1,4 +1,4 @@
-//! `mrol health`: does a server serve?
+//! `mrol health`: asks whether a server is ready.
 
 use std::fmt::{self, Display};
 use std::time::Duration;
@@ -28,7 +28,7 @@ pub(super) struct Health {
     server: ServerOptions,
 }
 
-/// How long the answer may take.
+/// Longest time to wait for the answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Serialize)]

@@ -1,4 +1,4 @@
-//! `mrol insert`: scans into a map of a server.
+//! `mrol insert`: sends scans to a map of a server.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -36,7 +36,8 @@ EXAMPLES:
   mrol insert scans/ --map office --json | jq .verdict
 
 Each scan is aligned to the map from the robot's last accepted pose; the first from --guess. The first scan of
-an empty map goes in at its guess, or at the origin. A scan that does not align is reported, and left out.";
+an empty map goes in at its guess, or at the origin. A scan that does not align is reported, and left out; the
+other scans are sent all the same, and the exit code is then 3. It is 1 where scans were not answered.";
 
 /// Send scans to a map on a server, which aligns and adds them
 #[derive(Debug, clap::Args)]
@@ -47,7 +48,7 @@ pub(super) struct Insert {
     scans: Vec<PathBuf>,
     #[command(flatten)]
     map: MapOptions,
-    /// Who sends them
+    /// Name of the robot that sends the scans
     #[arg(long, value_name = "NAME", default_value = "mrol", value_parser = parse::robot_name)]
     robot: RobotName,
     /// Where the first scan was taken: "x y z qx qy qz qw"
@@ -59,8 +60,7 @@ pub(super) struct Insert {
     /// Add scans where they were found even if their verdict is not accepted
     #[arg(long)]
     force: bool,
-    /// Where each next scan is thought to have been taken: at the last accepted pose, or as far on as that is from the
-    /// one before it
+    /// Guess of every scan but the first: the last accepted pose, or one as far on as that is from the pose before
     #[arg(long, value_enum, value_name = "GUESS", default_value_t)]
     next_guess: GuessName,
     #[command(flatten)]
@@ -70,7 +70,7 @@ pub(super) struct Insert {
     /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
     #[arg(long, value_name = "FILE", conflicts_with = "guess")]
     truth: Option<PathBuf>,
-    /// Number the scans from here on: sent again, they are not added twice
+    /// Number the scans from N on, so that a scan that is sent again is not added twice
     #[arg(long, value_name = "N")]
     first_scan_id: Option<u64>,
     /// Make the map first
@@ -109,13 +109,17 @@ impl Insert {
             move || plan.send(&files, &sender)
         });
         let output = output.with_bar(files.len());
-        let answered = self.print_answers(&client, scans, &files, &output).await?;
+        let Answers { answered, failed, refused } =
+            self.print_answers(&client, scans, &files, &output).await?;
         reader.await.map_err(CliError::failed)??;
-        match answered == files.len() {
-            true => Ok(()),
-            false => {
-                Err(CliError::failed(format!("the server answered {answered} of {} scans", files.len())))
-            }
+        if answered != files.len() {
+            return Err(CliError::failed(format!("the server answered {answered} of {} scans", files.len())));
+        }
+        match failed {
+            0 => CliError::unless_accepted(refused, answered),
+            _ => Err(CliError::failed(format!(
+                "{failed} of {answered} scans failed; the others were answered"
+            ))),
         }
     }
 
@@ -130,41 +134,49 @@ impl Insert {
         (self.guess.map_or(Guess::Last, Guess::Pose), self.at_guess)
     }
 
-    /// Prints a line for each scan; the number of them.
+    /// Prints a line for each answer of the server, and counts the answers.
     async fn print_answers(
         &self,
         client: &Client,
         scans: mpsc::Receiver<ScanRequest>,
         files: &[PathBuf],
         output: &Output,
-    ) -> Result<usize, CliError> {
+    ) -> Result<Answers, CliError> {
         let width = name_width(files);
         let mut answers = client.insert_scans(&self.map.name, ReceiverStream::new(scans)).await?;
-        let (mut answered, mut failed) = (0, 0);
+        let mut counted = Answers::default();
         while let Some(answer) = answers.next().await {
-            let name = files.get(answered).map(|file| name_of(file)).unwrap_or_default();
-            if answered == 0 && answer.is_ok() {
+            let name = files.get(counted.answered).map(|file| name_of(file)).unwrap_or_default();
+            if counted.answered == 0 && answer.is_ok() {
                 output.say(ScanLine::head(width))?;
             }
             match answer {
-                Ok(answer) => output.print(&ScanLine::of(name, &answer, width))?,
+                Ok(answer) => {
+                    output.print(&ScanLine::of(name, &answer, width))?;
+                    counted.refused += usize::from(!answer.accepted);
+                }
                 Err(error @ ClientError::Refused { .. }) if !concerns_all(&error) => {
                     output.print(&FailedLine { scan: name, error: error.to_string() })?;
-                    failed += 1;
+                    counted.failed += 1;
                 }
                 Err(error) => return Err(not_inserted(&name, &error)),
             }
             output.step();
-            answered += 1;
+            counted.answered += 1;
         }
         output.clear_bar();
-        match failed {
-            0 => Ok(answered),
-            _ => Err(CliError::failed(format!(
-                "{failed} of {answered} scans failed; the others were answered"
-            ))),
-        }
+        Ok(counted)
     }
+}
+/// Numbers of scans that the server answered.
+#[derive(Default)]
+struct Answers {
+    /// All of them.
+    answered: usize,
+    /// Those that failed, and have no verdict.
+    failed: usize,
+    /// Those that are not in the map because their verdict is not `accepted`.
+    refused: usize,
 }
 
 /// True of a failure that all scans after it would share.
@@ -184,16 +196,16 @@ fn not_inserted(name: &str, error: &ClientError) -> CliError {
     CliError::failed(format!("{name}: {error}{advice}"))
 }
 
-/// How the scans of files are sent.
+/// How the scans of the files are sent.
 struct Plan {
     robot: RobotName,
     /// Guess of the first scan, and whether to take it as it is.
     first: (Guess, bool),
-    /// Where each scan goes, if that is known.
+    /// Poses of the scans, map_from_sensor, if they are known.
     poses: Option<Vec<Pose>>,
     /// Number of the first scan, if they are numbered.
     ids: Option<u64>,
-    /// How the others begin.
+    /// Guess of the other scans.
     next: Guess,
     method: Option<Method>,
     filter: PointFilter,
@@ -201,7 +213,7 @@ struct Plan {
 }
 
 impl Plan {
-    /// Reads the files one by one, until nobody takes the scans any more.
+    /// Reads the files one by one and sends them, until the receiver is closed.
     fn send(&self, files: &[PathBuf], sender: &mpsc::Sender<ScanRequest>) -> Result<(), CliError> {
         for (k, file) in files.iter().enumerate() {
             let (guess, at_guess) = self.guess(k);

@@ -1,4 +1,4 @@
-//! `mrol key`: keys for callers.
+//! `mrol key`: manages the keys of callers.
 
 mod change;
 mod list;
@@ -21,19 +21,22 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol key new --name planner --scope read --file keys.toml
   mrol key new --name r1 --scope insert --maps hall,office --robots r1 --expires 2027-01-31 --file keys.toml
-  mrol key list --file keys.toml                 every key: scope, maps, robots and end; secrets are kept nowhere
-  mrol key rotate --name r1 --file keys.toml     another secret; the former one counts for 24 hours more
-  mrol key revoke --name r1 --file keys.toml     what was begun with it ends
-  mrol serve --keys-file keys.toml               asks for keys, and reads the file again when it changes
-  MROL_KEY=mrol_... mrol maps list               shows one; or --key-file FILE, --key SECRET
+  mrol key list --file keys.toml                 every key: scope, maps, robots and expiry; secrets are not stored
+  mrol key rotate --name r1 --file keys.toml     a new secret; the former one is valid for 24 more hours
+  mrol key revoke --name r1 --file keys.toml     its streams and requests end
+  mrol serve --keys-file keys.toml               needs keys, and reads the file again when it changes
+  MROL_KEY=mrol_... mrol maps list               uses a key; or --key-file FILE, --key SECRET
 
-read: everything that changes nothing, downloads of whole maps and metrics among it. insert: scans as well, and undo of
-those of its robots. write: deletions and undo of anything as well. admin: makes, restores and deletes maps as well. Without
---maps and --robots a key is for all of them.
+Scopes, each with all rights of the one before:
+  read     everything that changes nothing, including downloads of whole maps and metrics
+  insert   scans of the key's robots, and undo of those
+  write    deletions, and undo of any scan
+  admin    create, restore and delete maps
+Without --maps and --robots a key is valid for all of them.
 
-The secret is printed once, on the first line, and kept nowhere: the file holds its hash. A file that is not there is made;
-it is changed as a whole and by one command at a time, and comments in it stay. A server that runs reads it again by
-itself. Without --file, `mrol key new` changes nothing: behind the secret it prints the entry to put into a file.";
+The secret is printed once, on the first line, and not stored: the file holds its hash. The file is created if it does
+not exist; it is replaced atomically, by one command at a time, and its comments are kept. A running server reads it
+again by itself. Without --file, `mrol key new` changes no file, and prints the entry to put into one after the secret.";
 
 /// Make, list, rotate and revoke the keys of callers of the server
 #[derive(Debug, clap::Args)]
@@ -47,41 +50,41 @@ pub(super) struct Keys {
 enum Action {
     /// Make a key, and print its secret
     New(NewKey),
-    /// Print what each key is for, and until when
+    /// List the keys: scope, maps, robots and expiry
     List(list::ListKeys),
-    /// Take a key out of its file
+    /// Remove a key from its file
     Revoke(change::RevokeKey),
-    /// Give a key another secret, and print that
+    /// Replace the secret of a key, and print the new one
     Rotate(change::RotateKey),
 }
 
 #[derive(Debug, clap::Args)]
 struct NewKey {
-    /// Who it is for: 1 to 64 of [A-Za-z0-9_.-]; the log and metrics call its holder so
+    /// Name of the key's holder: 1 to 64 of [A-Za-z0-9_.-]; the log and metrics show it
     #[arg(long, value_parser = name)]
     name: KeyName,
-    /// What it is for
+    /// What the key allows
     #[arg(long, value_enum)]
     scope: ScopeName,
-    /// The maps that it is for, separated by commas [default: every map]
+    /// The maps that the key is valid for, separated by commas [default: every map]
     #[arg(long, value_name = "MAPS", value_delimiter = ',', value_parser = parse::map_name)]
     maps: Option<Vec<MapName>>,
-    /// The robots whose scans it sends and undoes, separated by commas [default: every robot]
+    /// The robots whose scans the key may send and undo, separated by commas [default: every robot]
     #[arg(long, value_name = "ROBOTS", value_delimiter = ',', value_parser = parse::robot_name)]
     robots: Option<Vec<RobotName>>,
-    /// When it ends: 2027-01-31T12:00:00Z, or 2027-01-31 for the first moment of that day, UTC [default: never]
+    /// When the key expires: 2027-01-31T12:00:00Z, or 2027-01-31 for the first moment of that day, UTC [default: never]
     #[arg(long, value_name = "TIME", value_parser = expiry)]
     expires: Option<Expiry>,
-    /// Requests a second of its holder [default: limits.caller_requests_per_s_max of the server]
+    /// Most requests a second with the key [default: limits.caller_requests_per_s_max of the server]
     #[arg(long, value_name = "N")]
     requests_per_s_max: Option<NonZeroU32>,
-    /// As many may come at once, where they are limited to some a second [default: 100]
+    /// Most requests in a burst, where requests a second are limited [default: 100]
     #[arg(long, value_name = "N", requires = "requests_per_s_max")]
     burst_max: Option<NonZeroU32>,
-    /// Requests of its holder in work at a time [default: limits.caller_requests_at_once_max of the server]
+    /// Most requests with the key in work at a time [default: limits.caller_requests_at_once_max of the server]
     #[arg(long, value_name = "N")]
     requests_at_once_max: Option<NonZeroU32>,
-    /// The file of keys to add it to, made where it is not there [default: the entry is printed for you to add]
+    /// The file of keys to add it to, created if it does not exist [default: the entry is printed for you to add]
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
 }
@@ -94,7 +97,7 @@ enum ScopeName {
     Admin,
 }
 
-/// A key that was made.
+/// A new key, to be printed.
 #[derive(Serialize)]
 struct Made {
     name: String,

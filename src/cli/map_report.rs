@@ -1,4 +1,4 @@
-//! What is printed of a map: the same object as over HTTP, or a table.
+//! Output of a map's description: the same object as over HTTP, or a table.
 
 use std::fmt::{self, Display};
 
@@ -78,17 +78,17 @@ fn write_level(f: &mut fmt::Formatter<'_>, level: &JsonLevel) -> fmt::Result {
     )
 }
 
-/// `1,234,567`.
+/// Formats a count: `1,234,567`.
 pub(super) fn count(n: usize) -> String {
     HumanCount(n as u64).to_string()
 }
 
-/// `1.23 MiB`.
+/// Formats a size: `1.23 MiB`.
 pub(super) fn bytes(n: usize) -> String {
     BinaryBytes(n as u64).to_string()
 }
 
-/// `2.10 %`.
+/// Formats a share: `2.10 %`.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.2} %", share * 100.0)
 }

@@ -33,12 +33,12 @@ pub(super) struct Maps {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List all maps, those that could not be opened with the reason and what helps
+    /// List all maps; those that could not be opened with the reason and the remedy
     List {
         #[command(flatten)]
         server: ServerOptions,
     },
-    /// Make a map; the same settings again are fine
+    /// Make a map; no error if a map with these settings exists
     Create {
         #[command(flatten)]
         map: Named,
@@ -76,7 +76,7 @@ pub(super) struct NewMapOptions {
     rest: OptionalSettings,
 }
 
-/// What the server has defaults for.
+/// Settings that the server has defaults for.
 #[derive(Debug, clap::Args)]
 pub(super) struct OptionalSettings {
     /// Number of levels, each twice as coarse as the one before: 1 to 12 [default: 6]
@@ -91,7 +91,7 @@ pub(super) struct OptionalSettings {
 }
 
 impl OptionalSettings {
-    /// True when one is given.
+    /// True when at least one setting is given.
     pub(super) fn is_any(&self) -> bool {
         self.levels.is_some() || self.filter_hashes.is_some() || self.filter_bits_per_key.is_some()
     }

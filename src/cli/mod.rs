@@ -2,7 +2,7 @@
 //!
 //! Results go to standard output, a line each, as text or (`--json`) as JSON objects; everything else goes to
 //! standard error. The exit code is 0 when all went well, 1 when something failed, 2 for a command line that
-//! makes no sense.
+//! makes no sense, and 3 when a scan was answered and not accepted (`insert` and `localize`).
 
 mod alignment_options;
 mod config;
@@ -49,7 +49,13 @@ EXAMPLES:
   mrol query --map office --point 1.0,2.5,0.3
   mrol map scans/ --resolution 0.05 --out office.mrol      no daemon needed
 
-`mrol COMMAND --help` explains a command, with examples.";
+`mrol COMMAND --help` explains a command, with examples.
+
+EXIT CODES:
+  0  success
+  1  the command failed
+  2  the command line is wrong
+  3  insert, localize: at least one scan was answered and not accepted";
 
 /// A networked multi-resolution voxel map: robots send scans, planners ask about points
 #[derive(Debug, Parser)]
@@ -82,7 +88,7 @@ enum Command {
     Config(config::Settings),
 }
 
-/// Does what the process was called for, and says how that went.
+/// Runs the command line of this process and returns its exit code.
 pub fn run() -> ExitCode {
     let CommandLine { json, command } = match CommandLine::try_parse() {
         Ok(parsed) => parsed,

@@ -1,4 +1,4 @@
-//! What a command prints.
+//! Output of commands.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::error::CliError;
 
-/// Where results go: lines of text, or of JSON, on standard output; a bar below them on a terminal.
+/// Output of a command: results as lines of text or JSON on standard output, with a progress bar on standard error if
+/// that is a terminal.
 #[derive(Debug, Clone)]
 pub(super) struct Output {
     json: bool,
@@ -20,12 +21,12 @@ impl Output {
         Self { json, bar: ProgressBar::hidden() }
     }
 
-    /// This output, with a bar of `steps` scans on standard error, if that is a terminal.
+    /// Adds a progress bar of `steps` scans.
     pub(super) fn with_bar(self, steps: usize) -> Self {
         self.with_bar_of(steps, "scans")
     }
 
-    /// This output, with a bar of `steps` of what is counted.
+    /// Adds a progress bar of `steps` items that are called `counted`.
     pub(super) fn with_bar_of(self, steps: usize, counted: &str) -> Self {
         let bar = ProgressBar::new(steps as u64);
         let template = format!("{{bar:40}} {{pos}}/{{len}} {counted}, {{elapsed}} gone, {{eta}} to go");
@@ -35,7 +36,7 @@ impl Output {
         Self { bar, ..self }
     }
 
-    /// This output, with a line on standard error that says what goes on, if that is a terminal.
+    /// Adds a spinner with a message.
     pub(super) fn with_spinner(self) -> Self {
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
@@ -44,45 +45,45 @@ impl Output {
         Self { bar, ..self }
     }
 
-    /// Says what goes on now.
+    /// Sets the spinner's message.
     pub(super) fn tell(&self, message: String) {
         self.bar.set_message(message);
         self.bar.tick();
     }
 
-    /// One step of the bar is done.
+    /// Advances the bar by one step.
     pub(super) fn step(&self) {
         self.bar.inc(1);
     }
 
-    /// The bar has done its duty.
+    /// Removes the bar.
     pub(super) fn clear_bar(&self) {
         self.bar.finish_and_clear();
     }
 
-    /// True when programs read the output.
+    /// True when results are printed as JSON.
     pub(super) fn is_json(&self) -> bool {
         self.json
     }
 
-    /// Prints a result: its object for programs, its text for people.
+    /// Prints a result: as an object for programs, as text for people.
     pub(super) fn print(&self, result: &(impl Serialize + Display)) -> Result<(), CliError> {
         if self.json { self.object(result) } else { self.line(result) }
     }
 
-    /// Prints something that only people want to read.
+    /// Prints a line of text that is left out of JSON output.
     pub(super) fn say(&self, text: impl Display) -> Result<(), CliError> {
         if self.json { Ok(()) } else { self.line(text) }
     }
 
-    /// Says something beside the results, on standard error.
+    /// Prints a note on standard error.
     pub(super) fn note(&self, text: impl Display) {
         self.bar.suspend(|| {
             let _ = writeln!(io::stderr(), "note: {text}");
         });
     }
 
-    /// Prints an object for programs.
+    /// Prints a result as a JSON object.
     pub(super) fn object(&self, result: &impl Serialize) -> Result<(), CliError> {
         self.line(serde_json::to_string(result).map_err(CliError::failed)?)
     }

@@ -1,4 +1,4 @@
-//! Values of options: poses, points, regions, names.
+//! Parsers for values of options: poses, points, regions, names.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
@@ -7,69 +7,69 @@ use crate::geometry::{self, Point, Pose};
 use crate::map::{MapName, Region, RequestId, RobotName};
 use crate::util::Keyword;
 
-/// An option's value by its word; `--help` lists the words.
+/// A parser for keywords; `--help` lists them.
 pub(super) fn keyword<T: Keyword>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(T::ALL.iter().map(|value| value.as_str()))
         .map(|word| T::from_word(&word).expect("one of the words"))
 }
 
-/// "x y z qx qy qz qw", meters and a unit quaternion.
+/// Parses a pose "x y z qx qy qz qw": meters, and a unit quaternion.
 pub(super) fn pose(text: &str) -> Result<Pose, String> {
     let [x, y, z, qx, qy, qz, qw] = numbers(text, "x y z qx qy qz qw")?;
     geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|error| error.to_string())
 }
 
-/// "x,y,z", meters.
+/// Parses a point "x,y,z", meters.
 pub(super) fn point(text: &str) -> Result<Point, String> {
     let [x, y, z] = numbers(text, "x,y,z")?;
     Ok(Point::from(nalgebra::Point3::new(x, y, z)))
 }
 
-/// "x y z x y z": smallest and largest corner, meters.
+/// Parses a box "x y z x y z": smallest and largest corner, meters.
 pub(super) fn cuboid(text: &str) -> Result<Region, String> {
     let (min_m, max_m) = corners(text)?;
     Region::cuboid(min_m, max_m).map_err(|error| error.to_string())
 }
 
-/// "x y z x y z": two corners, meters.
+/// Parses two corners "x y z x y z", meters.
 pub(super) fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
     Ok(([x0, y0, z0], [x1, y1, z1]))
 }
 
-/// "x y z x y z": smallest and largest corner of where a sensor may be, meters.
+/// Parses the box of a search "x y z x y z": smallest and largest corner, meters.
 pub(super) fn search_box(text: &str) -> Result<SearchBox, String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
     SearchBox::new([x0, y0, z0], [x1, y1, z1]).map_err(|error| error.to_string())
 }
 
-/// "x,y,z".
+/// Parses a vector "x,y,z".
 pub(super) fn vector(text: &str) -> Result<[f64; 3], String> {
     numbers(text, "x,y,z")
 }
 
-/// "x y z r": center and radius, meters.
+/// Parses a sphere "x y z r": center and radius, meters.
 pub(super) fn ball(text: &str) -> Result<Region, String> {
     let [x, y, z, radius_m] = numbers(text, "x y z r")?;
     Region::ball([x, y, z], radius_m).map_err(|error| error.to_string())
 }
 
-/// A map's name.
+/// Parses the name of a map.
 pub(super) fn map_name(text: &str) -> Result<MapName, String> {
     MapName::new(text).map_err(|error| error.to_string())
 }
 
-/// A robot's name.
+/// Parses the name of a robot.
 pub(super) fn robot_name(text: &str) -> Result<RobotName, String> {
     RobotName::new(text).map_err(|error| error.to_string())
 }
 
-/// A caller's own id of a change.
+/// Parses a request id.
 pub(super) fn request_id(text: &str) -> Result<RequestId, String> {
     RequestId::new(text).map_err(|error| error.to_string())
 }
 
-/// `N` numbers, divided by spaces or commas.
+/// Parses `N` numbers, separated by spaces or commas.
 fn numbers<const N: usize>(text: &str, form: &str) -> Result<[f64; N], String> {
     let words = text.split([' ', ',']).filter(|word| !word.is_empty());
     let number =

@@ -1,4 +1,4 @@
-//! `mrol query`: which points are in occupied voxels?
+//! `mrol query`: asks which points are in occupied voxels.
 
 use std::fmt::{self, Display};
 use std::fs;
@@ -17,7 +17,7 @@ use crate::map::Lookup;
 use crate::scan::read_points;
 use crate::service::{MapVersion, PointAnswer, PointQuery};
 
-/// Points of one message. A multiple of 8, so that the bitmaps of messages follow each other without a gap.
+/// Number of points of one message: a multiple of 8, so that the bitmaps of messages can be concatenated.
 const BATCH_POINTS: usize = 1_000_000;
 
 const EXAMPLES: &str = "\
@@ -44,7 +44,7 @@ pub(super) struct Query {
     /// Level to ask: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
-    /// What decides: the exact set, or the Bloom filter alone, which may say "occupied" of a free voxel
+    /// The look-up: the exact set, or the Bloom filter alone, which may call a free voxel occupied
     #[arg(long, value_parser = parse::keyword::<Lookup>(), default_value = "exact")]
     lookup: Lookup,
     /// Where the points' frame lies in the map: "x y z qx qy qz qw" [default: the map's own frame]
@@ -71,7 +71,7 @@ impl Query {
         points.iter().enumerate().try_for_each(|(i, point)| output.print(&answer.of_point(i, *point)))
     }
 
-    /// Asks about all points, in batches on one stream.
+    /// Queries all points, in batches on one stream.
     async fn ask(&self, points: &[Point]) -> Result<Answer, CliError> {
         let batches: Vec<_> = points.chunks(BATCH_POINTS).map(|points| self.query(points)).collect();
         let client = self.map.server.connect().await?;
@@ -101,7 +101,7 @@ impl Query {
     }
 }
 
-/// The points of a file, of which there must be one.
+/// Reads the points of a file, which must have at least one.
 pub(super) fn points_of(path: &Path) -> Result<Vec<Point>, CliError> {
     let points = read_points(path)?;
     if points.is_empty() {

@@ -1,4 +1,4 @@
-//! Which server, which map there, and with which rights.
+//! Options of commands that call a server: address, map and credentials.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::map::MapName;
 use super::error::CliError;
 use super::parse;
 
-/// What these options stand under in a command's help.
+/// Heading of these options in a command's help.
 const HEADING: &str = "Access";
 
 #[derive(Debug, clap::Args)]
@@ -21,27 +21,28 @@ pub(super) struct ServerOptions {
     credentials: CredentialOptions,
 }
 
-/// What is shown to a server that asks for it, and who is taken for one.
+/// Options of the credentials: what is shown to a server, and which server is trusted.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct CredentialOptions {
-    /// The secret of a key. Other users of this machine see options: better the variable, or a file
+    /// The secret of a key. Other users of this machine can see options: prefer the variable or a file
     #[arg(long, help_heading = HEADING, env = "MROL_KEY", value_name = "SECRET", hide_env_values = true)]
     key: Option<Hidden>,
     /// A file with the secret of a key
     #[arg(long, help_heading = HEADING, env = "MROL_KEY_FILE", value_name = "FILE", conflicts_with = "key")]
     key_file: Option<PathBuf>,
-    /// Certificates (PEM) of who may sign the server's [default: whom this system trusts]
+    /// Certificates (PEM) of the authorities that may sign the server's certificate [default: those that this system
+    /// trusts]
     #[arg(long, help_heading = HEADING, env = "MROL_CA", value_name = "FILE")]
     ca: Option<PathBuf>,
     /// The certificate (PEM) to show to a server that asks for one
     #[arg(long, help_heading = HEADING, env = "MROL_CLIENT_CERT", value_name = "FILE", requires = "client_key")]
     client_cert: Option<PathBuf>,
-    /// Its private key (PEM)
+    /// The private key (PEM) of the client's certificate
     #[arg(long, help_heading = HEADING, env = "MROL_CLIENT_KEY", value_name = "FILE", requires = "client_cert")]
     client_key: Option<PathBuf>,
 }
 
-/// What no output of ours repeats.
+/// A text that is never printed.
 #[derive(Clone)]
 struct Hidden(String);
 
@@ -52,7 +53,7 @@ impl ServerOptions {
 }
 
 impl CredentialOptions {
-    /// What the options name.
+    /// Reads the credentials that the options name.
     pub(super) fn read(&self) -> Result<Credentials, CliError> {
         let mut credentials = Credentials::default();
         if let Some(secret) = self.secret()? {
@@ -67,7 +68,7 @@ impl CredentialOptions {
         Ok(credentials)
     }
 
-    /// The secret to show, where there is one.
+    /// The secret of the key, if one is given.
     pub(super) fn secret(&self) -> Result<Option<String>, CliError> {
         match (&self.key, &self.key_file) {
             (Some(Hidden(secret)), _) => Ok(Some(secret.clone())),

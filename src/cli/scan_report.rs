@@ -1,4 +1,4 @@
-//! How scans are printed.
+//! Columns of printed scans.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! `mrol serve`: the daemon.
+//! `mrol serve`: runs the daemon.
 
 use std::fmt::{self, Display};
 use std::net::SocketAddr;
@@ -28,11 +28,13 @@ EXAMPLES:
   mrol serve --grpc-socket /run/mrol/grpc.sock   clients on this machine connect to unix:/run/mrol/grpc.sock
   MROL_LIMITS__MAPS_MAX=4 mrol serve             any setting as a variable: limits.maps_max, with two underscores
 
-The first line on standard output says where it serves; the log goes to standard error. Settings come from
-defaults, then the file of --config (TOML), then MROL_... variables, then the options here. SIGTERM and Ctrl-C
-end it: requests in flight are finished, maps are saved, within a bound even where a disk hangs; the second time at
-once. SIGHUP reads keys and certificates again. Whatever ends it, nothing acknowledged is lost, as long as there is a data
-folder and --durability is \"always\": with an interval, a loss of power takes what came in the last one.";
+The first line on standard output has the addresses; the log goes to standard error. Settings come from defaults,
+then the file of --config (TOML), then MROL_... variables, then the options here.
+
+SIGTERM and Ctrl-C end the server: requests in flight are finished and maps are saved, within a time limit even where
+a disk hangs. The second signal ends it at once. SIGHUP reads keys and certificates again. With a data folder and
+--durability \"always\", no acknowledged change is lost, however the server ends. With an interval, a loss of power
+takes the changes of the last interval.";
 
 /// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
 #[derive(Debug, clap::Args)]
@@ -42,7 +44,7 @@ pub(super) struct Serve {
     options: ServeOptions,
 }
 
-/// What the settings of the daemon are made from.
+/// Options that override settings of the daemon.
 #[derive(Debug, clap::Args)]
 pub(super) struct ServeOptions {
     /// Settings to start from, TOML; variables and options override them
@@ -75,7 +77,7 @@ pub(super) struct ServeOptions {
     /// Certificates (PEM) of who may sign those of clients, which then need one to connect
     #[arg(long, value_name = "FILE")]
     tls_client_ca: Option<PathBuf>,
-    /// Listen off this machine's loopback without keys: whoever reaches the ports may do everything. Not with --keys-file
+    /// Listen beyond loopback without keys: whoever reaches the ports may do everything. Not with --keys-file
     #[arg(long)]
     insecure_open: bool,
     /// How log lines are written: text or json [default: text]
@@ -94,10 +96,11 @@ pub(super) struct ServeOptions {
     /// Seconds after which a map that changed is written to a snapshot [default: 300]
     #[arg(long, value_name = "SECONDS")]
     snapshot_interval_s: Option<u64>,
-    /// Seconds that requests in flight may take when it ends, and saving the maps after them [default: 10]
+    /// Seconds for requests in flight when the server ends, and for saving the maps after them [default: 10]
     #[arg(long, value_name = "SECONDS")]
     drain_seconds: Option<u64>,
-    /// Seconds that it serves on when it is told to end, while /readyz says that it is not ready [default: 0]
+    /// Seconds that the server goes on serving when it is told to end, while /readyz says that it is not ready
+    /// [default: 0]
     #[arg(long, value_name = "SECONDS")]
     drain_delay_s: Option<u64>,
 }
@@ -110,8 +113,8 @@ impl Serve {
             tracing::warn!(variable, "is no setting and of no use here");
         }
         let (hangups, mut shutdown) = (Hangups::hear(), pin!(shutdown_signal()));
-        // The signal is heard from now on. The thread that opens maps is left behind then, wherever it is: nothing was
-        // acknowledged, and what it writes is whole or not there.
+        // Signals are handled from here on. The thread that opens maps is then abandoned at any point: nothing was
+        // acknowledged, and files are written as a whole or not at all.
         let server = tokio::select! {
             biased;
             () = &mut shutdown => {
@@ -122,7 +125,7 @@ impl Serve {
         };
         tokio::spawn(hangups.reload(server.files()));
         match output.print(&Serving::of(&server)) {
-            // A daemon need not have a reader.
+            // The daemon also runs without a reader of its output.
             Ok(()) | Err(CliError::OutputClosed) => {}
             Err(error) => return Err(error),
         }
@@ -137,7 +140,7 @@ impl Serve {
 }
 
 impl ServeOptions {
-    /// The settings that count.
+    /// The effective settings.
     pub(super) fn config(&self) -> Result<Config, ConfigError> {
         let options = json!({
             "data_dir": self.data_dir,
@@ -158,12 +161,12 @@ impl ServeOptions {
     }
 }
 
-/// Where a server is to be found.
+/// Addresses of a running server.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Serving {
     pub(super) http: SocketAddr,
     pub(super) grpc: SocketAddr,
-    /// Whether a client has to speak TLS.
+    /// True when clients must use TLS.
     pub(super) tls: bool,
 }
 

@@ -1,4 +1,4 @@
-//! `mrol snapshot` and `mrol restore`: maps out of a server, and into one.
+//! `mrol snapshot` and `mrol restore`: backs up the maps of a server, and restores them.
 
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
@@ -22,9 +22,9 @@ EXAMPLES:
   mrol snapshot backup/ --server http://robot-7:7334
 
 Each file is a map at one revision, with its trajectory and the ids that it has accepted; the server goes on working.
-A file is checked before it takes the place of an older one. Where the server has maps that it could not open, the others
-are saved, and the command fails and names them. A key of scope read is enough. `mrol restore` brings maps back, on this server or
-another; so does putting a file into DATA_DIR/maps of a server that is down.";
+A file is checked before it replaces an older one. Where the server has maps that it could not open, the command saves
+the others, names the missing ones, and fails. A key of scope read is enough. `mrol restore` restores maps, on this
+server or another; so does putting a file into DATA_DIR/maps of a server that is down.";
 
 const RESTORE_EXAMPLES: &str = "\
 EXAMPLES:
@@ -41,14 +41,14 @@ those before it stay restored.
 A map has the name of its file, without .mrol, unless --map says otherwise. It takes a key of scope admin, with --replace one
 for all maps.";
 
-/// Back maps of a running server up, as files
+/// Back up maps of a running server, as files
 #[derive(Debug, clap::Args)]
 #[command(name = "snapshot", after_help = SNAPSHOT_EXAMPLES)]
 pub(super) struct TakeSnapshots {
-    /// Where the files go; made where it is not there
+    /// Folder for the files; created if it does not exist
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Every map of the server, as where no map is named
+    /// Every map of the server: the default where no map is named
     #[arg(long, conflicts_with = "maps")]
     all: bool,
     /// Only this map; may be repeated
@@ -58,7 +58,7 @@ pub(super) struct TakeSnapshots {
     server: ServerOptions,
 }
 
-/// Bring maps back to a running server, from files
+/// Restore maps to a running server, from files
 #[derive(Debug, clap::Args)]
 #[command(after_help = RESTORE_EXAMPLES)]
 pub(super) struct Restore {
@@ -68,7 +68,7 @@ pub(super) struct Restore {
     /// Another name for the map than its file's; with one file only
     #[arg(long = "map", value_name = "NAME", value_parser = parse::map_name)]
     map: Option<MapName>,
-    /// Take the place of the map of that name, if there is one, which is kept as NAME-replaced-REVISION until it is deleted
+    /// Replace the map of that name, if there is one; it is kept as NAME-replaced-REVISION until it is deleted
     #[arg(long)]
     replace: bool,
     #[command(flatten)]
@@ -96,7 +96,7 @@ impl TakeSnapshots {
     }
 }
 
-/// Says that maps are missing that were asked for with all others: a backup without them is none of the server.
+/// Reports the maps that are missing in a backup of all maps.
 fn not_all(unavailable: &[UnavailableMap]) -> Result<(), CliError> {
     if unavailable.is_empty() {
         return Ok(());
@@ -145,7 +145,7 @@ impl Restore {
     }
 }
 
-/// The name that a file's name says.
+/// The name of the map, from the name of its file.
 fn name_of(path: &Path) -> Result<MapName, CliError> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     MapName::new(&stem)

@@ -1,15 +1,15 @@
-//! What a series of errors comes to.
+//! Statistics of a series of errors.
 
 use serde::Serialize;
 
-/// Largest, middle and mean of a series of errors.
+/// Maximum, median and root mean square of a series of errors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Statistics {
-    /// The largest.
+    /// The maximum.
     pub(super) max: f64,
-    /// The middle one.
+    /// The median.
     pub(super) median: f64,
-    /// The root of the mean square.
+    /// The root mean square.
     pub(super) rms: f64,
 }
 

@@ -1,4 +1,4 @@
-//! `mrol undo`: take scans out of a map again.
+//! `mrol undo`: removes scans from a map.
 
 use std::fmt::{self, Display};
 
@@ -18,16 +18,16 @@ EXAMPLES:
   mrol undo --map office --revision 41                   one scan, by the revision that it made
   mrol undo --map office --robot r1 --since 40           all that r1 sent after revision 40
 
-Of the voxels that the scans touched, those go that no other scan holds; everything else stays as it is. The scans'
-numbers may be used again. How far back this reaches, `mrol maps show` tells.";
+Removes the voxels that only these scans touched; everything else stays as it is. The scans' numbers may be used
+again. `mrol maps show` prints how far back undo can go.";
 
-/// Take scans out of a map on a server again
+/// Remove scans from a map on a server
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Undo {
     #[command(flatten)]
     map: MapOptions,
-    /// Who sent the scans
+    /// Name of the robot that sent the scans
     #[arg(long, value_name = "NAME", value_parser = parse::robot_name)]
     robot: Option<RobotName>,
     /// The robot's own number of the scan
@@ -39,7 +39,7 @@ pub(super) struct Undo {
     /// The scan that made this revision
     #[arg(long, value_name = "N", conflicts_with_all = ["robot", "scan_id", "since"])]
     revision: Option<u64>,
-    /// An id of this undo: sent again, it is not done again
+    /// An id of this undo, which makes it safe to send again
     #[arg(long, value_name = "ID", value_parser = parse::request_id)]
     request_id: Option<RequestId>,
 }
@@ -51,7 +51,9 @@ impl Undo {
             (Some(robot), None, Some(revision), _) => UndoTarget::RobotSince { robot, revision },
             (None, .., Some(revision)) => UndoTarget::Revision(revision),
             _ => {
-                return Err(CliError::usage("which scans? --robot with --scan-id or --since, or --revision"));
+                return Err(CliError::usage(
+                    "no scan is named: give --robot with --scan-id or --since, or --revision",
+                ));
             }
         };
         let undo = service::Undo { target, request_id: self.request_id };

@@ -1,4 +1,4 @@
-//! What stands in the place of the lab's commands in a program that was built for the daemon alone.
+//! Placeholders of the lab's commands in a program that was built for the daemon alone.
 
 use clap::Subcommand;
 
@@ -9,7 +9,7 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   cargo run --release -- demo      from the sources: a program with all commands";
 
-/// The commands that are not there, by their names.
+/// The commands that this program does not have.
 #[derive(Debug, Subcommand)]
 pub(super) enum Lab {
     /// Not in this program, which was built without the lab: see the daemon at work
@@ -20,7 +20,7 @@ pub(super) enum Lab {
     Experiment(Ignored),
 }
 
-/// Whatever stands behind the name of a command that is not there.
+/// Any arguments of a command that this program does not have.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Ignored {

@@ -1,4 +1,4 @@
-//! The answers of a stream.
+//! Answer streams of the client.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};

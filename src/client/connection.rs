@@ -1,4 +1,4 @@
-//! The connection: where to, with which limits and windows.
+//! The client's connection: address, limits and flow-control windows.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,7 +19,7 @@ use pb::occupancy_client::OccupancyClient;
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A channel to a server, what is shown to it, and its address for error messages.
+/// A channel to a server, with the key that calls show and the address that error messages name.
 #[derive(Debug, Clone)]
 pub(super) struct Connection {
     channel: Channel,
@@ -27,7 +27,7 @@ pub(super) struct Connection {
     url: Arc<str>,
 }
 
-/// A channel whose calls show the key.
+/// A channel that adds the key to every call.
 type Keyed = InterceptedService<Channel, ShownKey>;
 
 impl Connection {
@@ -65,7 +65,7 @@ impl Connection {
         ClientError::of(&self.url, status)
     }
 
-    /// The messages of a stream, in domain types.
+    /// Converts the messages of a stream to domain types.
     pub(super) fn answers<M, T>(
         &self,
         answers: Result<Response<Streaming<M>>, Status>,
@@ -83,7 +83,7 @@ impl Connection {
     }
 }
 
-/// Where `url` leads, in full, and how to go there.
+/// Parses `url`; returns it in full, with the endpoint to connect to.
 fn endpoint(url: &str, credentials: &Credentials) -> Result<(String, Endpoint), ClientError> {
     let refused = |problem: &str| ClientError::Url { url: url.to_owned(), problem: problem.to_owned() };
     let full = match url.starts_with("unix:") || url.contains("://") {

@@ -1,4 +1,4 @@
-//! How a client shows who it is, and whom it takes for the server.
+//! Credentials of a client: its key, its certificate, and the certificates that it trusts.
 
 use std::fmt;
 
@@ -9,8 +9,8 @@ use tonic::{Request, Status};
 
 use super::ClientError;
 
-/// What a client shows to a server that asks for it, and whom it trusts. Nothing, and whom the system trusts, by
-/// default.
+/// Credentials of a client: the key and certificate that it shows, and the certificate authorities that it trusts. By
+/// default it shows nothing and trusts those of the system.
 #[derive(Clone, Default)]
 pub struct Credentials {
     key: ShownKey,
@@ -18,15 +18,15 @@ pub struct Credentials {
     identity: Option<Identity>,
 }
 
-/// The key that goes with every call.
+/// The key that is sent with every call.
 #[derive(Clone, Default)]
 pub(super) struct ShownKey(Option<MetadataValue<Ascii>>);
 
 impl Credentials {
-    /// Shows the secret of a key with every call.
+    /// Sends the secret of a key with every call.
     ///
     /// # Errors
-    /// When it has characters that no secret has. The error does not repeat it.
+    /// When the secret has characters that no secret has. The error does not repeat the secret.
     pub fn with_key(self, secret: &str) -> Result<Self, ClientError> {
         let problem = "the key must be the secret that `mrol key new` prints, in one line";
         let secret = secret.trim();
@@ -40,16 +40,16 @@ impl Credentials {
         Ok(Self { key: ShownKey(Some(key)), ..self })
     }
 
-    /// Trusts servers whose certificate is signed by one of these (PEM), and no others.
+    /// Trusts only servers whose certificate is signed by one of these (PEM).
     ///
     /// # Errors
-    /// When there is no certificate in it.
+    /// When `pem` holds no certificate.
     pub fn with_server_ca(self, pem: &[u8]) -> Result<Self, ClientError> {
         has_block(pem, "CERTIFICATE", "the server's authority")?;
         Ok(Self { server_ca: Some(Certificate::from_pem(pem)), ..self })
     }
 
-    /// Shows a certificate (PEM, its signers after it), as mutual TLS asks for, and proves it with its private key.
+    /// Shows a client certificate (PEM, followed by its signers) with its private key, as mutual TLS needs.
     ///
     /// # Errors
     /// When there is no certificate or no key.
@@ -63,7 +63,7 @@ impl Credentials {
         self.key.clone()
     }
 
-    /// True where nothing of this makes sense without TLS.
+    /// True when the credentials are of use only with TLS.
     pub(super) fn want_tls(&self) -> bool {
         self.server_ca.is_some() || self.identity.is_some()
     }
@@ -96,7 +96,7 @@ impl fmt::Debug for ShownKey {
 }
 
 impl fmt::Debug for Credentials {
-    /// Says what there is, and nothing of it.
+    /// Says which credentials are set, without their values.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Credentials")
             .field("key", &self.key.0.is_some())
@@ -106,7 +106,8 @@ impl fmt::Debug for Credentials {
     }
 }
 
-/// What holds no such block of PEM would be taken for a store of nothing, and the cause told much later.
+/// Checks that `pem` has a block of the kind `block`. Without one it would count as an empty store, and the error would
+/// come much later.
 fn has_block(pem: &[u8], block: &str, what: &str) -> Result<(), ClientError> {
     let text = String::from_utf8_lossy(pem);
     let begins = text.lines().any(|line| line.starts_with("-----BEGIN ") && line.contains(block));

@@ -1,4 +1,4 @@
-//! Why a call failed.
+//! Errors of the client.
 
 use std::error::Error;
 
@@ -7,27 +7,27 @@ use tonic::{Code, Status};
 use crate::service::ServiceError;
 use crate::wire::pb;
 
-/// The metadata that holds the server's word for programs.
+/// Metadata key of the failure's reason.
 const REASON: &str = "mrol-reason";
 
-/// How TLS begins to say what is wrong with a server's certificate.
+/// Start of the TLS error for a server's certificate.
 const BAD_CERTIFICATE: &str = "invalid peer certificate";
 
 /// A call that failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClientError {
-    /// The address is none.
+    /// The address is not valid.
     #[error("{url:?} is no server address: {problem}; it looks like http://127.0.0.1:7334")]
     Url {
-        /// As it was given.
+        /// The address as it was given.
         url: String,
         /// What is wrong with it.
         problem: String,
     },
-    /// What the client would show, or trust, cannot be used.
+    /// The credentials cannot be used.
     #[error("{0}")]
     Credentials(String),
-    /// Nobody answers at the address.
+    /// No server answers at the address.
     #[error("cannot connect to {url}: {cause}; is `mrol serve` running there?")]
     Unreachable {
         /// The server's address.
@@ -35,7 +35,7 @@ pub enum ClientError {
         /// What the system said.
         cause: String,
     },
-    /// Somebody answers at the address with a certificate that nobody trusted has signed for it.
+    /// The server's certificate is not signed by a trusted authority.
     #[error("{url} cannot be trusted: {cause}; `--ca` names the authority that signs its certificate")]
     Untrusted {
         /// The server's address.
@@ -51,7 +51,7 @@ pub enum ClientError {
         /// What the system said.
         cause: String,
     },
-    /// Somebody answers at the address who is no gRPC server of ours, or one of another version.
+    /// The peer is not a gRPC server of this project, or has another version.
     #[error("{url} does not answer as mrol's gRPC does: {cause}; is that the gRPC address of `mrol serve`?")]
     Foreign {
         /// The address.
@@ -62,20 +62,20 @@ pub enum ClientError {
     /// The server refused.
     #[error("{message}{}", in_brackets(reason.as_deref()))]
     Refused {
-        /// What kind of failure.
+        /// gRPC status code of the failure.
         code: Code,
-        /// The word for programs: `guess_required`, `map_not_found`, ...
+        /// Reason of the failure, for programs: `guess_required`, `map_not_found`, ...
         reason: Option<String>,
-        /// The sentence for people.
+        /// Message of the failure, for people.
         message: String,
     },
-    /// The server's answer makes no sense to this version of the client.
+    /// The server's answer is not valid for this version of the client.
     #[error("the server's answer cannot be understood: {0}")]
     Answer(ServiceError),
 }
 
 impl ClientError {
-    /// The server's word for programs, where it said one.
+    /// Reason that the server gave for programs, if it gave one.
     pub fn reason(&self) -> Option<&str> {
         match self {
             Self::Refused { reason, .. } => reason.as_deref(),
@@ -90,7 +90,7 @@ impl ClientError {
         }
     }
 
-    /// What a status says: those that came over the wire have no source, those made on this side have.
+    /// Converts a status to an error. A status from the wire has no source; one that was made in this process has.
     pub(super) fn of(url: &str, status: &Status) -> Self {
         if let Some(cause) = status.source() {
             return Self::Lost { url: url.to_owned(), cause: root_cause(cause) };

@@ -63,31 +63,32 @@ impl Client {
     /// `https://robot-7:7334`; or `unix:/run/mrol/grpc.sock`, a socket on the same machine.
     ///
     /// # Errors
-    /// When the address is none, or nobody listens there.
+    /// When the address is not valid, or no server answers there.
     pub async fn connect(url: &str) -> Result<Self, ClientError> {
         Self::connect_with(url, &Credentials::default()).await
     }
 
-    /// [`Client::connect`], with a key to show or a certificate to trust or show.
+    /// Connects as [`Client::connect`] does, with credentials: a key or certificate to show, authorities to trust.
     ///
     /// # Errors
-    /// When the address is none, nobody listens there, or the two do not trust each other.
+    /// When the address is not valid, no server answers there, or the two do not trust each other.
     pub async fn connect_with(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
         Ok(Self { connection: Connection::open(url, credentials).await?, timeout: None })
     }
 
-    /// The connection itself, without the key: for what else the server speaks, as gRPC's health protocol.
+    /// The underlying channel, without the key: for other services of the server, such as gRPC's health protocol.
     pub fn channel(&self) -> Channel {
         self.connection.channel()
     }
 
-    /// This connection, with a deadline for every call that is not a stream: the server gives up at it, and waits for a
-    /// `min_revision` until it.
+    /// Sets a deadline for every call that is not a stream. The server gives up at the deadline, and waits for a
+    /// `min_revision` until then.
     pub fn with_timeout(self, timeout: Duration) -> Self {
         Self { timeout: Some(timeout), ..self }
     }
 
-    /// Makes a map; true when it was not there. The same settings again are fine.
+    /// Creates a map, and returns its description and whether it is new. A map of that name with the same settings is
+    /// no error.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -105,7 +106,7 @@ impl Client {
         self.domain(self.connection.maps().get_map(request).await)
     }
 
-    /// Describes all maps, by name, and says why some could not be opened and what helps.
+    /// Describes all maps, sorted by name; those that could not be opened with the reason and the remedy.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -114,7 +115,7 @@ impl Client {
         self.domain(self.connection.maps().list_maps(request).await)
     }
 
-    /// Takes a map out, in memory and on disk.
+    /// Deletes a map, in memory and on disk.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -124,7 +125,7 @@ impl Client {
         answer.map(|_| ()).map_err(|status| self.connection.failure(&status))
     }
 
-    /// A map as a map file, at one revision.
+    /// Returns the map as the bytes of a map file, at one revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -139,7 +140,7 @@ impl Client {
         Ok(file.freeze())
     }
 
-    /// Makes a map from a map file, under a uuid of its own.
+    /// Creates a map from a map file. The map gets a new uuid.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -147,8 +148,8 @@ impl Client {
         self.restore(map, file, false).await
     }
 
-    /// Restores a map in the place of the map of that name, if there is one, which is kept as `NAME-replaced-REVISION`
-    /// until it is deleted.
+    /// Restores a map under a name that may be in use. The map that was there is kept as `NAME-replaced-REVISION` until
+    /// it is deleted.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -161,7 +162,7 @@ impl Client {
         self.domain(self.connection.maps().restore_map(pieces).await)
     }
 
-    /// Says of each point whether its voxel is occupied, all at one revision.
+    /// Returns for each point whether its voxel is occupied, all at one revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -170,7 +171,7 @@ impl Client {
         self.domain(self.connection.occupancy().query_points(request).await)
     }
 
-    /// The occupied voxels of a level, in a region or everywhere, all at one revision.
+    /// Lists the occupied voxels of a level, in a region or everywhere, all at one revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -199,7 +200,7 @@ impl Client {
         self.domain(self.connection.mapping().insert_scan(request).await)
     }
 
-    /// Aligns a scan and says what [`Client::insert_scan`] would; changes nothing.
+    /// Aligns a scan and returns what [`Client::insert_scan`] would; changes nothing.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -208,7 +209,7 @@ impl Client {
         self.domain(self.connection.mapping().align_scan(request).await)
     }
 
-    /// Says where in the map a scan was taken, with no guess. A scan that fits nowhere is an answer, not an error.
+    /// Finds where in the map a scan was taken, without a guess. A scan that fits nowhere is an answer, not an error.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -221,7 +222,7 @@ impl Client {
         self.domain(self.connection.mapping().localize(request).await)
     }
 
-    /// Takes voxels out, with all their descendants.
+    /// Deletes voxels, with all their descendants.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -234,7 +235,7 @@ impl Client {
         self.domain(self.connection.mapping().delete_voxels(request).await)
     }
 
-    /// Takes scans out again; what other scans hold stays.
+    /// Removes scans from the map; voxels that other scans touched stay.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -243,7 +244,7 @@ impl Client {
         self.domain(self.connection.mapping().undo(request).await)
     }
 
-    /// The poses of the accepted scans, of one robot or of all, as many as there are, all at one revision.
+    /// Returns the poses of the accepted scans, of one robot or of all robots, all pages at one revision.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -262,7 +263,7 @@ impl Client {
         Ok(all)
     }
 
-    /// A page of the poses of the accepted scans; the answer says where the next one begins.
+    /// Returns one page of the poses of the accepted scans; the answer says where the next page begins.
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
@@ -292,7 +293,7 @@ impl Client {
     }
 }
 
-/// A listing has at least one message, so that its state is told.
+/// The error of a listing without a message; the first message tells the map's revision.
 fn missing_message(what: &str) -> ClientError {
     ClientError::Answer(ServiceError::new(Reason::MissingField, format!("the {what} has no message")))
 }

@@ -1,23 +1,23 @@
-//! What a caller says of a map to make; the server fills in the rest.
+//! Settings of a map to create.
 
 use crate::map::MapName;
 use crate::wire::pb;
 
-/// Settings of a map to make; what is none is the server's default.
+/// Settings of a map to create; the server's default where a field is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewMap {
     /// Side of a finest voxel, r_0, meters.
     pub resolution_m: f64,
     /// Number of levels.
     pub levels: Option<u32>,
-    /// Hash functions of the filters, k of eq. (1).
+    /// Number of hash functions of the filters, k of eq. (1).
     pub filter_hashes: Option<u32>,
-    /// Bits of the filters' planes a voxel, m / n of eq. (1).
+    /// Bits of the filters' planes for each voxel, m / n of eq. (1).
     pub filter_bits_per_key: Option<f64>,
 }
 
 impl NewMap {
-    /// A map of `resolution_m`, all else as the server sees fit.
+    /// Settings with the side of a finest voxel `resolution_m` (meters), and defaults for all else.
     pub fn of(resolution_m: f64) -> Self {
         Self { resolution_m, levels: None, filter_hashes: None, filter_bits_per_key: None }
     }

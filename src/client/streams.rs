@@ -1,4 +1,4 @@
-//! Many requests on one call, answered in order.
+//! Streams of requests on one call, answered in order.
 
 use tokio_stream::{Stream, StreamExt};
 
@@ -8,9 +8,10 @@ use crate::service::{PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceEr
 use crate::wire::pb;
 
 impl Client {
-    /// Inserts scans one after the other, an answer a scan: as [`Client::insert_scan`] without a round trip
-    /// between two. `scans` is read as fast as the server takes them. A scan that the server refuses is an error among
-    /// the answers, [`ClientError::Refused`], and the next answer is that of the next scan.
+    /// Inserts scans one after the other, with one answer for each: [`Client::insert_scan`] without a round trip
+    /// between two scans. `scans` is polled as fast as the server accepts scans. A scan that the
+    /// server refuses is an error among the answers, [`ClientError::Refused`], and the next answer is that of the
+    /// next scan.
     ///
     /// # Errors
     /// When the server cannot be reached.
@@ -26,8 +27,8 @@ impl Client {
         Ok(Answers::new(answers.map(|inserted| inserted?.0)))
     }
 
-    /// Asks batch after batch, an answer a batch: as [`Client::query_points`] without a round trip between two.
-    /// Each batch is answered at one revision of its own.
+    /// Queries batch after batch, with one answer for each: [`Client::query_points`] without a round trip between two
+    /// batches. Each batch is answered at one revision of its own.
     ///
     /// # Errors
     /// When the server cannot be reached; a refused request ends the answers.

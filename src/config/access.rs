@@ -1,4 +1,4 @@
-//! Who may do what.
+//! Section `access` of the settings.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -8,24 +8,26 @@ use serde::{Deserialize, Serialize};
 use super::ConfigError;
 use crate::access::is_host;
 
-/// Who may do what. Keys stand in a file of their own, so that settings can be shown to anybody.
+/// Settings of access: which keys are valid, and who needs none. Keys are in a file of their own, so that the settings
+/// can be shown to anybody.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AccessConfig {
-    /// The file of keys, which is read again when it changes; without one, whoever can connect may do everything.
+    /// Path of the file of keys, which is read again when it changes. Without it, whoever can connect may do
+    /// everything.
     pub keys_file: Option<PathBuf>,
-    /// Listen off this machine's loopback without keys all the same; not together with `keys_file`. false.
+    /// Allows listening beyond loopback without keys; not together with `keys_file`. False.
     pub open: bool,
-    /// Answer `/metrics` without a key. false.
+    /// Answers `/metrics` without a key. False.
     pub open_metrics: bool,
-    /// Names and addresses, without ports, that a server without keys answers to besides `localhost`, loopback
-    /// addresses and the address that was connected to; none.
+    /// Host names and addresses, without ports, that a server without keys accepts besides `localhost`, loopback
+    /// addresses and the address that was connected to. Empty.
     pub hosts: Vec<String>,
-    /// Days before a key expires from which on the log says so, once a day; 0 to 3650. 14.
+    /// Number of days before a key expires from which on the log warns of it once a day; 0 to 3650. 14.
     pub expiry_warning_days: u32,
 }
 
-/// Days before an expiry from which on it is warned of, at most.
+/// Most days before an expiry from which on it may be warned of.
 pub(super) const WARNING_DAYS_MAX: u32 = 3650;
 
 impl Default for AccessConfig {
@@ -35,7 +37,7 @@ impl Default for AccessConfig {
 }
 
 impl AccessConfig {
-    /// How long before a key expires it is warned of.
+    /// Time before a key expires from which on it is warned of.
     pub fn expiry_warning(&self) -> Duration {
         days(self.expiry_warning_days)
     }

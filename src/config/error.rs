@@ -1,68 +1,68 @@
-//! Why there is no configuration.
+//! Errors of the settings.
 
 use std::path::PathBuf;
 
 use crate::scan::PointFilterError;
 
-/// Why there is no configuration.
+/// Why the settings are not valid.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// A key that is none, or a value that does not fit; the message names both and where they stand.
+    /// An unknown setting or a value of the wrong type; the message names both and their source.
     #[error("{0}")]
     Value(Box<figment::Error>),
-    /// The file named on the command line is not there.
+    /// The settings file that the command line names does not exist.
     #[error("configuration file {} cannot be read", .0.display())]
     File(PathBuf),
-    /// A setting that has another name since an earlier version.
+    /// A setting that was renamed since an earlier version.
     #[error("{old} is called {new} now")]
     Renamed {
         /// The setting that was given.
         old: &'static str,
-        /// The setting's name of today.
+        /// The setting's present name.
         new: &'static str,
     },
-    /// A number out of its range.
+    /// A value out of its range.
     #[error("{key} must be {range}, got {value}")]
     Range {
         /// The setting.
         key: &'static str,
-        /// What it may be.
+        /// The range, as text.
         range: &'static str,
-        /// What it is.
+        /// The value that was given.
         value: String,
     },
-    /// A setting that another one needs.
+    /// A setting is missing that another one needs.
     #[error("{needed} is missing: {by} is of no use without it")]
     Missing {
-        /// The setting that is not there.
+        /// The missing setting.
         needed: &'static str,
-        /// The one that is.
+        /// The setting that needs it.
         by: &'static str,
     },
-    /// Two settings that mean opposite things.
+    /// Two settings contradict each other.
     #[error("{one} and {other} contradict each other: set one of them")]
     Contradiction {
-        /// The one.
+        /// One of the two settings.
         one: &'static str,
-        /// The setting that it contradicts.
+        /// The setting that contradicts it.
         other: &'static str,
     },
-    /// A variable that would be a setting if it were spelled otherwise.
+    /// A misspelled environment variable.
     #[error(
         "variable {name} is no setting: a section and its setting are joined by two underscores, {meant}"
     )]
     Variable {
-        /// As it is.
+        /// The variable as it was given.
         name: String,
-        /// As it must be.
+        /// The variable with the right spelling.
         meant: String,
     },
-    /// Numbers of a robot's table that make no filter.
+    /// The point filter of a robot is not valid.
     #[error("robots.{name}: {error}")]
     Robot {
-        /// The name of the table.
+        /// The name of the robot's table.
         name: String,
-        /// What is wrong.
+        /// What is wrong with the filter.
         error: PointFilterError,
     },
 }

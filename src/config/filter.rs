@@ -1,16 +1,16 @@
-//! The filter of maps whose makers do not say.
+//! Section `filter` of the settings: the filters of new maps whose requests do not say.
 
 use serde::{Deserialize, Serialize};
 
 use crate::bloom::FilterSettings;
 
-/// A counting Bloom filter.
+/// Settings of the counting Bloom filters of new maps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilterConfig {
-    /// Hash functions, k of eq. (1).
+    /// Number of hash functions, k of eq. (1).
     pub hashes: u32,
-    /// Bits of the plane a voxel, m / n of eq. (1).
+    /// Bits of the filter's plane for each voxel, m / n of eq. (1).
     pub bits_per_key: f64,
 }
 

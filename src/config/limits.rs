@@ -1,9 +1,9 @@
-//! Limits that leave the server able to work.
+//! Checks of the section `limits`. The limits themselves are [`Limits`].
 
 use super::ConfigError;
 use crate::service::Limits;
 
-/// Refuses numbers that would stop the server from working at all.
+/// Refuses limits that would keep the server from working at all.
 pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
     let range = |key, range, value: String| Err(ConfigError::Range { key, range, value });
     if limits.message_bytes_max == 0 {
@@ -55,7 +55,7 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
     check_marks(limits)
 }
 
-/// Refuses marks with nothing between them, and those that no system has.
+/// Refuses watermarks that are not in order or beyond any system.
 fn check_marks(limits: &Limits) -> Result<(), ConfigError> {
     let range = |key, range, value: u64| Err(ConfigError::Range { key, range, value: value.to_string() });
     for (key, mib) in [

@@ -1,16 +1,16 @@
-//! What is logged, and how.
+//! Section `log` of the settings.
 
 use serde::{Deserialize, Serialize};
 
 use crate::telemetry::LogFormat;
 
-/// The log.
+/// Settings of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LogConfig {
-    /// `text` or `json`.
+    /// Format of log lines: `text` or `json`.
     pub format: LogFormat,
-    /// A level, or a list of `target=level`. `info`.
+    /// Least level of log lines, or a list of `target=level`. `info`.
     pub level: String,
     /// Whether changes and refused keys are written to the log, whatever the level. True.
     pub audit: bool,

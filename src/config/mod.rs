@@ -48,7 +48,7 @@ const DRAIN_DELAY_MAX_S: u64 = 3600;
 pub struct Config {
     /// Where maps are kept across restarts; an empty path keeps them in memory only. `./mrol-data`.
     pub data_dir: PathBuf,
-    /// How maps are kept.
+    /// Settings of the store.
     pub store: StoreConfig,
     /// Seconds that requests in flight may take when the server goes down, and saving the maps after them. 10.
     pub drain_seconds: u64,
@@ -59,21 +59,21 @@ pub struct Config {
     pub http: ListenerConfig,
     /// The gRPC listener; 127.0.0.1:7334.
     pub grpc: ListenerConfig,
-    /// Who may do what.
+    /// Keys, and who needs none.
     pub access: AccessConfig,
-    /// How connections are secured.
+    /// Settings of TLS.
     pub tls: TlsConfig,
-    /// The log.
+    /// Settings of the log.
     pub log: LogConfig,
-    /// Threads for work that uses the CPU.
+    /// Numbers of threads for work that uses the CPU.
     pub threads: ThreadsConfig,
-    /// The filter of maps whose makers do not say.
+    /// Filter of new maps whose requests do not say.
     pub filter: FilterConfig,
-    /// How scans are aligned.
+    /// Settings of alignment.
     pub alignment: AlignmentConfig,
-    /// Which points of whose scans count: a table a robot, `"*"` for every other.
+    /// Point filters by robot name; `"*"` is that of every other robot.
     pub robots: BTreeMap<String, RobotConfig>,
-    /// Bounds on what callers may ask.
+    /// Limits of the server; each is named in the error of a request beyond it.
     pub limits: Limits,
 }
 
@@ -109,8 +109,7 @@ impl Config {
     /// nobody is known to set, [`unknown_variables`] lists.
     ///
     /// # Errors
-    /// For a key that is none, a value of the wrong kind or out of range, a file that is not there, or a variable that
-    /// is spelled wrong.
+    /// For an unknown setting, a value of the wrong type or out of range, a missing file, or a misspelled variable.
     pub fn load(file: Option<&Path>, overrides: impl Serialize) -> Result<Self, ConfigError> {
         variables::check(variables::of_environment())?;
         let mut figment = Figment::from(Serialized::defaults(Self::default()));
@@ -170,7 +169,7 @@ impl Config {
         Ok(self)
     }
 
-    /// What to open the service with.
+    /// The settings that the service is opened with.
     pub fn service_settings(&self) -> ServiceSettings {
         let FilterConfig { hashes, bits_per_key } = self.filter;
         ServiceSettings {
@@ -201,21 +200,21 @@ impl Config {
     }
 }
 
-/// Settings of earlier versions, and what they are called now.
+/// Renamed settings: former name, present name.
 const RENAMED: [(&str, &str); 3] = [
     ("filter.bits_per_voxel", "filter.bits_per_key"),
     ("limits.disk_free_back_mib", "limits.disk_free_resume_mib"),
     ("limits.memory_back_mib", "limits.memory_resume_mib"),
 ];
 
-/// The variables that mean this program; see [`Config::load`].
+/// The provider of the environment variables that are settings; see [`Config::load`].
 fn settings_of_environment() -> Env {
     Env::prefixed(variables::PREFIX)
         .filter(|key| key.as_str().contains("__") || variables::TOP.iter().any(|name| key == *name))
         .split("__")
 }
 
-/// The same object without its nulls, at any depth.
+/// Removes nulls from a JSON value, at any depth.
 fn without_nulls(value: serde_json::Value) -> serde_json::Value {
     match value {
         serde_json::Value::Object(fields) => {

@@ -1,4 +1,4 @@
-//! How scans are aligned, and which of their points count.
+//! Sections `alignment` and `robots` of the settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,23 +6,24 @@ use crate::align::Method;
 use crate::scan::PointFilter;
 use crate::wire::json::ByKeyword;
 
-/// How scans are aligned.
+/// Settings of alignment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AlignmentConfig {
-    /// How scans are aligned whose request does not say: `refined` or `overlap`. `refined`.
+    /// Method of alignment for requests that do not say: `refined` or `overlap`. `refined`.
     pub method: ByKeyword<Method>,
 }
 
-/// Which points of a robot's scans count; a request may say otherwise.
+/// Point filter of a robot's scans; a request may override each value.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotConfig {
-    /// Distance from the sensor, meters; nearer points are skipped.
+    /// Least range: points nearer to the sensor than this are skipped, meters.
     pub range_min_m: Option<f64>,
-    /// Distance from the sensor, meters; farther points are skipped.
+    /// Largest range: points farther from the sensor than this are skipped, meters.
     pub range_max_m: Option<f64>,
-    /// The robot's own body in the sensor frame, meters: smallest and largest corner.
+    /// Box of the robot's own body in the sensor frame, meters: smallest and largest corner. Points within it are
+    /// skipped.
     pub body_m: Option<[[f64; 3]; 2]>,
 }
 

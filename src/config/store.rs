@@ -1,4 +1,4 @@
-//! How maps are kept.
+//! Section `store` of the settings.
 
 use std::time::Duration;
 
@@ -8,30 +8,31 @@ use super::ConfigError;
 use crate::map::TrajectorySpacing;
 use crate::store::{Durability, StoreMode, StoreSettings};
 
-/// How maps are kept; see [`StoreSettings`].
+/// Settings of the store; see [`StoreSettings`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StoreConfig {
-    /// `always`: what is acknowledged is synced; or an interval (`200ms`, `1s`) at which it is. `always`.
+    /// When a change is acknowledged: `always`, once it is synced; or an interval (`200ms`, `1s`) at which the journal
+    /// is synced. `always`.
     #[serde(with = "as_text")]
     pub durability: Durability,
-    /// MiB of journal after which a map is written to a snapshot. 32.
+    /// Size of a map's journal, MiB, from which on a snapshot is written. 32.
     pub snapshot_journal_mib: u64,
-    /// Seconds after which a map that changed is written to a snapshot. 300.
+    /// Seconds after which a snapshot of a changed map is written. 300.
     pub snapshot_interval_s: u64,
-    /// Revisions behind the newest within which a scan can be undone, at least. 20,000.
+    /// Least number of revisions within which a scan can be undone. 20,000.
     pub undo_revisions: u64,
-    /// Bytes of snapshots and journal that are kept for undo alone, at most. 4 GiB.
+    /// Most bytes of snapshots and journal that are kept for undo alone. 4 GiB.
     pub undo_bytes_max: u64,
     /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
     /// execution. `0700`.
     #[serde(with = "as_text")]
     pub mode: StoreMode,
-    /// See [`TrajectorySpacing::distance_m`]. 0.5.
+    /// Distance between kept poses, meters; see [`TrajectorySpacing::distance_m`]. 0.5.
     pub trajectory_spacing_m: f64,
-    /// See [`TrajectorySpacing::rotation_deg`]. 10.
+    /// Rotation between kept poses, degrees; see [`TrajectorySpacing::rotation_deg`]. 10.
     pub trajectory_spacing_deg: f64,
-    /// See [`TrajectorySpacing::seconds`]. 60.
+    /// Time between kept poses, seconds; see [`TrajectorySpacing::seconds`]. 60.
     pub trajectory_spacing_s: f64,
 }
 
@@ -53,7 +54,7 @@ impl Default for StoreConfig {
 }
 
 impl StoreConfig {
-    /// Refuses a spacing that is none.
+    /// Refuses a spacing that is negative or not finite.
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         for (key, value, range, least, most) in [
             ("store.trajectory_spacing_m", self.trajectory_spacing_m, "0.01 to 1000", 0.01, 1000.0),
@@ -85,7 +86,7 @@ impl StoreConfig {
     }
 }
 
-/// Values that are written as text.
+/// Serialization of values by their text form.
 mod as_text {
     use std::fmt::Display;
     use std::str::FromStr;

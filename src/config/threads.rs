@@ -1,18 +1,18 @@
-//! Threads for work that uses the CPU.
+//! Section `threads` of the settings.
 
 use serde::{Deserialize, Serialize};
 
-/// Threads for work that uses the CPU; 0 = one a core.
+/// Numbers of threads for work that uses the CPU; 0 means one for each core.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ThreadsConfig {
-    /// For queries, listings and descriptions.
+    /// Threads for queries, listings and descriptions.
     pub query: usize,
-    /// For insertions, with their alignments, and deletions.
+    /// Threads for insertions, with their alignments, and deletions.
     pub mapping: usize,
-    /// For alignments of scans that are not inserted, which a key for reading may ask for. 1.
+    /// Threads for alignments of scans that are not inserted, which a key of scope read may ask for. 1.
     pub alignment: usize,
-    /// For searches with no guess, which take seconds and much memory each. 1.
+    /// Threads for localization without a guess, which takes seconds and much memory each time. 1.
     pub localization: usize,
 }
 

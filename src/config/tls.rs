@@ -1,21 +1,23 @@
-//! Certificates.
+//! Section `tls` of the settings.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// How TCP connections of both protocols are secured; in the clear without a certificate. Unix sockets never are.
+/// Settings of TLS for the TCP connections of both protocols. Without a certificate they are not encrypted. Unix
+/// sockets never are.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TlsConfig {
-    /// The server's certificate, PEM, its signers after it.
+    /// Path of the server's certificate, PEM, followed by its signers.
     pub certificate: Option<PathBuf>,
-    /// The certificate's private key, PEM.
+    /// Path of the certificate's private key, PEM.
     pub key: Option<PathBuf>,
-    /// Certificates, PEM, of who may sign those of clients: without one of theirs nobody may connect.
+    /// Path of the certificates, PEM, that sign those of clients. Where it is given, a client needs such a certificate
+    /// to connect.
     pub client_ca: Option<PathBuf>,
-    /// Days before a certificate expires from which on the log says so, once a day; 0 to 3650. 14.
+    /// Number of days before a certificate expires from which on the log warns of it once a day; 0 to 3650. 14.
     pub expiry_warning_days: u32,
 }
 
@@ -26,12 +28,12 @@ impl Default for TlsConfig {
 }
 
 impl TlsConfig {
-    /// How long before a certificate expires it is warned of.
+    /// Time before a certificate expires from which on it is warned of.
     pub fn expiry_warning(&self) -> Duration {
         super::access::days(self.expiry_warning_days)
     }
 
-    /// What lacks, as a setting, and the setting that needs it.
+    /// A missing setting and the setting that needs it, if there is one.
     pub(super) fn missing(&self) -> Option<(&'static str, &'static str)> {
         match (&self.certificate, &self.key, &self.client_ca) {
             (None, Some(_), _) => Some(("tls.certificate", "tls.key")),

@@ -1,32 +1,32 @@
-//! Environment variables: which are settings, which are somebody else's, and which were meant to be settings.
+//! Environment variables: which are settings, which belong to others, and which are misspelled settings.
 
 use serde_json::Value;
 
 use super::{Config, ConfigError};
 
-/// What a variable's name begins with; `__` stands between sections: `MROL_HTTP__LISTEN`.
+/// Prefix of the variables' names. `__` separates section and setting: `MROL_HTTP__LISTEN`.
 pub(super) const PREFIX: &str = "MROL_";
 
-/// Settings at the top, which need no `__`.
+/// Settings outside of any section, which need no `__`.
 pub(super) const TOP: [&str; 3] = ["data_dir", "drain_seconds", "drain_delay_s"];
 
-/// What the options of commands are read from, without [`PREFIX`]; a test of the command line compares.
+/// Variables that options of commands are read from, without [`PREFIX`]; a test compares them with the command line.
 pub(crate) const OF_COMMANDS: [&str; 7] =
     ["CONFIG", "SERVER", "KEY", "KEY_FILE", "CA", "CLIENT_CERT", "CLIENT_KEY"];
 
-/// What a variable is to the settings.
+/// What a variable means to the settings.
 #[derive(Debug, PartialEq, Eq)]
 enum Meaning {
-    /// A setting, or what figment refuses as none.
+    /// A setting, or a name that figment refuses.
     Setting,
-    /// Not for the settings.
+    /// No setting.
     Other,
-    /// The variable would be a setting if it were spelled so.
+    /// A misspelled setting; the payload is the right spelling.
     Misspelled(String),
     Unknown,
 }
 
-/// Refuses variables that would be settings with `__` in place of `_`.
+/// Refuses variables that have `_` where a setting has `__`.
 ///
 /// # Errors
 /// Names the variable and the right spelling.
@@ -40,7 +40,7 @@ pub(super) fn check(names: impl Iterator<Item = String>) -> Result<(), ConfigErr
     Ok(())
 }
 
-/// The variables that begin with `MROL_` and mean nothing to this program, sorted.
+/// Names of this process's variables that begin with `MROL_` and mean nothing to this program, sorted.
 pub fn unknown_variables() -> Vec<String> {
     let settings = spellings();
     let mut unknown: Vec<String> =
@@ -49,7 +49,7 @@ pub fn unknown_variables() -> Vec<String> {
     unknown
 }
 
-/// The names of this process's variables; a name that is no text is none of ours.
+/// Names of this process's variables; names that are not UTF-8 are left out.
 pub(super) fn of_environment() -> impl Iterator<Item = String> {
     std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())
 }
@@ -70,8 +70,9 @@ fn meaning(name: &str, settings: &[String]) -> Meaning {
     }
 }
 
-/// True of what Kubernetes, and links of containers before it, set for a service called mrol: `MROL_SERVICE_HOST`,
-/// `MROL_SERVICE_PORT`, `MROL_SERVICE_PORT_GRPC`, `MROL_PORT`, `MROL_PORT_7333_TCP`, `MROL_PORT_7333_TCP_ADDR`, ...
+/// True of variables that Kubernetes, and container links before it, set for a service called mrol:
+/// `MROL_SERVICE_HOST`, `MROL_SERVICE_PORT`, `MROL_SERVICE_PORT_GRPC`, `MROL_PORT`, `MROL_PORT_7333_TCP`,
+/// `MROL_PORT_7333_TCP_ADDR`, ...
 fn is_of_kubernetes(rest: &str) -> bool {
     let of_port = |rest: &str| {
         let mut parts = rest.splitn(3, '_');
@@ -85,7 +86,7 @@ fn is_of_kubernetes(rest: &str) -> bool {
         || rest.strip_prefix("PORT_").is_some_and(of_port)
 }
 
-/// Every setting within a section, as a variable spells it without [`PREFIX`].
+/// Names of all settings within sections, spelled as variables without [`PREFIX`].
 fn spellings() -> Vec<String> {
     let mut found = Vec::new();
     if let Ok(Value::Object(sections)) = serde_json::to_value(Config::default()) {

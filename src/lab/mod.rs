@@ -1,6 +1,6 @@
-//! Everything that simulates, measures or compares: what `mrol demo`, `bench` and `experiment` are made of.
+//! The lab: simulation, benchmarks and experiments, behind `mrol demo`, `mrol bench` and `mrol experiment`.
 //!
-//! Nothing of the daemon names it, and the image is built without it. In the order of a reading:
+//! The daemon does not use it, and the container image is built without it. In reading order:
 //!
 //! * [`simulate`]: buildings, sensors and tours through them; a small feature of its own, for tests and examples.
 //! * [`workload`]: what is put into a map, and what it is asked.
@@ -10,7 +10,8 @@
 //! * `fleet`: a server under the load of planners and robots.
 //! * [`report`]: results as tables and plots in files.
 //!
-//! What `measure` and `experiment` time runs in this process, without a network.
+//! What `measure` and `experiment` time runs in this process, without a network. Benchmarks of single kernels are in
+//! `benches/`.
 
 #[cfg(feature = "lab")]
 pub mod experiment;

@@ -1,4 +1,4 @@
-//! Why a scan cannot be mapped.
+//! Errors of mapping.
 
 use crate::map::RobotName;
 use crate::scan::PointFilterError;
@@ -9,42 +9,42 @@ pub enum MappingError {
     /// A point is not finite, and the caller asked that all are.
     #[error("strict: points[{index}] is not finite, and {count} points are not")]
     NotFinite {
-        /// The first such point.
+        /// Index of the first point that is not finite.
         index: usize,
-        /// How many points there are.
+        /// Number of points that are not finite.
         count: usize,
     },
     /// No point is finite.
     #[error("none of the scan's {points} points is finite: nothing but no-returns")]
     NoReturns {
-        /// The scan's points.
+        /// Number of points of the scan.
         points: usize,
     },
-    /// The filter makes no sense.
+    /// The point filter is not valid.
     #[error(transparent)]
     BadFilter(#[from] PointFilterError),
     /// The filter leaves no point.
     #[error("none of the scan's {points} points passes {filter} of robot {robot}")]
     AllFiltered {
-        /// The scan's points.
+        /// Number of points of the scan.
         points: usize,
         /// The filter, as text.
         filter: String,
-        /// Whose scan it is.
+        /// The robot whose scan it is.
         robot: RobotName,
     },
-    /// The guess is relative to a pose of the robot, and there is none.
+    /// The guess is relative to the robot's last accepted pose, and the robot has none in this map.
     #[error("guess required: robot {0} has no accepted scan in the map, which is not empty")]
     GuessRequired(RobotName),
-    /// No point has a voxel.
+    /// No point of the scan lies within the range of the map's coordinates.
     #[error("no point of the scan lies within the map's range of {min_m} to {end_m} m")]
     OutOfRange {
         /// The smallest coordinate of the map, meters.
         min_m: f64,
-        /// The end of its coordinates, meters.
+        /// The end of the map's coordinates (exclusive), meters.
         end_m: f64,
     },
-    /// The stop signal ended it: its caller has gone, or its time is up.
+    /// Mapping was stopped: the caller cancelled it, or its time is up.
     #[error("the mapping of the scan was stopped")]
     Stopped,
 }

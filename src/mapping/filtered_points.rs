@@ -1,4 +1,4 @@
-//! The points of a scan that show something.
+//! Filtering of a scan's points.
 
 use super::MappingError;
 use crate::geometry::Point;
@@ -20,7 +20,7 @@ impl FilteredPoints {
     /// it is left out, or an error where the scan is `strict`.
     ///
     /// # Errors
-    /// No point is left, one had to be left out of a strict scan, or the filter is none.
+    /// No point is left, a strict scan has a point that is not finite, or the filter is not valid.
     pub fn of(
         all: &[Point],
         filter: PointFilter,

@@ -1,8 +1,8 @@
-//! Which points of a scan count.
+//! Point filters: which points of a scan are used.
 
 use crate::geometry::Point;
 
-/// The points of a robot's scans that are of its surroundings: neither too near, nor too far, nor of itself.
+/// A filter for the points of a robot's scans: skips those that are too near, too far, or on the robot itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PointFilter {
     /// Distance from the sensor, meters; nearer points are skipped. None: no such limit.
@@ -13,22 +13,22 @@ pub struct PointFilter {
     pub body_m: Option<([f64; 3], [f64; 3])>,
 }
 
-/// Why numbers make no filter.
+/// Why a filter is not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PointFilterError {
-    /// A range that is no distance.
+    /// A range that is negative or not finite; the payload is the field and its value.
     #[error("{0} must be finite and not negative, got {1}")]
     Range(&'static str, f64),
-    /// Nothing would pass.
+    /// `range_min_m` is not below `range_max_m`, so that nothing would pass.
     #[error("range_min_m {0} must be below range_max_m {1}")]
     Empty(f64, f64),
-    /// A box without inside.
+    /// A box whose corners are not finite or not in order.
     #[error("body_m must have finite corners, the smaller first, got {0:?} and {1:?}")]
     Body([f64; 3], [f64; 3]),
 }
 
 impl PointFilter {
-    /// Checks the numbers.
+    /// Checks the filter's numbers, and returns the filter.
     ///
     /// # Errors
     /// Names what is out of range.
@@ -53,7 +53,7 @@ impl PointFilter {
         }
     }
 
-    /// This, and of `fallback` what it does not say.
+    /// This filter, with the values of `fallback` for what it leaves open.
     pub fn or(self, fallback: Self) -> Self {
         Self {
             range_min_m: self.range_min_m.or(fallback.range_min_m),
@@ -62,7 +62,7 @@ impl PointFilter {
         }
     }
 
-    /// True of a finite point (sensor frame) of the surroundings.
+    /// True when the filter keeps a finite point (sensor frame).
     pub fn keeps(&self, point: Point) -> bool {
         let point = point.to_f64().coords;
         let range_m = point.norm();

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::reader::{Problem, ReadError, lines, number, read_file};
 use crate::geometry::{Pose, pose, rotation_xyzw, translation_m};
 
-/// Numbers of a line: id, tx ty tz in meters, qx qy qz qw.
+/// Number of columns of a line: id, tx ty tz in meters, qx qy qz qw.
 const COLUMNS: usize = 8;
 
 /// The pose of one scan of a trajectory.
@@ -16,12 +16,12 @@ const COLUMNS: usize = 8;
 pub struct StampedPose {
     /// A time in seconds or an index: an f64 keeps microseconds of today's times and every index below 2^53.
     pub id: f64,
-    /// Where the sensor stood.
+    /// Pose of the sensor, map_from_sensor.
     pub map_from_sensor: Pose,
 }
 
 impl Display for StampedPose {
-    /// The pose's line: plain decimal numbers, each with the digits it takes to read the same f64 again.
+    /// Writes the pose's line: plain decimal numbers, each with the digits that give the same f64 when read.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.id)?;
         let [translation, rotation] =
@@ -39,15 +39,15 @@ pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ReadError> {
     parse_trajectory(path, &read_file(path)?)
 }
 
-/// The trajectory in a file's `bytes`, wherever they came from; `path` is what errors name.
+/// The poses in the `bytes` of a TUM file; errors name `path`.
 ///
 /// # Errors
-/// When a line is no pose, as there.
+/// When a line is not eight numbers of which the last seven are a pose.
 pub fn parse_trajectory(path: &Path, bytes: &[u8]) -> Result<Vec<StampedPose>, ReadError> {
     trajectory(bytes).map_err(|problem| problem.in_file(path))
 }
 
-/// Writes `poses` to `path` as a TUM file, numbers that are whole without a point.
+/// Writes `poses` to `path` as a TUM file; whole numbers have no decimal point.
 ///
 /// # Errors
 /// When the file cannot be written.

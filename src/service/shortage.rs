@@ -53,7 +53,7 @@ impl Display for Shortage {
             Self::Disk { free, low, back } => write!(
                 f,
                 "the disk of the data folder has {} MiB free: below limits.disk_free_low_mib, {}, changes are refused \
-                 until limits.disk_free_resume_mib, {}, are free again; make budget there, or delete a map",
+                 until limits.disk_free_resume_mib, {}, are free again; make room there, or delete a map",
                 mib(free),
                 mib(low),
                 mib(back)

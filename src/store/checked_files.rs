@@ -1,4 +1,4 @@
-//! A file system that checks, before every operation, that its caller may wait for a disk.
+//! A file system that checks, before each operation, that the calling thread may block on a disk.
 
 use std::io;
 use std::path::Path;
@@ -8,8 +8,8 @@ use super::{Appending, FileSystem};
 use crate::sync::before_file_operation;
 use crate::util::StopSignal;
 
-/// Another file system whose operations never start while the lock of a map's content is held, nor on a thread that polls
-/// async tasks; see [`crate::sync`].
+/// Wraps a file system so that operations never start while the lock of a map's content is held, nor on a thread that
+/// polls async tasks; see [`crate::sync`].
 #[derive(Debug)]
 pub(super) struct CheckedFiles(Arc<dyn FileSystem>);
 

@@ -1,4 +1,4 @@
-//! The folder where a server keeps its maps.
+//! The data folder, where a server keeps its maps.
 //!
 //! ```text
 //! DATA_DIR/lock                   held by the one process that uses the folder
@@ -41,20 +41,21 @@ use crate::util::StopSignal;
 const MAPS: &str = "maps";
 const LOCK_FILE: &str = "lock";
 
-/// The folder where a server keeps its maps. Only one process may hold it.
+/// The data folder, where a server keeps its maps. One process may hold it at a time.
 #[derive(Debug)]
 pub struct DataDir {
     files: Arc<dyn FileSystem>,
     maps: PathBuf,
     settings: StoreSettings,
-    /// Names of folders that are no map's any more, or never became one's, and may be there still: something failed.
+    /// Names of folders of maps that were deleted or never completed, which may still be there because removing them
+    /// failed.
     leftovers: Mutex<BTreeSet<String>>,
-    /// Locked as long as it is open.
+    /// Lock file, locked as long as it is open.
     _lock: Option<File>,
 }
 
 impl DataDir {
-    /// Takes the folder, and makes it where it is not there.
+    /// Opens the data folder, creates it where it does not exist, and locks it.
     ///
     /// # Errors
     /// When another process holds it or the system refuses.
@@ -70,7 +71,7 @@ impl DataDir {
         }
     }
 
-    /// [`DataDir::open`] on another file system, where nobody else is.
+    /// Opens the data folder on another file system, without a lock.
     ///
     /// # Errors
     /// When the file system refuses.
@@ -82,7 +83,7 @@ impl DataDir {
         Ok(Self { files, maps, settings, leftovers, _lock: None })
     }
 
-    /// The names of the maps kept here, in order, those that cannot be opened among them.
+    /// Names of the maps in the folder, sorted, including those that cannot be opened.
     ///
     /// # Errors
     /// When the folder cannot be read.
@@ -94,7 +95,8 @@ impl DataDir {
     /// Opens a map.
     ///
     /// # Errors
-    /// When its files cannot be read, or miss something that may have been acknowledged; when two folders claim to be it.
+    /// When its files cannot be read, something is missing that may have been acknowledged, or two folders claim to be
+    /// the map.
     pub fn map(&self, name: &MapName, progress: &OpeningProgress) -> Result<OpenedMap, StoreError> {
         let (path, uuid) = self.adopted(name, progress)?;
         let files = Arc::clone(&self.files);
@@ -103,8 +105,8 @@ impl DataDir {
         Ok(opened)
     }
 
-    /// Opens a map without the revisions of which there is no trace but that they had been acknowledged, and writes a
-    /// snapshot that expects them no more; the map's revision.
+    /// Opens a map that lacks revisions which are known only to have been acknowledged, and writes a snapshot that no
+    /// longer expects them. Returns the map's revision.
     pub(super) fn go_on_without(&self, name: &MapName) -> Result<u64, StoreError> {
         let (files, progress) = (Arc::clone(&self.files), OpeningProgress::default());
         let (path, uuid) = self.adopted(name, &progress)?;
@@ -114,7 +116,7 @@ impl DataDir {
         Ok(snapshot.contents.revision)
     }
 
-    /// Makes a map; it is there as a whole or not at all.
+    /// Creates a map, as a whole or not at all.
     ///
     /// # Errors
     /// When the system refuses, or there is a map of that name.
@@ -128,11 +130,11 @@ impl DataDir {
         self.folder(&entry, first).inspect_err(|_| self.leave(&entry))
     }
 
-    /// Makes a map that takes the place of `old` under its name `name`; that map gets the name `kept`.
+    /// Creates a map in the place of `old` under its name `name`; the old map is renamed to `kept`.
     ///
     /// # Errors
-    /// When the system refuses; all is then as it was, in memory. Where the system refused to take back what it had done,
-    /// the next start may find the exchange made.
+    /// When the system refuses; in memory, all is then as it was. Where undoing a part of it failed too, the next start
+    /// may find the exchange made.
     pub fn replace(
         &self,
         name: &MapName,
@@ -145,7 +147,7 @@ impl DataDir {
         let old_entry = old.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
         let replacement = Replacement { old: old_entry, kept: Entry::folder_name(kept, old.uuid()) };
         self.make(&new, first, Some(&replacement), StopSignal::NEVER)?;
-        // Nobody uses it before it is known to stay.
+        // It is not used before it is known to stay.
         let exchange = || {
             let folder = self.folder(&new, first)?;
             old.move_to(&self.maps.join(&replacement.kept))?;
@@ -157,11 +159,11 @@ impl DataDir {
         Ok(folder)
     }
 
-    /// Takes a map away. When this returns it is gone for good, though not all its bytes may be.
+    /// Deletes a map. When this returns, the map is deleted for good, though its bytes may not all be freed.
     ///
     /// # Errors
-    /// When the system refuses. Where [`MapFolder::is_gone`] says so all the same, the map is gone, and only the loss of
-    /// power could bring it back.
+    /// When the system refuses. Where [`MapFolder::is_gone`] is true all the same, the map is deleted, and only a loss
+    /// of power could bring it back.
     pub fn remove(&self, folder: &MapFolder) -> Result<(), StoreError> {
         let path = folder.path();
         let gone = folder::unfinished(&path);
@@ -176,7 +178,7 @@ impl DataDir {
         Ok(())
     }
 
-    /// A map's folder with its first snapshot, whole and under its name, or not there.
+    /// Creates a map's folder with its first snapshot, as a whole or not at all.
     fn make(
         &self,
         entry: &str,
@@ -199,19 +201,18 @@ impl DataDir {
         make().inspect_err(|_| self.leave(entry))
     }
 
-    /// The folder whose one snapshot was just written.
+    /// The folder object of a map whose only snapshot was just written.
     fn folder(&self, entry: &str, first: &Snapshot) -> Result<MapFolder, StoreError> {
         MapFolder::new(Arc::clone(&self.files), self.maps.join(entry), self.settings.clone(), first)
     }
 
-    /// Notes that a folder is no map's, and takes it away where that can be done.
+    /// Notes that a folder is no longer a map's, and removes it if that succeeds.
     fn leave(&self, entry: &str) {
         self.leftovers.lock().insert(entry.to_owned());
         drop(self.clear_leftovers());
     }
 
-    /// Takes away what failed operations left, for good: the next map of the name could not be told from it after a
-    /// crash.
+    /// Removes for good what failed operations left: after a crash it could not be told from the next map of the name.
     fn clear_leftovers(&self) -> Result<(), StoreError> {
         let leftovers = self.leftovers.lock().clone();
         if leftovers.is_empty() {
@@ -238,8 +239,8 @@ impl DataDir {
         self.files.list(&self.maps).map_err(StoreError::io(&self.maps))
     }
 
-    /// The names of the folders that claim to be that map. What a failed operation left is none: it goes before the
-    /// next map is made, and must not be served until then.
+    /// Names of the folders that claim to be that map. Leftovers of failed operations do not count: they are removed
+    /// before the next map is created.
     fn folders_of(&self, name: &MapName) -> Result<Vec<String>, StoreError> {
         let mut entries = self.entries()?;
         let leftovers = self.leftovers.lock();
@@ -263,7 +264,7 @@ impl DataDir {
         }
     }
 
-    /// The folder of a map with the uuid in its name; one of a former release gets it now.
+    /// Path of a map's folder with the uuid in its name; a folder of a former release is renamed first.
     fn adopted(&self, name: &MapName, progress: &OpeningProgress) -> Result<(PathBuf, Uuid), StoreError> {
         let path = self.path(name)?;
         if let Entry::Map { uuid, .. } = Entry::of_path(&path) {
@@ -283,7 +284,7 @@ impl DataDir {
     }
 }
 
-/// Makes a folder, and its name in the one above durable, where it is not there.
+/// Creates a folder where it does not exist, and makes its entry durable.
 fn make_folder(files: &dyn FileSystem, folder: &Path) -> std::io::Result<()> {
     if files.list(folder).is_ok() {
         return Ok(());

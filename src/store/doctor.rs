@@ -1,4 +1,4 @@
-//! A data folder looked through while no server uses it: every file, and whether they agree.
+//! Check of a data folder while no server uses it: reads every file, and checks that they agree.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,29 +11,29 @@ use super::journal::{self, Inspected};
 use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot, snapshot_files};
 use crate::map::{MapContents, MapName, MappedScan, MultiResolutionMap};
 
-/// What was found of a map.
+/// Findings about a map.
 #[derive(Debug, Default)]
 pub struct Diagnosis {
-    /// Revisions of the map's snapshots that can be read, ascending.
+    /// Revisions of the readable snapshots, ascending.
     pub snapshots: Vec<u64>,
-    /// Segments of the journal.
+    /// Number of segments of the journal.
     pub segments: usize,
-    /// Changes in them.
+    /// Number of changes in the segments.
     pub records: u64,
-    /// The revision that the files give; none where there is no good snapshot.
+    /// The revision that the files give; none without a readable snapshot.
     pub revision: Option<u64>,
     /// The last revision that the snapshots know to have been acknowledged.
     pub acknowledged: u64,
-    /// Finest voxels at that revision.
+    /// Number of finest voxels at that revision.
     pub voxels: usize,
     /// Bytes that a crash left unfinished, which the next start cuts off: nothing acknowledged is among them.
     pub torn_bytes: u64,
-    /// Files that were set aside since they could not be read. Damaged snapshots among them go with the snapshots of
-    /// their age; parts of a journal stay until somebody removes them.
+    /// Files that were set aside because they cannot be read. Damaged snapshots are removed together with the snapshots
+    /// of their age; parts of a journal stay until somebody removes them.
     pub set_aside: Vec<AsideFile>,
-    /// Files in the folder that nobody understands: no harm, but somebody put them there.
+    /// Files in the folder that are not part of a map: harmless, but somebody put them there.
     pub not_understood: Vec<String>,
-    /// What is wrong, a sentence each.
+    /// Problems, a sentence each.
     pub problems: Vec<String>,
 }
 
@@ -43,7 +43,7 @@ impl Diagnosis {
     }
 }
 
-/// A file that nobody reads any more.
+/// A file that was set aside.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AsideFile {
     /// The file's name in the map's folder.
@@ -52,20 +52,20 @@ pub struct AsideFile {
     pub bytes: u64,
 }
 
-/// What was set aside.
+/// Result of [`set_aside`].
 #[derive(Debug)]
 pub struct SetAside {
-    /// The files that hold it now.
+    /// Files that hold what was set aside.
     pub files: Vec<PathBuf>,
-    /// The revision that the map has without it.
+    /// Revision of the map without what was set aside.
     pub revision: u64,
 }
 
-/// Looks a map through: reads every snapshot and every record, replays the journal from the oldest snapshot, and
-/// compares the map with each snapshot on the way. Changes nothing.
+/// Checks a map: reads every snapshot and every record, replays the journal from the oldest snapshot, and compares the
+/// map with each snapshot on the way. Changes nothing.
 ///
 /// # Errors
-/// When the system refuses. What is wrong with the files is in the diagnosis.
+/// When the system refuses. Problems with the files are in the diagnosis.
 pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreError> {
     let files = data_dir.files();
     let path = match data_dir.path(name) {
@@ -152,10 +152,10 @@ fn read_snapshots(
     Ok(snapshots)
 }
 
-/// A map that is made again from its oldest snapshot.
+/// A map that is rebuilt from its oldest snapshot.
 struct Replay {
     map: MultiResolutionMap,
-    /// Snapshots that were not reached yet, newest first.
+    /// Snapshots that are not reached yet, newest first.
     snapshots: Vec<Snapshot>,
     problems: Vec<String>,
 }
@@ -192,7 +192,8 @@ impl Replay {
         Ok(())
     }
 
-    /// Revisions are missing. Where a snapshot is on the far side, a server goes on from there.
+    /// Notes that revisions are missing. Where a snapshot is beyond the gap, the replay continues from there, as a
+    /// server would.
     fn gap(&mut self, expected: u64, first: u64) {
         while self.snapshots.last().is_some_and(|snapshot| snapshot.contents.revision < first) {
             if let Some(Ok(map)) = self.snapshots.pop().map(Snapshot::restore) {
@@ -222,8 +223,9 @@ impl Replay {
     }
 }
 
-/// True of contents that the journal makes. Poses that undo reached no more were thinned before they were written, and the
-/// journal knows nothing of that: of those all that are left are among the journal's.
+/// True when the contents `written` of a snapshot agree with `made`, replayed from the journal. Poses beyond the undo
+/// window were thinned before the snapshot was written, which the journal does not record; those that are left must be
+/// among the replayed ones.
 fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
     let (revision, voxels, requests) = (&made.revision, &made.voxels, &made.requests);
     let same = (&written.revision, &written.voxels, &written.requests) == (revision, voxels, requests);
@@ -231,11 +233,11 @@ fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
     same && written.moments == made.moments && written.trajectory.poses().all(is_known)
 }
 
-/// Takes the part of a damaged journal that cannot be read, and what comes after it, out of the way. None where the
-/// map can be opened as it is.
+/// Sets aside the part of a damaged journal that cannot be read, and what follows it. None where the map can be opened
+/// as it is.
 ///
 /// # Errors
-/// When the system refuses, or what is wrong is not the journal.
+/// When the system refuses, or the damage is not in the journal.
 pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>, StoreError> {
     let mut aside = Vec::new();
     loop {
@@ -257,7 +259,7 @@ pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>,
     }
 }
 
-/// Gives a file a name under which nobody looks for it.
+/// Renames a file so that it is no longer read.
 fn move_aside(files: &dyn FileSystem, path: &Path) -> Result<PathBuf, StoreError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let to = path.with_file_name(format!("{name}.damaged"));
@@ -266,13 +268,13 @@ fn move_aside(files: &dyn FileSystem, path: &Path) -> Result<PathBuf, StoreError
     Ok(to)
 }
 
-/// Moves a segment from `offset` on, and all later ones, to names under which nobody looks for them.
+/// Moves a segment from `offset` on, and all later ones, to files that are not read.
 fn set_aside_from(files: &dyn FileSystem, path: &Path, offset: u64) -> Result<Vec<PathBuf>, StoreError> {
     let above = folder::folder_of(path);
     let bytes = files.read(path).map_err(StoreError::io(path))?;
     let damaged = path.with_extension("log.damaged");
     folder::replace(files, &damaged, &bytes)?;
-    // Without a frame a segment is not needed.
+    // A segment without a frame is not needed.
     let shortened = match offset < journal::SEGMENT_HEADER_BYTES as u64 {
         true => files.remove(path),
         false => files.truncate(path, offset).and_then(|()| files.sync(path)),

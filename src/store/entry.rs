@@ -1,4 +1,4 @@
-//! What the names in the folder of maps mean.
+//! Names in the folder of maps, and what they mean.
 
 use std::path::Path;
 
@@ -9,18 +9,18 @@ use crate::map::MapName;
 
 const MAP_FILE_SUFFIX: &str = ".mrol";
 
-/// What a name in the folder of maps means. A map's name has no dot, so that each means one thing.
+/// Meaning of a name in the folder of maps. A map's name has no dot, so that each name means one thing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Entry {
-    /// A map's folder.
+    /// The folder of a map.
     Map { name: MapName, uuid: Uuid },
-    /// One of a former release.
+    /// The folder of a map of a former release, without a uuid.
     OldMap(MapName),
-    /// A map file that is to become a map.
+    /// A map file to be imported.
     MapFile(MapName),
-    /// What a crash left.
+    /// Something unfinished that a crash left.
     Unfinished,
-    /// Nobody knows.
+    /// Not part of a data folder.
     Unknown,
 }
 
@@ -45,7 +45,7 @@ impl Entry {
         Self::of(&path.file_name().unwrap_or_default().to_string_lossy())
     }
 
-    /// The name of the map whose folder it is.
+    /// The name of the map, where the entry is a map's folder.
     pub(super) fn into_map(self) -> Option<MapName> {
         match self {
             Self::Map { name, .. } | Self::OldMap(name) => Some(name),

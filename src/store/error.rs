@@ -1,4 +1,4 @@
-//! What can go wrong with what is kept.
+//! Errors of the store.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::map::{MapName, REVISION_MAX};
 /// Why a map could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The system said no.
+    /// The operating system refused a file operation.
     #[error("{}: {source}", .path.display())]
     Io {
         /// The file or folder.
@@ -20,7 +20,7 @@ pub enum StoreError {
     /// Another process uses the data folder.
     #[error("{} is in use by another server: stop it, or choose another data folder", .0.display())]
     InUse(PathBuf),
-    /// The file is none of ours, damaged, or of a newer version.
+    /// The file is not of this program, damaged, or of a newer version.
     #[error("{}: {reason}", .path.display())]
     Damaged {
         /// The file.
@@ -28,8 +28,8 @@ pub enum StoreError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The journal is damaged before its end: something that was acknowledged may be lost, and nothing is skipped
-    /// in silence.
+    /// The journal is damaged before its end. Something that was acknowledged may be lost, and nothing is skipped
+    /// silently.
     #[error(
         "{}: damaged at offset {offset}: {reason}. Revision {revision} and what follows cannot be read; {} keeps \
          what comes before and sets the rest aside",
@@ -45,7 +45,7 @@ pub enum StoreError {
         /// The first revision that is lost.
         revision: u64,
     },
-    /// The journal ends before a revision that had been acknowledged: files are missing.
+    /// The journal ends before a revision that was acknowledged: files are missing.
     #[error(
         "{}: the journal ends at revision {last}, and revision {acknowledged} had been acknowledged: put the missing \
          files back; {} goes on without them",
@@ -54,12 +54,12 @@ pub enum StoreError {
     RevisionsMissing {
         /// The map's folder.
         folder: PathBuf,
-        /// The last revision that is there.
+        /// The last revision in the journal.
         last: u64,
-        /// The last that is known to have been acknowledged.
+        /// The last revision that is known to have been acknowledged.
         acknowledged: u64,
     },
-    /// A file in a map's folder is another map's.
+    /// A file in a map's folder belongs to another map.
     #[error(
         "{}: it is another map's: its uuid is {found}, that of the map is {expected}; move it away, or {} does",
         .path.display(), set_aside_command(.path)
@@ -67,9 +67,9 @@ pub enum StoreError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// Whose it is.
+        /// Uuid of the map that the file belongs to.
         found: Uuid,
-        /// Whose folder it is in.
+        /// Uuid of the map whose folder it is in.
         expected: Uuid,
     },
     /// Two folders claim to be one map.
@@ -82,32 +82,32 @@ pub enum StoreError {
         name: MapName,
         /// The first of the folders.
         first: PathBuf,
-        /// Another.
+        /// The second folder.
         second: PathBuf,
     },
-    /// A map's folder is not there.
+    /// There is no folder of that map.
     #[error("map {0} has no folder")]
     NoFolder(MapName),
-    /// The map has no revision left for another change.
+    /// The map has used up its revision numbers.
     #[error("the map is at revision {0}, and {REVISION_MAX} is the last that there is: make another map")]
     RevisionsUsedUp(u64),
     /// The map was deleted, and its folder with it.
     #[error("the map was deleted")]
     Gone,
-    /// Nobody wants the maps any more.
+    /// Opening was cancelled.
     #[error("the opening of the maps was ended")]
     Cancelled,
-    /// A snapshot would take what the journal needs.
+    /// A snapshot would take disk space that the journal needs.
     #[error(
         "a snapshot of {bytes} bytes does not fit on the disk, at most {bytes_max} leave enough for the journal"
     )]
     NoRoom {
-        /// The record's size, bytes.
+        /// Size of the snapshot, bytes.
         bytes: u64,
-        /// The most that it may have.
+        /// Most bytes that the snapshot may have.
         bytes_max: u64,
     },
-    /// An earlier write failed, and what the disk holds since is unknown.
+    /// An earlier write failed, and it is unknown what the disk holds since.
     #[error("the journal stopped: {0}")]
     JournalStopped(String),
 }
@@ -118,19 +118,19 @@ impl StoreError {
         move |source| Self::Io { path, source }
     }
 
-    /// A journal's segment is wrong at `offset`, where `revision` should stand.
+    /// The error of a segment that is damaged at `offset`, where `revision` should be.
     pub(super) fn at(path: &Path, offset: usize, revision: u64, reason: impl Into<String>) -> Self {
         let (path, offset, reason) = (path.to_owned(), offset as u64, reason.into());
         Self::JournalDamaged { path, offset, reason, revision }
     }
 
-    /// The file, or what it is to hold, is wrong.
+    /// The error of a file that is damaged, or of content that may not be written.
     pub(crate) fn damaged(path: &Path, reason: impl Into<String>) -> Self {
         Self::Damaged { path: path.to_owned(), reason: reason.into() }
     }
 }
 
-/// What helps against a damaged file `DATA_DIR/maps/MAP.UUID/FILE`.
+/// The command that sets aside the damaged file `DATA_DIR/maps/MAP.UUID/FILE`.
 fn set_aside_command(file: &Path) -> String {
     let folder = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
     let map = folder.split('.').next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What the store asks of a file system, and no more: tests put one in its place that fails on demand.
+//! The file operations that the store uses, as a trait, so that tests can replace them by ones that fail on demand.
 
 use std::fmt::Debug;
 use std::fs::{self, DirBuilder, File, OpenOptions};
@@ -8,33 +8,33 @@ use std::path::Path;
 use super::StoreMode;
 use crate::util::StopSignal;
 
-/// Bytes that are read between two looks at the stop signal: some ten milliseconds of a slow disk.
+/// Bytes that are read between two checks of the stop signal: some ten milliseconds of a slow disk.
 const BYTES_PER_LOOK: u64 = 4 << 20;
 
-/// The operations that maps are kept with.
+/// The file operations that maps are kept with.
 ///
 /// Nothing is durable before it is synced: the bytes of a file by [`Appending::sync`] or [`FileSystem::sync`], the
-/// names in a folder (files made, renamed, removed) by [`FileSystem::sync`] of the folder.
+/// entries of a folder (files created, renamed, removed) by [`FileSystem::sync`] of the folder.
 pub trait FileSystem: Debug + Send + Sync {
-    /// Makes a folder and those above it; fine where it is there.
+    /// Creates a folder and its parents; no error where it exists.
     ///
     /// # Errors
-    /// Those of the system, here and below.
+    /// When the system refuses; so with all operations below.
     fn create_folder(&self, folder: &Path) -> io::Result<()>;
 
-    /// The names in a folder, in order.
+    /// Lists the names in a folder, sorted.
     ///
     /// # Errors
     /// See above.
     fn list(&self, folder: &Path) -> io::Result<Vec<String>>;
 
-    /// A file's bytes.
+    /// Reads all bytes of a file.
     ///
     /// # Errors
     /// See above.
     fn read(&self, file: &Path) -> io::Result<Vec<u8>>;
 
-    /// A file's bytes, for as long as somebody wants them; none once stopped.
+    /// Reads all bytes of a file; none once stopped.
     ///
     /// # Errors
     /// See above.
@@ -42,7 +42,7 @@ pub trait FileSystem: Debug + Send + Sync {
         self.read(file).map(|bytes| Some(bytes).filter(|_| !stop.is_stopped()))
     }
 
-    /// The first bytes of a file: so many, or all where there are fewer.
+    /// Reads the first `bytes` bytes of a file, or all where it has fewer.
     ///
     /// # Errors
     /// See above.
@@ -52,31 +52,31 @@ pub trait FileSystem: Debug + Send + Sync {
         Ok(start)
     }
 
-    /// A file's size in bytes.
+    /// Returns a file's size in bytes.
     ///
     /// # Errors
     /// See above.
     fn size(&self, file: &Path) -> io::Result<u64>;
 
-    /// An empty file to append to, in the place of one that is there.
+    /// Creates an empty file to append to, in the place of one that exists.
     ///
     /// # Errors
     /// See above.
     fn create(&self, file: &Path) -> io::Result<Box<dyn Appending>>;
 
-    /// Cuts a file off after `bytes`.
+    /// Truncates a file to `bytes` bytes.
     ///
     /// # Errors
     /// See above.
     fn truncate(&self, file: &Path, bytes: u64) -> io::Result<()>;
 
-    /// Makes a file's bytes, or a folder's names, durable.
+    /// Makes the bytes of a file, or the entries of a folder, durable.
     ///
     /// # Errors
     /// See above.
     fn sync(&self, path: &Path) -> io::Result<()>;
 
-    /// Renames a file or a folder, in the place of a file that is there.
+    /// Renames a file or a folder; a file of the new name is replaced.
     ///
     /// # Errors
     /// See above.
@@ -88,25 +88,25 @@ pub trait FileSystem: Debug + Send + Sync {
     /// See above.
     fn remove(&self, file: &Path) -> io::Result<()>;
 
-    /// Removes a folder and all in it.
+    /// Removes a folder with all its contents.
     ///
     /// # Errors
     /// See above.
     fn remove_folder(&self, folder: &Path) -> io::Result<()>;
 }
 
-/// A file that grows at its end.
+/// A file that is open for appending.
 pub trait Appending: Debug + Send {
     /// Appends all of `bytes`.
     ///
     /// # Errors
-    /// Those of the system; a part of the bytes may be in the file then.
+    /// When the system refuses; a part of the bytes may be in the file then.
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Makes all that was appended durable.
+    /// Makes everything appended so far durable.
     ///
     /// # Errors
-    /// Those of the system. What is durable is then unknown, and asking again would not tell: the system may have
+    /// When the system refuses. What is durable is then unknown, and a second sync would not tell: the system may have
     /// dropped what it could not write.
     fn sync(&mut self) -> io::Result<()>;
 }
@@ -118,12 +118,13 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// The file system, where files and folders are made with the permissions `mode`, not with those of the process.
+    /// The file system of this machine; files and folders are created with the permissions `mode`, not with those of
+    /// the process.
     pub fn of_mode(mode: StoreMode) -> Self {
         Self { mode: Some(mode) }
     }
 
-    /// How a file is made that is to be written.
+    /// The options with which files are created for writing.
     pub(super) fn creation(self) -> OpenOptions {
         let mut options = File::options();
         options.write(true).create(true).truncate(true);

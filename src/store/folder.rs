@@ -1,4 +1,4 @@
-//! Folders and files that are whole or not there.
+//! Atomic replacement of files and folders: a crash leaves the old or the new one, never a part.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use super::{FileSystem, StoreError};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
 
-/// Where a folder is, for all who use it: a map may get another name while it is open.
+/// The path of a folder, shared by all who use it: a map may be renamed while it is open.
 #[derive(Debug, Clone)]
 pub(super) struct FolderPath(Arc<Mutex<PathBuf>>);
 
@@ -24,27 +24,27 @@ impl FolderPath {
         *self.0.lock() = path;
     }
 
-    /// The file of that name.
+    /// The path of the file `name` in the folder.
     pub(super) fn file(&self, name: &str) -> PathBuf {
         self.0.lock().join(name)
     }
 }
 
-/// What the name of something unfinished begins with: swept away when it is found.
+/// Prefix of the names of unfinished files and folders, which are removed when they are found.
 pub(super) const UNFINISHED: &str = ".unfinished-";
 
-/// Where a path is made before it gets its name.
+/// The path at which `path` is prepared before it is renamed.
 pub(super) fn unfinished(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{UNFINISHED}{name}"))
 }
 
-/// Writes `bytes` to a file beside `path`, syncs it, renames it over `path` and syncs the folder: after a crash at
-/// any moment `path` holds the old bytes or the new.
+/// Replaces a file atomically: writes `bytes` to a file beside `path`, syncs it, renames it over `path` and syncs the
+/// folder. After a crash at any moment `path` holds the old bytes or the new ones.
 ///
 /// # Errors
-/// When the system refuses; `path` is then as it was, or, where the folder could not be synced, new. Nothing else is
-/// left that takes room.
+/// When the system refuses; `path` is then as it was or, where the folder could not be synced, new. Nothing else is
+/// left that takes space.
 pub(super) fn replace(files: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let aside = unfinished(path);
     let write = || {
@@ -55,12 +55,12 @@ pub(super) fn replace(files: &dyn FileSystem, path: &Path, bytes: &[u8]) -> Resu
         files.rename(&aside, path)?;
         files.sync(folder_of(path))
     };
-    // What is left of it takes the room that is missing.
+    // A remainder would take the space that is missing.
     let left = |_: &std::io::Error| drop(files.remove(&aside));
     write().inspect_err(left).map_err(StoreError::io(path))
 }
 
-/// The bytes of the file at `path`, for as long as somebody wants them.
+/// Reads the file at `path` under a stop signal.
 ///
 /// # Errors
 /// When the system refuses; `Cancelled` once stopped.
@@ -86,13 +86,13 @@ pub(super) fn sweep(files: &dyn FileSystem, folder: &Path) -> Result<(), StoreEr
     Ok(())
 }
 
-/// Bytes of the files in `folder`; what the system does not tell counts for nothing.
+/// Total size of the files in `folder`, bytes; files whose size cannot be read count 0.
 pub(super) fn bytes_in(files: &dyn FileSystem, folder: &Path) -> u64 {
     let names = files.list(folder).unwrap_or_default();
     names.iter().filter_map(|name| files.size(&folder.join(name)).ok()).sum()
 }
 
-/// The folder that a file is in.
+/// The folder of a file.
 pub(super) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

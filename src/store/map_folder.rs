@@ -1,4 +1,4 @@
-//! The folder of one map: snapshots, and the journal that goes on from them.
+//! The folder of one map: snapshots, and the journal that continues from them.
 //!
 //! ```text
 //! office.UUID/snapshot-00000000000000000000.mrol      at that revision
@@ -7,8 +7,8 @@
 //! office.UUID/journal-00000000000000004712.log
 //! ```
 //!
-//! Two locks are held while files are written, that of the snapshots and that of the journal, and only who writes waits
-//! for them. What readers ask is in [`Facts`].
+//! Two locks are held while files are written, one for the snapshots and one for the journal; only writers wait for
+//! them. What readers ask is in [`Facts`].
 
 mod facts;
 mod observing;
@@ -33,19 +33,19 @@ use crate::map::WithdrawnScan;
 use crate::sync::{Mutex, Rank};
 use facts::Facts;
 
-/// What keeps a map across crashes.
+/// A map's folder: keeps the map across crashes.
 #[derive(Debug)]
 pub struct MapFolder {
     files: Arc<dyn FileSystem>,
     uuid: Uuid,
     path: FolderPath,
     settings: StoreSettings,
-    /// Where the journal's segments are.
+    /// Location of the journal's segments.
     place: SegmentFolder,
     journal: Mutex<SegmentedJournal>,
     /// Held while a snapshot is written, or old ones are removed.
     snapshots: Mutex<()>,
-    /// True once the folder was taken away. Changed while both locks are held.
+    /// True once the folder was deleted. Changed while both locks are held.
     is_gone: AtomicBool,
     facts: Facts,
 }
@@ -78,20 +78,20 @@ impl MapFolder {
     /// Appends records; see [`Journal::append`].
     ///
     /// # Errors
-    /// As there; `Gone` where the map was deleted.
+    /// As for [`Journal::append`]; `Gone` where the map was deleted.
     pub fn append(&self, records: &[&Record]) -> Result<u64, StoreError> {
         self.in_journal(|journal| journal.append(records))
     }
 
-    /// Makes all that was appended durable; see [`Journal::sync`].
+    /// Makes everything appended so far durable; see [`Journal::sync`].
     ///
     /// # Errors
-    /// As there; `Gone` where the map was deleted.
+    /// As for [`Journal::sync`]; `Gone` where the map was deleted.
     pub fn sync(&self) -> Result<(), StoreError> {
         self.in_journal(Journal::sync)
     }
 
-    /// Does something with the journal, and tells of it.
+    /// Runs `act` on the journal, and updates the facts.
     fn in_journal<T>(
         &self,
         act: impl FnOnce(&mut SegmentedJournal) -> Result<T, StoreError>,
@@ -103,30 +103,30 @@ impl MapFolder {
         done
     }
 
-    /// How the map is kept.
+    /// Settings of the store.
     pub fn settings(&self) -> &StoreSettings {
         &self.settings
     }
 
-    /// Writes a snapshot of at most `bytes_max` beside the others, and forgets snapshots and journal that nobody needs any
-    /// more. Where it cannot, a while passes before the next one is due. Nothing is written where there is a newer one.
+    /// Writes a snapshot of at most `bytes_max` bytes, and removes snapshots and journal that are no longer needed.
+    /// After a failure the next snapshot is due only after a while. Nothing is written where there is a newer snapshot.
     ///
     /// # Errors
-    /// `NoRoom` for a larger one; when the system refuses, or the journal stopped. What was there is then there still.
+    /// `NoRoom` for a larger one; when the system refuses, or the journal stopped. What was there is then still there.
     pub fn save(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
         let written = self.write(snapshot, bytes_max).inspect_err(|_| self.facts.tell_not_saved());
         self.count_bytes();
         written
     }
 
-    /// Counts what is in the folder, so that who asks later need not look at the disk.
+    /// Counts the bytes in the folder, so that later queries need not read the disk.
     fn count_bytes(&self) {
         self.facts.tell_bytes(folder::bytes_in(&*self.files, &self.path.get()));
     }
 
     fn write(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
         let revision = snapshot.contents.revision;
-        // Before any lock: it takes seconds of a large map.
+        // Done before any lock is taken: it takes seconds for a large map.
         let mut file = snapshot.encode().map_err(StoreError::io(self.path.get()))?;
         if file.len() as u64 > bytes_max {
             return Err(StoreError::NoRoom { bytes: file.len() as u64, bytes_max });
@@ -140,25 +140,26 @@ impl MapFolder {
         if revision < self.facts.newest_snapshot() {
             return Ok(());
         }
-        // What the snapshot holds is durable in the journal before; what comes next begins a segment.
+        // Everything in the snapshot is durable in the journal first; the next record begins a segment.
         let (head, appended) = self.in_journal(|journal| {
             journal.end_segment()?;
             Ok((journal.head(), journal.used().bytes))
         })?;
-        // What was acknowledged while it was encoded is in the journal alone: who opens the map is to miss it.
+        // What was acknowledged during the encoding is only in the journal: opening the map must notice where that is
+        // missing.
         snapshot::set_head(&mut file, head.max(revision));
         folder::replace(&*self.files, &self.path.file(&snapshot_name(revision)), &file)?;
         self.facts.tell_saved(revision, appended);
         self.forget(self.undo_window(), snapshot.contents.trajectory.withdrawn())
     }
 
-    /// True when there is much journal since the last snapshot, or that is old; not just after one that failed.
+    /// True when there is much journal since the last snapshot, or that is old; false just after a failure.
     pub fn snapshot_is_due(&self) -> bool {
         self.facts.snapshot_is_due(&self.settings)
     }
 
-    /// Forgets what is kept for undo alone, for want of room on the disk; true where there was something. Where there is
-    /// nothing, and for a while after it failed, nothing is done on the disk: this is asked again and again.
+    /// Removes what is kept for undo alone, when the disk is short of space; true where there was something. Where
+    /// there is nothing, and for a while after a failure, the disk is not touched: this is called again and again.
     ///
     /// # Errors
     /// When the system refuses.
@@ -180,12 +181,12 @@ impl MapFolder {
         UndoWindow { revisions: self.settings.undo_revisions, bytes_max: self.settings.undo_bytes_max }
     }
 
-    /// Removes the snapshots and the journal that nobody needs; the lock of the snapshots is held.
+    /// Removes snapshots and journal that are no longer needed; the caller holds the lock of the snapshots.
     fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnScan]) -> Result<(), StoreError> {
         let path = self.path.get();
         let sizes = Sizes::of(&*self.files, &path)?;
         let kept = self.facts.forget(window, withdrawn, &sizes);
-        // The journal first: a snapshot without the journal behind it would be a gap, one more is not.
+        // The journal first: a crash between the two then leaves a snapshot too many, which is no gap.
         if let Some(base) = kept.first() {
             self.in_journal(|journal| journal.truncate_before(base + 1))?;
             forget_damaged(&*self.files, &path, *base)?;
@@ -197,23 +198,24 @@ impl MapFolder {
         self.files.sync(&path).map_err(StoreError::io(&path))
     }
 
-    /// How much is kept, and how. Waits for no disk.
+    /// Statistics of the folder. Does not wait for a disk.
     pub fn used(&self) -> FolderUse {
         self.facts.used()
     }
 
-    /// The oldest revision that undo reaches, where the scans of `withdrawn` were taken out before. Waits for no disk.
+    /// The oldest revision that undo can return to, where the scans of `withdrawn` were removed before. Does not wait
+    /// for a disk.
     pub fn undo_from(&self, withdrawn: &[WithdrawnScan]) -> u64 {
         self.facts.undo_from(withdrawn)
     }
 
-    /// True where the map was deleted, and this folder with it.
+    /// True where the map, and this folder with it, was deleted.
     pub fn is_gone(&self) -> bool {
         self.is_gone.load(Ordering::Acquire)
     }
 
     /// # Errors
-    /// Where it is gone; asked while one of the locks is held.
+    /// `Gone` where the folder was deleted. The caller holds one of the locks.
     fn check_there(&self) -> Result<(), StoreError> {
         if self.is_gone() { Err(StoreError::Gone) } else { Ok(()) }
     }
@@ -226,10 +228,10 @@ impl MapFolder {
         self.path.get()
     }
 
-    /// Gives the folder another name, for good. It may be used meanwhile, and waits.
+    /// Renames the folder, durably. It may be in use; users wait.
     ///
     /// # Errors
-    /// When the system refuses; it has then the name of before, as far as anybody can tell.
+    /// When the system refuses; as far as can be known, the folder then has its former name.
     pub(super) fn move_to(&self, to: &Path) -> Result<(), StoreError> {
         let _writing = self.snapshots.lock();
         let _appending = self.journal.lock();
@@ -246,8 +248,8 @@ impl MapFolder {
         Ok(())
     }
 
-    /// Gives the folder a name under which nobody looks for it; nothing is written there any more. Not durable before
-    /// the folder above is synced.
+    /// Renames the folder so that it is no longer found; nothing is written there any more. Not durable before the
+    /// parent folder is synced.
     ///
     /// # Errors
     /// When the system refuses; it is then as it was.
@@ -260,7 +262,7 @@ impl MapFolder {
         Ok(())
     }
 
-    /// Renames, and looks what became of it where the system says that it failed.
+    /// Renames the folder, and checks the result where the system reports a failure.
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StoreError> {
         match self.files.rename(from, to) {
             Err(_) if self.files.list(from).is_err() && self.files.list(to).is_ok() => Ok(()),

@@ -1,19 +1,19 @@
 //! Maps on disk: nothing that was acknowledged is lost.
 //!
-//! Every change of a map is a record in its *journal* before anybody sees it; *snapshots* of the whole map are
-//! written now and then beside the running server, so that starting takes the newest of them and the journal after
-//! it. Reading order: [`DataDir`] is the folder of a server, [`MapFolder`] that of a map, [`Snapshot`] and
-//! [`Journal`] the files in it, [`FileSystem`] what they ask of the system.
+//! Every change of a map is a record in its *journal* before it is visible. *Snapshots* of the whole map are written
+//! now and then while the server runs, so that a start reads the newest snapshot and the journal after it. Reading
+//! order: [`DataDir`] is the folder of a server, [`MapFolder`] that of a map, [`Snapshot`] and [`Journal`] the files in
+//! it, [`FileSystem`] the operations that they need.
 //!
-//! What is promised:
+//! Guarantees, after `kill -9` of the server, a crash of the machine, or a loss of power:
 //!
-//! * With [`Durability::Always`] a change that was acknowledged is there after a crash at any moment, loss of power
-//!   included; with an interval, after the end of the process at any moment.
-//! * After a start the map is that of one revision, and nothing is half applied.
-//! * An end of the journal that had never been written to its end is cut off, and reported. Everything else that
-//!   cannot be read is an error that names file, offset and what helps; nothing is skipped in silence.
-//! * When the journal cannot be written or synced, the map takes no more changes, and is read all the same. A sync is
-//!   never asked for again after it failed.
+//! * With [`Durability::Always`], the default, every acknowledged change is there afterwards. With
+//!   [`Durability::Interval`] that holds after the end of the process; a loss of power takes the last interval.
+//! * After a start the map is that of one revision; no change is applied in part.
+//! * A torn end of the journal, which was never written completely, is cut off and reported. Everything else that
+//!   cannot be read is an error that names the file, the offset and the remedy; nothing is skipped silently.
+//! * When the journal cannot be written or synced, the map accepts no more changes, and can still be read. A sync is
+//!   not repeated after it failed.
 //!
 //! Byte layouts: `snapshot.rs`, `journal/segment.rs`, `journal/frame.rs`, `proto/mrol/store/v1`.
 

@@ -1,9 +1,9 @@
-//! Who may read the data folder.
+//! Permissions of the data folder.
 
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
-/// The permissions of the folders that a store makes; its files have the same but for execution. `0700`: nobody but the
+/// Permissions of the folders that a store creates; its files have the same without execution. `0700`: only the
 /// server's own user.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StoreMode(u32);
@@ -13,18 +13,18 @@ pub struct StoreMode(u32);
 #[error("must be the permissions of folders in octal from 0700 to 0777, such as 0700 or 0750, got {0:?}")]
 pub struct StoreModeError(String);
 
-/// What the server itself needs.
+/// Permissions that the server itself needs.
 const OWNER: u32 = 0o700;
 const ALL: u32 = 0o777;
 const READ_AND_WRITE: u32 = 0o666;
 
 impl StoreMode {
-    /// Bits of a folder.
+    /// Permission bits of folders.
     pub(super) fn of_folders(self) -> u32 {
         self.0
     }
 
-    /// Bits of a file.
+    /// Permission bits of files.
     pub(super) fn of_files(self) -> u32 {
         self.0 & READ_AND_WRITE
     }

@@ -1,10 +1,10 @@
-//! How far the opening of the maps has come.
+//! Progress of opening the maps.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use super::StoreError;
 
-/// Counted by who opens maps, read by who asks whether the server is ready.
+/// Shared counters of the progress of opening maps; the readiness probe reads them.
 #[derive(Debug, Default)]
 pub struct OpeningProgress {
     bytes: AtomicU64,
@@ -14,21 +14,21 @@ pub struct OpeningProgress {
     cancelled: AtomicBool,
 }
 
-/// How far it has come.
+/// Progress of opening the maps, at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Opened {
     /// Bytes of the snapshots and journals that have to be read.
     pub bytes: u64,
-    /// Bytes that were read.
+    /// Bytes that have been read.
     pub bytes_read: u64,
-    /// Maps there are.
+    /// Number of maps.
     pub maps: u64,
-    /// Maps that are open.
+    /// Number of maps that are open.
     pub maps_open: u64,
 }
 
 impl OpeningProgress {
-    /// How far it has come.
+    /// Returns the present progress.
     pub fn opened(&self) -> Opened {
         Opened {
             bytes: self.bytes.load(Relaxed),
@@ -38,23 +38,23 @@ impl OpeningProgress {
         }
     }
 
-    /// Ends the opening early: nobody wants the maps any more.
+    /// Cancels the opening.
     pub fn cancel(&self) {
         self.cancelled.store(true, Relaxed);
     }
 
-    /// True where nobody wants the maps any more: what long work of an opening asks.
+    /// True once the opening was cancelled; long operations check it.
     pub(super) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Relaxed)
     }
 
     /// # Errors
-    /// Where nobody wants the maps any more.
+    /// `Cancelled` once the opening was cancelled.
     pub(super) fn check_wanted(&self) -> Result<(), StoreError> {
         if self.is_cancelled() { Err(StoreError::Cancelled) } else { Ok(()) }
     }
 
-    /// One more map of so many bytes will be opened.
+    /// Adds a map whose files have `bytes` bytes.
     pub(super) fn expect_map(&self, bytes: u64) {
         self.maps.fetch_add(1, Relaxed);
         self.bytes.fetch_add(bytes, Relaxed);

@@ -1,4 +1,4 @@
-//! A map that takes another's place under its name.
+//! Replacement of a map: a new map takes the name of another.
 //!
 //! ```text
 //!                        maps/office.OLD/
@@ -8,33 +8,33 @@
 //! done                   maps/office-replaced-41.OLD/          maps/office.NEW/
 //! ```
 //!
-//! The file `replaces` names the folder of the map that was there, and the one that it gets. As long as it is there the
-//! next start goes on where a crash came, so that there is one map of the name at every moment.
+//! The file `replaces` names the folder of the old map, and the new name of that folder. While it exists, the next
+//! start completes what a crash interrupted, so that there is one map of the name at every moment.
 
 use std::path::Path;
 
 use super::entry::Entry;
 use super::{FileSystem, StoreError, folder};
 
-/// The file in the new map's folder.
+/// Name of the file in the new map's folder.
 pub(super) const REPLACES: &str = "replaces";
 
-/// What the file says.
+/// Contents of the file `replaces`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Replacement {
-    /// The name of the folder of the map that was there.
+    /// Name of the old map's folder.
     pub(super) old: String,
-    /// The one that it gets.
+    /// New name of the old map's folder.
     pub(super) kept: String,
 }
 
 impl Replacement {
-    /// The file's bytes.
+    /// Encodes the file.
     pub(super) fn encode(&self) -> Vec<u8> {
         format!("{}\n{}\n", self.old, self.kept).into_bytes()
     }
 
-    /// What the file in `folder` says, where there is one.
+    /// Reads the file in `folder`, if there is one.
     pub(super) fn in_folder(files: &dyn FileSystem, folder: &Path) -> Result<Option<Self>, StoreError> {
         let names = files.list(folder).map_err(StoreError::io(folder))?;
         if !names.iter().any(|name| name == REPLACES) {
@@ -52,7 +52,7 @@ impl Replacement {
         }
     }
 
-    /// Gives the old map's folder its name, where it has the one of before.
+    /// Renames the old map's folder, unless that is done.
     pub(super) fn keep_old(&self, files: &dyn FileSystem, maps: &Path) -> Result<(), StoreError> {
         let (old, kept) = (maps.join(&self.old), maps.join(&self.kept));
         if files.list(&old).is_err() {
@@ -63,7 +63,7 @@ impl Replacement {
     }
 }
 
-/// Takes the file out of the new map's folder: all is done.
+/// Removes the file from the new map's folder, which completes the replacement.
 pub(super) fn finish(files: &dyn FileSystem, new: &Path) -> Result<(), StoreError> {
     let path = new.join(REPLACES);
     let removed = files.remove(&path).and_then(|()| files.sync(folder::folder_of(&path)));

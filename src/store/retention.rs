@@ -1,4 +1,4 @@
-//! Which snapshots are kept.
+//! Retention: which snapshots are kept.
 //!
 //! Two for recovery: the newest, and the one before it in case the newest is damaged. And one or two older ones for
 //! undo, which replays from a *base*: a snapshot from before the scans in question.
@@ -13,10 +13,10 @@
 use super::snapshot_files::Sizes;
 use crate::map::WithdrawnScan;
 
-/// The newest snapshot, and one in case that is damaged.
+/// Number of snapshots that are kept for recovery: the newest, and one more in case that is damaged.
 pub(super) const FOR_RECOVERY: usize = 2;
 
-/// The revisions of the snapshots to keep, of `snapshots`, ascending. The journal is kept from the first of them on.
+/// The revisions to keep of `snapshots` (ascending). The journal is kept from the first of them on.
 pub(super) fn kept(
     snapshots: &[u64],
     head: u64,
@@ -37,7 +37,7 @@ pub(super) fn kept(
     kept
 }
 
-/// How far back undo reaches, at most.
+/// How far back undo can go at most.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UndoWindow {
     pub(super) revisions: u64,
@@ -45,7 +45,7 @@ pub(super) struct UndoWindow {
     pub(super) bytes_max: u64,
 }
 
-/// What is kept within a number of bytes: where what undo alone needs is more, it reaches less far back.
+/// The snapshots to keep within a number of bytes: where undo alone needs more, it can go less far back.
 pub(super) fn kept_within(
     snapshots: &[u64],
     head: u64,
@@ -75,7 +75,7 @@ fn undo_bytes(kept: &[u64], sizes: &Sizes) -> u64 {
     snapshots + segments.sum::<u64>()
 }
 
-/// True when a snapshot holds nothing of a scan that was withdrawn after it: who holds which of its voxels could
+/// True when undo can begin with a snapshot: it holds nothing of a scan that was withdrawn later, whose voxels could
 /// not be told apart.
 pub(super) fn is_base(snapshot: u64, withdrawn: &[WithdrawnScan]) -> bool {
     withdrawn.iter().all(|withdrawn| snapshot < withdrawn.scan || withdrawn.revision <= snapshot)

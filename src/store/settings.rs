@@ -1,4 +1,4 @@
-//! How maps are kept.
+//! Settings of the store.
 
 use std::fmt::{self, Display};
 use std::str::FromStr;
@@ -18,7 +18,7 @@ pub enum Durability {
     Interval(Duration),
 }
 
-/// Why a text is no [`Durability`].
+/// Why a text is not a valid [`Durability`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("must be \"always\" or an interval such as \"200ms\" or \"1s\", from 1ms to 1h, got {0:?}")]
 pub struct DurabilityError(String);
@@ -55,23 +55,23 @@ impl Display for Durability {
 /// Settings of a store.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoreSettings {
-    /// When a change may be acknowledged. Always synced.
+    /// When a change may be acknowledged. [`Durability::Always`].
     pub durability: Durability,
-    /// A map is written to a snapshot after so many bytes of journal. 32 MiB.
+    /// Bytes of a map's journal from which on a snapshot is written. 32 MiB.
     pub snapshot_journal_bytes: u64,
-    /// A map that changed is written to a snapshot after so long. 5 minutes.
+    /// Time after which a snapshot of a changed map is written. 5 minutes.
     pub snapshot_interval: Duration,
-    /// Revisions behind the newest within which a scan can be undone, at least: so long the journal outlives the
-    /// snapshots. 20,000.
+    /// Least number of revisions within which a scan can be undone; the journal outlives the snapshots that long.
+    /// 20,000.
     pub undo_revisions: u64,
-    /// Bytes of snapshots and journal that are kept for undo alone: where they are more, undo reaches less far back than
+    /// Most bytes of snapshots and journal that are kept for undo alone; beyond it undo can go less far back than
     /// `undo_revisions`. 4 GiB, which is 20,000 scans of 200 KiB.
     pub undo_bytes_max: u64,
     /// Permissions of the data folder.
     pub mode: StoreMode,
-    /// How far poses of one robot lie apart that undo reaches no more.
+    /// Spacing of the poses of one robot that are kept beyond the undo window.
     pub trajectory_spacing: TrajectorySpacing,
-    /// Bytes after which a segment of the journal is ended. 64 MiB.
+    /// Size from which on a segment of the journal is ended, bytes. 64 MiB.
     pub segment_bytes_max: u64,
 }
 

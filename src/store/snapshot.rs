@@ -1,4 +1,4 @@
-//! A whole map in one file.
+//! Snapshots: a whole map in one file.
 //!
 //! ```text
 //! offset  bytes
@@ -35,13 +35,13 @@ use compression::{WINDOW_BYTES, checksum_after, compress_onto, decompress};
 use limits::Memory;
 use writing::body_of;
 
-/// The version that this build writes; it reads this one and all before. Version 1 had the voxels as masks of 64
-/// bytes, and neither withdrawn scans nor requests; up to version 2 moments had no forms, up to version 3 a header neither
-/// head nor uuid.
+/// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
+/// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
+/// header has neither head nor uuid.
 pub const FORMAT_VERSION: u32 = 4;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 pub(super) const HEADER_BYTES: usize = 48;
-/// Up to version 3.
+/// Bytes of the header up to version 3.
 const OLD_HEADER_BYTES: usize = 24;
 const BODY_BYTES_AT: usize = 16;
 const HEAD_AT: usize = 24;
@@ -54,14 +54,14 @@ const CHECKED_FROM: usize = 16;
 pub struct Snapshot {
     /// The uuid of this incarnation of the map.
     pub uuid: Uuid,
-    /// What it was made with.
+    /// Settings of the map.
     pub settings: MapSettings,
-    /// What it holds.
+    /// Contents of the map.
     pub contents: MapContents,
 }
 
 impl Snapshot {
-    /// Takes the picture of `map`, at one revision.
+    /// Takes a snapshot of `map`, at one revision.
     pub fn of(map: &MultiResolutionMap, uuid: Uuid) -> Self {
         Self { uuid, settings: *map.settings(), contents: map.contents() }
     }
@@ -71,7 +71,7 @@ impl Snapshot {
         Some(Self { uuid, settings: *map.settings(), contents: map.contents_until(stop)? })
     }
 
-    /// The map again.
+    /// Builds the map from the snapshot.
     ///
     /// # Errors
     /// When its settings are out of range.
@@ -79,7 +79,7 @@ impl Snapshot {
         MultiResolutionMap::restore(self.settings, self.contents)
     }
 
-    /// Writes it to `path`, beside the old file and renamed.
+    /// Writes the snapshot to `path` atomically: to a file beside it, which is then renamed.
     ///
     /// # Errors
     /// When the system refuses.
@@ -87,10 +87,10 @@ impl Snapshot {
         self.write_until(files, path, StopSignal::NEVER)
     }
 
-    /// [`Snapshot::write`], unless it is stopped before there is anything on the disk.
+    /// [`Snapshot::write`] under a stop signal; once stopped, nothing is on the disk.
     ///
     /// # Errors
-    /// As there; `Cancelled` once stopped.
+    /// As for [`Snapshot::write`]; `Cancelled` once stopped.
     pub(super) fn write_until(
         &self,
         files: &dyn FileSystem,
@@ -104,21 +104,21 @@ impl Snapshot {
     /// Reads the file at `path`.
     ///
     /// # Errors
-    /// When it cannot be read, is no map, is damaged, or was written by a newer version.
+    /// When the file cannot be read, is not a map file, is damaged, or was written by a newer version.
     pub fn read(files: &dyn FileSystem, path: &Path) -> Result<Self, StoreError> {
         Self::read_until(files, path, StopSignal::NEVER)
     }
 
-    /// [`Snapshot::read`], for as long as somebody wants it.
+    /// [`Snapshot::read`] under a stop signal.
     ///
     /// # Errors
-    /// As there; `Cancelled` once stopped.
+    /// As for [`Snapshot::read`]; `Cancelled` once stopped.
     pub fn read_until(files: &dyn FileSystem, path: &Path, stop: StopSignal<'_>) -> Result<Self, StoreError> {
         let bytes = folder::read_until(files, path, stop)?;
         Self::decode_own(&bytes, stop)?.map_err(|reason| StoreError::damaged(path, reason))
     }
 
-    /// The file's bytes.
+    /// Encodes the snapshot as the bytes of a map file.
     ///
     /// # Errors
     /// When compression fails, for want of memory.
@@ -130,7 +130,7 @@ impl Snapshot {
     /// [`Snapshot::encode`] under a stop signal; none once stopped.
     ///
     /// # Errors
-    /// As there.
+    /// As for [`Snapshot::encode`].
     pub fn encode_until(&self, stop: StopSignal<'_>) -> std::io::Result<Option<Vec<u8>>> {
         let body = body_of(self, stop);
         if stop.is_stopped() {
@@ -151,17 +151,17 @@ impl Snapshot {
         Ok(Some(bytes).filter(|_| !stop.is_stopped()))
     }
 
-    /// The inverse of [`Snapshot::encode`], of a file of one's own.
+    /// Decodes a map file that is known to be a server's own: the inverse of [`Snapshot::encode`].
     ///
     /// # Errors
-    /// What is wrong with the bytes, and where.
+    /// A description of what is wrong with the bytes, and where.
     pub fn decode(bytes: &[u8]) -> Result<Self, Unreadable> {
         let decoded = Self::decode_within(bytes, &MapFileLimits::OWN, |_| Ok::<_, Infallible>(()));
         decoded.map_err(|refusal| refusal.to_string())
     }
 
-    /// Reads a file of which nobody knows who made it. `reserve` is asked for the bytes of each part before it is built:
-    /// what was asked for before is there by then.
+    /// Decodes a map file from an unknown source. `reserve` is called with the bytes of each part before it is built,
+    /// when all parts before it exist.
     ///
     /// # Errors
     /// When something is wrong with the bytes, they hold more than `limits` allow, or `reserve` refuses.
@@ -173,10 +173,10 @@ impl Snapshot {
         Self::decode_until(bytes, limits, reserve, StopSignal::NEVER)
     }
 
-    /// [`Snapshot::decode`], for as long as somebody wants it.
+    /// [`Snapshot::decode_within`] under a stop signal.
     ///
     /// # Errors
-    /// As there; `Stopped` once stopped.
+    /// As for [`Snapshot::decode_within`]; `Stopped` once stopped.
     pub fn decode_until<E>(
         bytes: &[u8],
         limits: &MapFileLimits,
@@ -184,11 +184,11 @@ impl Snapshot {
         stop: StopSignal<'_>,
     ) -> Result<Self, MapFileError<E>> {
         let decoded = Self::decode_paced(bytes, limits, &mut Memory(reserve), stop);
-        // What was read of a part looks like damage.
+        // A part that was read incompletely looks like damage.
         if stop.is_stopped() { Err(MapFileError::Stopped) } else { decoded }
     }
 
-    /// One of a server's own.
+    /// Decodes a map file of a server's own under a stop signal.
     ///
     /// # Errors
     /// `Cancelled` once stopped; else what is wrong with the bytes.
@@ -213,14 +213,14 @@ impl Snapshot {
         if length > most {
             return Err(format!("a body of {length} bytes, at most {most} are read").into());
         }
-        // A frame of less would be of less than its header says, and is refused all the same.
+        // A frame of fewer bytes contradicts the header, and is refused as well.
         memory.reserve(length as usize + WINDOW_BYTES.min(length as usize))?;
         let body = decompress(compressed, length as usize, stop)
             .map_err(|e| format!("the body from offset {} on: {e}", bytes.len() - compressed.len()))?;
         Body::of(&body, stop).map_err(|e| format!("the body: {e}"))?.read(limits, memory)
     }
 
-    /// The compressed body of a file whose header is right, and the bytes that it says it is of.
+    /// Checks the header and checksum of a file; returns its compressed body and the size before compression.
     fn checked_frame<'b>(bytes: &'b [u8], stop: StopSignal<'_>) -> Result<(&'b [u8], u64), Unreadable> {
         let header = bytes.get(..OLD_HEADER_BYTES).ok_or_else(|| too_short(bytes))?;
         if &header[..8] != MAGIC {
@@ -248,7 +248,7 @@ fn too_short(bytes: &[u8]) -> Unreadable {
     format!("{} bytes are too few for a map file's header", bytes.len())
 }
 
-/// The head of the journal that the map file `bytes`, which is whole, was written beside; none up to version 3.
+/// The journal's head in the map file `bytes`, which must be complete; none up to version 3.
 pub(super) fn head_of(bytes: &[u8]) -> Option<u64> {
     let header = bytes.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
     Some(u64_at(header, HEAD_AT))

@@ -1,4 +1,4 @@
-//! The snapshots in a map's folder: their names, the newest good one, and damaged ones set aside.
+//! Snapshot files in a map's folder: names, the newest readable one, and damaged ones.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use super::{FileSystem, OpeningProgress, Snapshot, StoreError, snapshot};
 use crate::map::REVISION_MAX;
 use crate::util::StopSignal;
 
-/// Bytes that opening the map in `folder` has to read: its newest snapshot, and the journal from there on.
+/// Bytes that opening the map in `folder` will read: its newest snapshot, and the journal from there on.
 pub(super) fn bytes_to_read(files: &dyn FileSystem, folder: &Path) -> Result<u64, StoreError> {
     let names = files.list(folder).map_err(StoreError::io(folder))?;
     let newest = names.iter().filter_map(|name| snapshot_revision(name)).max().unwrap_or_default();
@@ -27,7 +27,7 @@ pub(super) fn snapshot_name(revision: u64) -> String {
     format!("snapshot-{revision:020}.mrol")
 }
 
-/// What the name of a file ends with that was set aside, since it cannot be read.
+/// Suffix of the name of a file that was set aside because it cannot be read.
 const SET_ASIDE: &str = ".damaged";
 
 fn snapshot_revision(name: &str) -> Option<u64> {
@@ -43,16 +43,16 @@ pub(super) fn snapshot_revisions(files: &dyn FileSystem, folder: &Path) -> Resul
 
 pub(super) type Damaged = (u64, StoreError);
 
-/// The newest good snapshot of a folder.
+/// The newest readable snapshot of a folder.
 pub(super) struct Newest {
     pub(super) snapshot: Snapshot,
-    /// The head of the journal when it was written, or more.
+    /// Head of the journal when it was written, or later.
     pub(super) head: u64,
-    /// Newer ones that cannot be read.
+    /// Newer snapshots that cannot be read.
     pub(super) damaged: Vec<Damaged>,
 }
 
-/// The newest snapshot that can be read, and the newer ones that cannot, which leave `revisions`.
+/// Finds the newest readable snapshot, and the newer ones that are not, which are removed from `revisions`.
 pub(super) fn newest_good(
     files: &dyn FileSystem,
     folder: &Path,
@@ -82,11 +82,11 @@ pub(super) fn newest_good(
     Err(damaged.into_iter().next().map_or_else(none, |(_, error)| error))
 }
 
-/// Checks that every snapshot and every segment in `folder` is the map's, as far as it can be read; what cannot is found
-/// when it is read. The snapshots of the revisions `read` were looked at before.
+/// Checks that every snapshot and segment in `folder` belongs to the map, as far as it can be read; damage is found
+/// when the file is read. The snapshots of the revisions `read` were checked before.
 ///
 /// # Errors
-/// `Foreign` for one that is another map's.
+/// `Foreign` for a file of another map.
 pub(super) fn check_owner(
     files: &dyn FileSystem,
     folder: &Path,
@@ -111,8 +111,8 @@ pub(super) fn check_owner(
     Ok(())
 }
 
-/// Whose a snapshot is. Where its header does not say that it is that of `expected`, all of it is read: the header may be
-/// damaged.
+/// The map that a snapshot belongs to. Where its header does not name `expected`, the whole file is read, since the
+/// header may be damaged.
 fn owner_of_snapshot(
     files: &dyn FileSystem,
     path: &Path,
@@ -129,7 +129,7 @@ fn owner_of_snapshot(
     Ok(snapshot.ok().map(|snapshot| snapshot.uuid))
 }
 
-/// The names in `folder` that nobody understands: neither snapshot nor segment, nor set aside.
+/// Names in `folder` that are neither snapshots nor segments, nor set aside.
 pub(super) fn not_understood(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
     let mut names = files.list(folder).map_err(StoreError::io(folder))?;
     names.retain(|name| {
@@ -139,7 +139,7 @@ pub(super) fn not_understood(files: &dyn FileSystem, folder: &Path) -> Result<Ve
     Ok(names)
 }
 
-/// Bytes of the snapshots and segments in a folder, by revision.
+/// Sizes of the snapshots and segments in a folder, bytes, by revision.
 #[derive(Debug, Default)]
 pub(super) struct Sizes {
     pub(super) snapshots: BTreeMap<u64, u64>,
@@ -161,7 +161,7 @@ impl Sizes {
     }
 }
 
-/// Gives damaged snapshots names under which nobody looks for them.
+/// Renames damaged snapshots so that they are no longer read.
 pub(super) fn set_aside(
     files: &dyn FileSystem,
     folder: &Path,
@@ -174,8 +174,8 @@ pub(super) fn set_aside(
     files.sync(folder).map_err(StoreError::io(folder))
 }
 
-/// Removes snapshots of before `revision` that were set aside. Parts of journals stay until somebody has looked at them:
-/// they may hold what is nowhere else.
+/// Removes snapshots from before `revision` that were set aside. Parts of journals stay until a person has looked at
+/// them: they may hold what is nowhere else.
 pub(super) fn forget_damaged(files: &dyn FileSystem, folder: &Path, revision: u64) -> Result<(), StoreError> {
     for name in set_aside_in(files, folder)? {
         let snapshot = name.strip_suffix(SET_ASIDE).and_then(snapshot_revision);
@@ -187,7 +187,7 @@ pub(super) fn forget_damaged(files: &dyn FileSystem, folder: &Path, revision: u6
     Ok(())
 }
 
-/// The names of the files in `folder` that were set aside.
+/// Names of the files in `folder` that were set aside.
 pub(super) fn set_aside_in(files: &dyn FileSystem, folder: &Path) -> Result<Vec<String>, StoreError> {
     let mut names = files.list(folder).map_err(StoreError::io(folder))?;
     names.retain(|name| name.ends_with(SET_ASIDE));

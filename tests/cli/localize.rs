@@ -29,6 +29,21 @@ fn a_scan_of_a_map_file_is_found_where_it_was_taken() {
 }
 
 #[test]
+fn a_scan_that_no_place_is_accepted_for_ends_with_a_code_of_its_own() {
+    let sequence = Sequence::of(1);
+    let (scan, map, wall) =
+        (sequence.path("scans/0000.ply"), sequence.path("map.mrol"), sequence.path("wall.xyz"));
+    objects(&["map", &scan, "--resolution", "0.1", "--out", &map]);
+    // A blank wall fits along every wall of the map.
+    let points = (0..900).map(|i| format!("1 {} {}\n", f64::from(i % 30) * 0.05, f64::from(i / 30) * 0.05));
+    std::fs::write(&wall, points.collect::<String>()).unwrap();
+    let localize = ["localize", "--map", &map, &wall, "--gravity", "0,0,-1", "--json"];
+    let output = mrol(&localize).assert().code(3).get_output().clone();
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["accepted"], false, "{answer}");
+}
+
+#[test]
 fn what_cannot_be_searched_is_said() {
     let missing = complaint(&["localize", "scan.ply"], 2);
     assert!(missing.contains("--map") || missing.contains("--name"), "{missing}");

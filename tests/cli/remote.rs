@@ -68,6 +68,22 @@ fn a_sequence_sent_to_a_daemon_gives_the_poses_of_one_mapped_here() {
 }
 
 #[test]
+fn an_insertion_ends_with_a_code_of_its_own_where_a_scan_is_refused() {
+    let sequence = Sequence::of(2);
+    let (scans, away) = (sequence.path("scans"), "50 50 0 0 0 0 1");
+    let daemon = Daemon::start("");
+    daemon.call(&["insert", &scans, "--map", "a", "--create", "--resolution", "0.1"]);
+
+    let first = sequence.path("scans/0000.ply");
+    let insert = ["insert", &first, "--map", "a", "--guess", away, "--server", &daemon.0.grpc, "--json"];
+    let output = mrol(&insert).assert().code(3).get_output().clone();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&answer["accepted"], &answer["verdict"]), (&json!(false), &json!("low_overlap")));
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "error: 1 of 1 scans not accepted\n");
+    assert_eq!(daemon.call(&[&insert[..6], &["--force"]].concat())[0]["accepted"], true);
+}
+
+#[test]
 fn what_was_inserted_is_found_and_what_was_deleted_is_not() {
     let sequence = Sequence::of(2);
     let (scans, truth) = (sequence.path("scans"), sequence.path("poses.txt"));

@@ -1,22 +1,23 @@
-//! What a search for a scan's place says.
+//! Results of global localization.
 
 use crate::align::{Alignment, Verdict};
 use crate::geometry::Pose;
 
-/// Where a scan may have been taken, and whether to believe it.
+/// Result of a global localization: where a scan may have been taken, and whether to believe it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Localization {
-    /// Accepted only where the best candidate fits and no other place is as good.
+    /// Verdict on the best candidate: accepted only where it fits and no other place is as good.
     pub verdict: Verdict,
-    /// Why, in a sentence with the figures.
+    /// Reason for the verdict, a sentence with the figures.
     pub reason: String,
-    /// Distinct places, best first; none where nothing fits.
+    /// Distinct places that fit, best first; empty where none does.
     pub candidates: Vec<Candidate>,
-    /// True when every pose of the search box was considered: the way down was known, and the search ended by itself.
+    /// True when every pose of the search box was considered: the direction of gravity was given, and the search ended
+    /// by itself.
     pub exhaustive: bool,
     /// True when the search was stopped before its end.
     pub cut_short: bool,
-    /// Cells of poses whose bound was taken.
+    /// Number of cells of poses whose bound was computed.
     pub cells: u64,
     /// The revision of the map that was searched.
     pub revision: u64,
@@ -25,75 +26,77 @@ pub struct Localization {
 /// A place that a scan fits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// How the scan fits there, after refinement.
+    /// Alignment of the scan at this place, after refinement.
     pub alignment: Alignment,
-    /// Fraction of the search's points that fall on the dilated map there.
+    /// Fraction of the search's points that fall on the dilated map at this place.
     pub search_overlap: f64,
-    /// Fraction of the scan's rays that pass through what the map holds.
+    /// Fraction of the scan's rays that pass through occupied voxels of the map before they reach their points.
     pub blocked: f64,
-    /// The candidate's fit less that of the best other candidate; none where there is no other.
+    /// Difference of the candidate's [`fit`](Self::fit) and that of the best other candidate; none where there is no
+    /// other.
     pub margin: Option<f64>,
 }
 
 impl Candidate {
-    /// The pose.
+    /// The candidate's pose, map_from_sensor.
     pub fn map_from_sensor(&self) -> Pose {
         self.alignment.map_from_sensor
     }
 
-    /// Overlap with the map times the share of the rays that get there: what candidates are ranked by. Overlap alone
-    /// prefers clutter.
+    /// Score that candidates are ranked by: the overlap with the map times the share of the rays that are not blocked.
+    /// Overlap alone prefers clutter.
     pub fn fit(&self) -> f64 {
         self.alignment.overlap() * (1.0 - self.blocked)
     }
 }
 
-/// How far a search has got.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchProgress {
-    /// Cells of poses whose bound was taken.
+    /// Number of cells of poses whose bound was computed.
     pub cells: u64,
-    /// Cells that wait to be divided.
+    /// Number of cells that wait to be divided.
     pub waiting: usize,
     /// The best [`Candidate::search_overlap`] so far.
     pub best_overlap: f64,
 }
 
-/// Why a scan cannot be searched for.
+/// Why a scan cannot be localized.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LocalizationError {
     /// Every point is too far away to be on any map.
     #[error("no point of the scan is within {extent_m} m, farther than two places of the map can lie apart")]
     NothingInRange {
-        /// How far that is, meters.
+        /// Largest distance between two places of a map, meters.
         extent_m: f64,
     },
-    /// There is no map yet.
+    /// The map has no voxel.
     #[error("the map is empty: nothing to localize in")]
     EmptyMap,
-    /// No voxel near the box.
+    /// The map has no voxel within the scan's range of the search box.
     #[error("search_box is nowhere near the map: no voxel is within {range_m:.1} m of it, the scan's range")]
     NothingThere {
-        /// The scan's largest range.
+        /// Largest range of the scan, meters.
         range_m: f64,
     },
     /// The search takes more memory than its caller allows.
     #[error("there is no memory for {bytes} bytes more of the search")]
     NoMemory {
-        /// What it asked for.
+        /// Number of bytes that were requested.
         bytes: usize,
     },
-    /// The grids would not fit.
+    /// The grids of the search would take more memory than
+    /// [`LocalizationSettings::grid_bytes_max`](super::LocalizationSettings::grid_bytes_max).
     #[error(
         "the part of the map to search takes {bytes} bytes at the coarsest resolution of use, {resolution_m} m, \
          localization_grid_bytes_max is {bytes_max}: give a smaller search_box"
     )]
     TooLarge {
-        /// What it takes.
+        /// Number of bytes that the grids take.
         bytes: usize,
-        /// At this resolution.
+        /// Resolution of the coarsest grids that the search can use, meters.
         resolution_m: f64,
-        /// The limit.
+        /// Limit on the bytes.
         bytes_max: usize,
     },
 }

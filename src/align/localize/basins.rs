@@ -1,8 +1,8 @@
-//! The best poses of a search that are not the same place.
+//! Basins: the best poses of a search, no two of which are the same place.
 
 use crate::geometry::Pose;
 
-/// A place that a scan fits.
+/// A pose that a scan fits, with its score.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Basin {
     pub(super) map_from_sensor: Pose,
@@ -13,7 +13,7 @@ pub(super) struct Basin {
 /// The best places found so far, no two of them the same.
 #[derive(Debug)]
 pub(super) struct Basins {
-    /// Best first.
+    /// The basins, best first.
     found: Vec<Basin>,
     radius_m: f64,
     radius_rad: f64,
@@ -21,7 +21,7 @@ pub(super) struct Basins {
 }
 
 impl Basins {
-    /// Keeps up to `most` places; poses that differ by less than both radii are one.
+    /// An empty list of up to `most` places. Poses that differ by less than `radius_m` and `radius_rad` are one place.
     pub(super) fn new(radius_m: f64, radius_rad: f64, most: usize) -> Self {
         Self { found: Vec::new(), radius_m, radius_rad, most }
     }
@@ -51,7 +51,8 @@ impl Basins {
         })
     }
 
-    /// Takes a pose in, unless a place as good is the same; the worse ones that are the same go.
+    /// Adds a pose, unless the same place is in the list with at least its score. Worse poses of the same place are
+    /// removed.
     pub(super) fn offer(&mut self, offered: Basin) {
         if self.cover(&offered.map_from_sensor, 0.0, 0.0, offered.score) {
             return;

@@ -1,4 +1,4 @@
-//! Cells of poses, and how many points of a scan can fall on the map from anywhere in one.
+//! Upper bounds of the search: how many points of a scan can fall on the map from any pose in a cell of poses.
 
 use std::f64::consts::PI;
 
@@ -9,20 +9,20 @@ use super::rotation::{RotationCell, RotationLattice};
 use super::sample::SearchSample;
 use crate::geometry::Pose;
 
-/// Slack for the rounding of places in a grid to f32, in voxels.
+/// Slack for the rounding of grid coordinates to f32, in voxels.
 const ROUNDING: f64 = 1e-2;
-/// A reach that every voxel is within.
+/// A distance, in voxels, that every voxel is within.
 const ANYWHERE: u8 = u8::MAX;
 
 /// A part of the space of poses: a cube of translations and a cell of rotations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct PoseCell {
-    /// How often it can still be halved.
+    /// Number of times that the cell can still be halved.
     pub(super) depth: u32,
-    /// Which of the search's orientations.
+    /// Index of the orientation among those of the search.
     pub(super) orientation: usize,
     pub(super) rotation: RotationCell,
-    /// Which cube, from the corner of the search's box.
+    /// Index of the cube of translations along each axis, from the corner of the search box.
     pub(super) translation: [i32; 3],
 }
 
@@ -71,7 +71,7 @@ impl<'a> Bounds<'a> {
         self.sample.points.iter().map(reaching).collect()
     }
 
-    /// Number of points.
+    /// Number of points of the sample.
     pub(super) fn points(&self) -> u16 {
         self.sample.points.len() as u16
     }
@@ -80,12 +80,12 @@ impl<'a> Bounds<'a> {
         self.orientations.len()
     }
 
-    /// Side of a depth's cubes, meters.
+    /// Side of the cubes of translations at `depth`, meters.
     pub(super) fn side_m_at(&self, depth: u32) -> f64 {
         self.side_m * f64::from(1u32 << depth)
     }
 
-    /// Cubes of a depth along each axis of the search's box, an even number.
+    /// Number of cubes at `depth` along each axis of the search box; even.
     pub(super) fn cubes(&self, depth: u32) -> [i32; 3] {
         let (min_m, max_m) = (self.levels.domain.min_m(), self.levels.domain.max_m());
         let pairs = |axis: usize| ((max_m[axis] - min_m[axis]) / self.side_m_at(depth) / 2.0).ceil().max(1.0);
@@ -110,7 +110,7 @@ impl<'a> Bounds<'a> {
         (0..3).all(|axis| min_m[axis] + (f64::from(cell.translation[axis]) + from) * side_m <= max_m[axis])
     }
 
-    /// Takes the bounds of cells with the rotation of `cell`.
+    /// Prepares the bounds of cells that have the rotation of `cell`.
     pub(super) fn turned(&self, cell: &PoseCell) -> Turned<'_> {
         let rotation = self.rotations.center(&self.orientations[cell.orientation], cell.depth, cell.rotation);
         let field = self.levels.at(cell.depth);

@@ -1,4 +1,4 @@
-//! From places of a search to ranked candidates.
+//! Candidates: the places that a search found, refined by alignment and ranked.
 
 use super::basins::Basin;
 use super::dilated::DilatedLevels;
@@ -11,10 +11,10 @@ use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
 use crate::voxel::volumetric_sample_until;
 
-/// Points that a place is refined with before it is known to be among the best.
+/// Number of points that a place is first refined with, before the best are refined with all.
 const THINNED: usize = 3000;
 
-/// What refinement reads.
+/// Inputs of the refinement of places.
 pub(super) struct Refinement<'a> {
     pub(super) map: &'a MultiResolutionMap,
     pub(super) points: &'a [Point],
@@ -26,8 +26,9 @@ pub(super) struct Refinement<'a> {
 }
 
 impl Refinement<'_> {
-    /// The distinct candidates that the places lead to, best first: all by some of the scan's points, then the best
-    /// `wish` by all of them. Once stopped the places are judged where they are, each by a few thousand look-ups.
+    /// The distinct candidates that the places lead to, best first. All are refined with some of the scan's points,
+    /// then the best `wish` with all of them. Once stopped, the remaining places are judged where they are, with a few
+    /// thousand look-ups each.
     pub(super) fn candidates(&self, places: &[Basin], wish: usize) -> Vec<Candidate> {
         let thinned = volumetric_sample_until(self.points, THINNED, self.alignment.seed, self.stop).points;
         let mut candidates: Vec<Candidate> =
@@ -36,7 +37,7 @@ impl Refinement<'_> {
         let mut candidates = self.distinct(candidates);
         for candidate in candidates.iter_mut().take(wish) {
             let refined = self.at(self.points, &candidate.map_from_sensor(), candidate.search_overlap);
-            // What was stopped on the way means nothing.
+            // A refinement that was stopped half-way is meaningless.
             if self.stop.is_stopped() {
                 break;
             }
@@ -48,7 +49,7 @@ impl Refinement<'_> {
         candidates
     }
 
-    /// The candidate that a place leads to; the place itself where the time is up.
+    /// The candidate that a place leads to, refined with the thinned points; the unrefined place once stopped.
     fn first_at(&self, thinned: &[Point], place: &Basin) -> Candidate {
         let (pose, search_overlap) = (place.map_from_sensor, self.share(place.score));
         if !self.stop.is_stopped() {
@@ -72,15 +73,14 @@ impl Refinement<'_> {
         Candidate { alignment, search_overlap, blocked, margin: None }
     }
 
-    /// The alignment of `points` from a place. Where that ends badly there is nothing to try around it: the search has.
+    /// Aligns `points` from a place. There is no restart from other guesses: the search has covered them.
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
         let mut alignment = *self.alignment;
         alignment.multi_start.ascents = 0;
         align_until(self.map, points, guess, &alignment, self.stop)
     }
 
-    /// The candidates without those that are the same place as a better one; that one takes over what their search
-    /// found.
+    /// Removes candidates that are the same place as a better one, which takes over their search score.
     fn distinct(&self, ranked: Vec<Candidate>) -> Vec<Candidate> {
         let radius_m = self.settings.basin_voxels * self.levels.finest().resolution_m();
         let mut distinct: Vec<Candidate> = Vec::with_capacity(ranked.len());
@@ -99,7 +99,7 @@ impl Refinement<'_> {
     }
 }
 
-/// Best fit first; of equals the first stays first.
+/// Sorts candidates by descending fit; the sort is stable.
 fn rank(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.fit().total_cmp(&a.fit()));
 }

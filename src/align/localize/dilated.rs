@@ -1,4 +1,4 @@
-//! The levels that a search reads: those of one revision of the map, dilated, and coarser ones where needed.
+//! Dilated levels that a search reads: those of one revision of the map, and coarser ones where they are needed.
 
 use super::distance_field::DistanceField;
 use super::sample::SearchSample;
@@ -14,34 +14,34 @@ use crate::voxel::{BLOCK_LEVELS, BlockMask, VoxelKey};
 #[derive(Debug)]
 pub(super) struct DilatedLevels {
     fields: Vec<DistanceField>,
-    /// Where the sensor is searched.
+    /// Box in which the sensor is searched for.
     pub(super) domain: SearchBox,
     /// The revision of the map that the levels were taken from.
     pub(super) revision: u64,
 }
 
-/// Voxels along a cell in the field that it reads, if there is one as fine: rounding up to whole voxels then costs
-/// little.
+/// Voxels along the side of a cell in the field that it reads, where there is a field as fine: rounding up to whole
+/// voxels then costs little.
 const VOXELS_PER_CELL: u32 = 4;
 /// Share of a map's voxels that may be strays at each end of each axis: seen through windows, or not there.
 const STRAY_SHARE: f64 = 1e-3;
-/// Search voxels within the scan's range that a search cannot do without.
+/// Fewest search voxels within the scan's range that a search works with.
 const RESOLUTIONS_PER_RANGE_MIN: f64 = 8.0;
-/// Levels beyond which a whole map is a voxel.
+/// Level at which a whole map is one voxel.
 const LEVEL_MAX: f64 = 20.0;
-/// Grids of a byte a voxel that building a field takes besides it, of the same size.
+/// Number of temporary grids, one byte a voxel, that exist while a field is built.
 const GRIDS_BESIDE: usize = 2;
-/// Poses of a trajectory between two looks at the stop signal.
+/// Poses of a trajectory between two checks of the stop signal.
 const POSES_PER_LOOK: usize = 16 << 10;
 
-/// The blocks of one revision of a map, in no order.
+/// Blocks of one revision of a map, in no particular order.
 struct Blocks {
     blocks: Vec<(VoxelKey, BlockMask)>,
     revision: u64,
 }
 
 impl Blocks {
-    /// A copy of the map's. Changes wait until it is made, and readers do not.
+    /// Copies the blocks of the map. Commits wait meanwhile; readers do not.
     fn of(map: &MultiResolutionMap, supervision: &mut Supervision<'_>) -> Result<Self, Unbuilt> {
         let count = map.view().lists(0).map(|list| list.blocks().len()).sum::<usize>();
         supervision.take(count * size_of::<(VoxelKey, BlockMask)>())?;
@@ -57,7 +57,8 @@ impl Blocks {
         Ok(Self { blocks, revision: view.revision() })
     }
 
-    /// Calls `f` with the voxels of `level` within a box of finest voxels, each once for each block that it is of.
+    /// Calls `f` with the voxels of `level` within a box of finest voxels. A coarse voxel comes once for each block
+    /// that it has.
     fn for_each_voxel(
         &self,
         level: u32,
@@ -82,8 +83,8 @@ impl Blocks {
 }
 
 impl DilatedLevels {
-    /// The levels that `sample` can show from within `search_box`; without one, from within the bulk of the map and
-    /// around its trajectory.
+    /// The levels that the points of `sample` can fall on from within `search_box`; without a box, from within the bulk
+    /// of the map and around its trajectory.
     ///
     /// # Errors
     /// When the map has no voxel there, or too many for [`LocalizationSettings::grid_bytes_max`]; when there is no memory
@@ -114,7 +115,7 @@ impl DilatedLevels {
             }
         };
         let seen = seen.ok_or(nothing_there.clone())?;
-        // From further away too little is in sight: so the box is finite, whatever was given.
+        // From farther away too little of the map is visible, so the box is finite whatever was given.
         let sight_m = sample.sight_m(settings.search_overlap_min) + resolution_m(1);
         let domain = domain.meet(box_of(seen).grown(sight_m)).ok_or(nothing_there.clone())?;
         let level = finest_level(seen, sample.range_m, resolution_m(0), settings)?;

@@ -1,12 +1,12 @@
-//! A map's level and all its dilations in one grid.
+//! Distance field: one grid that holds a level of the map and all its dilations.
 
 use super::supervision::{Unbuilt, check};
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
-/// Chebyshev distances beyond this many voxels are not told apart.
+/// Largest Chebyshev distance that is stored, in voxels; greater ones are all [`FAR`].
 pub(super) const DISTANCE_MAX: u8 = 8;
-/// A voxel with nothing occupied within [`DISTANCE_MAX`].
+/// Value of a voxel with nothing occupied within [`DISTANCE_MAX`].
 const FAR: u8 = DISTANCE_MAX + 1;
 
 /// The Chebyshev distance of every voxel of a box to the nearest occupied one, in voxels, up to [`DISTANCE_MAX`].
@@ -23,7 +23,7 @@ pub(super) struct DistanceField {
 }
 
 impl DistanceField {
-    /// Voxels of the grid around a box of voxels `min..=max`: the border is out of everybody's reach.
+    /// Size of the grid around the voxels `min..=max`, including a border that is [`FAR`] from all of them.
     pub(super) fn grid(min: [i32; 3], max: [i32; 3]) -> [usize; 3] {
         let border = 2 * usize::from(FAR);
         std::array::from_fn(|axis| max[axis].abs_diff(min[axis]) as usize + 1 + border)
@@ -41,15 +41,15 @@ impl DistanceField {
         Ok(Self { resolution_m, min: min.map(|i| i - i32::from(FAR)), size, distances })
     }
 
-    /// Takes note of an occupied voxel, one of those that the field was made around.
+    /// Marks a voxel as occupied; it must be within the box that the field was made for.
     pub(super) fn occupy(&mut self, voxel: VoxelKey) {
         let cell = self.cell(voxel.index());
         self.distances[cell] = 0;
     }
 
-    /// Finds the distances to the voxels that are occupied.
+    /// Computes the distances to the voxels that are marked as occupied.
     ///
-    /// One voxel further each round: the smallest of 3 x 3 x 3 neighbors, axis by axis, and one.
+    /// Each round extends the distances by one voxel: the smallest of the 3 x 3 x 3 neighbors, axis by axis, plus one.
     pub(super) fn spread(&mut self, stop: StopSignal<'_>) -> Result<(), Unbuilt> {
         let strides = [1, self.size[0], self.size[0] * self.size[1]];
         let (mut from, mut to) =
@@ -131,20 +131,20 @@ impl DistanceField {
         self.resolution_m
     }
 
-    /// `point_m` (map frame) in voxels from the grid's corner.
+    /// Converts `point_m` (map frame, meters) to voxels from the grid's corner.
     pub(super) fn in_grid(&self, point_m: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| point_m[axis] / self.resolution_m - f64::from(self.min[axis]))
     }
 
-    /// The distance at a place in the grid, in voxels from its corner; far, outside of it.
+    /// The distance at `place`, in voxels from the grid's corner; [`FAR`] outside of the grid.
     #[inline(always)]
     pub(super) fn at(&self, place: [f32; 3]) -> u8 {
         let [x, y, z] = std::array::from_fn(|axis| self.clamped(place[axis], axis));
         self.distances[(z * self.size[1] + y) * self.size[0] + x]
     }
 
-    /// Where on the way from `origin` along `toward` (voxels from the grid's corner) the grid is entered and left, as shares
-    /// of `toward`, none below 0; none where it is passed by, or a number is none.
+    /// Where the ray from `origin` along `toward` (voxels from the grid's corner) enters and leaves the grid, as
+    /// multiples of `toward`, not negative. None where the ray misses the grid or a number is NaN.
     pub(super) fn crossed_by(&self, origin: [f32; 3], toward: [f32; 3]) -> Option<(f32, f32)> {
         let (mut enters, mut leaves) = (0.0f32, f32::INFINITY);
         for axis in 0..3 {
@@ -160,17 +160,16 @@ impl DistanceField {
         (enters <= leaves && enters.is_finite()).then_some((enters, leaves))
     }
 
-    /// The row of the grid that a coordinate falls in, or the border's on its side.
+    /// Row of the grid that a coordinate falls in, clamped to the grid.
     #[inline(always)]
     fn clamped(&self, coordinate: f32, axis: usize) -> usize {
         (coordinate.max(0.0) as usize).min(self.size[axis] - 1)
     }
 
-    /// How many points are near an occupied voxel, for the eight translations `grid_from_sensor` + {0, `side`} an axis
-    /// (x fastest). Zeros when none of them can exceed `floor`.
+    /// Number of points near an occupied voxel, for the eight translations `grid_from_sensor` + {0, `side`} an axis (x
+    /// fastest). Zeros when none of them can exceed `floor`.
     ///
-    /// This is where a search spends its time: rotate, translate, quantize, look up, as everywhere in this map, eight
-    /// look-ups a point.
+    /// The inner loop of the search: rotate, translate, quantize, and look up, eight look-ups a point.
     pub(super) fn count_of_eight(
         &self,
         points: &[ReachingPoint],
@@ -183,7 +182,8 @@ impl DistanceField {
         let mut counts = [0u16; 8];
         let mut left = points.len();
         for points in points.chunks(CHUNK) {
-            // Rows of the grid, low and high translation, axis by axis: two loops, so that the first is vectorized.
+            // Rows of the grid for the low and high translation, axis by axis. Two loops, so that the first is
+            // vectorized.
             let mut rows = [[[0u32; CHUNK]; 2]; 3];
             for axis in 0..3 {
                 let [r0, r1, r2] = grid_from_sensor.rotation[axis];
@@ -212,14 +212,15 @@ impl DistanceField {
     }
 }
 
-/// A point in the sensor frame, meters, and how far from it an occupied voxel may be, in voxels.
+/// A point in the sensor frame, meters, and the distance, in voxels, within which a voxel must be occupied for the
+/// point to count.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ReachingPoint {
     pub(super) xyz: [f32; 3],
     pub(super) reach: u8,
 }
 
-/// From meters in the sensor frame to voxels from the corner of a grid.
+/// Transform from meters in the sensor frame to voxels from the corner of a grid.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GridFromSensor {
     /// Rows of the rotation matrix, over the resolution.
@@ -227,10 +228,10 @@ pub(super) struct GridFromSensor {
     pub(super) translation: [f32; 3],
 }
 
-/// Points between two looks at whether it is worth going on.
+/// Points between two checks of whether `floor` can still be exceeded.
 const CHUNK: usize = 32;
 
-/// The whole part of `place`, clamped to 0..=`last`.
+/// The integer part of `place`, clamped to 0..=`last`.
 ///
 /// Adding 2^23 leaves no bit for fractions: a conversion that vectorizes without any unsafe code. It rounds to
 /// nearest, so half is taken off; a tie may go either way, which the slack of a bound allows for.
@@ -240,10 +241,10 @@ fn whole(place: f32, last: f32) -> u32 {
     ((place - 0.5).clamp(0.0, last) + SHIFT).to_bits() - SHIFT.to_bits()
 }
 
-/// Cells of a grid between two looks at the stop signal: a fraction of a millisecond.
+/// Cells of a grid between two checks of the stop signal: a fraction of a millisecond.
 const CELLS_PER_LOOK: usize = 1 << 20;
 
-/// Makes a field of so many cells with nothing near.
+/// A grid of `cells` voxels, all of them [`FAR`].
 fn far_everywhere(cells: usize, stop: StopSignal<'_>) -> Result<Vec<u8>, Unbuilt> {
     let mut distances = Vec::with_capacity(cells);
     while distances.len() < cells {

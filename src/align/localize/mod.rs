@@ -7,8 +7,9 @@
 //! such a bound only after dilation, since a point's cube of translations spans up to 2 x 2 x 2 of its voxels and
 //! rotations widen that by the arc at the point's range.
 //!
-//! Reading order: `field` is a dilated level, `dilated` the levels of one revision, `orientation` and `rotation` the rotations,
-//! `bound` the bounds, `search` the search; `candidates`, `sight` and `verdict` say what its places are worth.
+//! Reading order: `distance_field` is a dilated level, `dilated` the levels of one revision, `orientation` and
+//! `rotation` the rotations, `bound` the bounds, `search` the search; `candidates`, `visibility` and `verdict` judge
+//! the places that it finds.
 
 mod answer;
 mod basins;
@@ -52,9 +53,9 @@ use verdict::verdict_on;
 
 /// Finds where in the map a scan was taken, with no guess.
 ///
-/// `points` are in the sensor frame; those farther away than any two places of a map are left out. One revision of the map
-/// is searched; the refinement at the end sees the map as it is then. One thread does it all, and the same input gives
-/// the same answer.
+/// `points` are in the sensor frame, meters; those farther away than any two places of a map are left out. One revision
+/// of the map is searched; the refinement at the end reads the map as it is then. The search runs on one thread, and
+/// the same input gives the same answer.
 ///
 /// # Errors
 /// When the map is empty, has nothing near the search box, or needs more memory than the settings allow; when no point
@@ -75,8 +76,9 @@ pub fn localize(
     localize_supervised(map, points, query, settings, alignment, alone)
 }
 
-/// [`localize`] under supervision. Once it is stopped, which every phase looks at every few milliseconds, the answer is
-/// the best so far, refined by what was left of the time: cut short, and never accepted.
+/// [`localize`] with stop signals, progress reports and a memory budget. Every phase checks the stop signal every few
+/// milliseconds. Once stopped, the answer is the best so far, refined in what is left of the time: it is cut short, and
+/// never accepted.
 ///
 /// # Errors
 /// As for [`localize`]; when memory is refused.
@@ -104,7 +106,7 @@ fn search_and_refine(
     supervision: &mut Supervision<'_>,
 ) -> Result<Localization, Unbuilt> {
     let (stop, extent_m) = (supervision.stop, map.lattice().extent_m());
-    // A copy of the points, and what thinning them takes.
+    // Memory for a copy of the points, and for thinning them.
     supervision.take(size_of_val(points) + sample_bytes_max(points.len()))?;
     let points: &[Point] = &within_extent(points, extent_m, stop);
     supervision::check(stop)?;
@@ -118,7 +120,8 @@ fn search_and_refine(
     // 2) Dilate one revision of the map, at levels coarser than its own where needed.
     let levels = DilatedLevels::of(map, &sample, query.search_box, settings, supervision)?;
 
-    // 3) Turn about the way down where it is known, else about what the scan's surfaces and the map's could share.
+    // 3) Consider all rotations about the direction of gravity where it is known, else those that bring surfaces of the
+    // scan parallel to surfaces of the map.
     let orientations = Orientations::of(points, &levels, query.gravity.as_ref(), settings, stop)?;
 
     // 4) Bound and divide cells of poses, the most promising first.
@@ -150,7 +153,7 @@ fn search_and_refine(
 }
 
 impl Localization {
-    /// The answer of a search that was stopped before there was anything to search in.
+    /// The answer of a search that was stopped before its data structures were built.
     fn cut_short_at_once(revision: u64) -> Self {
         Self {
             verdict: Verdict::Ambiguous,

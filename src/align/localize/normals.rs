@@ -1,4 +1,4 @@
-//! The directions that most surfaces face.
+//! Dominant surface normals: the directions that most surfaces face.
 
 use nalgebra::{Matrix3, UnitVector3, Vector3};
 
@@ -7,25 +7,25 @@ use crate::geometry::symmetric_eigen;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
-/// Voxels each way that a surface is fitted to.
+/// Half width, in voxels, of the neighborhood that a plane is fitted to.
 const WINDOW: i32 = 2;
 /// Fewest voxels that make a surface.
 const VOXELS_MIN: usize = 8;
 /// How much flatter than wide the voxels of a surface are: smallest to middle eigenvalue.
 const FLATNESS_MAX: f64 = 0.35;
-/// Surfaces looked at.
+/// Most voxels that a plane is fitted around.
 pub(super) const SURFACES_MAX: usize = 2000;
-/// Directions closer than this are one.
+/// Directions within this angle, degrees, are one cluster.
 const SAME_DEG: f64 = 8.0;
-/// Directions less than this apart are not told apart.
+/// Least angle, degrees, between two dominant directions.
 const APART_DEG: f64 = 20.0;
-/// Share of the surfaces that makes a direction dominant.
+/// Least share of the surfaces that a dominant direction has.
 const SHARE_MIN: f64 = 0.04;
-/// Surfaces that are fitted, or compared with all others, between two looks at the stop signal.
+/// Surfaces that are fitted, or compared with all others, between two checks of the stop signal.
 const SURFACES_PER_LOOK: usize = 64;
 
-/// Up to `wish` directions, without sign, that surfaces made of occupied voxels face around `voxels`, at most
-/// [`SURFACES_MAX`] of them; most frequent first.
+/// Up to `wish` dominant normals (without sign) of the surfaces around `voxels`, at most [`SURFACES_MAX`] of them; most
+/// frequent first.
 pub(super) fn dominant_normals(
     voxels: &[VoxelKey],
     is_occupied: &dyn Fn(VoxelKey) -> bool,
@@ -88,7 +88,7 @@ fn mean_axis(directions: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     Some(eigen.eigenvectors.column(order[2]).into_owned())
 }
 
-/// Eigenvalues, and the order that makes them ascend.
+/// Eigenvalues and eigenvectors, with the order that sorts the eigenvalues ascending.
 fn sorted_eigen(
     symmetric: Matrix3<f64>,
 ) -> Option<([usize; 3], nalgebra::SymmetricEigen<f64, nalgebra::U3>)> {

@@ -1,4 +1,4 @@
-//! Which rotations a search considers.
+//! Orientations: the rotations that a search considers.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -24,10 +24,10 @@ pub(super) struct Orientation {
 }
 
 impl Orientation {
-    /// All rotations that bring `sensor` (sensor frame) near `map` (map frame).
+    /// All rotations that turn the direction `sensor` (sensor frame) to within the tilt tolerance of `map` (map frame).
     pub(super) fn bringing(sensor: UnitVector3<f64>, map: UnitVector3<f64>) -> Self {
         let to_z = |axis: UnitVector3<f64>| {
-            // Opposite vectors leave the axis of the turn open; any will do.
+            // Between opposite vectors any perpendicular axis will do.
             UnitQuaternion::rotation_between_axis(&axis, &Vector3::z_axis())
                 .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI))
         };
@@ -47,22 +47,23 @@ impl Orientation {
 #[derive(Debug)]
 pub(super) struct Orientations {
     pub(super) families: Vec<Orientation>,
-    /// How far the common axis may lie off, each way in x and y, radians.
+    /// Tolerance of the common axis, each way in x and y, radians.
     pub(super) tilt_max_rad: f64,
-    /// True when the scan's rotation is certainly among them.
+    /// True when the families certainly contain the scan's rotation.
     pub(super) all: bool,
 }
 
-/// Directions of the map's surfaces that the scan's may be; most maps have a floor and a wall.
+/// Number of dominant normals of the map that are tried; most maps have a floor and a wall.
 const MAP_DIRECTIONS: usize = 2;
-/// Directions of the scan's surfaces; most scans show no more.
+/// Number of dominant normals of the scan that are tried; most scans have no more.
 const SCAN_DIRECTIONS: usize = 4;
-/// Points of a scan that are quantized between two looks at the stop signal.
+/// Points of a scan that are quantized between two checks of the stop signal.
 const POINTS_PER_LOOK: usize = 16 << 10;
 
 impl Orientations {
-    /// The turns about the way down where it is known. Where not, those that bring one of the scan's dominant surfaces
-    /// parallel to one of the map's, either way round: nobody can be sure that there is one.
+    /// The families of a search: one about the direction of gravity where it is known. Otherwise those that bring one
+    /// of the scan's dominant surfaces parallel to one of the map's, either way round; then the search is not
+    /// exhaustive.
     pub(super) fn of(
         points: &[Point],
         levels: &DilatedLevels,
@@ -97,7 +98,7 @@ impl Orientations {
     }
 }
 
-/// The voxels of a scan in its own frame, by block. Coarser than any lattice's limit there is nothing to see.
+/// The voxels of a scan in its own frame, block by block. Above the lattice's coarsest resolution the result is empty.
 fn voxels_of(
     points: &[Point],
     resolution_m: f64,

@@ -1,21 +1,21 @@
-//! What is known beforehand of where a scan was taken.
+//! Queries of global localization: what is known beforehand of where a scan was taken.
 
 use nalgebra::{UnitVector3, Vector3};
 
 /// What to search for, and where.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LocalizationQuery {
-    /// Which way is down; any rotation is considered without.
+    /// Direction of gravity; without it, any rotation is considered.
     pub gravity: Option<Gravity>,
-    /// Where the sensor may be; within the bulk of the map and around its trajectory without.
+    /// Box in which the sensor may be; without it, the bulk of the map and around its trajectory.
     pub search_box: Option<SearchBox>,
-    /// Candidates wanted, at most.
+    /// Most candidates that are returned.
     pub candidates: usize,
     /// Seed of the choice of the scan's points: the same seed gives the same answer, on every machine.
     pub seed: u64,
 }
 
-/// Which way things fall, in both frames.
+/// Direction of gravity in the sensor frame and in the map frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gravity {
     pub(super) in_sensor: UnitVector3<f64>,
@@ -32,10 +32,10 @@ pub struct SearchBox {
     pub(super) max_m: [f64; 3],
 }
 
-/// Why numbers say nothing of where a scan was taken.
+/// Why a query is not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LocalizationQueryError {
-    /// A direction that is none.
+    /// A direction that is zero or not finite; the payload is the field and its value.
     #[error("{0} must be a finite direction other than zero, got {1:?}")]
     Direction(&'static str, [f64; 3]),
     /// A corner with NaN, or corners in the wrong order.
@@ -44,8 +44,8 @@ pub enum LocalizationQueryError {
 }
 
 impl Gravity {
-    /// Gravity as an accelerometer at rest tells it (its reading points up, so with the other sign), of any length,
-    /// in the sensor and in the map frame.
+    /// Gravity as the direction in which things fall, of any length, in the sensor frame and in the map frame. An
+    /// accelerometer at rest reads the opposite direction.
     ///
     /// # Errors
     /// When one is not finite, or zero.
@@ -62,12 +62,12 @@ impl Gravity {
         })
     }
 
-    /// Unit vector, sensor frame.
+    /// Direction of gravity in the sensor frame, a unit vector.
     pub fn in_sensor(&self) -> [f64; 3] {
         self.in_sensor.into_inner().into()
     }
 
-    /// Unit vector, map frame.
+    /// Direction of gravity in the map frame, a unit vector.
     pub fn in_map(&self) -> [f64; 3] {
         self.in_map.into_inner().into()
     }
@@ -112,7 +112,7 @@ impl SearchBox {
         }
     }
 
-    /// What both boxes hold; none where that is nothing.
+    /// The intersection of both boxes; none where it is empty.
     pub(super) fn meet(self, other: Self) -> Option<Self> {
         let min_m = std::array::from_fn(|axis| self.min_m[axis].max(other.min_m[axis]));
         let max_m = std::array::from_fn(|axis| self.max_m[axis].min(other.max_m[axis]));

@@ -1,4 +1,4 @@
-//! How the rotations of a search are cut into cells.
+//! The lattice of rotations: how a search divides them into cells.
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -6,18 +6,18 @@ use nalgebra::UnitQuaternion;
 
 use super::orientation::Orientation;
 
-/// How the rotations of an [`Orientation`] are cut at each depth of the search; 0 is the finest.
+/// Division of the rotations of an [`Orientation`] into cells, at each depth of the search; 0 is the finest.
 #[derive(Debug, Clone)]
 pub(super) struct RotationLattice {
-    /// How far the axis may lie off, each way in x and y, radians.
+    /// Tolerance of the common axis, each way in x and y, radians.
     tilt_max_rad: f64,
-    /// Cells of the full turn, by depth.
+    /// Number of cells of the full turn, by depth.
     yaws: Vec<i32>,
-    /// Cells of the tilt along each of its two axes, by depth.
+    /// Number of cells of the tilt along each of its two axes, by depth.
     tilts: Vec<i32>,
 }
 
-/// A cell of a [`RotationLattice`]: which part of the turn, which part of each tilt.
+/// A cell of a [`RotationLattice`]: its index along the yaw and along each tilt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct RotationCell {
     pub(super) yaw: i32,
@@ -25,8 +25,8 @@ pub(super) struct RotationCell {
 }
 
 impl RotationLattice {
-    /// Cells of at most `turn_rad` from their center at depth 0 and about twice as much a depth, half of it for
-    /// the yaw and half for the tilt.
+    /// Divides rotations into cells of at most `turn_rad` from their center at depth 0, and about twice as much at each
+    /// next depth, half of it for the yaw and half for the tilt.
     pub(super) fn new(turn_rad: f64, tilt_max_rad: f64, depths: u32) -> Self {
         let turn_at = |depth: u32| turn_rad * f64::from(1u32 << depth);
         let top = depths - 1;

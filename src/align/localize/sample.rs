@@ -1,4 +1,4 @@
-//! The points of a scan that a search looks at.
+//! The sample of a scan's points that a search reads.
 
 use nalgebra::Point3;
 use rand::SeedableRng;
@@ -12,9 +12,9 @@ use crate::voxel::volumetric_sample_until;
 /// A few hundred points, even over the surfaces that a scan shows, in random order.
 #[derive(Debug, Clone)]
 pub(super) struct SearchSample {
-    /// Sensor frame.
+    /// The points: sensor frame, meters, in random order.
     pub(super) points: Vec<Point3<f64>>,
-    /// Distance from the sensor within which three quarters of them lie, meters: what a rotation is measured by.
+    /// Range that three quarters of the points are within, meters; the size of rotation cells depends on it.
     pub(super) range_m: f64,
 }
 
@@ -24,14 +24,14 @@ const THINNING: usize = 20;
 /// Share of the points within [`SearchSample::range_m`].
 const RANGE_QUANTILE: f64 = 0.75;
 
-/// Ranges within which the nearest points lie, with what the search's voxels add: a quarter of the range at most.
+/// Factor that extends [`SearchSample::range_m`] by the size of the search's voxels, a quarter of the range at most.
 const SIGHT: f64 = 1.25;
 
 impl SearchSample {
     /// Thins `points` (finite, at least one) to `wish` of them.
     pub(super) fn of(points: &[Point], wish: usize, seed: u64, stop: StopSignal<'_>) -> Self {
         let mut sample = volumetric_sample_until(points, wish.saturating_mul(THINNING), seed, stop).points;
-        // In random order the first points foretell the rest, so that hopeless cells are given up early.
+        // In random order the first points predict the rest, so that hopeless cells are given up early.
         sample.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
         sample.truncate(wish);
         let points: Vec<Point3<f64>> = sample.into_iter().map(Point::to_f64).collect();
@@ -41,9 +41,9 @@ impl SearchSample {
         Self { points, range_m }
     }
 
-    /// Within which a voxel lies of every place where at least `share` of the points fall on the map, meters, from that
-    /// place: where so many do, one of the nearest does. A stray far return has no say, unless `share` is so small that
-    /// strays alone could make it.
+    /// Distance, meters, within which the map has a voxel around every place where at least `share` of the points fall
+    /// on the map: there, one of the nearest points does. Stray far returns have no influence, unless `share` is so
+    /// small that strays alone could make it.
     pub(super) fn sight_m(&self, share: f64) -> f64 {
         match share > 1.0 - RANGE_QUANTILE {
             true => self.range_m * SIGHT,

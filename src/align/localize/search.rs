@@ -1,4 +1,4 @@
-//! Branch and bound over poses, best first.
+//! The search: branch and bound over cells of poses, best first.
 
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
@@ -10,33 +10,33 @@ use super::{LocalizationSettings, SearchProgress, Supervision};
 /// What a search found.
 #[derive(Debug)]
 pub(super) struct Found {
-    /// Best first.
+    /// The places, best first.
     pub(super) places: Vec<Basin>,
-    /// Nothing was left out.
+    /// True when the search ended by itself and dropped no cell for want of memory.
     pub(super) complete: bool,
-    /// Cells whose bound was taken.
+    /// Number of cells whose bound was computed.
     pub(super) cells: u64,
 }
 
-/// A cell that waits to be divided, ordered by what is expected of it.
+/// A cell that waits to be divided, ordered by [`Waiting::promise`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Waiting {
-    /// The cell's bound less what it is expected to lose until the finest depth: deep cells come first among equals,
-    /// and so good poses are found early, which prune the rest.
+    /// Priority of the cell: its bound less the expected loss until the finest depth. Among equal bounds deep cells
+    /// come first, so that good poses are found early and prune the rest.
     promise: i32,
     bound: u16,
     cell: PoseCell,
 }
 
-/// Share of the points that a bound is expected to lose with each halving.
+/// Expected loss of a bound with each halving, as a share of the points.
 const LOSS_PER_HALVING: f64 = 0.04;
-/// Cells divided between two reports of progress.
+/// Cells that are divided between two progress reports.
 const CELLS_PER_REPORT: u32 = 64;
-/// Eights of cells that are bounded between two looks at the stop signal: each is eight look-ups a search point, all of
-/// them a millisecond or less.
+/// Groups of eight cells that are bounded between two checks of the stop signal. Each group takes eight look-ups a
+/// search point; together they take a millisecond or less.
 const EIGHTS_PER_LOOK: u32 = 64;
 
-/// Cells that there is room for before any of them waits.
+/// Initial capacity of the queue, in cells.
 const ROOM_AT_FIRST: usize = 1024;
 
 /// A search under way.
@@ -44,12 +44,12 @@ pub(super) struct Search<'a, 's> {
     bounds: &'a Bounds<'a>,
     settings: &'a LocalizationSettings,
     supervision: &'a mut Supervision<'s>,
-    /// Eights bounded since the last look at the stop signal.
+    /// Groups of eight that were bounded since the last check of the stop signal.
     since_look: u32,
     waiting: BinaryHeap<Waiting>,
-    /// Cells that memory was reserved for.
+    /// Number of cells that memory is reserved for.
     room: usize,
-    /// Beyond which the least promising cells are dropped: no more than there is memory for.
+    /// Most cells that may wait, by settings and memory; beyond it the least promising are dropped.
     waiting_max: usize,
     basins: Basins,
     cells: u64,
@@ -115,7 +115,7 @@ impl<'a, 's> Search<'a, 's> {
         ControlFlow::Continue(())
     }
 
-    /// Divides the most promising cell, until none can hold a place worth knowing.
+    /// Divides the most promising cell until no cell can hold a better place.
     fn divide_best_first(&mut self) -> ControlFlow<()> {
         let mut divided = 0u32;
         while let Some(Waiting { bound, cell, .. }) = self.waiting.pop() {
@@ -144,7 +144,7 @@ impl<'a, 's> Search<'a, 's> {
         ControlFlow::Continue(())
     }
 
-    /// Bounds `first` and its seven neighbors of the same parent, and lets those wait that are worth it.
+    /// Computes the bounds of `first` and its seven siblings, and queues those that may hold a better place.
     fn enter_eight(&mut self, first: PoseCell, turned: &Turned<'_>, parent: u16) -> ControlFlow<()> {
         self.since_look += 1;
         if self.since_look >= EIGHTS_PER_LOOK {
@@ -170,10 +170,10 @@ impl<'a, 's> Search<'a, 's> {
         ControlFlow::Continue(())
     }
 
-    /// Lets twice as many cells wait as there was room for. Where there is no memory for them, no more may wait than now.
+    /// Doubles the capacity of the queue. Where memory for that is refused, the present capacity becomes the limit.
     fn make_room(&mut self) {
         let room = (2 * self.room).max(ROOM_AT_FIRST);
-        // While they move, both are there.
+        // While the queue is moved, both allocations exist.
         match self.supervision.take(room * size_of::<Waiting>()) {
             Ok(()) => {
                 self.waiting.reserve_exact(room - self.waiting.len());
@@ -183,7 +183,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Cells bounded by this much or less are of no interest.
+    /// Cells whose bound is this or less are discarded.
     fn floor(&self) -> u16 {
         let share = |share: f64, of: u16| (share * f64::from(of)) as u16;
         share(self.settings.search_overlap_min, self.bounds.points())
@@ -191,7 +191,7 @@ impl<'a, 's> Search<'a, 's> {
             .max(self.basins.entry())
     }
 
-    /// True when the whole cell is a place that is known, and better.
+    /// True when every pose of the cell belongs to a known place with a better score.
     fn is_known(&self, cell: &PoseCell, bound: u16) -> bool {
         let half_diagonal_m = self.bounds.side_m_at(cell.depth) / 2.0 * 3f64.sqrt();
         let turn_rad = self.bounds.rotations.turn_rad(cell.depth);
@@ -199,7 +199,7 @@ impl<'a, 's> Search<'a, 's> {
             && self.basins.cover(&self.bounds.center(cell), half_diagonal_m, turn_rad, bound)
     }
 
-    /// Half of the cells have to go.
+    /// Drops the less promising half of the queue.
     fn drop_least_promising(&mut self) {
         let mut cells = std::mem::take(&mut self.waiting).into_vec();
         let floor = self.floor();
@@ -224,7 +224,7 @@ impl<'a, 's> Search<'a, 's> {
         self.look()
     }
 
-    /// Breaks once it is to end.
+    /// Checks the stop signal and reports progress; breaks when the search is to end.
     fn look(&mut self) -> ControlFlow<()> {
         self.since_look = 0;
         let Supervision { stop, search_stop, .. } = &self.supervision;

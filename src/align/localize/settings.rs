@@ -1,31 +1,31 @@
-//! The constants of the search, by name.
+//! Settings of global localization.
 
 /// Settings of [`super::localize`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalizationSettings {
-    /// Points of the scan that bound a cell of poses. 300.
+    /// Number of sample points that a cell of poses is bounded with. 300.
     pub search_points: usize,
-    /// Finest voxels of the search within the scan's range (that of three quarters of its points): the search ends
-    /// where the ascent of an alignment is sure to go on. 56.
+    /// Number of finest search voxels within the scan's range (that of three quarters of its points): the search ends
+    /// at cells from which the ascent of an alignment converges. 56.
     pub resolutions_per_range: f64,
-    /// Times the search's coarsest cells are halved. 4.
+    /// Number of times that the coarsest cells are halved. 4.
     pub halvings: u32,
-    /// How far points may move by rotation within a cell, as a share of its side. 0.5.
+    /// Distance that points may move by rotation within a cell, as a share of the cell's side. 0.5.
     pub arc_share: f64,
-    /// How far the direction of gravity may be wrong, degrees. 2.
+    /// Largest error of the direction of gravity, degrees. 2.
     pub gravity_tolerance_deg: f64,
-    /// How far a surface's direction may be wrong where the up direction is guessed from surfaces, degrees. 3.
+    /// Largest error of a surface normal, degrees, where rotations are derived from surfaces. 3.
     pub surface_tolerance_deg: f64,
-    /// Share of the search points that must fall on the dilated map for a pose to be looked at. 0.6.
+    /// Least share of the search points that fall on the dilated map for a pose to be considered. 0.6.
     pub search_overlap_min: f64,
-    /// Poses of less than this share of the best one's search points are not looked at: as long as there is none
-    /// above, no other place can be mistaken for the best. 0.9.
+    /// Least share of the best pose's search points for a pose to be considered. Another place can be mistaken for the
+    /// best only above it. 0.9.
     pub search_share_of_best: f64,
-    /// Poses that differ by less than so many voxels of the search are one place. 5.
+    /// Two poses are the same place where they differ by less than this many search voxels. 5.
     pub basin_voxels: f64,
     /// Two poses are the same place where they also differ by less than so many degrees. 10.
     pub basin_deg: f64,
-    /// Places of which the search keeps the best. 16.
+    /// Number of best places that the search keeps. 16.
     pub basins_max: usize,
     /// Fraction of a scan's points that must fall in occupied voxels for a place to be accepted. 0.45: more than an
     /// alignment asks, which knows where to look.
@@ -33,12 +33,11 @@ pub struct LocalizationSettings {
     /// Share of a scan's rays that may pass through what the map holds for a place to be accepted. 0.4:
     /// rays that graze edges count, in a building with many doors up to a quarter of them.
     pub blocked_max: f64,
-    /// Overlap of the runner-up, as a share of the best one's, from which on the two are told apart by nothing.
-    /// 0.95.
+    /// Two candidates are ambiguous where the overlap of the second is at least this share of that of the best. 0.95.
     pub ambiguous_share: f64,
-    /// Bytes that the dilated levels of one search may take. 512 MiB.
+    /// Most bytes of the dilated levels of one search. 512 MiB.
     pub grid_bytes_max: usize,
-    /// Cells that may wait to be divided; beyond them the least promising are dropped, and the search is not
+    /// Most cells that may wait to be divided; beyond it the least promising are dropped, and the search is not
     /// exhaustive. 4,000,000.
     pub cells_waiting_max: usize,
 }

@@ -1,4 +1,4 @@
-//! Where along each axis the voxels of a map lie.
+//! Slabs: how the voxels of a map are distributed along each axis.
 
 use super::supervision::{Unbuilt, check};
 use crate::util::StopSignal;
@@ -7,10 +7,10 @@ use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, VoxelKey};
 /// A box of finest voxels, inclusive.
 pub(super) type VoxelBox = ([i32; 3], [i32; 3]);
 
-/// Blocks that are looked at between two looks at the stop signal.
+/// Blocks that are counted between two checks of the stop signal.
 pub(super) const BLOCKS_PER_LOOK: usize = 16 << 10;
 
-/// The finest voxels in each slab of blocks, axis by axis.
+/// Number of finest voxels in each slab of blocks, axis by axis.
 #[derive(Debug)]
 pub(super) struct Slabs {
     /// Index of the first slab.
@@ -20,7 +20,7 @@ pub(super) struct Slabs {
 }
 
 impl Slabs {
-    /// The slabs of the blocks of a map, of which there is at least one.
+    /// Counts the slabs of the blocks of a map, of which there is at least one.
     pub(super) fn of(blocks: &[(VoxelKey, BlockMask)], stop: StopSignal<'_>) -> Result<Self, Unbuilt> {
         let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
         for blocks in blocks.chunks(BLOCKS_PER_LOOK) {
@@ -46,7 +46,7 @@ impl Slabs {
         Ok(counted)
     }
 
-    /// The box that holds all blocks but a `stray` share of the voxels at each end of each axis.
+    /// Box of all blocks, without those that hold the outermost `stray` share of the voxels at each end of each axis.
     pub(super) fn bounds(&self, stray: f64) -> Option<VoxelBox> {
         let strays = (self.voxels as f64 * stray) as usize;
         let (mut low, mut high) = ([0; 3], [0; 3]);
@@ -61,7 +61,7 @@ impl Slabs {
     }
 }
 
-/// The slab in which more than `strays` voxels have been passed.
+/// Index of the slab in which the running total first exceeds `strays`.
 fn first_beyond<'a>(strays: usize, counts: impl Iterator<Item = &'a usize>) -> Option<i32> {
     let mut passed = 0;
     let mut beyond = counts.map(|count| {

@@ -1,17 +1,18 @@
-//! What a search asks of whoever started it.
+//! Supervision of a search by its caller.
 
 use super::{LocalizationError, SearchProgress};
 use crate::util::StopSignal;
 
-/// When a search is to end, who hears how far it is, and what memory it may have.
+/// Callbacks of a search: when to end, where to report progress, and how much memory to take.
 pub struct Supervision<'a> {
-    /// Asked every few milliseconds, in every phase. Stopped, a search answers with what it has.
+    /// Stop signal of all phases, checked every few milliseconds. Once set, the search returns what it has.
     pub stop: StopSignal<'a>,
-    /// Asked by the search alone, as often: what it found until then is refined while `stop` lets it.
+    /// Stop signal of the search phase alone. What was found until then is still refined, as long as `stop` allows.
     pub search_stop: StopSignal<'a>,
-    /// Told every few hundred cells.
+    /// Called with the progress every few hundred cells.
     pub progress: &'a mut dyn FnMut(&SearchProgress),
-    /// Asked before memory is taken, for so many bytes beside all those before: false refuses them, and ends the search.
+    /// Called before memory is taken, with the number of bytes in addition to all those before. False refuses the
+    /// memory and ends the search.
     pub reserve: &'a mut dyn FnMut(usize) -> bool,
 }
 
@@ -21,12 +22,12 @@ impl std::fmt::Debug for Supervision<'_> {
     }
 }
 
-/// Why what a search reads was not built.
+/// Why the data structures of a search were not built.
 #[derive(Debug)]
 pub(super) enum Unbuilt {
-    /// Building was stopped: there is nothing to search in.
+    /// Building was stopped, so there is nothing to search in.
     Stopped,
-    /// What is searched in cannot be built.
+    /// The data structures cannot be built, for the reason given.
     Refused(LocalizationError),
 }
 

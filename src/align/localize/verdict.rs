@@ -1,9 +1,10 @@
-//! Whether the best candidate is where the scan was taken.
+//! Verdict of global localization: whether the best candidate is where the scan was taken.
 
 use super::{Candidate, LocalizationSettings};
 use crate::align::Verdict;
 
-/// Believes the first of `ranked` where it fits, is held in every direction, and no other place is as good.
+/// Verdict on the first of `ranked`, with the reason. It is accepted where it fits, is determined in every direction,
+/// and no other place is as good.
 pub(super) fn verdict_on(
     ranked: &[Candidate],
     cut_short: bool,
@@ -40,9 +41,9 @@ pub(super) fn verdict_on(
     }
 }
 
-/// By what nothing tells `other` from `best`, with both figures: the finest voxels, or the dilated map that both were
-/// found on. In a map where the scan does not belong many places are alike on the latter, and one of them is the best by
-/// chance.
+/// The measure by which `other` is as good as `best`, with both values: overlap with the finest voxels, or with the
+/// dilated map that both were found on. Where the scan does not belong to the map, many places score alike on the
+/// dilated map, and one of them is best by chance.
 fn rivals(
     other: &Candidate,
     best: &Candidate,

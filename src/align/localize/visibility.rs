@@ -1,4 +1,4 @@
-//! Free space as evidence: what a sensor looked through cannot be there.
+//! Visibility: what the sensor looked through cannot be occupied.
 
 use super::dilated::DilatedLevels;
 use super::distance_field::DISTANCE_MAX;
@@ -6,25 +6,26 @@ use super::sample::SearchSample;
 use crate::geometry::Pose;
 use crate::util::StopSignal;
 
-/// How far from everything, in voxels, a ray is out in the open again.
+/// Distance to the nearest occupied voxel, in voxels, at which a ray counts as out in the open again.
 const OPEN: u8 = 3;
-/// How long a ray is in occupied voxels, in voxels, before it is taken for passing through and not by their corners.
+/// Length of a ray within occupied voxels, in voxels, from which on it counts as passing through them and not past
+/// their corners.
 const THROUGH: f32 = 1.0;
-/// A ray's steps where something is near, in voxels.
+/// Step along a ray near occupied voxels, in voxels.
 const STEP: f32 = 0.5;
-/// A ray's steps where nothing is, in voxels.
+/// Step along a ray where nothing is near, in voxels.
 const OPEN_STEP: f32 = DISTANCE_MAX as f32;
 
-/// Rays that are followed between two looks at the stop signal, each by at most two steps for each voxel along the grid's
-/// diagonal.
+/// Rays that are followed between two checks of the stop signal, each by at most two steps for each voxel along the
+/// grid's diagonal.
 const RAYS_PER_LOOK: usize = 16;
 
-/// The share of the sample's rays that pass through what the map holds and come out behind it, before they reach
-/// their points. 0 without points.
+/// Share of the sample's rays that pass through occupied voxels and come out behind them before they reach their
+/// points; 0 without points.
 ///
-/// Coming out is what counts: a ray along a floor is within its voxels for meters before it ends there. The paper
-/// stores no free space (III-B); this is its converse, the rays of one scan against the occupied voxels. It means nothing
-/// once stopped.
+/// A ray has to come out again: along a floor it is within occupied voxels for meters before it ends there. The paper
+/// stores no free space (III-B); this is the converse, the rays of one scan against the occupied voxels. Once stopped,
+/// the result is meaningless.
 pub(super) fn blocked_share(
     levels: &DilatedLevels,
     sample: &SearchSample,
@@ -38,11 +39,11 @@ pub(super) fn blocked_share(
         let end = place(map_from_sensor * **point);
         let toward: [f32; 3] = std::array::from_fn(|axis| end[axis] - origin[axis]);
         let length = toward.iter().map(|c| c * c).sum::<f32>().sqrt();
-        // Farther than single precision tells, which is nowhere on a map.
+        // Beyond the precision of f32, which is nowhere on a map.
         if !length.is_finite() {
             return false;
         }
-        // Outside of the grid nothing is near: there the ray is passed over in the steps that it takes anyway.
+        // Outside of the grid nothing is near: the ray skips it in whole steps.
         let Some((enters, leaves)) = field.crossed_by(origin, toward) else { return false };
         let open_steps = (enters * length / OPEN_STEP).floor().max(0.0);
         let end = length.min(leaves * length + 2.0 * OPEN_STEP);

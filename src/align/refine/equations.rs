@@ -8,11 +8,11 @@ use crate::geometry::{Point, Pose};
 use crate::map::MomentsView;
 use crate::util::StopSignal;
 
-/// Points that are matched between two looks at the stop signal: a millisecond, where none of their voxels was asked for
+/// Points that are matched between two checks of the stop signal: a millisecond, where none of their voxels was read
 /// before.
 pub(super) const POINTS_PER_LOOK: usize = 256;
 
-/// What all points say together of how the pose should change.
+/// Normal equations of a Gauss-Newton step: the sum of what all matched points say of how the pose should change.
 ///
 /// A change is (translation, rotation): meters along the map's axes, radians about them through the sensor.
 #[derive(Debug, Clone)]
@@ -22,18 +22,18 @@ pub(super) struct NormalEquations {
     /// Sum of J^T W e.
     gradient: Vector6<f64>,
     points: usize,
-    /// Points with a Gaussian.
+    /// Number of points that have a Gaussian.
     pub(super) matched: usize,
-    /// Points nearer to theirs than the robust scale.
+    /// Number of points within the robust scale of their Gaussian.
     pub(super) inliers: usize,
-    /// Sum of each matched point's weight, 1 for one that lies on its surface.
+    /// Sum of the weights of the matched points; the weight is 1 for a point on its surface.
     fitness: f64,
 }
 
 impl NormalEquations {
-    /// The normal equations of `points` (sensor frame) at `pose`, each against its Gaussian, with the weights of Geman
-    /// and McClure at `robust_scale` (a Mahalanobis distance), so that points of what the map does not show have no
-    /// say. They mean nothing once stopped.
+    /// The normal equations of `points` (sensor frame) at `pose`, each against its Gaussian. Weights are those of Geman
+    /// and McClure at `robust_scale` (a Mahalanobis distance), so that points on what the map does not show have no
+    /// influence. Once stopped, the result is meaningless.
     pub(super) fn of(
         points: &[Point],
         pose: &Pose,
@@ -69,21 +69,21 @@ impl NormalEquations {
         rotation += from_sensor.cross(pull);
     }
 
-    /// The change of pose that they ask for; none where they say nothing.
+    /// The step that solves the equations; none where they are singular.
     pub(super) fn solve(&self) -> Option<Step> {
-        // Far below what one point on a surface adds: keeps a direction that nothing determines from moving.
+        // Damping far below what one point on a surface adds: it keeps an undetermined direction from moving.
         let damped = self.hessian + Matrix6::identity() * 1e-9;
         (self.matched > 0).then_some(())?;
         Some(Step(-damped.cholesky()?.solve(&self.gradient)))
     }
 
-    /// How well all points lie on surfaces: 1 where each does, a point without one adds nothing.
+    /// Mean weight of all points, 0 to 1: 1 where every point lies on a surface; a point without a Gaussian adds 0.
     pub(super) fn fitness(&self) -> f64 {
         self.fitness / self.points.max(1) as f64
     }
 }
 
-/// The inverse covariance of a pose at which points lie on surfaces.
+/// The information matrix (inverse covariance) of a pose at which points lie on surfaces.
 ///
 /// The points of one voxel average their noise, but share what is wrong with its Gaussian: together they are one
 /// measurement with the variance of the Gaussian's floor and an n-th of its thickness.
@@ -112,9 +112,9 @@ struct Match {
     from_sensor: Vector3<f64>,
     /// From the Gaussian's mean to the point, meters.
     error: Vector3<f64>,
-    /// 1 on the surface, a half at the robust scale.
+    /// Weight of the match: 1 on the surface, 1/2 at the robust scale.
     fit: f64,
-    /// Nearer than the robust scale.
+    /// True when the point is within the robust scale.
     is_inlier: bool,
 }
 

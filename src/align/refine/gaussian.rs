@@ -5,13 +5,13 @@ use nalgebra::{Matrix3, Vector3};
 use crate::geometry::symmetric_eigen;
 use crate::voxel::Moments;
 
-/// Points that make a Gaussian, at least: fewer say nothing of a surface.
+/// Least number of points that make a Gaussian: fewer say nothing of a surface.
 const POINTS_MIN: i64 = 6;
 /// A Gaussian is used where the second largest variance is at least this fraction of the voxel's side squared. A single
 /// scan line in a voxel is a line, not a surface: to align to it would be to align to the sensor's pattern (paper
 /// III-B: the voxels "have to be large enough to cover gaps in the point cloud due to scan line spacing").
 const SPREAD_MIN: f64 = 0.005;
-/// How much a Gaussian holds its points.
+/// How soft a Gaussian is: how far a point may lie from its surface before that counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Softness {
     /// By how much points are uncertain beyond the spread of the surface, meters.
@@ -25,13 +25,13 @@ pub(super) struct Softness {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Gaussian {
     mean_m: Vector3<f64>,
-    /// Along `axes`, square meters.
+    /// Variances along `axes`, square meters.
     variances: Vector3<f64>,
     axes: Matrix3<f64>,
     side_m: f64,
-    /// Variance that it was softened by.
+    /// Variance that [`Gaussian::soften`] added, square meters.
     noise: f64,
-    /// Inverse covariance, of the directions that are determined, 1 / m^2.
+    /// Inverse covariance within the determined directions, 1 / m^2.
     information: Matrix3<f64>,
 }
 
@@ -57,7 +57,7 @@ impl Gaussian {
         })
     }
 
-    /// Takes points for uncertain by `softness.std_m` in every direction, on top of the surface's own spread.
+    /// Adds an uncertainty of `softness.std_m` in every direction to the surface's own spread.
     pub(super) fn soften(&mut self, softness: Softness) {
         let noise = softness.std_m * softness.std_m;
         self.noise = noise;
@@ -66,19 +66,19 @@ impl Gaussian {
         self.information = self.axes * Matrix3::from_diagonal(&information) * self.axes.transpose();
     }
 
-    /// The information matrix as last softened, 1 / m^2.
+    /// The information matrix of a point as last softened, 1 / m^2.
     pub(super) fn information(&self) -> &Matrix3<f64> {
         &self.information
     }
 
-    /// By how much better `count` points together say where the surface is than one of them: they average its thickness, not
-    /// the noise that it was softened by.
+    /// How many times the information of one point `count` points together have: they average the thickness of the
+    /// surface, but not the uncertainty that [`Gaussian::soften`] added.
     pub(super) fn averaging(&self, count: f64) -> f64 {
         let (thickness, noise) = (self.variances.min(), self.noise);
         (thickness + noise) / (thickness / count + noise)
     }
 
-    /// From the mean to a point of the map frame, meters.
+    /// The vector from the mean to a point of the map frame, meters.
     pub(super) fn to(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         point_m - self.mean_m
     }

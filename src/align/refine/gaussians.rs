@@ -7,12 +7,12 @@ use super::gaussian::{Gaussian, Softness};
 use crate::map::{MomentsView, MultiResolutionMap};
 use crate::voxel::{MOMENT_LEVEL, Moments, VoxelKey};
 
-/// Levels that have Gaussians: voxels of 4, 8 and 16 r_0. Where the finest are too thinly seen to show a surface, the
-/// coarser ones, sums of them, may.
+/// Number of voxel sizes that have Gaussians: 4, 8 and 16 r_0. Where the smallest voxels hold too few points to show a
+/// surface, the larger ones, which are sums of them, may.
 const SIZES: usize = 3;
 
-/// What a map's surfaces look like, near where a scan is thought to be. Kept for one alignment: the map may grow
-/// meanwhile, and what was asked before stays as it was.
+/// The Gaussians of a map's voxels near a scan, computed on demand and cached for one alignment. The map may change
+/// meanwhile; a cached Gaussian stays as it was.
 #[derive(Debug)]
 pub(super) struct VoxelGaussians {
     resolution_m: f64,
@@ -27,20 +27,20 @@ impl VoxelGaussians {
         Self { resolution_m, softness, sizes: Default::default(), gaussians: Vec::new() }
     }
 
-    /// See [`Gaussian::soften`].
+    /// Softens all Gaussians, present and future; see [`Gaussian::soften`].
     pub(super) fn soften(&mut self, softness: Softness) {
         self.softness = softness;
         self.gaussians.iter_mut().for_each(|gaussian| gaussian.soften(softness));
     }
 
-    /// The Gaussian of number `i`.
+    /// The Gaussian with index `i`, as [`VoxelGaussians::nearest`] returned it.
     pub(super) fn get(&self, i: u32) -> &Gaussian {
         &self.gaussians[i as usize]
     }
 
-    /// The number of the Gaussian that a point of the map frame belongs to: that of its finest voxel that has one, or
-    /// of the neighbors across the nearest faces, or the same of larger voxels. (A surface on the border of two voxels
-    /// would otherwise hold on to the points on its own side alone.)
+    /// Index of the Gaussian that a point of the map frame belongs to: that of its smallest voxel that has one or,
+    /// failing that, of the neighbors across its nearest faces; then the same for larger voxels. (Otherwise a surface
+    /// on the border of two voxels would attract only the points on its own side.)
     pub(super) fn nearest(&mut self, moments: &MomentsView<'_>, point_m: &Vector3<f64>) -> Option<u32> {
         (0..SIZES).find_map(|size| self.nearest_of(moments, point_m, size))
     }

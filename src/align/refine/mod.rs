@@ -1,4 +1,4 @@
-//! Refinement: the last centimeter, which overlap cannot see.
+//! Refinement of a pose on the surfaces of the map, below the size of a voxel.
 //!
 //! Takes the place of step 5 of the paper's III-B. Overlap is flat within a voxel; the Gaussian of the points in it is
 //! not. Points are matched with the Gaussian of their voxel and the pose moves to where they lie on its surface: the
@@ -22,22 +22,24 @@ use gaussians::VoxelGaussians;
 const SETTLED: f64 = 1e-4;
 const SETTLED_RAD: f64 = 1e-6;
 
-/// See [`Softness::spread`]. The rim of what was seen of a surface still tells roughly where it is: it may pull.
+/// [`Softness::spread`] while the pose is refined. The rim of a partly seen surface still says roughly where it is, so
+/// it may pull.
 const SPREAD_TO_REFINE: f64 = 1.0 / 24.0;
-/// The verdict trusts bends and edges alone: a rim moves when more of the surface is seen.
+/// [`Softness::spread`] for the verdict, which trusts bends and edges alone: a rim moves when more of the surface is
+/// seen.
 const SPREAD_TO_JUDGE: f64 = 1.0 / 150.0;
 
-/// A pose, and how the points lie on the map's surfaces there.
+/// A refined pose, and how the points lie on the map's surfaces there.
 #[derive(Debug, Clone)]
 pub(super) struct Refinement {
     pub(super) map_from_sensor: Pose,
     pub(super) iterations: u32,
 }
 
-/// How points lie on the surfaces of a map.
+/// How well points lie on the surfaces of a map.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SurfaceFit {
-    /// What the surfaces say of the pose.
+    /// Information that the surfaces give about the pose.
     pub(super) information: PoseInformation,
     /// Fraction of the points that lie on a surface.
     pub(super) inliers: f64,
@@ -90,7 +92,8 @@ pub(super) fn refine(
     refined
 }
 
-/// Says how `points` lie on the map's surfaces with the sensor at `map_from_sensor`; nothing, once stopped.
+/// Measures how `points` (sensor frame) lie on the map's surfaces with the sensor at `map_from_sensor`. Once stopped,
+/// the result is meaningless.
 pub(super) fn surface_fit(
     map: &MultiResolutionMap,
     points: &[Point],

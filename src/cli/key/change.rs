@@ -29,10 +29,10 @@ pub(super) struct RotateKey {
     /// The file of keys, which is changed
     #[arg(long, value_name = "FILE")]
     file: PathBuf,
-    /// Hours for which the former secret counts beside the new one, so that no holder is shut out
+    /// Hours for which the former secret remains valid, so that no holder is locked out
     #[arg(long, value_name = "HOURS", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=8760))]
     overlap_h: u32,
-    /// End the former secret at once, and the one of a rotation that is not over: for a secret that leaked
+    /// Revoke the former secret at once, and that of a rotation in progress: for a secret that leaked
     #[arg(long, conflicts_with = "overlap_h")]
     end_former: bool,
 }

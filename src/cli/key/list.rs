@@ -1,4 +1,4 @@
-//! `mrol key list`: what each key is for.
+//! `mrol key list`: lists keys.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -12,12 +12,12 @@ use crate::cli::output::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ListKeys {
-    /// The file of keys, which stays as it is
+    /// The file of keys, which is not changed
     #[arg(long, value_name = "FILE")]
     file: PathBuf,
 }
 
-/// A key, without anything that opens.
+/// A key without its secret or hash, to be printed.
 #[derive(Serialize)]
 struct Listed {
     name: String,
@@ -26,7 +26,7 @@ struct Listed {
     robots: Option<Vec<String>>,
     expires: Option<String>,
     expired: bool,
-    /// Until when the secret before the last rotation counts.
+    /// When the former secret of a rotation expires.
     former_expires: Option<String>,
 }
 

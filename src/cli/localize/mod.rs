@@ -1,4 +1,4 @@
-//! `mrol localize`: where in a map a scan was taken, with no guess.
+//! `mrol localize`: finds where in a map a scan was taken, without a guess.
 
 mod report;
 
@@ -32,10 +32,10 @@ EXAMPLES:
   mrol localize --map hall.mrol scan.ply --box \"-5 -5 0 5 5 2\" --candidates 3
   mrol localize --name hall new/*.ply --json | jq .verdict    on a server
 
-Accepted is a place only where the scan fits it and no other place is as good; a scan that fits nowhere, or in several
-places, is an answer too, with the places it fits best. Without --gravity, rotations are tried that bring surfaces of
-the scan parallel to the map's dominant ones, and the search is not exhaustive. What --gravity says may be 2 degrees
-off.";
+A place is accepted only where the scan fits it and no other place is as good. A scan that fits nowhere, or in several
+places, is answered with the places it fits best, and the exit code is then 3. Without --gravity, only rotations are
+tried that bring surfaces of the scan parallel to the map's dominant ones, and the search is not exhaustive. --gravity
+may be 2 degrees off.";
 
 /// Find where in a map a scan was taken, with no guess
 #[derive(Debug, clap::Args)]
@@ -52,10 +52,10 @@ pub(super) struct Localize {
     name: Option<MapName>,
     #[command(flatten)]
     server: ServerOptions,
-    /// Which way things fall in the sensor frame
+    /// Direction of gravity in the sensor frame
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::vector)]
     gravity: Option<[f64; 3]>,
-    /// Which way things fall in the map frame
+    /// Direction of gravity in the map frame
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -74,7 +74,7 @@ pub(super) struct Localize {
     /// Candidates to print, at most
     #[arg(long, value_name = "COUNT", default_value_t = CANDIDATES_DEFAULT)]
     candidates: usize,
-    /// Of the choice of the scan's points
+    /// Seed of the choice of the scan's points
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
 }
@@ -89,6 +89,7 @@ impl Localize {
             (None, None) => return Err(CliError::usage("one of --map and --name is needed")),
         };
         let output = output.with_spinner();
+        let mut refused = 0;
         for file in &files {
             let request = LocalizationRequest {
                 points: read_points(file)?.into(),
@@ -98,9 +99,10 @@ impl Localize {
             output.tell(format!("{}: searching", name_of(file)));
             let answer = place.find(request, &output).await?;
             output.print(&Localized::of(name_of(file), &answer))?;
+            refused += usize::from(!answer.accepted());
         }
         output.clear_bar();
-        Ok(())
+        CliError::unless_accepted(refused, files.len())
     }
 
     fn query(&self) -> Result<LocalizationQuery, CliError> {
@@ -119,7 +121,7 @@ impl Localize {
     }
 }
 
-/// Where the map is.
+/// Source of the map.
 enum MapSource {
     File(Box<MultiResolutionMap>, MapVersion),
     Server(Client, MapName),
@@ -144,10 +146,10 @@ impl MapSource {
     }
 }
 
-/// A time limit that no search waits for: a year.
+/// A time limit beyond any search: a year.
 const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 
-/// Searches in this process, and says how far that is.
+/// Searches in this process, with progress reports.
 fn find_here(
     map: &MultiResolutionMap,
     version: MapVersion,

@@ -1,4 +1,4 @@
-//! What `mrol localize` prints of a scan.
+//! Output of `mrol localize` for a scan.
 
 use std::fmt::{self, Display};
 

@@ -1,4 +1,4 @@
-//! Are the filters ample? How many of a run's look-ups they are expected to have answered wrongly.
+//! Check whether the filters are ample: the expected number of wrong answers in a run.
 
 use serde::Serialize;
 
@@ -13,13 +13,13 @@ pub(in crate::cli) struct FalsePositives {
 }
 
 impl FalsePositives {
-    /// Counts the look-ups of one alignment, made at that false positive rate.
+    /// Adds the look-ups of one alignment, made at the false positive rate `rate`.
     pub(in crate::cli) fn add(&mut self, lookups: u64, rate: f64) {
         self.lookups += lookups;
         self.expected += lookups as f64 * rate;
     }
 
-    /// What it comes to; `rate` is that at the end.
+    /// The summary of the run; `rate` is the false positive rate at its end.
     pub(in crate::cli) fn summary(&self, rate: f64) -> FilterSummary {
         FilterSummary {
             lookups: self.lookups,
@@ -30,7 +30,7 @@ impl FalsePositives {
     }
 }
 
-/// See [`FalsePositives`].
+/// Summary of the false positives of a run; see [`FalsePositives`].
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(in crate::cli) struct FilterSummary {
     pub(in crate::cli) lookups: u64,

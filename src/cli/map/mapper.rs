@@ -1,4 +1,4 @@
-//! Scans into a map, one after the other.
+//! Mapping of scans in this process, one after the other.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
 use crate::mapping::{Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings};
 use crate::util::StopSignal;
 
-/// Whose scans they are, in the map's trajectory.
+/// Name of the robot in the map's trajectory.
 const ROBOT: &str = "mrol";
 
 /// A map that grows scan by scan.
@@ -21,14 +21,14 @@ pub(in crate::cli) struct Mapper {
     sightings: Sightings,
 }
 
-/// What became of a scan.
+/// Result of mapping a scan.
 pub(in crate::cli) struct Mapped {
     pub(in crate::cli) alignment: Alignment,
-    /// Finest voxels that it added.
+    /// Number of finest voxels that the scan added.
     pub(in crate::cli) new_voxels: usize,
-    /// Finest voxels after it.
+    /// Number of finest voxels after the scan.
     pub(in crate::cli) voxels: usize,
-    /// What the filters were expected to let through while it was aligned.
+    /// False positive rate of the filters while the scan was aligned.
     pub(in crate::cli) false_positive_rate: f64,
     pub(in crate::cli) align_time: Duration,
     pub(in crate::cli) insert_time: Duration,

@@ -1,4 +1,4 @@
-//! `mrol map`: scans to a map in this process, without a server.
+//! `mrol map`: builds a map of scans in this process, without a server.
 
 pub(super) mod ample;
 pub(super) mod mapper;
@@ -113,7 +113,7 @@ impl Map {
         output.clear_bar();
         self.write_results(&mapper, &run)?;
         let summary = run.summary(&mapper);
-        // Programs get the scans alone, unless they ask for what is in the summary.
+        // Programs get only the scans, unless they ask for what is in the summary.
         match output.is_json() && self.truth.is_none() && self.lookup.is_none() {
             true => Ok(()),
             false => output.print(&summary),
@@ -147,7 +147,7 @@ impl Map {
     }
 }
 
-/// What is kept while the scans go by.
+/// State of a run.
 struct Run {
     first_pose: Option<Pose>,
     at_truth: bool,
@@ -177,13 +177,13 @@ impl Run {
         ScanLine::head(self.name_width, self.truth.is_some())
     }
 
-    /// Where scan `k` is known to have been taken.
+    /// Known pose of scan `k`, map_from_sensor, if there is one.
     fn guess(&self, k: usize) -> Option<Pose> {
         let truth = self.truth.as_ref().filter(|_| self.at_truth);
         truth.map(|truth| truth.pose(k)).or(self.first_pose.filter(|_| k == 0))
     }
 
-    /// Keeps what is to be kept of scan `k`; its line.
+    /// Records the result of scan `k`; returns its line.
     fn note(&mut self, k: usize, file: &Path, mapped: &Mapped) -> ScanLine {
         self.scans += 1;
         self.false_positives.add(mapped.alignment.lookups, mapped.false_positive_rate);
@@ -211,7 +211,7 @@ impl Run {
     }
 }
 
-/// The points of a scan that can be somewhere.
+/// Reads the points of a scan that are finite and pass the filter.
 fn usable_points(file: &Path, filter: &PointFilter) -> Result<Vec<Point>, CliError> {
     let mut points = read_points(file)?;
     let all = points.len();
@@ -235,7 +235,7 @@ fn in_file(file: &Path, problem: impl std::fmt::Display) -> CliError {
     CliError::failed(format!("{}: {problem}", file.display()))
 }
 
-/// A long run should not end with a file that cannot be written.
+/// Checks that the folder of an output file exists, so that a long run does not fail at its end.
 fn check_folder(path: &Path) -> Result<(), CliError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match folder.is_dir() {

@@ -1,4 +1,4 @@
-//! What `mrol map` prints.
+//! Output of `mrol map`.
 
 use std::fmt::{self, Display};
 
@@ -11,7 +11,7 @@ use crate::cli::map_report::count;
 use crate::cli::scan_report::{PLACE_HEAD, place};
 use crate::wire::json::JsonPose;
 
-/// What became of a scan.
+/// The line of a scan.
 #[derive(Serialize)]
 pub(super) struct ScanLine {
     scan: String,
@@ -91,7 +91,7 @@ impl Display for ScanLine {
     }
 }
 
-/// What the run comes to.
+/// Summary of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Summary {
     pub(super) scans: usize,

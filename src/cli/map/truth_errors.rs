@@ -1,4 +1,4 @@
-//! Errors of found poses against true ones.
+//! Errors of estimated poses against true ones.
 
 use serde::Serialize;
 
@@ -11,13 +11,13 @@ use crate::geometry::{Pose, pose_difference};
 /// accepted: it does not matter where the map's origin lies.
 pub(in crate::cli) struct TruthErrors {
     truth: Vec<Pose>,
-    /// E_0 and T_0.
+    /// E_0 and T_0: estimated and true pose of the first accepted scan.
     first: Option<(Pose, Pose)>,
     meters: Vec<f64>,
     degrees: Vec<f64>,
 }
 
-/// What the errors come to.
+/// Summary of the errors.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(in crate::cli) struct ErrorSummary {
     pub(in crate::cli) meters: Statistics,
@@ -29,12 +29,12 @@ impl TruthErrors {
         Self { truth, first: None, meters: Vec::new(), degrees: Vec::new() }
     }
 
-    /// T_k.
+    /// True pose of scan `k`, T_k.
     pub(in crate::cli) fn pose(&self, k: usize) -> Pose {
         self.truth[k]
     }
 
-    /// Notes that scan `k` was found at `map_from_sensor`; its error, meters and degrees.
+    /// Adds the estimated pose of scan `k`; returns its error, meters and degrees.
     pub(in crate::cli) fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
         let (found_first, true_first) = *self.first.get_or_insert((*map_from_sensor, self.truth[k]));
         let found = found_first.inv_mul(map_from_sensor);
@@ -44,7 +44,7 @@ impl TruthErrors {
         error
     }
 
-    /// None before the first scan.
+    /// Returns the summary; none before the first scan.
     pub(in crate::cli) fn summary(&self) -> Option<ErrorSummary> {
         let meters = Statistics::of(self.meters.clone())?;
         Some(ErrorSummary { meters, degrees: Statistics::of(self.degrees.clone())? })

@@ -1,4 +1,4 @@
-//! From how far off a guess an alignment finds the pose: its region of convergence (paper III-B).
+//! Experiment on the region of convergence: from how far off a guess an alignment finds the pose (paper III-B).
 
 use std::time::Instant;
 
@@ -11,23 +11,23 @@ use crate::geometry::{Point, Pose, pose_difference};
 use crate::lab::simulate::gaussian;
 use crate::map::MultiResolutionMap;
 
-/// How far off guesses are at most, meters.
+/// Largest distance of a guess from the truth, meters.
 pub const OFFSET_MAX_M: f64 = 2.0;
 /// The largest rotation of a guess from the truth, degrees.
 pub const OFFSET_MAX_DEG: f64 = 40.0;
-/// An alignment converged that ends this near to the truth, meters.
+/// An alignment has converged within this distance of the truth, meters.
 pub const CONVERGED_M: f64 = 0.1;
 /// An alignment has converged within this rotation of the truth, degrees.
 pub const CONVERGED_DEG: f64 = 1.0;
 
-/// A guess, and how far it is off.
+/// A guess, with its distance and angle from the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffGuess {
-    /// map_from_sensor.
+    /// The guess, map_from_sensor.
     pub guess: Pose,
-    /// Distance to the true place.
+    /// Distance of the guess from the true position, meters.
     pub offset_m: f64,
-    /// Angle to the true rotation.
+    /// Angle between the guess and the true rotation, degrees.
     pub offset_deg: f64,
 }
 
@@ -46,21 +46,21 @@ pub fn guesses_around(truth: &Pose, count: usize, seed: u64) -> Vec<OffGuess> {
     (0..count).map(|_| guess()).collect()
 }
 
-/// Uniform on the unit sphere.
+/// A direction drawn uniformly from the unit sphere.
 fn direction(random: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| gaussian(random)).normalize()
 }
 
-/// Where an alignment ended.
+/// Result of one alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
-    /// Distance to the true place.
+    /// Distance of the result from the true position, meters.
     pub error_m: f64,
-    /// Angle to the true rotation.
+    /// Angle between the result and the true rotation, degrees.
     pub error_deg: f64,
-    /// What the alignment says of its end.
+    /// Verdict of the alignment.
     pub verdict: Verdict,
-    /// How long it took.
+    /// Duration of the alignment, milliseconds.
     pub ms: f64,
 }
 

@@ -1,4 +1,4 @@
-//! An odometry that drifts, where a sequence of scans has none.
+//! Simulated odometry with drift, for sequences without odometry.
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -7,15 +7,15 @@ use rand_chacha::ChaCha8Rng;
 use crate::geometry::{Pose, pose_difference};
 use crate::lab::simulate::gaussian;
 
-/// Standard deviation of a step along each axis, as a share of its length,
+/// Standard deviation of a step's translation along each axis, as a share of the step's length.
 const SHIFT: f64 = 0.02;
-/// and about each axis, as a share of its turn, and degrees a meter.
+/// Standard deviation of a step's rotation about each axis, as a share of the step's angle.
 const TURN: f64 = 0.02;
 const TURN_DEG_PER_M: f64 = 0.5;
 
-/// What an odometry would tell of a sensor that went along `truth` (map_from_sensor): each step with an error drawn from
-/// `seed`, 2 % of its length along each axis, and 2 % of its turn and half a degree a meter about each (standard
-/// deviations).
+/// Simulates the odometry of a sensor that moved along `truth` (map_from_sensor). Each step has an error drawn from
+/// `seed`, with standard deviations of 2 % of its length along each axis, and of 2 % of its rotation plus half a degree
+/// a meter about each axis.
 pub fn drifting(truth: &[Pose], seed: u64) -> Vec<Pose> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = |std: f64| Vector3::from_fn(|_, _| std * gaussian(&mut random));

@@ -1,4 +1,4 @@
-//! Maps that grow scan by scan, timed (paper IV-C).
+//! Experiment on mapping: maps that grow scan by scan, timed (paper IV-C).
 
 use std::time::Instant;
 
@@ -6,7 +6,7 @@ use crate::geometry::{Point, Pose};
 use crate::lab::rivals::HashTables;
 use crate::map::{MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 
-/// A map of any structure.
+/// A map of any structure that points can be added to.
 pub trait GrowingMap {
     /// Adds the voxels of `points`.
     fn insert(&mut self, points: &[Point], map_from_points: &Pose);
@@ -15,12 +15,12 @@ pub trait GrowingMap {
     fn voxels(&self) -> usize;
 }
 
-/// Our own map, as a robot called `bench` makes it grow.
+/// The map of this crate, as a robot called `bench` maps with it.
 #[derive(Debug)]
 pub struct OwnMap {
     /// The map: voxels, their filters and the moments of their points.
     pub map: MultiResolutionMap,
-    /// Whose scans they are.
+    /// Robot that the scans belong to.
     pub robot: RobotName,
 }
 
@@ -45,33 +45,33 @@ impl GrowingMap for HashTables {
     }
 }
 
-/// A map, and where its last scan was taken.
+/// A map that is being built, with the pose of its last scan.
 #[derive(Debug)]
 pub struct Mapping<M> {
     map: M,
     last: Pose,
 }
 
-/// What became of a scan.
+/// Result of mapping one scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mapped {
-    /// Where it was found to be.
+    /// Pose that was found, map_from_sensor.
     pub map_from_sensor: Pose,
-    /// How long that took.
+    /// Duration of the alignment, milliseconds.
     pub align_ms: f64,
-    /// How long it took to add it.
+    /// Duration of the insertion, milliseconds.
     pub update_ms: f64,
-    /// Finest occupied voxels after it.
+    /// Number of finest occupied voxels after the insertion.
     pub voxels: usize,
 }
 
 impl<M: GrowingMap> Mapping<M> {
-    /// Before the first scan, which will be at the origin.
+    /// Starts with `map`, before the first scan, which will be at the origin.
     pub fn new(map: M) -> Self {
         Self { map, last: Pose::identity() }
     }
 
-    /// As it is now.
+    /// Returns the map as it is now.
     pub fn map(&self) -> &M {
         &self.map
     }

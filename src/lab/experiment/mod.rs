@@ -1,4 +1,4 @@
-//! The paper's experiments (IV), and how far an alignment reaches.
+//! The paper's experiments (IV), and measurements of convergence and scaling.
 
 pub mod convergence;
 pub mod drift;

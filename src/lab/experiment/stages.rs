@@ -1,4 +1,4 @@
-//! Experiment 1 of the paper: the stages of a look-up, one by one (IV-A, Fig. 1).
+//! Experiment 1 of the paper: the durations of the stages of a look-up (IV-A, Fig. 1).
 
 use std::hint::black_box;
 
@@ -10,16 +10,16 @@ use crate::map::MultiResolutionMap;
 use crate::voxel::LatticeFromPoints;
 use crate::voxel::quantize;
 
-/// A stage and how long it took, nanoseconds a point, run by run.
+/// A stage of a look-up, with its durations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// As in the figure.
+    /// Name of the stage, as in the figure.
     pub name: &'static str,
-    /// Run by run.
+    /// Durations run by run, nanoseconds a point.
     pub runs: Runs,
 }
 
-/// The stages of Fig. 1 from bottom to top, and the dense array's whole, which the figure leaves out.
+/// The stages of Fig. 1 from bottom to top, and the whole look-up in the dense array, which the figure leaves out.
 pub const STAGES: [&str; 8] = [
     "look-up: Bloom filter",
     "look-up: dense array",
@@ -44,7 +44,7 @@ pub fn measure(
     let mut measured = STAGES.map(|name| Stage { name, runs: Runs::default() });
     for _ in 0..runs {
         for (stage, measured) in measured.iter_mut().enumerate() {
-            // What the others left in the caches is not this one's doing.
+            // An untimed run first, so that what other stages left in the caches does not count.
             bench.run(stage, &mut Runs::default());
             bench.run(stage, &mut measured.runs);
         }
@@ -52,7 +52,7 @@ pub fn measure(
     Ok(measured.into())
 }
 
-/// All that the stages need, made beforehand.
+/// Inputs of the stages, prepared before the timing.
 struct Bench<'a> {
     queries: &'a Queries,
     quantize: LatticeFromPoints,
@@ -60,7 +60,7 @@ struct Bench<'a> {
     filter: Kernel<'a>,
     dense: Dense,
     set: HashSet,
-    /// Keys of all points: what the look-ups by themselves begin with.
+    /// Keys of all points, the input of the look-ups alone.
     keys: Vec<u64>,
     offsets: Vec<u32>,
     occupied: Vec<u64>,
@@ -86,7 +86,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Runs the stage at that place of [`STAGES`].
+    /// Runs and times the stage with that index in [`STAGES`].
     fn run(&mut self, stage: usize, runs: &mut Runs) {
         let points = self.queries.points.len();
         runs.time(points, || match stage {
@@ -101,13 +101,14 @@ impl<'a> Bench<'a> {
         });
     }
 
-    /// The overlap as the paper's first implementation has it: the set of the scan's voxels, intersected with the map's.
+    /// The overlap as in the paper's first implementation: the intersection of the set of the scan's voxels with that
+    /// of the map.
     fn intersection(&self) -> usize {
         let scan: hashbrown::HashSet<u64> = self.keys.iter().copied().collect();
         scan.intersection(self.set.keys()).count()
     }
 
-    /// Keys of a thousand points at a time, which nothing but the innermost cache sees.
+    /// Computes the keys in batches of a thousand points, which stay in the innermost cache.
     fn transform(&self) {
         let mut keys = [0; 1024];
         for points in self.queries.points.chunks(keys.len()) {

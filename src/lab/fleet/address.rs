@@ -1,4 +1,4 @@
-//! Where a server is asked, and what is shown there.
+//! Addresses of a server, with the credentials to show there.
 
 use axum::http::HeaderValue;
 
@@ -16,7 +16,7 @@ pub(crate) struct GrpcAddress {
 #[derive(Debug, Clone)]
 pub(crate) struct HttpAddress {
     pub(crate) url: String,
-    /// Marked as sensitive: no output shows it.
+    /// Authorization header, marked as sensitive so that no output shows it.
     pub(crate) authorization: Option<HeaderValue>,
 }
 

@@ -1,4 +1,4 @@
-//! The real daemon in this process, on threads of its own.
+//! The daemon within this process, on threads of its own.
 
 use std::io::ErrorKind;
 use std::net::SocketAddr;
@@ -11,7 +11,7 @@ use super::FleetError;
 use crate::config::Config;
 use crate::server::{Server, ServerError};
 
-/// A daemon as in another process, but for the memory.
+/// A daemon that runs as it would in a process of its own, except for the memory.
 pub(crate) struct Daemon {
     http: SocketAddr,
     grpc: SocketAddr,
@@ -20,7 +20,7 @@ pub(crate) struct Daemon {
     runtime: Option<Runtime>,
 }
 
-/// An address that was taken, so that its protocol takes a free port instead.
+/// An address that was in use, so that the protocol listens at a free port instead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Taken {
     /// `http` or `grpc`.
@@ -29,7 +29,7 @@ pub(crate) struct Taken {
 }
 
 impl Daemon {
-    /// Starts one on free ports, with maps in memory alone.
+    /// Starts a daemon on free ports, with maps in memory only.
     pub(crate) async fn start_in_memory() -> Result<Self, FleetError> {
         let mut config = Config { data_dir: "".into(), ..Config::default() };
         config.http.listen.set_port(0);
@@ -37,7 +37,7 @@ impl Daemon {
         Self::start(config, |_| None).await
     }
 
-    /// Starts one. Where an address is taken, `instead` says where to listen; none ends it.
+    /// Starts a daemon. Where an address is in use, `instead` returns another one, or none to fail.
     pub(crate) async fn start(
         config: Config,
         instead: impl FnMut(Taken) -> Option<SocketAddr> + Send + 'static,
@@ -49,23 +49,23 @@ impl Daemon {
         let (http, grpc) = (server.http_address(), server.grpc_address());
         let (shutdown, told) = oneshot::channel();
         let ended = runtime.spawn(server.run(async {
-            // The sender gone is as good a reason to stop.
+            // A dropped sender stops the daemon as well.
             let _ = told.await;
         }));
         Ok(Self { http, grpc, shutdown: Some(shutdown), ended, runtime: Some(runtime) })
     }
 
-    /// Where HTTP is served.
+    /// Address of HTTP.
     pub(crate) fn http(&self) -> SocketAddr {
         self.http
     }
 
-    /// Where gRPC is served.
+    /// Address of gRPC.
     pub(crate) fn grpc(&self) -> SocketAddr {
         self.grpc
     }
 
-    /// Lets it finish what it has in hand, save, and go.
+    /// Stops the daemon: it completes requests in flight, saves its maps and ends.
     pub(crate) async fn stop(mut self) -> Result<(), FleetError> {
         self.shutdown = None;
         Ok((&mut self.ended).await.map_err(FleetError::failed)??)
@@ -73,7 +73,7 @@ impl Daemon {
 }
 
 impl Drop for Daemon {
-    /// A runtime must not wait for its threads on a thread of another runtime.
+    /// Drops the runtime in the background: it must not wait for its threads on a thread of another runtime.
     fn drop(&mut self) {
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();

@@ -14,7 +14,7 @@ use crate::service::PointCloud;
 /// Most bytes of an answer: a bit a point, or an error's text.
 const ANSWER_BYTES_MAX: usize = 1 << 20;
 
-/// A connection, and where it asks.
+/// A connection to a server, with the URL of its queries.
 pub(crate) struct HttpConnection {
     client: Client<HttpConnector, Body>,
     uri: Uri,
@@ -33,7 +33,7 @@ impl HttpConnection {
         })
     }
 
-    /// Asks about `points`; how many are occupied.
+    /// Queries `points`; returns how many of them are occupied.
     pub(crate) async fn ask(&self, points: PointCloud) -> Result<usize, FleetError> {
         let request =
             Request::post(self.uri.clone()).header(header::CONTENT_TYPE, "application/octet-stream");

@@ -1,4 +1,4 @@
-//! Connections that ask again and again.
+//! Load of point queries over several connections.
 
 use crate::util::Keyword;
 use std::collections::VecDeque;
@@ -18,12 +18,12 @@ use crate::lab::workload::Queries;
 use crate::map::{Lookup, MapName};
 use crate::service::{PointCloud, PointQuery};
 
-/// Answers that take longer count as this long: ten minutes.
+/// Longest latency that is told apart: longer ones count as ten minutes, in nanoseconds.
 const LATENCY_NS_MAX: u64 = 600_000_000_000;
-/// Digits of a time that are kept.
+/// Significant digits of a latency.
 const LATENCY_DIGITS: u8 = 3;
 
-/// What is asked, message after message.
+/// The queries of a load, message after message.
 #[derive(Debug, Clone)]
 pub(crate) struct Question {
     messages: Arc<[PointCloud]>,
@@ -56,7 +56,7 @@ impl Question {
         self.messages[message % self.messages.len()].clone()
     }
 
-    /// All of it but the points, as an address.
+    /// The URL of the query, with all its parameters but the points.
     pub(crate) fn asked_at(&self, server: &HttpAddress, map: &MapName) -> HttpAddress {
         let ([x, y, z], [qx, qy, qz, qw]) =
             (translation_m(&self.map_from_points), rotation_xyzw(&self.map_from_points));
@@ -69,7 +69,7 @@ impl Question {
     }
 }
 
-/// A way to ask.
+/// A protocol to query by.
 #[derive(Debug, Clone)]
 pub(crate) enum Load {
     Unary { server: GrpcAddress, map: MapName, question: Question },
@@ -77,9 +77,9 @@ pub(crate) enum Load {
     Http { http: HttpAddress, question: Question },
 }
 
-/// All answers of some time.
+/// Answers within some time.
 pub(crate) struct Answered {
-    /// Nanoseconds from question to answer.
+    /// Latencies, nanoseconds from query to answer.
     pub(crate) latencies: Histogram<u64>,
     pub(crate) points: usize,
     pub(crate) occupied: usize,
@@ -108,12 +108,12 @@ impl Answered {
 }
 
 impl Load {
-    /// Asks over `connections` connections for `time`.
+    /// Sends queries over `connections` connections for `time`.
     pub(crate) async fn run(&self, connections: usize, time: Duration) -> Result<Answered, FleetError> {
         let mut asking = JoinSet::new();
         let start = Instant::now();
         for connection in 0..connections {
-            // Each begins with another message.
+            // Each connection begins with another message.
             asking.spawn(self.clone().ask(connection, time));
         }
         let mut all = Answered::none()?;
@@ -176,7 +176,7 @@ async fn over_http(
     Ok(answered)
 }
 
-/// One stream, on which the next message is sent for each that is answered.
+/// Sends queries on one stream, the next one after each answer.
 async fn stream(
     server: &GrpcAddress,
     map: &MapName,
@@ -190,13 +190,13 @@ async fn stream(
     let (sender, questions) = mpsc::channel(in_flight);
     let mut answers = client.query_stream(map, ReceiverStream::new(questions)).await?;
     let (mut under_way, mut messages) = (VecDeque::new(), first..);
-    // Without a sender the stream ends, once all is answered.
+    // Once the sender is dropped, the stream ends after the last answer.
     let mut sender = Some(sender);
     loop {
         while let Some(open) = sender.as_ref().filter(|_| under_way.len() < in_flight) {
             under_way.push_back(Instant::now());
             let message = messages.next().unwrap_or(first);
-            // Who does not read any more says why in an answer.
+            // A server that stops reading says why in an answer.
             let _ = open.send(question.query(message)).await;
         }
         let Some(answer) = answers.next().await else {

@@ -1,4 +1,4 @@
-//! Members of a fleet at work.
+//! Members of a fleet, and their work.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,14 +12,14 @@ use super::tally::Tally;
 
 /// A member of a fleet, which carries out operations.
 pub(crate) trait Member: Send + 'static {
-    /// Carries out the operation with a number, which no other has.
+    /// Carries out the operation `number`; every operation has a number of its own.
     fn carry_out(&mut self, number: u64) -> impl Future<Output = Result<(), FleetError>> + Send;
 }
 
-/// Members of one kind between two spells of work.
+/// Members of one kind, between two periods of work.
 pub(crate) struct Fleet<M> {
     members: Vec<M>,
-    /// The number of the next operation.
+    /// Number of the next operation.
     number: u64,
 }
 
@@ -35,7 +35,7 @@ impl<M: Member> Fleet<M> {
         Self { members, number: 0 }
     }
 
-    /// Sets them to work for `time`, without a pause or at `rate` operations a second.
+    /// Starts the members for `time`, without a pause or at `rate` operations a second in total.
     pub(crate) fn work(self, rate: Option<f64>, time: Duration) -> Result<Working<M>, FleetError> {
         let pace = Arc::new(Pace::new(rate, time, self.number));
         let tally = Arc::new(Mutex::new(Tally::new()?));
@@ -48,12 +48,12 @@ impl<M: Member> Fleet<M> {
 }
 
 impl<M: Member> Working<M> {
-    /// What was done since it was asked for last.
+    /// Returns the tally since the last call.
     pub(crate) fn tally(&self) -> Result<Tally, FleetError> {
         Ok(std::mem::replace(&mut *self.tally.lock(), Tally::new()?))
     }
 
-    /// Waits until the time is over and all are done; the rest of what was done.
+    /// Waits for the end of the period and of all operations; returns the members and the rest of the tally.
     pub(crate) async fn end(mut self) -> Result<(Fleet<M>, Tally), FleetError> {
         let mut members = Vec::new();
         while let Some(member) = self.members.join_next().await {

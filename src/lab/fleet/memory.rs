@@ -1,8 +1,8 @@
-//! Memory of a process, and whether it grows.
+//! Memory of a process, and its trend.
 
 use super::FleetError;
 
-/// Memory that a process has resident, as Linux tells it.
+/// Resident memory of a process, bytes, as Linux reports it.
 pub(crate) fn resident_bytes(pid: u32) -> Result<u64, FleetError> {
     let path = format!("/proc/{pid}/status");
     let status = std::fs::read_to_string(&path)
@@ -18,7 +18,7 @@ pub(crate) fn resident_bytes(pid: u32) -> Result<u64, FleetError> {
 pub(crate) struct Trend {
     /// The mean of all measurements.
     pub(crate) mean: f64,
-    /// A second.
+    /// Slope of the line, per second.
     pub(crate) slope: f64,
 }
 

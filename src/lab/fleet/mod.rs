@@ -1,4 +1,4 @@
-//! A server under a fleet's load: the daemon or a process of its own, planners that ask and robots that map.
+//! Fleets: a server, in this process or another, under the load of planners that query and robots that map.
 
 mod address;
 mod daemon;
@@ -29,16 +29,16 @@ pub(crate) use robot::{Robot, Seen, TURN_POINTS};
 pub(crate) use tally::Tally;
 pub(crate) use target::Target;
 
-/// What kept a fleet from its work.
+/// Errors of a fleet.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum FleetError {
-    /// The server refused something, or is not there.
+    /// The server refused a request, or cannot be reached.
     #[error(transparent)]
     Client(#[from] ClientError),
     /// The daemon cannot serve.
     #[error(transparent)]
     Server(#[from] ServerError),
-    /// What was asked for makes no sense.
+    /// The options are not valid.
     #[error("{0}")]
     Usage(String),
     /// Anything else.

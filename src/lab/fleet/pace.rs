@@ -1,37 +1,37 @@
-//! When the next operation is due.
+//! Pace: when the next operation is due.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use tokio::time::sleep_until;
 
-/// Numbers operations for all who carry them out, as fast as they are done or at a rate.
+/// Shared counter of operations, which are due one after the other or at a rate.
 #[derive(Debug)]
 pub(crate) struct Pace {
     start: Instant,
     time: Duration,
-    /// Operations a second; none for as fast as they are done.
+    /// Operations a second; none: each is due when the one before is done.
     rate: Option<f64>,
     first: u64,
     next: AtomicU64,
 }
 
-/// An operation that is to be carried out.
+/// An operation that is due.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Due {
-    /// The operation's number.
+    /// Number of the operation.
     pub(crate) number: u64,
-    /// When it was due. At a rate, who comes late to it makes it wait: that is part of what it took.
+    /// Time at which it was due. At a rate, a late start counts as part of the operation's latency.
     pub(crate) since: Instant,
 }
 
 impl Pace {
-    /// Begins now, and ends after `time`. Numbers begin at `first`.
+    /// A pace that begins now with the number `first`, and ends after `time`.
     pub(crate) fn new(rate: Option<f64>, time: Duration, first: u64) -> Self {
         Self { start: Instant::now(), time, rate, first, next: AtomicU64::new(first) }
     }
 
-    /// The number that comes next.
+    /// Returns the next number.
     pub(crate) fn next(&self) -> u64 {
         self.next.load(Ordering::Relaxed)
     }

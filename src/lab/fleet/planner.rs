@@ -1,4 +1,4 @@
-//! A member of the fleet that asks.
+//! Planners: members of a fleet that query.
 
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -13,7 +13,7 @@ use crate::client::{Answers, Client};
 use crate::map::MapName;
 use crate::service::{PointAnswer, PointQuery};
 
-/// Asks about points, by every protocol in turn.
+/// A planner that queries points, by each protocol in turn.
 pub(crate) struct Planner {
     map: MapName,
     question: Question,
@@ -52,7 +52,7 @@ impl Member for Planner {
     }
 }
 
-/// A stream of queries with one under way at a time.
+/// A stream of queries, one at a time.
 struct QueryStream {
     questions: mpsc::Sender<PointQuery>,
     answers: Answers<PointAnswer>,
@@ -66,7 +66,7 @@ impl QueryStream {
     }
 
     async fn ask(&mut self, query: PointQuery) -> Result<(), FleetError> {
-        // Who does not read any more says why in an answer.
+        // A server that stops reading says why in an answer.
         let _ = self.questions.send(query).await;
         match self.answers.next().await {
             Some(answer) => answer.map(drop).map_err(FleetError::from),

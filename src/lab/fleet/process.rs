@@ -14,20 +14,20 @@ use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
 use super::memory::resident_bytes;
 
-/// How long it may take to go down, beyond the ten seconds of its drain.
+/// Longest time for the server to end, beyond the ten seconds of its drain.
 const STOPPING_MAX: Duration = Duration::from_secs(30);
 
-/// Revisions within which undo works: missions are short, and more would fill the disk.
+/// Undo window of the server: missions are short, and more revisions would fill the disk.
 const UNDO_REVISIONS: &str = "1000";
 
-/// This same program as a daemon, on free ports. It is killed where it was not stopped.
+/// This program as a daemon in another process, on free ports. It is killed when dropped without a stop.
 pub(crate) struct ServerProcess {
     child: Child,
     pid: u32,
     serving: Serving,
 }
 
-/// What it prints first.
+/// The first line that the daemon prints.
 #[derive(Deserialize)]
 struct Serving {
     http: String,
@@ -35,7 +35,7 @@ struct Serving {
 }
 
 impl ServerProcess {
-    /// Starts it with its maps in `data_dir`.
+    /// Starts the server with its maps in `data_dir`.
     pub(crate) async fn start(data_dir: &Path) -> Result<Self, FleetError> {
         let no_server = |error: &dyn std::fmt::Display| FleetError::failed(format!("no server: {error}"));
         let program = std::env::current_exe().map_err(|error| no_server(&error))?;
@@ -67,12 +67,12 @@ impl ServerProcess {
         HttpAddress::open(format!("http://{}", self.serving.http))
     }
 
-    /// Memory that it has resident.
+    /// Resident memory of the server, bytes.
     pub(crate) fn resident_bytes(&self) -> Result<u64, FleetError> {
         resident_bytes(self.pid)
     }
 
-    /// Tells it to end as a service manager does, and sees that it does so well.
+    /// Stops the server as a service manager does, and checks its exit code.
     pub(crate) async fn stop(mut self) -> Result<(), FleetError> {
         if let Some(pid) = i32::try_from(self.pid).ok().and_then(Pid::from_raw) {
             kill_process(pid, Signal::TERM).map_err(FleetError::failed)?;

@@ -1,4 +1,4 @@
-//! A member of the fleet that maps.
+//! Robots: members of a fleet that map.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::map::{MapName, Region, RobotName};
 use crate::mapping::Guess;
 use crate::service::{Deletion, DeletionTarget, PointCloud, ScanRequest, Undo, UndoTarget};
 
-/// Points of a turn of the workload's sensor.
+/// Points of one revolution of the workload's sensor.
 pub(crate) const TURN_POINTS: usize = 64 * 1024;
-/// Scans of a mission.
+/// Number of scans of a mission.
 const SCANS: u64 = 20;
-/// What is deleted at once.
+/// Radius of a deletion, meters.
 const DELETED_RADIUS_M: f64 = 0.3;
 
-/// What robots see of the workload, turn by turn.
+/// Scans of the workload, one for each revolution of the sensor.
 #[derive(Debug, Clone)]
 pub(crate) struct Seen {
     turns: Arc<[PointCloud]>,
@@ -27,7 +27,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// Whole turns of `points`, each thinned evenly to `scan_points` at most.
+    /// Divides `points` into whole revolutions, each thinned evenly to at most `scan_points` points.
     pub(crate) fn of(points: &Queries, scan_points: usize) -> Self {
         let every = TURN_POINTS.div_ceil(scan_points);
         let thinned = |turn: &[Point]| turn.iter().copied().step_by(every).collect::<Vec<_>>().into();
@@ -35,26 +35,26 @@ impl Seen {
         Self { turns, map_from_points: points.map_from_points }
     }
 
-    /// The turns follow each other again and again.
+    /// The scan of revolution `number`; the revolutions repeat.
     fn turn(&self, number: u64) -> PointCloud {
         self.turns[number as usize % self.turns.len()].clone()
     }
 }
 
-/// A robot goes on one mission after the other, each with a map of its own that ends with it; one scan of each is for the
-/// map that all have.
+/// A robot that carries out one mission after another, each with a map of its own that is deleted at its end. One scan
+/// of each mission goes to the map that all robots share.
 pub(crate) struct Robot {
     name: RobotName,
     client: Client,
     seen: Seen,
-    /// The map that all have,
+    /// Name of the shared map.
     shared: MapName,
-    /// and the mission's.
+    /// Name of the mission's map.
     own: MapName,
     settings: NewMap,
-    /// Steps of the mission that are done.
+    /// Number of completed steps of the mission.
     steps: u64,
-    /// The revision of the mission's map after half of its scans.
+    /// Revision of the mission's map after half of its scans.
     half_way: u64,
 }
 
@@ -71,7 +71,7 @@ enum Step {
 }
 
 impl Step {
-    /// The step after `steps` steps of a mission.
+    /// The step that follows `steps` steps of a mission.
     fn after(steps: u64) -> Self {
         match steps.checked_sub(SCANS) {
             None if steps == 0 => Self::MakeMap,
@@ -100,7 +100,8 @@ impl Robot {
         })
     }
 
-    /// Adds a turn, aligned or as it is. All turns fit, so that a refused one is an error here.
+    /// Inserts a revolution, aligned or at its guess; returns the revision. All revolutions fit, so that a refused one
+    /// is an error.
     async fn insert(&self, map: &MapName, number: u64, at_guess: bool) -> Result<u64, FleetError> {
         let scan = ScanRequest {
             scan_id: Some(number),
@@ -115,7 +116,7 @@ impl Robot {
         }
     }
 
-    /// Takes out what is around one point of a turn.
+    /// Deletes the voxels around one point of a revolution.
     async fn delete(&self, map: &MapName, number: u64) -> Result<(), FleetError> {
         let turn = self.seen.turn(number);
         let seen = turn.as_slice()[number as usize * 7919 % turn.len()];
@@ -126,7 +127,7 @@ impl Robot {
         Ok(())
     }
 
-    /// Takes out what came in since half-way.
+    /// Undoes the scans since half of the mission.
     async fn undo_half(&self) -> Result<(), FleetError> {
         let target = UndoTarget::RobotSince { robot: self.name.clone(), revision: self.half_way };
         self.client.undo(&self.own, Undo { target, request_id: None }).await?;

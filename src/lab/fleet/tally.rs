@@ -1,4 +1,4 @@
-//! What came of the operations of some time.
+//! Tallies of operations: latencies and errors.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -7,17 +7,17 @@ use hdrhistogram::Histogram;
 
 use super::FleetError;
 
-/// Answers that take longer count as this long: ten minutes.
+/// Longest latency that is told apart: longer ones count as ten minutes, in nanoseconds.
 const LATENCY_NS_MAX: u64 = 600_000_000_000;
-/// Digits of a time that are kept.
+/// Significant digits of a latency.
 const LATENCY_DIGITS: u8 = 3;
 
-/// Latencies and errors.
+/// Latencies and errors of operations.
 #[derive(Debug, Clone)]
 pub(crate) struct Tally {
-    /// Nanoseconds from the moment when an operation was due.
+    /// Latencies, nanoseconds from the time at which an operation was due.
     latencies: Histogram<u64>,
-    /// How often each message came.
+    /// Number of errors, by message.
     pub(crate) errors: BTreeMap<String, u64>,
 }
 
@@ -34,7 +34,7 @@ impl Tally {
         }
     }
 
-    /// Adds what `other` counted.
+    /// Adds the counts of `other`.
     pub(crate) fn merge(&mut self, other: &Self) -> Result<(), FleetError> {
         self.latencies.add(&other.latencies).map_err(FleetError::failed)?;
         for (error, count) in &other.errors {
@@ -51,7 +51,7 @@ impl Tally {
         self.errors.values().sum()
     }
 
-    /// The time within which that share of the operations was done, milliseconds.
+    /// The quantile `share` of the latencies, milliseconds.
     pub(crate) fn quantile_ms(&self, share: f64) -> f64 {
         self.latencies.value_at_quantile(share) as f64 / 1e6
     }

@@ -1,4 +1,4 @@
-//! The map that is asked, on whatever server.
+//! The map of a workload on any server.
 
 use uuid::Uuid;
 
@@ -23,7 +23,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// Makes the map on a server and fills it with `workload`.
+    /// Creates the map on a server and fills it with `workload`.
     pub(crate) async fn make(
         grpc: GrpcAddress,
         http: Option<HttpAddress>,
@@ -44,14 +44,14 @@ impl Target {
         match target.fill(workload).await {
             Ok(()) => Ok(target),
             Err(error) => {
-                // What went wrong first is what is told.
+                // The first error is the one that is reported.
                 let _ = target.delete().await;
                 Err(error)
             }
         }
     }
 
-    /// Sends the voxels as scans of points in their middles.
+    /// Sends the voxels as scans of points in their centers.
     async fn fill(&mut self, workload: Workload) -> Result<(), FleetError> {
         let robot = RobotName::new("bench").map_err(FleetError::failed)?;
         let lattice = Lattice::new(workload.resolution_m(), 1).map_err(FleetError::failed)?;

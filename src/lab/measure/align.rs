@@ -1,4 +1,4 @@
-//! How long alignments take, by method and by what answers their look-ups.
+//! Measurement of alignments: durations, by method and look-up.
 
 use std::time::Instant;
 
@@ -9,18 +9,18 @@ use crate::map::{
     Lookup, MapSettings, MapSettingsError, MappedScan, MultiResolutionMap, RobotName, ScanRecord,
 };
 
-/// All alignments of one kind.
+/// Measurements of one method and look-up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aligned {
-    /// How.
+    /// Method of alignment.
     pub method: Method,
-    /// What answered the ascent's look-ups.
+    /// Look-up that the ascent used.
     pub lookup: Lookup,
-    /// Time of each scan but the first, milliseconds: the quickest of the repeats.
+    /// Duration for each scan but the first, milliseconds: the shortest of the repeats.
     pub ms: Vec<f64>,
-    /// Look-ups of all alignments.
+    /// Number of look-ups of all alignments.
     pub lookups: u64,
-    /// Error of each scan but the first, meters and degrees from where it was taken; empty where that is not known.
+    /// Error of each scan but the first against the true pose, meters and degrees; empty where that is not known.
     pub errors: Vec<(f64, f64)>,
 }
 
@@ -38,8 +38,8 @@ impl Aligned {
 
 /// Aligns each scan but the first to the map of those before it, in each of `ways`, `repeats` times.
 ///
-/// All get the same map and the same guess, the pose of the scan before: as it was, where that is known, or as the first
-/// way found it.
+/// All ways get the same map and the same guess, the pose of the scan before: the true one where it is known, else the
+/// one that the first way found.
 ///
 /// # Errors
 /// When a setting is out of range.
@@ -60,7 +60,7 @@ pub fn align_each(
             let way = (aligned.method, aligned.lookup);
             let (alignment, ms) = quickest(&map, &scan.points, &guess, way, repeats);
             aligned.add(&alignment, ms, scan.map_from_sensor.as_ref());
-            // In reverse order, so that the first way has the last word.
+            // In reverse order, so that the pose of the first way is the one that is kept.
             last = scan.map_from_sensor.unwrap_or(alignment.map_from_sensor);
         }
         let pose = MappedScan::new(robot.clone(), last);
@@ -69,7 +69,7 @@ pub fn align_each(
     Ok(all)
 }
 
-/// The alignment, which is always the same, and the milliseconds of the quickest.
+/// Aligns repeatedly; returns the alignment, which is always the same, and the shortest duration, milliseconds.
 fn quickest(
     map: &MultiResolutionMap,
     points: &[Point],

@@ -1,4 +1,4 @@
-//! What a map's growth costs: memory, those who wait for a change, and those who read meanwhile.
+//! Measurement of a map's growth: memory, and the latencies of commits and of a reader.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -8,26 +8,27 @@ use crate::lab::rivals::{Structure, ThroughMap};
 use crate::lab::workload::{Order, Queries, Workload, add};
 use crate::map::{Lookup, MapSettings, MapSettingsError, MultiResolutionMap};
 
-/// What was seen while a map grew from nothing to a workload's size.
+/// Measurements while a map grew from nothing to a workload's size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Growth {
-    /// Voxels at the end.
+    /// Number of voxels at the end.
     pub voxels: usize,
-    /// Bytes a finest voxel, all levels, filters and counters: least and most after any commit but the first ones.
+    /// Bytes for each finest voxel, of all levels, filters and counters: least and most after any commit but the first
+    /// ones.
     pub bytes_per_voxel: (f64, f64),
-    /// How long the commits took that made no filter larger, milliseconds, ascending.
+    /// Durations of the commits that did not enlarge a filter, milliseconds, ascending.
     pub commits_ms: Vec<f64>,
-    /// How long those took that did.
+    /// Durations of the commits that enlarged a filter, milliseconds, ascending.
     pub growing_commits_ms: Vec<f64>,
-    /// How long a reader's questions of [`READ_POINTS`] points took meanwhile, microseconds, ascending.
+    /// Durations of a reader's queries of [`READ_POINTS`] points meanwhile, microseconds, ascending.
     pub reads_us: Vec<f32>,
 }
 
-/// Points of a reader's question.
+/// Number of points of a reader's query.
 pub const READ_POINTS: usize = 640;
-/// How long a reader rests between two questions: it is to meet the writer, not to hinder it.
+/// Pause of a reader between two queries: it is to meet the writer, not to hinder it.
 const READ_REST: Duration = Duration::from_micros(50);
-/// Voxels below which bytes a voxel say little.
+/// Number of voxels below which bytes for each voxel say little.
 const VOXELS_MIN: usize = 100_000;
 
 /// Streams a workload into a map, piece by piece, while one thread reads.
@@ -90,7 +91,7 @@ fn read(map: &MultiResolutionMap, queries: &Queries, over: &AtomicBool) -> Vec<f
     reads_us
 }
 
-/// The most memory that this process has held so far, bytes; none where the system does not tell.
+/// Peak resident memory of this process, bytes; none where the system does not report it.
 pub fn peak_resident_bytes() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

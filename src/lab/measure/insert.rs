@@ -1,4 +1,4 @@
-//! How fast a map takes points in, and gives them back.
+//! Measurement of insertion and removal.
 
 use super::stopwatch::Runs;
 use crate::geometry::{Point, Pose};
@@ -7,14 +7,14 @@ use crate::map::{MapDescription, MapSettings, MapSettingsError, MultiResolutionM
 use crate::voxel::quantize;
 use crate::voxel::{Lattice, VoxelSet};
 
-/// What insertion took: nanoseconds a point, run by run.
+/// Durations of insertion, nanoseconds a point, run by run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Inserted {
-    /// Every point in a voxel that was not there.
+    /// Insertion of points in voxels that were not in the map.
     pub new: Runs,
-    /// Every point in a voxel that was.
+    /// Insertion of points in voxels that were in the map.
     pub known: Runs,
-    /// Voxels afterwards.
+    /// Number of voxels afterwards.
     pub voxels: usize,
     /// Bytes of memory afterwards.
     pub bytes: usize,
@@ -49,12 +49,12 @@ fn insert(map: &MultiResolutionMap, points: &Queries, scan_points: usize) {
     }
 }
 
-/// Bytes of a map's sets and filters, all levels.
+/// Bytes of a map's sets and filters, of all levels.
 pub fn bytes(map: &MultiResolutionMap) -> usize {
     map.describe(0, 0).set_bytes + filter_bytes(map)
 }
 
-/// Bytes of a map's filters, all levels.
+/// Bytes of a map's filters, of all levels.
 pub(super) fn filter_bytes(map: &MultiResolutionMap) -> usize {
     let MapDescription { levels, .. } = map.describe(0, 0);
     levels.iter().map(|level| level.plane_bytes + level.counter_bytes).sum()
@@ -91,7 +91,8 @@ fn insert_keys(set: &mut hashbrown::HashSet<u64>, scan: &[Point], lattice: &Latt
     set.extend(keys.into_iter().filter(|&key| key != quantize::NO_KEY));
 }
 
-/// Takes all voxels of `points` out of a map that holds them, scan by scan, `repeats` times: nanoseconds a point.
+/// Times the removal of all voxels of `points` from a map that holds them, scan by scan, `repeats` times; nanoseconds a
+/// point.
 ///
 /// # Errors
 /// When a setting is out of range.

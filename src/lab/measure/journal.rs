@@ -1,4 +1,5 @@
-//! What durability costs: the same scans at the same poses, sent by several robots at once, with and without a journal.
+//! Measurement of durability: the same scans at the same poses, sent by several robots at once, with and without a
+//! journal.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,26 +12,26 @@ use crate::mapping::Guess;
 use crate::service::{MapService, PointCloud, ScanRequest, ServiceError, ServiceSettings};
 use crate::store::{Durability, OpeningProgress, StoreSettings};
 
-/// How a service keeps what it is sent.
+/// Where a service keeps its maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Keeping {
     /// In memory only.
     InMemory,
-    /// In a folder, acknowledged as the durability says.
+    /// In a folder, with this durability.
     OnDisk(Durability),
 }
 
 /// Scans of several robots.
 #[derive(Debug, Clone)]
 pub struct Scans {
-    /// Robot by robot.
+    /// Scans of each robot.
     of_robots: Vec<Vec<PointCloud>>,
-    /// The pose of them all.
+    /// Pose of all scans.
     guess: Guess,
 }
 
 impl Scans {
-    /// `points` as scans of `scan_points` points, dealt out to `robots` robots.
+    /// Divides `points` into scans of `scan_points` points, dealt out to `robots` robots.
     pub fn of(points: &Queries, scan_points: usize, robots: usize) -> Self {
         let mut of_robots = vec![Vec::new(); robots];
         for (i, scan) in points.points.chunks(scan_points).enumerate() {
@@ -44,14 +45,14 @@ impl Scans {
         self.of_robots.iter().map(Vec::len).sum()
     }
 
-    /// True without a scan.
+    /// True when there is no scan.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// Sends all scans to a new service, each robot its next one when the last is acknowledged: how long that takes, and
-/// the bytes of journal that it makes. `folder` must be empty or not there.
+/// Times the insertion of all scans into a new service, and returns the duration and the bytes of journal. Each robot
+/// sends its next scan when the last is acknowledged. `folder` must be empty or not exist.
 ///
 /// # Errors
 /// When the service refuses.

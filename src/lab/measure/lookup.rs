@@ -1,4 +1,4 @@
-//! Structures side by side on the same questions.
+//! Measurement of look-ups: several structures with the same queries.
 
 use super::stopwatch::Runs;
 use crate::lab::rivals::{Structure, StructureName};
@@ -6,36 +6,36 @@ use crate::lab::workload::Queries;
 use crate::map::Lookup;
 use crate::map::MultiResolutionMap;
 
-/// What a structure did.
+/// Measurements of a structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Which.
+    /// Name of the structure.
     pub name: StructureName,
-    /// Time of each pass over all points, nanoseconds a point.
+    /// Duration of each pass over all points, nanoseconds a point.
     pub runs: Runs,
-    /// Points asked about.
+    /// Number of points of a pass.
     pub points: usize,
-    /// Points that it took for occupied, false positives among them.
+    /// Number of points that it called occupied, false positives included.
     pub occupied: usize,
-    /// Points that it took for occupied in voxels that are not.
+    /// Number of points that it called occupied in voxels that are not.
     pub false_positives: usize,
-    /// Bytes of memory that it takes.
+    /// Bytes of memory of the structure.
     pub bytes: usize,
 }
 
-/// A structure gave an answer that cannot be: its time is worth nothing.
+/// A structure gave a wrong answer, so that its times are worthless.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Disagreement {
-    /// A structure denies an occupied voxel.
+    /// A structure calls occupied voxels free; the payload is the structure and the number of such points.
     #[error("{0} says of {1} points in occupied voxels that they are free")]
     Denies(&'static str, usize),
-    /// A structure that is exact says "occupied" of a free voxel.
+    /// An exact structure calls free voxels occupied; the payload is the structure and the number of such points.
     #[error("{0} says of {1} points in free voxels that they are occupied")]
     Invents(&'static str, usize),
 }
 
-/// Times `structures` over `level` of `map` in `passes` passes over all points, each after one that is not timed. They
-/// take turns, so that whatever else the machine does meanwhile befalls all of them.
+/// Times `structures` on `level` of `map` in `passes` passes over all points, each after one that is not timed. The
+/// structures take turns, so that other load of the machine affects all of them.
 ///
 /// # Errors
 /// When answers contradict those of the map's exact set.
@@ -56,7 +56,7 @@ pub fn compare(
     for _ in 0..passes {
         for ((_, structure), measured) in structures.iter().zip(&mut measured) {
             let mut ask = || structure.occupied(&queries.points, &queries.map_from_points, &mut answers);
-            // What the others left in the caches is not this one's doing.
+            // An untimed pass first, so that what other structures left in the caches does not count.
             ask();
             measured.runs.time(queries.points.len(), ask);
         }

@@ -1,4 +1,4 @@
-//! What `mrol bench` measures: each operation by itself, again and again, by one clock.
+//! Measurements behind `mrol bench`: each operation by itself, repeatedly, with one clock.
 
 pub mod align;
 pub mod growth;

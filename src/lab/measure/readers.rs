@@ -1,4 +1,4 @@
-//! How readers of one map get on beside each other, and beside a writer.
+//! Measurement of concurrency: readers of one map at once, and beside a writer.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -8,29 +8,29 @@ use crate::lab::workload::{Queries, add};
 use crate::map::{Lookup, MultiResolutionMap};
 use crate::voxel::VoxelSet;
 
-/// Readers and writers that use the map.
+/// Readers and writers that use the map at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crowd {
-    /// Threads that ask.
+    /// Number of reading threads.
     pub readers: usize,
-    /// Whether a thread changes the map all the time: takes a scan out, puts it in again.
+    /// Whether a thread changes the map all the time: removes a scan and inserts it again.
     pub writer: bool,
 }
 
-/// What the crowd got done.
+/// Throughput of a crowd.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Throughput {
-    /// Points that readers were answered, all together.
+    /// Points answered per second, over all readers.
     pub points_per_s: f64,
-    /// Changes that the writer made.
+    /// Changes of the writer per second.
     pub commits_per_s: f64,
 }
 
-/// Points of a scan of the writer's.
+/// Number of points of a scan of the writer.
 const SCAN_POINTS: usize = 30_000;
 
-/// Lets a crowd use `map` for `time`. Readers ask about all points again and again, as a scan each of ten thousand;
-/// the writer changes the voxels of the same points.
+/// Lets a crowd use `map` for `time`. Readers query all points repeatedly, ten thousand at a time; the writer changes
+/// the voxels of the same points.
 pub fn run(
     map: &MultiResolutionMap,
     queries: &Queries,
@@ -55,7 +55,7 @@ pub fn run(
     Throughput { points_per_s: rate(answered), commits_per_s: rate(commits) }
 }
 
-/// Points of a reader's call: it looks at the clock about every tenth of a millisecond.
+/// Number of points between two looks of a reader at the clock: about a tenth of a millisecond.
 const CALL_POINTS: usize = 40_960;
 
 fn read(map: &ThroughMap<'_>, queries: &Queries, over: &AtomicBool, answered: &AtomicUsize) {
@@ -63,7 +63,7 @@ fn read(map: &ThroughMap<'_>, queries: &Queries, over: &AtomicBool, answered: &A
     for points in queries.points.chunks(CALL_POINTS).cycle() {
         map.occupied(points, &queries.map_from_points, &mut occupied[..points.len().div_ceil(64)]);
         answered.fetch_add(points.len(), Ordering::Relaxed);
-        // At the end, so that on a busy machine each has been answered once.
+        // Checked at the end, so that on a busy machine each reader is answered once.
         if over.load(Ordering::Relaxed) {
             return;
         }

@@ -1,4 +1,4 @@
-//! How long a server takes to start: a snapshot of a map, and the journal after it.
+//! Measurement of a server's start: a snapshot of a map, and the journal after it.
 
 use std::path::Path;
 
@@ -11,19 +11,19 @@ use crate::service::{MapService, ServiceError, ServiceSettings};
 use crate::store::{DataDir, OpeningProgress, Record, Snapshot, StoreError, StoreSettings};
 use crate::voxel::MomentSet;
 
-/// Bytes of snapshot and journal in a folder.
+/// Sizes of snapshot and journal in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kept {
-    /// Bytes of the snapshot, as a file.
+    /// Bytes of the snapshot file.
     pub snapshot_bytes: usize,
     /// Bytes of the journal after the snapshot.
     pub journal_bytes: u64,
-    /// Records in that.
+    /// Number of records in the journal.
     pub records: u64,
 }
 
-/// Fills an empty folder with a snapshot of `map`, and scans of `scan_points` of `points` as a journal of at least
-/// `journal_bytes` after it, over and over where they are few.
+/// Fills an empty folder with a snapshot of `map`, and a journal of at least `journal_bytes` after it: scans of
+/// `scan_points` of `points`, repeated where they are few.
 ///
 /// # Errors
 /// When the system refuses.
@@ -35,7 +35,7 @@ pub fn keep(
     journal_bytes: u64,
 ) -> Result<Kept, StoreError> {
     let mut snapshot = Snapshot::of(map, Uuid::new_v4());
-    // A workload's map knows no points: as many moments as a map that robots made.
+    // A workload's map has no moments: they are added, as many as in a map that robots made.
     snapshot.contents.moments = MomentSet::of_centers(&snapshot.contents.voxels);
     let snapshot_bytes = snapshot.encode().map_or(0, |bytes| bytes.len());
     let name = MapName::new("bench").map_err(|e| StoreError::damaged(folder, e.to_string()))?;
@@ -55,7 +55,7 @@ pub fn keep(
     Ok(Kept { snapshot_bytes, journal_bytes: journal.bytes, records: journal.records })
 }
 
-/// Opens a service on the folder, `repeats` times: nanoseconds each.
+/// Times the opening of a service on the folder, `repeats` times, nanoseconds each.
 ///
 /// # Errors
 /// When the service cannot be opened.

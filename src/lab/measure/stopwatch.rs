@@ -1,29 +1,28 @@
-//! Timing one piece of work again and again.
+//! Timing of repeated work.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// The times of several runs of the same work, nanoseconds an item.
+/// Durations of several runs of the same work, nanoseconds an item.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Runs(Vec<f64>);
 
 impl Runs {
-    /// Does `work` on `items` items once, and keeps how long that took; what it gives.
+    /// Runs `work` on `items` items once, records its duration, and returns its result.
     pub fn time<T>(&mut self, items: usize, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
-        // Neither begun before the clock nor left out because nobody looks at the result.
+        // The compiler may neither start the work before the clock nor drop it for want of a use of its result.
         let result = black_box(work());
         self.push(items, start.elapsed());
         result
     }
 
-    /// Keeps how long a run on `items` items took, which somebody else timed.
+    /// Records the duration of a run on `items` items that was timed elsewhere.
     pub fn push(&mut self, items: usize, elapsed: Duration) {
         self.0.push(elapsed.as_nanos() as f64 / items.max(1) as f64);
     }
 
-    /// The middle run, or the mean of the two middle ones: what another program does on the same core now and then
-    /// does not move it. 0 without a run.
+    /// The median run, which occasional load of the same core does not move; 0 without a run.
     pub fn median(&self) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -34,7 +33,7 @@ impl Runs {
         }
     }
 
-    /// Every run, in order.
+    /// All runs, in order.
     pub fn ns_per_item(&self) -> &[f64] {
         &self.0
     }

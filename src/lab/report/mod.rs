@@ -1,4 +1,4 @@
-//! Results as pictures and tables in files.
+//! Reports: results as plots and tables in files.
 
 pub mod chart;
 mod spread;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 pub use spread::Spread;
 pub use table::{Table, folder};
 
-/// A result could not be written to its file.
+/// Why a report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The file or folder cannot be written.

@@ -1,23 +1,23 @@
-//! The spread of some runs, as a box with whiskers shows it.
+//! Statistics of a box plot.
 
-/// Quartiles, the furthest runs that are no outliers, and those that are: further from the box than one and a half
+/// The spread of some runs: quartiles, whiskers and outliers. Outliers are further from the box than one and a half
 /// times its length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spread {
-    /// The least run that is no outlier.
+    /// End of the lower whisker: the least run that is no outlier.
     pub low: f64,
-    /// A quarter of the runs, half of them and three quarters lie below these.
+    /// The quartiles: a quarter of the runs, half of them and three quarters lie below these.
     pub quartiles: [f64; 3],
-    /// The greatest run that is no outlier.
+    /// End of the upper whisker: the greatest run that is no outlier.
     pub high: f64,
-    /// Runs further from the box than the whiskers reach, ascending.
+    /// Runs beyond the whiskers, ascending.
     pub outliers: Vec<f64>,
 }
 
 const WHISKER: f64 = 1.5;
 
 impl Spread {
-    /// The spread of `runs`, in any order; none without a run.
+    /// Computes the spread of `runs`, in any order; none without a run.
     pub fn of(runs: &[f64]) -> Option<Self> {
         let mut sorted = runs.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -30,7 +30,7 @@ impl Spread {
     }
 }
 
-/// The value below which `share` of the sorted values lie, between two of them where need be.
+/// The quantile `share` of ascending values, interpolated between two of them.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * (sorted.len() - 1) as f64;
     let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);

@@ -1,4 +1,4 @@
-//! Results as files of text.
+//! Tables as text files.
 
 use std::fmt::Display;
 use std::fs;
@@ -6,14 +6,14 @@ use std::path::Path;
 
 use super::ReportError;
 
-/// A table of text: rows of cells under a head.
+/// A table of text cells: rows under a head.
 pub struct Table {
     head: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table without rows under `head`.
+    /// Creates a table without rows under `head`.
     pub fn new(head: impl IntoIterator<Item = impl Display>) -> Self {
         Self { head: cells(head), rows: Vec::new() }
     }
@@ -32,7 +32,7 @@ impl Table {
         write(path, &std::iter::once(&self.head).chain(&self.rows).map(line).collect::<String>())
     }
 
-    /// Writes the table as Markdown, its cells to the right.
+    /// Writes the table as Markdown, aligned to the right.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -52,7 +52,7 @@ fn write(path: &Path, text: &str) -> Result<(), ReportError> {
     fs::write(path, text).map_err(ReportError::writing(path))
 }
 
-/// Makes the folder `path` and those above it where they are not there.
+/// Creates the folder `path` and its parents where they do not exist.
 ///
 /// # Errors
 /// When the folder cannot be made.

@@ -5,7 +5,7 @@ use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
 use crate::voxel::{Lattice, VoxelKey};
 
-/// hashbrown's set of keys with its default hasher.
+/// A hashbrown set of packed keys with its default hasher.
 #[derive(Debug)]
 pub struct HashSet {
     keys: hashbrown::HashSet<u64>,
@@ -14,7 +14,7 @@ pub struct HashSet {
 }
 
 impl HashSet {
-    /// The occupied voxels of a map's `level`.
+    /// Builds the set of the occupied voxels of `level` of a map.
     pub fn of(map: &MultiResolutionMap, level: u32) -> Self {
         let mut keys = hashbrown::HashSet::with_capacity(map.voxels(level));
         keys.extend(voxels(&map.view(), level).map(VoxelKey::to_bits));
@@ -38,7 +38,7 @@ impl Structure for HashSet {
     }
 }
 
-/// Bytes of a set's table.
+/// Bytes of the table of a set.
 pub fn hash_set_bytes(keys: &hashbrown::HashSet<u64>) -> usize {
     keys.allocation_size()
 }

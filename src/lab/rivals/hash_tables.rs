@@ -1,4 +1,5 @@
-//! A hash table of packed keys a level: the map of the paper's predecessor \[8\], which it compares with (IV-C).
+//! Hash tables of packed keys, one for each level: the map of the paper's predecessor \[8\], which it compares with
+//! (IV-C).
 
 use super::count_by_key;
 use crate::align::OccupiedVoxels;
@@ -7,7 +8,8 @@ use crate::map::Lookup;
 use crate::voxel::quantize;
 use crate::voxel::{Lattice, VoxelKey};
 
-/// hashbrown's sets of keys with their default hasher, one a level, behind the same transform as our own map.
+/// A map of hashbrown sets with their default hasher, one for each level, behind the same transform as the map of this
+/// crate.
 #[derive(Debug)]
 pub struct HashTables {
     lattice: Lattice,
@@ -15,17 +17,17 @@ pub struct HashTables {
 }
 
 impl HashTables {
-    /// Tables without a voxel.
+    /// Creates tables without a voxel.
     pub fn new(lattice: Lattice) -> Self {
         Self { lattice, levels: vec![hashbrown::HashSet::new(); lattice.levels() as usize] }
     }
 
-    /// Adds the voxels of `points`, at every level.
+    /// Inserts the voxels of `points`, at every level.
     pub fn insert(&mut self, points: &[Point], map_from_points: &Pose) {
         let mut keys = vec![quantize::NO_KEY; points.len()];
         quantize::keys(points, &self.lattice.from_points(map_from_points), 0, &mut keys);
         for voxel in keys.into_iter().filter_map(VoxelKey::from_bits) {
-            // A coarse voxel is there where one of its children is.
+            // A coarse voxel is occupied where one of its children is.
             let mut ancestors = (0..).map(|up| voxel.ancestor(up).to_bits());
             self.levels.iter_mut().zip(&mut ancestors).all(|(level, key)| level.insert(key));
         }
@@ -42,7 +44,7 @@ impl OccupiedVoxels for HashTables {
         &self.lattice
     }
 
-    /// Exactly, whatever `lookup` says: there is but one way to ask.
+    /// Counts exactly, whatever `lookup` says: there is only one way to look up.
     fn hits(&self, points: &[Point], poses: &[Pose], level: u32, _lookup: Lookup) -> Vec<usize> {
         let keys = &self.levels[level as usize];
         let count =

@@ -1,5 +1,5 @@
-//! Structures that answer one question, "which of these points are in occupied voxels?", from the same points and
-//! pose to the same bitmap. All get the fastest transform at hand, so that only the structure differs.
+//! Rivals: structures that answer the same query, "which of these points are in occupied voxels?", from the same points
+//! and pose with the same bitmap. All get the fastest transform available, so that only the structure differs.
 
 mod dense;
 mod hash_set;
@@ -21,7 +21,7 @@ pub use ours::{Kernel, ThroughMap, filter_contains, query_scalar};
 pub use paper::PaperFilter;
 pub use weighted_sum::WeightedSum;
 
-/// Which structure.
+/// Name of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum StructureName {
     /// The counting Bloom filters, through the sharded map and its locks
@@ -41,7 +41,7 @@ pub enum StructureName {
 }
 
 impl StructureName {
-    /// As it is printed.
+    /// The name as it is printed.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Bloom => "bloom",
@@ -54,12 +54,12 @@ impl StructureName {
         }
     }
 
-    /// True when it never says "occupied" of a free voxel.
+    /// True for a structure that never calls a free voxel occupied.
     pub fn is_exact(self) -> bool {
         !matches!(self, Self::Bloom | Self::BloomKernel | Self::Paper)
     }
 
-    /// The structure over the occupied voxels of a map's `level`.
+    /// Builds the structure of the occupied voxels of `level` of a map.
     ///
     /// # Errors
     /// When a dense array would be too large.
@@ -86,26 +86,27 @@ impl Display for StructureName {
     }
 }
 
-/// Occupied voxels of one level.
+/// A structure of occupied voxels of one level.
 pub trait Structure {
-    /// Says of each point whether its voxel is occupied: point i is bit i % 64 of `occupied[i / 64]`, which has a
+    /// Looks up whether the voxel of each point is occupied: point i is bit i % 64 of `occupied[i / 64]`, which has a
     /// word for each 64 points. A point without a voxel is not occupied.
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]);
 
-    /// Bytes of memory that it takes.
+    /// Bytes of memory of the structure.
     fn bytes(&self) -> usize;
 }
 
-/// Points that are transformed at a time: their keys stay in the innermost cache.
+/// Points that are transformed at a time; their keys stay in the innermost cache.
 const CHUNK: usize = 1024;
 const _: () = assert!(CHUNK.is_multiple_of(64), "a chunk's answers are whole words");
 
-/// The occupied voxels of `level`.
+/// Keys of the occupied voxels of `level`.
 fn voxels<'a>(view: &'a MapView<'_>, level: u32) -> impl Iterator<Item = VoxelKey> + 'a {
     view.lists(level).flat_map(|list| list.iter())
 }
 
-/// Answers by key: transform a chunk, then ask of each key. `contains` is never true of [`quantize::NO_KEY`].
+/// Looks up points by key, chunk by chunk: transforms the points, then calls `contains` with each key. `contains` must
+/// be false for [`quantize::NO_KEY`].
 #[inline(always)]
 fn occupied_by_key(
     points: &[Point],
@@ -122,7 +123,7 @@ fn occupied_by_key(
     }
 }
 
-/// How many points have a key that is contained; see [`occupied_by_key`].
+/// Counts the points whose key is contained; see [`occupied_by_key`].
 #[inline(always)]
 fn count_by_key(
     points: &[Point],
@@ -139,7 +140,7 @@ fn count_by_key(
     points.chunks(CHUNK).map(count).sum()
 }
 
-/// A bit for each item: item i is bit i % 64 of `words[i / 64]`.
+/// Writes a bit for each item: item i is bit i % 64 of `words[i / 64]`.
 #[inline(always)]
 pub(super) fn bits<T>(items: &[T], words: &mut [u64], is_set: impl Fn(&T) -> bool) {
     for (items, word) in items.chunks(64).zip(words) {

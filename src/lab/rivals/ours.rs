@@ -1,4 +1,4 @@
-//! The map's own structures.
+//! The structures of this crate's map.
 
 use super::Structure;
 use crate::geometry::{Point, Pose};
@@ -6,7 +6,7 @@ use crate::map::lookup::{self, Lookup};
 use crate::map::{MapView, MultiResolutionMap};
 use crate::voxel::LatticeFromPoints;
 
-/// A level of a map as its users ask it: through the sharded map and its locks.
+/// A level of a map, queried as users do: through the sharded map and its locks.
 #[derive(Debug)]
 pub struct ThroughMap<'a> {
     map: &'a MultiResolutionMap,
@@ -14,12 +14,13 @@ pub struct ThroughMap<'a> {
     lookup: Lookup,
 }
 
-/// Points of one question: what a spinning sensor sends in a tenth of a turn. For each the locks are taken anew.
+/// Number of points of one query, for which the locks are taken once: what a spinning sensor sends in a tenth of a
+/// revolution.
 const QUESTION_POINTS: usize = 10_240;
 const _: () = assert!(QUESTION_POINTS.is_multiple_of(64), "a question's answers are whole words");
 
 impl<'a> ThroughMap<'a> {
-    /// `level` of `map`, asked by `lookup`.
+    /// Queries `level` of `map` by `lookup`.
     pub fn new(map: &'a MultiResolutionMap, level: u32, lookup: Lookup) -> Self {
         Self { map, level, lookup }
     }
@@ -39,7 +40,7 @@ impl Structure for ThroughMap<'_> {
     }
 }
 
-/// A level of a map that is locked once for all points of a question: the bare kernel.
+/// A level of a map, locked once for all points of a query: the kernel alone.
 #[derive(Debug)]
 pub struct Kernel<'a> {
     map: &'a MultiResolutionMap,
@@ -48,7 +49,7 @@ pub struct Kernel<'a> {
 }
 
 impl<'a> Kernel<'a> {
-    /// `level` of `map`, asked by `lookup`.
+    /// Queries `level` of `map` by `lookup`.
     pub fn new(map: &'a MultiResolutionMap, level: u32, lookup: Lookup) -> Self {
         Self { map, level, lookup }
     }
@@ -66,7 +67,7 @@ impl Structure for Kernel<'_> {
     }
 }
 
-/// [`MapView::query`] as CPUs without SIMD instructions run it: the reference implementation.
+/// The reference implementation of [`MapView::query`], which CPUs without SIMD instructions run.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 points.
@@ -81,8 +82,7 @@ pub fn query_scalar(
     lookup::occupied_scalar(points, lattice_from_points, &view.level_view(level), lookup, occupied)
 }
 
-/// The look-up in the filter of `level` alone, of voxels whose packed keys are known: key i is bit i % 64 of
-/// `occupied[i / 64]`.
+/// Looks up packed keys in the filter of `level` alone: key i is bit i % 64 of `occupied[i / 64]`.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.
@@ -90,8 +90,8 @@ pub fn filter_contains(view: &MapView<'_>, keys: &[u64], level: u32, occupied: &
     lookup::filter_contains(keys, &view.level_view(level), occupied);
 }
 
-/// Bytes of a structure: of a filter its plane and its counters; of the exact set the tables of all levels, since three
-/// levels share one.
+/// Bytes of a structure. For a filter those of its plane and counters; for the exact set those of the tables of all
+/// levels, since three levels share one table.
 fn bytes(map: &MultiResolutionMap, level: u32, lookup: Lookup) -> usize {
     let described = map.describe(0, 0);
     match lookup {

@@ -6,14 +6,14 @@ use crate::map::MultiResolutionMap;
 use crate::voxel::Lattice;
 use crate::voxel::quantize::NO_KEY;
 
-/// "the Bloom filter used two hash functions and had 6 million elements" (IV), a byte each.
+/// Number of counters, one byte each: "the Bloom filter used two hash functions and had 6 million elements" (IV).
 const COUNTERS: u64 = 6_000_000;
-/// `djbhash(i)`: h = 5381, t = h * 33 modulo 2^32, t ^ i.
+/// Constant of `djbhash(i)`: h = 5381, t = h * 33 modulo 2^32, t ^ i.
 const DJB: u64 = (5381 * 33) & 0xffff_ffff;
-/// `fnvhash(i)`: h = 2166136261, t = h * 16777619 modulo 2^32, t ^ i.
+/// Constant of `fnvhash(i)`: h = 2166136261, t = h * 16777619 modulo 2^32, t ^ i.
 const FNV: u64 = (2_166_136_261 * 16_777_619) & 0xffff_ffff;
 
-/// Six million counters, two of which each key increments.
+/// The paper's counting Bloom filter: six million counters, of which each key increments two.
 #[derive(Debug)]
 pub struct PaperFilter {
     counters: Vec<u8>,
@@ -22,7 +22,7 @@ pub struct PaperFilter {
 }
 
 impl PaperFilter {
-    /// The occupied voxels of a map's `level`.
+    /// Builds the filter of the occupied voxels of `level` of a map.
     pub fn of(map: &MultiResolutionMap, level: u32) -> Self {
         let mut counters = vec![0u8; COUNTERS as usize];
         for place in voxels(&map.view(), level).flat_map(|voxel| places(voxel.to_bits())) {
@@ -32,14 +32,14 @@ impl PaperFilter {
     }
 }
 
-/// The counters of a key.
+/// Indices of the two counters of a key.
 #[inline(always)]
 fn places(key: u64) -> [usize; 2] {
     let i = repacked(key);
     [DJB, FNV].map(|t| ((t ^ i) % COUNTERS) as usize)
 }
 
-/// Three indices as the paper packs them, "as four 2 byte integers (with one zero filler)" (II-B): its hashes spread
+/// Packs three indices as the paper does, "as four 2 byte integers (with one zero filler)" (II-B): its hashes spread
 /// these far better than indices of 21 bits. Indices beyond 2 bytes wrap, which can only add false positives.
 #[inline(always)]
 fn repacked(key: u64) -> u64 {
@@ -49,7 +49,7 @@ fn repacked(key: u64) -> u64 {
 impl Structure for PaperFilter {
     fn occupied(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64]) {
         let quantize = self.lattice.from_points(map_from_points);
-        // Both are read whatever the first says: a branch that is wrong half the time would cost more.
+        // Both are read in any case: a branch that is mispredicted half the time would cost more.
         occupied_by_key(points, &quantize, self.level, occupied, |key| {
             let [a, b] = places(key).map(|place| self.counters[place] != 0);
             a & b & (key != NO_KEY)

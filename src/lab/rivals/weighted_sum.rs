@@ -5,7 +5,7 @@ use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MultiResolutionMap};
 use crate::voxel::Lattice;
 
-/// A map whose hits are those of all levels, each counted twice as much as those of the next coarser one.
+/// A map whose hits are a weighted sum over all levels, each weighted twice as much as the next coarser one.
 ///
 /// The ascent of the paper climbs on it unchanged: at each level the steps are of that level, and the objective is the
 /// sum over all of them (paper III-B names it as what the search level by level took the place of).
@@ -17,7 +17,7 @@ impl OccupiedVoxels for WeightedSum<'_> {
         self.0.lattice()
     }
 
-    /// Weighted hits over all levels, whatever `level` says.
+    /// Returns the weighted hits over all levels, whatever `level` says.
     fn hits(&self, points: &[Point], poses: &[Pose], _level: u32, lookup: Lookup) -> Vec<usize> {
         let coarsest = self.lattice().levels() - 1;
         let mut sums = vec![0; poses.len()];

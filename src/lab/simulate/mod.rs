@@ -1,4 +1,4 @@
-//! Sensors simulated in a simulated building.
+//! Simulated sensors in a simulated building.
 //!
 //! A scan is a `Vec<Point>` in its sensor's frame, meters, as in [`crate::scan`]; a beam without a return is a point
 //! with NaN coordinates.

@@ -1,4 +1,4 @@
-//! How a robot carries its sensor along a route, step by step.
+//! Rides: how a robot carries its sensor along a route, step by step.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -7,39 +7,39 @@ use nalgebra::{Translation3, UnitQuaternion};
 use super::route::Route;
 use crate::geometry::{Pose, pose_difference};
 
-/// By how much a step that would be too long or turn too far is shortened, again and again.
+/// Factor by which a step that is too long, or turns too far, is shortened repeatedly.
 const SHORTENING: f64 = 0.9;
-/// How often in a lap the sensor glances to the right and to the left; at the corners it then looks where the
-/// robot goes, not at the wall beside it.
+/// Number of glances to each side in a lap; at the corners the sensor then looks where the robot goes, not at the wall
+/// beside it.
 const GLANCES: f64 = 3.0;
-/// Ways over which it rolls, pitches and heaves once, meters; no two have a common multiple nearby.
+/// Periods of roll, pitch and heave along the route, meters; no two have a small common multiple.
 const ROLL_WAY_M: f64 = 2.9;
 const PITCH_WAY_M: f64 = 3.7;
 const HEAVE_WAY_M: f64 = 2.3;
-/// How far it heaves, meters.
+/// Amplitude of the heave, meters.
 const HEAVE_M: f64 = 0.01;
 
 /// How a robot carries its sensor along a route.
 pub(super) struct Ride {
     pub(super) route: Route,
-    /// Mean height of the sensor above the floor.
+    /// Mean height of the sensor above the floor, meters.
     pub(super) height_m: f64,
-    /// How far it looks down.
+    /// Angle by which the sensor looks down, degrees.
     pub(super) pitch_down_deg: f64,
     /// True for camera axes: x to the right, y down, z forward.
     pub(super) is_camera: bool,
-    /// How far the sensor turns to both sides on its way.
+    /// Amplitude of the glances to both sides, degrees.
     pub(super) glance_deg: f64,
-    /// How far it rolls and pitches.
+    /// Amplitude of roll and pitch, degrees.
     pub(super) sway_deg: f64,
-    /// Longest way of a step.
+    /// Largest length of a step, meters.
     pub(super) step_max_m: f64,
-    /// Largest turn of a step.
+    /// Largest rotation of a step, degrees.
     pub(super) turn_max_deg: f64,
 }
 
 impl Ride {
-    /// The first `steps` places of the sensor, map_from_sensor; after a lap comes the next.
+    /// The first `steps` poses of the sensor, map_from_sensor, over as many laps as needed.
     pub(super) fn poses(&self, steps: usize) -> Vec<Pose> {
         let mut way_m = 0.0;
         std::iter::repeat_with(|| {

@@ -1,11 +1,11 @@
-//! The robots' routes on the floor: closed lines of straight stretches, their corners smoothed.
+//! Routes of the robots on the floor: closed lines of straight stretches with smoothed corners.
 //!
-//! They depend on the building alone; furniture keeps off them.
+//! They depend on the building alone; furniture is placed away from them.
 
-/// Places averaged for one smoothed place.
+/// Number of positions that are averaged for one smoothed position.
 const AVERAGED: usize = 24;
 
-/// Room to room through every door, twice along the corridor: 44 m.
+/// Route of the lidar robot: from room to room through every door, twice along the corridor: 44 m.
 pub(super) const LIDAR_ROUTE: Route = Route {
     corners: &[
         [4.6, 6.9],
@@ -22,18 +22,18 @@ pub(super) const LIDAR_ROUTE: Route = Route {
     turning_m: 2.3,
 };
 
-/// The northern rooms and the corridor: 22 m, half a meter beside the other route and less.
+/// Route of the camera robot: the northern rooms and the corridor: 22 m, half a meter or less beside the other route.
 pub(super) const CAMERA_ROUTE: Route = Route {
     corners: &[[4.0, 6.75], [10.8, 6.75], [10.8, 4.45], [2.65, 4.45], [2.65, 6.75]],
     cornering_m: 1.4,
     turning_m: 2.3,
 };
 
-/// A closed route; places on it are given by the way gone from its start, meters, lap after lap.
+/// A closed route. Positions on it are given by the distance from its start, meters, lap after lap.
 pub(super) struct Route {
     /// Corners in the map frame, meters. The first is the start and lies on a straight stretch.
     corners: &'static [[f64; 2]],
-    /// Length over which places are averaged: a corner is cut from half of it before to half of it after.
+    /// Length over which positions are averaged: a corner is cut from half of it before to half of it after.
     cornering_m: f64,
     /// Length over which the robot turns at a corner; the corners lie at least this far apart.
     turning_m: f64,
@@ -45,7 +45,7 @@ impl Route {
         self.stretches().map(distance).sum()
     }
 
-    /// The place after `way_m`, map frame, meters.
+    /// The position after `way_m`, map frame, meters.
     pub(super) fn position(&self, way_m: f64) -> [f64; 2] {
         let mut sum = [0.0; 2];
         for i in 0..AVERAGED {

@@ -1,5 +1,5 @@
-//! What is put into a map, and what it is asked: seeded, and made piece by piece, so that 50 million voxels need no
-//! list of their keys.
+//! Workloads: content for maps, and queries about it. Both are seeded and made in pieces, so that 50 million voxels
+//! need no list of their keys.
 
 mod ride;
 mod room;
@@ -19,29 +19,29 @@ pub use scatter::Scatter;
 pub use sequence::{Scan, simulate};
 pub use site::Site;
 
-/// In which order a map is asked.
+/// Order of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Order {
-    /// Anywhere: uniform in the volume, on a site near its surface.
+    /// Random points: uniform in the volume, or on a site near its surface.
     #[default]
     Random,
-    /// As a spinning sensor of 64 rings sees the surface from a moving place.
+    /// Points in the order in which a spinning sensor of 64 rings sees the surface while it moves.
     Scan,
-    /// Each voxel once, row by row, as a survey without gaps would bring them.
+    /// A point in each voxel, row by row, as a survey without gaps would give.
     Sweep,
 }
 
-/// Points to look up, and where their frame lies: as a sensor's are, neither upright nor at the origin.
+/// Points to look up, with the pose of their frame, which is neither upright nor at the origin, like a sensor's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Queries {
-    /// In the frame of `map_from_points`.
+    /// The points, in a frame of their own, meters.
     pub points: Vec<Point>,
-    /// Places them in the map.
+    /// Pose of the points' frame in the map.
     pub map_from_points: Pose,
 }
 
 impl Queries {
-    /// Points of the map frame, told in a tilted frame.
+    /// Converts points of the map frame to a tilted frame.
     fn of_map_points(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let map_from_points = tilted();
         let points_from_map = map_from_points.inverse();
@@ -49,7 +49,7 @@ impl Queries {
         Self { points: points.into_iter().map(told).collect(), map_from_points }
     }
 
-    /// The first point in each voxel, `most` of them at most.
+    /// The first point in each voxel, for at most `most` voxels.
     pub fn first_of_each_voxel(
         self,
         lattice_from_map: impl Fn(&Pose) -> LatticeFromPoints,
@@ -62,24 +62,24 @@ impl Queries {
     }
 }
 
-/// A frame that makes the whole transform necessary: turned about every axis and shifted.
+/// A frame that needs the whole transform: rotated about every axis and shifted.
 fn tilted() -> Pose {
     Pose::from_parts(Translation3::new(1.7, -2.9, 0.4), UnitQuaternion::from_euler_angles(0.05, -0.08, 0.9))
 }
 
-/// A map's content with the questions to go with it.
+/// Content of a map, with queries about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Workload {
-    /// The surfaces of a room, in the size of the paper's map.
+    /// The surfaces of a room, of the size of the paper's map.
     Room(Room),
-    /// Rolling terrain, as large as is wished.
+    /// Rolling terrain of any size.
     Site(Site),
     /// Randomly generated voxels, as in the paper's first experiment.
     Scatter(Scatter),
 }
 
 impl Workload {
-    /// Side of its voxels, meters.
+    /// Side of the workload's voxels, meters.
     pub fn resolution_m(&self) -> f64 {
         match self {
             Self::Room(_) => Room::RESOLUTION_M,
@@ -88,7 +88,7 @@ impl Workload {
         }
     }
 
-    /// The workload's voxels in pieces of some hundred thousand at most, as parts of one whole: no voxel comes twice.
+    /// Iterates over the workload's voxels, in disjoint pieces of at most some hundred thousand voxels.
     pub fn pieces(self) -> Box<dyn Iterator<Item = VoxelSet>> {
         match self {
             Self::Room(room) => Box::new(std::iter::once(room.voxels())),
@@ -97,8 +97,8 @@ impl Workload {
         }
     }
 
-    /// `count` points to ask about; of a sweep as many as there are voxels, at most. A sensor sees nothing of what is
-    /// scattered: there its order is random too.
+    /// Makes `count` points to query; for a sweep at most as many as there are voxels. Scattered voxels have no surface
+    /// for a sensor to see: there the order is random.
     pub fn queries(&self, order: Order, count: usize, seed: u64) -> Queries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         match (self, order) {
@@ -113,7 +113,7 @@ impl Workload {
         }
     }
 
-    /// A point somewhere in each voxel, but not on its border.
+    /// Makes a point in each voxel, away from its border.
     fn sweep(&self, count: usize, random: &mut ChaCha8Rng) -> Queries {
         let indices: Box<dyn Iterator<Item = [i32; 3]>> = match *self {
             Self::Room(room) => Box::new(room.indices()),
@@ -126,7 +126,7 @@ impl Workload {
         Queries::of_map_points(indices.take(count).map(|index| index.map(&mut inside)))
     }
 
-    /// A map of it with `settings`, its voxels streamed in.
+    /// Builds the map of the workload with `settings`.
     ///
     /// # Errors
     /// When a setting is out of range.
@@ -137,7 +137,7 @@ impl Workload {
     }
 }
 
-/// Adds voxels to a map, as a scan would.
+/// Inserts voxels into a map, as a scan would.
 pub fn add(map: &MultiResolutionMap, voxels: VoxelSet) {
     let Ok(robot) = RobotName::new("bench") else { return };
     let pose = MappedScan::new(robot, Pose::identity());

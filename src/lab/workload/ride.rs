@@ -1,4 +1,4 @@
-//! What a spinning sensor sees on its way.
+//! Simulation of a spinning sensor that moves through a workload.
 
 use std::f64::consts::TAU;
 
@@ -9,33 +9,34 @@ use super::Queries;
 use crate::geometry::{Pose, translation_m};
 use crate::lab::simulate::gaussian;
 
-/// Lasers, one above the other.
+/// Number of lasers, one above the other.
 const RINGS: usize = 64;
-/// Shots of each in a turn.
+/// Number of shots of each laser in a revolution.
 const AZIMUTHS: usize = 1024;
 
-/// How a sensor sees a surface.
+/// Properties of the sensor for a surface.
 pub(super) struct Sight {
-    /// Elevations of its lowest and its highest ring.
+    /// Elevations of the lowest and the highest ring, degrees.
     pub(super) elevation_deg: (f64, f64),
-    /// Standard deviation of a range.
+    /// Standard deviation of a range, meters.
     pub(super) noise_m: f64,
 }
 
-/// Something to be seen.
+/// A surface that a ray can hit.
 pub(super) trait Surface {
-    /// How it is seen.
+    /// Properties of the sensor.
     const SIGHT: Sight;
 
-    /// Where the sensor is at its `turn`-th turn, map_from_sensor.
+    /// Pose of the sensor in revolution `turn`, map_from_sensor.
     fn sensor(&self, turn: usize) -> Pose;
 
-    /// How far it is from a place along a direction of length one; none where nothing is met.
+    /// Distance from the point `from` to the surface along the unit vector `direction`, meters; none where the ray
+    /// misses.
     fn range_m(&self, from: [f64; 3], direction: [f64; 3]) -> Option<f64>;
 }
 
-/// The first `count` points that a ride sees: turn after turn, azimuth after azimuth, ring above ring. As scans are
-/// that one client gathered, all are in one frame.
+/// The first `count` points of a ride: revolution after revolution, azimuth after azimuth, ring after ring. All are in
+/// one frame, as if one client had gathered the scans.
 pub(super) fn queries<S: Surface>(surface: &S, count: usize, random: &mut ChaCha8Rng) -> Queries {
     let turns = 0..turns_max(count);
     let shots = turns.flat_map(|turn| {
@@ -51,8 +52,8 @@ pub(super) fn queries<S: Surface>(surface: &S, count: usize, random: &mut ChaCha
     Queries::of_map_points(seen.take(count))
 }
 
-/// More turns than are needed where at least one ray in thirty meets the surface, so that a ride ends even where none
-/// does.
+/// Limit on the revolutions, enough where at least one ray in thirty hits the surface, so that a ride ends even where
+/// none does.
 fn turns_max(count: usize) -> usize {
     count * 30 / (RINGS * AZIMUTHS) + 1
 }

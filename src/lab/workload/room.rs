@@ -1,4 +1,4 @@
-//! A room.
+//! The workload of a room.
 
 use nalgebra::{Translation3, UnitQuaternion};
 use rand::RngExt;
@@ -9,27 +9,27 @@ use super::ride::{Sight, Surface};
 use crate::geometry::Pose;
 use crate::voxel::{VoxelKey, VoxelSet};
 
-/// Floor, ceiling and walls of a room of 14 x 9 x 3 m, one voxel thick: 155 thousand voxels of 5 cm, as many as the
-/// paper's largest map has. Its middle is the origin.
+/// A room: floor, ceiling and walls of 14 x 9 x 3 m, one voxel thick. It has 155 thousand voxels of 5 cm, as many as
+/// the paper's largest map. Its center is the origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room;
 
-/// Half the room's sides, voxels.
+/// Half of the room's sides, voxels.
 const HALF: [i32; 3] = [140, 90, 30];
-/// The sensor's way: an ellipse around the room's middle, meters,
+/// Half axes of the sensor's path, an ellipse around the room's center, meters.
 const WAY_M: [f64; 2] = [4.5, 2.5];
-/// and how far it gets in a turn of the sensor.
+/// Distance that the sensor moves in a revolution, meters.
 const TURN_M: f64 = 0.1;
 
 impl Room {
-    /// Side of its voxels, meters.
+    /// Side of the room's voxels, meters.
     pub const RESOLUTION_M: f64 = 0.05;
 
     pub(super) fn voxels(self) -> VoxelSet {
         self.indices().filter_map(VoxelKey::new).collect()
     }
 
-    /// The room's voxels, row by row.
+    /// Indices of the room's voxels, row by row.
     pub(super) fn indices(self) -> impl Iterator<Item = [i32; 3]> {
         let [nx, ny, nz] = HALF.map(|half| 2 * half);
         let index = move |n: i32| [n % nx - HALF[0], n / nx % ny - HALF[1], n / (nx * ny) - HALF[2]];
@@ -56,7 +56,7 @@ impl Surface for Room {
         Pose::from_parts(place, UnitQuaternion::from_euler_angles(0.02, -0.03, angle))
     }
 
-    /// The walls are met in the middle of their voxels.
+    /// The walls are hit in the middle of their voxels.
     fn range_m(&self, from: [f64; 3], direction: [f64; 3]) -> Option<f64> {
         let to_wall = |k: usize| {
             let wall = half_m()[k] - Self::RESOLUTION_M / 2.0;

@@ -1,4 +1,4 @@
-//! Randomly generated voxels.
+//! The workload of randomly generated voxels.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,25 +6,25 @@ use rand_chacha::ChaCha8Rng;
 use super::Queries;
 use crate::voxel::{VoxelKey, VoxelSet};
 
-/// Voxels of 5 cm anywhere in 14 x 9 x 3 m: "a map consisting of randomly generated voxels" (paper IV-A).
+/// Random voxels of 5 cm in 14 x 9 x 3 m: "a map consisting of randomly generated voxels" (paper IV-A).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scatter {
     voxels: usize,
     seed: u64,
 }
 
-/// Voxels along the sides.
+/// Number of voxels along the sides.
 const SIZE: [i32; 3] = [280, 180, 60];
 
 impl Scatter {
-    /// Side of its voxels, meters.
+    /// Side of the voxels, meters.
     pub const RESOLUTION_M: f64 = 0.05;
-    /// Voxels of the paper's map of real scans (IV).
+    /// Number of voxels of the paper's map of real scans (IV).
     pub const VOXELS: usize = 142_812;
-    /// Voxels there may be at most: half of the volume.
+    /// Most voxels: half of the volume.
     pub const VOXELS_MAX: usize = (SIZE[0] * SIZE[1] * SIZE[2] / 2) as usize;
 
-    /// `voxels` voxels, at most [`Scatter::VOXELS_MAX`].
+    /// Makes `voxels` voxels, at most [`Scatter::VOXELS_MAX`].
     pub fn of(voxels: usize, seed: u64) -> Self {
         Self { voxels: voxels.min(Self::VOXELS_MAX), seed }
     }

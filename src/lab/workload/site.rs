@@ -1,4 +1,4 @@
-//! A site.
+//! The workload of a large site.
 
 use std::f64::consts::TAU;
 
@@ -11,45 +11,45 @@ use super::ride::{Sight, Surface};
 use crate::geometry::Pose;
 use crate::voxel::{VoxelKey, VoxelSet};
 
-/// A square of rolling terrain, its ground two voxels of 10 cm thick. Its middle is the origin; hills of 3 and 2.5 m
-/// every 63 and 48 m are shifted by the seed.
+/// A site: a square of rolling terrain, its ground two voxels of 10 cm thick. Its center is the origin; hills of 3 and
+/// 2.5 m every 63 and 48 m are shifted by the seed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Site {
-    /// Columns along a side.
+    /// Number of columns along a side.
     side: i32,
     phases: [f64; 2],
 }
 
-/// Columns along the side of a piece: 131 thousand voxels at most.
+/// Number of columns along the side of a piece: at most 131 thousand voxels.
 const PIECE_SIDE: i32 = 256;
-/// Voxels in a column.
+/// Number of voxels in a column.
 const THICKNESS: i32 = 2;
-/// Heights of the hills along x and y, meters,
+/// Heights of the hills along x and y, meters.
 const HILLS_M: [f64; 2] = [3.0, 2.5];
-/// and how steeply they go up and down, radians a meter.
+/// Angular frequencies of the hills along x and y, radians a meter.
 const WAVES: [f64; 2] = [0.1, 0.13];
-/// Random questions are about points this far above or below the ground, meters.
+/// Largest distance of random points above or below the ground, meters.
 const NEAR_M: f64 = 0.5;
-/// How high the sensor is carried, meters,
+/// Height of the sensor above the ground, meters.
 const SENSOR_HEIGHT_M: f64 = 2.0;
-/// or on small sites, this share of the side: from higher up it would look beyond the border.
+/// Height of the sensor on small sites, as a share of the side: from higher up it would look beyond the border.
 const SENSOR_HEIGHT_SHARE: f64 = 1.0 / 16.0;
-/// How far the sensor gets in a turn, meters.
+/// Distance that the sensor moves in a revolution, meters.
 const TURN_M: f64 = 1.0;
-/// How far it sees, meters.
+/// Largest range of the sensor, meters.
 const RANGE_MAX_M: f64 = 100.0;
-/// The ground is met when a ray is as near as this, meters.
+/// Distance from the ground at which a ray counts as hitting it, meters.
 const TOUCH_M: f64 = 1e-3;
 
 impl Site {
-    /// Side of its voxels, meters.
+    /// Side of the site's voxels, meters.
     pub const RESOLUTION_M: f64 = 0.1;
-    /// Voxels of a site where nothing else is said.
+    /// Default number of voxels.
     pub const VOXELS: usize = 10_000_000;
-    /// Voxels there may be at least and at most.
+    /// Least and largest number of voxels.
     pub const VOXELS_RANGE: std::ops::RangeInclusive<u64> = 1000..=100_000_000;
 
-    /// A site of about `voxels` voxels.
+    /// Makes a site of about `voxels` voxels.
     pub fn of(voxels: usize, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let side = (voxels as f64 / f64::from(THICKNESS)).sqrt().round().max(1.0) as i32;
@@ -75,12 +75,12 @@ impl Site {
         self.starts().map(move |start| self.piece(start).filter_map(VoxelKey::new).collect())
     }
 
-    /// The site's voxels, piece by piece, row by row.
+    /// Indices of the site's voxels, piece by piece, row by row.
     pub(super) fn indices(self) -> impl Iterator<Item = [i32; 3]> {
         self.starts().flat_map(move |start| self.piece(start))
     }
 
-    /// The first columns of all pieces.
+    /// The first column of each piece.
     fn starts(self) -> impl Iterator<Item = [i32; 2]> {
         let starts = move || (0..self.side).step_by(PIECE_SIDE as usize);
         starts().flat_map(move |y| starts().map(move |x| [x, y]))
@@ -93,7 +93,8 @@ impl Site {
         columns.flat_map(move |[x, y]| self.column(x, y))
     }
 
-    /// The ground goes through the middle of a column's voxels, as near as whole voxels allow.
+    /// Indices of a column's voxels: the ground passes through the middle of the column, as closely as whole voxels
+    /// allow.
     fn column(self, x: i32, y: i32) -> impl Iterator<Item = [i32; 3]> + use<> {
         let [middle_x, middle_y] = [x, y].map(|i| (f64::from(i) + 0.5) * Self::RESOLUTION_M);
         let lowest = self.height_m(middle_x, middle_y) / Self::RESOLUTION_M - f64::from(THICKNESS) / 2.0;
@@ -114,7 +115,7 @@ impl Site {
 impl Surface for Site {
     const SIGHT: Sight = Sight { elevation_deg: (-25.0, 2.0), noise_m: 0.04 };
 
-    /// On a circle half-way between the middle and the border.
+    /// The path of the sensor is a circle half-way between the center and the border.
     fn sensor(&self, turn: usize) -> Pose {
         let radius_m = self.side_m() / 4.0;
         let angle = turn as f64 * TURN_M / radius_m;
@@ -124,7 +125,7 @@ impl Surface for Site {
         Pose::from_parts(place, UnitQuaternion::from_euler_angles(0.01, -0.015, angle))
     }
 
-    /// Follows the ray in steps that cannot go through the ground: none is longer than its clearance, over how fast
+    /// Follows the ray in steps that cannot pass through the ground: each is at most the clearance divided by how fast
     /// that can shrink.
     fn range_m(&self, from: [f64; 3], direction: [f64; 3]) -> Option<f64> {
         let shrinks = Self::slope_max() * direction[0].hypot(direction[1]) - direction[2];

@@ -1,4 +1,4 @@
-//! Why a file could not be read.
+//! Errors of reading scan and trajectory files.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
     },
-    /// A directory without a scan.
+    /// A directory has no scan file.
     #[error("{path}: no scan file in this directory, supported are {}", EXTENSIONS.join(" "))]
     Empty {
         /// The directory.
@@ -68,7 +68,7 @@ impl ReadError {
     }
 }
 
-/// What is wrong with a file's content, before the file's name is known.
+/// A problem of a file's content, before the file's name is known.
 #[derive(Debug)]
 pub(in crate::scan) struct Problem {
     line: Option<usize>,
@@ -76,7 +76,7 @@ pub(in crate::scan) struct Problem {
 }
 
 impl Problem {
-    /// A problem of the whole content, or one that `text` places by byte or element.
+    /// A problem of the whole content, or one whose place is in `text`.
     pub(in crate::scan) fn new(text: impl Into<String>) -> Self {
         Self { line: None, text: shortened(text.into(), PROBLEM_CHARS_MAX) }
     }
@@ -86,7 +86,7 @@ impl Problem {
         Self { line: Some(line), ..Self::new(text) }
     }
 
-    /// The error that names the file at `path`.
+    /// The [`ReadError`] of this problem in the file at `path`.
     pub(in crate::scan) fn in_file(self, path: &Path) -> ReadError {
         let (path, problem) = (path.to_owned(), self.text);
         match self.line {
@@ -96,7 +96,7 @@ impl Problem {
     }
 }
 
-/// `text` in quotes, shortened: a hostile file must not write a gigabyte into a log.
+/// `text` in quotes, shortened, so that a hostile file cannot write a gigabyte into a log.
 pub(in crate::scan) fn quoted(text: &str) -> String {
     match text.char_indices().nth(QUOTE_CHARS_MAX) {
         Some((end, _)) => format!("{:?}...", &text[..end]),

@@ -42,7 +42,7 @@ pub fn read_points(path: &Path) -> Result<Vec<Point>, ReadError> {
     format.points(&bytes).map_err(|problem| problem.in_file(path))
 }
 
-/// The points in a file's `bytes`, wherever they came from; `path` says the format, and is what errors name.
+/// The points in the `bytes` of a scan file; `path` gives the format by its extension, and errors name it.
 ///
 /// # Errors
 /// When the bytes are of another format, broken or truncated.
@@ -53,13 +53,15 @@ pub fn parse_points(path: &Path, bytes: &[u8]) -> Result<Vec<Point>, ReadError> 
 /// The scan files that `paths` name: a directory gives its scan files sorted by name, a file itself.
 ///
 /// # Errors
-/// When a path does not exist, a directory cannot be read, or a directory has no scan file.
+/// When a path does not exist, a file has an extension that [`read_points`] does not know, a directory cannot be read, or
+/// a directory has no scan file.
 pub fn scan_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for path in paths {
         if fs::metadata(path).map_err(ReadError::io(path))?.is_dir() {
             files.extend(files_of_directory(path)?);
         } else {
+            Format::named_by(path)?;
             files.push(path.clone());
         }
     }
@@ -144,7 +146,7 @@ fn packed_points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
     Ok(points.to_vec())
 }
 
-/// Which coordinate a property or field called `name` is.
+/// The axis, 0 to 2, of a property or field called `name`.
 fn axis(name: &str) -> Option<usize> {
     match name {
         "x" => Some(0),

@@ -10,14 +10,14 @@ use pcd_rs::{DataKind, Error, PcdDeserialize, PcdMeta, Reader, Schema, ValueKind
 use super::{FILE_BYTES_MAX, HEADER_BYTES_MAX, Problem, axis, check_count, number};
 use crate::geometry::Point;
 
-/// Fewest bytes of one ascii value: a digit and what divides it from the next.
+/// Fewest bytes of one ascii value: a digit and a separator.
 const ASCII_VALUE_BYTES_MIN: u64 = 2;
 /// Bytes of the two sizes that come before compressed data.
 const SIZES_BYTES: usize = 8;
 /// Most bytes that one byte of LZF data can stand for: 3 bytes repeat 264.
 const LZF_RATIO_MAX: u64 = 88;
 
-/// The points of a `.pcd` file. Its viewpoint is ignored: the poses of scans come with them.
+/// The points of a `.pcd` file. Its viewpoint is ignored: the pose of a scan is given with the scan.
 pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
     let start = &bytes[..bytes.len().min(HEADER_BYTES_MAX)];
     let mut rest = start;
@@ -93,7 +93,7 @@ fn check_compressed(points: u64, record_bytes: u64, data: &[u8]) -> Result<(), P
 struct Record([f32; 3]);
 
 impl PcdDeserialize for Record {
-    /// True: the fields need not be exactly these three.
+    /// Returns true: a file may have other fields than these three.
     fn is_dynamic() -> bool {
         true
     }

@@ -13,7 +13,7 @@ pub(super) fn points(bytes: &[u8]) -> Result<Vec<Point>, Problem> {
     Ok(points)
 }
 
-/// The lines that are neither blank nor a comment, with their numbers; the first of `bytes` has number `first`.
+/// Lines that are neither blank nor a comment, with their numbers; the first line of `bytes` has the number `first`.
 pub(in crate::scan) fn lines(
     bytes: &[u8],
     first: usize,
@@ -29,13 +29,13 @@ fn is_content((_, line): &(usize, &[u8])) -> bool {
     !line.is_empty() && line[0] != b'#'
 }
 
-/// The number that `token` writes: any that the type parses, so `nan` and `inf` are numbers too.
+/// Parses `token` as a number; `nan` and `inf` are accepted.
 pub(in crate::scan) fn number<T: std::str::FromStr>(token: &str) -> Result<T, String> {
     token.parse().map_err(|_| format!("{} is not a number (a comment starts with #)", quoted(token)))
 }
 
 fn point(text: &str) -> Result<Point, String> {
-    // A comma divides even where nothing stands before it: an empty cell is an error, not a shifted column.
+    // A comma separates even after nothing: an empty cell is an error, not a shifted column.
     if text.contains(',') { xyz(text.split(',').map(str::trim)) } else { xyz(text.split_ascii_whitespace()) }
 }
 

@@ -1,4 +1,4 @@
-//! Changes, and the requests behind them.
+//! Encoding of changes, and of the requests that made them.
 
 use super::{Unreadable, count, required};
 use crate::map::{CallerName, Change, CompletedRequest, DeletionRecord, Request, RequestId, UndoRecord};

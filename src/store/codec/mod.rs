@@ -1,6 +1,6 @@
-//! Between what is stored and the domain: every message of `proto/mrol/store/v1`, there and back.
+//! Conversion between stored messages and domain types, both ways, for every message of `proto/mrol/store/v1`.
 //!
-//! Numbers come back bit for bit. What cannot be read is said as a sentence; who reads adds file and offset.
+//! Numbers are restored bit for bit. What cannot be read is described in a sentence; the caller adds file and offset.
 
 mod change;
 pub(super) mod moments;
@@ -9,15 +9,15 @@ pub(super) mod voxels;
 
 pub(super) use scan::with_forgotten;
 
-/// What is wrong with a message; of no meaning once its reading was stopped.
+/// Description of what is wrong with a message; meaningless once its reading was stopped.
 pub(super) type Unreadable = String;
 
-/// The value of a field that must be there.
+/// Returns the value of a required field.
 fn required<T>(value: Option<T>, field: &str) -> Result<T, Unreadable> {
     value.ok_or_else(|| format!("{field} is missing"))
 }
 
-/// A count. Machines of less than 64 bits hold no map that would notice.
+/// Converts a count to `usize`; larger counts saturate.
 fn count(count: u64) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX)
 }

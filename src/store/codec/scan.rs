@@ -1,4 +1,4 @@
-//! Scans: their poses, and with their voxels.
+//! Encoding of scans: their poses, and their voxels.
 
 use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
@@ -93,10 +93,10 @@ impl From<(&RobotName, &[(u64, u64)])> for pb::ForgottenScans {
     }
 }
 
-/// Robots whose ranges of ids are taken over between two looks at the stop signal.
+/// Robots whose ranges of ids are read between two checks of the stop signal.
 const ROBOTS_PER_LOOK: usize = 16;
 
-/// The trajectory where, besides, these scans are known whose poses are not kept.
+/// The trajectory together with the ids of scans whose poses are no longer kept.
 pub(in crate::store) fn with_forgotten(
     mut trajectory: Trajectory,
     forgotten: &[pb::ForgottenScans],

@@ -1,4 +1,4 @@
-//! Sets of voxels: gaps between block keys, and each block as an octree of three levels.
+//! Encoding of voxel sets: gaps between block keys, and each block as an octree of three levels.
 
 use super::Unreadable;
 use crate::store::pb;
@@ -19,7 +19,7 @@ impl TryFrom<pb::Voxels> for VoxelSet {
     }
 }
 
-/// The message of a set; of a part of it once stopped.
+/// The message of a set; incomplete once stopped.
 pub(in crate::store) fn write(voxels: &VoxelSet, stop: StopSignal<'_>) -> pb::Voxels {
     let (mut before, count) = (0, voxels.blocks().len());
     let (mut key_gaps, mut octrees) = (Vec::with_capacity(count), Vec::with_capacity(count * 16));
@@ -31,7 +31,7 @@ pub(in crate::store) fn write(voxels: &VoxelSet, stop: StopSignal<'_>) -> pb::Vo
     pb::Voxels { key_gaps, octrees: octrees.into() }
 }
 
-/// The inverse of [`write`].
+/// Reads a set: the inverse of [`write`].
 pub(in crate::store) fn read(voxels: &pb::Voxels, stop: StopSignal<'_>) -> Result<VoxelSet, Unreadable> {
     let (mut key, mut octrees) = (0u64, &voxels.octrees[..]);
     let mut blocks = Vec::with_capacity(voxels.key_gaps.len());
@@ -62,7 +62,7 @@ fn write_octree(mask: &BlockMask, tree: &mut Vec<u8>) {
     }
 }
 
-/// Takes the tree of one block off the front; none where it is no tree.
+/// Takes the octree of one block from the front of `tree`; none where it is not valid.
 fn read_octree(tree: &mut &[u8]) -> Option<BlockMask> {
     let mut bytes = [0; BlockMask::BYTES];
     let (words, _) = bytes.as_chunks_mut::<8>();
@@ -74,17 +74,17 @@ fn read_octree(tree: &mut &[u8]) -> Option<BlockMask> {
     Some(BlockMask::from_le_bytes(&bytes))
 }
 
-/// The next byte, which says something: no node of a tree is empty.
+/// Takes the next byte, which must not be 0: no node of a tree is empty.
 fn next(tree: &mut &[u8]) -> Option<u8> {
     tree.split_off_first().copied().filter(|&byte| byte != 0)
 }
 
-/// A bit for each child that is there, lowest first.
+/// The byte of a node: bit i is set where child i is there.
 fn children(there: [bool; 8]) -> u8 {
     there.into_iter().rev().fold(0, |bits, there| bits << 1 | u8::from(there))
 }
 
-/// The children that a byte says are there.
+/// The children whose bits are set.
 fn present<T>(children: &mut [T], bits: u8) -> impl Iterator<Item = &mut T> {
     children.iter_mut().enumerate().filter(move |(i, _)| bits >> i & 1 == 1).map(|(_, child)| child)
 }

@@ -1,4 +1,4 @@
-//! What a data folder holds at a start, once what a crash left is put right.
+//! Contents of a data folder at a start, after repair of what a crash left.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -10,34 +10,34 @@ use crate::store::replacement::{self, Replacement};
 use crate::store::{OpeningProgress, Snapshot, StoreError, folder, snapshot_files};
 use crate::util::StopSignal;
 
-/// What a data folder holds.
+/// Contents of a data folder.
 #[derive(Debug, Default)]
 pub struct DataDirContents {
-    /// The names of the maps that are kept, in order.
+    /// Names of the maps, sorted.
     pub maps: Vec<MapName>,
-    /// Names of map files that could not become maps, and why. Nobody is to take their names meanwhile.
+    /// Names of map files that could not become maps, and why. Their names must not be used meanwhile.
     pub refused: Vec<(MapName, StoreError)>,
-    /// Files and folders that nobody understands.
+    /// Files and folders that are not part of a data folder.
     pub not_understood: Vec<PathBuf>,
-    /// Why what a crash left unfinished is there still. Nobody looks for it, and the next start tries again.
+    /// Why leftovers of a crash could not be removed. They do no harm, and the next start tries again.
     pub not_swept: Option<StoreError>,
 }
 
 impl DataDir {
-    /// Makes the folder ready: sweeps away what a crash left unfinished, ends what it came between, and makes maps of the map files
-    /// that lie about.
+    /// Prepares the folder for use: removes what a crash left unfinished, completes interrupted replacements, and turns
+    /// map files into maps.
     ///
     /// # Errors
-    /// When the folder cannot be read, or the system refuses. What is wrong with one map keeps no other from being
-    /// opened.
+    /// When the folder cannot be read, or the system refuses. A problem with one map does not keep the others from
+    /// being opened.
     pub fn import_map_files(&self) -> Result<DataDirContents, StoreError> {
         self.import_map_files_until(&OpeningProgress::default())
     }
 
-    /// [`DataDir::import_map_files`], for as long as somebody wants the maps.
+    /// [`DataDir::import_map_files`], unless `progress` is cancelled.
     ///
     /// # Errors
-    /// As there; `Cancelled` where nobody wants them any more.
+    /// As for [`DataDir::import_map_files`]; `Cancelled` once cancelled.
     pub fn import_map_files_until(&self, progress: &OpeningProgress) -> Result<DataDirContents, StoreError> {
         let not_swept = folder::sweep(&*self.files, &self.maps).err();
         let mut contents = DataDirContents { not_swept, ..DataDirContents::default() };
@@ -57,7 +57,7 @@ impl DataDir {
         Ok(contents)
     }
 
-    /// Files and folders that nobody understands.
+    /// Paths of files and folders that are not part of a data folder.
     ///
     /// # Errors
     /// When the folder cannot be read.
@@ -66,7 +66,8 @@ impl DataDir {
         Ok(self.entries()?.into_iter().filter(unknown).map(|entry| self.maps.join(entry)).collect())
     }
 
-    /// Counts what opening the maps `names` will take. What is wrong with one of them is told when it is opened.
+    /// Adds the bytes that opening the maps `names` will read to `progress`. Problems with a map are reported when it
+    /// is opened.
     pub fn expect(&self, names: &[MapName], progress: &OpeningProgress) {
         for name in names {
             let bytes = self.path(name).and_then(|path| snapshot_files::bytes_to_read(&*self.files, &path));
@@ -74,13 +75,13 @@ impl DataDir {
         }
     }
 
-    /// Ends the replacements of maps that a crash came between. Where one cannot be ended, neither map of the name can be
-    /// told from the other: it is refused, and the next start tries again.
+    /// Completes the replacements of maps that a crash interrupted. Where that fails, neither map of the name can be
+    /// told from the other: the name is refused, and the next start tries again.
     fn end_replacements(&self, contents: &mut DataDirContents) -> Result<(), StoreError> {
         for entry in self.entries()? {
             let Entry::Map { name, .. } = Entry::of(&entry) else { continue };
             let new = self.maps.join(&entry);
-            // Told when the map is opened, where something is wrong with it.
+            // Reported when the map is opened, where something is wrong with it.
             let Ok(Some(replacement)) = Replacement::in_folder(&*self.files, &new) else { continue };
             let ended = replacement.keep_old(&*self.files, &self.maps);
             if let Err(error) = ended.and_then(|()| replacement::finish(&*self.files, &new)) {
@@ -90,14 +91,14 @@ impl DataDir {
         Ok(())
     }
 
-    /// True of a folder that holds one snapshot, of that revision, and no journal: what taking in a map file leaves.
+    /// True of a folder that holds only one snapshot, of that revision: what importing a map file leaves.
     fn holds_only(&self, entry: &str, revision: u64) -> Result<bool, StoreError> {
         let path = self.maps.join(entry);
         let names = self.files.list(&path).map_err(StoreError::io(&path))?;
         Ok(names == [snapshot_files::snapshot_name(revision)])
     }
 
-    /// Makes a map's folder of a map file.
+    /// Turns a map file into a map's folder.
     fn take_in(&self, name: &MapName, progress: &OpeningProgress) -> Result<(), StoreError> {
         let is_cancelled = || progress.is_cancelled();
         let (file, stop) = (self.maps.join(Entry::file_name(name)), StopSignal::when(&is_cancelled));

@@ -1,4 +1,4 @@
-//! How a record stands in a segment.
+//! Frames: how a record is stored in a segment.
 //!
 //! ```text
 //! offset  bytes
@@ -28,7 +28,7 @@ const HEADER_BYTES: usize = 32;
 const CHECKED_BYTES: usize = 28;
 const ALIGNMENT: usize = 32;
 const PADDING: u8 = 0xff;
-/// Disks write sectors: what a crash left unwritten is at least one of them, or all to the file's end.
+/// Size of a disk's sector, bytes: what a crash left unwritten is at least one sector, or all up to the file's end.
 const SECTOR_BYTES: usize = 512;
 
 /// A frame whose checksums are right.
@@ -36,15 +36,15 @@ const SECTOR_BYTES: usize = 512;
 pub(super) struct Frame<'a> {
     pub(super) revision: u64,
     payload: &'a [u8],
-    /// Before compression.
+    /// Bytes of the record before compression.
     bytes: u32,
 }
 
-/// Why there is no frame.
+/// Why a frame cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct BadFrame {
     pub(super) reason: String,
-    /// True of a frame that looks as if it had never been written to its end.
+    /// True when the frame looks as if it had never been written completely.
     pub(super) torn: bool,
 }
 
@@ -62,12 +62,12 @@ pub(super) fn write(record: &Record, revision: u64, durable: u64, map: Uuid, byt
     bytes.resize(start + length_of(record.payload.len()), PADDING);
 }
 
-/// Bytes of a frame with a payload of that length.
+/// Bytes of a frame with a payload of `payload` bytes.
 pub(super) fn length_of(payload: usize) -> usize {
     (HEADER_BYTES + payload + 1).next_multiple_of(ALIGNMENT)
 }
 
-/// The frame at `offset` of a segment's bytes; none at their end.
+/// Reads the frame at `offset` of a segment's `bytes`; none at their end.
 pub(super) fn read(bytes: &[u8], offset: usize, map: Uuid) -> Result<Option<Frame<'_>>, BadFrame> {
     let rest = &bytes[offset..];
     if rest.is_empty() {
@@ -98,22 +98,21 @@ pub(super) fn read(bytes: &[u8], offset: usize, map: Uuid) -> Result<Option<Fram
     Ok(Some(Frame { revision: header.revision, payload, bytes: header.bytes }))
 }
 
-/// What a header says.
+/// Contents of a frame header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Newest {
     pub(super) revision: u64,
     pub(super) durable: u64,
 }
 
-/// The newest of the headers from `offset` on, at whatever place they stand: behind what cannot be read, nobody
-/// knows where the next frame begins.
+/// The newest frame header from `offset` on, at any position: after damage it is unknown where the next frame begins.
 pub(super) fn newest_behind(bytes: &[u8], offset: usize, map: Uuid) -> Option<Newest> {
     let headers = bytes.get(offset..)?.windows(HEADER_BYTES).filter_map(|header| Header::read(header, map));
     headers.map(|Header { revision, durable, .. }| Newest { revision, durable }).max_by_key(|it| it.revision)
 }
 
 impl Frame<'_> {
-    /// Bytes that the frame takes.
+    /// Bytes of the frame.
     pub(super) fn len(&self) -> usize {
         length_of(self.payload.len())
     }
@@ -132,7 +131,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header, where its checksum is right.
+    /// Reads a header; none where its checksum is wrong.
     fn read(header: &[u8], map: Uuid) -> Option<Self> {
         let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| header[at + i]));
         let u64_at = |at: usize| u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32;

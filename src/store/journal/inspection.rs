@@ -1,4 +1,4 @@
-//! A look at a segment that changes nothing.
+//! Inspection of a segment, without changing it.
 
 use std::sync::Arc;
 
@@ -10,18 +10,19 @@ use crate::map::Change;
 use crate::store::folder::FolderPath;
 use crate::store::{FileSystem, StoreError};
 
-/// What stands in a segment.
+/// Contents of a segment.
 #[derive(Debug)]
 pub(in crate::store) struct Inspected {
     /// The revision after the last that can be read.
     pub(in crate::store) next: u64,
-    /// Bytes behind that, which a crash left and the next start will cut off.
+    /// Bytes after that, which a crash left and the next start will cut off.
     pub(in crate::store) torn_bytes: u64,
     /// Why the rest cannot be read.
     pub(in crate::store) damage: Option<StoreError>,
 }
 
-/// Reads the segment that begins with revision `first`, and hands its changes to `each`, which may object.
+/// Reads the segment that begins with revision `first`, and calls `each` with its changes; an error of `each` is
+/// reported as damage.
 ///
 /// # Errors
 /// When the file cannot be read at all.

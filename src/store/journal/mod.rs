@@ -1,8 +1,8 @@
-//! The journal of a map: its changes in the order of their revisions, durable before anybody sees them.
+//! The journal of a map: its changes in the order of their revisions, durable before they are visible.
 //!
 //! [`Journal`] is a narrow trait, so that a replicated log can take the place of [`SegmentedJournal`], which is files
-//! of this machine. Reading order: `record` is a change as bytes, `frame` a record in a file, `segment` a file,
-//! `segmented` all of them, `recovery` what is made of them after a crash.
+//! on this machine. Reading order: `record` is a change as bytes, `frame` a record in a file, `segment` a file,
+//! `segmented` all files, `recovery` reads them after a crash.
 
 mod frame;
 mod inspection;
@@ -25,34 +25,34 @@ use crate::map::Change;
 
 /// A change with the revision that it made.
 pub type Revised = (u64, Change);
-/// Changes in the order of their revisions, read as they are asked for.
+/// Iterator of changes in the order of their revisions, read on demand.
 pub type Changes = Box<dyn Iterator<Item = Result<Revised, StoreError>> + Send>;
 
-/// A log of changes. Sequence numbers are the map's revisions: 1, 2, 3, ...
+/// A log of changes. The sequence numbers are the map's revisions: 1, 2, 3, ...
 pub trait Journal: std::fmt::Debug + Send {
-    /// Appends records, which take the revisions after the head; the new head. They are durable after the next
-    /// [`Journal::sync`], so that one sync serves all who wait for it.
+    /// Appends records, which get the revisions after the head, and returns the new head. They are durable after the
+    /// next [`Journal::sync`], so that one sync serves all who wait for it.
     ///
     /// # Errors
-    /// When they cannot be written. The journal takes nothing more then.
+    /// When they cannot be written. The journal then accepts nothing more.
     fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError>;
 
-    /// Makes all that was appended durable.
+    /// Makes everything appended so far durable.
     ///
     /// # Errors
-    /// When that is not sure. The journal takes nothing more then, and is not asked again: the system may have
+    /// When that is not certain. The journal then accepts nothing more and is not synced again: the system may have
     /// dropped what it could not write.
     fn sync(&mut self) -> Result<(), StoreError>;
 
-    /// The last revision that was appended.
+    /// Returns the last revision that was appended.
     fn head(&self) -> u64;
 
-    /// The changes from `revision` to the present head; a revision that is no longer there is an error.
+    /// Reads the changes from `revision` to the present head; a revision that was removed is an error.
     fn read_from(&self, revision: u64) -> Changes;
 
-    /// Forgets changes before `revision`, as far as that is cheap.
+    /// Removes changes before `revision`, as far as that is cheap.
     ///
     /// # Errors
-    /// When the system refuses; nothing else is forgotten then.
+    /// When the system refuses; nothing else is removed then.
     fn truncate_before(&mut self, revision: u64) -> Result<(), StoreError>;
 }

@@ -1,4 +1,4 @@
-//! A change as its bytes: made where there is time for it, before its revision is known.
+//! Records: changes as bytes, encoded before their revision is known.
 
 use prost::Message;
 
@@ -6,25 +6,25 @@ use crate::map::Change;
 use crate::store::codec::Unreadable;
 use crate::store::pb;
 
-/// Bytes that a record may have before compression. Beyond it no memory is taken: taking out a whole map of the
-/// largest size allowed by default is a tenth of it.
+/// Most bytes of a record before compression. No memory is taken beyond it: deleting a whole map of the largest default
+/// size takes a tenth of it.
 pub const RECORD_BYTES_MAX: usize = 2 << 30;
-/// The fastest: gaps and octrees have left little to find.
+/// Compression level of zstd: the fastest, since gaps and octrees leave little to compress.
 const ZSTD_LEVEL: i32 = 1;
 
 /// A change, encoded (`proto/mrol/store/v1/records.proto`), compressed and checksummed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Record {
-    /// A zstd frame.
+    /// The zstd frame of the change.
     pub(super) payload: Vec<u8>,
-    /// Before compression.
+    /// Bytes before compression.
     pub(super) bytes: u32,
     /// CRC-32C of the payload.
     pub(super) checksum: u32,
 }
 
 impl Record {
-    /// The record of `change`.
+    /// Encodes a change.
     ///
     /// # Errors
     /// When it is larger than [`RECORD_BYTES_MAX`], or there is no memory to compress it.
@@ -38,18 +38,18 @@ impl Record {
         Ok(Self { payload, bytes: message.len() as u32, checksum })
     }
 
-    /// Bytes that it takes in the journal, but for its frame.
+    /// Bytes of the payload: what the record takes in the journal, without its frame.
     pub fn len(&self) -> usize {
         self.payload.len()
     }
 
-    /// False: a record has at least its kind.
+    /// Returns false: a record has at least its kind.
     pub fn is_empty(&self) -> bool {
         self.payload.is_empty()
     }
 }
 
-/// The change of a record whose checksum was right.
+/// Decodes the change of a record whose checksum was right.
 pub(super) fn change_of(payload: &[u8], bytes: u32) -> Result<Change, Unreadable> {
     if bytes as usize > RECORD_BYTES_MAX {
         return Err(format!("a record of {bytes} bytes, at most {RECORD_BYTES_MAX} are read"));

@@ -1,4 +1,4 @@
-//! What is made of a journal after a crash.
+//! Recovery: reading the journal after a crash.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,47 +11,47 @@ use crate::map::Change;
 use crate::store::folder::FolderPath;
 use crate::store::{FileSystem, OpeningProgress, StoreError};
 
-/// What was found in a journal behind a snapshot.
+/// Result of reading the journal after a snapshot.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recovered {
-    /// Changes that were made again.
+    /// Number of changes that were replayed.
     pub replayed: u64,
-    /// Bytes of journal that they take.
+    /// Bytes of journal that the changes take.
     pub bytes: u64,
-    /// The end that was cut off: it had never been written to its end, and so never been acknowledged.
+    /// The torn end that was cut off: it was never written completely, and so never acknowledged.
     pub cut: Option<Cut>,
     /// Damage that does no harm, since the snapshot holds what was there.
     pub harmless: Option<String>,
 }
 
-/// An end that was cut off.
+/// A torn end of the journal that was cut off.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cut {
     /// The segment.
     pub path: PathBuf,
-    /// What is left of it.
+    /// Bytes of the segment that are left.
     pub offset: u64,
-    /// What was cut off.
+    /// Number of bytes that were cut off.
     pub bytes: u64,
-    /// What was wrong with it.
+    /// What was wrong with the bytes.
     pub reason: String,
 }
 
-/// What recovery goes by.
+/// What is known before the journal is read.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::store) struct Known {
-    /// The snapshot's revision: what comes after it is replayed.
+    /// Revision of the snapshot; later changes are replayed.
     pub(in crate::store) snapshot: u64,
-    /// Everything up to here had been durable: a snapshot of it was written, readable or not, or one that knew the head
-    /// of the journal.
+    /// The last revision that is known to have been durable: there is a snapshot of it, readable or not, or a snapshot
+    /// names it as the head of the journal.
     pub(in crate::store) durable: u64,
 }
 
 impl SegmentedJournal {
-    /// Opens the segments in `folder` and hands every change after the snapshot to `replay`, in order.
+    /// Opens the segments in `folder` and calls `replay` with every change after the snapshot, in order.
     ///
-    /// A torn end is cut off. What was read is synced, since a crash may have left it unsynced, and from now on it
-    /// is seen.
+    /// A torn end is cut off. What was read is then synced, since a crash may have left it unsynced and it is visible
+    /// from now on.
     ///
     /// # Errors
     /// When the system refuses; when a revision is missing or unreadable that may have been acknowledged; when
@@ -98,17 +98,17 @@ fn missing(path: &Path, expected: u64, first: u64) -> StoreError {
     StoreError::at(path, 0, expected, format!("it begins with revision {first}, those before it are missing"))
 }
 
-/// A segment that is read again.
+/// A segment that is being replayed.
 struct Segment<'a> {
     path: &'a Path,
     bytes: &'a [u8],
     first: u64,
-    /// No other comes after it.
+    /// True for the last segment.
     last: bool,
 }
 
 impl Segment<'_> {
-    /// Hands its changes after the snapshot to `replay`; the revision expected next.
+    /// Calls `replay` with the segment's changes after the snapshot; returns the next revision.
     fn replay(
         &mut self,
         place: &SegmentFolder,
@@ -131,7 +131,7 @@ impl Segment<'_> {
             progress.check_wanted()?;
             if frame.revision > known.snapshot {
                 let made = frame.change().and_then(|change| replay(frame.revision, change));
-                // One that was stopped is not damaged.
+                // A segment whose reading was stopped is not damaged.
                 progress.check_wanted()?;
                 made.map_err(|reason| StoreError::at(self.path, at, frame.revision, reason))?;
                 recovered.replayed += 1;
@@ -144,7 +144,7 @@ impl Segment<'_> {
         Ok(frames.next_revision())
     }
 
-    /// What can be done about a segment that breaks off; the revision expected next.
+    /// Handles a segment that breaks off: cuts the end off, or fails; returns the next revision.
     fn ends_with(
         &self,
         broken: Break,
@@ -164,8 +164,8 @@ impl Segment<'_> {
         }
     }
 
-    /// True where the snapshot holds all that had ever been acknowledged, as far as anything tells. A segment of another
-    /// map tells that the folder is not what it should be.
+    /// True where the snapshot holds everything that was acknowledged, as far as is known. A segment of another map
+    /// shows that the folder is not what it should be.
     fn is_harmless(&self, broken: &Break, known: Known) -> bool {
         let newest = broken.last_behind.unwrap_or(broken.revision).max(broken.revision).max(known.durable);
         self.last && newest <= known.snapshot && broken.foreign.is_none()
@@ -174,8 +174,9 @@ impl Segment<'_> {
     fn cut(&self, broken: Break, place: &SegmentFolder) -> Result<Cut, StoreError> {
         let (offset, bytes) = (broken.offset as u64, self.bytes.len() as u64);
         let cut = || match offset {
-            // Begun anew and not removed: the segment before it would be the last then, and be read by other rules. Where that
-            // fails, as on a full disk, it is as good as it was: the next record begins it anew.
+            // The segment is begun anew and not removed: otherwise the segment before it would be the last, and other
+            // rules would apply to it. Where that fails, as on a full disk, nothing is worse than before: the next
+            // record begins it anew.
             0 => place.begin_segment(self.first).map(drop).or(Ok(())),
             _ => place.files.truncate(self.path, offset).and_then(|()| place.files.sync(self.path)),
         };

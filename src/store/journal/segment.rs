@@ -1,4 +1,4 @@
-//! A file of the journal: frames of consecutive revisions.
+//! Segments: files of the journal, with frames of consecutive revisions.
 //!
 //! ```text
 //! offset  bytes
@@ -23,8 +23,8 @@ use super::frame::{self, Frame};
 use crate::map::REVISION_MAX;
 use crate::store::StoreError;
 
-/// The version that this build writes; it reads this one and all before. In version 1 moments had no forms, up to
-/// version 2 segments had no head.
+/// Format version that this build writes; it reads this one and all earlier ones. In version 1 moments have no forms;
+/// up to version 2 segments have no head.
 pub const JOURNAL_VERSION: u32 = 3;
 const MAGIC: &[u8; 8] = b"MROL-JNL";
 const CHECKED_FROM: usize = 16;
@@ -32,18 +32,18 @@ const UUID_BYTES: usize = 16;
 const HEAD: usize = 40;
 pub(crate) const HEADER_BYTES: usize = 64;
 
-/// The name of the segment that begins with revision `first`.
+/// The file name of the segment that begins with revision `first`.
 pub(super) fn file_name(first: u64) -> String {
     format!("journal-{first:020}.log")
 }
 
-/// The first revision of the segment of that name, where it is one's.
+/// The first revision of a segment, from its file name; none where it is not a segment's.
 pub(crate) fn first_revision(name: &str) -> Option<u64> {
     let first = name.strip_prefix("journal-")?.strip_suffix(".log")?.parse().ok()?;
     (first <= REVISION_MAX && file_name(first) == name).then_some(first)
 }
 
-/// What a segment begins with that comes after revision `first - 1`, which is durable.
+/// The header of a segment that begins with revision `first`, where `first - 1` is durable.
 pub(super) fn header(map: Uuid, first: u64) -> Vec<u8> {
     let head = first.saturating_sub(1);
     let checked = [&map.as_bytes()[..], &first.to_le_bytes(), &head.to_le_bytes(), &[0; 16]].concat();
@@ -51,7 +51,7 @@ pub(super) fn header(map: Uuid, first: u64) -> Vec<u8> {
     [&MAGIC[..], &version, &checksum, &checked].concat()
 }
 
-/// Where a segment ends to be one.
+/// Where and why a segment cannot be read any further.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Break {
     /// The first byte that is wrong.
@@ -61,13 +61,13 @@ pub(crate) struct Break {
     /// The largest revision that a frame behind it has.
     pub(crate) last_behind: Option<u64>,
     pub(crate) reason: String,
-    /// Nothing that is known to have been durable is lost with it: a crash while it was written explains it.
+    /// True when a crash while it was written explains the damage: nothing that is known to have been durable is lost.
     pub(crate) torn: bool,
-    /// The segment is that map's.
+    /// Uuid of the other map that the segment belongs to, if so.
     pub(crate) foreign: Option<Uuid>,
 }
 
-/// Where the reading of a segment's frames has come to; its bytes are handed in at each step.
+/// Reader of a segment's frames; the segment's bytes are passed to each step.
 #[derive(Debug)]
 pub(super) struct Frames {
     map: Uuid,
@@ -76,8 +76,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Before the first frame of the segment `bytes` of the map `map`, whose name says that it begins with revision
-    /// `first`.
+    /// Reads the header of the segment `bytes` of the map `map`, whose name says that it begins with revision `first`.
     pub(super) fn of(bytes: &[u8], map: Uuid, first: u64) -> Result<Self, Break> {
         let frames = Self { map, offset: HEADER_BYTES, revision: first };
         let blank = bytes.iter().all(|&byte| byte == 0);
@@ -95,7 +94,7 @@ impl Frames {
         }
     }
 
-    /// The next frame; none at the segment's end.
+    /// Reads the next frame; none at the segment's end.
     pub(super) fn next<'a>(&mut self, bytes: &'a [u8]) -> Result<Option<Frame<'a>>, Break> {
         match frame::read(bytes, self.offset, self.map) {
             Ok(Some(frame)) if frame.revision == self.revision => {
@@ -112,17 +111,17 @@ impl Frames {
         }
     }
 
-    /// Bytes that were read.
+    /// Number of bytes that were read.
     pub(super) fn offset(&self) -> usize {
         self.offset
     }
 
-    /// The revision that comes next.
+    /// The revision of the next frame.
     pub(super) fn next_revision(&self) -> u64 {
         self.revision
     }
 
-    /// Something is wrong at `offset`. A crash tore it only where no frame behind it knows it to have been durable.
+    /// The break at `offset`. It counts as torn by a crash only where no later frame says that it was durable.
     fn broken(&self, bytes: &[u8], offset: usize, reason: String, torn: bool) -> Break {
         let behind = frame::newest_behind(bytes, offset + 1, self.map);
         let was_durable = behind.is_some_and(|newest| newest.durable >= self.revision);
@@ -146,7 +145,7 @@ fn check_header(header: &[u8], expected: &[u8]) -> Result<(), String> {
     if crc32c::crc32c(&header[CHECKED_FROM..]) != stored {
         return Err("the segment's header has a wrong checksum".into());
     }
-    // Up to version 2 a segment had no head.
+    // Up to version 2 segments have no head.
     let has_head = version >= 3 || header[HEAD..].iter().any(|&byte| byte != 0);
     let end = if has_head { HEADER_BYTES } else { HEAD };
     if header[CHECKED_FROM..end] != expected[CHECKED_FROM..end] {
@@ -157,7 +156,7 @@ fn check_header(header: &[u8], expected: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// The uuid of the map whose segment begins with `header`, where that is whole.
+/// The uuid in a segment's `header`; none where the header is damaged.
 pub(crate) fn owner(header: &[u8]) -> Option<Uuid> {
     let header = header.get(..HEADER_BYTES).filter(|header| header[..8] == MAGIC[..])?;
     let stored = u32::from_le_bytes(std::array::from_fn(|i| header[12 + i]));
@@ -167,7 +166,7 @@ pub(crate) fn owner(header: &[u8]) -> Option<Uuid> {
 }
 
 impl Break {
-    /// As an error of the segment at `path` of the map `map`.
+    /// The error of this break, for the segment at `path` of the map `map`.
     pub(super) fn of(self, path: &Path, map: Uuid) -> StoreError {
         if let Some(found) = self.foreign {
             return StoreError::Foreign { path: path.to_owned(), found, expected: map };

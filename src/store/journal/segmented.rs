@@ -1,4 +1,4 @@
-//! A journal of files.
+//! The journal as files.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,8 @@ use crate::store::folder::{self, FolderPath};
 use crate::store::{Appending, FileSystem, OpeningProgress, StoreError};
 use crate::util::{Durations, StopSignal};
 
-/// A journal as segments in a map's folder. It appends to segments that it began itself, never to one it found.
+/// A journal as segment files in a map's folder. It appends only to segments that it began itself, never to one it
+/// found.
 #[derive(Debug)]
 pub struct SegmentedJournal {
     pub(super) place: SegmentFolder,
@@ -24,24 +25,24 @@ pub struct SegmentedJournal {
     pub(super) head: u64,
     /// The last revision that is known to be durable.
     pub(super) durable: u64,
-    /// Why it takes nothing more.
+    /// Why the journal accepts nothing more; none while it does.
     stopped: Option<String>,
     segment_bytes_max: u64,
     used: JournalUse,
 }
 
-/// What a journal has done since it was opened.
+/// Statistics of a journal since it was opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct JournalUse {
-    /// Records appended.
+    /// Number of records appended.
     pub records: u64,
-    /// Bytes appended, frames included.
+    /// Number of bytes appended, frames included.
     pub bytes: u64,
-    /// How often it was synced, and how long that took.
+    /// Number and durations of the syncs.
     pub syncs: Durations,
 }
 
-/// Where a map's segments are.
+/// Location of a map's segments.
 #[derive(Debug, Clone)]
 pub(in crate::store) struct SegmentFolder {
     pub(super) files: Arc<dyn FileSystem>,
@@ -71,32 +72,32 @@ impl SegmentedJournal {
         }
     }
 
-    /// What it has done since it was opened.
+    /// Statistics of the journal since it was opened.
     pub fn used(&self) -> JournalUse {
         self.used
     }
 
-    /// The last revision that is known to be durable.
+    /// Returns the last revision that is known to be durable.
     pub fn durable(&self) -> u64 {
         self.durable
     }
 
-    /// The first revision that can be read; none without a segment.
+    /// Returns the first revision that can be read; none without a segment.
     pub fn tail(&self) -> Option<u64> {
         self.segments.first().copied()
     }
 
-    /// The first revisions of its segments, ascending.
+    /// Returns the first revisions of the segments, ascending.
     pub(in crate::store) fn segments(&self) -> &[u64] {
         &self.segments
     }
 
-    /// Where they are.
+    /// Returns the location of the segments.
     pub(in crate::store) fn place(&self) -> &SegmentFolder {
         &self.place
     }
 
-    /// Ends the present segment: what comes next begins another, so that this one can be forgotten as a whole.
+    /// Ends the present segment. The next record begins another, so that this one can be removed as a whole.
     ///
     /// # Errors
     /// As for [`Journal::sync`].
@@ -106,7 +107,7 @@ impl SegmentedJournal {
         Ok(())
     }
 
-    /// Does what may fail; after a failure nobody knows what the disk holds, so nothing more is taken.
+    /// Runs `act`; after a failure it is unknown what the disk holds, so the journal accepts nothing more.
     fn or_stop<T>(&mut self, act: impl FnOnce(&mut Self) -> Result<T, StoreError>) -> Result<T, StoreError> {
         if let Some(reason) = &self.stopped {
             return Err(StoreError::JournalStopped(reason.clone()));
@@ -140,7 +141,7 @@ impl SegmentedJournal {
         let first = self.head + 1;
         let path = self.place.path(first);
         let file = self.place.begin_segment(first).map_err(StoreError::io(&path))?;
-        // One without a frame, left by a crash, has the same name.
+        // A segment without a frame, left by a crash, has the same name.
         if self.segments.last() != Some(&first) {
             self.segments.push(first);
         }
@@ -162,7 +163,7 @@ impl SegmentedJournal {
 
 impl Journal for SegmentedJournal {
     fn append(&mut self, records: &[&Record]) -> Result<u64, StoreError> {
-        // Refused before anything is written: the journal goes on.
+        // Refused before anything is written, so the journal goes on.
         if records.len() as u64 > REVISION_MAX.saturating_sub(self.head) {
             return Err(StoreError::RevisionsUsedUp(self.head));
         }
@@ -198,14 +199,14 @@ impl SegmentFolder {
         self.folder.file(&segment::file_name(first))
     }
 
-    /// The changes from `revision` to `head`, of the segments that begin with the revisions `segments`.
+    /// Reads the changes from `revision` to `head` from the segments that begin with the revisions `segments`.
     pub(in crate::store) fn read_from(&self, revision: u64, segments: &[u64], head: u64) -> Changes {
         let first = segments.partition_point(|&first| first <= revision).saturating_sub(1);
         let segments = segments[first..].iter().copied().collect();
         Box::new(Reader { place: self.clone(), segments, revision, head, open: None })
     }
 
-    /// The changes that made `revisions`, ascending, alone: others are passed over without a look into them.
+    /// Reads only the changes that made `revisions` (ascending); others are skipped without decoding.
     pub(in crate::store) fn read_at(&self, revisions: Vec<u64>, segments: &[u64], head: u64) -> Changes {
         let first = revisions.first().copied().unwrap_or_default();
         let begin = segments.partition_point(|&begins| begins <= first).saturating_sub(1);
@@ -218,7 +219,7 @@ impl SegmentFolder {
         }))
     }
 
-    /// A segment without a frame, in the place of one that is there.
+    /// Creates a segment without a frame, in the place of one that exists.
     pub(super) fn begin_segment(&self, first: u64) -> std::io::Result<Box<dyn Appending>> {
         let mut file = self.files.create(&self.path(first))?;
         file.append(&segment::header(self.map, first))?;
@@ -231,19 +232,19 @@ impl SegmentFolder {
         self.files.read(path).map_err(StoreError::io(path))
     }
 
-    /// Reads the journal, for as long as somebody wants the maps.
+    /// Reads a segment, unless `progress` is cancelled.
     pub(super) fn read_until(&self, path: &Path, progress: &OpeningProgress) -> Result<Vec<u8>, StoreError> {
         folder::read_until(&*self.files, path, StopSignal::when(&|| progress.is_cancelled()))
     }
 }
 
-/// Changes read segment by segment.
+/// Iterator of changes, read segment by segment.
 struct Reader {
     place: SegmentFolder,
     segments: VecDeque<u64>,
-    /// The next to hand out.
+    /// The next revision to return.
     revision: u64,
-    /// The last to hand out.
+    /// The last revision to return.
     head: u64,
     open: Option<OpenSegment>,
 }
@@ -264,7 +265,7 @@ impl Iterator for Reader {
         let change = self.read();
         match &change {
             Ok(_) => self.revision += 1,
-            // Nothing comes after a failure.
+            // Iteration ends after a failure.
             Err(_) => self.revision = u64::MAX,
         }
         Some(change)

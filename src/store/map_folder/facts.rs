@@ -1,4 +1,4 @@
-//! What many ask of a map's folder, where nobody waits for a disk to be told.
+//! Facts about a map's folder, kept in memory so that reading them never waits for a disk.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,31 +10,30 @@ use crate::store::retention::{self, UndoWindow};
 use crate::store::snapshot_files::Sizes;
 use crate::sync::{Mutex, MutexGuard, Rank};
 
-/// How long after one that could not be written the next snapshot is due at the earliest, and what is kept for undo is
-/// given up again after that failed: to make a snapshot takes a while of a thread, and a disk that is full does not empty
-/// at once.
+/// Least time from a failed snapshot to the next attempt, and from a failed removal of what is kept for undo to the
+/// next attempt: a snapshot takes a while of a thread, and a full disk does not empty at once.
 const AGAIN_AFTER: Duration = Duration::from_secs(5);
 
-/// How much is kept of a map, and how.
+/// Statistics of a map's folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FolderUse {
     /// The last revision that is known to be durable.
     pub durable: u64,
-    /// The newest snapshot's revision.
+    /// Revision of the newest snapshot.
     pub snapshot: u64,
-    /// The revision from which on all changes are kept.
+    /// First revision from which on all changes are kept.
     pub kept_from: u64,
-    /// What the journal has done.
+    /// Statistics of the journal.
     pub journal: JournalUse,
     /// Time since the newest snapshot was written, or since the folder was opened where that was later.
     pub snapshot_age: Duration,
-    /// Snapshots that could not be written since the folder was opened.
+    /// Number of snapshots that could not be written since the folder was opened.
     pub snapshot_failures: u64,
     /// Bytes of the files in the folder.
     pub disk_bytes: u64,
 }
 
-/// What is known of a folder. Whoever writes there tells it after each step; a clone is another handle on the same.
+/// Shared facts about a folder. Writers update them after each step; a clone is another handle to the same facts.
 #[derive(Debug, Clone)]
 pub(super) struct Facts(Arc<Mutex<Known>>);
 
@@ -47,30 +46,31 @@ struct Known {
     segments: Vec<u64>,
     /// Revisions of the snapshots, ascending.
     snapshots: Vec<u64>,
-    /// Revisions that somebody reads the journal from just now.
+    /// Revisions from which the journal is being read; see [`Pin`].
     pinned: Vec<u64>,
     saved: Saved,
-    /// When nothing could be given up though there was something.
+    /// Time of the last failed attempt to remove what is kept for undo.
     gave_up_in_vain: Option<Instant>,
-    /// Bytes of the folder when they were last counted, less those appended to the journal until then; wrapping.
+    /// Bytes of the folder when they were last counted, less those that had been appended to the journal by then; wraps
+    /// around.
     counted_bytes: u64,
 }
 
-/// How much journal there is behind the newest snapshot, and since when.
+/// Amount of journal after the newest snapshot, and since when.
 #[derive(Debug, Clone, Copy)]
 struct Saved {
     at: Instant,
-    /// Bytes of journal that were found behind it at the start.
+    /// Bytes of journal after the snapshot that were found at the start.
     found: u64,
-    /// Bytes that had been appended when it was written.
+    /// Bytes that had been appended when the snapshot was written.
     appended: u64,
-    /// When the next one could not be written.
+    /// Time at which the next snapshot could not be written.
     failed: Option<Instant>,
-    /// How many snapshots could not be written, since the start.
+    /// Number of snapshots that could not be written since the start.
     failures: u64,
 }
 
-/// Keeps a snapshot, and the journal from it on, until it is dropped.
+/// Guard that keeps a snapshot, and the journal from it on, until it is dropped.
 #[derive(Debug)]
 pub struct Pin {
     facts: Facts,
@@ -107,7 +107,7 @@ impl Facts {
         self.0.lock()
     }
 
-    /// The journal was written.
+    /// Records that the journal was written.
     pub(super) fn tell(&self, journal: &SegmentedJournal) {
         let mut known = self.lock();
         (known.head, known.durable, known.journal) = (journal.head(), journal.durable(), journal.used());
@@ -115,7 +115,7 @@ impl Facts {
         known.segments.extend_from_slice(journal.segments());
     }
 
-    /// A snapshot was written, when so many bytes of journal had been appended.
+    /// Records that the snapshot of `revision` was written, when `appended` bytes of journal had been appended.
     pub(super) fn tell_saved(&self, revision: u64, appended: u64) {
         let mut known = self.lock();
         let at = known.snapshots.partition_point(|&snapshot| snapshot < revision);
@@ -126,14 +126,14 @@ impl Facts {
         known.saved = Saved { at: Instant::now(), found: 0, appended, failed: None, failures };
     }
 
-    /// A snapshot could not be written.
+    /// Records that a snapshot could not be written.
     pub(super) fn tell_not_saved(&self) {
         let mut known = self.lock();
         known.saved.failed = Some(Instant::now());
         known.saved.failures += 1;
     }
 
-    /// True where something is kept for undo alone that nobody reads; not just after it could not be given up.
+    /// True where something is kept for undo alone and not being read; false for a while after it could not be removed.
     pub(super) fn may_give_up(&self) -> bool {
         let known = self.lock();
         if known.gave_up_in_vain.is_some_and(|then| then.elapsed() < AGAIN_AFTER) {
@@ -146,12 +146,12 @@ impl Facts {
             || kept.is_some_and(|base| known.segments.partition_point(|first| *first <= base + 1) > 1)
     }
 
-    /// Notes whether what is kept for undo alone could be given up.
+    /// Records whether what is kept for undo alone could be removed.
     pub(super) fn tell_given_up(&self, gave_up: bool) {
         self.lock().gave_up_in_vain = (!gave_up).then(Instant::now);
     }
 
-    /// The files of the folder were counted.
+    /// Records the size of the folder's files.
     pub(super) fn tell_bytes(&self, bytes: u64) {
         let mut known = self.lock();
         known.counted_bytes = bytes.wrapping_sub(known.journal.bytes);
@@ -188,20 +188,20 @@ impl Facts {
         }
     }
 
-    /// The first revisions of the segments, and the head of the journal.
+    /// Returns the first revisions of the segments, and the head of the journal.
     pub(super) fn journal(&self) -> (Vec<u64>, u64) {
         let known = self.lock();
         (known.segments.clone(), known.head)
     }
 
-    /// The oldest revision that undo reaches, where the scans of `withdrawn` were taken out before.
+    /// The oldest revision that undo can return to, where the scans of `withdrawn` were removed before.
     pub(super) fn undo_from(&self, withdrawn: &[WithdrawnScan]) -> u64 {
         let known = self.lock();
         let fits = |snapshot: &&u64| known.is_base(**snapshot, withdrawn);
         known.snapshots.iter().find(fits).map_or(known.head, |base| *base) + 1
     }
 
-    /// The newest snapshot that undo can begin with, which stays as long as somebody reads from there.
+    /// Pins the newest snapshot that an undo of `scans` can begin with.
     pub(super) fn pin_base_of(&self, scans: &[u64], withdrawn: &[WithdrawnScan]) -> Option<Pin> {
         let first = *scans.iter().min()?;
         let mut known = self.lock();
@@ -212,7 +212,8 @@ impl Facts {
         Some(Pin { facts: self.clone(), snapshot })
     }
 
-    /// Forgets the snapshots that nobody needs any more: nobody begins to read them from now on. Those that are kept.
+    /// Drops snapshots that are no longer needed, so that no reader begins with them from now on; returns those that
+    /// are kept.
     pub(super) fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnScan], sizes: &Sizes) -> Vec<u64> {
         let mut known = self.lock();
         let head = known.snapshots.last().copied().unwrap_or_default();
@@ -230,8 +231,8 @@ impl Facts {
 }
 
 impl Known {
-    /// True of a snapshot that undo can begin with: the journal is kept from there on, and it holds nothing of a scan that
-    /// was withdrawn after it.
+    /// True of a snapshot that undo can begin with: the journal is kept from there on, and it holds nothing of a scan
+    /// that was withdrawn later.
     fn is_base(&self, snapshot: u64, withdrawn: &[WithdrawnScan]) -> bool {
         let is_kept = self.segments.first().is_some_and(|tail| *tail <= snapshot + 1);
         is_kept && retention::is_base(snapshot, withdrawn)

@@ -1,4 +1,4 @@
-//! Who held which voxels, as a map's folder tells: for undo.
+//! Reads from a map's folder which scans touched which voxels, for undo.
 
 use super::MapFolder;
 use super::facts::Pin;
@@ -7,27 +7,27 @@ use crate::store::snapshot_files::snapshot_name;
 use crate::store::{MapFileError, MapFileLimits, Snapshot, StoreError, folder};
 use crate::util::StopSignal;
 
-/// Who held which of the voxels that some scans touched.
+/// Ownership of the voxels that some scans touched.
 #[derive(Debug)]
 pub struct Observed {
-    /// Up to `revision`.
+    /// Ownership up to `revision`.
     pub observations: VoxelOwnership,
-    /// The last change that was seen.
+    /// The last revision that was read.
     pub revision: u64,
-    /// What it was read from stays as long as this.
+    /// Keeps the snapshot and journal that it was read from.
     pub pin: Pin,
 }
 
-/// Why nothing was observed.
+/// Why the ownership of voxels could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum NotObserved<E> {
     /// The journal does not reach back to the first of the scans.
     #[error("the journal does not reach back to the first of the scans")]
     OutsideUndoWindow,
-    /// Nobody waits for it any more, or its time is up.
+    /// Reading was stopped: the caller cancelled it, or its time is up.
     #[error("it was stopped")]
     Stopped,
-    /// There is no memory for it.
+    /// The memory for it was refused.
     #[error("{0}")]
     NoMemory(E),
     /// A snapshot or the journal cannot be read.
@@ -36,13 +36,14 @@ pub enum NotObserved<E> {
 }
 
 impl MapFolder {
-    /// Who holds which of the voxels that `scans` touched, up to the present head of the journal. `reserve` is asked for the
-    /// bytes of each part before it is built: what was asked for before is there by then.
+    /// Reads which scans own the voxels that `scans` touched, up to the present head of the journal. `reserve` is
+    /// called with the bytes of each part before it is built, when all parts before it exist.
     ///
-    /// The journal is read twice: for what the scans touched, so that nothing else need be remembered, and from the base on.
+    /// The journal is read twice: for the voxels that the scans touched, so that nothing else need be remembered, and
+    /// from the base on.
     ///
     /// # Errors
-    /// When the journal does not reach back so far, something cannot be read, `reserve` refuses, or it is stopped.
+    /// When the journal does not reach back far enough, something cannot be read, `reserve` refuses, or `stop` is set.
     pub fn observations<E: std::fmt::Display>(
         &self,
         scans: &[u64],
@@ -75,7 +76,7 @@ impl MapFolder {
         if stop.is_stopped() { Err(NotObserved::Stopped) } else { Ok(observed) }
     }
 
-    /// Reads what the targets touched.
+    /// Reads which voxels the scans to undo touched.
     fn touch<E>(
         &self,
         observations: &mut VoxelOwnership,
@@ -96,7 +97,7 @@ impl MapFolder {
         Ok(())
     }
 
-    /// Shows `observed` the changes that it has not seen, while somebody wants to know.
+    /// Brings `observed` up to date with the changes since its revision.
     ///
     /// # Errors
     /// When the journal cannot be read.

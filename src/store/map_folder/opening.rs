@@ -1,4 +1,4 @@
-//! A map's folder when it is made, and when it is found.
+//! Creating and opening a map's folder.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,27 +14,27 @@ use crate::store::snapshot_files::{
 use crate::store::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder};
 use crate::util::StopSignal;
 
-/// A map as it was found.
+/// A map that was opened.
 #[derive(Debug)]
 pub struct OpenedMap {
-    /// Where it is kept.
+    /// Folder of the map.
     pub folder: MapFolder,
     /// The uuid of this incarnation of the map.
     pub uuid: Uuid,
-    /// At the revision of the last durable change.
+    /// The map at the revision of the last durable change.
     pub map: MultiResolutionMap,
-    /// The snapshot it was read from.
+    /// Revision of the snapshot that it was read from.
     pub snapshot: u64,
-    /// What was found behind it.
+    /// Result of reading the journal after the snapshot.
     pub recovered: Recovered,
-    /// Newer snapshots that could not be read, and were set aside.
+    /// Newer snapshots that could not be read and were set aside.
     pub damaged: Vec<String>,
-    /// Files in the folder that nobody understands.
+    /// Files in the folder that are not part of a map.
     pub not_understood: Vec<String>,
 }
 
 impl MapFolder {
-    /// A folder whose one snapshot was just written.
+    /// The folder of a map whose only snapshot was just written.
     pub(in crate::store) fn new(
         files: Arc<dyn FileSystem>,
         path: PathBuf,
@@ -71,8 +71,7 @@ impl MapFolder {
         Self::open_at(files, path, uuid, settings, progress, true)
     }
 
-    /// Opens a map's folder, where the loss of revisions of which there is no trace but that they had been acknowledged
-    /// may be taken.
+    /// Opens a map's folder; the caller may accept the loss of revisions that are known only to have been acknowledged.
     pub(in crate::store) fn open_at(
         files: Arc<dyn FileSystem>,
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! The body of a map file. What it holds is counted first: of each part memory is asked for before it is built.
+//! The body of a map file. Its contents are counted first, so that memory for each part is reserved before it is built.
 
 use std::collections::HashSet;
 
@@ -19,7 +19,7 @@ use crate::store::pb;
 use crate::util::StopSignal;
 use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
 
-/// The numbers of the fields, as `proto/mrol/store/v1` has them.
+/// Field numbers, as in `proto/mrol/store/v1`.
 pub(super) mod number {
     pub(in crate::store::snapshot) const UUID: u64 = 1;
     pub(in crate::store::snapshot) const RESOLUTION_M: u64 = 2;
@@ -36,42 +36,43 @@ pub(super) mod number {
     pub(in crate::store::snapshot) const MOMENTS: u64 = 13;
     pub(in crate::store::snapshot) const FORGOTTEN: u64 = 14;
 
-    /// In `Voxels` and `Moments`.
+    /// Field of `Voxels` and of `Moments`.
     pub(in crate::store::snapshot) const KEY_GAPS: u64 = 1;
-    /// In `Voxels`.
+    /// Field of `Voxels`.
     pub(in crate::store::snapshot) const OCTREES: u64 = 2;
-    /// In `Moments`.
+    /// Field of `Moments`.
     pub(in crate::store::snapshot) const NUMBERS: u64 = 2;
     pub(in crate::store::snapshot) const FORMS: u64 = 3;
     pub(in crate::store::snapshot) const POINTS: u64 = 4;
 
-    /// In `ForgottenScans`.
+    /// Field of `ForgottenScans`.
     pub(in crate::store::snapshot) const ID_GAPS: u64 = 2;
 }
 
-/// Scans that become a trajectory between two looks at the stop signal: a few milliseconds.
+/// Scans that are added to a trajectory between two checks of the stop signal: a few milliseconds.
 const SCANS_PER_LOOK: usize = 4096;
-/// Robots whose forgotten scans are read between two looks, each up to some thousand ranges.
+/// Robots whose forgotten scans are read between two checks of the stop signal, each with up to some thousand ranges.
 const ROBOTS_PER_LOOK: usize = 16;
-/// Bytes of one scan or request: a name, an overlap for each level and some numbers are a few hundred.
+/// Most bytes of one scan or request: a name, an overlap for each level and some numbers are a few hundred.
 const RECORD_BYTES_MAX: usize = 4096;
-/// Bytes of memory of a number that is read one by one into a list, which doubles its room: the old and the new one.
+/// Bytes of memory of a number that is read into a growing list: the old and the new allocation.
 const NUMBER_BYTES: usize = 3 * size_of::<u64>();
-/// Bytes in memory of a scan in the trajectory: itself as it was read and in a list that doubles its room, its overlaps
-/// and name, and its places by robot and id.
+/// Bytes of memory of a scan in the trajectory: the scan itself, read and in a growing list, its overlaps and name, and
+/// its entries by robot and id.
 const SCAN_BYTES: usize = 3 * size_of::<MappedScan>() + 12 * size_of::<f64>() + 240;
-/// Bytes in memory of a request, which is found by its id, its revision and its caller, each with a text of its own.
+/// Bytes of memory of a request, which is indexed by its id, its revision and its caller, each with a string of its
+/// own.
 const REQUEST_BYTES: usize = 3 * size_of::<CompletedRequest>() + 320;
-/// Robots whose forgotten scans a file may list.
+/// Most robots whose forgotten scans a file may list.
 const ROBOTS_MAX: usize = 1 << 20;
-/// Bytes in memory of a robot whose scans were forgotten, besides their ids: its name, and its place by name.
+/// Bytes of memory of a robot with forgotten scans, without the ids: its name, and its entry by name.
 const FORGOTTEN_BYTES: usize = 480;
 const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
-/// Bytes in memory of a voxel's moments: its key twice, the moments by themselves and with their key.
+/// Bytes of memory of a voxel's moments: its key twice, and the moments with and without their key.
 const MOMENT_BYTES: usize =
     2 * size_of::<VoxelKey>() + size_of::<Moments>() + size_of::<(VoxelKey, Moments)>();
 
-/// A body whose fields were found, and nothing built of them.
+/// A body whose fields were located, but not decoded.
 #[derive(Debug)]
 pub(super) struct Body<'a> {
     all: &'a [u8],
@@ -92,10 +93,10 @@ pub(super) struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// Finds the fields of a body. Once stopped, neither this nor what is read of it means anything.
+    /// Locates the fields of a body. Once stopped, this and everything read from it is meaningless.
     ///
     /// # Errors
-    /// When it is no message, or has a part twice that there is one of.
+    /// When it is not a message, or a part that may occur once occurs twice.
     pub(super) fn of(all: &'a [u8], stop: StopSignal<'a>) -> Result<Self, Unreadable> {
         let mut body = Self {
             all,
@@ -146,16 +147,16 @@ impl<'a> Body<'a> {
             (known @ number::UUID..=number::FORGOTTEN, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
-            // Of a newer version, which says so where it matters.
+            // A field of a newer version, which is reported where it matters.
             _ => {}
         }
         Ok(())
     }
 
-    /// What it holds.
+    /// Decodes the body.
     ///
     /// # Errors
-    /// When it is wrong, holds more than `limits` allow, or there is no `memory` for it.
+    /// When the body is damaged, holds more than `limits` allow, or `memory` is refused.
     pub(super) fn read<E>(
         self,
         limits: &MapFileLimits,
@@ -188,7 +189,7 @@ impl<'a> Body<'a> {
     fn check_counts<E>(&self, limits: &MapFileLimits) -> Result<(), MapFileError<E>> {
         let (limit, most) = ("map_file_scans_max", limits.scans_max);
         for (what, count) in [("scans", self.scans), ("withdrawn scans", self.withdrawn)] {
-            // Each has made a revision of its own.
+            // Each made a revision of its own.
             if count as u64 > self.revision {
                 return Err(MapFileError::Bad(format!(
                     "{count} {what} of a map at revision {}",
@@ -295,7 +296,8 @@ impl<'a> Body<'a> {
         Ok(scans)
     }
 
-    /// Each of its own revision, and each id of a caller once a kind: which answer is whose is told by them.
+    /// Decodes the requests: each has a revision of its own, and each id of a caller occurs once for each kind, since
+    /// answers are found by them.
     fn requests(&self) -> Result<IdempotencyLog, Unreadable> {
         let requests: Vec<CompletedRequest> =
             self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?;

@@ -1,22 +1,22 @@
-//! Compression and checksum of a map file, piece by piece, with a look at the stop signal between any two.
+//! Compression and checksum of a map file, with a check of the stop signal after each piece.
 
 use std::io::{self, Read, Write};
 
 use crate::util::StopSignal;
 
-/// The fastest: gaps and octrees have left little to find.
+/// Compression level of zstd: the fastest, since gaps and octrees leave little to compress.
 const ZSTD_LEVEL: i32 = 1;
-/// Bytes of a body between two looks at the stop signal: a few milliseconds.
+/// Bytes of a body between two checks of the stop signal: a few milliseconds.
 const BYTES_PER_LOOK: usize = 1 << 20;
-/// How far back a frame may refer, as a power of two: 8 MiB, for which memory is taken. Ours go back 512 KiB.
+/// Largest window of a frame, as a power of two: 8 MiB, for which memory is reserved. Own frames use 512 KiB.
 const WINDOW_LOG_MAX: u32 = 23;
 /// Bytes of memory that decompression takes besides the body.
 pub(super) const WINDOW_BYTES: usize = (1 << WINDOW_LOG_MAX) + (1 << 19);
 
-/// A zstd frame of `body`; not whole once stopped.
+/// Appends a zstd frame of `body` to `bytes`; incomplete once stopped.
 ///
 /// # Errors
-/// For want of memory.
+/// When there is no memory.
 pub(super) fn compress_onto(bytes: Vec<u8>, body: &[u8], stop: StopSignal<'_>) -> io::Result<Vec<u8>> {
     let mut frame = zstd::Encoder::new(bytes, ZSTD_LEVEL)?;
     if stop.is_stopped() {
@@ -32,17 +32,17 @@ pub(super) fn compress_onto(bytes: Vec<u8>, body: &[u8], stop: StopSignal<'_>) -
     frame.finish()
 }
 
-/// What a zstd frame holds, at most `length` bytes; not all of it once stopped.
+/// Decompresses a zstd frame of at most `length` bytes; incomplete once stopped.
 ///
 /// # Errors
-/// When it is no frame, is damaged, holds more, or refers further back than frames of ours do.
+/// When it is not a zstd frame, is damaged, holds more, or needs a larger window than own frames do.
 pub(super) fn decompress(frame: &[u8], length: usize, stop: StopSignal<'_>) -> io::Result<Vec<u8>> {
     let mut body = Vec::with_capacity(length);
     let mut unread = zstd::Decoder::with_buffer(frame)?;
     unread.window_log_max(WINDOW_LOG_MAX)?;
     while !stop.is_stopped() {
         let piece = BYTES_PER_LOOK.min(length - body.len());
-        // A byte more than there may be, where that is all that is missing.
+        // One byte more than allowed, to detect a frame that holds more.
         let read = unread.by_ref().take(piece.max(1) as u64).read_to_end(&mut body)?;
         if body.len() > length {
             return Err(io::Error::other(format!("it holds more than {length} bytes")));
@@ -54,7 +54,7 @@ pub(super) fn decompress(frame: &[u8], length: usize, stop: StopSignal<'_>) -> i
     Ok(body)
 }
 
-/// The CRC-32C of `bytes`, after others whose it is `before`; that of a part of them once stopped.
+/// The CRC-32C of `bytes`, continued from `before`; incomplete once stopped.
 pub(super) fn checksum_after(before: u32, bytes: &[u8], stop: StopSignal<'_>) -> u32 {
     stop.pieces(bytes, 16 * BYTES_PER_LOOK).fold(before, crc32c::crc32c_append)
 }

@@ -1,12 +1,12 @@
-//! The fields of a protobuf message as they stand in its bytes: nothing is built of them, so that they can be counted
-//! before memory is taken.
+//! The fields of a protobuf message, read from its bytes without decoding them, so that they can be counted before
+//! memory is taken.
 
 use crate::store::codec::Unreadable;
 use crate::util::StopSignal;
 
-/// Fields, or numbers, that are read between two looks at the stop signal: a millisecond or so.
+/// Fields, or numbers, that are read between two checks of the stop signal: a millisecond or so.
 pub(super) const FIELDS_PER_LOOK: usize = 4096;
-/// Bytes in which ends of numbers are counted between two looks at the stop signal.
+/// Bytes in which varints are counted between two checks of the stop signal.
 const BYTES_PER_LOOK: usize = 1 << 20;
 
 /// The value of a field.
@@ -22,7 +22,7 @@ pub(super) enum Value<'a> {
     Fixed32,
 }
 
-/// The fields of a message, in their order, with their numbers.
+/// Iterator over the fields of a message, in order, with their numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Fields<'a>(&'a [u8]);
 
@@ -45,7 +45,7 @@ impl<'a> Fields<'a> {
                 Value::Bytes(self.0.split_off(..length)?)
             }
             5 => self.0.split_off(..4).map(|_| Value::Fixed32)?,
-            // Groups are as old as protobuf, and nothing of ours.
+            // Groups (deprecated in protobuf) do not occur in this format.
             _ => return None,
         };
         Some((key >> 3, value))
@@ -67,8 +67,8 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// The numbers that a message holds in the repeated field `number`, packed or one by one, each as `value_of` makes it; some
-/// of them once stopped. There is room for `count`.
+/// Reads the repeated field `number` of varints, packed or not, each converted by `value_of`; incomplete once stopped.
+/// The list is allocated for `count` values.
 pub(super) fn varints<T>(
     message: &[u8],
     number: u64,
@@ -98,7 +98,7 @@ pub(super) fn varints<T>(
     Ok(values)
 }
 
-/// The bytes of the field `number` of a message; of several, the last.
+/// The bytes of the field `number` of a message; of the last one where it is repeated.
 pub(super) fn bytes_of<'b>(
     message: &'b [u8],
     number: u64,
@@ -115,12 +115,12 @@ pub(super) fn bytes_of<'b>(
     Ok(last)
 }
 
-/// The number that stands as `zigzag`, which small ones of both signs are short as.
+/// Decodes a zigzag-encoded number, whose small values of both signs are short.
 pub(super) fn unzigzag(zigzag: u64) -> i64 {
     (zigzag >> 1) as i64 ^ -((zigzag & 1) as i64)
 }
 
-/// How many numbers a message holds in the repeated field `number`, packed or one by one.
+/// Counts the values of the repeated varint field `number`, packed or not.
 pub(super) fn count_varints(message: &[u8], number: u64, stop: StopSignal<'_>) -> Result<usize, Unreadable> {
     let ends = |packed: &[u8]| packed.iter().filter(|&&byte| byte < 128).count();
     let mut count = 0;
@@ -134,7 +134,7 @@ pub(super) fn count_varints(message: &[u8], number: u64, stop: StopSignal<'_>) -
     Ok(count)
 }
 
-/// Bytes of the field `number` of a message, all its occurrences together.
+/// Counts the bytes of the field `number`, over all its occurrences.
 pub(super) fn count_bytes(message: &[u8], number: u64, stop: StopSignal<'_>) -> Result<usize, Unreadable> {
     let mut count = 0;
     for field in stop.paced(Fields::of(message), FIELDS_PER_LOOK) {
@@ -147,7 +147,7 @@ pub(super) fn count_bytes(message: &[u8], number: u64, stop: StopSignal<'_>) -> 
     Ok(count)
 }
 
-/// Takes a varint off the front; none where it is cut short, or of more than 64 bits.
+/// Takes a varint from the front of `bytes`; none where it is truncated or longer than 64 bits.
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0u64;
     for shift in (0..64).step_by(7) {

@@ -1,15 +1,15 @@
-//! What a map file may hold, and why one is not read.
+//! Limits on map files, and why one is refused.
 
 use crate::store::codec::Unreadable;
 
-/// Bounds on what is read of a map file. Each is named in the refusal of a file beyond it.
+/// Limits on the contents of a map file. The error of a file beyond one names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MapFileLimits {
-    /// Bytes of the body before compression.
+    /// Most bytes of the body before compression.
     pub body_bytes_max: u64,
-    /// Finest voxels, and blocks of them.
+    /// Most finest voxels, and most blocks of them.
     pub voxels_max: usize,
-    /// Scans of the trajectory, and as many that were taken out again.
+    /// Most scans of the trajectory, and most withdrawn scans.
     pub scans_max: usize,
 }
 
@@ -22,25 +22,25 @@ impl MapFileLimits {
 /// Why a map file was not read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MapFileError<E> {
-    /// The file is no map file, is damaged, or was written by a newer version.
+    /// The file is not a map file, is damaged, or was written by a newer version.
     #[error("{0}")]
     Bad(Unreadable),
     /// The file holds more than a limit allows.
     #[error("the map file has {count} {what}, {limit} is {most}")]
     TooLarge {
-        /// What it has too much of.
+        /// What the file has too much of.
         what: &'static str,
-        /// How much.
+        /// Count in the file.
         count: usize,
-        /// The limit's name.
+        /// Name of the limit.
         limit: &'static str,
-        /// The limit.
+        /// Value of the limit.
         most: usize,
     },
-    /// There is no memory for what it holds.
+    /// Memory for the contents was refused.
     #[error("{0}")]
     NoMemory(E),
-    /// Nobody waits for it any more, or its time is up.
+    /// Reading was stopped: the caller cancelled it, or its time is up.
     #[error("the reading of the map file was stopped")]
     Stopped,
 }
@@ -51,12 +51,12 @@ impl<E> From<Unreadable> for MapFileError<E> {
     }
 }
 
-/// Memory for what is read of a map file, asked for a part at a time: what was asked for before is there by then.
+/// Callback that reserves memory for the next part of a map file, when all parts before it exist.
 pub(super) struct Memory<F>(pub(super) F);
 
 impl<F> Memory<F> {
     /// # Errors
-    /// When there is none.
+    /// When the memory is refused.
     pub(super) fn reserve<E>(&mut self, bytes: usize) -> Result<(), MapFileError<E>>
     where
         F: FnMut(u64) -> Result<(), E>,

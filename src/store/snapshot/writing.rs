@@ -1,5 +1,5 @@
-//! The body of a map file as it is written: part by part, with a look at the stop signal between any two. The bytes are
-//! those that the message of `snapshot.proto` as a whole has.
+//! Encoding of the body of a map file, part by part, with a check of the stop signal after each part. The bytes are the
+//! same as those of the whole message of `snapshot.proto`.
 
 use prost::Message;
 use prost::encoding::{WireType, encode_key, encode_varint, encoded_len_varint, key_len};
@@ -11,12 +11,12 @@ use crate::store::codec::{moments, voxels};
 use crate::store::pb;
 use crate::util::StopSignal;
 
-/// Records, of scans and of requests, between two looks at the stop signal: a millisecond.
+/// Records (scans and requests) between two checks of the stop signal: a millisecond.
 const RECORDS_PER_LOOK: usize = 1024;
-/// Numbers between two looks at the stop signal: a millisecond.
+/// Numbers between two checks of the stop signal: a millisecond.
 const NUMBERS_PER_LOOK: usize = 128 << 10;
 
-/// The body of a snapshot; a part of it once stopped.
+/// Encodes the body of a snapshot; incomplete once stopped.
 pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
     let Snapshot { uuid, settings, contents } = snapshot;
     let MapContents { revision, voxels, moments, trajectory, requests } = contents;
@@ -48,7 +48,7 @@ pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
     body
 }
 
-/// Appends the messages of `items`, some at a time, each as `snapshot_of` puts them into the field that is theirs.
+/// Appends the messages of `items`, some at a time, each in the field that `snapshot_of` puts it in.
 fn append<T: Into<R>, R>(
     body: &mut Vec<u8>,
     items: impl IntoIterator<Item = T>,
@@ -83,7 +83,7 @@ fn append_moments(body: &mut Vec<u8>, moments: &pb::Moments, stop: StopSignal<'_
     bytes.iter().for_each(|(number, bytes)| append_bytes(body, *number, bytes));
 }
 
-/// What stands before the fields of a message of that length.
+/// Appends the key and length of a message field.
 fn begin_message(body: &mut Vec<u8>, number: u64, length: usize) {
     body.reserve_exact(length + 16);
     encode_key(number as u32, WireType::LengthDelimited, body);
@@ -98,12 +98,12 @@ fn append_bytes(body: &mut Vec<u8>, number: u64, bytes: &[u8]) {
     }
 }
 
-/// Bytes of a field of bytes.
+/// Encoded size of a field of bytes.
 fn len_of_bytes(number: u64, bytes: &[u8]) -> usize {
     len_of_field(number, bytes.len())
 }
 
-/// Bytes of a field that is so long but for its key and length; it is left out where it is empty.
+/// Encoded size of a field whose content has `length` bytes; 0 where it is empty, since it is then left out.
 fn len_of_field(number: u64, length: usize) -> usize {
     if length == 0 { 0 } else { key_len(number as u32) + encoded_len_varint(length as u64) + length }
 }
@@ -112,12 +112,12 @@ fn zigzag(number: i64) -> u64 {
     ((number << 1) ^ (number >> 63)) as u64
 }
 
-/// A field of packed numbers.
+/// A field of packed varints.
 struct Packed<'a, T> {
     number: u64,
     values: &'a [T],
     varint: fn(&T) -> u64,
-    /// Bytes of the values.
+    /// Encoded size of the values, bytes.
     bytes: usize,
 }
 
@@ -128,7 +128,7 @@ impl<'a, T> Packed<'a, T> {
         Self { number, values, varint, bytes }
     }
 
-    /// Bytes of the field.
+    /// Encoded size of the field, bytes.
     fn len(&self) -> usize {
         len_of_field(self.number, self.bytes)
     }

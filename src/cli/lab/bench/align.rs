@@ -1,4 +1,4 @@
-//! `mrol bench align`: how long an alignment takes.
+//! `mrol bench align`: times alignments.
 
 use crate::util::Keyword;
 use std::fmt::{self, Display};
@@ -41,10 +41,10 @@ pub(super) struct Align {
     /// True poses of the scans, a TUM file
     #[arg(long, value_name = "FILE", requires = "scans")]
     truth: Option<PathBuf>,
-    /// Scans at most
+    /// Largest number of scans
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=1000))]
     scans_max: u16,
-    /// Of the simulation
+    /// Seed of the simulation
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `mrol bench growth`: a map from nothing to its size, and what that costs.
+//! `mrol bench growth`: measures memory and latencies while a map grows.
 
 use std::fmt::{self, Display};
 
@@ -54,14 +54,14 @@ struct Report {
     bytes_per_voxel_max: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     peak_resident_bytes: Option<usize>,
-    /// Milliseconds.
+    /// Durations of commits that did not enlarge a filter, milliseconds.
     commits: Waits,
-    /// Milliseconds.
+    /// Durations of commits that enlarged a filter, milliseconds.
     growing_commits: Waits,
     reads_us: Waits,
 }
 
-/// Statistics of several times.
+/// Statistics of durations.
 #[derive(Serialize)]
 struct Waits {
     number: usize,

@@ -1,4 +1,4 @@
-//! `mrol bench insert`: how fast points go in.
+//! `mrol bench insert`: times insertion and removal.
 
 use std::fmt::{self, Display};
 
@@ -25,7 +25,7 @@ known), and out again (removed). Each point has a voxel of its own: of the workl
 map does all its levels and filters, the hash set one level without a filter; its keys are not taken out. Figures are
 medians of --repeats runs.";
 
-/// Points that are made for each that is inserted: a sensor sees most voxels more than once.
+/// Number of points that are generated for each that is inserted: a sensor sees most voxels more than once.
 const POINTS_PER_VOXEL: usize = 6;
 
 /// Time insertion and removal: new points, known ones, and what a hash set takes for them

@@ -1,4 +1,4 @@
-//! `mrol bench journal`: what durability costs.
+//! `mrol bench journal`: measures the cost of durability.
 
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ EXAMPLES:
 The same scans at the same poses, with and without a journal, on a new map each time and in turn. Each robot sends its
 next scan when the last one is acknowledged; nothing goes over a network. Figures are medians of --repeats runs.";
 
-/// Time insertion with a journal and without: what it costs that nothing is lost
+/// Time insertion with a journal and without: the cost of durability
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Journal {
@@ -95,7 +95,7 @@ struct Line {
     keeping: String,
     ms_per_scan: f64,
     scans_per_s: f64,
-    /// 1 without a journal.
+    /// Duration relative to the one without a journal.
     times_as_long: f64,
     journal_bytes_per_scan: usize,
 }

@@ -1,4 +1,4 @@
-//! `mrol bench lookup`: this map's look-ups against other structures'.
+//! `mrol bench lookup`: times the map's look-ups and those of other structures.
 
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};

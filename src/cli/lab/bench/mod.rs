@@ -1,4 +1,4 @@
-//! `mrol bench`: what everything costs on this machine.
+//! `mrol bench`: benchmarks on this machine.
 
 mod align;
 mod growth;

@@ -1,4 +1,4 @@
-//! `mrol bench readers`: readers of one map beside each other, and beside a writer.
+//! `mrol bench readers`: times readers of one map, alone, at once, and beside a writer.
 
 use std::fmt::{self, Display};
 use std::time::Duration;
@@ -73,7 +73,7 @@ impl Readers {
     }
 }
 
-/// The round of middle throughput.
+/// The round of median throughput.
 fn middle(mut rounds: Vec<Throughput>) -> Throughput {
     rounds.sort_unstable_by(|a, b| a.points_per_s.total_cmp(&b.points_per_s));
     rounds[rounds.len() / 2]

@@ -1,4 +1,4 @@
-//! `mrol bench start`: how long a server takes to start.
+//! `mrol bench start`: times the start of a server.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -37,7 +37,7 @@ pub(super) struct Start {
     /// A folder on the disk in question [default: that of temporary files]
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
-    /// Starts
+    /// Number of starts
     #[arg(long, value_name = "N", default_value = "5", value_parser = times)]
     repeats: usize,
 }

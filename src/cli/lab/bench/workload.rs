@@ -1,4 +1,4 @@
-//! Options that say what is put into a map, and how the map is made.
+//! Options of workloads, and of the maps that are made of them.
 
 use std::fmt::{self, Display};
 
@@ -10,7 +10,7 @@ use crate::cli::map_report::count;
 use crate::lab::workload::{Order, Queries, Room, Scatter, Site, Workload};
 use crate::map::{LEVELS_DEFAULT, MapSettings, MultiResolutionMap};
 
-/// Which workload.
+/// Name of a workload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(in crate::cli) enum WorkloadName {
     /// Surfaces of a room of 14 x 9 x 3 m: 155 thousand voxels of 5 cm, as many as the paper's map has
@@ -21,7 +21,7 @@ pub(in crate::cli) enum WorkloadName {
     Scatter,
 }
 
-/// What is put into a map, and what it is asked.
+/// Options of a workload.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct WorkloadOptions {
     /// A simulated workload
@@ -30,20 +30,20 @@ pub(in crate::cli) struct WorkloadOptions {
     /// Voxels of a site, about
     #[arg(long, value_name = "N", default_value_t = Site::VOXELS as u64, value_parser = clap::value_parser!(u64).range(Site::VOXELS_RANGE))]
     site_voxels: u64,
-    /// In which order points come: anywhere, as a spinning sensor of 64 rings sees the surface, or each voxel once
-    /// [default: random; of points that are inserted, scan]
+    /// Order of the points: anywhere, as a spinning sensor of 64 rings sees the surface, or each voxel once [default:
+    /// random; of points that are inserted, scan]
     #[arg(long, value_enum)]
     order: Option<Order>,
     /// Points of a pass
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     queries: u64,
-    /// Of the workload: the same seed gives the same voxels and points
+    /// Seed of the workload: the same seed gives the same voxels and points
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
 impl WorkloadOptions {
-    /// This workload in the order `usual`, where none was asked for.
+    /// Sets the order to `usual` where none was given.
     pub(in crate::cli) fn usually(self, usual: Order) -> Self {
         Self { order: self.order.or(Some(usual)), ..self }
     }
@@ -62,7 +62,7 @@ impl WorkloadOptions {
 
     /// The points to ask about; `times` as many as were asked for.
     pub(in crate::cli) fn queries(&self, times: usize) -> Queries {
-        // The voxels' seed would give scattered points that are scattered voxels.
+        // With the seed of the voxels, scattered points would coincide with the scattered voxels.
         let seed = self.seed.wrapping_add(0x5eed);
         self.workload().queries(self.order(), self.points() * times, seed)
     }
@@ -92,7 +92,7 @@ impl Display for WorkloadOptions {
     }
 }
 
-/// How a map is made.
+/// Options of a map.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct MapOptions {
     /// Number of levels
@@ -118,12 +118,12 @@ impl MapOptions {
     }
 }
 
-/// `154,880 voxels of 0.05 m`.
+/// The size of a map as text: `154,880 voxels of 0.05 m`.
 pub(in crate::cli) fn size_of(map: &MultiResolutionMap, level: u32) -> String {
     format!("{} voxels of {} m", count(map.voxels(level)), map.lattice().resolution_m(level))
 }
 
-/// How often something is timed.
+/// Parses a number of repeats.
 pub(in crate::cli) fn times(text: &str) -> Result<usize, String> {
     let times: usize = text.parse().map_err(|_| format!("{text:?} is no number"))?;
     (1..=10_000).contains(&times).then_some(times).ok_or_else(|| format!("1 to 10000, got {times}"))

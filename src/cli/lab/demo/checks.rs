@@ -1,4 +1,4 @@
-//! Is all as it should be?
+//! Checks of the demonstration's results.
 
 use std::fmt::{self, Display};
 
@@ -8,14 +8,14 @@ use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::service::MapInfo;
 
-/// What the method keeps to over a tour of 60 scans without odometry, with room for the order in which the two
-/// robots' scans happen to arrive.
+/// Largest median error, in voxels, over a tour of 60 scans without odometry, with a margin for the order in which the
+/// two robots' scans arrive.
 const MEDIAN_ERROR_MAX_VOXELS: f64 = 1.5;
 const MEDIAN_ERROR_MAX_DEG: f64 = 1.0;
-/// Beyond this a robot is lost.
+/// Error, in voxels, beyond which a robot is lost.
 const ERROR_MAX_VOXELS: f64 = 5.0;
 
-/// What was looked at, and whether it is as it should be.
+/// Checks with their results.
 pub(super) struct Checks(Vec<(bool, String)>);
 
 impl Checks {
@@ -31,12 +31,12 @@ impl Checks {
         ])
     }
 
-    /// What is not as it should be.
+    /// Descriptions of the failed checks.
     pub(super) fn problems(&self) -> Vec<&str> {
         self.0.iter().filter(|(good, _)| !good).map(|(_, text)| text.as_str()).collect()
     }
 
-    /// An error where something is not as it should be.
+    /// An error where a check failed.
     pub(super) fn verdict(&self) -> Result<(), CliError> {
         match self.problems().as_slice() {
             [] => Ok(()),

@@ -11,17 +11,17 @@ use crate::config::Config;
 use crate::lab::fleet;
 use crate::telemetry::{LogFormat, start_logging};
 
-/// Only what is wrong: the demonstration itself says what happens.
+/// Log level: only problems, since the demonstration itself says what happens.
 const LOG_LEVEL: &str = "warn";
 
 pub(super) struct Daemon {
     daemon: fleet::Daemon,
-    /// Removed when the daemon is gone.
+    /// Data folder, removed when the daemon is dropped.
     _data_dir: TempDir,
 }
 
 impl Daemon {
-    /// Starts it at the given addresses, or at its usual ones, or where these are taken, at free ports.
+    /// Starts the daemon at the given addresses, or at the default ones, or where these are in use, at free ports.
     pub(super) async fn start(
         http: Option<SocketAddr>,
         grpc: Option<SocketAddr>,
@@ -54,7 +54,7 @@ impl Daemon {
         Serving { http: self.daemon.http(), grpc: self.daemon.grpc(), tls: false }
     }
 
-    /// Lets it finish what it has in hand, save, and go.
+    /// Stops the daemon: it completes requests in flight, saves its maps and ends.
     pub(super) async fn stop(self) -> Result<(), CliError> {
         Ok(self.daemon.stop().await?)
     }

@@ -1,4 +1,4 @@
-//! Where to look next.
+//! Text on where to look next.
 
 use crate::cli::serve::Serving;
 

@@ -1,4 +1,4 @@
-//! What happened on the robots' way.
+//! Record of what happened to the robots' scans.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use super::report::Line;
 use super::robot::News;
 use crate::cli::statistics::Statistics;
 
-/// Over which the planner's rate is told: lines may come at once.
+/// Least time over which the planner's rate is computed, since lines may come at once.
 const RATE_WINDOW: Duration = Duration::from_millis(100);
 
-/// All that the robots were told, and how the map grew.
+/// All answers to the robots, and how the map grew.
 pub(super) struct Journal {
     start: Instant,
     tally: Arc<Tally>,
-    /// The tally at the beginning of the window whose rate is told, and the rate of the window before.
+    /// Time and tally at the beginning of the present window, and the rate of the window before.
     window: (Instant, u64, u64),
     told: Option<Told>,
     robots: Vec<RobotJournal>,
@@ -32,7 +32,7 @@ pub(super) struct RobotJournal {
     degrees: Vec<f64>,
 }
 
-/// What a robot's journal comes to.
+/// Summary of a robot's journal.
 pub(super) struct RobotSummary {
     pub(super) name: &'static str,
     pub(super) accepted: usize,
@@ -46,7 +46,7 @@ impl Journal {
         Self { start, tally, window: (start, 0, 0), told: None, robots: Vec::new(), voxels: 0 }
     }
 
-    /// Enters a scan; its line.
+    /// Records a scan; returns its line.
     pub(super) fn enter(&mut self, news: News) -> Line {
         let answer = &news.answer;
         self.voxels += answer.new_voxels;
@@ -78,7 +78,7 @@ impl Journal {
         &mut self.robots[place]
     }
 
-    /// What the planner was told in the last window that is long enough for a rate.
+    /// The planner's rate in the last window that is long enough.
     fn told_lately(&mut self) -> Told {
         let (then, points_then, occupied_then) = self.window;
         let (now, (points, occupied)) = (Instant::now(), self.tally.read());
@@ -91,12 +91,12 @@ impl Journal {
         *self.told.insert(told)
     }
 
-    /// Voxels that the answers speak of.
+    /// Number of voxels by the answers.
     pub(super) fn voxels(&self) -> usize {
         self.voxels
     }
 
-    /// By name.
+    /// Summaries of the robots, sorted by name.
     pub(super) fn robots(&self) -> Vec<RobotSummary> {
         let mut robots: Vec<_> = self.robots.iter().filter_map(RobotJournal::summary).collect();
         robots.sort_unstable_by_key(|robot| robot.name);
@@ -111,7 +111,7 @@ impl RobotJournal {
             return;
         }
         self.accepted += 1;
-        // The first scan is where it was told to be.
+        // The first scan is placed, not aligned.
         if self.accepted > 1 {
             self.meters.push(meters);
             self.degrees.push(degrees);

@@ -1,4 +1,4 @@
-//! `mrol demo`: the main job with nothing to download.
+//! `mrol demo`: shows mapping and queries without anything to download.
 //!
 //! Two simulated robots ray-cast scans of a furnished building and stream them over gRPC, at once, into one map
 //! of the real daemon, while a planner asks about it. Everything printed is measured.
@@ -35,9 +35,9 @@ use report::{Beginning, Line};
 use robot::Robot;
 use summary::Summary;
 
-/// The map that the robots make.
+/// Name of the map that the robots build.
 const MAP: &str = "demo";
-/// Answers that robots may be ahead of the printer.
+/// Answers that are buffered before the printer.
 const NEWS_AHEAD: usize = 16;
 
 const EXAMPLES: &str = "\
@@ -53,7 +53,7 @@ pub(in crate::cli) struct Demo {
     /// End when the robots are done
     #[arg(long)]
     once: bool,
-    /// Of furniture and noise: the same seed gives the same scene and the same scans
+    /// Seed of furniture and noise: the same seed gives the same scene and the same scans
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Scans of each robot
@@ -89,7 +89,7 @@ impl Demo {
         shown?.verdict()
     }
 
-    /// The whole story; what there is to say against it.
+    /// Runs the demonstration; returns the checks of its results.
     async fn show(&self, serving: Serving, output: &Output) -> Result<Checks, CliError> {
         let map = MapName::new(MAP).map_err(CliError::failed)?;
         let operator = Client::connect(&serving.grpc.to_string()).await?;
@@ -118,7 +118,7 @@ impl Demo {
         tours.zip(0..).map(|(tour, stream)| Robot::new(tour, Arc::clone(&scene), self.seed, stream)).collect()
     }
 
-    /// Lets all robots go at once, and tells of each scan when it is answered.
+    /// Starts all robots at once, and prints each scan when it is answered.
     async fn run_robots(
         &self,
         robots: Vec<Robot>,
@@ -127,7 +127,7 @@ impl Demo {
         mut tell: impl FnMut(robot::News) -> Result<(), CliError>,
     ) -> Result<(), CliError> {
         let (sender, mut news) = mpsc::channel(NEWS_AHEAD);
-        // Dropped with this future, and all robots with it.
+        // The robots are dropped with this future.
         let mut on_tour = JoinSet::new();
         for robot in robots {
             let client = Client::connect(&serving.grpc.to_string()).await?;

@@ -18,7 +18,7 @@ use crate::service::{PointCloud, PointQuery};
 
 /// Points of one batch.
 pub(super) const BATCH_POINTS: usize = 100_000;
-/// Different batches, asked in turn.
+/// Number of different batches, which are queried in turn.
 const BATCHES: usize = 8;
 /// The building of the simulated scene, meters: candidates lie anywhere in it.
 const BUILDING_M: [f32; 3] = [14.0, 9.0, 2.7];
@@ -30,14 +30,14 @@ pub(super) struct Planner {
     start: Instant,
 }
 
-/// What the planner was told so far.
+/// Tally of the planner's answers so far.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     points: AtomicU64,
     occupied: AtomicU64,
 }
 
-/// What a planner was told over some time.
+/// Answers of a planner over some time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Told {
     pub(super) points: u64,
@@ -56,7 +56,7 @@ impl Told {
 }
 
 impl Tally {
-    /// Points answered, and how many of them were occupied.
+    /// The number of points answered, and how many of them were occupied.
     pub(super) fn read(&self) -> (u64, u64) {
         (self.points.load(Ordering::Relaxed), self.occupied.load(Ordering::Relaxed))
     }
@@ -68,7 +68,7 @@ impl Tally {
 }
 
 impl Planner {
-    /// Starts asking, on a connection of its own.
+    /// Starts the queries, on a connection of its own.
     pub(super) async fn start(serving: &Serving, map: &MapName, seed: u64) -> Result<Self, CliError> {
         let client = Client::connect(&serving.grpc.to_string()).await?;
         let (tally, enough) = (Arc::<Tally>::default(), CancellationToken::new());
@@ -81,7 +81,7 @@ impl Planner {
         Arc::clone(&self.tally)
     }
 
-    /// Waits for the answers that are under way; all that was told.
+    /// Waits for the answers in flight; returns the tally.
     pub(super) async fn stop(self) -> Result<Told, CliError> {
         self.enough.cancel();
         self.task.await.map_err(CliError::failed)??;
@@ -90,7 +90,7 @@ impl Planner {
     }
 }
 
-/// Asks until it is enough, on one stream.
+/// Queries on one stream until it is told to stop.
 async fn ask(
     client: Client,
     map: MapName,

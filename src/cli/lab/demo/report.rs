@@ -1,4 +1,4 @@
-//! What the demonstration prints before and while the robots are on their way.
+//! Reports of the demonstration before and during the tours.
 
 use std::fmt::{self, Display};
 
@@ -11,7 +11,7 @@ use crate::cli::serve::Serving;
 use crate::map::MapSettings;
 use crate::service::MapInfo;
 
-/// What is about to happen.
+/// The report at the beginning.
 #[derive(Serialize)]
 pub(super) struct Beginning {
     #[serde(flatten)]

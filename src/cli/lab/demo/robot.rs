@@ -1,4 +1,4 @@
-//! A simulated robot: it goes on its tour, looks around, and streams what it sees.
+//! A simulated robot: moves along its tour, scans, and streams its scans.
 
 use std::sync::Arc;
 
@@ -21,14 +21,14 @@ const SCANS_AHEAD: usize = 2;
 pub(super) struct Robot {
     tour: Tour,
     scene: Arc<Scene>,
-    /// Random numbers of the sensor's noise.
+    /// Random generator of the sensor's noise.
     rng: ChaCha8Rng,
 }
 
-/// What became of a robot's scan.
+/// The answer to a robot's scan.
 pub(super) struct News {
     pub(super) robot: &'static str,
-    /// Counted from 1.
+    /// Number of the scan, from 1.
     pub(super) scan: usize,
     pub(super) scans: usize,
     pub(super) answer: ScanAnswer,
@@ -52,7 +52,7 @@ impl Robot {
         self.tour.poses.len()
     }
 
-    /// What it looks with, in words.
+    /// Description of the robot's sensor.
     pub(super) fn sensor(&self) -> String {
         match &self.tour.sensor {
             Sensor::DepthCamera(camera) => {
@@ -66,7 +66,7 @@ impl Robot {
         }
     }
 
-    /// Goes on its tour and streams a scan from each place; tells what became of each.
+    /// Streams a scan from each pose of the tour; sends each answer to `news`.
     pub(super) async fn tour(
         self,
         client: Client,
@@ -91,7 +91,7 @@ impl Robot {
         looking.await.map_err(CliError::failed)
     }
 
-    /// Ray-casts scan after scan, until nobody takes them any more.
+    /// Ray-casts scan after scan, until the receiver is closed.
     fn look_around(mut self, name: &RobotName, sender: &mpsc::Sender<ScanRequest>) {
         for (k, pose) in self.tour.poses.iter().enumerate() {
             let points = self.tour.sensor.scan(&self.scene, pose, &mut self.rng);
@@ -108,7 +108,7 @@ impl Robot {
     }
 }
 
-/// A robot knows where it starts. From there on it has its last pose in the map, and no odometry.
+/// The guess of scan `k`: the true pose for the first one; from there on the last pose in the map, without odometry.
 fn guess(k: usize, true_pose: &Pose) -> Guess {
     if k == 0 { Guess::Pose(*true_pose) } else { Guess::Last }
 }

@@ -1,4 +1,4 @@
-//! What the demonstration prints at its end.
+//! Report of the demonstration at its end.
 
 use std::fmt::{self, Display};
 
@@ -11,7 +11,7 @@ use super::planner::Told;
 use crate::cli::map_report::{bytes, count, percent};
 use crate::service::MapInfo;
 
-/// What it all comes to.
+/// The summary.
 pub(super) struct Summary<'a> {
     robots: Vec<RobotSummary>,
     queries: &'a Told,

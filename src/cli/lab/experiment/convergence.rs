@@ -1,4 +1,4 @@
-//! `mrol experiment convergence`: from how far off a guess an alignment finds the pose.
+//! `mrol experiment convergence`: measures from how far off a guess an alignment finds the pose.
 
 use crate::util::Keyword;
 use std::fmt::{self, Display};
@@ -33,7 +33,7 @@ offset). 200 trials take some minutes.
 benches/peers/icp.py takes guesses.csv and adds others to the comparison.";
 
 const METHODS: [Method; 2] = [Method::Refined, Method::Overlap];
-/// Trials are counted by offset in steps of this much.
+/// Width of the bins by which trials are counted, meters.
 const BIN_M: f64 = 0.5;
 const BIN_DEG: f64 = 10.0;
 
@@ -59,7 +59,7 @@ pub(super) struct Convergence {
     /// Guesses to start from
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     trials: u16,
-    /// Of the guesses
+    /// Seed of the guesses
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -104,7 +104,7 @@ impl Convergence {
         Ok(map)
     }
 
-    /// Where `scan` was taken: the line of the truth whose number is that of the scan in its folder.
+    /// True pose of `scan`: the line of the truth whose number is that of the scan in its folder.
     fn pose_of(&self, scan: &Path) -> Result<Pose, CliError> {
         let (poses, file) = (read_trajectory(&self.truth)?, self.truth.display());
         let folder = scan.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -158,7 +158,7 @@ fn write_trials(series: &[Series], path: &Path) -> Result<(), CliError> {
     Ok(table.write_csv(path)?)
 }
 
-/// The share that converged, a row for each bin of offsets and one for all.
+/// Table of the share that converged: a row for each bin of offsets and one for all.
 fn by_offset(series: &[Series]) -> Table {
     let names = series.iter().map(|series| series.method.as_str());
     let mut table = Table::new(["offset m", "offset deg", "trials"].into_iter().chain(names));
@@ -185,7 +185,7 @@ fn share_converged(trials: &[Trial]) -> Option<f64> {
     (!trials.is_empty()).then(|| converged as f64 / trials.len() as f64)
 }
 
-/// From here to below there.
+/// A bin of offsets, from (inclusive) and to (exclusive).
 #[derive(Debug, Clone, Copy)]
 struct Bin {
     from: f64,
@@ -216,7 +216,7 @@ struct Line {
     trials: usize,
     converged: f64,
     accepted: f64,
-    /// Share that was accepted and did not converge.
+    /// Share of the trials that were accepted and did not converge.
     accepted_wrongly: f64,
     ms_median: f64,
 }

@@ -1,4 +1,4 @@
-//! `mrol experiment lookup`: the stages of a look-up, as in Fig. 1 of the paper.
+//! `mrol experiment lookup`: times the stages of a look-up, as in Fig. 1 of the paper.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -37,7 +37,7 @@ pub(super) struct Lookup {
     /// Points of a run
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     points: u32,
-    /// Of voxels and points
+    /// Seed of voxels and points
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]

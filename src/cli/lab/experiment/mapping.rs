@@ -1,4 +1,4 @@
-//! `mrol experiment mapping`: time and growth scan by scan, by hash tables and by Bloom filters (paper IV-C).
+//! `mrol experiment mapping`: measures time and growth scan by scan, by hash tables and by Bloom filters (paper IV-C).
 
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ poses_odometry.txt beside the scans, or the truth with a seeded drift of 2 % of 
 own map's updates are those of its moments too, which the refinement needs. On one core. Writes mapping.svg, mapping.csv
 (every scan) and mapping.md.";
 
-/// Looked for in the folder of the scans.
+/// File with the poses by odometry that is looked for in the folder of the scans.
 const ODOMETRY_FILE: &str = "poses_odometry.txt";
 
 /// Experiment 3 of the paper: time a scan, and growth of the map, by hash tables and by Bloom filters
@@ -58,10 +58,10 @@ pub(super) struct Mapping {
     /// Poses of the scans by odometry, a TUM file
     #[arg(long, value_name = "FILE")]
     odometry: Option<PathBuf>,
-    /// Scans at most
+    /// Largest number of scans
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(2..=10_000))]
     scans_max: u16,
-    /// Of the odometry's drift, where it is made from the truth
+    /// Seed of the odometry's drift, where it is simulated from the truth
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -85,7 +85,7 @@ impl Mapping {
         Ok(panels(&self.out.join("mapping.svg"), &[times(&series), growth(&series)])?)
     }
 
-    /// Where each scan was taken by odometry, in the frame of the first.
+    /// Poses of the scans by odometry, in the frame of the first.
     fn odometry(
         &self,
         scans: usize,
@@ -104,7 +104,7 @@ impl Mapping {
         Ok(Some(poses.iter().map(|pose| poses[0].inv_mul(pose)).collect()))
     }
 
-    /// Scan by scan through all maps, so that what else the machine does falls on all alike.
+    /// Maps scan by scan into all maps in turn, so that other load of the machine affects all of them.
     fn map(
         &self,
         scans: &[Scan],
@@ -149,7 +149,7 @@ impl Mapping {
     }
 }
 
-/// What became of each scan in one map.
+/// Results of all scans in one map.
 struct Series {
     map: &'static str,
     scans: Vec<Mapped>,
@@ -162,7 +162,7 @@ impl Series {
         Self { map, scans: Vec::new() }
     }
 
-    /// Against `truth`, meters and degrees.
+    /// Errors against `truth`, meters and degrees, with their summary.
     fn errors(&self, truth: &[Pose]) -> (Vec<(f64, f64)>, Option<ErrorSummary>) {
         let mut errors = TruthErrors::new(truth.to_vec());
         let of_scans =
@@ -208,7 +208,7 @@ fn times(series: &[Series]) -> Panel {
 /// The second panel of Fig. 5.
 fn growth(series: &[Series]) -> Panel {
     let curve = |(color, series): (usize, &Series)| {
-        // On top of that of the Bloom filters, which a solid one would hide.
+        // Drawn on top of the curve of the Bloom filters, which a solid curve would hide.
         let style = if series.map == "hash table" { Style::Dashed } else { Style::Solid };
         series.curve(series.map.to_owned(), color, style, |mapped| mapped.voxels as f64)
     };
@@ -270,7 +270,7 @@ fn write_maps(
 struct Line {
     map: &'static str,
     scans: usize,
-    /// Median of every scan but the first.
+    /// Median over every scan but the first, milliseconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     align_ms: Option<f64>,
     update_ms: f64,

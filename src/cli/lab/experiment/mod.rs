@@ -1,4 +1,4 @@
-//! `mrol experiment`: the paper's experiments again, as plots and tables.
+//! `mrol experiment`: repeats the paper's experiments, with plots and tables as results.
 
 mod convergence;
 mod lookup;

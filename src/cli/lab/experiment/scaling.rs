@@ -1,4 +1,4 @@
-//! `mrol experiment scaling`: cost a point against the size of the map.
+//! `mrol experiment scaling`: measures the cost of a look-up against the size of the map.
 
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -46,7 +46,7 @@ pub(super) struct Scaling {
     /// Passes over all points
     #[arg(long, value_name = "N", default_value = "7", value_parser = times)]
     repeats: usize,
-    /// Of terrain and points
+    /// Seed of terrain and points
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -64,7 +64,7 @@ impl Scaling {
         self.write(&lines)
     }
 
-    /// All structures and orders at one size.
+    /// Measures all structures and orders at one size.
     fn measure(&self, size: usize, output: &Output) -> Result<Vec<Line>, CliError> {
         let site = Workload::Site(Site::of(size, self.seed));
         let map = self.map.map_of(site)?;
@@ -107,7 +107,7 @@ impl Scaling {
     }
 }
 
-/// A structure and what it is called.
+/// A structure with its name.
 type Named<'a> = (StructureName, Box<dyn Structure + 'a>);
 
 fn build(map: &MultiResolutionMap) -> Result<Vec<Named<'_>>, CliError> {
@@ -137,7 +137,7 @@ fn of_order(lines: &[Line], order: Order) -> impl Iterator<Item = Curve> {
     })
 }
 
-/// A row a size, a column a curve.
+/// Table with a row for each size and a column for each curve.
 fn markdown(curves: &[Curve]) -> Table {
     let names = curves.iter().map(|curve| curve.name.clone());
     let mut table = Table::new(std::iter::once("voxels".to_owned()).chain(names));
@@ -156,7 +156,7 @@ struct Line {
     order: &'static str,
     structure: &'static str,
     ns_per_point: f64,
-    /// Among absent voxels.
+    /// False positive rate among absent voxels.
     false_positive_rate: f64,
 }
 

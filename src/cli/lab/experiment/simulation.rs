@@ -1,4 +1,4 @@
-//! `mrol experiment simulation`: poses with the filter and without, on a simulated sequence (paper IV-B).
+//! `mrol experiment simulation`: compares poses with the filter and without, on a simulated sequence (paper IV-B).
 
 use crate::util::Keyword;
 use std::fmt::{self, Display};
@@ -62,12 +62,12 @@ pub(super) struct Simulation {
     /// the paper
     #[arg(long, value_name = "METERS", default_value_t = 0.0)]
     noise: f64,
-    /// Of furniture and noise
+    /// Seed of furniture and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
-/// Whose tour.
+/// The robot whose tour is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum RobotKind {
     #[default]
@@ -75,7 +75,7 @@ enum RobotKind {
     Lidar,
 }
 
-/// What answers look-ups.
+/// A way to answer look-ups.
 #[derive(Debug, Clone, Copy)]
 struct Answers {
     name: &'static str,
@@ -121,7 +121,8 @@ impl Simulation {
         tour
     }
 
-    /// The exact set first: the others are compared with it. The ample filter last: its curve is drawn on top.
+    /// The ways to answer look-ups. The exact set is first, since the others are compared with it; the ample filter is
+    /// last, so that its curve is drawn on top.
     fn answers(&self) -> [Answers; 4] {
         let filter = FilterSettings::default();
         let small = FilterSettings { bits_per_key: self.small_filter_bits_per_key, ..filter };
@@ -150,7 +151,7 @@ impl Simulation {
         Ok(Run { method, answers, scans: mapped_scans, filter, error: errors.summary() })
     }
 
-    /// Voxels after each scan, with the scans where they were taken.
+    /// Number of voxels after each scan, with the scans at their true poses.
     fn map_at_truth(&self, scans: &[Scan], bar: &Output) -> Result<Vec<f64>, CliError> {
         let mut mapper = self.mapper(FilterSettings::default(), AlignmentSettings::default())?;
         let truth = truth(scans);
@@ -204,7 +205,8 @@ impl Simulation {
     }
 }
 
-/// Every scan goes into the map, as in the paper, which has no verdict: a refused scan would stand for the filter's error.
+/// Alignment settings that accept every scan, as the paper does, which has no verdict: a refused scan would look like
+/// an error of the filter.
 fn unjudged(method: Method, lookup: Lookup) -> AlignmentSettings {
     let defaults = AlignmentSettings::default();
     AlignmentSettings {
@@ -236,7 +238,7 @@ fn numbered(values: impl Iterator<Item = (usize, f64)>) -> Vec<(f64, f64)> {
 struct Run {
     method: Method,
     answers: Answers,
-    /// With the errors, meters and degrees.
+    /// Results of the scans, with the errors in meters and degrees.
     scans: Vec<(Mapped, (f64, f64))>,
     filter: FilterSummary,
     error: Option<ErrorSummary>,
@@ -251,7 +253,7 @@ impl Run {
         let refined = usize::from(self.method == Method::Refined);
         let (color, style) = match self.answers.name {
             "small filter" => (2 + refined, Style::Solid),
-            // On top of those of the exact set, which it hides if it is solid.
+            // Drawn on top of those of the exact set, which a solid curve would hide.
             "ample filter" => (4, Style::Dashed),
             _ => (refined, Style::Solid),
         };
@@ -315,7 +317,7 @@ struct Line {
     filter_hashes: Option<u32>,
     filter_bits_per_key: Option<f64>,
     false_positive_rate: Option<f64>,
-    /// At most, in all look-ups of the run.
+    /// Upper bound of the expected false positives in all look-ups of the run.
     expected_false_positives: Option<f64>,
     scans: usize,
     error_m_median: f64,
@@ -323,7 +325,7 @@ struct Line {
     error_m_max: f64,
     error_deg_max: f64,
     voxels: usize,
-    /// True when every pose is that of the exact set, bit for bit.
+    /// True when every pose equals that of the exact set, bit for bit.
     poses_are_the_exact_sets: bool,
     furthest_from_exact_m: f64,
     furthest_from_exact_deg: f64,

@@ -1,4 +1,4 @@
-//! Boxes with whiskers, as in Fig. 1 of the paper.
+//! Box plots with whiskers, as in Fig. 1 of the paper.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use super::{COLORS, LABEL_PX, MARGIN_PX, Outcome, SIZE_PX, TITLE_PX, drawn};
 use crate::lab::experiment::stages::Stage;
 use crate::lab::report::{ReportError, Spread};
 
-/// Half the height of a box, as wide as it is on its line.
+/// Half the height of a box, pixels.
 const HALF_BOX_PX: i32 = 10;
 
-/// Draws a box with whiskers for each stage, the first at the bottom: nanoseconds a point.
+/// Draws a box with whiskers for each stage, the first at the bottom, with an axis in nanoseconds a point.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -30,7 +30,7 @@ fn try_box_plot(path: &Path, title: &str, stages: &[Stage]) -> Outcome<()> {
         .margin(MARGIN_PX)
         .x_label_area_size(45)
         .y_label_area_size(270)
-        // The set intersection takes twenty times as long as the filter: both are to be seen.
+        // Logarithmic, since the set intersection takes twenty times as long as the filter.
         .build_cartesian_2d(
             ((fastest * 0.8) as f32..(slowest * 1.2) as f32).log_scale(),
             names[..].into_segmented(),
@@ -54,7 +54,7 @@ fn try_box_plot(path: &Path, title: &str, stages: &[Stage]) -> Outcome<()> {
         let [first, median, third] = spread.quartiles;
         chart.draw_series([
             PathElement::new([at(spread.low), at(spread.high)], color.stroke_width(2)),
-            // Hides the whisker behind the box.
+            // Hides the part of the whisker behind the box.
             PathElement::new([at(first), at(third)], WHITE.stroke_width(2 * HALF_BOX_PX as u32)),
             PathElement::new([at(first), at(third)], color.mix(0.4).stroke_width(2 * HALF_BOX_PX as u32)),
         ])?;
@@ -75,7 +75,7 @@ fn segment_name(segment: &SegmentValue<&&str>) -> String {
     }
 }
 
-/// One color a structure.
+/// Color of a stage: one for each structure.
 fn color_of(stage: &str) -> RGBColor {
     let structures = ["Bloom filter", "dense array", "hash table"];
     let color = structures.iter().position(|structure| stage.ends_with(structure));

@@ -14,12 +14,12 @@ pub use panel::{Axis, Curve, Panel, Scale, Style, panels};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Width and height of one plot; panels lie side by side.
+/// Width and height of one plot, pixels; panels are side by side.
 const SIZE_PX: (u32, u32) = (900, 480);
 const TITLE_PX: i32 = 18;
 const LABEL_PX: i32 = 14;
 const MARGIN_PX: i32 = 12;
-/// Colors that can be told apart by those who do not see all of them, and in print.
+/// Colors that can be told apart with a color vision deficiency and in print.
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),

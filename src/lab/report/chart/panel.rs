@@ -14,27 +14,27 @@ use crate::lab::report::ReportError;
 const DASH_PX: i32 = 7;
 const GAP_PX: i32 = 5;
 const LEGEND_PX: i32 = 30;
-/// Radius of a place on a curve of few.
+/// Radius of the dots of a curve with few points, pixels.
 const DOT_PX: i32 = 3;
-/// Room above the values of a logarithmic axis, as a share of what they take.
+/// Space above the values of a logarithmic axis for the legend, as a share of the values' range.
 const NAMES_SHARE: f64 = 0.55;
-/// Curves of fewer places than this show each.
+/// Number of points below which each point of a curve is drawn as a dot.
 const DOTS_BELOW: usize = 40;
 
-/// Curves over two axes.
+/// A panel: curves over two axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Above the panel.
+    /// Title, drawn above the panel.
     pub title: String,
     /// The horizontal axis.
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// Drawn in this order, one over the other.
+    /// Curves, drawn in this order.
     pub curves: Vec<Curve>,
 }
 
-/// What is shown along an axis.
+/// An axis of a panel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
     /// The quantity, with its unit.
@@ -46,22 +46,22 @@ pub struct Axis {
 /// How values are spread along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
-    /// From zero.
+    /// Linear, from zero.
     Linear,
-    /// From the least value that is shown; values are positive.
+    /// Logarithmic, from the least value that is drawn; values are positive.
     Logarithmic,
 }
 
-/// One value against another.
+/// A curve of one value against another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// In the legend.
+    /// Name in the legend.
     pub name: String,
-    /// Curves of one color belong together.
+    /// Index of the color; related curves have the same.
     pub color: usize,
     /// How the line is drawn.
     pub style: Style,
-    /// Ascending by the first.
+    /// Points of the curve, ascending by x.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -70,11 +70,11 @@ pub struct Curve {
 pub enum Style {
     /// A solid line.
     Solid,
-    /// Seen on top of a solid curve of another color where both coincide.
+    /// A dashed line, which can be seen on top of a solid curve where both coincide.
     Dashed,
 }
 
-/// Draws `panels` side by side, from left to right.
+/// Draws `panels` side by side, from left to right, as an SVG file.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -103,7 +103,7 @@ fn try_panels(path: &Path, panels: &[Panel]) -> Outcome<()> {
     Ok(root.present()?)
 }
 
-/// A logarithmic range with room above the values for the names of the curves.
+/// A logarithmic range with space above the values for the legend.
 fn with_room_for_names(values: Range<f64>) -> Range<f64> {
     values.start..values.end * (values.end / values.start).powf(NAMES_SHARE)
 }
@@ -111,12 +111,12 @@ fn with_room_for_names(values: Range<f64>) -> Range<f64> {
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 impl Panel {
-    /// What an axis has to show.
+    /// The range of values along an axis.
     fn range(&self, of: fn(&(f64, f64)) -> f64, scale: Scale) -> Range<f64> {
         let values = || self.curves.iter().flat_map(|curve| curve.points.iter().map(of));
         let most = values().fold(0.0, f64::max);
         match scale {
-            // Never empty, so that there is something to divide.
+            // Never empty, so that no division by zero occurs.
             Scale::Linear => 0.0..if most > 0.0 { most * 1.05 } else { 1.0 },
             Scale::Logarithmic => {
                 let least = values().filter(|value| *value > 0.0).fold(f64::INFINITY, f64::min);
@@ -176,9 +176,9 @@ impl Panel {
     }
 }
 
-/// `10 k`, `2.5 M`, `0.001`.
+/// Formats a number of an axis: `10 k`, `2.5 M`, `0.001`.
 fn short(value: f64) -> String {
-    // Steps of an axis are sums: 0.30000000000000004 is 0.3.
+    // Ticks of an axis are sums: 0.30000000000000004 is printed as 0.3.
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
     match value.abs() {
         n if n >= 1e6 => format!("{} M", rounded(value / 1e6)),

@@ -1,13 +1,13 @@
-//! A box of voxels, and the offset of each in an array.
+//! Grids: boxes of voxels, and the offset of each voxel in an array.
 
 use crate::voxel::VoxelKey;
 
 /// A box of voxels of one level, of less than 2^32 cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
-    /// Index of its first voxel.
+    /// Index of the first voxel, along x, y and z.
     pub min: [i32; 3],
-    /// Voxels along x, y and z.
+    /// Number of voxels along x, y and z.
     pub size: [u32; 3],
 }
 
@@ -28,7 +28,7 @@ impl Grid {
         self.size.iter().map(|&size| u64::from(size)).product()
     }
 
-    /// Where the cell of the voxel at `index` lies, x first, then y, then z; [`Grid::cells`] where that is outside.
+    /// Offset of the voxel at `index`, x first, then y, then z; [`Grid::cells`] for one that is outside.
     #[inline(always)]
     pub fn offset(&self, index: [i32; 3]) -> u32 {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| index[k].wrapping_sub(self.min[k]) as u32);

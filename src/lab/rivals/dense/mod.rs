@@ -1,4 +1,4 @@
-//! A dense array: the paper's upper limit to query speed.
+//! A dense array of bytes: the paper's upper limit to query speed.
 
 mod grid;
 mod offsets;
@@ -11,12 +11,12 @@ use crate::geometry::{Point, Pose};
 use crate::map::MultiResolutionMap;
 use crate::voxel::Lattice;
 
-/// Bytes that an array may have at most.
+/// Most bytes of an array.
 pub const DENSE_BYTES_MAX: u64 = 4 << 30;
 const _: () = assert!(DENSE_BYTES_MAX <= 1 << 32, "offsets are u32");
 
-/// A byte for each voxel of the bounding box of those that are occupied, x first, then y, then z; and one for all
-/// that lie outside, so that no point needs a branch.
+/// A dense array: a byte for each voxel of the bounding box of the occupied ones, x first, then y, then z, and one more
+/// byte for all that is outside, so that no point needs a branch.
 #[derive(Debug)]
 pub struct Dense {
     cells: Vec<u8>,
@@ -25,13 +25,13 @@ pub struct Dense {
     level: u32,
 }
 
-/// An array over the bounding box would not fit.
+/// An array over the bounding box would be too large; the payload is its size, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a byte for each voxel of the bounding box would take {0} bytes, the limit is {DENSE_BYTES_MAX}")]
 pub struct DenseTooLarge(pub u128);
 
 impl Dense {
-    /// The occupied voxels of a map's `level`.
+    /// Builds the array of the occupied voxels of `level` of a map.
     ///
     /// # Errors
     /// When the array would take more than [`DENSE_BYTES_MAX`].
@@ -47,12 +47,12 @@ impl Dense {
         Ok(Self { cells, grid, lattice: *map.lattice(), level })
     }
 
-    /// Where in the array each voxel is.
+    /// The grid of the array.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Answers by offset.
+    /// Looks up `offsets`: point i is bit i % 64 of `occupied[i / 64]`.
     #[inline(always)]
     pub fn contains(&self, offsets: &[u32], occupied: &mut [u64]) {
         bits(offsets, occupied, |&offset| self.cells[offset as usize] != 0);

@@ -1,4 +1,5 @@
-//! From points to offsets in a dense array, as wide as our own look-up: the rival gets the same transform.
+//! Offsets of points in a dense array, with SIMD variants as of the map's own look-up, so that the rival gets the same
+//! transform.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -11,8 +12,8 @@ use crate::geometry::Point;
 use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::LatticeFromPoints;
 
-/// Rotate, translate, quantize, and the offset of each point's voxel of `level` in `grid`: [`Grid::cells`] of
-/// what lies outside or has no voxel.
+/// Computes the offset of each point in `grid`: rotates, translates and quantizes to `level`. A point outside of the
+/// grid, or without a voxel, gets [`Grid::cells`].
 ///
 /// # Panics
 /// When `offsets` is not as long as `points`.

@@ -1,4 +1,4 @@
-//! The building: four rooms about a corridor, joined by doors. It is the same for every seed.
+//! The building: four rooms along a corridor, joined by doors. It is the same for every seed.
 //!
 //! ```text
 //!   y
@@ -21,21 +21,21 @@ const WALL_M: f64 = 0.12;
 const DOOR_WIDTH_M: f64 = 1.1;
 const DOOR_HEIGHT_M: f64 = 2.1;
 
-/// Where the wall between corridor and northern rooms stands, y.
+/// The y coordinate of the wall between the corridor and the northern rooms, meters.
 const NORTH_M: f64 = 5.5;
-/// Where the wall between corridor and southern rooms stands, y.
+/// The y coordinate of the wall between the corridor and the southern rooms, meters.
 const SOUTH_M: f64 = 3.7;
-/// Where the wall between the northern rooms stands, x.
+/// The x coordinate of the wall between the northern rooms, meters.
 const NORTH_DIVIDE_M: f64 = 7.0;
-/// Where the wall between the southern rooms stands, x.
+/// The x coordinate of the wall between the southern rooms, meters.
 const SOUTH_DIVIDE_M: f64 = 6.5;
 
 /// The floor of a room between its walls, map frame, meters.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
-    /// From, to.
+    /// Extent along x, from and to.
     pub(super) x: (f64, f64),
-    /// From, to.
+    /// Extent along y, from and to.
     pub(super) y: (f64, f64),
 }
 
@@ -50,7 +50,7 @@ pub(super) const ARCHIVE: Room = Room { x: (SOUTH_DIVIDE_M + HALF_WALL_M, LENGTH
 pub(super) const CORRIDOR: Room =
     Room { x: (0.0, LENGTH_M), y: (SOUTH_M + HALF_WALL_M, NORTH_M - HALF_WALL_M) };
 
-/// Floor, ceiling, walls, the pilasters of the corridor and the lamps that hang from the ceiling.
+/// The objects of the building: floor, ceiling, walls, the pilasters of the corridor and the lamps on the ceiling.
 pub(super) fn building() -> Vec<Object> {
     let parts = [slabs(), outer_walls(), inner_walls(), pilasters()].concat();
     parts.into_iter().map(|part| Object::new(vec![part])).chain(hanging_lamps()).collect()
@@ -113,8 +113,8 @@ fn wall(
     pieces
 }
 
-/// Pilasters: without these a corridor looks the same from every place along it, and no alignment could tell them
-/// apart.
+/// The pilasters of the corridor. Without them it would look the same from every position along it, and no alignment
+/// could tell these apart.
 fn pilasters() -> Vec<Shape> {
     let pilaster = |x: f64, y: f64| Shape::cuboid([x, y, 0.0], [0.3, 0.16, CEILING_M]);
     let north = [0.9, 4.4, 8.1, 12.7].map(|x| pilaster(x, CORRIDOR.y.1 - 0.08));

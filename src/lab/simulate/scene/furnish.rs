@@ -1,4 +1,4 @@
-//! Where the furniture stands: drawn at random, refused where it would block a robot or another piece.
+//! Placement of the furniture: drawn at random, and rejected where it would block a robot or another piece.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -10,13 +10,13 @@ use super::building::{ARCHIVE, CORRIDOR, LOUNGE, Room, STUDY, WORKSHOP};
 use super::furniture::Kind;
 use crate::lab::simulate::route::{CAMERA_ROUTE, LIDAR_ROUTE, Route};
 
-/// How far furniture stays from the robots' routes, meters.
+/// Least distance of furniture from the robots' routes, meters.
 const ROUTE_CLEARANCE_M: f64 = 0.4;
-/// Distance between the places of a route that are checked, meters.
+/// Distance between the positions of a route that are checked, meters.
 const ROUTE_SPACING_M: f64 = 0.1;
-/// How far pieces stay from each other and from walls, meters.
+/// Least distance of pieces from each other and from walls, meters.
 const GAP_M: f64 = 0.04;
-/// Draws before a piece is left out.
+/// Number of draws before a piece is left out.
 const DRAWS_MAX: usize = 400;
 
 /// The pieces of each room, the large ones first: they find room only while it is empty.
@@ -48,7 +48,7 @@ pub(super) fn furniture(seed: u64) -> Vec<Object> {
     placed
 }
 
-/// `piece` at a free place of `room`; none when no draw finds one.
+/// Places `piece` at a free position of `room`; none when no draw finds one.
 fn place(
     kind: Kind,
     piece: &Object,

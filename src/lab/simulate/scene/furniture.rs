@@ -8,14 +8,14 @@ use rand_chacha::ChaCha8Rng;
 use super::shape::Shape;
 use super::{CEILING_M, Object};
 
-/// What a piece is.
+/// Kinds of furniture.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Kind {
     Table,
     Chair,
     Shelf,
     Cupboard,
-    /// Shallow enough for a corridor.
+    /// A sideboard, shallow enough for the corridor.
     Sideboard,
     Sofa,
     Column,
@@ -31,7 +31,7 @@ impl Kind {
         matches!(self, Self::Shelf | Self::Cupboard | Self::Sideboard | Self::Sofa)
     }
 
-    /// A piece of this kind, its sizes drawn from `rng`.
+    /// Builds a piece of this kind, with sizes drawn from `rng`.
     pub(super) fn build(self, rng: &mut ChaCha8Rng) -> Object {
         Object::new(match self {
             Self::Table => table(rng),

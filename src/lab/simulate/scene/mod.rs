@@ -14,15 +14,15 @@ use shape::Shape;
 /// Height of the ceiling, meters.
 const CEILING_M: f64 = 2.7;
 
-/// Four rooms and a corridor of 14 x 9 x 2.7 m, with furniture; the map frame's origin is a corner of the
-/// floor, z points up.
+/// A simulated scene: four rooms and a corridor of 14 x 9 x 2.7 m, with furniture. The map frame's origin is a corner
+/// of the floor; z points up.
 #[derive(Debug, Clone)]
 pub struct Scene {
     objects: Vec<Object>,
 }
 
 impl Scene {
-    /// The building with furniture drawn from `seed`: the same seed gives the same scene.
+    /// The building with furniture drawn from `seed`; the same seed gives the same scene.
     ///
     /// Seeds differ in the furniture's sizes and places; none of it ever stands in the robots' way.
     pub fn furnished(seed: u64) -> Self {
@@ -46,7 +46,7 @@ impl Scene {
     }
 }
 
-/// Shapes that stand together, behind bounds that most rays miss.
+/// A group of shapes with a bounding box, which most rays miss.
 #[derive(Debug, Clone)]
 struct Object {
     parts: Vec<Shape>,

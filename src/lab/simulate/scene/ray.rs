@@ -18,7 +18,7 @@ impl Ray {
     }
 }
 
-/// Where a line is inside something: from, to.
+/// Interval of a line, from and to, in lengths of its direction.
 pub(super) type Interval = (f64, f64);
 
 pub(super) fn intersection(a: Interval, b: Interval) -> Option<Interval> {
@@ -26,14 +26,14 @@ pub(super) fn intersection(a: Interval, b: Interval) -> Option<Interval> {
     (from <= to).then_some((from, to))
 }
 
-/// Where `origin + t * direction` lies within -half..=half, given 1 / direction.
+/// Interval of t in which `origin + t * direction` is within -half..=half, given 1 / direction.
 pub(super) fn slab(origin: f64, inverse: f64, half: f64) -> Interval {
     let (a, b) = ((-half - origin) * inverse, (half - origin) * inverse);
-    // On the slab's very face a parallel ray gives 0 * inf = NaN, which min and max pass over.
+    // On the face of the slab a parallel ray gives 0 * inf = NaN, which min and max ignore.
     (a.min(b), a.max(b))
 }
 
-/// Where `origin + t * direction` lies within `radius` of zero, for the dimensions given.
+/// Interval of t in which `origin + t * direction` is within `radius` of zero, in the dimensions given.
 pub(super) fn ball<const N: usize>(origin: [f64; N], direction: [f64; N], radius: f64) -> Option<Interval> {
     let dot = |a: [f64; N], b: [f64; N]| (0..N).map(|i| a[i] * b[i]).sum::<f64>();
     let (a, half_b, c) =
@@ -54,7 +54,7 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of nothing: no ray meets them, their union with any others is the others.
+    /// Empty bounds: no ray meets them, and their union with others is the others.
     pub(super) const NONE: Self = Self {
         min: Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
         max: Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),

@@ -1,4 +1,4 @@
-//! Ascii elements, one a line.
+//! Ascii elements of `.ply` files, one a line.
 //!
 //! They are not left to ply-rs-bw, whose grammar refuses `nan`, `inf`, `.5` and `5.`.
 
@@ -8,7 +8,7 @@ use super::{before_vertex, check_element};
 use crate::geometry::Point;
 use crate::scan::reader::{Problem, axis, lines, number};
 
-/// What the tokens of an ascii property are.
+/// How the tokens of an ascii property are read.
 enum Column {
     Axis(usize),
     Other,

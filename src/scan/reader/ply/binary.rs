@@ -1,4 +1,4 @@
-//! Binary elements, of either byte order.
+//! Binary elements of `.ply` files, of either byte order.
 
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult};
@@ -25,7 +25,7 @@ pub(super) fn points(
         .collect()
 }
 
-/// Entry `index` of `element`, taken from the front of `payload`.
+/// Reads entry `index` of `element` from the front of `payload`.
 fn read_binary<E: PropertyAccess>(
     encoding: Encoding,
     element: &ElementDef,

@@ -12,7 +12,7 @@ use super::{HEADER_BYTES_MAX, Problem, check_count, quoted};
 use crate::geometry::Point;
 
 const VERTEX: &str = "vertex";
-/// Fewest bytes of one ascii value: a digit and what divides it from the next.
+/// Fewest bytes of one ascii value: a digit and a separator.
 const ASCII_VALUE_BYTES_MIN: u64 = 2;
 
 /// The points of a `.ply` file.

@@ -177,8 +177,9 @@ fn a_directory_gives_its_scan_files_by_name_and_a_file_itself() {
         fs::write(path(name), b"").unwrap();
     }
     fs::create_dir(path("d.ply")).unwrap();
-    let files = scan_files(&[path("poses.txt"), directory.path().to_owned()]).unwrap();
-    assert_eq!(files, ["poses.txt", "a.PLY", "b.ply", "c.pcd"].map(path));
+    let files = scan_files(&[path("c.pcd"), directory.path().to_owned()]).unwrap();
+    assert_eq!(files, ["c.pcd", "a.PLY", "b.ply", "c.pcd"].map(path));
+    assert!(matches!(scan_files(&[path("poses.txt")]), Err(ReadError::Extension { .. })));
     let error = scan_files(&[path("d.ply")]).unwrap_err().to_string();
     assert!(error.contains("no scan file"), "{error}");
     assert!(matches!(scan_files(&[path("none")]), Err(ReadError::Io { .. })));

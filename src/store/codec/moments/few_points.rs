@@ -1,9 +1,9 @@
-//! Points of a voxel that are so few that its moments say where they lie.
+//! Encoding of moments of one or two points as the points themselves.
 
 use super::Numbers;
 use crate::voxel::Moments;
 
-/// At most [`FewPoints::MOST`], each three offsets from the voxel's center, signed bytes in steps.
+/// Up to [`FewPoints::MOST`] points, each as three signed bytes: its offset from the voxel's center in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct FewPoints {
     offsets: [[u8; 3]; FewPoints::MOST as usize],
@@ -11,10 +11,10 @@ pub(super) struct FewPoints {
 }
 
 impl FewPoints {
-    /// Two are their sum and how far they lie apart; of three, no more than that is known.
+    /// Most points that can be recovered from moments: two follow from their sum and difference, three do not.
     pub(super) const MOST: u8 = 2;
 
-    /// The points of which these are the numbers, in steps; none where they are more, or there are no such.
+    /// The points whose moments are `numbers` (in steps); none where there are more of them, or no such points.
     pub(super) fn of(numbers: &Numbers) -> Option<Self> {
         let [count, x, y, z, ..] = *numbers;
         let points = match count {
@@ -27,7 +27,7 @@ impl FewPoints {
         (Self::numbers(few.offsets()) == *numbers).then_some(few)
     }
 
-    /// The numbers of points, in steps.
+    /// The moments of points, in steps.
     pub(super) fn numbers(offsets: &[[u8; 3]]) -> Numbers {
         let mut sum = Moments::default();
         offsets.iter().for_each(|offset| sum += Moments::of_offset(offset.map(|d| i64::from(d as i8))));
@@ -47,8 +47,8 @@ impl FewPoints {
     }
 }
 
-/// From the sums s and q of two points: e, how far they lie apart, has e_i e_j = 2 q_ij - s_i s_j, and (s + e) / 2 and
-/// (s - e) / 2 are the points.
+/// Recovers two points from the sums s and q: their difference e has e_i e_j = 2 q_ij - s_i s_j, and the points are (s
+/// + e) / 2 and (s - e) / 2.
 fn two_points(&[_, x, y, z, xx, xy, xz, yy, yz, zz]: &Numbers) -> Option<[[i64; 3]; 2]> {
     let length = |xx: i64, x: i64| u64::try_from(2 * xx - x * x).ok().map(|square| square.isqrt() as i64);
     let (ex, ey, ez) = (length(xx, x)?, length(yy, y)?, length(zz, z)?);

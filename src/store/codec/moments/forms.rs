@@ -1,4 +1,4 @@
-//! The moments of voxels without their keys: each in the shortest form that says all.
+//! Encoding of moments without their keys, each in the shortest form that holds all of it.
 
 use super::few_points::FewPoints;
 use super::{Numbers, VOXELS_PER_LOOK, steps};
@@ -7,12 +7,12 @@ use crate::store::pb;
 use crate::util::StopSignal;
 use crate::voxel::{MomentSet, Moments};
 
-/// Ten numbers in steps. A smaller form is the number of points.
+/// Form of ten numbers in steps. Smaller forms are numbers of points.
 const STEPS: u8 = FewPoints::MOST + 1;
-/// Ten numbers in units.
+/// Form of ten numbers in units.
 const UNITS: u8 = STEPS + 1;
 
-/// The message of a set, but for its keys; of a part of it once stopped.
+/// The message of a set without its keys; incomplete once stopped.
 pub(super) fn write(set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
     let mut forms = Vec::with_capacity(set.as_slice().len());
     let (mut points, mut numbers) = (Vec::new(), Vec::new());
@@ -37,7 +37,8 @@ pub(super) fn write(set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
     pb::Moments { key_gaps: Vec::new(), numbers, forms: forms.into(), points: points.into() }
 }
 
-/// The inverse of [`write`], of so many voxels. Before there were forms, all were in units.
+/// Reads the moments of `voxels` voxels: the inverse of [`write`]. Files of before there were forms have all numbers in
+/// units.
 pub(super) fn read(
     message: &pb::Moments,
     voxels: usize,
@@ -71,7 +72,7 @@ pub(super) fn read(
     }
 }
 
-/// What is still to be dealt out to voxels.
+/// The parts of a message that are not read yet.
 struct Unread<'a> {
     points: &'a [[u8; 3]],
     numbers: &'a [Numbers],
@@ -89,7 +90,7 @@ impl<'a> Unread<'a> {
         }
     }
 
-    /// The numbers of the next voxel, in units; none where they would be too large.
+    /// Takes the numbers of the next voxel, in units; none where they are too large.
     fn take(&mut self, form: u8) -> Result<Option<Numbers>, Unreadable> {
         match form {
             0..=FewPoints::MOST => {

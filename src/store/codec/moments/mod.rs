@@ -1,4 +1,4 @@
-//! Moments of the points in voxels: beside the voxels, or with keys of their own.
+//! Encoding of the moments of voxels: beside the voxels, or with keys of their own.
 
 mod few_points;
 mod forms;
@@ -9,10 +9,10 @@ use crate::store::pb;
 use crate::util::StopSignal;
 use crate::voxel::{MomentSet, Moments, VoxelKey, VoxelSet};
 
-/// Voxels whose moments are written or read between two looks at the stop signal: some milliseconds.
+/// Voxels whose moments are written or read between two checks of the stop signal: some milliseconds.
 const VOXELS_PER_LOOK: usize = 16 << 10;
 
-/// As [`Moments::to_numbers`] has them, in units or in steps.
+/// Moments as [`Moments::to_numbers`] returns them, in units or in steps.
 type Numbers = [i64; Moments::NUMBERS];
 
 impl From<&MomentSet> for pb::Moments {
@@ -38,8 +38,8 @@ impl TryFrom<pb::Moments> for MomentSet {
     }
 }
 
-/// The message of the moments of points in `voxels`: it leaves out the keys where they follow from those. Of a part of
-/// them once stopped.
+/// The message of the moments of points in `voxels`. Keys that follow from the voxels are left out. Incomplete once
+/// stopped.
 pub(in crate::store) fn beside(voxels: &VoxelSet, set: &MomentSet, stop: StopSignal<'_>) -> pb::Moments {
     let keys = set.as_slice().iter().map(|(key, _)| *key);
     match keys.eq(voxels.moment_voxels_until(stop)) || stop.is_stopped() {
@@ -48,7 +48,7 @@ pub(in crate::store) fn beside(voxels: &VoxelSet, set: &MomentSet, stop: StopSig
     }
 }
 
-/// The inverse of [`beside`].
+/// Reads moments: the inverse of [`beside`].
 pub(in crate::store) fn read(
     message: &pb::Moments,
     voxels: &VoxelSet,

@@ -1,4 +1,4 @@
-//! `mrol bench serve`: a load of point queries on a server.
+//! `mrol bench serve`: puts a load of point queries on a server.
 
 mod report;
 
@@ -27,7 +27,7 @@ On the server a map of the workload is made under a name of its own, and deleted
 again as soon as it is answered; on a stream --in-flight messages are under way. The time of an answer is that from
 handing over the question to having the bitmap. A tenth of the time goes by before the clock runs.";
 
-/// What questions travel by.
+/// Protocol of the queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Protocol {
     /// gRPC, a call a message
@@ -54,7 +54,7 @@ pub(super) struct Serve {
     workload: WorkloadOptions,
     #[command(flatten)]
     map: MapOptions,
-    /// What questions travel by, separated by commas
+    /// Protocols of the queries, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["grpc", "grpc-stream", "http"])]
     protocols: Vec<Protocol>,
     /// Points of a message, several separated by commas
@@ -93,7 +93,7 @@ impl Serve {
         measured
     }
 
-    /// Where the server is: gRPC, and HTTP if that is known.
+    /// Addresses of the server: gRPC, and HTTP if it is known.
     fn addresses(
         &self,
         daemon: Option<&Daemon>,
@@ -124,7 +124,7 @@ impl Serve {
             let question = Question::of(&queries, points, self.lookup);
             for &protocol in &self.protocols {
                 let Some(load) = self.load(protocol, target, &question) else { continue };
-                // Until connections, windows and caches are as they will be.
+                // A warm-up, until connections, windows and caches have settled.
                 load.run(self.connections.into(), time / 10).await?;
                 let answered = load.run(self.connections.into(), time).await?;
                 output.print(&Line::of(protocol, points, &answered))?;

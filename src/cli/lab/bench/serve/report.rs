@@ -1,4 +1,4 @@
-//! What the load came to.
+//! Results of the load.
 
 use std::fmt::{self, Display};
 

@@ -1,4 +1,5 @@
-//! `mrol bench soak`: a server under a fleet's load for hours. Does its memory grow, does anything fail?
+//! `mrol bench soak`: runs a server under a fleet's load for hours, and checks that its memory does not grow and
+//! nothing fails.
 
 mod report;
 
@@ -31,9 +32,9 @@ ask, and deletes its own. First they work without a pause: that is the capacity.
 from the moment when an operation was due, whoever is late. The exit code says whether nothing failed, the load was
 carried out, and memory was flat over the second half.";
 
-/// How often the server's memory is measured.
+/// Time between two measurements of the server's memory.
 const MEASURED_EVERY: Duration = Duration::from_secs(1);
-/// Turns of the workload's sensor, which the robots send again and again.
+/// Number of revolutions of the workload's sensor, which the robots send repeatedly.
 const TURNS: usize = 50;
 
 /// Run a server for an hour under a fleet's load: nothing may fail, and memory may not grow
@@ -47,7 +48,7 @@ pub(super) struct Soak {
     /// Seconds at the load
     #[arg(long, default_value_t = 3600.0, value_parser = seconds)]
     seconds: f64,
-    /// Of the capacity
+    /// Load, as a share of the capacity
     #[arg(long, default_value_t = 0.8, value_parser = share)]
     load: f64,
     /// Seconds for which the capacity is measured
@@ -56,16 +57,16 @@ pub(super) struct Soak {
     /// Seconds between two lines
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
     report_seconds: f64,
-    /// How much memory may grow over the second half, by the line through its measurements, for it to be flat
+    /// Largest growth of memory over the second half, by the line through its measurements, as a share
     #[arg(long, value_name = "SHARE", default_value_t = 0.03, value_parser = share)]
     growth_max: f64,
-    /// Of the operations that were due, how many may be undone when the time is over
+    /// Largest share of the operations that were due and are not done when the time is over
     #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = share)]
     left_max: f64,
-    /// Clients that ask
+    /// Number of clients that query
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
     planners: u16,
-    /// Clients that map
+    /// Number of clients that map
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
     robots: u16,
     /// Points of a query
@@ -125,7 +126,7 @@ impl Soak {
         Ok(Fleet::new(robots))
     }
 
-    /// Queries and changes a second, without a pause and at the same time.
+    /// Measures the capacity: queries and changes a second, without a pause and at the same time.
     async fn capacity(
         &self,
         planners: Fleet<Planner>,

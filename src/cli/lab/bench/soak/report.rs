@@ -1,4 +1,4 @@
-//! What is said during a soak and at its end.
+//! Reports during a soak and at its end.
 
 use std::fmt::{self, Display};
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::cli::map_report::{bytes, count};
 use crate::lab::fleet::{Tally, Trend};
 
-/// Operations of one kind.
+/// Statistics of the operations of one kind.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Done {
     operations: u64,
@@ -19,7 +19,7 @@ pub(super) struct Done {
 }
 
 impl Done {
-    /// Within `seconds`.
+    /// The statistics of `tally`, over `seconds`.
     pub(super) fn of(tally: &Tally, seconds: f64) -> Self {
         Self {
             operations: tally.operations(),
@@ -39,7 +39,7 @@ impl Display for Done {
     }
 }
 
-/// Some time of it.
+/// The report of an interval.
 #[derive(Serialize)]
 pub(super) struct Line {
     pub(super) seconds: f64,
@@ -61,18 +61,18 @@ impl Display for Line {
     }
 }
 
-/// What it came to.
+/// The result of the soak.
 #[derive(Serialize)]
 pub(super) struct Verdict {
     seconds: f64,
     load: f64,
-    /// The share of what was due that was not done in time.
+    /// Share of the due operations that were not done in time.
     left: f64,
     queries: Done,
     changes: Done,
-    /// Over the second half.
+    /// Mean resident memory over the second half, bytes.
     mean_resident_bytes: f64,
-    /// By the line through the measurements of the second half.
+    /// Growth of resident memory by the line through the measurements of the second half, bytes an hour.
     growth_bytes_per_hour: f64,
     growth_of_second_half: f64,
 }
@@ -98,7 +98,7 @@ impl Verdict {
         }
     }
 
-    /// What is wrong, if anything.
+    /// Description of what is wrong, if anything.
     pub(super) fn complaint(&self, growth_max: f64, left_max: f64) -> Option<String> {
         let errors = self.queries.errors + self.changes.errors;
         if errors > 0 {

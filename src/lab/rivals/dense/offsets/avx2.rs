@@ -1,4 +1,4 @@
-//! Offsets of eight points at a time, for CPUs with AVX2.
+//! AVX2 variant of the offsets: eight points at a time.
 #![expect(
     unsafe_code,
     reason = "vector intrinsics, and functions that are compiled for more than the crate is"
@@ -15,7 +15,7 @@ use crate::voxel::quantize::avx2::{LANES, Quantizer};
 /// Points that take each step together.
 const BATCH: usize = 128;
 
-/// See [`super::offsets`].
+/// AVX2 variant of [`super::offsets`].
 pub(super) fn offsets(
     _: Avx2,
     points: &[Point],
@@ -45,7 +45,7 @@ fn all_offsets(points: &[Point], t: &LatticeFromPoints, level: u32, grid: &Grid,
         }
         let [x, y, z] = &index;
         for (i, offset) in offsets.iter_mut().enumerate() {
-            // Compiles to vector instructions, for none of it is a branch.
+            // Free of branches, so that it compiles to vector instructions.
             let inside = grid.offset([x[i], y[i], z[i]]);
             *offset = if has_voxel[i] { inside } else { grid.cells() as u32 };
         }

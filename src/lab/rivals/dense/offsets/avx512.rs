@@ -1,4 +1,4 @@
-//! Offsets of sixteen points at a time, for CPUs with AVX-512.
+//! AVX-512 variant of the offsets: sixteen points at a time.
 #![expect(
     unsafe_code,
     reason = "vector intrinsics, and functions that are compiled for more than the crate is"
@@ -12,7 +12,7 @@ use crate::util::cpu::Avx512;
 use crate::voxel::LatticeFromPoints;
 use crate::voxel::quantize::avx512::{LANES, Quantizer};
 
-/// See [`super::offsets`].
+/// AVX-512 variant of [`super::offsets`].
 pub(super) fn offsets(
     _: Avx512,
     points: &[Point],
