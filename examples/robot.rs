@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use mrol::client::{Client, Credentials, NewMap};
+use mrol::client::{Client, Credentials, NewMap, new_session};
 use mrol::geometry::{Point, translation_m};
 use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{MapName, RobotName};
@@ -32,9 +32,11 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
     let client = Client::connect_with(&url, &credentials()?).await?;
     client.create_map(&map, NewMap::of(0.05)).await?;
-    // The number makes a retry safe: a scan that the map has already is answered again, and not added twice. Other scans
-    // of the same robot need other numbers.
-    let requests = scans.into_iter().zip(1..).map(move |(points, scan_id)| ScanRequest {
+    // Session and number make a retry safe: a scan that the map has already is answered again, and not added twice. A new
+    // session at each start lets the numbers begin again.
+    let session = new_session();
+    let requests = scans.into_iter().zip(0..).map(move |(points, scan_id)| ScanRequest {
+        session: session.clone(),
         scan_id: Some(scan_id),
         ..ScanRequest::new(robot.clone(), points.into())
     });

@@ -17,9 +17,9 @@ use super::remote::MapOptions;
 use super::scan_report::{PLACE_HEAD, name_of, name_width, place};
 use super::truth::true_poses;
 use crate::align::Method;
-use crate::client::{Client, ClientError};
+use crate::client::{Client, ClientError, new_session};
 use crate::geometry::Pose;
-use crate::map::RobotName;
+use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::{PointFilter, read_points, scan_files};
 use crate::service::{ScanAnswer, ScanRequest};
@@ -70,9 +70,13 @@ pub(super) struct Insert {
     /// Put every scan at its pose in this TUM file, line k for scan k, without aligning
     #[arg(long, value_name = "FILE", conflicts_with = "guess")]
     truth: Option<PathBuf>,
-    /// Number the scans from N on, so that a scan that is sent again is not added twice
+    /// Number the scans from N on, so that a scan that is sent again in the same session is not added twice [default:
+    /// from 0, in a new session]
     #[arg(long, value_name = "N")]
     first_scan_id: Option<u64>,
+    /// Session of the scans' numbers; with --first-scan-id alone, that of clients that name none
+    #[arg(long, value_name = "NAME", requires = "first_scan_id", value_parser = parse::session_name)]
+    session: Option<SessionName>,
     /// Make the map first
     #[arg(long, requires = "resolution")]
     create: bool,
@@ -98,7 +102,11 @@ impl Insert {
             robot: self.robot.clone(),
             first: self.first_guess(),
             poses,
-            ids: self.first_scan_id,
+            session: match self.first_scan_id {
+                Some(_) => self.session.clone().unwrap_or_default(),
+                None => new_session(),
+            },
+            first_scan_id: self.first_scan_id.unwrap_or(0),
             next: self.next_guess.into(),
             method: self.alignment.method(),
             filter: self.points.filter().map_err(CliError::usage)?,
@@ -203,8 +211,9 @@ struct Plan {
     first: (Guess, bool),
     /// Poses of the scans, map_from_sensor, if they are known.
     poses: Option<Vec<Pose>>,
-    /// Number of the first scan, if they are numbered.
-    ids: Option<u64>,
+    session: SessionName,
+    /// Number of the first scan.
+    first_scan_id: u64,
     /// Guess of the other scans.
     next: Guess,
     method: Option<Method>,
@@ -218,7 +227,8 @@ impl Plan {
         for (k, file) in files.iter().enumerate() {
             let (guess, at_guess) = self.guess(k);
             let scan = ScanRequest {
-                scan_id: self.ids.map(|first| first.saturating_add(k as u64)),
+                session: self.session.clone(),
+                scan_id: Some(self.first_scan_id.saturating_add(k as u64)),
                 guess,
                 at_guess,
                 force: self.force,

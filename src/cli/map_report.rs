@@ -1,12 +1,13 @@
 //! Output of a map's description: the same object as over HTTP, or a table.
 
 use std::fmt::{self, Display};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
 use crate::service::MapInfo;
-use crate::wire::json::{JsonFilter, JsonLevel, JsonMap, JsonStorage, JsonVersion};
+use crate::wire::json::{JsonFilter, JsonLevel, JsonMap, JsonSighting, JsonStorage, JsonVersion};
 
 /// A map's description, to be printed.
 #[derive(Serialize)]
@@ -44,6 +45,7 @@ impl Display for MapReport {
         let (sets, moments) = (bytes(map.set_bytes), bytes(map.moment_bytes));
         let (scans, poses) = (count(map.scans), bytes(map.trajectory_bytes));
         writeln!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}")?;
+        map.sightings.iter().try_for_each(|sighting| write_sighting(f, sighting))?;
         match &map.storage {
             Some(storage) => write_storage(f, storage)?,
             None => writeln!(f, "in memory only: it ends with the server")?,
@@ -54,6 +56,15 @@ impl Display for MapReport {
         write!(f, " expected   eq. (1)   measured")?;
         map.levels.iter().try_for_each(|level| write_level(f, level))
     }
+}
+
+fn write_sighting(f: &mut fmt::Formatter<'_>, sighting: &JsonSighting) -> fmt::Result {
+    let JsonSighting { robot, seen_at_ns, map_from_sensor, verdict, stationary, .. } = sighting;
+    let seen_at = UNIX_EPOCH + Duration::from_nanos(u64::try_from(*seen_at_ns).unwrap_or(0));
+    let ago = SystemTime::now().duration_since(seen_at).unwrap_or_default().as_secs_f64();
+    let [x, y, z] = map_from_sensor.translation_m;
+    let standing = if *stationary { ", standing still" } else { "" };
+    writeln!(f, "{robot} was seen {ago:.1} s ago at {x:.2} {y:.2} {z:.2} m: {verdict}{standing}")
 }
 
 fn write_storage(f: &mut fmt::Formatter<'_>, storage: &JsonStorage) -> fmt::Result {

@@ -4,7 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::align::localize::SearchBox;
 use crate::geometry::{self, Point, Pose};
-use crate::map::{MapName, Region, RequestId, RobotName};
+use crate::map::{MapName, Region, RequestId, RobotName, SessionName};
 use crate::util::Keyword;
 
 /// A parser for keywords; `--help` lists them.
@@ -62,6 +62,11 @@ pub(super) fn map_name(text: &str) -> Result<MapName, String> {
 /// Parses the name of a robot.
 pub(super) fn robot_name(text: &str) -> Result<RobotName, String> {
     RobotName::new(text).map_err(|error| error.to_string())
+}
+
+/// Parses a session's name.
+pub(super) fn session_name(text: &str) -> Result<SessionName, String> {
+    SessionName::new(text).map_err(|error| error.to_string())
 }
 
 /// Parses a request id.

@@ -9,7 +9,7 @@ use super::map_report::count;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
-use crate::map::{RequestId, RobotName};
+use crate::map::{RequestId, RobotName, SessionName};
 use crate::service::{self, UndoAnswer, UndoTarget};
 
 const EXAMPLES: &str = "\
@@ -18,8 +18,8 @@ EXAMPLES:
   mrol undo --map office --revision 41                   one scan, by the revision that it made
   mrol undo --map office --robot r1 --since 40           all that r1 sent after revision 40
 
-Removes the voxels that only these scans touched; everything else stays as it is. The scans' numbers may be used
-again. `mrol maps show` prints how far back undo can go.";
+Removes the voxels that only these scans touched; everything else stays as it is. The same scans sent
+again are not inserted: send them under new numbers. `mrol maps show` prints how far back undo can go.";
 
 /// Remove scans from a map on a server
 #[derive(Debug, clap::Args)]
@@ -33,6 +33,9 @@ pub(super) struct Undo {
     /// The robot's own number of the scan
     #[arg(long, value_name = "N", requires = "robot")]
     scan_id: Option<u64>,
+    /// The session in which the robot sent it; without, that of clients that name none
+    #[arg(long, value_name = "NAME", requires = "scan_id", value_parser = parse::session_name)]
+    session: Option<SessionName>,
     /// All of the robot's scans that made a revision after this one
     #[arg(long, value_name = "REVISION", requires = "robot", conflicts_with = "scan_id")]
     since: Option<u64>,
@@ -47,7 +50,9 @@ pub(super) struct Undo {
 impl Undo {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let target = match (self.robot, self.scan_id, self.since, self.revision) {
-            (Some(robot), Some(scan_id), ..) => UndoTarget::Scan { robot, scan_id },
+            (Some(robot), Some(scan_id), ..) => {
+                UndoTarget::Scan { robot, session: self.session.unwrap_or_default(), scan_id }
+            }
             (Some(robot), None, Some(revision), _) => UndoTarget::RobotSince { robot, revision },
             (None, .., Some(revision)) => UndoTarget::Revision(revision),
             _ => {

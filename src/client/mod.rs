@@ -42,7 +42,7 @@ use bytes::{Bytes, BytesMut};
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status};
 
-use crate::map::{MapName, Region, RobotName};
+use crate::map::{MapName, Region, RobotName, SessionName};
 use crate::service::{
     Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, MapList, PointAnswer,
     PointQuery, Reason, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo,
@@ -56,6 +56,12 @@ use connection::Connection;
 pub struct Client {
     connection: Connection,
     timeout: Option<Duration>,
+}
+
+/// A name for the session of a robot's program that starts, unlike any other: scans are counted from 0 in it.
+pub fn new_session() -> SessionName {
+    // 32 hexadecimal digits are a name.
+    SessionName::new(&uuid::Uuid::new_v4().simple().to_string()).unwrap_or_default()
 }
 
 impl Client {

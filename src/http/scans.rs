@@ -11,7 +11,7 @@ use super::object::Object;
 use super::params::{self, Map};
 use crate::align::Method;
 use crate::geometry::Pose;
-use crate::map::RobotName;
+use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{PointCloud, Reason, ScanRequest, ServiceError};
@@ -23,6 +23,8 @@ use crate::wire::json::{JsonPose, JsonScan};
 #[serde(deny_unknown_fields)]
 pub(super) struct ScanBody {
     robot: String,
+    #[serde(default)]
+    session: String,
     scan_id: Option<u64>,
     points: JsonPoints,
     timestamp_ns: Option<i64>,
@@ -47,6 +49,8 @@ pub(super) struct ScanBody {
 #[serde(deny_unknown_fields)]
 pub(super) struct ScanParams {
     robot: String,
+    #[serde(default)]
+    session: String,
     scan_id: Option<u64>,
     timestamp_ns: Option<i64>,
     guess: Option<String>,
@@ -104,6 +108,7 @@ impl TryFrom<ScanBody> for ScanRequest {
         let guess = scan.guess.map(|Object(pose)| Pose::try_from(pose).in_field("guess")).transpose()?;
         let motion = scan.motion.map(|Object(pose)| Pose::try_from(pose).in_field("motion")).transpose()?;
         Ok(Self {
+            session: SessionName::new(&scan.session)?,
             scan_id: scan.scan_id,
             timestamp_ns: scan.timestamp_ns,
             guess: guess_of(guess, motion, scan.constant_velocity)?,
@@ -126,6 +131,7 @@ impl ScanParams {
     fn with(self, points: PointCloud) -> Result<ScanRequest, ServiceError> {
         let pose = |text: Option<String>, field| text.map(|text| params::pose(&text, field)).transpose();
         Ok(ScanRequest {
+            session: SessionName::new(&self.session)?,
             scan_id: self.scan_id,
             timestamp_ns: self.timestamp_ns,
             guess: guess_of(

@@ -48,6 +48,7 @@ struct Page {
 #[derive(Serialize)]
 struct PoseResponse {
     robot: String,
+    session: String,
     scan_id: Option<u64>,
     timestamp_ns: Option<i64>,
     map_from_sensor: JsonPose,
@@ -123,6 +124,7 @@ impl From<&MappedScan> for PoseResponse {
     fn from(pose: &MappedScan) -> Self {
         Self {
             robot: pose.robot.to_string(),
+            session: pose.session.to_string(),
             scan_id: pose.scan_id,
             timestamp_ns: pose.timestamp_ns,
             map_from_sensor: (&pose.map_from_sensor).into(),

@@ -7,15 +7,16 @@ use super::body;
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, request_id_of};
-use crate::map::RobotName;
+use crate::map::{RobotName, SessionName};
 use crate::service::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget};
 use crate::wire::json::JsonVersion;
 
-/// `{"robot", "scan_id"}`, `{"robot", "since_revision"}` or `{"revision"}`.
+/// `{"robot", "scan_id"}`, to which `"session"` may be added, `{"robot", "since_revision"}` or `{"revision"}`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct UndoBody {
     robot: Option<String>,
+    session: Option<String>,
     scan_id: Option<u64>,
     since_revision: Option<u64>,
     revision: Option<u64>,
@@ -45,12 +46,18 @@ impl TryFrom<UndoBody> for Undo {
 
     fn try_from(undo: UndoBody) -> Result<Self, ServiceError> {
         let robot = undo.robot.map(|robot| RobotName::new(&robot)).transpose()?;
+        let session = undo.session.map(|session| SessionName::new(&session)).transpose()?;
         let target = match (robot, undo.scan_id, undo.since_revision, undo.revision) {
-            (Some(robot), Some(scan_id), None, None) => UndoTarget::Scan { robot, scan_id },
-            (Some(robot), None, Some(revision), None) => UndoTarget::RobotSince { robot, revision },
-            (None, None, None, Some(revision)) => UndoTarget::Revision(revision),
+            (Some(robot), Some(scan_id), None, None) => {
+                UndoTarget::Scan { robot, session: session.unwrap_or_default(), scan_id }
+            }
+            (Some(robot), None, Some(revision), None) if session.is_none() => {
+                UndoTarget::RobotSince { robot, revision }
+            }
+            (None, None, None, Some(revision)) if session.is_none() => UndoTarget::Revision(revision),
             _ => {
-                let message = "give robot and scan_id, robot and since_revision, or revision";
+                let message =
+                    "give robot and scan_id (and the session), robot and since_revision, or revision";
                 return Err(ServiceError::new(Reason::AmbiguousTarget, message));
             }
         };

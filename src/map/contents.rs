@@ -56,7 +56,7 @@ impl MapContents {
         if self.revision > REVISION_MAX {
             return Err(ContentsError::Revision(self.revision));
         }
-        let (scans, withdrawn) = (self.trajectory.poses(), self.trajectory.withdrawn());
+        let (scans, withdrawn) = (self.trajectory.stored(), self.trajectory.withdrawn());
         self.check_order("scans", scans.map(|scan| scan.revision))?;
         self.check_order("withdrawn scans", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
         self.check_order("requests", self.requests.iter().map(|request| request.revision))?;

@@ -38,14 +38,14 @@ pub use info::{LevelInfo, MapDescription};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;
-pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName};
+pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName};
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError, SPHERE_M_MAX};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{
-    ID_RANGES_PER_ROBOT_MAX, MappedScan, OverlapOfNoLevel, ScanRecord, Trajectory, TrajectorySpacing,
-    WithdrawnScan,
+    ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
+    ScanRecord, Trajectory, TrajectorySpacing, WithdrawnScan,
 };
 pub use view::{LongRead, MapView};
 pub use voxel_ownership::{Leaving, VoxelOwnership};

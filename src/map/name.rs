@@ -16,6 +16,9 @@ pub enum NameError {
     /// Not a robot's name.
     #[error("robot must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
     Robot(String),
+    /// Not a session's name.
+    #[error("session must be empty or 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
+    Session(String),
     /// Not a caller's name.
     #[error("caller must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
     Caller(String),
@@ -65,6 +68,36 @@ impl RobotName {
     /// The text.
     pub fn as_str(&self) -> &str {
         &self.0
+    }
+}
+
+/// The name of one run of a robot's software: empty, or 1 to 64 of `[A-Za-z0-9_.-]`.
+///
+/// The numbers of a robot's scans are unique within a session, so that a robot that starts again may count from 0 under
+/// another name. The empty name is that of clients which do not tell one run from another.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub struct SessionName(Arc<str>);
+
+impl SessionName {
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// Names the text and what a name looks like.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        if text.is_empty() {
+            return Ok(Self::default());
+        }
+        word(text).map(Self).ok_or_else(|| NameError::Session(excerpt(text)))
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// True of the session of clients that do not tell one run from another.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 }
 
@@ -119,6 +152,12 @@ impl std::fmt::Display for MapName {
 }
 
 impl std::fmt::Display for RobotName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::fmt::Display for SessionName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0)
     }

@@ -36,7 +36,7 @@ impl Guess {
         sightings: &Sightings,
         map_is_empty: bool,
     ) -> Result<Pose, MappingError> {
-        let seen = |last: &MappedScan| sightings.since(last);
+        let seen = |last: &MappedScan| sightings.standing_since(last);
         let last_or_origin = || match trajectory.last_of(robot) {
             Some(last) => Ok(seen(last).map_or(last.map_from_sensor, |seen| seen.map_from_sensor)),
             None if map_is_empty => Ok(Pose::identity()),

@@ -14,14 +14,14 @@ mod stationary;
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
 pub use guess::Guess;
-pub use sightings::Sightings;
+pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
 
 use std::time::{Duration, Instant};
 
 use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
 use crate::geometry::Point;
-use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName};
 use crate::util::StopSignal;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
@@ -62,11 +62,13 @@ pub struct MappingSettings {
 }
 
 /// A scan to map.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Scan<'a> {
     /// The robot that took it.
     pub robot: &'a RobotName,
-    /// The robot's own number of the scan.
+    /// The run of the robot's software that sent it.
+    pub session: SessionName,
+    /// The robot's own number of the scan, unique in its session.
     pub scan_id: Option<u64>,
     /// When the scan was taken, nanoseconds since the Unix epoch.
     pub timestamp_ns: Option<i64>,
@@ -91,6 +93,7 @@ impl<'a> Scan<'a> {
     pub fn new(robot: &'a RobotName, points: &'a [Point]) -> Self {
         Self {
             robot,
+            session: SessionName::default(),
             scan_id: None,
             timestamp_ns: None,
             points,
@@ -155,6 +158,7 @@ impl<'a> ScanMapper<'a> {
     /// it was.
     pub fn map_scan(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<ScanOutcome, MappingError> {
         let located = self.locate(scan, stop)?;
+        self.sightings.note(scan, &located);
         if !located.is_accepted() && !scan.force {
             return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
         }
@@ -198,6 +202,7 @@ impl<'a> ScanMapper<'a> {
     pub fn record(&self, scan: &Scan<'_>, alignment: &Alignment) -> Result<ScanRecord, MappingError> {
         let pose = MappedScan {
             robot: scan.robot.clone(),
+            session: scan.session.clone(),
             scan_id: scan.scan_id,
             timestamp_ns: scan.timestamp_ns,
             map_from_sensor: alignment.map_from_sensor,
@@ -227,7 +232,7 @@ impl<'a> ScanMapper<'a> {
         let Some(last) = self.map.trajectory().last_of(scan.robot).cloned() else { return false };
         let is_stationary = settings.is_stationary(self.map, &last, record);
         if is_stationary {
-            self.sightings.note(&last, record.pose.map_from_sensor, scan.timestamp_ns);
+            self.sightings.note_standing(&last, record.pose.map_from_sensor, scan.timestamp_ns);
         }
         is_stationary
     }

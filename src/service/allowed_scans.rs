@@ -66,13 +66,15 @@ fn robot_not_allowed(robots: &BTreeSet<RobotName>, what: &str) -> ServiceError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::SessionName;
 
     #[test]
     fn a_caller_undoes_scans_of_its_robots_and_nothing_else() {
         let robot = |name| RobotName::new(name).unwrap();
         let reason =
             |reach: &AllowedScans, target| reach.permit_undo(&target).err().map(|error| error.reason);
-        let scan = |name| UndoTarget::Scan { robot: robot(name), scan_id: 1 };
+        let scan =
+            |name| UndoTarget::Scan { robot: robot(name), session: SessionName::default(), scan_id: 1 };
         let since = |name| UndoTarget::RobotSince { robot: robot(name), revision: 1 };
         let own = AllowedScans { robots: Some(Arc::new([robot("r1")].into())), undo_of_others: false };
         assert_eq!([reason(&own, scan("r1")), reason(&own, since("r1"))], [None, None]);

@@ -25,9 +25,10 @@ impl<'a> FilteredScan<'a> {
 
     /// The scan as the core maps it.
     pub(super) fn to_map(&self) -> Scan<'_> {
-        let ScanRequest { robot, scan_id, timestamp_ns, guess, at_guess, force, .. } = self.request;
+        let ScanRequest { robot, session, scan_id, timestamp_ns, guess, at_guess, force, .. } = self.request;
         Scan {
             robot,
+            session: session.clone(),
             scan_id: *scan_id,
             timestamp_ns: *timestamp_ns,
             points: &self.filtered.points,

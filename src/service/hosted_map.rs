@@ -45,7 +45,7 @@ pub(super) struct HostedMap {
     announced: watch::Receiver<u64>,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
-    /// Where robots were seen that stand still.
+    /// Where and when robots were last seen.
     pub(super) sightings: Sightings,
     /// One undo is found out and made before the next is looked at.
     pub(super) undo_turn: Arc<tokio::sync::Mutex<()>>,
@@ -333,6 +333,7 @@ impl HostedMap {
             levels: described.levels,
             scans: trajectory.len(),
             robots: trajectory.robots(),
+            sightings: Vec::new(),
             set_bytes: described.set_bytes,
             moment_bytes: described.moment_bytes,
             commits: self.commit_queue.durations(),

@@ -8,11 +8,11 @@ use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
 use super::resource_budget::ResourceBudget;
-use super::trajectory::check_not_forgotten;
+use super::trajectory::{scan_id_too_old, scan_name};
 use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::{AlignmentSettings, Verdict};
 use crate::geometry::{Point, Pose};
-use crate::map::{Change, Committed, Lookup, MappedScan, ScanRecord};
+use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
 use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper};
 use crate::util::StopSignal;
 
@@ -36,6 +36,7 @@ impl HostedMap {
         budget.check_to_grow()?;
         let mapper = self.mapper(request, settings);
         let located = self.locate(&scan, &mapper, stop)?;
+        self.sightings.note(&scan.to_map(), &located);
         let answer = self.answer(&scan, &located);
         if !answer.accepted && !request.force {
             return Ok(Step::Answered(answer));
@@ -102,28 +103,43 @@ impl HostedMap {
         let Some(trajectory) = self.map.try_trajectory() else {
             return false;
         };
-        let robot = &request.robot;
-        let accepted = |id| trajectory.find(robot, id).is_some() || trajectory.has_forgotten(robot, id);
+        let accepted = |id| trajectory.known(&request.robot, &request.session, id).is_some();
         !request.scan_id.is_some_and(accepted)
     }
 
     /// The first answer again, where this scan was accepted before.
     fn replay(&self, scan: &FilteredScan<'_>) -> Result<Option<ScanAnswer>, ServiceError> {
-        let Some(scan_id) = scan.request.scan_id else {
+        let ScanRequest { robot, session, scan_id: Some(scan_id), .. } = scan.request else {
             return Ok(None);
         };
+        let name = || scan_name(robot, session, *scan_id);
         let trajectory = self.map.trajectory();
-        let Some(pose) = trajectory.find(&scan.request.robot, scan_id) else {
-            return check_not_forgotten(&trajectory, &scan.request.robot, scan_id).map(|()| None);
+        let (reason, message) = match trajectory.known(robot, session, *scan_id) {
+            None => return Ok(None),
+            Some(KnownScan::Kept(pose)) if pose.digest == scan.digest => {
+                return Ok(Some(self.answer_again(pose)));
+            }
+            Some(KnownScan::TooOld) => return Err(scan_id_too_old(robot, session, *scan_id)),
+            Some(KnownScan::Undone(pose)) if pose.digest == scan.digest => {
+                let message = format!(
+                    "{} was accepted at revision {} and undone since: it is not inserted again; send it under a new \
+                     scan_id to have it back",
+                    name(),
+                    pose.revision
+                );
+                (Reason::ScanWithdrawn, message)
+            }
+            Some(KnownScan::Kept(pose) | KnownScan::Undone(pose)) => {
+                let message = format!(
+                    "{} was accepted at revision {} with other content: number new scans anew, in a session with a \
+                     new name after a restart",
+                    name(),
+                    pose.revision
+                );
+                (Reason::ScanIdTaken, message)
+            }
         };
-        if pose.digest == scan.digest {
-            return Ok(Some(self.answer_again(pose)));
-        }
-        let message = format!(
-            "scan_id {scan_id} of robot {} was accepted at revision {} with other content: number new scans anew",
-            pose.robot, pose.revision
-        );
-        Err(ServiceError::new(Reason::ScanIdTaken, message))
+        Err(ServiceError::new(reason, message))
     }
 
     /// How scans of this map are located and recorded, by the method that the request asks for.

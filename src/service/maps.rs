@@ -51,12 +51,16 @@ impl MapService {
         .await
     }
 
-    /// Describes a map.
+    /// Describes a map, with the last sighting of each robot.
     ///
     /// # Errors
     /// `NotFound` without such a map.
     pub async fn map_info(&self, name: &MapName) -> Result<MapInfo, ServiceError> {
-        let work = async { self.describe(self.map(name)?).await };
+        let work = async {
+            let map = self.map(name)?;
+            let sightings = map.sightings.to_vec();
+            Ok(MapInfo { sightings, ..self.describe(map).await? })
+        };
         self.observed("GetMap", Some(name), work, |_| Outcome::Read).await
     }
 

@@ -131,7 +131,7 @@ reasons! {
     Conflict {
         MapExists "map_exists" Both: "a map of this name with other settings, or where one is to be restored", "another name, or `replace`";
         RequestIdTaken "request_id_taken" Both: "another request of this key had this id", "choose ids that are unique";
-        ScanIdTaken "scan_id_taken" Both: "an accepted scan with other content has this id", "number new scans anew";
+        ScanIdTaken "scan_id_taken" Both: "an accepted scan with other content has this id", "number new scans anew, in a new `session` after a restart";
     }
     FailedPrecondition {
         GuessRequired "guess_required" Both: "the robot has no accepted scan here, the map is not empty, and there is no guess", "give `guess`, or use `localize` first";
@@ -140,7 +140,8 @@ reasons! {
         NoJournal "no_journal" Both: "the server keeps maps in memory only, and undo needs a journal", "start it with `--data-dir`";
         OutsideUndoWindow "outside_undo_window" Both: "the scan is from before `storage.undo_from_revision`", "delete by region; `store.undo_revisions`, `store.undo_bytes_max`";
         RevisionsUsedUp "revisions_used_up" Both: "revision 2^53 was reached", "make another map";
-        ScanIdTooOld "scan_id_too_old" Both: "the id is from before the undo window, where ids are not kept", "number new scans upwards";
+        ScanIdTooOld "scan_id_too_old" Both: "the id is from before the undo window, where ids are not kept, or its session from long ago", "number new scans upwards, or choose another session";
+        ScanWithdrawn "scan_withdrawn" Both: "the scan was accepted and undone since", "send it under a new id to have it back";
     }
     ResourceExhausted {
         DiskFull "disk_full" Both 507: "little room on the disk of the data folder; changes are refused until there is more", "make room, or delete a map";

@@ -10,11 +10,11 @@ use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
 use super::time_limit::TimeLimit;
-use super::trajectory::check_not_forgotten;
+use super::trajectory::{scan_id_too_old, scan_name};
 use super::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
 use crate::map::{
-    CallerName, Change, Committed, Leaving, MappedScan, MultiResolutionMap, Request, RequestKind, Trajectory,
-    UndoRecord, WithdrawnScan,
+    CallerName, Change, Committed, KnownScan, Leaving, MappedScan, MultiResolutionMap, Request, RequestKind,
+    Trajectory, UndoRecord, WithdrawnScan,
 };
 use crate::store::{MapFolder, NotObserved, Observed, Record, StoreError};
 use crate::util::StopSignal;
@@ -176,9 +176,13 @@ impl HostedMap {
             found.map(|pose| vec![pose.revision]).ok_or_else(missing)
         };
         let scans = match target {
-            UndoTarget::Scan { robot, scan_id } => {
-                check_not_forgotten(&trajectory, robot, *scan_id)?;
-                one(trajectory.find(robot, *scan_id), format!("of scan_id {scan_id} of robot {robot}"))?
+            UndoTarget::Scan { robot, session, scan_id } => {
+                let found = match trajectory.known(robot, session, *scan_id) {
+                    Some(KnownScan::Kept(pose)) => Some(pose),
+                    Some(KnownScan::TooOld) => return Err(scan_id_too_old(robot, session, *scan_id)),
+                    Some(KnownScan::Undone(_)) | None => None,
+                };
+                one(found, format!("of {}", scan_name(robot, session, *scan_id)))?
             }
             UndoTarget::Revision(revision) => {
                 self.check_undo_window(&trajectory, *revision)?;
@@ -236,8 +240,10 @@ impl HostedMap {
 fn digest(target: &UndoTarget) -> u64 {
     let digest = Digest::new("undo");
     match target {
-        UndoTarget::Scan { robot, scan_id } => {
-            digest.bytes(b"scan").bytes(robot.as_str().as_bytes()).number(*scan_id)
+        UndoTarget::Scan { robot, session, scan_id } => {
+            let digest = digest.bytes(b"scan").bytes(robot.as_str().as_bytes()).number(*scan_id);
+            // Requests from before there were sessions have the digest without one.
+            if session.is_empty() { digest } else { digest.bytes(session.as_str().as_bytes()) }
         }
         UndoTarget::Revision(revision) => digest.bytes(b"revision").number(*revision),
         UndoTarget::RobotSince { robot, revision } => {
@@ -251,7 +257,7 @@ fn digest(target: &UndoTarget) -> u64 {
 fn former_digest(target: &UndoTarget) -> u64 {
     let digest = FormerDigest::default().bytes(b"undo");
     match target {
-        UndoTarget::Scan { robot, scan_id } => digest.bytes(robot.as_str().as_bytes()).number(*scan_id),
+        UndoTarget::Scan { robot, scan_id, .. } => digest.bytes(robot.as_str().as_bytes()).number(*scan_id),
         UndoTarget::Revision(revision) => digest.number(*revision),
         UndoTarget::RobotSince { robot, revision } => {
             digest.bytes(b"since").bytes(robot.as_str().as_bytes()).number(*revision)

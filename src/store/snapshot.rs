@@ -3,7 +3,7 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 4
+//!      8  4      format version, u32 little-endian: 5
 //!     12  4      CRC-32C of the version, from version 3 on, and of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
 //!     24  8      from version 4 on: head of the map's journal when the file was written, the last revision that may
@@ -37,8 +37,8 @@ use writing::body_of;
 
 /// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
 /// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
-/// header has neither head nor uuid.
-pub const FORMAT_VERSION: u32 = 4;
+/// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored.
+pub const FORMAT_VERSION: u32 = 5;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 pub(super) const HEADER_BYTES: usize = 48;
 /// Bytes of the header up to version 3.
@@ -296,7 +296,8 @@ mod tests {
     use super::*;
     use crate::geometry;
     use crate::map::{
-        CallerName, CompletedRequest, MappedScan, RequestId, RobotName, Trajectory, WithdrawnScan,
+        CallerName, CompletedRequest, ForgottenIds, MappedScan, RequestId, RobotName, SessionName,
+        Trajectory, WithdrawnScan,
     };
     use crate::store::codec::moments;
     use crate::store::pb;
@@ -306,6 +307,7 @@ mod tests {
         let keys = (0..5000).map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3]).unwrap());
         let pose = MappedScan {
             robot: RobotName::new("r1").unwrap(),
+            session: SessionName::new("boot-2").unwrap(),
             scan_id: Some(7),
             timestamp_ns: Some(-5),
             map_from_sensor: geometry::pose([1.0, -2.0, 0.5], [0.0, 0.6, 0.0, 0.8]).unwrap(),
@@ -328,11 +330,27 @@ mod tests {
                 revision: 42,
                 moments: MomentSet::from_iter([(VoxelKey::new([1, -2, 0]).unwrap(), moments)]),
                 voxels: keys.collect(),
-                trajectory: Trajectory::new([pose], vec![WithdrawnScan { scan: 39, revision: 42 }])
-                    .with_forgotten(&RobotName::new("r0").unwrap(), [(0, 6), (9, 9), (u64::MAX, u64::MAX)]),
+                trajectory: trajectory_of(pose),
                 requests: [request].into_iter().collect(),
             },
         }
+    }
+
+    /// A trajectory with a scan, one that was undone, and ids of which nothing else is known.
+    fn trajectory_of(pose: MappedScan) -> Trajectory {
+        let r0 = RobotName::new("r0").unwrap();
+        let session = SessionName::new("boot-1").unwrap();
+        let ids = |session, last_revision| ForgottenIds {
+            session,
+            ranges: &[(0, 6), (9, 9), (u64::MAX, u64::MAX)],
+            last_revision,
+        };
+        let undone = MappedScan { revision: 39, session: session.clone(), ..pose.clone() };
+        Trajectory::default()
+            .with_forgotten(&r0, &ids(Some(&SessionName::default()), 0))
+            .with_forgotten(&r0, &ids(Some(&session), 17))
+            .with_forgotten(&r0, &ids(None, 0))
+            .with_poses([undone, pose], vec![WithdrawnScan { scan: 39, revision: 42 }])
     }
 
     /// All of it in one message.
@@ -347,7 +365,7 @@ mod tests {
             revision: *revision,
             block_keys: Vec::new(),
             block_masks: Vec::new().into(),
-            trajectory: trajectory.poses().map(Into::into).collect(),
+            trajectory: trajectory.stored().map(Into::into).collect(),
             voxels: Some(voxels.into()),
             withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
             requests: requests.iter().map(Into::into).collect(),
@@ -463,8 +481,9 @@ mod tests {
     #[test]
     fn a_newer_version_is_refused_by_name() {
         let mut bytes = snapshot().encode().unwrap();
-        bytes[8] = 5;
-        assert!(Snapshot::decode(&bytes).unwrap_err().contains("format version 5"));
+        let newer = FORMAT_VERSION + 1;
+        bytes[VERSION].copy_from_slice(&newer.to_le_bytes());
+        assert!(Snapshot::decode(&bytes).unwrap_err().contains(&format!("format version {newer}")));
     }
 
     #[test]

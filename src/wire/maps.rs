@@ -1,11 +1,13 @@
 //! Maps, their settings and their descriptions (`maps.proto`).
 
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
+use super::scan::verdict_from;
 use super::types::count_from;
 use super::{InField, pb, required};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
+use crate::mapping::Sighting;
 use crate::service::{MapInfo, MapList, MapStorage, ServiceError, UnavailableMap};
 use crate::store::JournalUse;
 use crate::util::Durations;
@@ -125,6 +127,7 @@ impl From<MapInfo> for pb::MapInfo {
             levels: info.levels.iter().map(Into::into).collect(),
             scans: info.scans as u64,
             robots: info.robots.iter().map(ToString::to_string).collect(),
+            sightings: info.sightings.iter().map(Into::into).collect(),
             set_bytes: info.set_bytes as u64,
             storage: info.storage.map(Into::into),
             moment_bytes: info.moment_bytes as u64,
@@ -146,6 +149,7 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             levels: info.levels.iter().map(Into::into).collect(),
             scans: count_from(info.scans),
             robots: robots.in_field("map.robots")?,
+            sightings: info.sightings.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
             set_bytes: count_from(info.set_bytes),
             commits: Durations::default(),
             storage: info.storage.map(Into::into),
@@ -153,6 +157,42 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             trajectory_bytes: count_from(info.trajectory_bytes),
         })
     }
+}
+
+impl From<&Sighting> for pb::RobotSighting {
+    fn from(sighting: &Sighting) -> Self {
+        Self {
+            robot: sighting.robot.to_string(),
+            seen_at_ns: nanoseconds(sighting.seen_at),
+            timestamp_ns: sighting.timestamp_ns,
+            map_from_sensor: Some((&sighting.map_from_sensor).into()),
+            verdict: pb::Verdict::from(sighting.verdict).into(),
+            stationary: sighting.is_stationary,
+        }
+    }
+}
+
+impl TryFrom<pb::RobotSighting> for Sighting {
+    type Error = ServiceError;
+
+    fn try_from(sighting: pb::RobotSighting) -> Result<Self, ServiceError> {
+        let since_epoch = Duration::from_nanos(u64::try_from(sighting.seen_at_ns).unwrap_or(0));
+        let map_from_sensor = required(sighting.map_from_sensor, "map.sightings.map_from_sensor")?;
+        Ok(Self {
+            robot: RobotName::new(&sighting.robot).in_field("map.sightings.robot")?,
+            seen_at: SystemTime::UNIX_EPOCH + since_epoch,
+            timestamp_ns: sighting.timestamp_ns,
+            map_from_sensor: map_from_sensor.try_into().in_field("map.sightings.map_from_sensor")?,
+            verdict: verdict_from(sighting.verdict)?,
+            is_stationary: sighting.stationary,
+        })
+    }
+}
+
+/// Nanoseconds since the Unix epoch; 0 before it, and the largest number after 2262.
+pub(super) fn nanoseconds(time: SystemTime) -> i64 {
+    let since_epoch = time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since_epoch.as_nanos()).unwrap_or(i64::MAX)
 }
 
 impl From<MapStorage> for pb::MapStorage {

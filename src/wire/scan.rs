@@ -7,7 +7,7 @@ use bytes::Bytes;
 use super::types::count_from;
 use super::{InField, pb, required};
 use crate::align::{Direction, Method, Verdict};
-use crate::map::{MapName, RobotName};
+use crate::map::{MapName, RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError};
@@ -40,6 +40,7 @@ fn scan_from(
     let scan = required(scan, "scan")?;
     let filter = filter_from(&scan)?;
     Ok(ScanRequest {
+        session: SessionName::new(&scan.session).in_field("scan.session")?,
         scan_id: scan.scan_id,
         timestamp_ns: scan.timestamp_ns,
         guess: guess_from(guess)?,
@@ -125,6 +126,7 @@ impl From<ScanRequest> for pb::Scan {
         };
         Self {
             robot: scan.robot.to_string(),
+            session: scan.session.to_string(),
             scan_id: scan.scan_id,
             points: Some(scan.points.into()),
             timestamp_ns: scan.timestamp_ns,

@@ -2,7 +2,7 @@
 
 use super::types::count_from;
 use super::{InField, pb, required};
-use crate::map::{MapName, MappedScan, RobotName};
+use crate::map::{MapName, MappedScan, RobotName, SessionName};
 use crate::service::{ServiceError, TrajectoryAnswer, TrajectoryQuery};
 
 impl TryFrom<pb::GetTrajectoryRequest> for (MapName, TrajectoryQuery) {
@@ -65,6 +65,7 @@ impl From<&MappedScan> for pb::TrajectoryPose {
     fn from(pose: &MappedScan) -> Self {
         Self {
             robot: pose.robot.to_string(),
+            session: pose.session.to_string(),
             scan_id: pose.scan_id,
             timestamp_ns: pose.timestamp_ns,
             map_from_sensor: Some((&pose.map_from_sensor).into()),
@@ -104,6 +105,7 @@ impl TryFrom<pb::TrajectoryPose> for MappedScan {
         let map_from_sensor = required(pose.map_from_sensor, "poses.map_from_sensor")?;
         Ok(Self {
             robot: RobotName::new(&pose.robot)?,
+            session: SessionName::new(&pose.session)?,
             scan_id: pose.scan_id,
             timestamp_ns: pose.timestamp_ns,
             map_from_sensor: map_from_sensor.try_into().in_field("poses.map_from_sensor")?,

@@ -2,7 +2,7 @@
 
 use super::types::{count_from, request_id_from, text_of};
 use super::{InField, pb, required};
-use crate::map::{MapName, RobotName};
+use crate::map::{MapName, RobotName, SessionName};
 use crate::service::{ServiceError, Undo, UndoAnswer, UndoTarget};
 
 impl TryFrom<pb::UndoRequest> for (MapName, Undo) {
@@ -11,9 +11,11 @@ impl TryFrom<pb::UndoRequest> for (MapName, Undo) {
     fn try_from(request: pb::UndoRequest) -> Result<Self, ServiceError> {
         use pb::undo_request::Target;
         let target = match required(request.target, "target")? {
-            Target::Scan(pb::RobotScan { robot, scan_id }) => {
-                UndoTarget::Scan { robot: RobotName::new(&robot).in_field("scan.robot")?, scan_id }
-            }
+            Target::Scan(pb::RobotScan { robot, session, scan_id }) => UndoTarget::Scan {
+                robot: RobotName::new(&robot).in_field("scan.robot")?,
+                session: SessionName::new(&session).in_field("scan.session")?,
+                scan_id,
+            },
             Target::Revision(revision) => UndoTarget::Revision(revision),
             Target::Since(pb::RobotSince { robot, revision }) => {
                 UndoTarget::RobotSince { robot: RobotName::new(&robot).in_field("since.robot")?, revision }
@@ -27,9 +29,11 @@ impl From<(&MapName, Undo)> for pb::UndoRequest {
     fn from((map, undo): (&MapName, Undo)) -> Self {
         use pb::undo_request::Target;
         let target = match undo.target {
-            UndoTarget::Scan { robot, scan_id } => {
-                Target::Scan(pb::RobotScan { robot: robot.to_string(), scan_id })
-            }
+            UndoTarget::Scan { robot, session, scan_id } => Target::Scan(pb::RobotScan {
+                robot: robot.to_string(),
+                session: session.to_string(),
+                scan_id,
+            }),
             UndoTarget::Revision(revision) => Target::Revision(revision),
             UndoTarget::RobotSince { robot, revision } => {
                 Target::Since(pb::RobotSince { robot: robot.to_string(), revision })

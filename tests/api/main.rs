@@ -12,6 +12,7 @@ mod lifecycle;
 mod localize;
 mod memory_returns;
 mod scan_requests;
+mod sessions;
 #[path = "../support/mod.rs"]
 mod support;
 mod trajectory;

@@ -3,9 +3,10 @@
 
 use mrol::config::RobotConfig;
 use mrol::wire::pb;
+use reqwest::StatusCode;
 use serde_json::json;
 
-use crate::support::daemon::{Daemon, bits_of, bytes_of, corner, guess_pb, json_of, scan_pb};
+use crate::support::daemon::{Daemon, bits_of, bytes_of, corner, guess_pb, json_of, row, scan_pb};
 
 /// The corner as a sensor sees it that stands at `at`, and a scan of it that is to be aligned.
 fn seen_from(at: [f32; 3]) -> Vec<[f32; 3]> {

@@ -20,7 +20,7 @@ use std::time::Duration;
 
 use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
-use mrol::map::{MapName, RequestId, RobotName};
+use mrol::map::{MapName, RequestId, RobotName, SessionName};
 use mrol::mapping::Guess;
 use mrol::service::{Deletion, DeletionTarget, ScanRequest, Undo, UndoTarget};
 use mrol::voxel::{Lattice, VoxelKey};
@@ -129,7 +129,11 @@ impl Writer {
                 (answer.version, answer.removed)
             }
             Wish::Undo { request_id, scan_id } => {
-                let target = UndoTarget::Scan { robot: self.robot(), scan_id: *scan_id };
+                let target = UndoTarget::Scan {
+                    robot: self.robot(),
+                    session: SessionName::default(),
+                    scan_id: *scan_id,
+                };
                 let undo = Undo { target, request_id: Some(request_id.clone()) };
                 let answer = client.undo(&office(), undo).await?;
                 assert_eq!(answer.scans, 1);

@@ -193,6 +193,27 @@ async fn a_data_folder_of_version_3_is_opened_with_its_journal() {
     assert_eq!(undone["scans"], 1);
 }
 
+/// The same, of map files of version 4 and journals of version 3: scans have no session there.
+#[tokio::test]
+async fn a_data_folder_of_version_4_is_opened_with_its_journal() {
+    let daemon = Daemon::start_in(released("data-4"), |_| {}).await;
+    let (revision, voxels) = daemon.contents("office").await;
+    assert_eq!((revision, voxels.len()), (7, 567));
+    let scans = json_of(daemon.get("/v1/maps/office/trajectory").await).await;
+    let made: Vec<_> = scans["poses"].as_array().unwrap().iter().map(|pose| &pose["revision"]).collect();
+    assert_eq!(made, [1, 3, 5, 6]);
+    assert_eq!(scans["poses"][3]["session"], "");
+    let undo = json!({"revision": 2, "request_id": "u-2"});
+    let again = json_of(daemon.post("/v1/maps/office/undo", undo).await).await;
+    assert_eq!((&again["replayed"], &again["removed"]), (&json!(true), &json!(91)));
+    let undone =
+        json_of(daemon.post("/v1/maps/office/undo", json!({"robot": "r1", "scan_id": 0})).await).await;
+    assert_eq!(undone["scans"], 1);
+    let before = daemon.contents("office").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("office").await, before);
+}
+
 #[tokio::test]
 async fn a_damaged_snapshot_is_set_aside_and_goes_with_those_of_its_age() {
     let daemon = Daemon::start_with(|config| config.store.undo_revisions = 1).await;

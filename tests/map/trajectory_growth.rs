@@ -4,7 +4,9 @@
 //! `MROL_GROWTH_SCANS=1000000` sets the number of scans; without, 64,000.
 
 use mrol::geometry::{Point, Pose};
-use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord, TrajectorySpacing};
+use mrol::map::{
+    MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName, TrajectorySpacing,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -65,7 +67,6 @@ fn the_second_half_of_the_scans_adds_a_pose_a_minute_and_robot() {
     assert!(stated < thick / 4, "what is stated says nothing: {stated} of {thick}");
     assert!(all <= half + stated, "{half} bytes at half, {all} in the end, {stated} are stated");
     assert!(names.iter().all(|robot| {
-        (0..scans / ROBOTS)
-            .all(|id| trajectory.find(robot, id).is_some() || trajectory.has_forgotten(robot, id))
+        (0..scans / ROBOTS).all(|id| trajectory.known(robot, &SessionName::default(), id).is_some())
     }));
 }

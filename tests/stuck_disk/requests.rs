@@ -79,7 +79,7 @@ pub(crate) fn deletion(random: &mut ChaCha8Rng, map: &str) -> pb::DeleteVoxelsRe
 }
 
 pub(crate) fn undo(map: &str, robot: &str, scan_id: u64) -> pb::UndoRequest {
-    let scan = pb::RobotScan { robot: robot.into(), scan_id };
+    let scan = pb::RobotScan { robot: robot.into(), scan_id, ..Default::default() };
     pb::UndoRequest {
         map: map.into(),
         target: Some(pb::undo_request::Target::Scan(scan)),

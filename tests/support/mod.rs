@@ -7,6 +7,7 @@
 #[cfg(feature = "server")]
 pub mod daemon;
 pub mod disk;
+pub mod hall;
 pub mod hostile_files;
 pub mod map_folders;
 #[cfg(target_os = "linux")]

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::FleetError;
 use super::member::Member;
 use super::target::Target;
-use crate::client::{Client, NewMap};
+use crate::client::{Client, NewMap, new_session};
 use crate::geometry::{Point, Pose};
 use crate::lab::workload::Queries;
-use crate::map::{MapName, Region, RobotName};
+use crate::map::{MapName, Region, RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::service::{Deletion, DeletionTarget, PointCloud, ScanRequest, Undo, UndoTarget};
 
@@ -47,6 +47,8 @@ pub(crate) struct Robot {
     name: RobotName,
     client: Client,
     seen: Seen,
+    /// Session of the robot's scans.
+    session: SessionName,
     /// Name of the shared map.
     shared: MapName,
     /// Name of the mission's map.
@@ -91,6 +93,7 @@ impl Robot {
         Ok(Self {
             own: MapName::new(&format!("{name}-own")).map_err(FleetError::failed)?,
             name: RobotName::new(&name).map_err(FleetError::failed)?,
+            session: new_session(),
             client: target.grpc.connect().await?,
             seen,
             shared: target.map.clone(),
@@ -104,6 +107,7 @@ impl Robot {
     /// is an error.
     async fn insert(&self, map: &MapName, number: u64, at_guess: bool) -> Result<u64, FleetError> {
         let scan = ScanRequest {
+            session: self.session.clone(),
             scan_id: Some(number),
             guess: Guess::Pose(self.seen.map_from_points),
             at_guess,

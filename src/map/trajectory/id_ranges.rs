@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-/// Ranges of ids that a map remembers of one robot's thinned scans, at most: 64 KiB. Beyond, the two of the smallest ids
-/// become one, with the gap between them: an id from there counts as accepted, whether it was or not.
-pub const ID_RANGES_PER_ROBOT_MAX: usize = 4096;
+/// Ranges of ids that a map remembers of one session's forgotten scans, at most: 64 KiB. Beyond, the two of the smallest
+/// ids become one, with the gap between them: an id from there counts as accepted, whether it was or not.
+pub const ID_RANGES_PER_SESSION_MAX: usize = 4096;
 
 /// Sorted ranges of ids, both ends within, with a gap between any two.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl IdRanges {
         let first = met.first().map_or(first, |&(start, _)| start.min(first));
         let last = met.last().map_or(last, |&(_, end)| end.max(last));
         ranges.splice(begin..end.max(begin), [(first, last)]);
-        if ranges.len() > ID_RANGES_PER_ROBOT_MAX {
+        if ranges.len() > ID_RANGES_PER_SESSION_MAX {
             ranges[1].0 = ranges[0].0;
             ranges.remove(0);
         }
@@ -78,12 +78,12 @@ mod tests {
     #[test]
     fn beyond_the_bound_the_oldest_ranges_take_their_gap_in() {
         let mut ranges = IdRanges::default();
-        let most = ID_RANGES_PER_ROBOT_MAX as u64;
+        let most = ID_RANGES_PER_SESSION_MAX as u64;
         (0..most).for_each(|n| ranges.insert(n * 10, n * 10));
-        assert_eq!(ranges.as_slice().len(), ID_RANGES_PER_ROBOT_MAX);
+        assert_eq!(ranges.as_slice().len(), ID_RANGES_PER_SESSION_MAX);
         assert!(!ranges.contains(5));
         ranges.insert(most * 10, most * 10);
-        assert_eq!(ranges.as_slice().len(), ID_RANGES_PER_ROBOT_MAX);
+        assert_eq!(ranges.as_slice().len(), ID_RANGES_PER_SESSION_MAX);
         assert!(ranges.contains(5) && !ranges.contains(15) && ranges.contains(most * 10));
     }
 }

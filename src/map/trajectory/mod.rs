@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! poses    chunk  chunk  chunk ...      all robots, by revision, 256 poses a chunk
-//! robots   r1 -> revisions, ids -> revisions, ranges of the ids of thinned scans
+//! robots   r1 -> revisions; session -> (ids -> revisions, ranges of the ids of thinned scans)
 //!          r2 -> ...
 //! marked   poses that were taken out again and are still in their chunks
 //! ```
@@ -18,18 +18,20 @@ mod chunked;
 mod id_ranges;
 mod robot_scans;
 mod scan;
+mod session;
 mod thinning;
 
-pub use id_ranges::ID_RANGES_PER_ROBOT_MAX;
+pub use id_ranges::ID_RANGES_PER_SESSION_MAX;
+pub use robot_scans::SESSIONS_PER_ROBOT_MAX;
 pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, WithdrawnScan};
 pub use thinning::TrajectorySpacing;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::RobotName;
+use super::{RobotName, SessionName};
 use chunked::{Chunked, Keyed};
-use robot_scans::RobotScans;
+use robot_scans::{KnownId, RobotScans};
 
 impl Keyed for MappedScan {
     fn key(&self) -> u64 {
@@ -48,6 +50,29 @@ pub struct Trajectory {
     withdrawn: Arc<Vec<WithdrawnScan>>,
     /// Bytes that poses point to.
     overlap_bytes: usize,
+}
+
+/// What a map knows of a scan by its robot, session and id.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KnownScan<'a> {
+    /// It was accepted and is in the map.
+    Kept(&'a MappedScan),
+    /// It was accepted, and an undo took it out of the map.
+    Undone(&'a MappedScan),
+    /// It was accepted, or may have been, so long ago that its pose is not stored.
+    TooOld,
+}
+
+/// Ids of a robot's scans whose poses are not stored any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ForgottenIds<'a> {
+    /// The session whose ids they are. None: `ranges` are digests of the names of closed sessions, all of whose ids are
+    /// too old.
+    pub session: Option<&'a SessionName>,
+    /// The ids as ascending ranges, both ends within.
+    pub ranges: &'a [(u64, u64)],
+    /// The last revision that a scan of the session made; 0 of the empty session, which is never closed.
+    pub last_revision: u64,
 }
 
 impl Trajectory {
@@ -92,8 +117,7 @@ impl Trajectory {
         self.poses.get(revision).filter(|pose| !self.marked.contains(&pose.revision))
     }
 
-    /// The scans that were taken out again, in the order in which that was done: all that undo has to know of. They are
-    /// no longer accepted: their ids may be used again.
+    /// The scans that were taken out again, in the order in which that was done: all that undo has to know of.
     pub fn withdrawn(&self) -> &[WithdrawnScan] {
         &self.withdrawn
     }
@@ -110,25 +134,30 @@ impl Trajectory {
         Some((self.poses.get(*last)?, self.poses.get(*before)?))
     }
 
-    /// A robot's accepted scan of that number, where its pose is kept.
-    pub fn find(&self, robot: &RobotName, scan_id: u64) -> Option<&MappedScan> {
-        self.poses.get(self.robots.get(robot)?.find(scan_id)?)
+    /// What is known of a robot's scan by its id.
+    pub fn known(&self, robot: &RobotName, session: &SessionName, scan_id: u64) -> Option<KnownScan<'_>> {
+        match self.robots.get(robot)?.find(session, scan_id)? {
+            KnownId::TooOld => Some(KnownScan::TooOld),
+            KnownId::Of(revision) => {
+                let scan = self.poses.get(revision)?;
+                let is_undone = self.marked.contains(&revision);
+                Some(if is_undone { KnownScan::Undone(scan) } else { KnownScan::Kept(scan) })
+            }
+        }
     }
 
-    /// True when a robot's scan of that number was accepted, or may have been, so long ago that its pose is not kept.
-    pub fn has_forgotten(&self, robot: &RobotName, scan_id: u64) -> bool {
-        self.robots
-            .get(robot)
-            .is_some_and(|robot| robot.find(scan_id).is_none() && robot.forgotten.contains(scan_id))
+    /// All scans whose poses are stored, in the order of acceptance: those that were undone are among them until
+    /// thinning takes them, so that their ids tell them.
+    pub fn stored(&self) -> impl Iterator<Item = &MappedScan> {
+        self.poses.iter()
     }
 
-    /// The ids of scans whose poses are not kept, robot by robot: ranges with both ends within, ascending.
-    pub fn forgotten(&self) -> impl Iterator<Item = (&RobotName, &[(u64, u64)])> {
-        let ranges = self.robots.iter().map(|(name, robot)| (name, robot.forgotten.as_slice()));
-        ranges.filter(|(_, ranges)| !ranges.is_empty())
+    /// The ids of scans whose poses are not stored, robot by robot, session by session.
+    pub fn forgotten(&self) -> impl Iterator<Item = (&RobotName, ForgottenIds<'_>)> {
+        self.robots.iter().flat_map(|(name, robot)| robot.forgotten().map(move |ids| (name, ids)))
     }
 
-    /// True when a robot sent a scan that was accepted and not taken out again.
+    /// True when a scan of the robot was accepted, even if it was undone.
     pub fn knows(&self, robot: &RobotName) -> bool {
         self.robots.contains_key(robot)
     }
@@ -153,16 +182,28 @@ impl Trajectory {
         size_of::<Self>() + self.poses.bytes() + self.overlap_bytes + robots + marked + withdrawn
     }
 
-    pub(super) fn push(&mut self, mut pose: MappedScan) {
+    pub(super) fn push(&mut self, pose: MappedScan) {
+        self.put(pose, false);
+    }
+
+    fn put(&mut self, mut pose: MappedScan, is_undone: bool) {
         if self.poses.get(pose.revision).is_some() {
             return;
         }
         let robots = Arc::make_mut(&mut self.robots);
-        // One name for all of a robot's poses.
-        if let Some((name, _)) = robots.get_key_value(&pose.robot) {
+        // One name for all of a robot's poses, and one for all of a session's.
+        if let Some((name, scans)) = robots.get_key_value(&pose.robot) {
+            pose.session = scans.session_name(&pose.session).unwrap_or(&pose.session).clone();
             pose.robot = name.clone();
         }
-        Arc::make_mut(robots.entry(pose.robot.clone()).or_default()).push(&pose);
+        let robot = Arc::make_mut(robots.entry(pose.robot.clone()).or_default());
+        match is_undone {
+            false => robot.push(&pose),
+            true => {
+                robot.push_id(&pose);
+                Arc::make_mut(&mut self.marked).insert(pose.revision);
+            }
+        }
         pose.level_overlaps.shrink_to_fit();
         self.overlap_bytes += overlap_bytes(&pose);
         self.poses.insert(pose);
@@ -170,18 +211,31 @@ impl Trajectory {
 }
 
 impl Trajectory {
-    /// The trajectory of these poses, after the scans of `withdrawn` were taken out of it.
+    /// The trajectory of these poses, in ascending order of their revisions, of which those of `withdrawn` were undone.
     pub fn new(poses: impl IntoIterator<Item = MappedScan>, withdrawn: Vec<WithdrawnScan>) -> Self {
-        let mut trajectory = Self { withdrawn: withdrawn.into(), ..Self::default() };
-        poses.into_iter().for_each(|pose| trajectory.push(pose));
-        trajectory
+        Self::default().with_poses(poses, withdrawn)
     }
 
-    /// This trajectory, where the scans of a robot with the ids `ranges`, both ends within, are not kept.
-    pub fn with_forgotten(mut self, robot: &RobotName, ranges: impl IntoIterator<Item = (u64, u64)>) -> Self {
+    /// This trajectory, without a pose yet, with these poses: see [`Trajectory::new`].
+    pub fn with_poses(
+        mut self,
+        poses: impl IntoIterator<Item = MappedScan>,
+        withdrawn: Vec<WithdrawnScan>,
+    ) -> Self {
+        let undone: BTreeSet<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();
+        for pose in poses {
+            let is_undone = undone.contains(&pose.revision);
+            self.put(pose, is_undone);
+        }
+        self.withdrawn = withdrawn.into();
+        self
+    }
+
+    /// This trajectory, which has no pose yet, with ids of a robot's scans whose poses are not stored. They come before
+    /// the poses, since scans of a closed session have no ids.
+    pub fn with_forgotten(mut self, robot: &RobotName, ids: &ForgottenIds<'_>) -> Self {
         let robots = Arc::make_mut(&mut self.robots);
-        let robot = Arc::make_mut(robots.entry(robot.clone()).or_default());
-        ranges.into_iter().for_each(|(first, last)| robot.forgotten.insert(first, last));
+        Arc::make_mut(robots.entry(robot.clone()).or_default()).remember(ids);
         self
     }
 
@@ -204,13 +258,12 @@ impl Trajectory {
             let poses = revisions.iter().filter_map(|&revision| self.poses.get(revision));
             let thinned: Vec<_> = poses.filter(|pose| !robot.seen.keeps(pose, spacing)).collect();
             gone.extend(thinned.iter().map(|pose| pose.revision));
-            for id in robot.remove(thinned.into_iter()) {
-                robot.forgotten.insert(id, id);
-            }
+            robot.forget(thinned.into_iter());
         }
         let thinned = gone.len();
         let marked: Vec<u64> = self.marked.range(..before).copied().collect();
         if !marked.is_empty() {
+            self.forget_undone(&marked);
             Arc::make_mut(&mut self.marked).retain(|revision| *revision >= before);
             gone.extend(marked);
         }
@@ -232,20 +285,34 @@ impl Trajectory {
         unjudged.filter(|(_, revisions)| !revisions.is_empty()).collect()
     }
 
-    /// Makes robots forget scans, which ascend.
+    /// Takes scans, which ascend, out of what robots have in the map. Their ids stay known.
     fn take_from_robots(&mut self, scans: &[u64]) {
-        let mut by_robot: BTreeMap<RobotName, Vec<&MappedScan>> = BTreeMap::new();
-        for pose in scans.iter().filter_map(|&scan| self.poses.get(scan)) {
-            by_robot.entry(pose.robot.clone()).or_default().push(pose);
-        }
-        let robots = Arc::make_mut(&mut self.robots);
-        for (name, poses) in by_robot {
+        for (name, poses) in self.by_robot(scans) {
+            let robots = Arc::make_mut(&mut self.robots);
             let Some(robot) = robots.get_mut(&name).map(Arc::make_mut) else { continue };
-            robot.remove(poses.into_iter());
+            robot.withdraw(&poses.iter().map(|pose| pose.revision).collect::<Vec<_>>());
             if robot.is_unknown() {
                 robots.remove(&name);
             }
         }
+    }
+
+    /// Forgets scans, which ascend and were undone, but for their ids.
+    fn forget_undone(&mut self, scans: &[u64]) {
+        for (name, poses) in self.by_robot(scans) {
+            if let Some(robot) = Arc::make_mut(&mut self.robots).get_mut(&name) {
+                Arc::make_mut(robot).forget(poses.iter());
+            }
+        }
+    }
+
+    /// The stored ones of these scans, by robot, in their order.
+    fn by_robot(&self, scans: &[u64]) -> BTreeMap<RobotName, Vec<MappedScan>> {
+        let mut by_robot: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for pose in scans.iter().filter_map(|&scan| self.poses.get(scan)) {
+            by_robot.entry(pose.robot.clone()).or_default().push(pose.clone());
+        }
+        by_robot
     }
 }
 
@@ -256,7 +323,8 @@ fn overlap_bytes(pose: &MappedScan) -> usize {
 impl PartialEq for Trajectory {
     /// The indices follow from the poses.
     fn eq(&self, other: &Self) -> bool {
-        self.poses().eq(other.poses())
+        self.stored().eq(other.stored())
+            && self.marked == other.marked
             && self.withdrawn == other.withdrawn
             && self.forgotten().eq(other.forgotten())
     }

@@ -1,7 +1,7 @@
 //! A scan as it enters a map, and what is kept of it.
 
 use crate::geometry::{Point, Pose};
-use crate::map::RobotName;
+use crate::map::{RobotName, SessionName};
 use crate::voxel::{Lattice, MomentSet, VoxelSet};
 
 /// A scan as it enters a map: everything that replaying the insertion needs, nothing that would have to be
@@ -37,7 +37,9 @@ impl ScanRecord {
 pub struct MappedScan {
     /// The robot that sent the scan.
     pub robot: RobotName,
-    /// The robot's own number of the scan.
+    /// The run of the robot's software that sent it.
+    pub session: SessionName,
+    /// The robot's own number of the scan, unique in its session.
     pub scan_id: Option<u64>,
     /// When the scan was taken, nanoseconds since the Unix epoch.
     pub timestamp_ns: Option<i64>,
@@ -62,6 +64,7 @@ impl MappedScan {
     pub fn new(robot: RobotName, map_from_sensor: Pose) -> Self {
         Self {
             robot,
+            session: SessionName::default(),
             scan_id: None,
             timestamp_ns: None,
             map_from_sensor,

@@ -24,6 +24,10 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
+fn session(n: u64) -> SessionName {
+    SessionName::new(&if n == 0 { String::new() } else { format!("boot-{n}") }).unwrap()
+}
+
 fn robot(n: u8) -> RobotName {
     RobotName::new(&format!("r{n}")).unwrap()
 }
@@ -81,10 +85,17 @@ fn check(trajectory: &Trajectory, model: &Model, spacing: &TrajectorySpacing) ->
         prop_assert_eq!(after, expected);
         for pose in model.all.iter().filter(of_robot) {
             let Some(id) = pose.scan_id else { continue };
-            let found = kept.iter().find(|kept| kept.robot == name && kept.scan_id == Some(id));
-            prop_assert_eq!(trajectory.find(&name, id), found);
-            let accepted = model.accepted().any(|other| other.robot == name && other.scan_id == Some(id));
-            prop_assert_eq!(trajectory.has_forgotten(&name, id), accepted && found.is_none());
+            let known = trajectory.known(&name, &pose.session, id);
+            let expected = match kept.iter().find(|kept| kept.revision == pose.revision) {
+                Some(kept) => KnownScan::Kept(kept),
+                None if model.gone.contains(&pose.revision) && pose.revision >= model.base => {
+                    KnownScan::Undone(pose)
+                }
+                None => KnownScan::TooOld,
+            };
+            prop_assert_eq!(known, Some(expected));
+            let other_session = session(pose.revision % 2 + 20);
+            prop_assert_eq!(trajectory.known(&name, &other_session, id), None);
         }
     }
     Ok(())
@@ -106,7 +117,8 @@ proptest! {
                     let at = Pose::translation(f64::from(x[usize::from(n)] % 900) / 100.0, 0.0, 0.0);
                     let pose = MappedScan {
                         revision: model.revision,
-                        scan_id: (model.revision % 5 != 0).then_some(model.revision * 7),
+                        session: session(model.revision / 500),
+                        scan_id: (model.revision % 5 != 0).then_some(model.revision % 500 * 7),
                         timestamp_ns: Some(model.revision as i64 * 300_000_000),
                         level_overlaps: vec![0.5; 3],
                         ..MappedScan::new(robot(n), at)
@@ -132,11 +144,7 @@ proptest! {
             prop_assert_eq!(copy.poses().cloned().collect::<Vec<_>>(), before);
         }
         // As it is after a restart: nothing is known but what a snapshot holds.
-        let poses: Vec<_> = trajectory.poses().cloned().collect();
-        let mut restored = Trajectory::new(poses, trajectory.withdrawn().to_vec());
-        for (robot, ranges) in trajectory.forgotten() {
-            restored = restored.with_forgotten(robot, ranges.iter().copied());
-        }
+        let mut restored = restored(&trajectory);
         prop_assert_eq!(&restored, &trajectory);
         model.base = model.revision + 1;
         restored.thin(model.base, &spacing);
@@ -144,15 +152,64 @@ proptest! {
     }
 }
 
+/// The trajectory as a snapshot gives it back.
+fn restored(trajectory: &Trajectory) -> Trajectory {
+    let forgotten = trajectory.forgotten();
+    let empty = forgotten.fold(Trajectory::default(), |all, (robot, ids)| all.with_forgotten(robot, &ids));
+    empty.with_poses(trajectory.stored().cloned(), trajectory.withdrawn().to_vec())
+}
+
+fn scan(revision: u64, session: &SessionName, id: u64) -> MappedScan {
+    let pose = MappedScan::new(robot(0), Pose::identity());
+    MappedScan { revision, session: session.clone(), scan_id: Some(id), ..pose }
+}
+
 #[test]
-fn an_undone_id_may_be_used_again_and_is_then_that_of_the_new_scan() {
-    let pose =
-        |revision| MappedScan { revision, scan_id: Some(7), ..MappedScan::new(robot(0), Pose::identity()) };
-    let mut trajectory: Trajectory = [pose(1)].into_iter().collect();
+fn the_id_of_an_undone_scan_stays_known_and_may_be_that_of_a_later_one_in_old_journals() {
+    let none = SessionName::default();
+    let mut trajectory: Trajectory = [scan(1, &none, 7)].into_iter().collect();
     trajectory.withdraw(&[1], 2);
-    assert!(!trajectory.knows(&robot(0)) && trajectory.find(&robot(0), 7).is_none());
-    trajectory.push(pose(3));
-    assert_eq!(trajectory.find(&robot(0), 7).map(|pose| pose.revision), Some(3));
+    let known = |trajectory: &Trajectory| {
+        trajectory.known(&robot(0), &none, 7).map(|known| match known {
+            KnownScan::Kept(pose) => ("kept", pose.revision),
+            KnownScan::Undone(pose) => ("undone", pose.revision),
+            KnownScan::TooOld => ("too old", 0),
+        })
+    };
+    assert_eq!(known(&trajectory), Some(("undone", 1)));
+    assert_eq!(known(&restored(&trajectory)), Some(("undone", 1)));
+    assert!(trajectory.is_empty() && trajectory.last_of(&robot(0)).is_none());
+    let mut thinned = trajectory.clone();
+    thinned.thin(3, &TrajectorySpacing::default());
+    assert_eq!(known(&thinned), Some(("too old", 0)));
+    // Servers that did not remember undone ids let them be used again.
+    trajectory.push(scan(3, &none, 7));
+    assert_eq!(known(&trajectory), Some(("kept", 3)));
     trajectory.thin(3, &TrajectorySpacing::default());
-    assert_eq!(trajectory.find(&robot(0), 7).map(|pose| pose.revision), Some(3));
+    assert_eq!(known(&trajectory), Some(("kept", 3)));
+}
+
+#[test]
+fn beyond_their_bound_the_session_is_closed_that_was_used_least_recently() {
+    let most = SESSIONS_PER_ROBOT_MAX as u64;
+    let mut trajectory: Trajectory = (1..=most).map(|n| scan(n, &session(n), 0)).collect();
+    trajectory.push(scan(most + 1, &session(1), 1));
+    trajectory.push(scan(most + 2, &session(0), 0));
+    let is_known = |trajectory: &Trajectory, n, id| trajectory.known(&robot(0), &session(n), id).is_some();
+    let is_too_old = |trajectory: &Trajectory, n, id| {
+        trajectory.known(&robot(0), &session(n), id) == Some(KnownScan::TooOld)
+    };
+    assert!((1..=most).all(|n| !is_too_old(&trajectory, n, 0)));
+    trajectory.push(scan(most + 3, &session(most + 1), 0));
+    for trajectory in [restored(&trajectory), trajectory] {
+        // All ids of a closed session are too old, those that were never used too: it is never taken up again.
+        assert!(is_too_old(&trajectory, 2, 0) && is_too_old(&trajectory, 2, 5));
+        for n in [0, 1, 3, most, most + 1] {
+            assert!(is_known(&trajectory, n, 0) && !is_too_old(&trajectory, n, 0), "{n}");
+            assert!(!is_known(&trajectory, n, 5), "{n}");
+        }
+        assert!(!is_known(&trajectory, most + 2, 0));
+        // The poses of a closed session are poses as all others.
+        assert_eq!(trajectory.len() as u64, most + 3);
+    }
 }

@@ -6,6 +6,7 @@ use bytes::Bytes;
 
 use super::version::MapVersion;
 use crate::map::{LevelInfo, MapName, MapSettings, RobotName};
+use crate::mapping::Sighting;
 use crate::store::JournalUse;
 use crate::util::Durations;
 
@@ -33,6 +34,9 @@ pub struct MapInfo {
     pub scans: usize,
     /// The robots that sent the scans, by name.
     pub robots: Vec<RobotName>,
+    /// The last scan of each robot since the server was started, by name, whether it was accepted or not; of a list of
+    /// maps, none.
+    pub sightings: Vec<Sighting>,
     /// Bytes of memory of the exact sets of all levels.
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments, which alignments are refined with.

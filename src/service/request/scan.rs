@@ -8,7 +8,7 @@ use super::point_cloud::PointCloud;
 use super::version::MapVersion;
 use crate::align::{Direction, Method, Verdict};
 use crate::geometry::Pose;
-use crate::map::RobotName;
+use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{Reason, ServiceError};
@@ -18,6 +18,8 @@ use crate::service::{Reason, ServiceError};
 pub struct ScanRequest {
     /// The robot that sends the scan.
     pub robot: RobotName,
+    /// The run of the robot's software that sends it: scan ids are unique within it.
+    pub session: SessionName,
     /// The robot's own number of the scan; makes insertion idempotent.
     pub scan_id: Option<u64>,
     /// In the sensor frame; not finite = no return.
@@ -60,6 +62,7 @@ impl ScanRequest {
     pub fn new(robot: RobotName, points: PointCloud) -> Self {
         Self {
             robot,
+            session: SessionName::default(),
             scan_id: None,
             points,
             timestamp_ns: None,

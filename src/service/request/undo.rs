@@ -1,7 +1,7 @@
 //! Undo, and its answers.
 
 use super::version::MapVersion;
-use crate::map::{RequestId, RobotName};
+use crate::map::{RequestId, RobotName, SessionName};
 
 /// Which scans to take out again.
 #[derive(Debug, Clone)]
@@ -19,6 +19,8 @@ pub enum UndoTarget {
     Scan {
         /// The robot that sent the scan.
         robot: RobotName,
+        /// The session in which it did.
+        session: SessionName,
         /// The scan's number.
         scan_id: u64,
     },

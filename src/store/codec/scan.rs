@@ -2,7 +2,10 @@
 
 use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
-use crate::map::{ID_RANGES_PER_ROBOT_MAX, MappedScan, RobotName, ScanRecord, Trajectory, WithdrawnScan};
+use crate::map::{
+    ForgottenIds, ID_RANGES_PER_SESSION_MAX, MappedScan, RobotName, ScanRecord, SessionName, Trajectory,
+    WithdrawnScan,
+};
 use crate::store::pb;
 use crate::util::StopSignal;
 
@@ -21,6 +24,7 @@ impl From<&MappedScan> for pb::ScanPose {
             points_skipped: pose.points_skipped as u64,
             new_voxels: pose.new_voxels as u64,
             digest: pose.digest,
+            session: pose.session.as_str().to_owned(),
         }
     }
 }
@@ -34,6 +38,7 @@ impl TryFrom<pb::ScanPose> for MappedScan {
         };
         Ok(Self {
             robot: RobotName::new(&message.robot).map_err(|e| e.to_string())?,
+            session: SessionName::new(&message.session).map_err(|e| e.to_string())?,
             scan_id: message.scan_id,
             timestamp_ns: message.timestamp_ns,
             map_from_sensor: geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?,
@@ -82,14 +87,20 @@ impl From<pb::WithdrawnScan> for WithdrawnScan {
     }
 }
 
-impl From<(&RobotName, &[(u64, u64)])> for pb::ForgottenScans {
-    fn from((robot, ranges): (&RobotName, &[(u64, u64)])) -> Self {
+impl From<(&RobotName, ForgottenIds<'_>)> for pb::ForgottenScans {
+    fn from((robot, ids): (&RobotName, ForgottenIds<'_>)) -> Self {
         let mut end = 0;
-        let gaps = ranges.iter().flat_map(|&(first, last)| {
+        let gaps = ids.ranges.iter().flat_map(|&(first, last)| {
             let gap = first - std::mem::replace(&mut end, last);
             [gap, last - first]
         });
-        Self { robot: robot.as_str().to_owned(), id_gaps: gaps.collect() }
+        Self {
+            robot: robot.as_str().to_owned(),
+            id_gaps: gaps.collect(),
+            session: ids.session.map(|session| session.as_str().to_owned()).unwrap_or_default(),
+            last_revision: ids.last_revision,
+            is_of_closed_sessions: ids.session.is_none(),
+        }
     }
 }
 
@@ -102,11 +113,13 @@ pub(in crate::store) fn with_forgotten(
     forgotten: &[pb::ForgottenScans],
     stop: StopSignal<'_>,
 ) -> Result<Trajectory, Unreadable> {
-    for pb::ForgottenScans { robot, id_gaps } in stop.paced(forgotten, ROBOTS_PER_LOOK) {
+    for message in stop.paced(forgotten, ROBOTS_PER_LOOK) {
+        let pb::ForgottenScans { robot, session, id_gaps, last_revision, is_of_closed_sessions } = message;
         let robot = RobotName::new(robot).map_err(|e| e.to_string())?;
+        let session = SessionName::new(session).map_err(|e| e.to_string())?;
         let (ranges, rest) = id_gaps.as_chunks();
-        if !rest.is_empty() || ranges.len() > ID_RANGES_PER_ROBOT_MAX {
-            let most = 2 * ID_RANGES_PER_ROBOT_MAX;
+        if !rest.is_empty() || ranges.len() > ID_RANGES_PER_SESSION_MAX {
+            let most = 2 * ID_RANGES_PER_SESSION_MAX;
             let found = id_gaps.len();
             return Err(format!(
                 "the forgotten ids of robot {robot} are {found} numbers: pairs, at most {most}"
@@ -120,7 +133,9 @@ pub(in crate::store) fn with_forgotten(
         };
         let ranges: Option<Vec<_>> = ranges.iter().map(range).collect();
         let ranges = ranges.ok_or_else(|| format!("the forgotten ids of robot {robot} go beyond 2^64"))?;
-        trajectory = trajectory.with_forgotten(&robot, ranges);
+        let session = (!is_of_closed_sessions).then_some(&session);
+        let ids = ForgottenIds { session, ranges: &ranges, last_revision: *last_revision };
+        trajectory = trajectory.with_forgotten(&robot, &ids);
     }
     Ok(trajectory)
 }

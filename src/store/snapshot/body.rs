@@ -63,9 +63,9 @@ const SCAN_BYTES: usize = 3 * size_of::<MappedScan>() + 12 * size_of::<f64>() + 
 /// Bytes of memory of a request, which is indexed by its id, its revision and its caller, each with a string of its
 /// own.
 const REQUEST_BYTES: usize = 3 * size_of::<CompletedRequest>() + 320;
-/// Most robots whose forgotten scans a file may list.
-const ROBOTS_MAX: usize = 1 << 20;
-/// Bytes of memory of a robot with forgotten scans, without the ids: its name, and its entry by name.
+/// Most sessions of robots whose forgotten scans a file may list.
+const SESSIONS_MAX: usize = 1 << 20;
+/// Bytes of memory of a session with forgotten scans, without the ids: its name, the robot's, and their entries by name.
 const FORGOTTEN_BYTES: usize = 480;
 const BLOCK_BYTES: usize = NUMBER_BYTES + size_of::<(VoxelKey, BlockMask)>();
 /// Bytes of memory of a voxel's moments: its key twice, and the moments with and without their key.
@@ -140,8 +140,8 @@ impl<'a> Body<'a> {
             (number::TRAJECTORY, Bytes(_)) => self.scans += 1,
             (number::WITHDRAWN, Bytes(_)) => self.withdrawn += 1,
             (number::REQUESTS, Bytes(_)) => self.requests += 1,
-            (number::FORGOTTEN, Bytes(_)) if self.forgotten.len() == ROBOTS_MAX => {
-                return Err(format!("forgotten scans of more than {ROBOTS_MAX} robots"));
+            (number::FORGOTTEN, Bytes(_)) if self.forgotten.len() == SESSIONS_MAX => {
+                return Err(format!("forgotten scans of more than {SESSIONS_MAX} sessions"));
             }
             (number::FORGOTTEN, Bytes(robot)) => self.forgotten.push(robot),
             (known @ number::UUID..=number::FORGOTTEN, _) => {
@@ -282,8 +282,8 @@ impl<'a> Body<'a> {
             memory.reserve(ids * NUMBER_BYTES + FORGOTTEN_BYTES)?;
             forgotten.push(decoded::<pb::ForgottenScans>(robot, "forgotten scans")?);
         }
-        let trajectory = Trajectory::new(self.stop.paced(scans, SCANS_PER_LOOK), withdrawn);
-        Ok(with_forgotten(trajectory, &forgotten, self.stop)?)
+        let trajectory = with_forgotten(Trajectory::default(), &forgotten, self.stop)?;
+        Ok(trajectory.with_poses(self.stop.paced(scans, SCANS_PER_LOOK), withdrawn))
     }
 
     fn scans(&self) -> Result<Vec<MappedScan>, Unreadable> {

@@ -30,7 +30,7 @@ pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
         ..pb::Snapshot::default()
     }
     .encode_to_vec();
-    append(&mut body, trajectory.poses(), stop, |trajectory| pb::Snapshot {
+    append(&mut body, trajectory.stored(), stop, |trajectory| pb::Snapshot {
         trajectory,
         ..Default::default()
     });

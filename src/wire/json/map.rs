@@ -2,9 +2,12 @@
 
 use serde::Serialize;
 
+use super::pose::JsonPose;
 use super::version::JsonVersion;
 use crate::map::{LevelInfo, MapSettings};
+use crate::mapping::Sighting;
 use crate::service::{MapInfo, MapStorage};
+use crate::wire::maps::nanoseconds;
 
 /// A map's description.
 #[derive(Debug, Serialize)]
@@ -22,6 +25,9 @@ pub struct JsonMap {
     pub scans: usize,
     /// The robots that sent them, by name.
     pub robots: Vec<String>,
+    /// The last scan of each robot since the server was started; of one map alone.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sightings: Vec<JsonSighting>,
     /// Bytes of the exact sets.
     pub set_bytes: usize,
     /// Bytes of the moments of points.
@@ -30,6 +36,36 @@ pub struct JsonMap {
     pub trajectory_bytes: usize,
     /// What lies on disk; null where nothing does.
     pub storage: Option<JsonStorage>,
+}
+
+/// A robot as its last scan showed it.
+#[derive(Debug, Serialize)]
+pub struct JsonSighting {
+    /// The robot.
+    pub robot: String,
+    /// When the server judged the scan, nanoseconds since the Unix epoch.
+    pub seen_at_ns: i64,
+    /// When the scan was taken, nanoseconds since the Unix epoch; null where it does not tell.
+    pub timestamp_ns: Option<i64>,
+    /// Where it was found; of one that was refused, where its alignment ended.
+    pub map_from_sensor: JsonPose,
+    /// Whether it fits there.
+    pub verdict: &'static str,
+    /// The robot stood where its last stored scan was taken, and saw nothing new.
+    pub stationary: bool,
+}
+
+impl From<&Sighting> for JsonSighting {
+    fn from(sighting: &Sighting) -> Self {
+        Self {
+            robot: sighting.robot.to_string(),
+            seen_at_ns: nanoseconds(sighting.seen_at),
+            timestamp_ns: sighting.timestamp_ns,
+            map_from_sensor: (&sighting.map_from_sensor).into(),
+            verdict: sighting.verdict.as_str(),
+            stationary: sighting.is_stationary,
+        }
+    }
 }
 
 /// What of a map lies on disk.
@@ -95,6 +131,7 @@ impl From<MapInfo> for JsonMap {
             levels: info.levels.iter().map(Into::into).collect(),
             scans: info.scans,
             robots: info.robots.iter().map(ToString::to_string).collect(),
+            sightings: info.sightings.iter().map(Into::into).collect(),
             set_bytes: info.set_bytes,
             moment_bytes: info.moment_bytes,
             trajectory_bytes: info.trajectory_bytes,

@@ -11,7 +11,7 @@ use http_body_util::{BodyExt, Limited};
 use mrol::access::{Access, Gate};
 use mrol::admission::{Admission, Lifecycle};
 use mrol::geometry::{Point, Pose};
-use mrol::map::{MapName, MapSettings, RobotName};
+use mrol::map::{MapName, MapSettings, RobotName, SessionName};
 use mrol::mapping::Guess;
 use mrol::middleware::Middleware;
 use mrol::scan::PointFilter;
@@ -157,6 +157,7 @@ fn scan(scan_id: u64) -> ScanRequest {
     };
     ScanRequest {
         robot: RobotName::new("r1").expect("a name"),
+        session: SessionName::default(),
         scan_id: Some(scan_id),
         points: PointCloud::from((0..3).flat_map(wall).collect::<Vec<_>>()),
         timestamp_ns: Some(scan_id as i64 * 100_000_000),

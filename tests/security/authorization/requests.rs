@@ -33,7 +33,7 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             pb::DeleteVoxelsRequest { map, target, ..Default::default() }.encode_to_vec()
         }
         Operation::Undo => {
-            let scan = pb::RobotScan { robot: "r".into(), scan_id: 1 };
+            let scan = pb::RobotScan { robot: "r".into(), scan_id: 1, ..Default::default() };
             let target = Some(pb::undo_request::Target::Scan(scan));
             pb::UndoRequest { map, target, ..Default::default() }.encode_to_vec()
         }

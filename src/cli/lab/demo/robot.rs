@@ -8,7 +8,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use crate::cli::error::CliError;
-use crate::client::Client;
+use crate::client::{Client, new_session};
 use crate::geometry::{Pose, pose_difference};
 use crate::lab::simulate::{Scene, Sensor, Tour};
 use crate::map::{MapName, RobotName};
@@ -93,9 +93,11 @@ impl Robot {
 
     /// Ray-casts scan after scan, until the receiver is closed.
     fn look_around(mut self, name: &RobotName, sender: &mpsc::Sender<ScanRequest>) {
+        let session = new_session();
         for (k, pose) in self.tour.poses.iter().enumerate() {
             let points = self.tour.sensor.scan(&self.scene, pose, &mut self.rng);
             let scan = ScanRequest {
+                session: session.clone(),
                 scan_id: Some(k as u64),
                 guess: guess(k, pose),
                 at_guess: k == 0,
