@@ -122,8 +122,14 @@ async fn a_scan_is_undone_and_what_others_saw_stays() {
     assert_eq!(daemon.contents("a").await.1, good);
     let trajectory = json_of(daemon.get("/v1/maps/a/trajectory").await).await;
     assert_eq!(trajectory["poses"].as_array().unwrap().len(), 1);
-    // Its number is free again.
-    insert(&daemon, "bad", 1, &row(5)).await;
+    // Its number is not free again.
+    for (points, status, reason) in
+        [(9, StatusCode::PRECONDITION_FAILED, "scan_withdrawn"), (5, StatusCode::CONFLICT, "scan_id_taken")]
+    {
+        let refused = daemon.post("/v1/maps/a/scans", scan_of("bad", 1, &row(points))).await;
+        assert_eq!(refused.status(), status);
+        assert_eq!(json_of(refused).await["reason"], reason);
+    }
     for body in [json!({"robot": "bad"}), json!({"revision": 1, "robot": "bad"}), json!({})] {
         assert_eq!(daemon.post("/v1/maps/a/undo", body).await.status(), StatusCode::BAD_REQUEST);
     }

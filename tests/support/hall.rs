@@ -2,22 +2,32 @@
 
 use mrol::geometry::{Point, Pose};
 
-/// A hall of 24 m by 10 m with shelves, no two alike, as points on its surfaces, meters.
+/// A hall of 24 m by 10 m with shelves, no two alike, as points on its surfaces, meters, a hundred or so on a square meter.
+/// None lies on a border between voxels.
 pub fn hall() -> Vec<Point> {
-    let steps = |length: f32| (0..(length / 0.12) as usize).map(|i| i as f32 * 0.12);
     let mut points = Vec::new();
-    for x in steps(24.0) {
-        points.extend(steps(10.0).map(|y| Point::new(x, y, 0.0)));
-        points.extend(steps(2.5).flat_map(|z| [Point::new(x, 0.0, z), Point::new(x, 10.0, z)]));
-    }
-    for y in steps(10.0) {
-        points.extend(steps(2.5).flat_map(|z| [Point::new(0.0, y, z), Point::new(24.0, y, z)]));
+    let mut random = 1u32;
+    let mut rectangle = |corner: [f32; 3], [u, v]: [usize; 2], [length, height]: [f32; 2]| {
+        for _ in 0..(length * height * 100.0) as usize {
+            let mut share = || {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (random >> 8) as f32 / (1 << 24) as f32
+            };
+            let mut point = corner.map(|c| c + 0.043);
+            point[u] += share() * length;
+            point[v] += share() * height;
+            points.push(Point::from(point));
+        }
+    };
+    rectangle([0.0; 3], [0, 1], [24.0, 10.0]);
+    for side in [0.0, 10.0] {
+        rectangle([0.0, side, 0.0], [0, 2], [24.0, 2.5]);
+        rectangle([side * 2.4, 0.0, 0.0], [1, 2], [10.0, 2.5]);
     }
     for (i, x) in [2.0, 5.3, 7.1, 11.2, 14.6, 16.0, 20.3, 22.1].into_iter().enumerate() {
         let (depth, height) = (1.0 + 0.3 * i as f32, 0.8 + 0.2 * i as f32);
-        for d in steps(depth) {
-            points.extend(steps(height).flat_map(|z| [Point::new(x, d, z), Point::new(x, 10.0 - d, z)]));
-        }
+        rectangle([x, 0.0, 0.0], [1, 2], [depth, height]);
+        rectangle([x, 10.0 - depth, 0.0], [1, 2], [depth, height]);
     }
     points
 }
