@@ -7,7 +7,8 @@
 //!   points and poses.
 //! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
 //!   point-cloud files.
-//! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Open this first.
+//! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Whoever wants to see the whole before its
+//!   parts begins here.
 //! * `store`: map files. `service`: the operations, once for every protocol.
 //! * `wire`: between generated and domain types. `access`: the operations by name, and who may ask for each. `grpc`,
 //!   `http`, `client`: adapters. `server`, `cli`: the daemon and the program.
@@ -15,7 +16,7 @@
 //!
 //! Where to find what:
 //!
-//! * Where a scan is aligned: [`align::align`]; without a guess, [`align::localize`]. The whole loop of a scan is
+//! * Where a scan is aligned: [`align::align`], which a server calls as [`align::align_until`]; without a guess, [`align::localize`]. The whole loop of a scan is
 //!   [`mapping::ScanMapper::map_scan`].
 //! * What *overlap* and *undetermined* mean: [`align`]. All verdicts: [`align::Verdict`].
 //! * Where a point is quantized and looked up: [`voxel`], [`map::MapView`].

@@ -12,7 +12,7 @@ pub enum Scope {
     Read,
     /// Scans, and undo of the scans of its own robots.
     Insert,
-    /// Changes of what maps hold: deletions, undo of anything.
+    /// Changes of what maps hold: deletions, undo of any scan.
     Write,
     /// Making, restoring and deleting maps.
     Admin,

@@ -18,7 +18,7 @@ pub struct PoseInformation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
     /// A unit vector: x y z along the map's axes, then rotations about them through the sensor, each times the scan's
-    /// mean range, so that both are lengths.
+    /// root mean square range, so that both are lengths.
     pub direction: [f64; 6],
     /// Standard deviation of the pose along `direction`, meters; infinite where nothing fixes it.
     pub std_m: f64,

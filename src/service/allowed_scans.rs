@@ -11,7 +11,7 @@ use crate::map::RobotName;
 pub struct AllowedScans {
     /// The robots; none = every robot.
     pub robots: Option<Arc<BTreeSet<RobotName>>>,
-    /// Whether changes may be undone whoever made them: scans of every robot since a revision, and deletions.
+    /// Whether changes may be undone whoever made them: scans named by the revision that they made.
     pub undo_of_others: bool,
 }
 

@@ -79,7 +79,7 @@ pub struct Limits {
     pub map_file_bytes_max: usize,
     /// Scans of a map file that is restored, and as many that were taken out again. 20,000,000.
     pub map_file_scans_max: usize,
-    /// How long a read waits for `min_revision` where the caller sets no deadline. 10 s.
+    /// How long a read waits for `min_revision` at most; the caller's deadline may end it sooner. 10 s.
     pub min_revision_wait_max_s: f64,
     /// How long aligning a scan may take that is not inserted. 10 s.
     pub alignment_time_max_s: f64,

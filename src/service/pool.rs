@@ -45,7 +45,7 @@ struct Counts {
 /// What became of the jobs of a pool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PoolUse {
-    /// The pool's: `query`, `mapping`, `alignment`, `localization` or `undo`.
+    /// The pool's: `query`, `mapping`, `alignment`, `localization`, `undo` or `map_file`.
     pub name: &'static str,
     /// Jobs that wait for a thread.
     pub waiting: usize,

@@ -72,7 +72,7 @@ async fn a_scan_in_json_is_answered_in_full() {
 
     let trajectory = json_of(daemon.get("/v1/maps/a/trajectory?robot=r1").await).await;
     let pose = json!({
-        "robot": "r1", "scan_id": 7, "timestamp_ns": 5, "map_from_sensor": pose_json([1.0, 0.0, 0.0]),
+        "robot": "r1", "session": "", "scan_id": 7, "timestamp_ns": 5, "map_from_sensor": pose_json([1.0, 0.0, 0.0]),
         "revision": 1, "overlap": 0.0, "new_voxels": 2,
     });
     assert_eq!(trajectory, json!({"poses": [pose], "revision": 1, "map_uuid": uuid}));

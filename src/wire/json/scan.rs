@@ -59,7 +59,7 @@ fn places(bitmap: &[u8]) -> Vec<usize> {
 #[derive(Debug, Serialize)]
 pub struct JsonDirection {
     /// A unit vector: x y z along the axes of the map, then rotations about them through the sensor, each times the
-    /// mean range of the scan, so that both are lengths.
+    /// root mean square range of the scan, so that both are lengths.
     pub direction: [f64; 6],
     /// Standard deviation along it, meters; null where nothing holds the pose.
     pub std_m: Option<f64>,
