@@ -2,6 +2,10 @@
 //!
 //! A transform's name holds both frames, so that `p_in_map = map_from_sensor * p_in_sensor`.
 
+mod twist;
+
+pub use twist::Twist;
+
 use bytemuck::{Pod, Zeroable};
 use nalgebra::allocator::Allocator;
 use nalgebra::{

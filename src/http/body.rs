@@ -40,7 +40,7 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for Json<T> {
 /// A body with points: as JSON `J` with everything, or as bytes with the rest, `Q`, in the query.
 pub(super) enum Points<J, Q> {
     Json(J),
-    Bytes(PointCloud, Q),
+    Bytes(Bytes, Q),
 }
 
 impl<J, Q> FromRequest<Adapter> for Points<J, Q>
@@ -55,12 +55,16 @@ where
             JSON => parse_all(request, adapter).await.map(Self::Json),
             OCTET_STREAM => {
                 let rest = params::from_query(request.uri())?;
-                let points = PointCloud::from_bytes(read(request, adapter).await?).in_field("body")?;
-                Ok(Self::Bytes(points, rest))
+                Ok(Self::Bytes(read(request, adapter).await?, rest))
             }
             other => Err(unsupported(other, "application/json or application/octet-stream")),
         }
     }
+}
+
+/// The points that a body of bytes is.
+pub(super) fn points_of(body: Bytes) -> Result<PointCloud, ServiceError> {
+    PointCloud::from_bytes(body).in_field("body")
 }
 
 /// The media type without its parameters, in lower case; empty where none is said.

@@ -3,7 +3,7 @@
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
 
-use super::body::Points;
+use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::json::JsonPoints;
 use super::middleware::Service;
@@ -76,7 +76,8 @@ impl TryFrom<DeletionPoints> for Deletion {
                 let request_id = request_id_of(json.request_id.take())?;
                 Ok(Self { level: json.level, request_id, target: json.try_into()? })
             }
-            Points::Bytes(points, DeletionParams { level, request_id }) => {
+            Points::Bytes(body, DeletionParams { level, request_id }) => {
+                let points = points_of(body)?;
                 let request_id = request_id_of(request_id)?;
                 Ok(Self { level, request_id, target: DeletionTarget::Points(points) })
             }

@@ -3,7 +3,7 @@
 use axum::response::Json;
 use serde::Deserialize;
 
-use super::body::Points;
+use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::json::JsonPoints;
 use super::middleware::Service;
@@ -71,7 +71,7 @@ impl TryFrom<LocalizationPoints> for LocalizationRequest {
     fn try_from(body: LocalizationPoints) -> Result<Self, ServiceError> {
         match body {
             Points::Json(scan) => scan.try_into(),
-            Points::Bytes(points, rest) => rest.with(points),
+            Points::Bytes(body, rest) => rest.with(points_of(body)?),
         }
     }
 }

@@ -4,7 +4,7 @@ use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
 
-use super::body::Points;
+use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::headers;
 use super::json::JsonPoints;
@@ -59,7 +59,7 @@ pub(super) async fn query(
 ) -> Result<Response, HttpError> {
     let (query, answer_with): (_, fn(PointAnswer) -> Response) = match body {
         Points::Json(query) => (query.try_into()?, as_json),
-        Points::Bytes(points, rest) => (rest.with(points)?, as_bitmap),
+        Points::Bytes(body, rest) => (rest.with(points_of(body)?)?, as_bitmap),
     };
     let answer = service.query_points(&map, query).await?;
     Ok(answer_with(answer))

@@ -1,20 +1,21 @@
 //! `POST /v1/maps/{map}/scans` and `/alignment`: insert a scan, or only align it.
 
+use axum::body::Bytes;
 use axum::response::Json;
 use serde::Deserialize;
 
-use super::body::Points;
+use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
 use crate::align::Method;
-use crate::geometry::Pose;
+use crate::geometry::{Point, Pose};
 use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
-use crate::service::{PointCloud, Reason, ScanRequest, ServiceError};
+use crate::service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference};
 use crate::wire::InField;
 use crate::wire::json::ByKeyword;
 use crate::wire::json::{JsonPose, JsonScan};
@@ -28,6 +29,9 @@ pub(super) struct ScanBody {
     scan_id: Option<u64>,
     points: JsonPoints,
     timestamp_ns: Option<i64>,
+    point_times: Option<Vec<f32>>,
+    #[serde(default)]
+    point_times_from_sweep_start: bool,
     guess: Option<Object<JsonPose>>,
     motion: Option<Object<JsonPose>>,
     #[serde(default)]
@@ -53,6 +57,11 @@ pub(super) struct ScanParams {
     session: String,
     scan_id: Option<u64>,
     timestamp_ns: Option<i64>,
+    /// Behind the points come their times.
+    #[serde(default)]
+    point_times: bool,
+    #[serde(default)]
+    point_times_from_sweep_start: bool,
     guess: Option<String>,
     motion: Option<String>,
     #[serde(default)]
@@ -96,7 +105,7 @@ impl TryFrom<ScanPoints> for ScanRequest {
     fn try_from(body: ScanPoints) -> Result<Self, ServiceError> {
         match body {
             Points::Json(scan) => scan.try_into(),
-            Points::Bytes(points, rest) => rest.with(points),
+            Points::Bytes(body, rest) => rest.with(body),
         }
     }
 }
@@ -111,6 +120,9 @@ impl TryFrom<ScanBody> for ScanRequest {
             session: SessionName::new(&scan.session)?,
             scan_id: scan.scan_id,
             timestamp_ns: scan.timestamp_ns,
+            point_times: scan
+                .point_times
+                .map(|times| PointTimes::new(&times, reference(scan.point_times_from_sweep_start))),
             guess: guess_of(guess, motion, scan.constant_velocity)?,
             at_guess: !scan.align,
             force: scan.force,
@@ -128,12 +140,17 @@ impl TryFrom<ScanBody> for ScanRequest {
 }
 
 impl ScanParams {
-    fn with(self, points: PointCloud) -> Result<ScanRequest, ServiceError> {
+    fn with(self, mut body: Bytes) -> Result<ScanRequest, ServiceError> {
+        let times = self.point_times.then(|| times_behind_points(&mut body)).transpose()?;
+        let reference = reference(self.point_times_from_sweep_start);
+        let times = times.map(|times| PointTimes::from_bytes(&times, reference)).transpose()?;
+        let points = points_of(body)?;
         let pose = |text: Option<String>, field| text.map(|text| params::pose(&text, field)).transpose();
         Ok(ScanRequest {
             session: SessionName::new(&self.session)?,
             scan_id: self.scan_id,
             timestamp_ns: self.timestamp_ns,
+            point_times: times,
             guess: guess_of(
                 pose(self.guess, "guess")?,
                 pose(self.motion, "motion")?,
@@ -152,6 +169,25 @@ impl ScanParams {
             ..ScanRequest::new(RobotName::new(&self.robot)?, points)
         })
     }
+}
+
+/// Takes the times off a body of points and times.
+fn times_behind_points(body: &mut Bytes) -> Result<Bytes, ServiceError> {
+    const BYTES: usize = Point::BYTES + size_of::<f32>();
+    if !body.len().is_multiple_of(BYTES) {
+        let message = format!(
+            "body: with point_times=true all points of {} bytes and then all times of 4 bytes are {BYTES} bytes a point, \
+             got {} bytes",
+            Point::BYTES,
+            body.len()
+        );
+        return Err(ServiceError::new(Reason::BadPointTimes, message));
+    }
+    Ok(body.split_off(body.len() / BYTES * Point::BYTES))
+}
+
+fn reference(from_sweep_start: bool) -> TimeReference {
+    if from_sweep_start { TimeReference::SweepStart } else { TimeReference::Timestamp }
 }
 
 /// A box as `x,y,z,x,y,z`.

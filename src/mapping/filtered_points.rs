@@ -10,6 +10,8 @@ use crate::scan::PointFilter;
 pub struct FilteredPoints {
     /// The points, sensor frame.
     pub points: Vec<Point>,
+    /// When each was measured, seconds from the scan's timestamp, where the scan tells.
+    pub times_s: Option<Vec<f32>>,
     /// How many points were left out.
     pub skipped: usize,
     filter: PointFilter,
@@ -17,12 +19,13 @@ pub struct FilteredPoints {
 
 impl FilteredPoints {
     /// Filters the points of a scan (sensor frame). A point that is not finite means "no return" in every depth camera:
-    /// it is left out, or an error where the scan is `strict`.
+    /// it is left out, or an error where the scan is `strict`. `times_s` are those of all points, as many as these are.
     ///
     /// # Errors
     /// No point is left, a strict scan has a point that is not finite, or the filter is not valid.
     pub fn of(
         all: &[Point],
+        times_s: Option<&[f32]>,
         filter: PointFilter,
         robot: &RobotName,
         strict: bool,
@@ -42,7 +45,14 @@ impl FilteredPoints {
             let filter = format!("{filter:?}");
             return Err(MappingError::AllFiltered { points: all.len(), filter, robot: robot.clone() });
         }
-        Ok(Self { skipped: all.len() - points.len(), points, filter })
+        let times_s = times_s.map(|times_s| {
+            let timed = all.iter().zip(times_s);
+            timed
+                .filter(|&(&point, _)| point.is_finite() && filter.keeps(point))
+                .map(|(_, &time)| time)
+                .collect()
+        });
+        Ok(Self { skipped: all.len() - points.len(), points, times_s, filter })
     }
 
     /// True of a point (sensor frame) that passes the filter.

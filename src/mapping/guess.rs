@@ -36,9 +36,8 @@ impl Guess {
         sightings: &Sightings,
         map_is_empty: bool,
     ) -> Result<Pose, MappingError> {
-        let seen = |last: &MappedScan| sightings.standing_since(last);
-        let last_or_origin = || match trajectory.last_of(robot) {
-            Some(last) => Ok(seen(last).map_or(last.map_from_sensor, |seen| seen.map_from_sensor)),
+        let last_or_origin = || match last_seen(robot, trajectory, sightings) {
+            Some((map_from_sensor, _)) => Ok(map_from_sensor),
             None if map_is_empty => Ok(Pose::identity()),
             None => Err(MappingError::GuessRequired(robot.clone())),
         };
@@ -48,9 +47,10 @@ impl Guess {
             Self::Motion(last_from_sensor) => Ok(last_or_origin()? * last_from_sensor),
             Self::ConstantVelocity => {
                 let last = trajectory.last_of(robot);
-                if let Some((last, seen)) = last.and_then(|last| Some((last, seen(last)?))) {
-                    let seen = (&seen.map_from_sensor, seen.timestamp_ns);
-                    return Ok(constant_velocity(stamped(last), seen, timestamp_ns));
+                let standing = last.and_then(|last| Some((last, sightings.standing_since(last)?)));
+                if let Some((last, standing)) = standing {
+                    let standing = (&standing.map_from_sensor, standing.timestamp_ns);
+                    return Ok(constant_velocity(stamped(last), standing, timestamp_ns));
                 }
                 match trajectory.last_two_of(robot) {
                     Some((last, before)) => {
@@ -63,8 +63,20 @@ impl Guess {
     }
 }
 
+/// Where a robot was last, with the time: standing still, or at its last stored scan.
+pub(super) fn last_seen(
+    robot: &RobotName,
+    trajectory: &Trajectory,
+    sightings: &Sightings,
+) -> Option<(Pose, Option<i64>)> {
+    let last = trajectory.last_of(robot)?;
+    let standing = sightings.standing_since(last);
+    let standing = standing.map(|standing| (standing.map_from_sensor, standing.timestamp_ns));
+    Some(standing.unwrap_or((last.map_from_sensor, last.timestamp_ns)))
+}
+
 /// A pose and its time, nanoseconds since the Unix epoch.
-type Stamped<'a> = (&'a Pose, Option<i64>);
+pub(super) type Stamped<'a> = (&'a Pose, Option<i64>);
 
 fn stamped(scan: &MappedScan) -> Stamped<'_> {
     (&scan.map_from_sensor, scan.timestamp_ns)

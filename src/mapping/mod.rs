@@ -5,22 +5,25 @@
 //! make the record durable before it is visible, calls [`ScanMapper::locate`], [`ScanMapper::record`] and
 //! [`ScanMapper::note_stationary`] by themselves and inserts through its commit queue.
 
+mod deskew;
 mod error;
 mod filtered_points;
 mod guess;
 mod sightings;
 mod stationary;
 
+pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
 pub use guess::Guess;
 pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
 
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
-use crate::geometry::Point;
+use crate::geometry::{Point, Pose, Twist};
 use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName};
 use crate::util::StopSignal;
 
@@ -59,6 +62,8 @@ pub struct MappingSettings {
     pub alignment: AlignmentSettings,
     /// When a scan shows nothing new because its robot stands still; none: every scan that fits is inserted.
     pub stationary: Option<StationarySettings>,
+    /// When a motion is believed that scans are deskewed with.
+    pub deskew: DeskewSettings,
 }
 
 /// A scan to map.
@@ -74,6 +79,9 @@ pub struct Scan<'a> {
     pub timestamp_ns: Option<i64>,
     /// The scan's points in the sensor frame, meters, all of them finite.
     pub points: &'a [Point],
+    /// When each of the points was measured, seconds from `timestamp_ns` (negative before it), where the sensor moved
+    /// meanwhile: the scan is deskewed. As many as points; none where they were measured at once.
+    pub times_s: Option<&'a [f32]>,
     /// Points that were left out before, see [`FilteredPoints`].
     pub points_skipped: usize,
     /// Where it is thought to have been taken.
@@ -87,6 +95,14 @@ pub struct Scan<'a> {
 }
 
 impl<'a> Scan<'a> {
+    /// The points in the sensor frame at the scan's timestamp, where the sensor moved with `velocity`.
+    fn points_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
+        match self.times_s.zip(velocity) {
+            Some((times_s, velocity)) => deskewed(self.points, times_s, velocity).into(),
+            None => self.points.into(),
+        }
+    }
+
     /// A scan without number and time, thought to have been taken at the robot's last pose.
     ///
     /// `points` are in the sensor frame and finite.
@@ -97,6 +113,7 @@ impl<'a> Scan<'a> {
             scan_id: None,
             timestamp_ns: None,
             points,
+            times_s: None,
             points_skipped: 0,
             guess: Guess::Last,
             at_guess: false,
@@ -116,6 +133,9 @@ pub struct LocatedScan {
     /// The map was empty, so that the scan went to its guess. Who inserts it must see to it that the map is still empty
     /// then, or locate it again.
     pub is_first: bool,
+    /// The velocity of the sensor that its points were deskewed with; none of points that were measured at once, or
+    /// where the velocity is not known.
+    pub velocity: Option<Twist>,
 }
 
 impl LocatedScan {
@@ -163,7 +183,7 @@ impl<'a> ScanMapper<'a> {
             return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
         }
         let start = Instant::now();
-        let record = self.record(scan, &located.alignment)?;
+        let record = self.record(scan, &located)?;
         let is_new = !self.note_stationary(scan, &record);
         let committed = is_new.then(|| self.map.committer().insert_scan(record));
         Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
@@ -172,34 +192,66 @@ impl<'a> ScanMapper<'a> {
     /// Finds where a scan was taken; changes nothing.
     ///
     /// The first scan of an empty map is taken at its guess. Every other one is aligned from its guess, or only judged
-    /// there where the caller wants it at its guess.
+    /// there where the caller wants it at its guess. Points with times are deskewed: first by the motion that the guess
+    /// tells, then, once the alignment has found the pose, by the motion to that, and aligned again.
     ///
     /// # Errors
     /// The guess needs a pose that is not there, or `stop` said so.
     pub fn locate(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<LocatedScan, MappingError> {
-        let Self { map, sightings, settings: MappingSettings { alignment: settings, .. } } = self;
+        let Self { map, sightings, .. } = self;
         let start = Instant::now();
         let map_is_empty = map.is_empty();
         let guess =
             scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, map_is_empty)?;
-        let alignment = if map_is_empty {
+        let mut velocity = self.velocity(scan, &guess);
+        let mut alignment = if map_is_empty {
             Alignment::trusted(guess, map.settings().levels, scan.points)
-        } else if scan.at_guess {
-            evaluate_at_until(map, scan.points, &guess, settings, stop).accepted_by_caller()
         } else {
-            align_until(map, scan.points, &guess, settings, stop)
+            self.align(scan, velocity.as_ref(), &guess, stop)
         };
+        if scan.times_s.is_some() && !scan.at_guess && alignment.verdict == Verdict::Accepted {
+            let found = self.velocity(scan, &alignment.map_from_sensor);
+            if found.is_some() && found != velocity {
+                alignment = self.align(scan, found.as_ref(), &alignment.map_from_sensor, stop);
+                velocity = found;
+            }
+        }
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
         }
-        Ok(LocatedScan { alignment, align_time: start.elapsed(), is_first: map_is_empty && !scan.at_guess })
+        let is_first = map_is_empty && !scan.at_guess;
+        Ok(LocatedScan { alignment, align_time: start.elapsed(), is_first, velocity })
+    }
+
+    /// Aligns a scan from `guess`, or judges it there, its points deskewed by `velocity`.
+    fn align(
+        &self,
+        scan: &Scan<'_>,
+        velocity: Option<&Twist>,
+        guess: &Pose,
+        stop: StopSignal<'_>,
+    ) -> Alignment {
+        let (points, settings) = (scan.points_at(velocity), &self.settings.alignment);
+        match scan.at_guess {
+            true => evaluate_at_until(self.map, &points, guess, settings, stop).accepted_by_caller(),
+            false => align_until(self.map, &points, guess, settings, stop),
+        }
+    }
+
+    /// The velocity of the sensor of a scan with times, if it was taken at `map_from_sensor`: constant since its robot
+    /// was seen last. None where a time or the last pose is not known.
+    fn velocity(&self, scan: &Scan<'_>, map_from_sensor: &Pose) -> Option<Twist> {
+        scan.times_s?;
+        let (last, last_ns) = guess::last_seen(scan.robot, &self.map.trajectory(), self.sightings)?;
+        self.settings.deskew.velocity((&last, last_ns), (map_from_sensor, scan.timestamp_ns))
     }
 
     /// The record of a scan where it was found: every voxel it touches, the moments of its points, and its pose.
     ///
     /// # Errors
     /// No point lies within the map's range.
-    pub fn record(&self, scan: &Scan<'_>, alignment: &Alignment) -> Result<ScanRecord, MappingError> {
+    pub fn record(&self, scan: &Scan<'_>, located: &LocatedScan) -> Result<ScanRecord, MappingError> {
+        let alignment = &located.alignment;
         let pose = MappedScan {
             robot: scan.robot.clone(),
             session: scan.session.clone(),
@@ -213,7 +265,8 @@ impl<'a> ScanMapper<'a> {
             new_voxels: 0,
             digest: scan.digest,
         };
-        let record = ScanRecord::of_points(pose, scan.points, self.map.lattice());
+        let points = scan.points_at(located.velocity.as_ref());
+        let record = ScanRecord::of_points(pose, &points, self.map.lattice());
         if record.voxels.is_empty() {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });

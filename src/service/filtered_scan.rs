@@ -1,6 +1,6 @@
 //! A scan request with the points that count.
 
-use super::{Reason, ScanRequest, ServiceError, ServiceSettings};
+use super::{PointTimes, Reason, ScanRequest, ServiceError, ServiceSettings};
 use crate::geometry::{Point, rotation_xyzw, translation_m};
 use crate::mapping::{FilteredPoints, Guess, MappingError, Scan};
 
@@ -19,7 +19,13 @@ impl<'a> FilteredScan<'a> {
     /// When no point is left, or one had to be left out of a strict request.
     pub(super) fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
         let filter = request.filter.or(settings.filter_of(&request.robot));
-        let filtered = FilteredPoints::of(request.points.as_slice(), filter, &request.robot, request.strict)?;
+        let filtered = FilteredPoints::of(
+            request.points.as_slice(),
+            request.point_times.as_ref().map(PointTimes::as_slice),
+            filter,
+            &request.robot,
+            request.strict,
+        )?;
         Ok(Self { request, filtered, digest: digest(request) })
     }
 
@@ -32,6 +38,7 @@ impl<'a> FilteredScan<'a> {
             scan_id: *scan_id,
             timestamp_ns: *timestamp_ns,
             points: &self.filtered.points,
+            times_s: self.filtered.times_s.as_deref(),
             points_skipped: self.filtered.skipped,
             guess: *guess,
             at_guess: *at_guess,
@@ -83,5 +90,7 @@ fn digest(request: &ScanRequest) -> u64 {
     let checksum = crc32c::crc32c(bytemuck::cast_slice(request.points.as_slice()));
     let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(&guess));
     let checksum = crc32c::crc32c_append(checksum, &kind);
+    let times = request.point_times.as_ref().map_or(&[][..], PointTimes::as_slice);
+    let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(times));
     (request.points.len() as u64) << 32 | u64::from(checksum)
 }

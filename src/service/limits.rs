@@ -61,6 +61,8 @@ pub struct Limits {
     pub health_watch_max_s: f64,
     /// Points of one query, deletion or scan. 2,000,000.
     pub points_per_request_max: usize,
+    /// How far the time of a scan's point may lie from the scan's timestamp. 2 s.
+    pub point_times_max_s: f64,
     /// Keys of one deletion. 2,000,000.
     pub keys_per_request_max: usize,
     /// Maps at once. 64.
@@ -130,6 +132,7 @@ impl Default for Limits {
             health_watches_max: 16,
             health_watch_max_s: 600.0,
             points_per_request_max: 2_000_000,
+            point_times_max_s: 2.0,
             keys_per_request_max: 2_000_000,
             maps_max: 64,
             voxels_per_map_max: 200_000_000,

@@ -11,9 +11,9 @@ use super::resource_budget::ResourceBudget;
 use super::trajectory::{scan_id_too_old, scan_name};
 use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::{AlignmentSettings, Verdict};
-use crate::geometry::{Point, Pose};
+use crate::geometry::Point;
 use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
-use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper};
+use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
 use crate::util::StopSignal;
 
 impl HostedMap {
@@ -41,7 +41,7 @@ impl HostedMap {
         if !answer.accepted && !request.force {
             return Ok(Step::Answered(answer));
         }
-        let scan_record = mapper.record(&scan.to_map(), &located.alignment)?;
+        let scan_record = mapper.record(&scan.to_map(), &located)?;
         check_not_stopped(stop)?;
         if mapper.note_stationary(&scan.to_map(), &scan_record) {
             return Ok(Step::Answered(ScanAnswer { accepted: true, stationary: true, ..answer }));
@@ -75,19 +75,20 @@ impl HostedMap {
         request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
         let scan = FilteredScan::of(request, settings)?;
         let located = self.locate(&scan, &self.mapper(request, settings), stop)?;
-        let foreground = request
-            .foreground_level
-            .map(|level| self.foreground(&scan, &located.alignment.map_from_sensor, level));
+        let foreground = request.foreground_level.map(|level| self.foreground(&scan, &located, level));
         Ok(ScanAnswer { foreground, ..self.answer(&scan, &located) })
     }
 
     /// The points of the scan in no occupied voxel of `level`.
-    fn foreground(&self, scan: &FilteredScan<'_>, map_from_sensor: &Pose, level: u32) -> Foreground {
+    fn foreground(&self, scan: &FilteredScan<'_>, located: &LocatedScan, level: u32) -> Foreground {
         let all = scan.request.points.as_slice();
+        let times = scan.request.point_times.as_ref().zip(located.velocity.as_ref());
+        let deskewed = times.map(|(times, velocity)| deskewed(all, times.as_slice(), velocity));
+        let points = deskewed.as_deref().unwrap_or(all);
         let mut words = vec![0; all.len().div_ceil(64)];
-        let quantize = self.map.lattice().from_points(map_from_sensor);
+        let quantize = self.map.lattice().from_points(&located.alignment.map_from_sensor);
         let long_read = self.map.long_read();
-        long_read.view().query(all, &quantize, level, Lookup::Exact, &mut words);
+        long_read.view().query(points, &quantize, level, Lookup::Exact, &mut words);
         drop(long_read);
         for (word, points) in words.iter_mut().zip(all.chunks(64)) {
             let counts = |(i, &point): (usize, &Point)| u64::from(scan.keeps(point)) << i;
@@ -149,7 +150,11 @@ impl HostedMap {
         ScanMapper::new(
             &self.map,
             &self.sightings,
-            MappingSettings { alignment, stationary: Some(settings.stationary) },
+            MappingSettings {
+                alignment,
+                stationary: Some(settings.stationary),
+                ..MappingSettings::default()
+            },
         )
     }
 

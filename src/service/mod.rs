@@ -50,8 +50,8 @@ pub use pool::PoolUse;
 pub use reason::{Reason, ToldBy};
 pub use request::{
     Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapStorage, MapVersion,
-    PointAnswer, PointCloud, PointQuery, ScanAnswer, ScanRequest, TrajectoryAnswer, TrajectoryQuery,
-    UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
+    PointAnswer, PointCloud, PointQuery, PointTimes, ScanAnswer, ScanRequest, TimeReference,
+    TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
 pub use settings::{EVERY_ROBOT, ServiceSettings};
 pub use shortage::Shortage;
@@ -220,7 +220,7 @@ impl MapService {
             self.scans.permit(&scan.robot)?;
             let map = self.map(map)?;
             scan.check_insertion()?;
-            self.limits().check_points(scan.points.len())?;
+            scan.check_points(self.limits())?;
             if map.is_new(&scan) {
                 self.inner.budget.check_to_grow()?;
             }
@@ -251,7 +251,7 @@ impl MapService {
             self.scans.permit(&scan.robot)?;
             let map = self.map(map)?;
             scan.check_alignment()?;
-            self.limits().check_points(scan.points.len())?;
+            scan.check_points(self.limits())?;
             let inner = Arc::clone(&self.inner);
             let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max_s);
             let align = move |stop: StopSignal<'_>| {

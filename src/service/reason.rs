@@ -76,6 +76,7 @@ reasons! {
         BadLookup "bad_lookup" Grpc: "a number that is none of the enum's", "use the generated constants";
         BadMapFile "bad_map_file" Both: "the file is no map file, or is damaged", "take another backup; `mrol map` and `mrol snapshot` write such files";
         BadMessage "bad_message" Grpc: "the message cannot be read", "check encoding and compression";
+        BadPointTimes "bad_point_times" Both: "`point_times` are not one for each point, not finite, beyond `point_times_max_s`, or without `timestamp_ns`", "send seconds from `timestamp_ns`, one for each point";
         BadMethod "bad_method" Grpc: "a number that is none of the enum's", "use the generated constants";
         BadName "bad_name" Both: "the name of a map, robot or request is not valid", "see [names](#rules-for-all-requests)";
         BadNumbers "bad_numbers" Http: "a parameter is not so many numbers with commas", "correct it";

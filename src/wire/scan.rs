@@ -10,7 +10,7 @@ use crate::align::{Direction, Method, Verdict};
 use crate::map::{MapName, RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
-use crate::service::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError};
+use crate::service::{Foreground, PointTimes, Reason, ScanAnswer, ScanRequest, ServiceError, TimeReference};
 
 impl TryFrom<pb::InsertScanRequest> for (MapName, ScanRequest) {
     type Error = ServiceError;
@@ -43,6 +43,7 @@ fn scan_from(
         session: SessionName::new(&scan.session).in_field("scan.session")?,
         scan_id: scan.scan_id,
         timestamp_ns: scan.timestamp_ns,
+        point_times: point_times_from(&scan.point_times, scan.point_times_reference)?,
         guess: guess_from(guess)?,
         at_guess,
         method: method_from(method)?,
@@ -53,6 +54,22 @@ fn scan_from(
             required(scan.points, "scan.points")?.try_into().in_field("scan.points")?,
         )
     })
+}
+
+/// The times of points; none where there are no bytes.
+fn point_times_from(bytes: &[u8], reference: i32) -> Result<Option<PointTimes>, ServiceError> {
+    let reference = match pb::TimeReference::try_from(reference) {
+        Ok(pb::TimeReference::Unspecified | pb::TimeReference::Timestamp) => TimeReference::Timestamp,
+        Ok(pb::TimeReference::SweepStart) => TimeReference::SweepStart,
+        Err(_) => {
+            let message = format!(
+                "scan.point_times_reference must be 0, 1 (timestamp) or 2 (sweep start), got {reference}"
+            );
+            return Err(ServiceError::new(Reason::BadPointTimes, message));
+        }
+    };
+    let times = (!bytes.is_empty()).then(|| PointTimes::from_bytes(bytes, reference));
+    times.transpose().in_field("scan.point_times")
 }
 
 fn filter_from(scan: &pb::Scan) -> Result<PointFilter, ServiceError> {
@@ -128,6 +145,8 @@ impl From<ScanRequest> for pb::Scan {
             robot: scan.robot.to_string(),
             session: scan.session.to_string(),
             scan_id: scan.scan_id,
+            point_times: scan.point_times.map(|times| times.to_bytes().into()).unwrap_or_default(),
+            point_times_reference: pb::TimeReference::Unspecified.into(),
             points: Some(scan.points.into()),
             timestamp_ns: scan.timestamp_ns,
             strict: scan.strict,

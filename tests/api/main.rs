@@ -5,6 +5,7 @@
 
 mod bad_input;
 mod callers_gone;
+mod deskewing;
 mod grpc;
 mod http;
 mod lifecycle;

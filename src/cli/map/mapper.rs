@@ -49,7 +49,7 @@ impl Mapper {
         Ok(Self {
             map: MultiResolutionMap::new(map).map_err(CliError::usage)?,
             // Every scan that fits is wanted in the map's trajectory.
-            settings: MappingSettings { alignment, stationary: None },
+            settings: MappingSettings { alignment, ..MappingSettings::default() },
             robot: RobotName::new(ROBOT).map_err(CliError::failed)?,
             guess,
             sightings: Sightings::default(),

@@ -1,6 +1,7 @@
 //! The paper's experiments (IV), and measurements of convergence and scaling.
 
 pub mod convergence;
+pub mod deskewing;
 pub mod drift;
 pub mod mapping;
 pub mod stages;

@@ -5,13 +5,14 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use super::point_cloud::PointCloud;
+use super::point_times::PointTimes;
 use super::version::MapVersion;
 use crate::align::{Direction, Method, Verdict};
 use crate::geometry::Pose;
 use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
-use crate::service::{Reason, ServiceError};
+use crate::service::{Limits, Reason, ServiceError};
 
 /// A scan to align or insert.
 #[derive(Debug, Clone)]
@@ -26,6 +27,8 @@ pub struct ScanRequest {
     pub points: PointCloud,
     /// When the scan was taken, nanoseconds since the Unix epoch.
     pub timestamp_ns: Option<i64>,
+    /// When each point was measured, seconds from `timestamp_ns`, where the sensor moved meanwhile.
+    pub point_times: Option<PointTimes>,
     /// Where it is thought to have been taken.
     pub guess: Guess,
     /// Take the guess as it is, without aligning.
@@ -58,6 +61,16 @@ impl ScanRequest {
         if self.force { Err(ServiceError::new(Reason::UnexpectedField, message)) } else { Ok(()) }
     }
 
+    /// # Errors
+    /// For too many points or none, and for times that are not theirs.
+    pub(in crate::service) fn check_points(&self, limits: &Limits) -> Result<(), ServiceError> {
+        limits.check_points(self.points.len())?;
+        let times = self.point_times.as_ref();
+        times.map_or(Ok(()), |times| {
+            times.check(self.points.len(), self.timestamp_ns, limits.point_times_max_s)
+        })
+    }
+
     /// A robot's scan, of which nothing else is said.
     pub fn new(robot: RobotName, points: PointCloud) -> Self {
         Self {
@@ -66,6 +79,7 @@ impl ScanRequest {
             scan_id: None,
             points,
             timestamp_ns: None,
+            point_times: None,
             guess: Guess::Last,
             at_guess: false,
             force: false,

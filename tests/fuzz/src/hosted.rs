@@ -161,6 +161,7 @@ fn scan(scan_id: u64) -> ScanRequest {
         scan_id: Some(scan_id),
         points: PointCloud::from((0..3).flat_map(wall).collect::<Vec<_>>()),
         timestamp_ns: Some(scan_id as i64 * 100_000_000),
+        point_times: None,
         guess: Guess::Pose(Pose::translation(0.0, 0.0, scan_id as f64 * 0.01)),
         at_guess: true,
         force: true,

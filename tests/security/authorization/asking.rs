@@ -2,6 +2,8 @@
 
 use bytes::{Buf, BufMut};
 use mrol::access::{Operation, Route, Secret};
+use mrol::wire::pb;
+use prost::Message;
 use reqwest::StatusCode;
 use reqwest::header::WWW_AUTHENTICATE;
 use serde_json::Value;
@@ -93,7 +95,19 @@ pub(crate) async fn first_answer(
     let mut grpc = Grpc::new(channel);
     grpc.ready().await.unwrap();
     let answers = grpc.streaming(request, PathAndQuery::from_static(call), Bytewise).await?;
-    answers.into_inner().message().await
+    let answer = answers.into_inner().message().await?;
+    match answer.as_deref().filter(|_| call.ends_with("/InsertScanStream")).and_then(failure) {
+        Some(failure) => Err(failure),
+        None => Ok(answer),
+    }
+}
+
+/// The status of a scan that failed in a stream of scans, which goes on.
+fn failure(answer: &[u8]) -> Option<Status> {
+    let failure = pb::InsertScanResponse::decode(answer).unwrap().error?;
+    let mut status = Status::new(Code::from_i32(failure.code), failure.message);
+    status.metadata_mut().insert("mrol-reason", failure.reason.parse().unwrap());
+    Some(status)
 }
 
 /// Messages as the bytes that they are.

@@ -1,6 +1,7 @@
 //! `mrol experiment`: repeats the paper's experiments, with plots and tables as results.
 
 mod convergence;
+mod deskewing;
 mod lookup;
 mod mapping;
 mod scaling;
@@ -20,6 +21,7 @@ EXAMPLES:
                                                experiment 3 of the paper: time and growth, scan by scan
   mrol experiment convergence scans/0000.ply scans/0001.ply --truth poses.txt --resolution 0.1 --out results/
                                                share of alignments that find the pose, against how far off the guess is
+  mrol experiment deskewing --out results/     poses of a lidar that moves while it turns
 
 Everything is measured when it is asked for, on one core; give the machine nothing else to do meanwhile.";
 
@@ -34,6 +36,7 @@ pub(in crate::cli) struct Experiment {
 #[derive(Debug, Subcommand)]
 enum Which {
     Convergence(convergence::Convergence),
+    Deskewing(deskewing::Deskewing),
     Lookup(lookup::Lookup),
     Mapping(mapping::Mapping),
     Scaling(scaling::Scaling),
@@ -44,6 +47,7 @@ impl Experiment {
     pub(super) fn run(self, output: Output) -> Result<(), CliError> {
         match self.which {
             Which::Convergence(convergence) => convergence.run(&output),
+            Which::Deskewing(deskewing) => deskewing.run(&output),
             Which::Lookup(lookup) => lookup.run(&output),
             Which::Mapping(mapping) => mapping.run(&output),
             Which::Scaling(scaling) => scaling.run(&output),

@@ -3,6 +3,7 @@
 mod building;
 mod furnish;
 mod furniture;
+mod hall;
 mod ray;
 mod shape;
 
@@ -27,6 +28,12 @@ impl Scene {
     /// Seeds differ in the furniture's sizes and places; none of it ever stands in the robots' way.
     pub fn furnished(seed: u64) -> Self {
         Self { objects: [building::building(), furnish::furniture(seed)].concat() }
+    }
+
+    /// A hall of 20 x 14 x 2.7 m with six pillars and furniture along its walls drawn from `seed`, and nothing else within
+    /// 4.5 m of its center (10, 7): room to drive circles in.
+    pub fn hall(seed: u64) -> Self {
+        Self { objects: hall::hall(seed) }
     }
 
     /// Distance from `origin` (map frame, meters) to the first surface along `direction`, none beyond

@@ -53,6 +53,30 @@ impl SpinningLidar {
             .collect()
     }
 
+    /// One scan of a sensor that moves during its turn: the points as in [`SpinningLidar::scan`], each in the sensor's
+    /// frame at its own time, and these times.
+    ///
+    /// The turn takes `turn_s` seconds and ends at time 0, so that times are negative; `map_from_sensor` is where the
+    /// sensor is at a time.
+    pub fn sweep(
+        &self,
+        scene: &Scene,
+        turn_s: f64,
+        map_from_sensor: impl Fn(f64) -> Pose,
+        rng: &mut ChaCha8Rng,
+    ) -> (Vec<Point>, Vec<f32>) {
+        let mut scan = (Vec::new(), Vec::new());
+        for azimuth in 0..self.azimuths {
+            let time_s = (f64::from(azimuth + 1) / f64::from(self.azimuths) - 1.0) * turn_s;
+            let pose = map_from_sensor(time_s);
+            for ring in 0..self.rings {
+                scan.0.push(self.measure(self.direction(azimuth, ring), scene, &pose, rng));
+                scan.1.push(time_s as f32);
+            }
+        }
+        scan
+    }
+
     fn direction(&self, azimuth: u32, ring: u32) -> Vector3<f64> {
         let (sin, cos) = (f64::from(azimuth) / f64::from(self.azimuths) * TAU).sin_cos();
         let share = (f64::from(ring) + 0.5) / f64::from(self.rings) * 2.0 - 1.0;
