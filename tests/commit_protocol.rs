@@ -36,18 +36,7 @@ fn new_map() -> MultiResolutionMap {
 }
 
 fn insertion(map: &MultiResolutionMap, robot: &str, regions: &[u8], each: usize) -> Change {
-    let pose = MappedScan {
-        robot: RobotName::new(robot).unwrap(),
-        scan_id: None,
-        timestamp_ns: None,
-        map_from_sensor: Pose::identity(),
-        revision: 0,
-        level_overlaps: Vec::new(),
-        iterations: 0,
-        points_skipped: 0,
-        new_voxels: 0,
-        digest: 0,
-    };
+    let pose = MappedScan::new(RobotName::new(robot).unwrap(), Pose::identity());
     Change::Insertion(ScanRecord::of_points(pose, &points(regions, each), map.lattice()))
 }
 
