@@ -287,10 +287,10 @@ impl Trajectory {
 
     /// Takes scans, which ascend, out of what robots have in the map. Their ids stay known.
     fn take_from_robots(&mut self, scans: &[u64]) {
-        for (name, poses) in self.by_robot(scans) {
+        for (name, revisions) in self.by_robot(scans, |pose| pose.revision) {
             let robots = Arc::make_mut(&mut self.robots);
             let Some(robot) = robots.get_mut(&name).map(Arc::make_mut) else { continue };
-            robot.withdraw(&poses.iter().map(|pose| pose.revision).collect::<Vec<_>>());
+            robot.withdraw(&revisions);
             if robot.is_unknown() {
                 robots.remove(&name);
             }
@@ -299,18 +299,18 @@ impl Trajectory {
 
     /// Forgets scans, which ascend and were undone, but for their ids.
     fn forget_undone(&mut self, scans: &[u64]) {
-        for (name, poses) in self.by_robot(scans) {
+        for (name, poses) in self.by_robot(scans, MappedScan::clone) {
             if let Some(robot) = Arc::make_mut(&mut self.robots).get_mut(&name) {
                 Arc::make_mut(robot).forget(poses.iter());
             }
         }
     }
 
-    /// The stored ones of these scans, by robot, in their order.
-    fn by_robot(&self, scans: &[u64]) -> BTreeMap<RobotName, Vec<MappedScan>> {
+    /// What `of` says of those of these scans that are stored, by robot, in their order.
+    fn by_robot<T>(&self, scans: &[u64], of: impl Fn(&MappedScan) -> T) -> BTreeMap<RobotName, Vec<T>> {
         let mut by_robot: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for pose in scans.iter().filter_map(|&scan| self.poses.get(scan)) {
-            by_robot.entry(pose.robot.clone()).or_default().push(pose.clone());
+            by_robot.entry(pose.robot.clone()).or_default().push(of(pose));
         }
         by_robot
     }
