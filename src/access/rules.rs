@@ -97,6 +97,8 @@ impl Access {
             return Ok(key.map_or_else(|| Caller::without_key(AllowedMaps::none()), Caller::with));
         };
         let key = key.ok_or_else(|| no_key(operation, secret.is_some()))?;
+        // The log names whoever is refused, too.
+        tracing::Span::current().record("key", key.name.as_str());
         if let Some(refusal) = key.expired(SystemTime::now()) {
             return Err(refusal);
         }

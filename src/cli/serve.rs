@@ -108,7 +108,8 @@ pub(super) struct ServeOptions {
 impl Serve {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
-        start_logging(config.log.format, &config.log.level, config.log.audit).map_err(CliError::usage)?;
+        let _logging =
+            start_logging(config.log.format, &config.log.level, config.log.audit).map_err(CliError::usage)?;
         for variable in unknown_variables() {
             tracing::warn!(variable, "is no setting and of no use here");
         }

@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use axum::Router;
 use axum::extract::{Request, State};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::{Next, from_fn_with_state, map_request};
 use axum::response::Response;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, RequestId, SetRequestIdLayer};
 use tracing::field::{Empty, display};
@@ -65,6 +65,7 @@ impl Middleware {
             .layer(from_fn_with_state((self.clone(), protocol), serve::<P>))
             .layer(PropagateRequestIdLayer::x_request_id())
             .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
+            .layer(map_request(without_unreadable_id))
     }
 
     /// The handler's answer to a request, if its caller may ask for the operation and there is room for it.
@@ -90,6 +91,16 @@ impl Middleware {
         let handle = |request| protocol.handle(request, next);
         caller.while_valid(self.admission.answer(operation, request, endings, handle)).await
     }
+}
+
+/// The request without an id that the log could not repeat: one is made then.
+async fn without_unreadable_id(mut request: Request) -> Request {
+    const REQUEST_ID: &str = "x-request-id";
+    let id = request.headers().get(REQUEST_ID);
+    if id.is_some_and(|id| id.to_str().is_ok_and(str::is_empty) || id.to_str().is_err()) {
+        request.headers_mut().remove(REQUEST_ID);
+    }
+    request
 }
 
 /// Serves one request.

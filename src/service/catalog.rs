@@ -130,15 +130,15 @@ impl Catalog {
         let _writing = self.turn_to_write().await?;
         self.check_free(&name, maps_max, replace)?;
         let old = self.find(&name)?;
-        let before = old.as_ref().map(|old| old.version(old.map.revision()));
         // `saving` is held until its snapshot is written.
         let BuiltMap { uuid, map, saving: _saving } = built;
         let build = move || Ok(map);
-        let map = match old {
+        let map = match &old {
             None => self.add(name.name(), uuid, build).await?,
-            Some(old) => self.replace(old, uuid, build).await?,
+            Some(old) => self.replace(Arc::clone(old), uuid, build).await?,
         };
-        Ok((before, map))
+        // Only now does it change no more.
+        Ok((old.map(|old| old.version(old.map.revision())), map))
     }
 
     /// Refuses a map file for which there is no place, before any work is done for it.

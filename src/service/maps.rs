@@ -42,7 +42,7 @@ impl MapService {
                 inner.catalog.create(name, settings, inner.settings.limits.maps_max).await
             };
             let (map, created) = run_to_completion(create).await?;
-            Ok((self.describe(map).await?, created))
+            Ok((describe_made(map).await?, created))
         };
         self.observed("CreateMap", Some(map), work, |(info, created)| {
             let before = (!created).then_some(info.version);
@@ -128,10 +128,10 @@ impl MapService {
     /// if there is one, which is kept as `NAME-replaced-REVISION` until somebody deletes it.
     ///
     /// # Errors
-    /// `InvalidArgument` for a file that is none, damaged or larger than `map_file_bytes_max`; `Conflict` where there
-    /// is a map of that name, unless `replace` says that it is to be kept under another; `ResourceExhausted` beyond
-    /// `maps_max`, `voxels_per_map_max` or `map_file_scans_max`, where there is no memory for what it holds, or while disk
-    /// or memory is nearly full.
+    /// `InvalidArgument` for a file that is none, or damaged; `Conflict` where there is a map of that name, unless `replace`
+    /// says that it is to be kept under another; `ResourceExhausted` beyond `map_file_bytes_max`, `maps_max`,
+    /// `voxels_per_map_max` or `map_file_scans_max`, where there is no memory for what it holds, or while disk or memory is
+    /// nearly full.
     pub async fn restore_map(
         &self,
         name: MapName,
@@ -156,7 +156,7 @@ impl MapService {
             let maps_max = self.limits().maps_max;
             let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
             let (before, map) = run_to_completion(restore).await?;
-            Ok((before, self.describe(map).await?))
+            Ok((before, describe_made(map).await?))
         };
         let outcome =
             |(before, info): &(_, MapInfo)| Outcome::Changed(Change::of_map(*before, Some(info.version)));
@@ -195,10 +195,57 @@ impl MapService {
     }
 }
 
+/// Describes a map that was just made, on no pool: who made it is told so, whatever the server has to do besides.
+async fn describe_made(map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
+    let described = tokio::task::spawn_blocking(move || map.describe(RATE_SAMPLES, StopSignal::NEVER));
+    described.await.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()))
+}
+
 /// Runs what must not stop halfway, whoever goes on waiting for it: memory and disk would disagree.
 async fn run_to_completion<T: Send + 'static>(
     change: impl Future<Output = Result<T, ServiceError>> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let done = tokio::spawn(polled_by_runtime(change)).await;
     done.unwrap_or_else(|e| Err(ServiceError::new(Reason::JobPanicked, e.to_string())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Limits, MapService, ServiceSettings};
+    use super::*;
+    use crate::store::OpeningProgress;
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn who_makes_a_map_is_told_so_whatever_the_server_has_to_do_besides() {
+        let settings = ServiceSettings {
+            query_threads: 1,
+            limits: Limits { jobs_waiting_max: 1, ..Limits::default() },
+            ..ServiceSettings::default()
+        };
+        let service = MapService::open(settings, &OpeningProgress::default()).unwrap();
+        let (hold, held) = std::sync::mpsc::channel::<()>();
+        let held = std::sync::Mutex::new(held);
+        let inner = Arc::clone(&service.inner);
+        let first =
+            tokio::spawn(
+                async move { inner.queries.run(move |_| held.lock().unwrap().recv().is_ok()).await },
+            );
+        let inner = Arc::clone(&service.inner);
+        let second = tokio::spawn(async move { inner.queries.run(|_| ()).await });
+        let waiting = || service.pools().iter().find(|pool| pool.name == "query").unwrap().waiting;
+        while waiting() == 0 {
+            tokio::task::yield_now().await;
+        }
+        let name = |n: u32| MapName::new(&format!("m{n}")).unwrap();
+        let settings = MapSettings::new(0.1, 4);
+        service.create_map(name(0), settings).await.unwrap();
+        assert_eq!(service.map_info(&name(0)).await.unwrap_err().reason, Reason::Overloaded);
+        for n in 0..5 {
+            let (info, created) = service.create_map(name(n), settings).await.unwrap();
+            assert_eq!((info.name, created), (name(n), n > 0), "map {n}");
+        }
+        drop(hold);
+        first.await.unwrap().unwrap();
+        second.await.unwrap().unwrap();
+    }
 }

@@ -9,21 +9,38 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 
-use crate::service::{Change, End, Ended, MapVersion, Observer, Outcome};
+use crate::service::{Change, End, Ended, MapVersion, Observer, Outcome, Reason};
 
 /// The target of the audit's lines.
 pub const AUDIT: &str = "mrol::audit";
 
-/// Requests that were refused or failed and are written one by one, a second. Whoever has no key may send any number of
-/// them, and must not fill the disk of the log: the others are counted in the next line.
+/// Requests of each kind that were refused, failed or left and are written one by one, a second. Anybody may send any
+/// number of them, and must not fill the disk of the log: the others are counted in the next line of their kind.
 const REFUSALS_PER_S_MAX: NonZeroU32 = NonZeroU32::new(10).expect("not zero");
 
 /// Operations whose refusal and failure are lines of their own; those that are done tell by their outcome.
 const CHANGES: [&str; 5] = ["CreateMap", "DeleteMap", "RestoreMap", "DeleteVoxels", "Undo"];
 
+/// Reasons for which somebody is not let in whose key is known.
+const OF_KNOWN_KEYS: [&str; 5] =
+    ["key_expired", "key_withdrawn", "map_not_allowed", "robot_not_allowed", "scope_too_small"];
+
 /// Writes the audit. A clone is another handle on the same one.
-#[derive(Debug, Clone)]
-pub struct Audit(Arc<Refusals>);
+#[derive(Debug, Clone, Default)]
+pub struct Audit(Arc<Kinds>);
+
+/// What is not written without bound, by who can cause it: strangers do not push the lines of known keys out.
+#[derive(Debug, Default)]
+struct Kinds {
+    /// Requests that were not let in, without a key that is known.
+    strangers: Refusals,
+    /// Requests that were not let in, with a key that is known.
+    keys: Refusals,
+    /// Changes that failed.
+    failed: Refusals,
+    /// Changes whose callers went away.
+    gone: Refusals,
+}
 
 #[derive(Debug)]
 struct Refusals {
@@ -32,17 +49,18 @@ struct Refusals {
     unwritten: AtomicU64,
 }
 
-impl Default for Audit {
+impl Default for Refusals {
     fn default() -> Self {
         let rate = RateLimiter::direct(Quota::per_second(REFUSALS_PER_S_MAX));
-        Self(Arc::new(Refusals { rate, unwritten: AtomicU64::new(0) }))
+        Self { rate, unwritten: AtomicU64::new(0) }
     }
 }
 
 impl Audit {
     /// A request was not let in, by the word `reason`; to be called within its span.
     pub fn denied(&self, reason: &str) {
-        if let Some(unwritten) = self.0.to_write() {
+        let kind = if OF_KNOWN_KEYS.contains(&reason) { &self.0.keys } else { &self.0.strangers };
+        if let Some(unwritten) = kind.to_write() {
             tracing::info!(target: AUDIT, outcome = "denied", reason, unwritten, "not let in");
         }
     }
@@ -82,15 +100,18 @@ impl Observer for Audit {
             End::Done(_) => {}
             End::Failed(error) if CHANGES.contains(operation) => {
                 let reason = error.reason.as_str();
-                if let Some(unwritten) = self.0.to_write() {
+                // Its change may be made, and its map is closed then: there are not many.
+                let is_open = error.reason == Reason::OutcomeUnknown;
+                if let Some(unwritten) = if is_open { Some(0) } else { self.0.failed.to_write() } {
                     tracing::info!(
                         target: AUDIT, operation, map, outcome = "failed", reason, %error, unwritten, "change"
                     );
                 }
             }
             End::CallerGone if CHANGES.contains(operation) => {
-                // The change may be made, so this one is always written.
-                tracing::info!(target: AUDIT, operation, map, outcome = "caller_gone", "change");
+                if let Some(unwritten) = self.0.gone.to_write() {
+                    tracing::info!(target: AUDIT, operation, map, outcome = "caller_gone", unwritten, "change");
+                }
             }
             End::Failed(_) | End::CallerGone => {}
         }

@@ -3,6 +3,7 @@
 use std::io::IsTerminal;
 
 use serde::{Deserialize, Serialize};
+use tracing_appender::non_blocking::{NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
 
 use super::AUDIT;
@@ -35,22 +36,34 @@ pub enum TelemetryError {
 /// The target of the spans of requests, whose fields (protocol, request id, key, peer) stand in every line within.
 pub const REQUEST: &str = "mrol::request";
 
+/// Lines that wait until standard error takes them, at most; further ones are lost.
+const LINES_WAITING_MAX: usize = 16_384;
+
+/// The running log. Dropped at the end of the process, it waits a second at most for the last lines to be written.
+#[derive(Debug)]
+#[must_use = "lines are written while it lives"]
+pub struct Logging(#[expect(dead_code, reason = "it works when it is dropped")] WorkerGuard);
+
 /// Starts the process's log at `level`: a level or a list of `target=level`. With `audit` the lines of the
-/// [audit](super::AUDIT) are written whatever the level, and without not at all.
+/// [audit](super::AUDIT) are written whatever the level, and without not at all. Lines are written until the result is
+/// dropped.
 ///
 /// # Errors
 /// When `level` is no filter, or the log was started before.
-pub fn start_logging(format: LogFormat, level: &str, audit: bool) -> Result<(), TelemetryError> {
+pub fn start_logging(format: LogFormat, level: &str, audit: bool) -> Result<Logging, TelemetryError> {
     let filter = EnvFilter::try_new(level).map_err(|error| TelemetryError::Level(level.to_owned(), error))?;
     let filter = with_audit(filter, audit);
     let colors = std::io::stderr().is_terminal();
-    let lines =
-        tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colors).with_writer(std::io::stderr);
+    // On a thread of its own: whoever reads standard error may stop, and must not stop the server.
+    let writing = NonBlockingBuilder::default().lossy(true).buffered_lines_limit(LINES_WAITING_MAX);
+    let (writer, worker) = writing.thread_name("log").finish(std::io::stderr());
+    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colors).with_writer(writer);
     let started = match format {
         LogFormat::Text => lines.try_init(),
         LogFormat::Json => lines.json().flatten_event(true).try_init(),
     };
-    started.map_err(|_| TelemetryError::Started)
+    started.map_err(|_| TelemetryError::Started)?;
+    Ok(Logging(worker))
 }
 
 fn with_audit(filter: EnvFilter, audit: bool) -> EnvFilter {

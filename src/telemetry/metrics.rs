@@ -277,7 +277,9 @@ impl Observer for Metrics {
             Outcome::Points { lookup, points } => self.0.maps.points_queried(map, *lookup, *points),
             Outcome::Scan { robot, verdict, replayed: false } => self.scan(map, robot, *verdict),
             Outcome::Changed(Change { voxels_removed, scans_undone, replayed: false, .. }) => {
-                self.0.maps.count(map, (Family::VoxelsRemoved, None), *voxels_removed);
+                if *voxels_removed > 0 {
+                    self.0.maps.count(map, (Family::VoxelsRemoved, None), *voxels_removed);
+                }
                 if *scans_undone > 0 {
                     self.0.maps.count(map, (Family::ScansUndone, None), *scans_undone);
                 }

@@ -9,6 +9,6 @@ mod metrics;
 mod requests;
 
 pub use audit::{AUDIT, Audit};
-pub use log::{LogFormat, REQUEST, TelemetryError, start_logging};
+pub use log::{LogFormat, Logging, REQUEST, TelemetryError, start_logging};
 pub use metrics::{InUse, Metrics, OpenConnection};
 pub use requests::{RequestOutcome, RequestRecorder};

@@ -34,7 +34,7 @@ const MONITORS: usize = 16;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Silent,
-    RateLimitKey,
+    Requesting,
     Answered,
 }
 
@@ -59,7 +59,7 @@ impl Reserved {
     /// A request of the connection begins.
     pub(super) fn asks(&mut self, number: u64) {
         if let Some(guest) = self.0.get_mut(&number).filter(|guest| guest.stage == Stage::Silent) {
-            (guest.stage, guest.news) = (Stage::RateLimitKey, Instant::now());
+            (guest.stage, guest.news) = (Stage::Requesting, Instant::now());
         }
     }
 

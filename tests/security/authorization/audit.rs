@@ -173,3 +173,52 @@ async fn the_audit_can_be_left_out() {
     assert_eq!(made.await.status(), StatusCode::CREATED);
     assert_eq!(audited.ended(), Vec::<Value>::new());
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn strangers_do_not_push_out_the_lines_of_known_keys_which_are_named() {
+    let audited = Audited::start(&[]);
+    let reader = audited._keyring.add("reader", Scope::Read, None);
+    audited.server.signal("HUP");
+    let create = json!({"resolution_m": 0.1});
+    // The key is known once its file was read again.
+    while audited.http(Method::GET, "/v1/maps", "wait", Some(&reader), Value::Null).await.status()
+        != StatusCode::OK
+    {
+        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+    }
+    for _ in 0..50 {
+        audited.http(Method::PUT, "/v1/maps/a", "flood", None, create.clone()).await;
+    }
+    let denied = audited.http(Method::PUT, "/v1/maps/a", "denied", Some(&reader), create).await;
+    assert_eq!(denied.status(), StatusCode::FORBIDDEN);
+    let missing =
+        audited.http(Method::DELETE, "/v1/maps/a", "failed", Some(&audited.operator), Value::Null).await;
+    assert_eq!(missing.status(), StatusCode::NOT_FOUND);
+    let nothing = audited.http(Method::DELETE, "/v1/maps/a", "", Some(&audited.operator), Value::Null).await;
+    let made = nothing.headers()["x-request-id"].to_str().unwrap().to_owned();
+    assert_eq!(made.len(), 36, "an id is made where the one sent cannot be read");
+
+    let lines = audited.ended();
+    let of =
+        |id: &str| lines.iter().find(|line| line["span"]["request_id"] == id).cloned().unwrap_or_default();
+    let denied = of("denied");
+    assert_eq!((&denied["reason"], &denied["span"]["key"]), (&json!("scope_too_small"), &json!("reader")));
+    let failed = of("failed");
+    assert_eq!((&failed["reason"], &failed["span"]["key"]), (&json!("map_not_found"), &json!("operator")));
+    assert_eq!(of(&made)["reason"], "map_not_found");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_log_that_nobody_reads_stops_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let (unread, log) = std::io::pipe().unwrap();
+    let server = Process::start_with_log(folder.path().to_str().unwrap(), &[], "debug", log.into());
+    // Each is a line or more of some 200 bytes; a pipe holds 64 KiB.
+    for _ in 0..2000 {
+        let answer = client().get(format!("{}/v1/maps/none", server.http)).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::NOT_FOUND);
+    }
+    assert_eq!(client().get(format!("{}/livez", server.http)).send().await.unwrap().status(), StatusCode::OK);
+    assert_eq!(server.stop(), Some(0));
+    drop(unread);
+}

@@ -9,7 +9,7 @@ use crate::cli::output::Output;
 use crate::cli::serve::Serving;
 use crate::config::Config;
 use crate::lab::fleet;
-use crate::telemetry::{LogFormat, start_logging};
+use crate::telemetry::{LogFormat, Logging, start_logging};
 
 /// Log level: only problems, since the demonstration itself says what happens.
 const LOG_LEVEL: &str = "warn";
@@ -18,6 +18,7 @@ pub(super) struct Daemon {
     daemon: fleet::Daemon,
     /// Data folder, removed when the daemon is dropped.
     _data_dir: TempDir,
+    _logging: Logging,
 }
 
 impl Daemon {
@@ -27,7 +28,7 @@ impl Daemon {
         grpc: Option<SocketAddr>,
         output: &Output,
     ) -> Result<Self, CliError> {
-        start_logging(LogFormat::Text, LOG_LEVEL, false).map_err(CliError::failed)?;
+        let logging = start_logging(LogFormat::Text, LOG_LEVEL, false).map_err(CliError::failed)?;
         let data_dir = TempDir::new()
             .map_err(|error| CliError::failed(format!("no temporary folder can be made: {error}")))?;
         let mut config = Config { data_dir: data_dir.path().to_owned(), ..Config::default() };
@@ -47,7 +48,7 @@ impl Daemon {
             Some(address)
         };
         let daemon = fleet::Daemon::start(config, instead).await?;
-        Ok(Self { daemon, _data_dir: data_dir })
+        Ok(Self { daemon, _data_dir: data_dir, _logging: logging })
     }
 
     pub(super) fn serving(&self) -> Serving {
