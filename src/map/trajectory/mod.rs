@@ -11,7 +11,7 @@
 //! what it changes: a chunk, where somebody holds a clone, and nothing where nobody does. Undo marks poses; they go
 //! when their chunks are thinned (see [`TrajectorySpacing`] and [`Trajectory::thin`]).
 //!
-//! A pose with its indices takes 225 bytes, as `tests/map/trajectory_growth.rs` measures. A week of eight robots at 10 Hz is 48
+//! A pose with its indices takes 256 bytes, as `tests/map/trajectory_growth.rs` measures. A week of eight robots at 10 Hz is 48
 //! million scans: thinned, 80,640 poses of one a minute, or 18 MB, and one a place and direction of each robot.
 
 mod chunked;
