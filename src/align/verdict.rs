@@ -112,7 +112,7 @@ impl Alignment {
     }
 
     /// This alignment with another verdict, and why.
-    pub(super) fn but(self, verdict: Verdict, reason: String) -> Self {
+    pub fn but(self, verdict: Verdict, reason: String) -> Self {
         Self { verdict, reason, ..self }
     }
 }

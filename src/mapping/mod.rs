@@ -9,6 +9,7 @@ mod deskew;
 mod error;
 mod filtered_points;
 mod guess;
+mod recovery;
 mod sightings;
 mod stationary;
 
@@ -16,6 +17,7 @@ pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
 pub use guess::Guess;
+pub use recovery::{LOST_ROBOTS_MAX, LostRobots, Recovered, RecoverySettings, SearchTask};
 pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
 
@@ -26,6 +28,7 @@ use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_
 use crate::geometry::{Point, Pose, Twist};
 use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName};
 use crate::util::StopSignal;
+use recovery::Recovery;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
 ///
@@ -53,6 +56,7 @@ pub struct ScanMapper<'a> {
     map: &'a MultiResolutionMap,
     sightings: &'a Sightings,
     settings: MappingSettings,
+    recovery: Option<Recovery<'a>>,
 }
 
 /// Settings of a [`ScanMapper`].
@@ -136,6 +140,8 @@ pub struct LocatedScan {
     /// The velocity of the sensor that its points were deskewed with; none of points that were measured at once, or
     /// where the velocity is not known.
     pub velocity: Option<Twist>,
+    /// How its robot, which was lost, was found again; none of a scan that fits from its own guess, or nowhere.
+    pub recovered: Option<Recovered>,
 }
 
 impl LocatedScan {
@@ -166,7 +172,7 @@ impl ScanOutcome {
 impl<'a> ScanMapper<'a> {
     /// A mapper of scans into `map`, whose robots were seen as `sightings` tells.
     pub fn new(map: &'a MultiResolutionMap, sightings: &'a Sightings, settings: MappingSettings) -> Self {
-        Self { map, sightings, settings }
+        Self { map, sightings, settings, recovery: None }
     }
 
     /// Maps one scan: aligns it to the map from its guess and, where it fits, adds all its points (paper III-B).
@@ -178,6 +184,8 @@ impl<'a> ScanMapper<'a> {
     /// it was.
     pub fn map_scan(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<ScanOutcome, MappingError> {
         let located = self.locate(scan, stop)?;
+        let located = self.recover(scan, located, stop)?;
+        let located = self.searched(scan, located, stop);
         self.sightings.note(scan, &located);
         if !located.is_accepted() && !scan.force {
             return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
@@ -220,7 +228,8 @@ impl<'a> ScanMapper<'a> {
             return Err(MappingError::Stopped);
         }
         let is_first = map_is_empty && !scan.at_guess;
-        Ok(LocatedScan { alignment, align_time: start.elapsed(), is_first, velocity })
+        let align_time = start.elapsed();
+        Ok(LocatedScan { alignment, align_time, is_first, velocity, recovered: None })
     }
 
     /// Aligns a scan from `guess`, or judges it there, its points deskewed by `velocity`.

@@ -6,7 +6,9 @@ use crate::align::{Alignment, AlignmentSettings, Verdict};
 use crate::cli::error::CliError;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
-use crate::mapping::{Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings};
+use crate::mapping::{
+    Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper, Sightings,
+};
 use crate::util::StopSignal;
 
 /// Name of the robot in the map's trajectory.
@@ -19,6 +21,8 @@ pub(in crate::cli) struct Mapper {
     robot: RobotName,
     guess: Guess,
     sightings: Sightings,
+    lost: LostRobots,
+    recovers: bool,
 }
 
 /// Result of mapping a scan.
@@ -32,6 +36,8 @@ pub(in crate::cli) struct Mapped {
     pub(in crate::cli) false_positive_rate: f64,
     pub(in crate::cli) align_time: Duration,
     pub(in crate::cli) insert_time: Duration,
+    /// How the robot, which was lost, was found again.
+    pub(in crate::cli) recovered: Option<Recovered>,
 }
 
 impl Mapped {
@@ -53,7 +59,15 @@ impl Mapper {
             robot: RobotName::new(ROBOT).map_err(CliError::failed)?,
             guess,
             sightings: Sightings::default(),
+            lost: LostRobots::default(),
+            recovers: false,
         })
+    }
+
+    /// This mapper, which looks for the robot after a scan was refused if `recovers`.
+    #[must_use]
+    pub(in crate::cli) fn recovering(self, recovers: bool) -> Self {
+        Self { recovers, ..self }
     }
 
     pub(in crate::cli) fn map(&self) -> &MultiResolutionMap {
@@ -82,7 +96,10 @@ impl Mapper {
             at_guess: known.is_some(),
             ..Scan::new(&self.robot, points)
         };
-        let mapper = ScanMapper::new(&self.map, &self.sightings, self.settings);
+        let mut mapper = ScanMapper::new(&self.map, &self.sightings, self.settings);
+        if self.recovers {
+            mapper = mapper.recovering(&self.lost, RecoverySettings::default());
+        }
         let outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
         Ok(Mapped {
             new_voxels: outcome.committed.map_or(0, |committed| committed.voxels),
@@ -90,6 +107,7 @@ impl Mapper {
             false_positive_rate,
             align_time: outcome.located.align_time,
             insert_time: outcome.insert_time,
+            recovered: outcome.located.recovered,
             alignment: outcome.located.alignment,
         })
     }

@@ -74,6 +74,10 @@ pub(super) struct Map {
     /// Share of a scan's points that must fall in occupied voxels for it to be accepted [default: 0.2]
     #[arg(long, value_name = "SHARE")]
     min_overlap: Option<f64>,
+    /// Leave a robot lost once its scans are refused. Otherwise each refused scan is aligned from other guesses, then
+    /// searched for in the whole map, where two scans in a row have to agree
+    #[arg(long)]
+    no_recovery: bool,
     /// Where a scan is thought to have been taken: at the last accepted pose, or as far on as that is from the one
     /// before it
     #[arg(long, value_enum, default_value_t)]
@@ -95,7 +99,8 @@ pub(super) struct Map {
 
 impl Map {
     pub(super) fn run(self, output: Output) -> Result<(), CliError> {
-        let mut mapper = Mapper::new(self.map_settings(), self.alignment_settings()?, self.guess.into())?;
+        let mapper = Mapper::new(self.map_settings(), self.alignment_settings()?, self.guess.into())?;
+        let mut mapper = mapper.recovering(!self.no_recovery);
         let filter = self.points.filter().map_err(CliError::usage)?;
         let files = scan_files(&self.scans)?;
         let truth = self.truth.as_ref().map(|path| true_poses(path, files.len(), &output)).transpose()?;

@@ -9,6 +9,7 @@ use super::mapper::Mapped;
 use super::truth_errors::ErrorSummary;
 use crate::cli::map_report::count;
 use crate::cli::scan_report::{PLACE_HEAD, place};
+use crate::util::Keyword;
 use crate::wire::json::JsonPose;
 
 /// The line of a scan.
@@ -27,6 +28,8 @@ pub(super) struct ScanLine {
     voxels: usize,
     align_ms: f64,
     insert_ms: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recovered: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     error_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -51,6 +54,7 @@ impl ScanLine {
             voxels: mapped.voxels,
             align_ms: mapped.align_time.as_secs_f64() * 1e3,
             insert_ms: mapped.insert_time.as_secs_f64() * 1e3,
+            recovered: mapped.recovered.map(Keyword::as_str),
             error_m: error.map(|(meters, _)| meters),
             error_deg: error.map(|(_, degrees)| degrees),
             name_width,
@@ -86,6 +90,9 @@ impl Display for ScanLine {
             (Some(meters), Some(degrees)) => write!(f, "  {meters:>8.4}  {degrees:>7.3}")?,
             _ if !self.accepted => write!(f, "  {}", self.reason)?,
             _ => {}
+        }
+        if let Some(how) = self.recovered {
+            write!(f, "  recovered: {how}")?;
         }
         Ok(())
     }

@@ -1,0 +1,173 @@
+//! Robots that are lost: what is remembered of them until they are found.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::align::localize::LocalizationQuery;
+use crate::geometry::{Point, Pose};
+use crate::map::RobotName;
+use crate::sync::{Mutex, Rank};
+
+/// Lost robots that are remembered, at most; beyond, the one goes whose last scan came longest ago.
+pub const LOST_ROBOTS_MAX: usize = 64;
+
+/// The robots whose last scan was refused, in memory.
+#[derive(Debug)]
+pub struct LostRobots(Mutex<All>);
+
+#[derive(Debug, Default)]
+struct All {
+    robots: HashMap<RobotName, Lost>,
+    /// Searches begun so far.
+    searches: u64,
+}
+
+/// A robot whose last scan was refused.
+#[derive(Debug, Clone)]
+pub(super) struct LostRobot {
+    /// Points of its last scan, sensor frame, meters.
+    pub(super) points: Arc<[Point]>,
+    /// Where its refused scans lead, one aligned to the other: map_from_sensor of the last one.
+    pub(super) chained: Pose,
+    /// Where a search saw it, moved on by its motion since: map_from_sensor of its last scan.
+    pub(super) place: Option<Pose>,
+}
+
+#[derive(Debug)]
+struct Lost {
+    robot: LostRobot,
+    noted_at: Instant,
+    /// Searches begun for this robot.
+    searches: u64,
+    searched_at: Option<Instant>,
+    under_way: Option<UnderWay>,
+    /// What the last search said.
+    news: Option<String>,
+}
+
+/// A search under way.
+#[derive(Debug)]
+struct UnderWay {
+    number: u64,
+    /// The robot's motion since the scan that is searched for: searched_from_last. None where it is not known.
+    since: Option<Pose>,
+}
+
+/// A search that is to be made for a lost robot.
+#[derive(Debug, Clone)]
+pub struct SearchTask {
+    number: u64,
+    robot: RobotName,
+    /// Points of the scan to search for, sensor frame, meters.
+    pub(super) points: Arc<[Point]>,
+    pub(super) query: LocalizationQuery,
+}
+
+impl Default for LostRobots {
+    fn default() -> Self {
+        Self(Mutex::new(Rank::Brief, All::default()))
+    }
+}
+
+/// A refused scan.
+#[derive(Debug)]
+pub(super) struct RefusedScan<'a> {
+    pub(super) robot: &'a RobotName,
+    /// Its points, sensor frame, meters.
+    pub(super) points: Vec<Point>,
+    /// Motion of the sensor since the refused scan before it: before_from_now. None where there is none, or it is not
+    /// known.
+    pub(super) motion: Option<Pose>,
+    /// Where it was taken if `motion` does not tell: map_from_sensor.
+    pub(super) probable_pose: Pose,
+    /// The place of a search was looked at, and the scan is not there.
+    pub(super) is_not_in_place: bool,
+}
+
+impl LostRobots {
+    /// The robot, if it is lost.
+    pub(super) fn get(&self, robot: &RobotName) -> Option<LostRobot> {
+        self.0.lock().robots.get(robot).map(|lost| lost.robot.clone())
+    }
+
+    /// What the last search for the robot said.
+    pub(super) fn news(&self, robot: &RobotName) -> Option<String> {
+        self.0.lock().robots.get(robot)?.news.clone()
+    }
+
+    /// The robot is lost no longer.
+    pub(super) fn found(&self, robot: &RobotName) {
+        self.0.lock().robots.remove(robot);
+    }
+
+    /// Notes a refused scan.
+    pub(super) fn note(&self, scan: RefusedScan<'_>) {
+        let RefusedScan { robot, motion, probable_pose, .. } = scan;
+        let points = scan.points.into();
+        let mut all = self.0.lock();
+        if let Some(lost) = all.robots.get_mut(robot) {
+            let moved = |pose: Pose| motion.map(|motion| pose * motion);
+            let place = lost.robot.place.filter(|_| !scan.is_not_in_place).and_then(moved);
+            let chained = moved(lost.robot.chained).unwrap_or(probable_pose);
+            lost.robot = LostRobot { points, chained, place };
+            lost.noted_at = Instant::now();
+            if let Some(search) = &mut lost.under_way {
+                search.since = search.since.and_then(moved);
+            }
+            return;
+        }
+        if all.robots.len() >= LOST_ROBOTS_MAX {
+            let longest_ago = all.robots.iter().min_by_key(|(_, lost)| lost.noted_at);
+            if let Some(robot) = longest_ago.map(|(robot, _)| robot.clone()) {
+                all.robots.remove(&robot);
+            }
+        }
+        let lost = Lost {
+            robot: LostRobot { points, chained: probable_pose, place: None },
+            noted_at: Instant::now(),
+            searches: 0,
+            searched_at: None,
+            under_way: None,
+            news: None,
+        };
+        all.robots.insert(robot.clone(), lost);
+    }
+
+    /// Begins a search for the scan of the robot that was noted last: one at a time, and no sooner after the one before
+    /// it than `interval`. `query` is told how many searches for the robot there are with it.
+    pub(super) fn begin_search(
+        &self,
+        robot: &RobotName,
+        interval: Duration,
+        query: impl FnOnce(u64) -> LocalizationQuery,
+    ) -> Option<SearchTask> {
+        let mut all = self.0.lock();
+        let All { robots, searches } = &mut *all;
+        let lost = robots.get_mut(robot)?;
+        let is_early = lost.searched_at.is_some_and(|at| at.elapsed() < interval);
+        if lost.under_way.is_some() || lost.robot.place.is_some() || is_early {
+            return None;
+        }
+        *searches += 1;
+        lost.searches += 1;
+        lost.searched_at = Some(Instant::now());
+        lost.under_way = Some(UnderWay { number: *searches, since: Some(Pose::identity()) });
+        let (number, points, of_robot) = (*searches, Arc::clone(&lost.robot.points), lost.searches);
+        drop(all);
+        Some(SearchTask { number, robot: robot.clone(), points, query: query(of_robot) })
+    }
+
+    /// Ends a search, which found the scan at a place (map_from_sensor), or tells why not.
+    pub(super) fn end_search(&self, task: &SearchTask, found: Result<Pose, String>) {
+        let mut all = self.0.lock();
+        // The robot may have been found meanwhile, and have lost itself again.
+        let Some(lost) = all.robots.get_mut(&task.robot) else { return };
+        let Some(search) = lost.under_way.take_if(|search| search.number == task.number) else { return };
+        lost.news = Some(match &found {
+            Ok(_) => "found at one place, which the next scan has to confirm".into(),
+            Err(reason) => reason.clone(),
+        });
+        lost.robot.place = found.ok().zip(search.since).map(|(place, since)| place * since);
+    }
+}

@@ -1,0 +1,294 @@
+//! Recovery: how a robot is found again whose scans were refused.
+//!
+//! A guess is relative to the robot's last accepted pose. Once a few scans were refused, that pose is too far away, and
+//! no scan fits any more. [`ScanMapper::recover`] then aligns a refused scan from [other guesses](OtherGuess): the pose
+//! that the refused scans before it lead to, chained by aligning scan to scan; the robot's last pose; and where constant
+//! velocity leads. [`ScanMapper::search`] looks for the scan in a box around the last good pose, as for a robot of which
+//! nothing is known ([`localize`](crate::align::localize)). One search is not believed: the next scan has to be found
+//! where the motion between the two leads, which is known from aligning one to the other.
+//!
+//! A robot may be found in the wrong one of two places that look the same only if the other lies beyond where it can
+//! be: see [`RecoverySettings::reach_m`].
+
+mod lost_robots;
+mod motion;
+mod search;
+
+pub use lost_robots::{LOST_ROBOTS_MAX, LostRobots, SearchTask};
+
+use std::time::{Duration, Instant};
+
+use super::guess::last_seen;
+use super::{Guess, LocatedScan, MappingError, Scan, ScanMapper};
+use crate::align::localize::LocalizationSettings;
+use crate::align::{Alignment, Verdict};
+use crate::geometry::{Point, Pose, pose_difference};
+use crate::util::{Keyword, StopSignal};
+use crate::voxel::volumetric_sample_until;
+use lost_robots::{LostRobot, RefusedScan};
+use motion::motion_between;
+
+/// When and how a lost robot is looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecoverySettings {
+    /// Approximate number of points that are kept of a refused scan. 20,000.
+    pub points_kept: usize,
+    /// A scan is where its motion since the scan before it leads if it is found within so many r_0 of that. 6.
+    pub agreement: f64,
+    /// And turned by no more than this, degrees. 5.
+    pub agreement_deg: f64,
+    /// How a robot is searched for of which nothing is known, and what a place has to fulfill.
+    pub localization: LocalizationSettings,
+    /// How far from its last good pose a robot is looked for at least, meters. 20.
+    pub reach_m: f64,
+    /// How fast the distance grows in which it is looked for, with the time since its last good pose, meters a second.
+    /// 5. Where scans have no timestamps, the whole map is searched.
+    pub speed_max_m_per_s: f64,
+    /// Every other search, the first among them, takes the sensor to be as upright as at its last good pose, which takes a
+    /// tenth of the time. False.
+    pub keeps_tilt: bool,
+    /// Shortest time between two searches for the same robot. 0.
+    pub search_interval: Duration,
+}
+
+impl Default for RecoverySettings {
+    fn default() -> Self {
+        Self {
+            points_kept: 20_000,
+            agreement: 6.0,
+            agreement_deg: 5.0,
+            localization: LocalizationSettings::default(),
+            reach_m: 20.0,
+            speed_max_m_per_s: 5.0,
+            keeps_tilt: false,
+            search_interval: Duration::ZERO,
+        }
+    }
+}
+
+/// How a robot was found again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recovered {
+    /// From its last good pose.
+    LastPose,
+    /// From where constant velocity leads.
+    ConstantVelocity,
+    /// From where its refused scans lead, aligned one to the other.
+    ChainedScans,
+    /// By a search with no guess, which two scans confirm.
+    Localization,
+}
+
+impl Keyword for Recovered {
+    const ALL: &'static [Self] =
+        &[Self::LastPose, Self::ConstantVelocity, Self::ChainedScans, Self::Localization];
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::LastPose => "last_pose",
+            Self::ConstantVelocity => "constant_velocity",
+            Self::ChainedScans => "chained_scans",
+            Self::Localization => "localization",
+        }
+    }
+}
+
+/// Lost robots, and how they are looked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Recovery<'a> {
+    pub(super) lost: &'a LostRobots,
+    pub(super) settings: RecoverySettings,
+}
+
+/// A pose from which a refused scan is aligned again.
+type OtherGuess = (Recovered, Pose);
+
+impl<'a> ScanMapper<'a> {
+    /// This mapper, which looks for robots whose scans are refused and remembers them in `lost`.
+    #[must_use]
+    pub fn recovering(self, lost: &'a LostRobots, settings: RecoverySettings) -> Self {
+        Self { recovery: Some(Recovery { lost, settings }), ..self }
+    }
+
+    /// Looks for a scan that was refused where it was `located`: aligns it from other guesses. Returns where it is.
+    ///
+    /// An accepted scan is returned as it is, and its robot is lost no longer. One that is at the caller's word (`at_guess`,
+    /// `force`) is not looked for.
+    ///
+    /// # Errors
+    /// `stop` said so.
+    pub fn recover(
+        &self,
+        scan: &Scan<'_>,
+        located: LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> Result<LocatedScan, MappingError> {
+        let Some(recovery) = self.recovery.filter(|_| !scan.at_guess && !scan.force) else {
+            return Ok(located);
+        };
+        if located.is_accepted() {
+            recovery.lost.found(scan.robot);
+            return Ok(located);
+        }
+        let start = Instant::now();
+        let points = scan.points_at(located.velocity.as_ref());
+        let settings = &recovery.settings;
+        let kept =
+            volumetric_sample_until(&points, settings.points_kept, self.settings.alignment.seed, stop).points;
+        let before = recovery.lost.get(scan.robot);
+        let motion = before.as_ref().and_then(|before| {
+            motion_between(&before.points, &kept, self.map.settings(), &self.settings.alignment, stop)
+        });
+        let found = self.from_place(before.as_ref(), motion.as_ref(), &points, settings, stop);
+        let found = match found {
+            Some(found) => Ok(found),
+            None => self.from_other_guesses(scan, &located, before.as_ref(), motion.as_ref(), &points, stop),
+        };
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
+        let align_time = located.align_time + start.elapsed();
+        match found {
+            Ok((recovered, alignment)) => {
+                recovery.lost.found(scan.robot);
+                Ok(LocatedScan { alignment, align_time, recovered: Some(recovered), ..located })
+            }
+            Err(reason) => {
+                recovery.lost.note(RefusedScan {
+                    robot: scan.robot,
+                    points: kept,
+                    motion,
+                    probable_pose: self.probable_pose(scan, &located),
+                    is_not_in_place: before.is_some_and(|before| before.place.is_some()),
+                });
+                let alignment = match reason {
+                    Some(reason) => located.alignment.but(Verdict::Ambiguous, reason),
+                    None => located.alignment,
+                };
+                Ok(self.told(scan, LocatedScan { alignment, align_time, ..located }))
+            }
+        }
+    }
+
+    /// Aligns the scan from where a search saw its robot, moved on since by `motion`: accepted where it is there, and fits
+    /// as well as a search asks.
+    fn from_place(
+        &self,
+        before: Option<&LostRobot>,
+        motion: Option<&Pose>,
+        points: &[Point],
+        settings: &RecoverySettings,
+        stop: StopSignal<'_>,
+    ) -> Option<(Recovered, Alignment)> {
+        let guess = before?.place? * motion?;
+        let alignment = self.align_points(points, &guess, stop);
+        let fits = alignment.overlap() >= settings.localization.overlap_min;
+        (fits && self.agrees(&alignment, &guess, settings)).then_some((Recovered::Localization, alignment))
+    }
+
+    /// Aligns the scan from other guesses than its own.
+    ///
+    /// # Errors
+    /// When it fits from none of them; with a reason where it fits from several, at different places.
+    fn from_other_guesses(
+        &self,
+        scan: &Scan<'_>,
+        located: &LocatedScan,
+        before: Option<&LostRobot>,
+        motion: Option<&Pose>,
+        points: &[Point],
+        stop: StopSignal<'_>,
+    ) -> Result<(Recovered, Alignment), Option<String>> {
+        let Some(Recovery { settings, .. }) = self.recovery else { return Err(None) };
+        let mut found: Option<(Recovered, Alignment)> = None;
+        for (how, guess) in self.other_guesses(scan, before, motion) {
+            let alignment = self.align_points(points, &guess, stop);
+            let is_chained = how == Recovered::ChainedScans;
+            if alignment.verdict != Verdict::Accepted
+                || is_chained && !self.agrees(&alignment, &guess, &settings)
+            {
+                continue;
+            }
+            match &found {
+                Some((_, first))
+                    if !self.is_near(&first.map_from_sensor, &alignment.map_from_sensor, &settings) =>
+                {
+                    let (meters, degrees) =
+                        pose_difference(&first.map_from_sensor, &alignment.map_from_sensor);
+                    return Err(Some(format!(
+                        "{}; from other guesses it fits at two places, {meters:.2} m and {degrees:.1} deg apart",
+                        located.alignment.reason
+                    )));
+                }
+                Some(_) => {}
+                None => found = Some((how, alignment)),
+            }
+        }
+        found.ok_or(None)
+    }
+
+    /// The guesses of a refused scan other than its own, each far enough from those before it to lead elsewhere.
+    fn other_guesses(
+        &self,
+        scan: &Scan<'_>,
+        before: Option<&LostRobot>,
+        motion: Option<&Pose>,
+    ) -> Vec<OtherGuess> {
+        let resolved = |guess: Guess| {
+            guess
+                .resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false)
+                .ok()
+        };
+        let chained = before.zip(motion).map(|(before, motion)| before.chained * motion);
+        let all = [
+            (Recovered::ChainedScans, chained),
+            (Recovered::LastPose, resolved(Guess::Last)),
+            (Recovered::ConstantVelocity, resolved(Guess::ConstantVelocity)),
+        ];
+        let own = resolved(scan.guess);
+        let resolution_m = self.map.settings().resolution_m;
+        let mut tried: Vec<Pose> = own.into_iter().collect();
+        let mut others = Vec::new();
+        for (how, guess) in all {
+            let Some(guess) = guess else { continue };
+            let is_new = |tried: &Pose| {
+                let (meters, degrees) = pose_difference(tried, &guess);
+                meters > resolution_m || degrees > 1.0
+            };
+            if tried.iter().all(is_new) {
+                tried.push(guess);
+                others.push((how, guess));
+            }
+        }
+        others
+    }
+
+    /// Where a refused scan most probably was taken: where its alignment ended if only that is open, else at its guess.
+    fn probable_pose(&self, scan: &Scan<'_>, located: &LocatedScan) -> Pose {
+        if located.alignment.verdict == Verdict::Undetermined {
+            return located.alignment.map_from_sensor;
+        }
+        let guess =
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false);
+        guess.unwrap_or(located.alignment.map_from_sensor)
+    }
+
+    fn align_points(&self, points: &[Point], guess: &Pose, stop: StopSignal<'_>) -> Alignment {
+        crate::align::align_until(self.map, points, guess, &self.settings.alignment, stop)
+    }
+
+    fn agrees(&self, alignment: &Alignment, expected: &Pose, settings: &RecoverySettings) -> bool {
+        alignment.verdict == Verdict::Accepted
+            && self.is_near(&alignment.map_from_sensor, expected, settings)
+    }
+
+    fn is_near(&self, a: &Pose, b: &Pose, settings: &RecoverySettings) -> bool {
+        let (meters, degrees) = pose_difference(a, b);
+        meters <= settings.agreement * self.map.settings().resolution_m && degrees <= settings.agreement_deg
+    }
+
+    /// The robot's last good pose, with its time.
+    fn last_good(&self, scan: &Scan<'_>) -> Option<(Pose, Option<i64>)> {
+        last_seen(scan.robot, &self.map.trajectory(), self.sightings)
+    }
+}

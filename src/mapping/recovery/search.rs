@@ -1,0 +1,125 @@
+//! The search for a lost robot.
+
+use nalgebra::Vector3;
+
+use super::lost_robots::{LostRobots, SearchTask};
+use crate::align::Verdict;
+use crate::align::localize::{
+    Gravity, Localization, LocalizationError, LocalizationQuery, MAP_DOWN, SearchBox, Supervision,
+    localize_supervised,
+};
+use crate::geometry::{Pose, translation_m};
+use crate::mapping::{LocatedScan, Scan, ScanMapper};
+use crate::util::StopSignal;
+
+/// Candidates that a search compares: a rival is enough to say no.
+const CANDIDATES: usize = 2;
+
+impl ScanMapper<'_> {
+    /// What to search for after `scan` was refused; none where its robot is not looked for, or a search for it is under way
+    /// or was not long ago. Whoever takes it has to [search](Self::search).
+    pub fn begin_search(&self, scan: &Scan<'_>) -> Option<SearchTask> {
+        let recovery = self.recovery.filter(|_| !scan.at_guess && !scan.force)?;
+        recovery.lost.begin_search(scan.robot, recovery.settings.search_interval, |number| {
+            self.search_query(scan, number)
+        })
+    }
+
+    /// Searches for a lost robot with no guess. What is found is not believed yet: the robot's next scan has to confirm it.
+    ///
+    /// # Errors
+    /// As for [`localize`](crate::align::localize::localize).
+    pub fn search(
+        &self,
+        task: &SearchTask,
+        supervision: &mut Supervision<'_>,
+    ) -> Result<(), LocalizationError> {
+        let Some(recovery) = self.recovery else { return Ok(()) };
+        let mut ending = Ending { lost: recovery.lost, task, found: Err("it was given up".into()) };
+        let found = localize_supervised(
+            self.map,
+            &task.points,
+            &task.query,
+            &recovery.settings.localization,
+            &self.settings.alignment,
+            supervision,
+        );
+        ending.found = found.as_ref().map_err(ToString::to_string).and_then(place_of);
+        found.map(drop)
+    }
+
+    /// [`ScanMapper::search`] at once and for as long as it takes; the scan with what came of it.
+    pub(in crate::mapping) fn searched(
+        &self,
+        scan: &Scan<'_>,
+        located: LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> LocatedScan {
+        if located.is_accepted() {
+            return located;
+        }
+        let Some(task) = self.begin_search(scan) else { return located };
+        let alone = &mut Supervision {
+            stop,
+            search_stop: stop,
+            progress: &mut |_| (),
+            reserve: &mut |_| true,
+        };
+        // An error is noted with the robot, and told with the scan.
+        drop(self.search(&task, alone));
+        self.told(scan, located)
+    }
+
+    /// A refused scan with what the last search for its robot said.
+    pub(super) fn told(&self, scan: &Scan<'_>, located: LocatedScan) -> LocatedScan {
+        let Some(news) = self.recovery.and_then(|recovery| recovery.lost.news(scan.robot)) else {
+            return located;
+        };
+        let reason = format!("{}; a search with no guess: {news}", located.alignment.reason);
+        let verdict = located.alignment.verdict;
+        LocatedScan { alignment: located.alignment.but(verdict, reason), ..located }
+    }
+
+    /// Where the robot may be, and which way up: within the reach of its last good pose.
+    fn search_query(&self, scan: &Scan<'_>, number: u64) -> LocalizationQuery {
+        let Some((recovery, (last, last_ns))) = self.recovery.zip(self.last_good(scan)) else {
+            return LocalizationQuery { candidates: CANDIDATES, ..LocalizationQuery::default() };
+        };
+        let settings = recovery.settings;
+        let elapsed_ns = last_ns.zip(scan.timestamp_ns).and_then(|(last, now)| now.checked_sub(last));
+        let search_box = elapsed_ns.filter(|ns| *ns > 0).and_then(|ns| {
+            let reach_m = settings.reach_m + settings.speed_max_m_per_s * ns as f64 * 1e-9;
+            let center = translation_m(&last);
+            SearchBox::new(center.map(|c| c - reach_m), center.map(|c| c + reach_m)).ok()
+        });
+        let gravity = (settings.keeps_tilt && number % 2 == 1).then(|| down_of(&last)).flatten();
+        LocalizationQuery { gravity, search_box, candidates: CANDIDATES, seed: number }
+    }
+}
+
+/// The direction down of a sensor at `map_from_sensor`, if the map's z axis points up.
+fn down_of(map_from_sensor: &Pose) -> Option<Gravity> {
+    let in_sensor = map_from_sensor.rotation.inverse() * Vector3::from(MAP_DOWN);
+    Gravity::new(in_sensor.into(), MAP_DOWN).ok()
+}
+
+/// The place that a search found, if it is to be believed.
+fn place_of(found: &Localization) -> Result<Pose, String> {
+    match found.candidates.first() {
+        Some(best) if found.verdict == Verdict::Accepted => Ok(best.map_from_sensor()),
+        _ => Err(format!("{}: {}", found.verdict.as_str(), found.reason)),
+    }
+}
+
+/// A search under way, which ends with what is dropped, whatever happens.
+struct Ending<'a> {
+    lost: &'a LostRobots,
+    task: &'a SearchTask,
+    found: Result<Pose, String>,
+}
+
+impl Drop for Ending<'_> {
+    fn drop(&mut self) {
+        self.lost.end_search(self.task, std::mem::replace(&mut self.found, Err(String::new())));
+    }
+}
