@@ -60,6 +60,9 @@ pub(super) struct Insert {
     /// Add scans where they were found even if their verdict is not accepted
     #[arg(long)]
     force: bool,
+    /// Look for the robot where a scan is refused, whatever the server is set to [default: as the server is set]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
+    recover: Option<bool>,
     /// Guess of every scan but the first: the last accepted pose, or one as far on as that is from the pose before
     #[arg(long, value_enum, value_name = "GUESS", default_value_t)]
     next_guess: GuessName,
@@ -111,6 +114,7 @@ impl Insert {
             method: self.alignment.method(),
             filter: self.points.filter().map_err(CliError::usage)?,
             force: self.force,
+            recover: self.recover,
         };
         let reader = tokio::task::spawn_blocking({
             let files = files.clone();
@@ -219,6 +223,7 @@ struct Plan {
     method: Option<Method>,
     filter: PointFilter,
     force: bool,
+    recover: Option<bool>,
 }
 
 impl Plan {
@@ -232,6 +237,7 @@ impl Plan {
                 guess,
                 at_guess,
                 force: self.force,
+                recover: self.recover,
                 method: self.method,
                 filter: self.filter,
                 ..ScanRequest::new(self.robot.clone(), read_points(file)?.into())
@@ -300,6 +306,7 @@ impl Display for ScanLine {
         match &self.answer {
             JsonScan { replayed: true, .. } => write!(f, "  (was there already)"),
             JsonScan { stationary: true, .. } => write!(f, "  (nothing new from where it stands)"),
+            JsonScan { recovered: Some(how), .. } => write!(f, "  recovered: {how}"),
             JsonScan { verdict: "accepted", .. } => Ok(()),
             JsonScan { reason, .. } => write!(f, "  {reason}"),
         }

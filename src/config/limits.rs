@@ -32,6 +32,8 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.insertion_time_max_s", limits.insertion_time_max_s),
         ("limits.undo_time_max_s", limits.undo_time_max_s),
         ("limits.localization_time_max_s", limits.localization_time_max_s),
+        ("limits.recovery_search_time_max_s", limits.recovery_search_time_max_s),
+        ("limits.recovery_search_interval_s", limits.recovery_search_interval_s),
         ("limits.connection_opening_max_s", limits.connection_opening_max_s),
         ("limits.http_idle_max_s", limits.http_idle_max_s),
         ("limits.grpc_idle_max_s", limits.grpc_idle_max_s),

@@ -71,7 +71,7 @@ pub struct Config {
     pub filter: FilterConfig,
     /// Settings of alignment.
     pub alignment: AlignmentConfig,
-    /// Point filters by robot name; `"*"` is that of every other robot.
+    /// Settings by robot name; `"*"` stands for every other robot.
     pub robots: BTreeMap<String, RobotConfig>,
     /// Limits of the server; each is named in the error of a request beyond it.
     pub limits: Limits,
@@ -184,7 +184,7 @@ impl Config {
             localization_threads: self.threads.localization,
             alignment: AlignmentSettings { method: self.alignment.method.0, ..AlignmentSettings::default() },
             stationary: StationarySettings::default(),
-            robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.filter())).collect(),
+            robots: self.robots.iter().map(|(name, robot)| (name.clone(), robot.settings())).collect(),
             filter: FilterSettings { hashes, bits_per_key },
         }
     }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::align::Method;
 use crate::scan::PointFilter;
+use crate::service::RobotSettings;
 use crate::wire::json::ByKeyword;
 
 /// Settings of alignment.
@@ -14,7 +15,7 @@ pub struct AlignmentConfig {
     pub method: ByKeyword<Method>,
 }
 
-/// Point filter of a robot's scans; a request may override each value.
+/// Settings of a robot's scans; a request may override each value.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotConfig {
@@ -25,9 +26,15 @@ pub struct RobotConfig {
     /// Box of the robot's own body in the sensor frame, meters: smallest and largest corner. Points within it are
     /// skipped.
     pub body_m: Option<[[f64; 3]; 2]>,
+    /// Look for the robot where its scans are refused. false.
+    pub recover: bool,
 }
 
 impl RobotConfig {
+    pub(super) fn settings(&self) -> RobotSettings {
+        RobotSettings { filter: self.filter(), recover: self.recover }
+    }
+
     pub(super) fn filter(&self) -> PointFilter {
         let body_m = self.body_m.map(|[min_m, max_m]| (min_m, max_m));
         PointFilter { range_min_m: self.range_min_m, range_max_m: self.range_max_m, body_m }

@@ -40,6 +40,7 @@ pub(super) struct ScanBody {
     align: bool,
     #[serde(default)]
     force: bool,
+    recover: Option<bool>,
     method: Option<ByKeyword<Method>>,
     foreground_level: Option<u32>,
     range_min_m: Option<f64>,
@@ -70,6 +71,7 @@ pub(super) struct ScanParams {
     align: bool,
     #[serde(default)]
     force: bool,
+    recover: Option<bool>,
     method: Option<ByKeyword<Method>>,
     foreground_level: Option<u32>,
     range_min_m: Option<f64>,
@@ -126,6 +128,7 @@ impl TryFrom<ScanBody> for ScanRequest {
             guess: guess_of(guess, motion, scan.constant_velocity)?,
             at_guess: !scan.align,
             force: scan.force,
+            recover: scan.recover,
             method: scan.method.map(|method| method.0),
             foreground_level: scan.foreground_level,
             filter: PointFilter {
@@ -158,6 +161,7 @@ impl ScanParams {
             )?,
             at_guess: !self.align,
             force: self.force,
+            recover: self.recover,
             method: self.method.map(|method| method.0),
             foreground_level: self.foreground_level,
             filter: PointFilter {

@@ -185,7 +185,10 @@ impl<'a> ScanMapper<'a> {
     pub fn map_scan(&self, scan: &Scan<'_>, stop: StopSignal<'_>) -> Result<ScanOutcome, MappingError> {
         let located = self.locate(scan, stop)?;
         let located = self.recover(scan, located, stop)?;
-        let located = self.searched(scan, located, stop);
+        if !located.is_accepted() {
+            self.search_at_once(scan, stop);
+        }
+        let located = self.told(scan, located);
         self.sightings.note(scan, &located);
         if !located.is_accepted() && !scan.force {
             return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });

@@ -123,7 +123,13 @@ mod tests {
     fn seen(sightings: &Sightings, robot: &RobotName, verdict: Verdict) {
         let points = [Point::new(1.0, 0.0, 0.0)];
         let alignment = Alignment { verdict, ..Alignment::trusted(Pose::identity(), 1, &points) };
-        let located = LocatedScan { alignment, align_time: Duration::ZERO, is_first: false, velocity: None, recovered: None };
+        let located = LocatedScan {
+            alignment,
+            align_time: Duration::ZERO,
+            is_first: false,
+            velocity: None,
+            recovered: None,
+        };
         sightings.note(&Scan::new(robot, &points), &located);
     }
 

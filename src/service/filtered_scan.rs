@@ -18,7 +18,7 @@ impl<'a> FilteredScan<'a> {
     /// # Errors
     /// When no point is left, or one had to be left out of a strict request.
     pub(super) fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
-        let filter = request.filter.or(settings.filter_of(&request.robot));
+        let filter = request.filter.or(settings.of_robot(&request.robot).filter);
         let filtered = FilteredPoints::of(
             request.points.as_slice(),
             request.point_times.as_ref().map(PointTimes::as_slice),

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::geometry::{Point, Pose};
 use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
-use crate::mapping::Sightings;
+use crate::mapping::{LostRobots, Sightings};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
@@ -47,6 +47,8 @@ pub(super) struct HostedMap {
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
     /// Where and when robots were last seen.
     pub(super) sightings: Sightings,
+    /// Robots whose scans are refused, and that want to be looked for.
+    pub(super) lost: LostRobots,
     /// One undo is found out and made before the next is looked at.
     pub(super) undo_turn: Arc<tokio::sync::Mutex<()>>,
     /// A snapshot is due, and there is no room for it.
@@ -99,6 +101,7 @@ impl HostedMap {
             announced,
             turns: Mutex::new(Rank::Brief, HashMap::new()),
             sightings: Sightings::default(),
+            lost: LostRobots::default(),
             undo_turn: Arc::default(),
             is_put_off: AtomicBool::default(),
         }

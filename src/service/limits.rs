@@ -91,6 +91,10 @@ pub struct Limits {
     pub undo_time_max_s: f64,
     /// How long a search with no guess may take. 60 s.
     pub localization_time_max_s: f64,
+    /// How long a search for a lost robot may take. 2 s.
+    pub recovery_search_time_max_s: f64,
+    /// Shortest time from one search for a lost robot to the next for the same one. 2 s.
+    pub recovery_search_interval_s: f64,
     /// Candidates of one search, which keeps that many places. 16.
     pub localization_candidates_max: usize,
     /// Memory for the dilated levels of one search; a map that takes more is searched at a coarser resolution, or in
@@ -147,6 +151,8 @@ impl Default for Limits {
             insertion_time_max_s: 30.0,
             undo_time_max_s: 60.0,
             localization_time_max_s: 60.0,
+            recovery_search_time_max_s: 2.0,
+            recovery_search_interval_s: 2.0,
             localization_candidates_max: 16,
             localization_grid_bytes_max: 512 << 20,
             disk_free_low_mib: 256,

@@ -194,7 +194,7 @@ impl HostedMap {
 const WHOM: &str = "a search with no guess";
 
 /// The search's settings where its grids may take `grid_bytes_max`: the cells that wait take half as much at most.
-fn search_settings(grid_bytes_max: usize) -> LocalizationSettings {
+pub(super) fn search_settings(grid_bytes_max: usize) -> LocalizationSettings {
     let usual = LocalizationSettings::default();
     let cells_waiting_max = usual.cells_waiting_max.min(grid_bytes_max / 2 / BYTES_PER_CELL);
     LocalizationSettings { grid_bytes_max, cells_waiting_max, ..usual }

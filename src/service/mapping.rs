@@ -7,10 +7,11 @@ use super::commit_queue::{Prepared, Step, Submission, Turn, record_of};
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::{HostedMap, bitmap};
+use super::recovery::recovery_settings;
 use super::resource_budget::ResourceBudget;
 use super::trajectory::{scan_id_too_old, scan_name};
 use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped};
-use crate::align::{AlignmentSettings, Verdict};
+use crate::align::{AlignmentSettings, Method, Verdict};
 use crate::geometry::Point;
 use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
 use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
@@ -34,8 +35,11 @@ impl HostedMap {
         self.check_voxels(settings)?;
         self.check_robots(&request.robot, &settings.limits)?;
         budget.check_to_grow()?;
-        let mapper = self.mapper(request, settings);
+        let mapper = self.mapper(request.method, settings.recovers(request), settings);
         let located = self.locate(&scan, &mapper, stop)?;
+        let recovered = mapper.recover(&scan.to_map(), located, stop);
+        check_not_stopped(stop)?;
+        let located = mapper.told(&scan.to_map(), recovered?);
         self.sightings.note(&scan.to_map(), &located);
         let answer = self.answer(&scan, &located);
         if !answer.accepted && !request.force {
@@ -74,7 +78,7 @@ impl HostedMap {
     ) -> Result<ScanAnswer, ServiceError> {
         request.foreground_level.map_or(Ok(()), |level| self.check_level(level))?;
         let scan = FilteredScan::of(request, settings)?;
-        let located = self.locate(&scan, &self.mapper(request, settings), stop)?;
+        let located = self.locate(&scan, &self.mapper(request.method, false, settings), stop)?;
         let foreground = request.foreground_level.map(|level| self.foreground(&scan, &located, level));
         Ok(ScanAnswer { foreground, ..self.answer(&scan, &located) })
     }
@@ -143,11 +147,17 @@ impl HostedMap {
         Err(ServiceError::new(reason, message))
     }
 
-    /// How scans of this map are located and recorded, by the method that the request asks for.
-    fn mapper(&self, request: &ScanRequest, settings: &ServiceSettings) -> ScanMapper<'_> {
-        let method = request.method.unwrap_or(settings.alignment.method);
+    /// How scans of this map are located and recorded: by the method that a request asks for, and with an eye on lost
+    /// robots where they are to be looked for.
+    pub(super) fn mapper(
+        &self,
+        method: Option<Method>,
+        recovers: bool,
+        settings: &ServiceSettings,
+    ) -> ScanMapper<'_> {
+        let method = method.unwrap_or(settings.alignment.method);
         let alignment = AlignmentSettings { method, ..settings.alignment };
-        ScanMapper::new(
+        let mapper = ScanMapper::new(
             &self.map,
             &self.sightings,
             MappingSettings {
@@ -155,7 +165,11 @@ impl HostedMap {
                 stationary: Some(settings.stationary),
                 ..MappingSettings::default()
             },
-        )
+        );
+        match recovers {
+            true => mapper.recovering(&self.lost, recovery_settings(&settings.limits)),
+            false => mapper,
+        }
     }
 
     /// Finds where the scan was taken.
@@ -213,6 +227,7 @@ impl HostedMap {
             version: self.version(pose.revision),
             replayed: true,
             stationary: false,
+            recovered: None,
         }
     }
 
@@ -237,6 +252,7 @@ impl HostedMap {
             version: self.version(self.map.revision()),
             replayed: false,
             stationary: false,
+            recovered: located.recovered,
         }
     }
 }

@@ -26,6 +26,7 @@ mod modeled;
 mod observer;
 mod pool;
 mod reason;
+mod recovery;
 mod request;
 mod resource_budget;
 mod settings;
@@ -53,7 +54,7 @@ pub use request::{
     PointAnswer, PointCloud, PointQuery, PointTimes, ScanAnswer, ScanRequest, TimeReference,
     TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
 };
-pub use settings::{EVERY_ROBOT, ServiceSettings};
+pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;
 pub use trajectory::TrajectoryPieces;
 
@@ -227,17 +228,25 @@ impl MapService {
             let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
             let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
             let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
-            self.submit_and_wait(&self.inner.mapping, None, move |stop| {
-                limit.run(stop, |stop| {
-                    map.submit_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.budget, stop)
-                })
-            })
-            .await
+            let submitted = self.submit_and_wait(&self.inner.mapping, None, {
+                let (map, scan) = (Arc::clone(&map), Arc::clone(&scan));
+                move |stop| {
+                    limit.run(stop, |stop| {
+                        map.submit_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.budget, stop)
+                    })
+                }
+            });
+            let answer = submitted.await?;
+            if !answer.accepted {
+                self.search_for_robot_of(map, &scan);
+            }
+            Ok(answer)
         };
         self.observed("InsertScan", Some(map), work, |answer| Outcome::Scan {
             robot,
             verdict: answer.verdict,
             replayed: answer.replayed,
+            recovered: answer.recovered,
         })
         .await
     }

@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use super::{MapService, MapVersion, ServiceError};
 use crate::align::Verdict;
 use crate::map::{CallerName, Lookup, MapName, RobotName};
+use crate::mapping::Recovered;
 
 /// Told of each operation of a service when it is over.
 ///
@@ -58,6 +59,8 @@ pub enum Outcome {
         verdict: Verdict,
         /// An answer that was given before.
         replayed: bool,
+        /// How its robot, which was lost, was found again.
+        recovered: Option<Recovered>,
     },
     /// The map, or which maps there are, was changed.
     Changed(Change),

@@ -30,6 +30,8 @@ pub(super) struct Pool {
     free: Arc<Semaphore>,
     /// One permit for each caller that waits for the turn of its map or robot.
     turns: Semaphore,
+    /// One permit for each thread that may do what nobody waits for: half of them.
+    spare: Arc<Semaphore>,
     jobs_waiting_max: usize,
     counts: Arc<Counts>,
 }
@@ -78,6 +80,7 @@ impl Pool {
             places: Semaphore::new(free + jobs_waiting_max).into(),
             free: Semaphore::new(free).into(),
             turns: Semaphore::new(jobs_waiting_max),
+            spare: Semaphore::new(free.div_ceil(2)).into(),
             jobs_waiting_max,
             counts: Arc::default(),
         })
@@ -156,6 +159,37 @@ impl Pool {
         answered.await.map_err(|_| failed())
     }
 
+    /// A thread for what nobody waits for, where one is free that no job waits for, and not half of them do such work
+    /// already.
+    pub(super) fn spare_thread(&self) -> Option<SpareThread> {
+        if self.is_wanted() {
+            return None;
+        }
+        let spare = Arc::clone(&self.spare).try_acquire_owned().ok()?;
+        let place = Arc::clone(&self.places).try_acquire_owned().ok()?;
+        let thread = Arc::clone(&self.free).try_acquire_owned().ok()?;
+        let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
+        Some(SpareThread { thread: FreeThread { _place: place, _thread: thread, unanswered }, _spare: spare })
+    }
+
+    /// [`Pool::run_on`] a thread that is spare.
+    ///
+    /// # Errors
+    /// `Internal` when the job panicked.
+    pub(super) async fn run_on_spare<T: Send + 'static>(
+        &self,
+        spare: SpareThread,
+        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let SpareThread { thread, _spare } = spare;
+        self.run_on(thread, job).await
+    }
+
+    /// True while a job waits for a thread.
+    pub(super) fn is_wanted(&self) -> bool {
+        self.in_use().waiting > 0
+    }
+
     pub(super) fn in_use(&self) -> PoolUse {
         let running = self.threads.current_num_threads() - self.free.available_permits();
         let all =
@@ -177,6 +211,13 @@ pub(super) struct FreeThread {
     _place: OwnedSemaphorePermit,
     _thread: OwnedSemaphorePermit,
     unanswered: Unanswered,
+}
+
+/// A thread of a pool for what nobody waits for.
+#[derive(Debug)]
+pub(super) struct SpareThread {
+    thread: FreeThread,
+    _spare: OwnedSemaphorePermit,
 }
 
 /// A job without an answer: cancelled where it is dropped as such.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::{Gauges, Limits, Observer};
+use super::{Gauges, Limits, Observer, ScanRequest};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::map::RobotName;
@@ -37,19 +37,34 @@ pub struct ServiceSettings {
     pub alignment: AlignmentSettings,
     /// When a robot counts as standing still.
     pub stationary: StationarySettings,
-    /// Which points of whose scans count; the name `*` stands for every other robot.
-    pub robots: BTreeMap<String, PointFilter>,
+    /// Settings of robots by name; the name `*` stands for every other robot.
+    pub robots: BTreeMap<String, RobotSettings>,
     /// Filter settings of maps whose makers do not say.
     pub filter: FilterSettings,
+}
+
+/// Settings of a robot, where its requests do not say.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RobotSettings {
+    /// Which points of its scans count.
+    pub filter: PointFilter,
+    /// Look for it where its scans are refused: from other guesses, then by a search with no guess around its last good
+    /// pose, which two scans have to confirm.
+    pub recover: bool,
 }
 
 /// The key of [`ServiceSettings::robots`] that stands for every robot without an entry.
 pub const EVERY_ROBOT: &str = "*";
 
 impl ServiceSettings {
-    /// Which points of a robot's scans count.
-    pub(super) fn filter_of(&self, robot: &RobotName) -> PointFilter {
-        let filter = self.robots.get(robot.as_str()).or_else(|| self.robots.get(EVERY_ROBOT));
-        filter.copied().unwrap_or_default()
+    /// The settings of a robot.
+    pub(super) fn of_robot(&self, robot: &RobotName) -> RobotSettings {
+        let settings = self.robots.get(robot.as_str()).or_else(|| self.robots.get(EVERY_ROBOT));
+        settings.copied().unwrap_or_default()
+    }
+
+    /// True where the robot of a scan is to be looked for if the scan is refused.
+    pub(super) fn recovers(&self, scan: &ScanRequest) -> bool {
+        scan.recover.unwrap_or_else(|| self.of_robot(&scan.robot).recover)
     }
 }

@@ -9,23 +9,26 @@ use parking_lot::Mutex;
 
 use crate::align::Verdict;
 use crate::map::{Lookup, MapName};
+use crate::mapping::Recovered;
 
 /// A counter with the map as its first label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Family {
     PointsQueried,
+    RobotsRecovered,
     Scans,
     ScansUndone,
     VoxelsRemoved,
 }
 
 impl Family {
-    pub(super) const ALL: [Self; 4] =
-        [Self::PointsQueried, Self::Scans, Self::ScansUndone, Self::VoxelsRemoved];
+    pub(super) const ALL: [Self; 5] =
+        [Self::PointsQueried, Self::RobotsRecovered, Self::Scans, Self::ScansUndone, Self::VoxelsRemoved];
 
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::PointsQueried => "mrol_points_queried_total",
+            Self::RobotsRecovered => "mrol_robots_recovered_total",
             Self::Scans => "mrol_scans_total",
             Self::ScansUndone => "mrol_scans_undone_total",
             Self::VoxelsRemoved => "mrol_voxels_removed_total",
@@ -35,6 +38,7 @@ impl Family {
     pub(super) fn help(self) -> &'static str {
         match self {
             Self::PointsQueried => "Points answered, by map and look-up",
+            Self::RobotsRecovered => "Scans by which a lost robot was found again, by map and how",
             Self::Scans => "Scans judged for insertion, by map and verdict",
             Self::ScansUndone => "Scans taken out again, by map",
             Self::VoxelsRemoved => "Finest voxels removed by deletions and undos, by map",
@@ -52,6 +56,10 @@ pub(super) struct MapCounters(Arc<Mutex<BTreeMap<MapName, BTreeMap<Series, u64>>
 impl MapCounters {
     pub(super) fn points_queried(&self, map: &MapName, lookup: Lookup, points: usize) {
         self.count(map, (Family::PointsQueried, Some(("lookup", lookup.as_str()))), points);
+    }
+
+    pub(super) fn recovered(&self, map: &MapName, how: Recovered) {
+        self.count(map, (Family::RobotsRecovered, Some(("how", how.as_str()))), 1);
     }
 
     pub(super) fn scan(&self, map: &MapName, verdict: Verdict) {

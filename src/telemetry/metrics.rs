@@ -275,7 +275,12 @@ impl Observer for Metrics {
         let (Some(map), End::Done(outcome)) = (ended.map, &ended.end) else { return };
         match outcome {
             Outcome::Points { lookup, points } => self.0.maps.points_queried(map, *lookup, *points),
-            Outcome::Scan { robot, verdict, replayed: false } => self.scan(map, robot, *verdict),
+            Outcome::Scan { robot, verdict, recovered, replayed: false } => {
+                self.scan(map, robot, *verdict);
+                if let Some(how) = recovered {
+                    self.0.maps.recovered(map, *how);
+                }
+            }
             Outcome::Changed(Change { voxels_removed, scans_undone, replayed: false, .. }) => {
                 if *voxels_removed > 0 {
                     self.0.maps.count(map, (Family::VoxelsRemoved, None), *voxels_removed);

@@ -8,7 +8,7 @@ use super::types::count_from;
 use super::{InField, pb, required};
 use crate::align::{Direction, Method, Verdict};
 use crate::map::{MapName, RobotName, SessionName};
-use crate::mapping::Guess;
+use crate::mapping::{Guess, Recovered};
 use crate::scan::PointFilter;
 use crate::service::{Foreground, PointTimes, Reason, ScanAnswer, ScanRequest, ServiceError, TimeReference};
 
@@ -17,7 +17,10 @@ impl TryFrom<pb::InsertScanRequest> for (MapName, ScanRequest) {
 
     fn try_from(request: pb::InsertScanRequest) -> Result<Self, ServiceError> {
         let scan = scan_from(request.scan, request.guess, request.at_guess, request.method)?;
-        Ok((MapName::new(&request.map)?, ScanRequest { force: request.force, ..scan }))
+        Ok((
+            MapName::new(&request.map)?,
+            ScanRequest { force: request.force, recover: request.recover, ..scan },
+        ))
     }
 }
 
@@ -159,9 +162,10 @@ impl From<ScanRequest> for pb::Scan {
 
 impl From<(&MapName, ScanRequest)> for pb::InsertScanRequest {
     fn from((map, scan): (&MapName, ScanRequest)) -> Self {
-        let (guess, at_guess, force) = ((&scan.guess).into(), scan.at_guess, scan.force);
+        let (guess, at_guess) = ((&scan.guess).into(), scan.at_guess);
+        let (force, recover) = (scan.force, scan.recover);
         let method = pb::Method::from(scan.method).into();
-        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, force }
+        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, force, recover }
     }
 }
 
@@ -193,6 +197,32 @@ pub(super) fn verdict_from(number: i32) -> Result<Verdict, ServiceError> {
         Ok(pb::Verdict::Ambiguous) => Ok(Verdict::Ambiguous),
         Ok(pb::Verdict::Unspecified) | Err(_) => {
             let message = format!("alignment.verdict must lie in 1..=4, got {number}");
+            Err(ServiceError::new(Reason::BadVerdict, message))
+        }
+    }
+}
+
+impl From<Option<Recovered>> for pb::Recovered {
+    fn from(recovered: Option<Recovered>) -> Self {
+        match recovered {
+            None => Self::Unspecified,
+            Some(Recovered::LastPose) => Self::LastPose,
+            Some(Recovered::ConstantVelocity) => Self::ConstantVelocity,
+            Some(Recovered::ChainedScans) => Self::ChainedScans,
+            Some(Recovered::Localization) => Self::Localization,
+        }
+    }
+}
+
+fn recovered_from(number: i32) -> Result<Option<Recovered>, ServiceError> {
+    match pb::Recovered::try_from(number) {
+        Ok(pb::Recovered::Unspecified) => Ok(None),
+        Ok(pb::Recovered::LastPose) => Ok(Some(Recovered::LastPose)),
+        Ok(pb::Recovered::ConstantVelocity) => Ok(Some(Recovered::ConstantVelocity)),
+        Ok(pb::Recovered::ChainedScans) => Ok(Some(Recovered::ChainedScans)),
+        Ok(pb::Recovered::Localization) => Ok(Some(Recovered::Localization)),
+        Err(_) => {
+            let message = format!("recovered must lie in 0..=4, got {number}");
             Err(ServiceError::new(Reason::BadVerdict, message))
         }
     }
@@ -257,6 +287,7 @@ impl From<ScanAnswer> for pb::InsertScanResponse {
             replayed: answer.replayed,
             stationary: answer.stationary,
             error: None,
+            recovered: pb::Recovered::from(answer.recovered).into(),
         }
     }
 }
@@ -289,10 +320,11 @@ impl TryFrom<pb::InsertScanResponse> for ScanAnswer {
             version: answer.version,
             ..Default::default()
         };
+        let recovered = recovered_from(answer.recovered)?;
         let judged = Self::try_from(judged)?;
         let (new_voxels, replayed, stationary) =
             (count_from(answer.new_voxels), answer.replayed, answer.stationary);
-        Ok(Self { new_voxels, replayed, stationary, ..judged })
+        Ok(Self { new_voxels, replayed, stationary, recovered, ..judged })
     }
 }
 
@@ -327,6 +359,7 @@ impl TryFrom<pb::AlignScanResponse> for ScanAnswer {
             version: required(answer.version, "version")?.try_into()?,
             replayed: false,
             stationary: false,
+            recovered: None,
         })
     }
 }

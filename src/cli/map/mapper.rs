@@ -7,7 +7,8 @@ use crate::cli::error::CliError;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
 use crate::mapping::{
-    Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper, Sightings,
+    Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper,
+    Sightings,
 };
 use crate::util::StopSignal;
 

@@ -23,6 +23,7 @@ use super::{Guess, LocatedScan, MappingError, Scan, ScanMapper};
 use crate::align::localize::LocalizationSettings;
 use crate::align::{Alignment, Verdict};
 use crate::geometry::{Point, Pose, pose_difference};
+use crate::map::RobotName;
 use crate::util::{Keyword, StopSignal};
 use crate::voxel::volumetric_sample_until;
 use lost_robots::{LostRobot, RefusedScan};
@@ -112,8 +113,8 @@ impl<'a> ScanMapper<'a> {
 
     /// Looks for a scan that was refused where it was `located`: aligns it from other guesses. Returns where it is.
     ///
-    /// An accepted scan is returned as it is, and its robot is lost no longer. One that is at the caller's word (`at_guess`,
-    /// `force`) is not looked for.
+    /// An accepted scan is returned as it is, and so is one that is in the map at the caller's word (`at_guess`, `force`):
+    /// its robot is lost no longer.
     ///
     /// # Errors
     /// `stop` said so.
@@ -123,10 +124,8 @@ impl<'a> ScanMapper<'a> {
         located: LocatedScan,
         stop: StopSignal<'_>,
     ) -> Result<LocatedScan, MappingError> {
-        let Some(recovery) = self.recovery.filter(|_| !scan.at_guess && !scan.force) else {
-            return Ok(located);
-        };
-        if located.is_accepted() {
+        let Some(recovery) = self.recovery else { return Ok(located) };
+        if located.is_accepted() || scan.at_guess || scan.force {
             recovery.lost.found(scan.robot);
             return Ok(located);
         }
@@ -165,7 +164,7 @@ impl<'a> ScanMapper<'a> {
                     Some(reason) => located.alignment.but(Verdict::Ambiguous, reason),
                     None => located.alignment,
                 };
-                Ok(self.told(scan, LocatedScan { alignment, align_time, ..located }))
+                Ok(LocatedScan { alignment, align_time, ..located })
             }
         }
     }
@@ -235,9 +234,7 @@ impl<'a> ScanMapper<'a> {
         motion: Option<&Pose>,
     ) -> Vec<OtherGuess> {
         let resolved = |guess: Guess| {
-            guess
-                .resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false)
-                .ok()
+            guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false).ok()
         };
         let chained = before.zip(motion).map(|(before, motion)| before.chained * motion);
         let all = [
@@ -278,8 +275,7 @@ impl<'a> ScanMapper<'a> {
     }
 
     fn agrees(&self, alignment: &Alignment, expected: &Pose, settings: &RecoverySettings) -> bool {
-        alignment.verdict == Verdict::Accepted
-            && self.is_near(&alignment.map_from_sensor, expected, settings)
+        alignment.verdict == Verdict::Accepted && self.is_near(&alignment.map_from_sensor, expected, settings)
     }
 
     fn is_near(&self, a: &Pose, b: &Pose, settings: &RecoverySettings) -> bool {
@@ -288,7 +284,7 @@ impl<'a> ScanMapper<'a> {
     }
 
     /// The robot's last good pose, with its time.
-    fn last_good(&self, scan: &Scan<'_>) -> Option<(Pose, Option<i64>)> {
-        last_seen(scan.robot, &self.map.trajectory(), self.sightings)
+    fn last_good(&self, robot: &RobotName) -> Option<(Pose, Option<i64>)> {
+        last_seen(robot, &self.map.trajectory(), self.sightings)
     }
 }

@@ -9,6 +9,7 @@ use crate::align::localize::{
     localize_supervised,
 };
 use crate::geometry::{Pose, translation_m};
+use crate::map::RobotName;
 use crate::mapping::{LocatedScan, Scan, ScanMapper};
 use crate::util::StopSignal;
 
@@ -16,12 +17,13 @@ use crate::util::StopSignal;
 const CANDIDATES: usize = 2;
 
 impl ScanMapper<'_> {
-    /// What to search for after `scan` was refused; none where its robot is not looked for, or a search for it is under way
-    /// or was not long ago. Whoever takes it has to [search](Self::search).
-    pub fn begin_search(&self, scan: &Scan<'_>) -> Option<SearchTask> {
-        let recovery = self.recovery.filter(|_| !scan.at_guess && !scan.force)?;
-        recovery.lost.begin_search(scan.robot, recovery.settings.search_interval, |number| {
-            self.search_query(scan, number)
+    /// What to search for after a scan of `robot`, taken at `timestamp_ns`, was refused; none where the robot is not lost,
+    /// a place that a search found is to be confirmed first, or a search is under way or was not long ago. Whoever takes it
+    /// has to [search](Self::search).
+    pub fn begin_search(&self, robot: &RobotName, timestamp_ns: Option<i64>) -> Option<SearchTask> {
+        let recovery = self.recovery?;
+        recovery.lost.begin_search(robot, recovery.settings.search_interval, |number| {
+            self.search_query(robot, timestamp_ns, number)
         })
     }
 
@@ -48,30 +50,21 @@ impl ScanMapper<'_> {
         found.map(drop)
     }
 
-    /// [`ScanMapper::search`] at once and for as long as it takes; the scan with what came of it.
-    pub(in crate::mapping) fn searched(
-        &self,
-        scan: &Scan<'_>,
-        located: LocatedScan,
-        stop: StopSignal<'_>,
-    ) -> LocatedScan {
-        if located.is_accepted() {
-            return located;
-        }
-        let Some(task) = self.begin_search(scan) else { return located };
-        let alone = &mut Supervision {
-            stop,
-            search_stop: stop,
-            progress: &mut |_| (),
-            reserve: &mut |_| true,
-        };
+    /// Searches for the robot of a refused scan at once, and for as long as it takes.
+    pub(in crate::mapping) fn search_at_once(&self, scan: &Scan<'_>, stop: StopSignal<'_>) {
+        let Some(task) = self.begin_search(scan.robot, scan.timestamp_ns) else { return };
+        let alone =
+            &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
         // An error is noted with the robot, and told with the scan.
         drop(self.search(&task, alone));
-        self.told(scan, located)
     }
 
     /// A refused scan with what the last search for its robot said.
-    pub(super) fn told(&self, scan: &Scan<'_>, located: LocatedScan) -> LocatedScan {
+    #[must_use]
+    pub fn told(&self, scan: &Scan<'_>, located: LocatedScan) -> LocatedScan {
+        if located.is_accepted() {
+            return located;
+        }
         let Some(news) = self.recovery.and_then(|recovery| recovery.lost.news(scan.robot)) else {
             return located;
         };
@@ -81,12 +74,12 @@ impl ScanMapper<'_> {
     }
 
     /// Where the robot may be, and which way up: within the reach of its last good pose.
-    fn search_query(&self, scan: &Scan<'_>, number: u64) -> LocalizationQuery {
-        let Some((recovery, (last, last_ns))) = self.recovery.zip(self.last_good(scan)) else {
+    fn search_query(&self, robot: &RobotName, timestamp_ns: Option<i64>, number: u64) -> LocalizationQuery {
+        let Some((recovery, (last, last_ns))) = self.recovery.zip(self.last_good(robot)) else {
             return LocalizationQuery { candidates: CANDIDATES, ..LocalizationQuery::default() };
         };
         let settings = recovery.settings;
-        let elapsed_ns = last_ns.zip(scan.timestamp_ns).and_then(|(last, now)| now.checked_sub(last));
+        let elapsed_ns = last_ns.zip(timestamp_ns).and_then(|(last, now)| now.checked_sub(last));
         let search_box = elapsed_ns.filter(|ns| *ns > 0).and_then(|ns| {
             let reach_m = settings.reach_m + settings.speed_max_m_per_s * ns as f64 * 1e-9;
             let center = translation_m(&last);

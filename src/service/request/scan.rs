@@ -10,7 +10,7 @@ use super::version::MapVersion;
 use crate::align::{Direction, Method, Verdict};
 use crate::geometry::Pose;
 use crate::map::{RobotName, SessionName};
-use crate::mapping::Guess;
+use crate::mapping::{Guess, Recovered};
 use crate::scan::PointFilter;
 use crate::service::{Limits, Reason, ServiceError};
 
@@ -35,6 +35,8 @@ pub struct ScanRequest {
     pub at_guess: bool,
     /// Add the scan where it was found even if the verdict is not `accepted`.
     pub force: bool,
+    /// Look for the robot where the scan is refused; where none, as the server is set for this robot.
+    pub recover: Option<bool>,
     /// How to align; the server's own where none.
     pub method: Option<Method>,
     /// Say too which points fall in no occupied voxel of this level; of an alignment only.
@@ -58,7 +60,11 @@ impl ScanRequest {
     /// For what an alignment does not take.
     pub(in crate::service) fn check_alignment(&self) -> Result<(), ServiceError> {
         let message = "force is for an insertion: an alignment changes nothing, leave it out";
-        if self.force { Err(ServiceError::new(Reason::UnexpectedField, message)) } else { Ok(()) }
+        if self.force {
+            return Err(ServiceError::new(Reason::UnexpectedField, message));
+        }
+        let message = "recover is for an insertion: an alignment remembers nothing, leave it out";
+        self.recover.map_or(Ok(()), |_| Err(ServiceError::new(Reason::UnexpectedField, message)))
     }
 
     /// # Errors
@@ -83,6 +89,7 @@ impl ScanRequest {
             guess: Guess::Last,
             at_guess: false,
             force: false,
+            recover: None,
             method: None,
             foreground_level: None,
             filter: PointFilter::default(),
@@ -128,6 +135,8 @@ pub struct ScanAnswer {
     pub replayed: bool,
     /// The robot stands where its last scan was taken and sees nothing new: it was accepted and not kept.
     pub stationary: bool,
+    /// How the robot, which was lost, was found again; none of a scan that fits from its own guess, or nowhere.
+    pub recovered: Option<Recovered>,
 }
 
 /// What is in front of the background that a map is: the points of a scan in no occupied voxel (paper \[9\]).

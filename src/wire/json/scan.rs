@@ -6,6 +6,7 @@ use super::pose::JsonPose;
 use super::version::JsonVersion;
 use crate::align::Direction;
 use crate::service::ScanAnswer;
+use crate::util::Keyword;
 
 /// What became of a scan.
 #[derive(Debug, Serialize)]
@@ -42,6 +43,8 @@ pub struct JsonScan {
     pub replayed: bool,
     /// True of a robot that stands where its last scan was taken and sees nothing new.
     pub stationary: bool,
+    /// How the robot, which was lost, was found again; null of a scan that fits from its own guess, or nowhere.
+    pub recovered: Option<&'static str>,
     /// Places in the scan of the points that the map does not show.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub foreground: Option<Vec<usize>>,
@@ -83,6 +86,7 @@ impl From<ScanAnswer> for JsonScan {
             points_skipped: answer.points_skipped,
             replayed: answer.replayed,
             stationary: answer.stationary,
+            recovered: answer.recovered.map(Keyword::as_str),
             foreground: answer.foreground.map(|foreground| places(&foreground.bitmap)),
             version: answer.version.into(),
             align_ms: answer.align_time.as_secs_f64() * 1e3,
