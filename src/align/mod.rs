@@ -11,16 +11,20 @@
 
 mod ascent;
 mod extent;
+mod free_space;
 mod information;
 pub mod localize;
 mod multi_start;
 mod overlap;
+mod prior;
 mod refine;
 mod settings;
 mod verdict;
 
+pub use free_space::{Contradiction, FreeSpaceSettings};
 pub use information::{Direction, PoseInformation};
 pub use overlap::{OccupiedVoxels, level_overlaps, overlap};
+pub use prior::{PoseCovariance, PoseCovarianceError, PosePrior};
 pub use settings::{
     AlignmentSettings, AlignmentSettingsError, Method, MultiStartSettings, RefinementSettings,
 };
@@ -73,25 +77,59 @@ pub fn align(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    align_until(map, points, guess, settings, StopSignal::NEVER)
+    align_until(map, points, &(*guess).into(), settings, StopSignal::NEVER)
 }
 
-/// [`align`] under a stop signal. Once `stop` is set, it returns early, and the result is meaningless.
+/// [`align`] with all that is known of the pose, under a stop signal.
+///
+/// Only poses that the prior allows are looked at and accepted. Once `stop` is set, it returns early, and the result is
+/// meaningless.
 pub fn align_until(
     map: &MultiResolutionMap,
     points: &[Point],
-    guess: &Pose,
+    prior: &PosePrior,
     settings: &AlignmentSettings,
     stop: StopSignal<'_>,
 ) -> Alignment {
     let scan = SampledScan::new(points, map.lattice().extent_m(), settings, stop);
-    let ascent = climb(map, &scan, *guess, map.settings().levels - 1, settings);
+    let guess = prior.leveled_guess();
+    let ascent = climb(map, &scan, guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
-    let found = match found.is_doubtful(guess, map, settings) {
-        true if !stop.is_stopped() => multi_start::align(map, &scan, guess, found, settings),
+    let found = match found.is_doubtful(&guess, map, settings) {
+        true if !stop.is_stopped() => {
+            let prior = PosePrior { guess, ..*prior };
+            multi_start::align(map, &scan, &prior, found, settings)
+        }
         _ => found,
     };
-    found.within_max_correction(guess, map, settings)
+    let found = found.within_max_correction(&guess, map, settings).within_prior(prior, map, settings);
+    uncontradicted(found, map, &scan, &guess, settings)
+}
+
+/// The alignment, refused where free space contradicts it.
+fn uncontradicted(
+    found: Alignment,
+    map: &MultiResolutionMap,
+    scan: &SampledScan<'_>,
+    guess: &Pose,
+    settings: &AlignmentSettings,
+) -> Alignment {
+    if found.verdict != Verdict::Accepted {
+        return found;
+    }
+    let (points, pose) = (&scan.surface_sample, &found.map_from_sensor);
+    let correction = pose_difference(guess, pose);
+    let contradiction = Contradiction::of(map, points, pose, &settings.free_space, scan.stop).with_overlaps(
+        &found.level_overlaps,
+        correction,
+        map.lattice().resolution_m(0),
+        &settings.free_space,
+    );
+    let found = Alignment { contradiction, ..found };
+    match contradiction.reason(settings) {
+        Some(reason) => found.but(Verdict::Contradicted, reason),
+        None => found,
+    }
 }
 
 /// Judges how a scan fits the map at the pose `map_from_sensor`, without moving it.

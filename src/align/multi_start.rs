@@ -6,7 +6,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::ascent::Ascent;
 use super::overlap::Overlap;
-use super::{Alignment, AlignmentSettings, SampledScan, Verdict, climb, finish};
+use super::{Alignment, AlignmentSettings, PosePrior, SampledScan, Verdict, climb, finish};
 use crate::geometry::{Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 use crate::util::StopSignal;
@@ -19,19 +19,21 @@ const SAME_DEG: f64 = 5.0;
 /// Number of the best ascents that are refined and judged.
 const FINISHED: usize = 2;
 
-/// Ascends from the most promising of many guesses around `guess`, and returns the better of their result and `first`.
+/// Ascends from the most promising of many guesses around the prior's, and returns the better of their result and `first`.
 ///
 /// The verdict is ambiguous where a different pose fits about equally well.
 pub(super) fn align(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
-    guess: &Pose,
+    prior: &PosePrior,
     first: Alignment,
     settings: &AlignmentSettings,
 ) -> Alignment {
     let coarse = map.settings().levels.saturating_sub(2);
     let shift_m = map.lattice().resolution_m(coarse);
-    let guesses = around(guess, shift_m);
+    let resolution_m = map.lattice().resolution_m(0);
+    let is_allowed = |guess: &Pose| prior.against(guess, resolution_m, settings).is_none();
+    let guesses: Vec<Pose> = around(&prior.guess, shift_m).into_iter().filter(is_allowed).collect();
     let overlap = Overlap::new(map, &scan.sample, coarse, settings.lookup);
     let mut lookups = first.lookups + overlap.lookups() * guesses.len() as u64;
     let guesses = highest(guesses, &overlap, settings.multi_start.ascents, scan.stop);
@@ -53,7 +55,7 @@ pub(super) fn align(
     }
 
     // After a small motion the guess itself may be the best of all: the coarse levels lead away from it.
-    ends.push(*guess);
+    ends.push(prior.guess);
     let mut found: Vec<_> =
         ends.into_iter().map(|end| finish(map, scan, Ascent::from(end), settings)).collect();
     lookups += found.iter().map(|found| found.lookups).sum::<u64>();

@@ -1,5 +1,6 @@
 //! Settings of the alignment.
 
+use super::FreeSpaceSettings;
 use crate::map::Lookup;
 use crate::util::Keyword;
 
@@ -62,10 +63,18 @@ pub struct AlignmentSettings {
     /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
     /// where anything holds it. 8.
     pub refinement_max_correction: f64,
-    /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 48.
+    /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 32.
     pub max_correction: f64,
-    /// The largest rotation of a correction, degrees. 60.
+    /// The largest rotation of a correction, degrees. 45.
     pub max_correction_deg: f64,
+    /// Largest angle between the direction of gravity that a scan tells and down in the map, degrees. 5: what an
+    /// accelerometer says of a robot that brakes at 1 m/s2 is 6 off, at half of that 3.
+    pub gravity_error_max_deg: f64,
+    /// How many standard deviations of its covariance a pose may be from the guess. 4.7: of guesses as good as they say,
+    /// one in a thousand is farther off (chi-squared with six degrees of freedom).
+    pub covariance_deviations_max: f64,
+    /// When free space contradicts a pose.
+    pub free_space: FreeSpaceSettings,
     /// What answers the ascent's look-ups. The filter (paper II-A: "for some operations like scan matching this
     /// subsequent value retrieval is unnecessary and can be skipped for speed").
     pub lookup: Lookup,
@@ -131,8 +140,11 @@ impl Default for AlignmentSettings {
             overlap_min: 0.2,
             undetermined_std: 0.2,
             refinement_max_correction: 8.0,
-            max_correction: 48.0,
-            max_correction_deg: 60.0,
+            max_correction: 32.0,
+            max_correction_deg: 45.0,
+            gravity_error_max_deg: 5.0,
+            covariance_deviations_max: 4.7,
+            free_space: FreeSpaceSettings::default(),
             lookup: Lookup::Bloom,
         }
     }
@@ -196,6 +208,8 @@ impl AlignmentSettings {
             ("refinement_max_correction", self.refinement_max_correction),
             ("max_correction", self.max_correction),
             ("max_correction_deg", self.max_correction_deg),
+            ("gravity_error_max_deg", self.gravity_error_max_deg),
+            ("covariance_deviations_max", self.covariance_deviations_max),
             ("multi_start.std_above", self.multi_start.std_above),
             ("multi_start.motion_above", self.multi_start.motion_above),
             ("multi_start.motion_above_deg", self.multi_start.motion_above_deg),
@@ -208,6 +222,10 @@ impl AlignmentSettings {
             ("overlap_min", self.overlap_min),
             ("multi_start.fitness_below", self.multi_start.fitness_below),
             ("multi_start.ambiguous_fitness", self.multi_start.ambiguous_fitness),
+            ("free_space.blocked_max", self.free_space.blocked_max),
+            ("free_space.seen_through_max", self.free_space.seen_through_max),
+            ("free_space.far_seen_through_max", self.free_space.far_seen_through_max),
+            ("free_space.far_explained_min", self.free_space.far_explained_min),
         ];
         match fractions.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
             Some(&(name, value)) => Err(AlignmentSettingsError::NotAFraction(name, value)),

@@ -37,7 +37,7 @@ fn an_alignment_looks_at_the_signal_in_proportion_to_its_work() {
             let count_look = || looks.replace(looks.get() + 1) == u64::MAX;
             let points = corner(count);
             let stop = StopSignal::when(&count_look);
-            let found = align_until(&map, &points, &guess, &settings(method), stop);
+            let found = align_until(&map, &points, &guess.into(), &settings(method), stop);
             let work = (found.lookups + 16 * points.len() as u64) / looks.get();
             assert!(work <= LOOKUPS_PER_LOOK as u64, "{method:?}, {count} points: {work} a look");
         }
@@ -66,7 +66,7 @@ fn an_alignment_that_is_stopped_at_any_look_ends_there() {
         for looks_max in [0, 1, 3, 10, 20, 30, 50, 100] {
             let looks = Cell::new(0u64);
             let is_over = || looks.replace(looks.get() + 1) >= looks_max;
-            align_until(&map, &points, &guess, &settings(method), StopSignal::when(&is_over));
+            align_until(&map, &points, &guess.into(), &settings(method), StopSignal::when(&is_over));
             // Each level and stage asks once on its way out.
             assert!(looks.get() <= looks_max + 100, "{method:?}: {} looks after {looks_max}", looks.get());
         }

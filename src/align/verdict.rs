@@ -1,7 +1,7 @@
 //! Verdicts: whether to believe an alignment, and why not.
 
 use super::refine::SurfaceFit;
-use super::{AlignmentSettings, Direction, PoseInformation};
+use super::{AlignmentSettings, Contradiction, Direction, PoseInformation, PosePrior};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
 
@@ -18,19 +18,24 @@ pub enum Verdict {
     /// Several starts ended at different poses that fit about equally well, or the pose lies farther from the guess
     /// than other poses were looked for.
     Ambiguous,
+    /// The scan fits, but its rays pass through what the map holds, earlier scans saw through its points, or the pose is
+    /// not where gravity or the covariance of the guess allow.
+    Contradicted,
 }
 
 impl Verdict {
     /// All verdicts.
-    pub const ALL: [Self; 4] = [Self::Accepted, Self::LowOverlap, Self::Undetermined, Self::Ambiguous];
+    pub const ALL: [Self; 5] =
+        [Self::Accepted, Self::LowOverlap, Self::Undetermined, Self::Ambiguous, Self::Contradicted];
 
-    /// The verdict's name: `accepted`, `low_overlap`, `undetermined` or `ambiguous`.
+    /// The verdict's name: `accepted`, `low_overlap`, `undetermined`, `ambiguous` or `contradicted`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Accepted => "accepted",
             Self::LowOverlap => "low_overlap",
             Self::Undetermined => "undetermined",
             Self::Ambiguous => "ambiguous",
+            Self::Contradicted => "contradicted",
         }
     }
 }
@@ -57,6 +62,9 @@ pub struct Alignment {
     /// Distance that the refinement moved the end of the ascent, meters; rotations count by the scan's root mean square
     /// range.
     pub refined_by_m: f64,
+    /// What free space says against the pose; nothing where it was not asked, because the pose is not believed anyway or
+    /// the caller knows it.
+    pub contradiction: Contradiction,
     /// Number of steps that moved the pose, over all stages.
     pub iterations: u32,
     /// Number of look-ups, one for each point and candidate pose. Times the false positive rate it is the expected
@@ -111,6 +119,22 @@ impl Alignment {
         self.but(Verdict::Ambiguous, reason)
     }
 
+    /// Changes the verdict from accepted where the pose contradicts what was known of it beforehand.
+    pub(super) fn within_prior(
+        self,
+        prior: &PosePrior,
+        map: &MultiResolutionMap,
+        settings: &AlignmentSettings,
+    ) -> Self {
+        if self.verdict != Verdict::Accepted {
+            return self;
+        }
+        match prior.against(&self.map_from_sensor, map.lattice().resolution_m(0), settings) {
+            Some(reason) => self.but(Verdict::Contradicted, reason),
+            None => self,
+        }
+    }
+
     /// This alignment with another verdict, and why.
     pub fn but(self, verdict: Verdict, reason: String) -> Self {
         Self { verdict, reason, ..self }
@@ -162,6 +186,7 @@ impl Fit {
             information: self.surfaces.information,
             undetermined,
             refined_by_m: self.refined_by_m,
+            contradiction: Contradiction::default(),
             iterations: self.iterations,
             lookups: self.lookups,
         }
@@ -181,6 +206,7 @@ impl Alignment {
             information: PoseInformation::none(points),
             undetermined: Vec::new(),
             refined_by_m: 0.0,
+            contradiction: Contradiction::default(),
             iterations: 0,
             lookups: 0,
         }

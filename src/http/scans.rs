@@ -10,15 +10,15 @@ use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
-use crate::align::Method;
+use crate::align::{Method, PoseCovariance};
 use crate::geometry::{Point, Pose};
 use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference};
-use crate::wire::InField;
 use crate::wire::json::ByKeyword;
 use crate::wire::json::{JsonPose, JsonScan};
+use crate::wire::{InField, gravity_in_sensor};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +36,8 @@ pub(super) struct ScanBody {
     motion: Option<Object<JsonPose>>,
     #[serde(default)]
     constant_velocity: bool,
+    guess_covariance: Option<Vec<f64>>,
+    gravity_in_sensor: Option<[f64; 3]>,
     #[serde(default = "yes")]
     align: bool,
     #[serde(default)]
@@ -67,6 +69,8 @@ pub(super) struct ScanParams {
     motion: Option<String>,
     #[serde(default)]
     constant_velocity: bool,
+    guess_covariance: Option<String>,
+    gravity_in_sensor: Option<String>,
     #[serde(default = "yes")]
     align: bool,
     #[serde(default)]
@@ -125,7 +129,9 @@ impl TryFrom<ScanBody> for ScanRequest {
             point_times: scan
                 .point_times
                 .map(|times| PointTimes::new(&times, reference(scan.point_times_from_sweep_start))),
+            gravity: scan.gravity_in_sensor.map(gravity_in_sensor).transpose()?,
             guess: guess_of(guess, motion, scan.constant_velocity)?,
+            guess_covariance: scan.guess_covariance.map(|rows| covariance_of(&rows)).transpose()?,
             at_guess: !scan.align,
             force: scan.force,
             recover: scan.recover,
@@ -149,11 +155,17 @@ impl ScanParams {
         let times = times.map(|times| PointTimes::from_bytes(&times, reference)).transpose()?;
         let points = points_of(body)?;
         let pose = |text: Option<String>, field| text.map(|text| params::pose(&text, field)).transpose();
+        let gravity =
+            self.gravity_in_sensor.map(|text| params::numbers(&text, "gravity_in_sensor")).transpose()?;
+        let covariance =
+            self.guess_covariance.map(|text| params::numbers::<36>(&text, "guess_covariance")).transpose()?;
         Ok(ScanRequest {
             session: SessionName::new(&self.session)?,
             scan_id: self.scan_id,
             timestamp_ns: self.timestamp_ns,
             point_times: times,
+            gravity: gravity.map(gravity_in_sensor).transpose()?,
+            guess_covariance: covariance.map(|rows| covariance_of(&rows)).transpose()?,
             guess: guess_of(
                 pose(self.guess, "guess")?,
                 pose(self.motion, "motion")?,
@@ -215,6 +227,10 @@ fn guess_of(
             Err(ServiceError::new(Reason::AmbiguousGuess, message))
         }
     }
+}
+
+fn covariance_of(rows: &[f64]) -> Result<PoseCovariance, ServiceError> {
+    Ok(PoseCovariance::new(rows).in_field("guess")?)
 }
 
 fn yes() -> bool {

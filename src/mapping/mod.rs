@@ -24,7 +24,10 @@ pub use stationary::StationarySettings;
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
-use crate::align::{Alignment, AlignmentSettings, Verdict, align_until, evaluate_at_until};
+use crate::align::localize::Gravity;
+use crate::align::{
+    Alignment, AlignmentSettings, PoseCovariance, PosePrior, Verdict, align_until, evaluate_at_until,
+};
 use crate::geometry::{Point, Pose, Twist};
 use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName};
 use crate::util::StopSignal;
@@ -88,8 +91,12 @@ pub struct Scan<'a> {
     pub times_s: Option<&'a [f32]>,
     /// Points that were left out before, see [`FilteredPoints`].
     pub points_skipped: usize,
+    /// Direction of gravity, as an accelerometer tells.
+    pub gravity: Option<Gravity>,
     /// Where it is thought to have been taken.
     pub guess: Guess,
+    /// How far off the guess may be.
+    pub guess_covariance: Option<PoseCovariance>,
     /// The guess is taken as it is, without aligning.
     pub at_guess: bool,
     /// Insert the scan where it was found even if it does not fit there.
@@ -107,6 +114,11 @@ impl<'a> Scan<'a> {
         }
     }
 
+    /// What is known of its pose, where it is thought to have been taken at `guess` (map_from_sensor).
+    fn prior(&self, guess: Pose) -> PosePrior {
+        PosePrior { guess, covariance: self.guess_covariance, gravity: self.gravity }
+    }
+
     /// A scan without number and time, thought to have been taken at the robot's last pose.
     ///
     /// `points` are in the sensor frame and finite.
@@ -119,7 +131,9 @@ impl<'a> Scan<'a> {
             points,
             times_s: None,
             points_skipped: 0,
+            gravity: None,
             guess: Guess::Last,
+            guess_covariance: None,
             at_guess: false,
             force: false,
             digest: 0,
@@ -202,7 +216,7 @@ impl<'a> ScanMapper<'a> {
 
     /// Finds where a scan was taken; changes nothing.
     ///
-    /// The first scan of an empty map is taken at its guess. Every other one is aligned from its guess, or only judged
+    /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other one is aligned from its guess, or only judged
     /// there where the caller wants it at its guess. Points with times are deskewed: first by the motion that the guess
     /// tells, then, once the alignment has found the pose, by the motion to that, and aligned again.
     ///
@@ -216,7 +230,8 @@ impl<'a> ScanMapper<'a> {
             scan.guess.resolve(scan.robot, scan.timestamp_ns, &map.trajectory(), sightings, map_is_empty)?;
         let mut velocity = self.velocity(scan, &guess);
         let mut alignment = if map_is_empty {
-            Alignment::trusted(guess, map.settings().levels, scan.points)
+            let upright = if scan.at_guess { guess } else { scan.prior(guess).leveled_guess() };
+            Alignment::trusted(upright, map.settings().levels, scan.points)
         } else {
             self.align(scan, velocity.as_ref(), &guess, stop)
         };
@@ -246,7 +261,7 @@ impl<'a> ScanMapper<'a> {
         let (points, settings) = (scan.points_at(velocity), &self.settings.alignment);
         match scan.at_guess {
             true => evaluate_at_until(self.map, &points, guess, settings, stop).accepted_by_caller(),
-            false => align_until(self.map, &points, guess, settings, stop),
+            false => align_until(self.map, &points, &scan.prior(*guess), settings, stop),
         }
     }
 

@@ -1,6 +1,7 @@
 //! A scan request with the points that count.
 
 use super::{PointTimes, Reason, ScanRequest, ServiceError, ServiceSettings};
+use crate::align::PoseCovarianceError;
 use crate::geometry::{Point, rotation_xyzw, translation_m};
 use crate::mapping::{FilteredPoints, Guess, MappingError, Scan};
 
@@ -31,7 +32,7 @@ impl<'a> FilteredScan<'a> {
 
     /// The scan as the core maps it.
     pub(super) fn to_map(&self) -> Scan<'_> {
-        let ScanRequest { robot, session, scan_id, timestamp_ns, guess, at_guess, force, .. } = self.request;
+        let ScanRequest { robot, session, scan_id, timestamp_ns, at_guess, force, .. } = self.request;
         Scan {
             robot,
             session: session.clone(),
@@ -40,7 +41,9 @@ impl<'a> FilteredScan<'a> {
             points: &self.filtered.points,
             times_s: self.filtered.times_s.as_deref(),
             points_skipped: self.filtered.skipped,
-            guess: *guess,
+            gravity: self.request.gravity,
+            guess: self.request.guess,
+            guess_covariance: self.request.guess_covariance,
             at_guess: *at_guess,
             force: *force,
             digest: self.digest,
@@ -55,6 +58,12 @@ impl<'a> FilteredScan<'a> {
     /// True of a point of the robot's surroundings.
     pub(super) fn keeps(&self, point: Point) -> bool {
         self.filtered.keeps(point)
+    }
+}
+
+impl From<PoseCovarianceError> for ServiceError {
+    fn from(error: PoseCovarianceError) -> Self {
+        Self::new(Reason::BadCovariance, error.to_string())
     }
 }
 
@@ -90,6 +99,13 @@ fn digest(request: &ScanRequest) -> u64 {
     let checksum = crc32c::crc32c(bytemuck::cast_slice(request.points.as_slice()));
     let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(&guess));
     let checksum = crc32c::crc32c_append(checksum, &kind);
+    let gravity = request.gravity.map(|gravity| gravity.in_sensor());
+    let checksum = gravity
+        .iter()
+        .fold(checksum, |sum, gravity| crc32c::crc32c_append(sum, bytemuck::cast_slice(gravity)));
+    let covariance = request.guess_covariance.map(|covariance| covariance.rows());
+    let checksum =
+        covariance.iter().fold(checksum, |sum, rows| crc32c::crc32c_append(sum, bytemuck::cast_slice(rows)));
     let times = request.point_times.as_ref().map_or(&[][..], PointTimes::as_slice);
     let checksum = crc32c::crc32c_append(checksum, bytemuck::cast_slice(times));
     (request.points.len() as u64) << 32 | u64::from(checksum)

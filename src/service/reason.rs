@@ -67,9 +67,11 @@ reasons! {
         AmbiguousGuess "ambiguous_guess" Http: "several of `guess`, `motion` and `constant_velocity` are given", "give one";
         AmbiguousPoints "ambiguous_points" Grpc: "both `xyz_f32le` and `xyz` are filled", "fill one";
         AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo", "give one";
+        BadCovariance "bad_covariance" Both: "the guess's covariance is not 36 finite numbers of a symmetric, positive semidefinite matrix", "send it row by row: x y z in meters, then turns about the map's axes in radians";
         BadDirection "bad_direction" Client: "the server's answer has a direction that is none", "update the client";
         BadFilter "bad_filter" Both: "range limits or body box are not numbers in order", "correct them";
         BadGuess "bad_guess" Grpc: "`constant_velocity` is false", "leave the guess out";
+        BadGravity "bad_gravity" Both: "a scan's `gravity_in_sensor` is zero or not finite", "send the direction in which things fall, in the sensor frame; an accelerometer at rest reads the opposite";
         BadInformation "bad_information" Client: "the server's answer has an information matrix that is none", "update the client";
         BadJson "bad_json" Http: "the body is no JSON of this request: place, what is there, what belongs there", "correct it; unknown fields are errors";
         BadKey "bad_key" Both: "a voxel key or index out of range", "correct it";

@@ -29,7 +29,9 @@ impl MapService {
         let Some(spare) = inner.localization.spare_thread() else { return };
         let method = request.method;
         let mapper = map.mapper(method, true, &inner.settings);
-        let Some(task) = mapper.begin_search(&request.robot, request.timestamp_ns) else { return };
+        let Some(task) = mapper.begin_search(&request.robot, request.timestamp_ns, request.gravity) else {
+            return;
+        };
         let pool = Arc::clone(&self.inner);
         tokio::spawn(async move {
             let search = move |_: StopSignal<'_>| {

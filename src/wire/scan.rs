@@ -6,7 +6,8 @@ use bytes::Bytes;
 
 use super::types::count_from;
 use super::{InField, pb, required};
-use crate::align::{Direction, Method, Verdict};
+use crate::align::localize::{Gravity, MAP_DOWN};
+use crate::align::{Direction, Method, PoseCovariance, Verdict};
 use crate::map::{MapName, RobotName, SessionName};
 use crate::mapping::{Guess, Recovered};
 use crate::scan::PointFilter;
@@ -47,6 +48,8 @@ fn scan_from(
         scan_id: scan.scan_id,
         timestamp_ns: scan.timestamp_ns,
         point_times: point_times_from(&scan.point_times, scan.point_times_reference)?,
+        gravity: scan.gravity_in_sensor.map(gravity_from).transpose()?,
+        guess_covariance: covariance_from(guess.as_ref())?,
         guess: guess_from(guess)?,
         at_guess,
         method: method_from(method)?,
@@ -111,6 +114,9 @@ impl From<Option<Method>> for pb::Method {
 
 fn guess_from(guess: Option<pb::Guess>) -> Result<Guess, ServiceError> {
     let Some(guess) = guess else { return Ok(Guess::Last) };
+    if guess.kind.is_none() && !guess.covariance.is_empty() {
+        return Ok(Guess::Last);
+    }
     match required(guess.kind, "guess.kind")? {
         pb::guess::Kind::MapFromSensor(pose) => {
             Ok(Guess::Pose(pose.try_into().in_field("guess.map_from_sensor")?))
@@ -126,16 +132,36 @@ fn guess_from(guess: Option<pb::Guess>) -> Result<Guess, ServiceError> {
     }
 }
 
-impl From<&Guess> for Option<pb::Guess> {
-    fn from(guess: &Guess) -> Self {
-        let kind = match guess {
-            Guess::Last => return None,
-            Guess::Pose(pose) => pb::guess::Kind::MapFromSensor(pose.into()),
-            Guess::Motion(motion) => pb::guess::Kind::LastFromSensor(motion.into()),
-            Guess::ConstantVelocity => pb::guess::Kind::ConstantVelocity(true),
-        };
-        Some(pb::Guess { kind: Some(kind) })
-    }
+/// The guess of a scan; absent where there is nothing to say.
+fn guess_of(scan: &ScanRequest) -> Option<pb::Guess> {
+    let kind = match &scan.guess {
+        Guess::Last => None,
+        Guess::Pose(pose) => Some(pb::guess::Kind::MapFromSensor(pose.into())),
+        Guess::Motion(motion) => Some(pb::guess::Kind::LastFromSensor(motion.into())),
+        Guess::ConstantVelocity => Some(pb::guess::Kind::ConstantVelocity(true)),
+    };
+    let covariance: Vec<f64> = scan.guess_covariance.iter().flat_map(PoseCovariance::rows).collect();
+    (kind.is_some() || !covariance.is_empty()).then_some(pb::Guess { kind, covariance })
+}
+
+/// The direction of gravity in the frame of a sensor, in a map whose z axis points up.
+pub(crate) fn gravity_in_sensor(in_sensor: [f64; 3]) -> Result<Gravity, ServiceError> {
+    Gravity::new(in_sensor, MAP_DOWN).map_err(|_| {
+        let message = format!(
+            "gravity_in_sensor must be a finite direction other than zero, in which things fall, got {in_sensor:?}"
+        );
+        ServiceError::new(Reason::BadGravity, message)
+    })
+}
+
+fn gravity_from(in_sensor: pb::Vector3) -> Result<Gravity, ServiceError> {
+    gravity_in_sensor(in_sensor.into()).in_field("scan")
+}
+
+/// The covariance of a guess; none where there are no numbers.
+fn covariance_from(guess: Option<&pb::Guess>) -> Result<Option<PoseCovariance>, ServiceError> {
+    let rows = guess.map(|guess| &guess.covariance[..]).filter(|rows| !rows.is_empty());
+    Ok(rows.map(PoseCovariance::new).transpose().in_field("guess")?)
 }
 
 impl From<ScanRequest> for pb::Scan {
@@ -152,6 +178,7 @@ impl From<ScanRequest> for pb::Scan {
             point_times_reference: pb::TimeReference::Unspecified.into(),
             points: Some(scan.points.into()),
             timestamp_ns: scan.timestamp_ns,
+            gravity_in_sensor: scan.gravity.map(|gravity| gravity.in_sensor().into()),
             strict: scan.strict,
             range_min_m: scan.filter.range_min_m,
             range_max_m: scan.filter.range_max_m,
@@ -162,7 +189,7 @@ impl From<ScanRequest> for pb::Scan {
 
 impl From<(&MapName, ScanRequest)> for pb::InsertScanRequest {
     fn from((map, scan): (&MapName, ScanRequest)) -> Self {
-        let (guess, at_guess) = ((&scan.guess).into(), scan.at_guess);
+        let (guess, at_guess) = (guess_of(&scan), scan.at_guess);
         let (force, recover) = (scan.force, scan.recover);
         let method = pb::Method::from(scan.method).into();
         Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, force, recover }
@@ -171,8 +198,7 @@ impl From<(&MapName, ScanRequest)> for pb::InsertScanRequest {
 
 impl From<(&MapName, ScanRequest)> for pb::AlignScanRequest {
     fn from((map, scan): (&MapName, ScanRequest)) -> Self {
-        let (guess, at_guess, foreground_level) =
-            ((&scan.guess).into(), scan.at_guess, scan.foreground_level);
+        let (guess, at_guess, foreground_level) = (guess_of(&scan), scan.at_guess, scan.foreground_level);
         let method = pb::Method::from(scan.method).into();
         Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, foreground_level }
     }
@@ -185,6 +211,7 @@ impl From<Verdict> for pb::Verdict {
             Verdict::LowOverlap => Self::LowOverlap,
             Verdict::Undetermined => Self::Undetermined,
             Verdict::Ambiguous => Self::Ambiguous,
+            Verdict::Contradicted => Self::Contradicted,
         }
     }
 }
@@ -195,8 +222,9 @@ pub(super) fn verdict_from(number: i32) -> Result<Verdict, ServiceError> {
         Ok(pb::Verdict::LowOverlap) => Ok(Verdict::LowOverlap),
         Ok(pb::Verdict::Undetermined) => Ok(Verdict::Undetermined),
         Ok(pb::Verdict::Ambiguous) => Ok(Verdict::Ambiguous),
+        Ok(pb::Verdict::Contradicted) => Ok(Verdict::Contradicted),
         Ok(pb::Verdict::Unspecified) | Err(_) => {
-            let message = format!("alignment.verdict must lie in 1..=4, got {number}");
+            let message = format!("alignment.verdict must lie in 1..=5, got {number}");
             Err(ServiceError::new(Reason::BadVerdict, message))
         }
     }

@@ -12,6 +12,8 @@ mod lifecycle;
 #[cfg(feature = "lab")]
 mod localize;
 mod memory_returns;
+#[cfg(feature = "lab")]
+mod recovery;
 mod scan_requests;
 mod sessions;
 #[path = "../support/mod.rs"]

@@ -8,6 +8,8 @@ mod alignment_verdicts;
 mod localization;
 #[cfg(feature = "client")]
 mod map_history;
+#[cfg(feature = "lab")]
+mod recovery;
 mod stationary_robots;
 #[path = "../support/mod.rs"]
 mod support;

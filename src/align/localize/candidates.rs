@@ -77,7 +77,7 @@ impl Refinement<'_> {
     fn refined(&self, points: &[Point], guess: &Pose) -> Alignment {
         let mut alignment = *self.alignment;
         alignment.multi_start.ascents = 0;
-        align_until(self.map, points, guess, &alignment, self.stop)
+        align_until(self.map, points, &(*guess).into(), &alignment, self.stop)
     }
 
     /// Removes candidates that are the same place as a better one, which takes over their search score.

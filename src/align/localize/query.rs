@@ -18,8 +18,8 @@ pub struct LocalizationQuery {
 /// Direction of gravity in the sensor frame and in the map frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gravity {
-    pub(super) in_sensor: UnitVector3<f64>,
-    pub(super) in_map: UnitVector3<f64>,
+    pub(in crate::align) in_sensor: UnitVector3<f64>,
+    pub(in crate::align) in_map: UnitVector3<f64>,
 }
 
 /// Down in the frame of a map whose z axis points up.

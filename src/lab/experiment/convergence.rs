@@ -47,7 +47,7 @@ pub fn guesses_around(truth: &Pose, count: usize, seed: u64) -> Vec<OffGuess> {
 }
 
 /// A direction drawn uniformly from the unit sphere.
-fn direction(random: &mut ChaCha8Rng) -> Vector3<f64> {
+pub(super) fn direction(random: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| gaussian(random)).normalize()
 }
 

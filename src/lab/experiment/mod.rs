@@ -3,5 +3,6 @@
 pub mod convergence;
 pub mod deskewing;
 pub mod drift;
+pub mod hostile_guesses;
 pub mod mapping;
 pub mod stages;

@@ -20,8 +20,8 @@ use std::time::{Duration, Instant};
 
 use super::guess::last_seen;
 use super::{Guess, LocatedScan, MappingError, Scan, ScanMapper};
-use crate::align::localize::LocalizationSettings;
-use crate::align::{Alignment, Verdict};
+use crate::align::localize::{Gravity, LocalizationSettings};
+use crate::align::{Alignment, PosePrior, Verdict, align_until};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::RobotName;
 use crate::util::{Keyword, StopSignal};
@@ -138,7 +138,7 @@ impl<'a> ScanMapper<'a> {
         let motion = before.as_ref().and_then(|before| {
             motion_between(&before.points, &kept, self.map.settings(), &self.settings.alignment, stop)
         });
-        let found = self.from_place(before.as_ref(), motion.as_ref(), &points, settings, stop);
+        let found = self.from_place(scan, before.as_ref(), motion.as_ref(), &points, stop);
         let found = match found {
             Some(found) => Ok(found),
             None => self.from_other_guesses(scan, &located, before.as_ref(), motion.as_ref(), &points, stop),
@@ -173,14 +173,15 @@ impl<'a> ScanMapper<'a> {
     /// as well as a search asks.
     fn from_place(
         &self,
+        scan: &Scan<'_>,
         before: Option<&LostRobot>,
         motion: Option<&Pose>,
         points: &[Point],
-        settings: &RecoverySettings,
         stop: StopSignal<'_>,
     ) -> Option<(Recovered, Alignment)> {
         let guess = before?.place? * motion?;
-        let alignment = self.align_points(points, &guess, stop);
+        let settings = &self.recovery?.settings;
+        let alignment = self.align_again(points, &guess, scan.gravity, stop);
         let fits = alignment.overlap() >= settings.localization.overlap_min;
         (fits && self.agrees(&alignment, &guess, settings)).then_some((Recovered::Localization, alignment))
     }
@@ -201,11 +202,8 @@ impl<'a> ScanMapper<'a> {
         let Some(Recovery { settings, .. }) = self.recovery else { return Err(None) };
         let mut found: Option<(Recovered, Alignment)> = None;
         for (how, guess) in self.other_guesses(scan, before, motion) {
-            let alignment = self.align_points(points, &guess, stop);
-            let is_chained = how == Recovered::ChainedScans;
-            if alignment.verdict != Verdict::Accepted
-                || is_chained && !self.agrees(&alignment, &guess, &settings)
-            {
+            let alignment = self.align_again(points, &guess, scan.gravity, stop);
+            if alignment.verdict != Verdict::Accepted {
                 continue;
             }
             match &found {
@@ -270,8 +268,16 @@ impl<'a> ScanMapper<'a> {
         guess.unwrap_or(located.alignment.map_from_sensor)
     }
 
-    fn align_points(&self, points: &[Point], guess: &Pose, stop: StopSignal<'_>) -> Alignment {
-        crate::align::align_until(self.map, points, guess, &self.settings.alignment, stop)
+    /// Aligns a scan from `guess`, in which what was known of its own guess says nothing.
+    fn align_again(
+        &self,
+        points: &[Point],
+        guess: &Pose,
+        gravity: Option<Gravity>,
+        stop: StopSignal<'_>,
+    ) -> Alignment {
+        let prior = PosePrior { gravity, ..(*guess).into() };
+        align_until(self.map, points, &prior, &self.settings.alignment, stop)
     }
 
     fn agrees(&self, alignment: &Alignment, expected: &Pose, settings: &RecoverySettings) -> bool {

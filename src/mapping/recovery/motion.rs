@@ -21,6 +21,6 @@ pub(super) fn motion_between(
     let robot = RobotName::new("before").ok()?;
     let taken_at = MappedScan::new(robot, Pose::identity());
     map.committer().insert_scan(ScanRecord::of_points(taken_at, before, map.lattice()));
-    let found = align_until(&map, now, &Pose::identity(), alignment, stop);
+    let found = align_until(&map, now, &Pose::identity().into(), alignment, stop);
     (found.verdict == Verdict::Accepted && !stop.is_stopped()).then_some(found.map_from_sensor)
 }

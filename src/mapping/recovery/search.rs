@@ -17,13 +17,20 @@ use crate::util::StopSignal;
 const CANDIDATES: usize = 2;
 
 impl ScanMapper<'_> {
-    /// What to search for after a scan of `robot`, taken at `timestamp_ns`, was refused; none where the robot is not lost,
+    /// What to search for after a scan of `robot`, taken at `timestamp_ns` and telling the direction of `gravity`, was
+    /// refused; none where the robot is not lost,
     /// a place that a search found is to be confirmed first, or a search is under way or was not long ago. Whoever takes it
     /// has to [search](Self::search).
-    pub fn begin_search(&self, robot: &RobotName, timestamp_ns: Option<i64>) -> Option<SearchTask> {
+    pub fn begin_search(
+        &self,
+        robot: &RobotName,
+        timestamp_ns: Option<i64>,
+        gravity: Option<Gravity>,
+    ) -> Option<SearchTask> {
         let recovery = self.recovery?;
-        recovery.lost.begin_search(robot, recovery.settings.search_interval, |number| {
-            self.search_query(robot, timestamp_ns, number)
+        recovery.lost.begin_search(robot, recovery.settings.search_interval, |number| LocalizationQuery {
+            gravity,
+            ..self.search_query(robot, timestamp_ns, number)
         })
     }
 
@@ -52,7 +59,7 @@ impl ScanMapper<'_> {
 
     /// Searches for the robot of a refused scan at once, and for as long as it takes.
     pub(in crate::mapping) fn search_at_once(&self, scan: &Scan<'_>, stop: StopSignal<'_>) {
-        let Some(task) = self.begin_search(scan.robot, scan.timestamp_ns) else { return };
+        let Some(task) = self.begin_search(scan.robot, scan.timestamp_ns, scan.gravity) else { return };
         let alone =
             &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
         // An error is noted with the robot, and told with the scan.

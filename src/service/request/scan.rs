@@ -7,7 +7,8 @@ use bytes::Bytes;
 use super::point_cloud::PointCloud;
 use super::point_times::PointTimes;
 use super::version::MapVersion;
-use crate::align::{Direction, Method, Verdict};
+use crate::align::localize::Gravity;
+use crate::align::{Direction, Method, PoseCovariance, Verdict};
 use crate::geometry::Pose;
 use crate::map::{RobotName, SessionName};
 use crate::mapping::{Guess, Recovered};
@@ -29,8 +30,12 @@ pub struct ScanRequest {
     pub timestamp_ns: Option<i64>,
     /// When each point was measured, seconds from `timestamp_ns`, where the sensor moved meanwhile.
     pub point_times: Option<PointTimes>,
+    /// Direction of gravity, as an accelerometer tells.
+    pub gravity: Option<Gravity>,
     /// Where it is thought to have been taken.
     pub guess: Guess,
+    /// How far off the guess may be.
+    pub guess_covariance: Option<PoseCovariance>,
     /// Take the guess as it is, without aligning.
     pub at_guess: bool,
     /// Add the scan where it was found even if the verdict is not `accepted`.
@@ -86,7 +91,9 @@ impl ScanRequest {
             points,
             timestamp_ns: None,
             point_times: None,
+            gravity: None,
             guess: Guess::Last,
+            guess_covariance: None,
             at_guess: false,
             force: false,
             recover: None,

@@ -2,6 +2,7 @@
 
 mod convergence;
 mod deskewing;
+mod hostile_guesses;
 mod lookup;
 mod mapping;
 mod scaling;
@@ -22,6 +23,8 @@ EXAMPLES:
   mrol experiment convergence scans/0000.ply scans/0001.ply --truth poses.txt --resolution 0.1 --out results/
                                                share of alignments that find the pose, against how far off the guess is
   mrol experiment deskewing --out results/     poses of a lidar that moves while it turns
+  mrol experiment hostile-guesses hall/:0.1:hall office/:0.04:office
+                                               what is accepted of guesses far off, and of scans of other places
 
 Everything is measured when it is asked for, on one core; give the machine nothing else to do meanwhile.";
 
@@ -37,6 +40,7 @@ pub(in crate::cli) struct Experiment {
 enum Which {
     Convergence(convergence::Convergence),
     Deskewing(deskewing::Deskewing),
+    HostileGuesses(hostile_guesses::HostileGuesses),
     Lookup(lookup::Lookup),
     Mapping(mapping::Mapping),
     Scaling(scaling::Scaling),
@@ -48,6 +52,7 @@ impl Experiment {
         match self.which {
             Which::Convergence(convergence) => convergence.run(&output),
             Which::Deskewing(deskewing) => deskewing.run(&output),
+            Which::HostileGuesses(hostile) => hostile.run(&output),
             Which::Lookup(lookup) => lookup.run(&output),
             Which::Mapping(mapping) => mapping.run(&output),
             Which::Scaling(scaling) => scaling.run(&output),

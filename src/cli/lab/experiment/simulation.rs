@@ -26,13 +26,15 @@ use crate::mapping::Guess;
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol experiment simulation --out results/
+  mrol experiment simulation --out results/ --noise 0.0015 --judged
   mrol experiment simulation --out results/ --scans 200 --small-filter-bits-per-key 4 --json
 
 \"With a Bloom filter size of 6 x 10^6 the pose solutions obtained were identical however at 6 x 10^5 a position error of
 around 0.02m was introduced\" (IV-B). A depth camera goes through a furnished building; each scan is aligned from the
 last pose, by overlap (the paper's method) and refined, with look-ups answered by the exact set, by the default filter,
 by one that is ample (below one false positive is expected in the whole run) and by one that is too small. Every scan
-goes into the map, as in the paper, whatever the verdict on it. Errors are those of inv(E_0) E_k against inv(T_0) T_k. Writes simulation.svg, simulation.csv (every scan) and simulation.md.";
+goes into the map, as in the paper, whatever the verdict on it; with --judged only those that fit, and the robot is looked
+for where one does not. Errors are those of inv(E_0) E_k against inv(T_0) T_k. Writes simulation.svg, simulation.csv (every scan) and simulation.md.";
 
 const METHODS: [Method; 2] = [Method::Overlap, Method::Refined];
 
@@ -62,6 +64,9 @@ pub(super) struct Simulation {
     /// the paper
     #[arg(long, value_name = "METERS", default_value_t = 0.0)]
     noise: f64,
+    /// Leave refused scans out, and look for the robot then, as `mrol map` does; errors are those of accepted scans
+    #[arg(long)]
+    judged: bool,
     /// Seed of furniture and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -136,14 +141,15 @@ impl Simulation {
     }
 
     fn map(&self, scans: &[Scan], method: Method, answers: Answers, bar: &Output) -> Result<Run, CliError> {
-        let mut mapper = self.mapper(answers.filter, unjudged(method, answers.lookup))?;
+        let mut mapper = self.mapper(answers.filter, self.alignment(method, answers.lookup))?;
         let mut errors = TruthErrors::new(truth(scans));
         let mut false_positives = FalsePositives::default();
         let mut mapped_scans = Vec::new();
         for (k, scan) in scans.iter().enumerate() {
             let mapped = mapper.add(k, &scan.points, None).map_err(CliError::failed)?;
             false_positives.add(mapped.alignment.lookups, mapped.false_positive_rate);
-            let error = errors.add(k, &mapped.alignment.map_from_sensor);
+            let counts = !self.judged || mapped.accepted();
+            let error = counts.then(|| errors.add(k, &mapped.alignment.map_from_sensor));
             mapped_scans.push((mapped, error));
             bar.step();
         }
@@ -166,16 +172,24 @@ impl Simulation {
 
     fn mapper(&self, filter: FilterSettings, settings: AlignmentSettings) -> Result<Mapper, CliError> {
         let map = MapSettings { resolution_m: self.resolution, levels: self.levels, filter };
-        Mapper::new(map, settings, Guess::Last)
+        Ok(Mapper::new(map, settings, Guess::Last)?.recovering(self.judged))
+    }
+
+    fn alignment(&self, method: Method, lookup: Lookup) -> AlignmentSettings {
+        match self.judged {
+            true => AlignmentSettings { method, lookup, ..AlignmentSettings::default() },
+            false => unjudged(method, lookup),
+        }
     }
 
     fn errors(&self, runs: &[Run]) -> Panel {
         // The default filter's curves are those of the ample one, nearly.
         let shown = runs.iter().filter(|run| run.answers.name != "default filter");
         let curve = |run: &Run| {
-            let errors = run.scans.iter().map(|(_, (meters, _))| meters * 1e3);
+            let of_scan = |(k, (_, error)): (usize, &(Mapped, ScanError))| Some((k, error.as_ref()?.0 * 1e3));
+            let errors = run.scans.iter().enumerate().filter_map(of_scan);
             // The first scan's error is zero by definition, which a logarithm cannot show.
-            run.curve(errors.enumerate().skip(1).filter(|(_, error)| *error > 0.0))
+            run.curve(errors.skip(1).filter(|(_, error)| *error > 0.0))
         };
         Panel {
             title: format!("Error of position, voxels of {} mm", self.resolution * 1e3),
@@ -234,12 +248,14 @@ fn numbered(values: impl Iterator<Item = (usize, f64)>) -> Vec<(f64, f64)> {
     values.map(|(k, value)| (k as f64, value)).collect()
 }
 
+/// Error of a scan's pose, meters and degrees; none of one that was refused and left out.
+type ScanError = Option<(f64, f64)>;
+
 /// A map of all scans.
 struct Run {
     method: Method,
     answers: Answers,
-    /// Results of the scans, with the errors in meters and degrees.
-    scans: Vec<(Mapped, (f64, f64))>,
+    scans: Vec<(Mapped, ScanError)>,
     filter: FilterSummary,
     error: Option<ErrorSummary>,
 }
@@ -266,13 +282,17 @@ fn write_scans(runs: &[(Run, Vec<Pose>)], path: &Path) -> Result<(), CliError> {
     let head = ["scan", "method", "answers", "error_m", "error_deg", "voxels", "align_ms"];
     let mut table = Table::new(head);
     for (run, _) in runs {
-        for (k, (mapped, (meters, degrees))) in run.scans.iter().enumerate() {
+        for (k, (mapped, error)) in run.scans.iter().enumerate() {
+            let [meters, degrees] = match error {
+                Some((meters, degrees)) => [format!("{meters:.6}"), format!("{degrees:.5}")],
+                None => [String::new(), String::new()],
+            };
             table.push([
                 k.to_string(),
                 run.method.as_str().to_owned(),
                 run.answers.name.to_owned(),
-                format!("{meters:.6}"),
-                format!("{degrees:.5}"),
+                meters,
+                degrees,
                 mapped.voxels.to_string(),
                 format!("{:.2}", mapped.align_time.as_secs_f64() * 1e3),
             ]);
@@ -320,6 +340,10 @@ struct Line {
     /// Upper bound of the expected false positives in all look-ups of the run.
     expected_false_positives: Option<f64>,
     scans: usize,
+    /// Scans that fit from the pose that they were looked for at, or anywhere that their robot was looked for.
+    accepted: usize,
+    /// Those among them by which the robot was found again.
+    recovered: usize,
     error_m_median: f64,
     error_deg_median: f64,
     error_m_max: f64,
@@ -332,7 +356,7 @@ struct Line {
 }
 
 impl Line {
-    const HEAD: &str = "method    look-ups        bits a voxel  false pos.  scans  median error         \
+    const HEAD: &str = "method    look-ups        bits a voxel  false pos.  scans  accepted  recovered  median error         \
                         largest error        voxels    from the exact set's poses";
 
     fn of(run: &Run, exact: &[Pose]) -> Self {
@@ -349,6 +373,8 @@ impl Line {
             false_positive_rate: filter.map(|_| run.filter.expected_false_positive_rate),
             expected_false_positives: filter.map(|_| run.filter.expected_false_positives),
             scans: run.scans.len(),
+            accepted: run.scans.iter().filter(|(mapped, _)| mapped.accepted()).count(),
+            recovered: run.scans.iter().filter(|(mapped, _)| mapped.recovered.is_some()).count(),
             error_m_median: of_errors(|error| error.meters.median),
             error_deg_median: of_errors(|error| error.degrees.median),
             error_m_max: of_errors(|error| error.meters.max),
@@ -374,7 +400,7 @@ fn millimeters(meters: f64, degrees: f64) -> String {
 
 impl Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { method, answers, scans, .. } = self;
+        let Self { method, answers, scans, accepted, recovered, .. } = self;
         let bits = self.filter_bits_per_key.map_or("-".to_owned(), |bits| bits.to_string());
         let rate = self.false_positive_rate.map_or("none".to_owned(), |rate| format!("{rate:.1e}"));
         let median = millimeters(self.error_m_median, self.error_deg_median);
@@ -382,7 +408,7 @@ impl Display for Line {
         let (voxels, distance) = (count(self.voxels), self.distance());
         write!(
             f,
-            "{method:<9} {answers:<15} {bits:>12}  {rate:>10}  {scans:>5}  {median:<20} {max:<20} {voxels:>7}  {distance}"
+            "{method:<9} {answers:<15} {bits:>12}  {rate:>10}  {scans:>5}  {accepted:>8}  {recovered:>9}  {median:<20} {max:<20} {voxels:>7}  {distance}"
         )
     }
 }

@@ -6,6 +6,7 @@ mod furniture;
 mod hall;
 mod ray;
 mod shape;
+mod twin_rooms;
 
 use nalgebra::{Point3, Vector3};
 
@@ -34,6 +35,12 @@ impl Scene {
     /// 4.5 m of its center (10, 7): room to drive circles in.
     pub fn hall(seed: u64) -> Self {
         Self { objects: hall::hall(seed) }
+    }
+
+    /// Two rooms of 7 x 5 x 2.7 m without doors, the first with a corner at the origin, the second `apart_m` from it along
+    /// x, with the same cupboards drawn from `seed`: a scan of one is a scan of the other.
+    pub fn twin_rooms(seed: u64, apart_m: f64) -> Self {
+        Self { objects: twin_rooms::twin_rooms(seed, apart_m) }
     }
 
     /// Distance from `origin` (map frame, meters) to the first surface along `direction`, none beyond

@@ -1,0 +1,179 @@
+//! Robots that were carried away, or lost themselves, are found again, and none is found in the wrong place.
+
+use mrol::geometry::{Point, Pose, pose_difference};
+use mrol::lab::simulate::{Scene, SpinningLidar};
+use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol::mapping::{
+    Guess, LocatedScan, LostRobots, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper, Sightings,
+};
+use mrol::util::StopSignal;
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+const RESOLUTION_M: f64 = 0.1;
+
+/// A robot in a scene, and the map of the scene.
+struct World {
+    scene: Scene,
+    map: MultiResolutionMap,
+    robot: RobotName,
+    sightings: Sightings,
+    lost: LostRobots,
+    scans: u64,
+}
+
+fn at(x: f64, y: f64, yaw_deg: f64) -> Pose {
+    Pose::new(Vector3::new(x, y, 1.0), Vector3::new(0.0, 0.0, yaw_deg.to_radians()))
+}
+
+impl World {
+    /// The scene, mapped by another robot from `viewpoints`.
+    fn mapped(scene: Scene, viewpoints: &[Pose]) -> Self {
+        let map = MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, 5)).unwrap();
+        let robot = RobotName::new("r").unwrap();
+        let (sightings, lost) = (Sightings::default(), LostRobots::default());
+        let mut world = Self { scene, map, robot, sightings, lost, scans: 0 };
+        for viewpoint in viewpoints {
+            let points = world.seen_from(viewpoint);
+            let pose = MappedScan::new(RobotName::new("surveyor").unwrap(), *viewpoint);
+            let record = ScanRecord::of_points(pose, &points, world.map.lattice());
+            world.map.committer().insert_scan(record);
+        }
+        world
+    }
+
+    fn seen_from(&mut self, map_from_sensor: &Pose) -> Vec<Point> {
+        self.scans += 1;
+        let lidar = SpinningLidar::default();
+        let scan = lidar.scan(&self.scene, map_from_sensor, &mut ChaCha8Rng::seed_from_u64(self.scans));
+        scan.into_iter().filter(|point| point.is_finite()).collect()
+    }
+
+    /// The robot scans from a pose; what becomes of the scan.
+    fn scan(&mut self, truth: &Pose, guess: Guess) -> LocatedScan {
+        let points = self.seen_from(truth);
+        let scan = Scan { guess, ..Scan::new(&self.robot, &points) };
+        let mapper = ScanMapper::new(&self.map, &self.sightings, MappingSettings::default());
+        let mapper = mapper.recovering(&self.lost, RecoverySettings::default());
+        mapper.map_scan(&scan, StopSignal::NEVER).unwrap().located
+    }
+}
+
+#[track_caller]
+fn assert_at(located: &LocatedScan, truth: &Pose) {
+    let alignment = &located.alignment;
+    assert!(located.is_accepted(), "{}", alignment.reason);
+    let (meters, degrees) = pose_difference(&alignment.map_from_sensor, truth);
+    assert!(meters < 0.05 && degrees < 0.5, "{meters} m and {degrees} deg off");
+}
+
+fn hall() -> World {
+    let viewpoints = [at(4.0, 5.0, 0.0), at(8.0, 8.0, 0.0), at(12.0, 5.5, 0.0), at(16.0, 8.0, 0.0)];
+    World::mapped(Scene::hall(3), &viewpoints)
+}
+
+#[test]
+fn a_robot_that_was_carried_is_found_by_a_search_that_its_next_scan_confirms() {
+    let mut hall = hall();
+    let start = at(4.2, 5.2, 5.0);
+    assert_at(&hall.scan(&start, Guess::Pose(at(4.0, 5.0, 0.0))), &start);
+    let there = at(15.5, 7.5, 130.0);
+    let first = hall.scan(&there, Guess::Last);
+    eprintln!("{:?}", (first.alignment.overlap(), first.alignment.contradiction, &first.alignment.reason));
+    assert!(!first.is_accepted() && first.recovered.is_none());
+    assert!(
+        first.alignment.reason.contains("which the next scan has to confirm"),
+        "{}",
+        first.alignment.reason
+    );
+    let next = at(15.2, 7.6, 120.0);
+    let found = hall.scan(&next, Guess::Last);
+    assert_at(&found, &next);
+    assert_eq!(found.recovered, Some(Recovered::Localization));
+    let on = at(14.9, 7.6, 115.0);
+    let on_its_way = hall.scan(&on, Guess::Last);
+    assert_at(&on_its_way, &on);
+    assert_eq!(on_its_way.recovered, None);
+}
+
+#[test]
+fn a_place_that_the_next_scan_does_not_confirm_is_given_up() {
+    let mut hall = hall();
+    let start = at(4.2, 5.2, 5.0);
+    assert_at(&hall.scan(&start, Guess::Pose(at(4.0, 5.0, 0.0))), &start);
+    assert!(!hall.scan(&at(15.5, 7.5, 130.0), Guess::Last).is_accepted());
+    // Carried on, before it could say that it is there.
+    let elsewhere = at(9.0, 4.6, -100.0);
+    assert!(!hall.scan(&elsewhere, Guess::Last).is_accepted());
+    let next = at(9.2, 4.6, -95.0);
+    let found = hall.scan(&next, Guess::Last);
+    assert_at(&found, &next);
+    assert_eq!(found.recovered, Some(Recovered::Localization));
+}
+
+#[test]
+fn a_robot_in_one_of_two_equal_rooms_is_found_in_neither() {
+    let apart_m = 12.0;
+    let viewpoints = [at(2.0, 2.5, 0.0), at(5.0, 2.5, 0.0)];
+    let twins = viewpoints.map(|pose| Pose::translation(apart_m, 0.0, 0.0) * pose);
+    let mut rooms = World::mapped(Scene::twin_rooms(5, apart_m), &[viewpoints, twins].concat());
+    let start = at(2.2, 2.4, 5.0);
+    assert_at(&rooms.scan(&start, Guess::Pose(at(2.0, 2.5, 0.0))), &start);
+    for k in 0..6 {
+        // In the other room it looks another way, so that its last pose is no guess.
+        let there = at(apart_m + 4.5, 2.6, 150.0 + 5.0 * f64::from(k));
+        let refused = rooms.scan(&there, Guess::Last);
+        eprintln!(
+            "{:?}",
+            (refused.alignment.overlap(), refused.alignment.contradiction, &refused.alignment.reason)
+        );
+        assert!(!refused.is_accepted(), "found at {:?}", refused.alignment.map_from_sensor);
+        let reason = &refused.alignment.reason;
+        assert!(reason.contains("ambiguous: another place fits about as well"), "{reason}");
+    }
+}
+
+#[test]
+fn a_robot_goes_on_from_where_its_refused_scans_lead() {
+    let mut hall = hall();
+    // A crowd that stands still: most of what it sees is not in the map.
+    let mut crowd = World::mapped(Scene::hall(11), &[]);
+    let pose = |k: u32| at(4.2 + 0.5 * f64::from(k), 5.5, 5.0 + 6.0 * f64::from(k));
+    assert_at(&hall.scan(&pose(0), Guess::Pose(at(4.0, 5.5, 0.0))), &pose(0));
+    let mut scan = |hall: &mut World, k: u32, is_crowded: bool| {
+        let mut points = hall.seen_from(&pose(k));
+        if is_crowded {
+            points = points.into_iter().step_by(10).collect();
+            let raised = |point: Point| {
+                let [x, y, z] = point.xyz();
+                Point::new(x, y, z + 30.0)
+            };
+            points.extend(crowd.seen_from(&pose(k)).into_iter().map(raised));
+        }
+        let mapper = ScanMapper::new(&hall.map, &hall.sightings, MappingSettings::default());
+        let mapper = mapper.recovering(&hall.lost, RecoverySettings::default());
+        let scan = Scan::new(&hall.robot, &points);
+        let located = mapper.locate(&scan, StopSignal::NEVER).unwrap();
+        mapper.recover(&scan, located, StopSignal::NEVER).unwrap()
+    };
+    for k in 1..12 {
+        assert!(!scan(&mut hall, k, true).is_accepted(), "scan {k}");
+    }
+    let found = scan(&mut hall, 12, false);
+    assert_at(&found, &pose(12));
+    assert_eq!(found.recovered, Some(Recovered::ChainedScans));
+}
+
+#[test]
+fn without_recovery_a_lost_robot_stays_lost_and_nothing_is_remembered_of_it() {
+    let mut hall = hall();
+    let start = at(4.2, 5.2, 5.0);
+    assert_at(&hall.scan(&start, Guess::Pose(at(4.0, 5.0, 0.0))), &start);
+    for k in 0..3 {
+        let points = hall.seen_from(&at(15.5 - 0.2 * f64::from(k), 7.5, 130.0));
+        let mapper = ScanMapper::new(&hall.map, &hall.sightings, MappingSettings::default());
+        let located = mapper.map_scan(&Scan::new(&hall.robot, &points), StopSignal::NEVER).unwrap().located;
+        assert!(!located.is_accepted() && located.recovered.is_none());
+    }
+}
