@@ -25,7 +25,7 @@ pub struct FreeSpaceSettings {
     pub seen_through_max: f64,
     /// A pose is far from its guess beyond so many r_0: it has to fit better to be believed. 12.
     pub far_above: f64,
-    /// Or beyond so many degrees. 15.
+    /// Or beyond so many degrees. 25.
     pub far_above_deg: f64,
     /// Share of the points that may lie where earlier scans saw through, at a pose far from its guess. 0.1.
     pub far_seen_through_max: f64,
@@ -42,7 +42,7 @@ impl Default for FreeSpaceSettings {
             blocked_max: 0.4,
             seen_through_max: 0.2,
             far_above: 12.0,
-            far_above_deg: 15.0,
+            far_above_deg: 25.0,
             far_seen_through_max: 0.1,
             far_explained_min: 0.72,
         }

@@ -52,7 +52,7 @@ async fn a_scan_of_a_moving_sensor_is_mapped_as_that_of_one_that_stands() {
         // Over gRPC from the timestamp, over HTTP from the beginning of the sweep, and without times.
         let mut scan = scan_pb("a", "r", &points);
         let kind = pb::guess::Kind::LastFromSensor((&motion).into());
-        scan.guess = Some(pb::Guess { kind: Some(kind) });
+        scan.guess = Some(pb::Guess { kind: Some(kind), ..Default::default() });
         scan.at_guess = false;
         let inner = scan.scan.as_mut().unwrap();
         inner.timestamp_ns = Some(k * STEP_NS);

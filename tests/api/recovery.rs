@@ -41,7 +41,7 @@ impl<'a> Carried<'a> {
         let request = pb::InsertScanRequest {
             map: "a".into(),
             scan: Some(scan),
-            guess: at_truth.then_some(pb::Guess { kind: Some(kind) }),
+            guess: at_truth.then_some(pb::Guess { kind: Some(kind), ..Default::default() }),
             at_guess: at_truth,
             recover: self.recover,
             ..Default::default()

@@ -40,7 +40,7 @@ async fn a_constant_velocity_goes_on_as_the_last_two_scans_went() {
             .await
             .unwrap();
     }
-    let guess = pb::Guess { kind: Some(pb::guess::Kind::ConstantVelocity(true)) };
+    let guess = pb::Guess { kind: Some(pb::guess::Kind::ConstantVelocity(true)), ..Default::default() };
     // Taken at its guess, so that the answer is the guess.
     let request = pb::InsertScanRequest { guess: Some(guess), ..scan_pb("a", "r", &corner()) };
     let answer = robot.insert_scan(request).await.unwrap().into_inner();

@@ -140,7 +140,8 @@ impl Robot {
             points: points_pb(&points),
             ..Default::default()
         };
-        let velocity = pb::Guess { kind: Some(pb::guess::Kind::ConstantVelocity(true)) };
+        let velocity =
+            pb::Guess { kind: Some(pb::guess::Kind::ConstantVelocity(true)), ..Default::default() };
         pb::InsertScanRequest {
             guess: Some(velocity),
             at_guess: false,

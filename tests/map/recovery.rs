@@ -1,7 +1,7 @@
 //! Robots that were carried away, or lost themselves, are found again, and none is found in the wrong place.
 
 use mrol::geometry::{Point, Pose, pose_difference};
-use mrol::lab::simulate::{Scene, SpinningLidar};
+use mrol::lab::simulate::{Scene, SpinningLidar, tours};
 use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::mapping::{
     Guess, LocatedScan, LostRobots, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper, Sightings,
@@ -12,6 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const RESOLUTION_M: f64 = 0.1;
+const STEPS: usize = 120;
 
 /// A robot in a scene, and the map of the scene.
 struct World {
@@ -68,47 +69,38 @@ fn assert_at(located: &LocatedScan, truth: &Pose) {
     assert!(meters < 0.05 && degrees < 0.5, "{meters} m and {degrees} deg off");
 }
 
-fn hall() -> World {
-    let viewpoints = [at(4.0, 5.0, 0.0), at(8.0, 8.0, 0.0), at(12.0, 5.5, 0.0), at(16.0, 8.0, 0.0)];
-    World::mapped(Scene::hall(3), &viewpoints)
+/// A building that no room of which looks like another, mapped from every tenth of `tour`.
+fn building() -> (World, Vec<Pose>) {
+    let [tour, _] = tours(STEPS);
+    let viewpoints: Vec<Pose> = tour.poses.iter().step_by(10).copied().collect();
+    (World::mapped(Scene::furnished(7), &viewpoints), tour.poses)
 }
 
 #[test]
 fn a_robot_that_was_carried_is_found_by_a_search_that_its_next_scan_confirms() {
-    let mut hall = hall();
-    let start = at(4.2, 5.2, 5.0);
-    assert_at(&hall.scan(&start, Guess::Pose(at(4.0, 5.0, 0.0))), &start);
-    let there = at(15.5, 7.5, 130.0);
-    let first = hall.scan(&there, Guess::Last);
-    eprintln!("{:?}", (first.alignment.overlap(), first.alignment.contradiction, &first.alignment.reason));
+    let (mut building, tour) = building();
+    assert_at(&building.scan(&tour[3], Guess::Pose(tour[2])), &tour[3]);
+    let first = building.scan(&tour[63], Guess::Last);
     assert!(!first.is_accepted() && first.recovered.is_none());
-    assert!(
-        first.alignment.reason.contains("which the next scan has to confirm"),
-        "{}",
-        first.alignment.reason
-    );
-    let next = at(15.2, 7.6, 120.0);
-    let found = hall.scan(&next, Guess::Last);
-    assert_at(&found, &next);
+    let reason = &first.alignment.reason;
+    assert!(reason.contains("found at one place, which the next scan has to confirm"), "{reason}");
+    let found = building.scan(&tour[64], Guess::Last);
+    assert_at(&found, &tour[64]);
     assert_eq!(found.recovered, Some(Recovered::Localization));
-    let on = at(14.9, 7.6, 115.0);
-    let on_its_way = hall.scan(&on, Guess::Last);
-    assert_at(&on_its_way, &on);
+    let on_its_way = building.scan(&tour[65], Guess::Last);
+    assert_at(&on_its_way, &tour[65]);
     assert_eq!(on_its_way.recovered, None);
 }
 
 #[test]
 fn a_place_that_the_next_scan_does_not_confirm_is_given_up() {
-    let mut hall = hall();
-    let start = at(4.2, 5.2, 5.0);
-    assert_at(&hall.scan(&start, Guess::Pose(at(4.0, 5.0, 0.0))), &start);
-    assert!(!hall.scan(&at(15.5, 7.5, 130.0), Guess::Last).is_accepted());
+    let (mut building, tour) = building();
+    assert_at(&building.scan(&tour[3], Guess::Pose(tour[2])), &tour[3]);
+    assert!(!building.scan(&tour[63], Guess::Last).is_accepted());
     // Carried on, before it could say that it is there.
-    let elsewhere = at(9.0, 4.6, -100.0);
-    assert!(!hall.scan(&elsewhere, Guess::Last).is_accepted());
-    let next = at(9.2, 4.6, -95.0);
-    let found = hall.scan(&next, Guess::Last);
-    assert_at(&found, &next);
+    assert!(!building.scan(&tour[93], Guess::Last).is_accepted());
+    let found = building.scan(&tour[94], Guess::Last);
+    assert_at(&found, &tour[94]);
     assert_eq!(found.recovered, Some(Recovered::Localization));
 }
 
@@ -122,12 +114,8 @@ fn a_robot_in_one_of_two_equal_rooms_is_found_in_neither() {
     assert_at(&rooms.scan(&start, Guess::Pose(at(2.0, 2.5, 0.0))), &start);
     for k in 0..6 {
         // In the other room it looks another way, so that its last pose is no guess.
-        let there = at(apart_m + 4.5, 2.6, 150.0 + 5.0 * f64::from(k));
+        let there = at(apart_m + 4.5, 2.6, 150.0 - 5.0 * f64::from(k));
         let refused = rooms.scan(&there, Guess::Last);
-        eprintln!(
-            "{:?}",
-            (refused.alignment.overlap(), refused.alignment.contradiction, &refused.alignment.reason)
-        );
         assert!(!refused.is_accepted(), "found at {:?}", refused.alignment.map_from_sensor);
         let reason = &refused.alignment.reason;
         assert!(reason.contains("ambiguous: another place fits about as well"), "{reason}");
@@ -136,7 +124,8 @@ fn a_robot_in_one_of_two_equal_rooms_is_found_in_neither() {
 
 #[test]
 fn a_robot_goes_on_from_where_its_refused_scans_lead() {
-    let mut hall = hall();
+    let viewpoints = [at(4.0, 5.0, 0.0), at(8.0, 8.0, 0.0), at(12.0, 5.5, 0.0), at(16.0, 8.0, 0.0)];
+    let mut hall = World::mapped(Scene::hall(3), &viewpoints);
     // A crowd that stands still: most of what it sees is not in the map.
     let mut crowd = World::mapped(Scene::hall(11), &[]);
     let pose = |k: u32| at(4.2 + 0.5 * f64::from(k), 5.5, 5.0 + 6.0 * f64::from(k));
@@ -166,14 +155,14 @@ fn a_robot_goes_on_from_where_its_refused_scans_lead() {
 }
 
 #[test]
-fn without_recovery_a_lost_robot_stays_lost_and_nothing_is_remembered_of_it() {
-    let mut hall = hall();
-    let start = at(4.2, 5.2, 5.0);
-    assert_at(&hall.scan(&start, Guess::Pose(at(4.0, 5.0, 0.0))), &start);
-    for k in 0..3 {
-        let points = hall.seen_from(&at(15.5 - 0.2 * f64::from(k), 7.5, 130.0));
-        let mapper = ScanMapper::new(&hall.map, &hall.sightings, MappingSettings::default());
-        let located = mapper.map_scan(&Scan::new(&hall.robot, &points), StopSignal::NEVER).unwrap().located;
+fn without_recovery_a_lost_robot_stays_lost() {
+    let (mut building, tour) = building();
+    assert_at(&building.scan(&tour[3], Guess::Pose(tour[2])), &tour[3]);
+    for truth in &tour[63..66] {
+        let points = building.seen_from(truth);
+        let mapper = ScanMapper::new(&building.map, &building.sightings, MappingSettings::default());
+        let scan = Scan::new(&building.robot, &points);
+        let located = mapper.map_scan(&scan, StopSignal::NEVER).unwrap().located;
         assert!(!located.is_accepted() && located.recovered.is_none());
     }
 }

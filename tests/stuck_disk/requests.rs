@@ -16,7 +16,7 @@ fn hall(random: &mut ChaCha8Rng) -> Vec<[f32; 3]> {
 }
 
 fn kind(kind: pb::guess::Kind) -> Option<pb::Guess> {
-    Some(pb::Guess { kind: Some(kind) })
+    Some(pb::Guess { kind: Some(kind), ..Default::default() })
 }
 
 /// The robot's scan of that number. Its guesses take turns; some scans are aligned, some go in where they say.

@@ -240,7 +240,8 @@ pub fn scan_pb(map: &str, robot: &str, points: &[[f32; 3]]) -> pb::InsertScanReq
 
 /// A guess without rotation.
 pub fn guess_pb(translation_m: [f64; 3]) -> Option<pb::Guess> {
-    Some(pb::Guess { kind: Some(pb::guess::Kind::MapFromSensor(pose_pb(translation_m))) })
+    let kind = Some(pb::guess::Kind::MapFromSensor(pose_pb(translation_m)));
+    Some(pb::Guess { kind, ..Default::default() })
 }
 
 /// A question about points.

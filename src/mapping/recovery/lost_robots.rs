@@ -10,7 +10,7 @@ use crate::map::RobotName;
 use crate::sync::{Mutex, Rank};
 
 /// Lost robots that are remembered, at most; beyond, the one goes whose last scan came longest ago.
-pub const LOST_ROBOTS_MAX: usize = 64;
+pub const LOST_ROBOTS_MAX: usize = 16;
 
 /// The robots whose last scan was refused, in memory.
 #[derive(Debug)]

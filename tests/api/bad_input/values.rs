@@ -49,12 +49,12 @@ async fn what_is_no_pose_is_refused_with_its_norm() {
     let query = pb::QueryPointsRequest { map_from_points: Some(pose), ..query_pb("a", &row(1)) };
     let status = daemon.occupancy().await.query_points(query).await.unwrap_err();
     assert_invalid(&status, &["map_from_points", "rotation", "norm 2", "0.001"]);
-    let guess = pb::Guess { kind: Some(pb::guess::Kind::MapFromSensor(pose)) };
+    let guess = pb::Guess { kind: Some(pb::guess::Kind::MapFromSensor(pose)), ..Default::default() };
     let scan = pb::InsertScanRequest { guess: Some(guess), ..scan_pb("a", "r", &row(1)) };
     let status = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
     assert_invalid(&status, &["guess.map_from_sensor", "norm 2"]);
     let half = pb::Pose { rotation: None, ..pose };
-    let guess = pb::Guess { kind: Some(pb::guess::Kind::LastFromSensor(half)) };
+    let guess = pb::Guess { kind: Some(pb::guess::Kind::LastFromSensor(half)), ..Default::default() };
     let scan = pb::InsertScanRequest { guess: Some(guess), ..scan_pb("a", "r", &row(1)) };
     let status = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
     assert_invalid(&status, &["guess.last_from_sensor", "rotation is missing"]);
@@ -335,5 +335,54 @@ async fn regions_and_robots_that_are_none_are_named() {
     assert_refused(refused(answer).await, &["robot", "1 to 64"]);
     let answer = daemon.get("/v1/maps/a/trajectory?robot=r%2f1").await;
     assert_refused(refused(answer).await, &["robot", "r/1"]);
+    assert_unchanged(&daemon).await;
+}
+
+#[tokio::test]
+async fn what_is_no_gravity_and_no_covariance_is_refused_with_its_numbers() {
+    let daemon = daemon().await;
+    for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [0.0, f64::INFINITY, 0.0]] {
+        let gravity = pb::Vector3 { x: bad[0], y: bad[1], z: bad[2] };
+        let mut scan = scan_pb("a", "r", &row(1));
+        scan.scan.as_mut().unwrap().gravity_in_sensor = Some(gravity);
+        let status = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
+        assert_invalid(&status, &["scan", "gravity_in_sensor", &format!("{bad:?}")]);
+    }
+    let mut asymmetric = vec![0.0; 36];
+    asymmetric[1] = 0.5;
+    let mut negative = vec![0.0; 36];
+    negative[35] = -2.0;
+    for (bad, words) in [
+        (vec![1.0; 35], "36 numbers"),
+        (vec![f64::NAN; 36], "finite, got NaN in row 0"),
+        (asymmetric.clone(), "symmetric, got 0 in row 1, column 0, and 0.5"),
+        (negative.clone(), "positive semidefinite, got a variance of -2"),
+    ] {
+        let guess = pb::Guess { covariance: bad, ..Default::default() };
+        let scan = pb::InsertScanRequest { guess: Some(guess), ..scan_pb("a", "r", &row(1)) };
+        let status = daemon.mapping().await.insert_scan(scan).await.unwrap_err();
+        assert_invalid(&status, &["guess", "covariance", words]);
+    }
+    for (field, value, words) in [
+        ("gravity_in_sensor", json!([0, 0, 0]), "gravity_in_sensor must be a finite direction"),
+        ("guess_covariance", json!([1, 2, 3]), "36 numbers, 6 rows of 6, got 3"),
+        ("guess_covariance", json!(asymmetric), "symmetric"),
+        ("guess_covariance", json!(negative), "positive semidefinite"),
+    ] {
+        for route in ["scans", "alignment"] {
+            let mut body = json!({"robot": "r", "points": row(1)});
+            body[field] = value.clone();
+            let answer = daemon.post(&format!("/v1/maps/a/{route}"), body).await;
+            assert_refused(refused(answer).await, &[words]);
+        }
+    }
+    for (query, words) in [
+        ("gravity_in_sensor=0,0,0", "gravity_in_sensor must be a finite direction"),
+        ("gravity_in_sensor=0,0", "gravity_in_sensor must be 3 numbers"),
+        ("guess_covariance=1,2", "guess_covariance must be 36 numbers"),
+    ] {
+        let route = format!("/v1/maps/a/scans?robot=r&{query}");
+        assert_refused(refused(daemon.post_bytes(&route, bytes_of(&row(1))).await).await, &[words]);
+    }
     assert_unchanged(&daemon).await;
 }

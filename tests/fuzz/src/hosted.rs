@@ -11,10 +11,9 @@ use http_body_util::{BodyExt, Limited};
 use mrol::access::{Access, Gate};
 use mrol::admission::{Admission, Lifecycle};
 use mrol::geometry::{Point, Pose};
-use mrol::map::{MapName, MapSettings, RobotName, SessionName};
+use mrol::map::{MapName, MapSettings, RobotName};
 use mrol::mapping::Guess;
 use mrol::middleware::Middleware;
-use mrol::scan::PointFilter;
 use mrol::service::{Limits, MapService, PointCloud, ScanRequest, ServiceSettings};
 use mrol::store::OpeningProgress;
 use mrol::telemetry::{Audit, Metrics, RequestRecorder};
@@ -135,6 +134,8 @@ fn limits() -> Limits {
         insertion_time_max_s: 0.2,
         undo_time_max_s: 0.2,
         localization_time_max_s: 0.02,
+        recovery_search_time_max_s: 0.02,
+        recovery_search_interval_s: 0.02,
         localization_candidates_max: 4,
         localization_grid_bytes_max: 4 << 20,
         ..Limits::default()
@@ -155,19 +156,14 @@ fn scan(scan_id: u64) -> ScanRequest {
             Point::from(point)
         })
     };
+    let robot = RobotName::new("r1").expect("a name");
+    let points = PointCloud::from((0..3).flat_map(wall).collect::<Vec<_>>());
     ScanRequest {
-        robot: RobotName::new("r1").expect("a name"),
-        session: SessionName::default(),
         scan_id: Some(scan_id),
-        points: PointCloud::from((0..3).flat_map(wall).collect::<Vec<_>>()),
         timestamp_ns: Some(scan_id as i64 * 100_000_000),
-        point_times: None,
         guess: Guess::Pose(Pose::translation(0.0, 0.0, scan_id as f64 * 0.01)),
         at_guess: true,
         force: true,
-        method: None,
-        foreground_level: None,
-        filter: PointFilter::default(),
-        strict: false,
+        ..ScanRequest::new(robot, points)
     }
 }
