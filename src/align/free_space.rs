@@ -6,32 +6,32 @@
 //! earlier viewpoints to the scan's points, which must not go on to surfaces behind them. In a building that repeats
 //! itself a scan fits at places where it was not taken; there it is contradicted by one or the other.
 
-use super::AlignmentSettings;
 use crate::geometry::{Point, Pose};
 use crate::map::{Lookup, MapView, MultiResolutionMap};
 use crate::util::StopSignal;
 use crate::voxel::LatticeFromPoints;
 
 /// When free space contradicts where an alignment puts a scan.
+///
+/// It is asked of poses far from their guess alone: near it there is no better explanation, and a robot in a crowd, or one
+/// whose points do not come from one place, is believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeSpaceSettings {
     /// Number of the scan's points whose rays are followed. 300; 0 asks nothing.
     pub rays: usize,
     /// Number of earlier viewpoints that the points are looked at from. 8.
     pub viewpoints: usize,
-    /// Share of the rays that may pass through what the map holds. 0.4, as for localization.
-    pub blocked_max: f64,
-    /// Share of the points that may lie where earlier scans saw through. 0.2.
-    pub seen_through_max: f64,
-    /// A pose is far from its guess beyond so many r_0: it has to fit better to be believed. 12.
+    /// A pose is far from its guess beyond so many r_0. 12.
     pub far_above: f64,
     /// Or beyond so many degrees. 25.
     pub far_above_deg: f64,
-    /// Share of the points that may lie where earlier scans saw through, at a pose far from its guess. 0.1.
-    pub far_seen_through_max: f64,
-    /// Of the points within 8 r_0 of what the map holds, the share that has to be on it, at a pose far from its guess. 0.72:
-    /// right poses in maps of several scans have 0.74 to 1, wrong ones, but in rooms of equal shape, up to 0.71.
-    pub far_explained_min: f64,
+    /// Of the points within 8 r_0 of what the map holds, the share that has to be on it. 0.72: right poses in maps of several
+    /// scans have 0.74 to 1, wrong ones up to 0.71 but in rooms of one shape.
+    pub explained_min: f64,
+    /// Share of the rays that may pass through what the map holds. 0.5: on a street with rough ground right poses have 0.4.
+    pub blocked_max: f64,
+    /// Share of the points that may lie where earlier scans saw through. 0.1; right poses have up to 0.03.
+    pub seen_through_max: f64,
 }
 
 impl Default for FreeSpaceSettings {
@@ -39,13 +39,19 @@ impl Default for FreeSpaceSettings {
         Self {
             rays: 300,
             viewpoints: 8,
-            blocked_max: 0.4,
-            seen_through_max: 0.2,
             far_above: 12.0,
             far_above_deg: 25.0,
-            far_seen_through_max: 0.1,
-            far_explained_min: 0.72,
+            explained_min: 0.72,
+            blocked_max: 0.5,
+            seen_through_max: 0.1,
         }
+    }
+}
+
+impl FreeSpaceSettings {
+    /// True where free space is asked of a pose so many meters and degrees from its guess.
+    pub(super) fn is_asked_at(&self, (meters, degrees): (f64, f64), resolution_m: f64) -> bool {
+        self.rays > 0 && (meters > self.far_above * resolution_m || degrees > self.far_above_deg)
     }
 }
 
@@ -59,15 +65,13 @@ pub struct Contradiction {
     pub seen_through: f64,
     /// Of the points near what the map holds, the share that is not on it.
     pub unexplained: f64,
-    /// The pose is far from its guess.
-    pub is_far: bool,
 }
 
 /// The level whose occupied voxels are near what the map holds: 8 r_0.
 const NEAR_LEVEL: usize = 3;
 
 /// Step along a ray, in voxels.
-const STEP: f64 = 0.7;
+const STEP: f64 = 0.5;
 /// Steps of a ray, at most: what is farther away is looked at in longer steps.
 const STEPS_MAX: f64 = 1024.0;
 /// Length of a ray within occupied voxels, in voxels, from which on it passes through them and not past their corners.
@@ -113,7 +117,8 @@ impl Contradiction {
         let share = |count: usize| count as f64 / points.len() as f64;
         let blocked = points.iter().filter(|point| space.is_blocked(origin, **point)).count();
         let unexplained = space.alone(&points);
-        let range_m = points.iter().map(|point| distance(origin, *point)).fold(0.0, f64::max);
+        // How far the earlier scans saw is not known: farther than this one, where this one looks at a wall.
+        let range_m = 2.0 * points.iter().map(|point| distance(origin, *point)).fold(0.0, f64::max);
         let is_seen_through = |point: &&Point| {
             !stop.is_stopped()
                 && viewpoints.iter().any(|viewpoint| space.sees_through(*viewpoint, **point, range_m))
@@ -122,35 +127,22 @@ impl Contradiction {
         Self { blocked: share(blocked), seen_through: share(seen_through), ..Self::default() }
     }
 
-    /// With what the overlaps with the levels (finest first) say, at a pose as far from its guess as `correction` (meters and
-    /// degrees), in a map of `resolution_m`.
-    pub(super) fn with_overlaps(
-        self,
-        level_overlaps: &[f64],
-        (meters, degrees): (f64, f64),
-        resolution_m: f64,
-        settings: &FreeSpaceSettings,
-    ) -> Self {
+    /// With what the overlaps with the levels (finest first) say.
+    pub(super) fn with_overlaps(self, level_overlaps: &[f64]) -> Self {
         let near = level_overlaps.get(NEAR_LEVEL).or(level_overlaps.last()).copied().unwrap_or(0.0);
         let on = level_overlaps.first().copied().unwrap_or(0.0);
-        let unexplained = if near > 0.0 { 1.0 - on / near } else { 0.0 };
-        let is_far = meters > settings.far_above * resolution_m || degrees > settings.far_above_deg;
-        Self { unexplained, is_far: is_far && settings.rays > 0, ..self }
+        Self { unexplained: if near > 0.0 { 1.0 - on / near } else { 0.0 }, ..self }
     }
 
     /// Why the pose is not believed; none where it may be.
-    pub(super) fn reason(&self, settings: &AlignmentSettings) -> Option<String> {
-        let FreeSpaceSettings { blocked_max, far_explained_min, .. } = settings.free_space;
-        let Self { blocked, seen_through, unexplained, is_far } = self;
-        let seen_through_max = match is_far {
-            true => settings.free_space.far_seen_through_max,
-            false => settings.free_space.seen_through_max,
-        };
+    pub(super) fn reason(&self, settings: &FreeSpaceSettings) -> Option<String> {
+        let FreeSpaceSettings { explained_min, blocked_max, seen_through_max, .. } = *settings;
+        let Self { blocked, seen_through, unexplained } = self;
         let explained = 1.0 - unexplained;
-        if *is_far && explained < far_explained_min {
+        if explained < explained_min {
             let words = "of the points near what the map holds are on it";
             return Some(format!(
-                "{explained:.3} {words}, so far from the guess at least {far_explained_min} have to be"
+                "{explained:.3} {words}, so far from the guess at least {explained_min} have to be"
             ));
         }
         if *blocked > blocked_max {
@@ -302,8 +294,9 @@ mod tests {
     use super::*;
     use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
 
-    fn plane(x: f32) -> Vec<Point> {
-        let steps = || (-20..20).map(|i| i as f32 * 0.05);
+    /// A square wall across the x axis, so far to each side of it.
+    fn plane(x: f32, half: i32) -> Vec<Point> {
+        let steps = || (-half * 20..half * 20).map(|i| i as f32 * 0.05 + 0.02);
         steps().flat_map(|y| steps().map(move |z| Point::new(x, y, z))).collect()
     }
 
@@ -311,51 +304,62 @@ mod tests {
     fn map_of(walls: &[f32]) -> MultiResolutionMap {
         let map = MultiResolutionMap::new(MapSettings::new(0.05, 4)).unwrap();
         let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
-        let points: Vec<Point> = walls.iter().flat_map(|x| plane(*x)).collect();
+        let points: Vec<Point> = walls.iter().flat_map(|x| plane(*x, 3)).collect();
         map.committer().insert_scan(ScanRecord::of_points(pose, &points, map.lattice()));
         map
     }
 
     fn against(map: &MultiResolutionMap, x: f32, map_from_sensor: &Pose) -> Contradiction {
         let settings = FreeSpaceSettings::default();
-        Contradiction::of(map, &plane(x), map_from_sensor, &settings, StopSignal::NEVER)
+        Contradiction::of(map, &plane(x, 1), map_from_sensor, &settings, StopSignal::NEVER)
     }
 
     #[test]
     fn what_is_where_it_was_is_not_contradicted() {
-        assert_eq!(against(&map_of(&[4.0]), 4.0, &Pose::identity()), Contradiction::default());
-        let nearer = against(&map_of(&[4.0]), 3.0, &Pose::translation(1.0, 0.0, 0.0));
+        assert_eq!(against(&map_of(&[4.02]), 4.02, &Pose::identity()), Contradiction::default());
+        let nearer = against(&map_of(&[4.02]), 3.02, &Pose::translation(1.0, 0.0, 0.0));
         assert_eq!(nearer, Contradiction::default());
     }
 
     #[test]
     fn a_wall_that_earlier_scans_looked_through_is_contradicted() {
-        let against = against(&map_of(&[4.0]), 2.0, &Pose::identity());
+        let against = against(&map_of(&[4.02]), 2.02, &Pose::identity());
         assert!(against.seen_through > 0.9 && against.blocked == 0.0, "{against:?}");
-        let reason = against.reason(&AlignmentSettings::default()).unwrap();
-        assert!(reason.contains("where earlier scans saw through, at most 0.2 may"), "{reason}");
+        let reason = against.reason(&FreeSpaceSettings::default()).unwrap();
+        assert!(reason.contains("where earlier scans saw through, at most 0.1 may"), "{reason}");
     }
 
     #[test]
     fn a_wall_in_new_space_is_not_contradicted() {
         // Behind what the map holds nobody has looked.
-        let behind = against(&map_of(&[4.0]), 2.0, &Pose::translation(5.0, 0.0, 0.0));
+        let behind = against(&map_of(&[4.02]), 2.02, &Pose::translation(5.0, 0.0, 0.0));
         assert_eq!(behind, Contradiction::default());
         // Nothing is behind it: who knows whether anybody looked there.
-        assert_eq!(against(&map_of(&[1.0]), 3.0, &Pose::translation(2.0, 0.0, 0.0)).seen_through, 0.0);
+        assert_eq!(against(&map_of(&[1.02]), 3.02, &Pose::translation(2.0, 0.0, 0.0)).seen_through, 0.0);
     }
 
     #[test]
     fn rays_through_what_the_map_holds_are_contradicted() {
-        let against = against(&map_of(&[2.0, 4.0]), 4.0, &Pose::identity());
+        let against = against(&map_of(&[2.02, 4.02]), 4.02, &Pose::identity());
         assert!(against.blocked > 0.9 && against.seen_through == 0.0, "{against:?}");
-        let reason = against.reason(&AlignmentSettings::default()).unwrap();
-        assert!(reason.contains("pass through what the map holds, at most 0.4 may"), "{reason}");
+        let reason = against.reason(&FreeSpaceSettings::default()).unwrap();
+        assert!(reason.contains("pass through what the map holds, at most 0.5 may"), "{reason}");
+    }
+
+    #[test]
+    fn points_beside_what_the_map_holds_are_not_explained() {
+        let against = |overlaps: &[f64]| Contradiction::default().with_overlaps(overlaps);
+        assert!((against(&[0.6, 0.7, 0.8, 0.9, 1.0]).unexplained - 1.0 / 3.0).abs() < 1e-12);
+        assert_eq!(against(&[0.3, 0.3, 0.3, 0.3, 1.0]).unexplained, 0.0, "new ground is no evidence");
+        assert_eq!(against(&[0.5]).unexplained, 0.0);
+        assert_eq!(against(&[0.0, 0.0]).unexplained, 0.0);
+        let reason = against(&[0.6, 0.7, 0.8, 0.9, 1.0]).reason(&FreeSpaceSettings::default()).unwrap();
+        assert!(reason.contains("0.667 of the points near what the map holds are on it"), "{reason}");
     }
 
     #[test]
     fn far_points_and_no_points_are_no_trouble() {
-        let map = map_of(&[4.0]);
+        let map = map_of(&[4.02]);
         let settings = FreeSpaceSettings::default();
         let of = |points: &[Point]| {
             Contradiction::of(&map, points, &Pose::identity(), &settings, StopSignal::NEVER)

@@ -12,6 +12,7 @@
 mod ascent;
 mod extent;
 mod free_space;
+mod gravity;
 mod information;
 pub mod localize;
 mod multi_start;
@@ -106,7 +107,7 @@ pub fn align_until(
     uncontradicted(found, map, &scan, &guess, settings)
 }
 
-/// The alignment, refused where free space contradicts it.
+/// The alignment, refused where it lies far from its guess and free space contradicts it.
 fn uncontradicted(
     found: Alignment,
     map: &MultiResolutionMap,
@@ -114,19 +115,16 @@ fn uncontradicted(
     guess: &Pose,
     settings: &AlignmentSettings,
 ) -> Alignment {
-    if found.verdict != Verdict::Accepted {
+    let (pose, free_space) = (&found.map_from_sensor, &settings.free_space);
+    let correction = pose_difference(guess, pose);
+    let is_asked = free_space.is_asked_at(correction, map.lattice().resolution_m(0));
+    if found.verdict != Verdict::Accepted || !is_asked {
         return found;
     }
-    let (points, pose) = (&scan.surface_sample, &found.map_from_sensor);
-    let correction = pose_difference(guess, pose);
-    let contradiction = Contradiction::of(map, points, pose, &settings.free_space, scan.stop).with_overlaps(
-        &found.level_overlaps,
-        correction,
-        map.lattice().resolution_m(0),
-        &settings.free_space,
-    );
+    let contradiction = Contradiction::of(map, &scan.surface_sample, pose, free_space, scan.stop);
+    let contradiction = contradiction.with_overlaps(&found.level_overlaps);
     let found = Alignment { contradiction, ..found };
-    match contradiction.reason(settings) {
+    match contradiction.reason(&settings.free_space) {
         Some(reason) => found.but(Verdict::Contradicted, reason),
         None => found,
     }

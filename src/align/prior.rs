@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector6};
 
 use super::AlignmentSettings;
-use super::localize::Gravity;
+use super::gravity::Gravity;
 use crate::geometry::Pose;
 
 /// What is known of a scan's pose beforehand: where it is thought to have been taken, how far off that may be, and which
@@ -146,7 +146,7 @@ impl PosePrior {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::localize::MAP_DOWN;
+    use crate::align::gravity::MAP_DOWN;
     use nalgebra::Vector3;
 
     fn diagonal(variances: [f64; 6]) -> [f64; 36] {

@@ -63,7 +63,7 @@ pub struct AlignmentSettings {
     /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
     /// where anything holds it. 8.
     pub refinement_max_correction: f64,
-    /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 32.
+    /// A pose farther from the guess than this many r_0 is ambiguous: nobody has looked what else lies as far. 48.
     pub max_correction: f64,
     /// The largest rotation of a correction, degrees. 45.
     pub max_correction_deg: f64,
@@ -140,7 +140,7 @@ impl Default for AlignmentSettings {
             overlap_min: 0.2,
             undetermined_std: 0.2,
             refinement_max_correction: 8.0,
-            max_correction: 32.0,
+            max_correction: 48.0,
             max_correction_deg: 45.0,
             gravity_error_max_deg: 5.0,
             covariance_deviations_max: 4.7,
@@ -224,8 +224,7 @@ impl AlignmentSettings {
             ("multi_start.ambiguous_fitness", self.multi_start.ambiguous_fitness),
             ("free_space.blocked_max", self.free_space.blocked_max),
             ("free_space.seen_through_max", self.free_space.seen_through_max),
-            ("free_space.far_seen_through_max", self.free_space.far_seen_through_max),
-            ("free_space.far_explained_min", self.free_space.far_explained_min),
+            ("free_space.explained_min", self.free_space.explained_min),
         ];
         match fractions.iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
             Some(&(name, value)) => Err(AlignmentSettingsError::NotAFraction(name, value)),

@@ -7,7 +7,7 @@ use super::resource_budget::{Reservation, ResourceBudget};
 use super::{Limits, MapVersion, PointCloud, Reason, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::Verdict;
 use crate::align::localize::{
-    Candidate, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
+    Candidate, GravityError, Localization, LocalizationError, LocalizationQuery, LocalizationQueryError,
     LocalizationSettings, Supervision, localize_supervised,
 };
 use crate::geometry::{Point, Pose};
@@ -202,6 +202,12 @@ pub(super) fn search_settings(grid_bytes_max: usize) -> LocalizationSettings {
 
 /// What a cell takes that waits to be divided, rounded up; while they move, those before them take half as much.
 const BYTES_PER_CELL: usize = 64;
+
+impl From<GravityError> for ServiceError {
+    fn from(error: GravityError) -> Self {
+        LocalizationQueryError::from(error).into()
+    }
+}
 
 impl From<LocalizationQueryError> for ServiceError {
     fn from(error: LocalizationQueryError) -> Self {

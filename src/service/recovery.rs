@@ -11,9 +11,8 @@ use super::hosted_map::HostedMap;
 use super::localization::{SEARCH_SHARE, search_settings};
 use super::resource_budget::{Reservation, ResourceBudget};
 use super::{Limits, MapService, ScanRequest, ServiceSettings};
-use crate::align::Method;
 use crate::align::localize::Supervision;
-use crate::mapping::{RecoverySettings, SearchTask};
+use crate::mapping::{RecoverySettings, ScanMapper, SearchTask};
 use crate::util::StopSignal;
 
 /// Whom a search's memory is lent to.
@@ -27,17 +26,16 @@ impl MapService {
             return;
         }
         let Some(spare) = inner.localization.spare_thread() else { return };
-        let method = request.method;
-        let mapper = map.mapper(method, true, &inner.settings);
-        let Some(task) = mapper.begin_search(&request.robot, request.timestamp_ns, request.gravity) else {
-            return;
-        };
+        let (robot, timestamp_ns, gravity, method) =
+            (request.robot.clone(), request.timestamp_ns, request.gravity, request.method);
         let pool = Arc::clone(&self.inner);
         tokio::spawn(async move {
             let search = move |_: StopSignal<'_>| {
-                let is_wanted = || inner.localization.is_wanted();
-                let stop = StopSignal::when(&is_wanted);
-                map.search_for_robot(&task, method, &inner.settings, &inner.budget, stop);
+                let (settings, is_wanted) = (&inner.settings, || inner.localization.is_wanted());
+                let mapper = map.mapper(method, true, settings);
+                if let Some(task) = mapper.begin_search(&robot, timestamp_ns, gravity) {
+                    map.search(&mapper, &task, settings, &inner.budget, StopSignal::when(&is_wanted));
+                }
             };
             // Nobody waits for the answer. What came of it is noted with the robot.
             drop(pool.localization.run_on_spare(spare, search).await);
@@ -47,10 +45,10 @@ impl MapService {
 
 impl HostedMap {
     /// Searches for a lost robot until the time is up or `stop` says so.
-    fn search_for_robot(
+    fn search(
         &self,
+        mapper: &ScanMapper<'_>,
         task: &SearchTask,
-        method: Option<Method>,
         settings: &ServiceSettings,
         budget: &ResourceBudget,
         stop: StopSignal<'_>,
@@ -66,7 +64,7 @@ impl HostedMap {
                 more.map(|reservation| lent.push(reservation)).is_ok()
             },
         };
-        let outcome = self.mapper(method, true, settings).search(task, supervision);
+        let outcome = mapper.search(task, supervision);
         let map = self.name.as_str();
         match outcome {
             Ok(()) => tracing::debug!(map, elapsed = ?start.elapsed(), "searched for a lost robot"),

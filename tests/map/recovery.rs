@@ -108,8 +108,8 @@ fn a_place_that_the_next_scan_does_not_confirm_is_given_up() {
 fn a_robot_in_one_of_two_equal_rooms_is_found_in_neither() {
     let apart_m = 12.0;
     let viewpoints = [at(2.0, 2.5, 0.0), at(5.0, 2.5, 0.0)];
-    let twins = viewpoints.map(|pose| Pose::translation(apart_m, 0.0, 0.0) * pose);
-    let mut rooms = World::mapped(Scene::twin_rooms(5, apart_m), &[viewpoints, twins].concat());
+    let there = viewpoints.map(|pose| Pose::translation(apart_m, 0.0, 0.0) * pose);
+    let mut rooms = World::mapped(Scene::equal_rooms(5, apart_m), &[viewpoints, there].concat());
     let start = at(2.2, 2.4, 5.0);
     assert_at(&rooms.scan(&start, Guess::Pose(at(2.0, 2.5, 0.0))), &start);
     for k in 0..6 {

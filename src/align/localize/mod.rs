@@ -29,8 +29,9 @@ mod supervision;
 mod verdict;
 mod visibility;
 
+pub use super::gravity::{Gravity, GravityError, MAP_DOWN};
 pub use answer::{Candidate, Localization, LocalizationError, SearchProgress};
-pub use query::{Gravity, LocalizationQuery, LocalizationQueryError, MAP_DOWN, SearchBox};
+pub use query::{LocalizationQuery, LocalizationQueryError, SearchBox};
 pub use settings::LocalizationSettings;
 pub use supervision::Supervision;
 

@@ -1,6 +1,6 @@
 //! Queries of global localization: what is known beforehand of where a scan was taken.
 
-use nalgebra::{UnitVector3, Vector3};
+use crate::align::gravity::{Gravity, GravityError};
 
 /// What to search for, and where.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -15,16 +15,6 @@ pub struct LocalizationQuery {
     pub seed: u64,
 }
 
-/// Direction of gravity in the sensor frame and in the map frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gravity {
-    pub(in crate::align) in_sensor: UnitVector3<f64>,
-    pub(in crate::align) in_map: UnitVector3<f64>,
-}
-
-/// Down in the frame of a map whose z axis points up.
-pub const MAP_DOWN: [f64; 3] = [0.0, 0.0, -1.0];
-
 /// A box in the map frame, meters; its sides may be infinite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
@@ -35,42 +25,12 @@ pub struct SearchBox {
 /// Why a query is not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LocalizationQueryError {
-    /// A direction that is zero or not finite; the payload is the field and its value.
-    #[error("{0} must be a finite direction other than zero, got {1:?}")]
-    Direction(&'static str, [f64; 3]),
+    /// A direction that is none.
+    #[error(transparent)]
+    Gravity(#[from] GravityError),
     /// A corner with NaN, or corners in the wrong order.
     #[error("search_box.min_m must not exceed search_box.max_m in any axis, got {0:?} and {1:?}")]
     Box([f64; 3], [f64; 3]),
-}
-
-impl Gravity {
-    /// Gravity as the direction in which things fall, of any length, in the sensor frame and in the map frame. An
-    /// accelerometer at rest reads the opposite direction.
-    ///
-    /// # Errors
-    /// When one is not finite, or zero.
-    pub fn new(in_sensor: [f64; 3], in_map: [f64; 3]) -> Result<Self, LocalizationQueryError> {
-        let direction = |name, vector: [f64; 3]| {
-            let length = Vector3::from(vector).norm();
-            let usable = length.is_finite() && length > 0.0;
-            let unit = usable.then(|| UnitVector3::new_normalize(Vector3::from(vector)));
-            unit.ok_or(LocalizationQueryError::Direction(name, vector))
-        };
-        Ok(Self {
-            in_sensor: direction("gravity.in_sensor", in_sensor)?,
-            in_map: direction("gravity.in_map", in_map)?,
-        })
-    }
-
-    /// Direction of gravity in the sensor frame, a unit vector.
-    pub fn in_sensor(&self) -> [f64; 3] {
-        self.in_sensor.into_inner().into()
-    }
-
-    /// Direction of gravity in the map frame, a unit vector.
-    pub fn in_map(&self) -> [f64; 3] {
-        self.in_map.into_inner().into()
-    }
 }
 
 impl SearchBox {

@@ -10,7 +10,7 @@ use crate::map::RobotName;
 use crate::sync::{Mutex, Rank};
 
 /// Lost robots that are remembered, at most; beyond, the one goes whose last scan came longest ago.
-pub const LOST_ROBOTS_MAX: usize = 16;
+pub const LOST_ROBOTS_MAX: usize = 64;
 
 /// The robots whose last scan was refused, in memory.
 #[derive(Debug)]
@@ -79,7 +79,7 @@ pub(super) struct RefusedScan<'a> {
     /// Motion of the sensor since the refused scan before it: before_from_now. None where there is none, or it is not
     /// known.
     pub(super) motion: Option<Pose>,
-    /// Where it was taken if `motion` does not tell: map_from_sensor.
+    /// Where it was taken if it is the first one: map_from_sensor.
     pub(super) probable_pose: Pose,
     /// The place of a search was looked at, and the scan is not there.
     pub(super) is_not_in_place: bool,
@@ -109,7 +109,7 @@ impl LostRobots {
         if let Some(lost) = all.robots.get_mut(robot) {
             let moved = |pose: Pose| motion.map(|motion| pose * motion);
             let place = lost.robot.place.filter(|_| !scan.is_not_in_place).and_then(moved);
-            let chained = moved(lost.robot.chained).unwrap_or(probable_pose);
+            let chained = moved(lost.robot.chained).unwrap_or(lost.robot.chained);
             lost.robot = LostRobot { points, chained, place };
             lost.noted_at = Instant::now();
             if let Some(search) = &mut lost.under_way {

@@ -8,7 +8,7 @@
 //! where the motion between the two leads, which is known from aligning one to the other.
 //!
 //! A robot may be found in the wrong one of two places that look the same only if the other lies beyond where it can
-//! be: see [`RecoverySettings::reach_m`].
+//! be: see [`RecoverySettings::distance_min_m`].
 
 mod lost_robots;
 mod motion;
@@ -41,7 +41,7 @@ pub struct RecoverySettings {
     /// How a robot is searched for of which nothing is known, and what a place has to fulfill.
     pub localization: LocalizationSettings,
     /// How far from its last good pose a robot is looked for at least, meters. 20.
-    pub reach_m: f64,
+    pub distance_min_m: f64,
     /// How fast the distance grows in which it is looked for, with the time since its last good pose, meters a second.
     /// 5. Where scans have no timestamps, the whole map is searched.
     pub speed_max_m_per_s: f64,
@@ -59,7 +59,7 @@ impl Default for RecoverySettings {
             agreement: 6.0,
             agreement_deg: 5.0,
             localization: LocalizationSettings::default(),
-            reach_m: 20.0,
+            distance_min_m: 20.0,
             speed_max_m_per_s: 5.0,
             keeps_tilt: false,
             search_interval: Duration::ZERO,
@@ -234,7 +234,8 @@ impl<'a> ScanMapper<'a> {
         let resolved = |guess: Guess| {
             guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false).ok()
         };
-        let chained = before.zip(motion).map(|(before, motion)| before.chained * motion);
+        // A scan that does not align to the one before it was taken near that all the same.
+        let chained = before.map(|before| before.chained * motion.copied().unwrap_or_else(Pose::identity));
         let all = [
             (Recovered::ChainedScans, chained),
             (Recovered::LastPose, resolved(Guess::Last)),

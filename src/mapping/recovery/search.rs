@@ -88,9 +88,9 @@ impl ScanMapper<'_> {
         let settings = recovery.settings;
         let elapsed_ns = last_ns.zip(timestamp_ns).and_then(|(last, now)| now.checked_sub(last));
         let search_box = elapsed_ns.filter(|ns| *ns > 0).and_then(|ns| {
-            let reach_m = settings.reach_m + settings.speed_max_m_per_s * ns as f64 * 1e-9;
+            let distance_m = settings.distance_min_m + settings.speed_max_m_per_s * ns as f64 * 1e-9;
             let center = translation_m(&last);
-            SearchBox::new(center.map(|c| c - reach_m), center.map(|c| c + reach_m)).ok()
+            SearchBox::new(center.map(|c| c - distance_m), center.map(|c| c + distance_m)).ok()
         });
         let gravity = (settings.keeps_tilt && number % 2 == 1).then(|| down_of(&last)).flatten();
         LocalizationQuery { gravity, search_box, candidates: CANDIDATES, seed: number }

@@ -1,12 +1,12 @@
 //! A furnished floor of a building, made of analytic shapes, that simulated sensors look at.
 
 mod building;
+mod equal_rooms;
 mod furnish;
 mod furniture;
 mod hall;
 mod ray;
 mod shape;
-mod twin_rooms;
 
 use nalgebra::{Point3, Vector3};
 
@@ -39,8 +39,8 @@ impl Scene {
 
     /// Two rooms of 7 x 5 x 2.7 m without doors, the first with a corner at the origin, the second `apart_m` from it along
     /// x, with the same cupboards drawn from `seed`: a scan of one is a scan of the other.
-    pub fn twin_rooms(seed: u64, apart_m: f64) -> Self {
-        Self { objects: twin_rooms::twin_rooms(seed, apart_m) }
+    pub fn equal_rooms(seed: u64, apart_m: f64) -> Self {
+        Self { objects: equal_rooms::equal_rooms(seed, apart_m) }
     }
 
     /// Distance from `origin` (map frame, meters) to the first surface along `direction`, none beyond

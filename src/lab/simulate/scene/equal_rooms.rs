@@ -12,10 +12,10 @@ const WALL_M: f64 = 0.2;
 const CUPBOARDS: u32 = 5;
 
 /// The objects of both rooms; the second is the first, moved by `apart_m` along x.
-pub(super) fn twin_rooms(seed: u64, apart_m: f64) -> Vec<Object> {
+pub(super) fn equal_rooms(seed: u64, apart_m: f64) -> Vec<Object> {
     let room = room(seed);
-    let twin: Vec<Object> = room.iter().map(|object| object.placed(apart_m, 0.0, 0.0)).collect();
-    [room, twin].concat()
+    let other: Vec<Object> = room.iter().map(|object| object.placed(apart_m, 0.0, 0.0)).collect();
+    [room, other].concat()
 }
 
 /// A room between (0, 0) and (7, 5) with cupboards along the walls, none like another.
