@@ -4,16 +4,15 @@ use std::time::{Duration, Instant};
 
 use mrol::config::RobotConfig;
 use mrol::geometry::{Pose, pose_difference};
-use mrol::lab::simulate::{Scene, SpinningLidar};
+use mrol::lab::simulate::{Scene, SpinningLidar, tours};
 use mrol::wire::pb;
-use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use crate::support::daemon::{Daemon, json_of, points_pb};
 
-/// A robot that is carried through a hall.
+/// A robot that is carried through a building.
 struct Carried<'a> {
     daemon: &'a Daemon,
     robot: &'static str,
@@ -21,8 +20,9 @@ struct Carried<'a> {
     recover: Option<bool>,
 }
 
-fn at(x: f64, y: f64, yaw_deg: f64) -> Pose {
-    Pose::new(Vector3::new(x, y, 1.0), Vector3::new(0.0, 0.0, yaw_deg.to_radians()))
+/// A pose of a tour through the building.
+fn pose(k: usize) -> Pose {
+    tours(120)[0].poses[k]
 }
 
 impl<'a> Carried<'a> {
@@ -34,7 +34,7 @@ impl<'a> Carried<'a> {
     async fn scan(&mut self, truth: &Pose, at_truth: bool) -> pb::InsertScanResponse {
         self.scans += 1;
         let mut random = ChaCha8Rng::seed_from_u64(self.scans);
-        let points = SpinningLidar::default().scan(&Scene::hall(3), truth, &mut random);
+        let points = SpinningLidar::default().scan(&Scene::furnished(7), truth, &mut random);
         let points: Vec<[f32; 3]> = points.iter().map(|point| point.xyz()).collect();
         let scan = pb::Scan { robot: self.robot.into(), points: points_pb(&points), ..Default::default() };
         let kind = pb::guess::Kind::MapFromSensor(truth.into());
@@ -49,9 +49,9 @@ impl<'a> Carried<'a> {
         self.daemon.mapping().await.insert_scan(request).await.unwrap().into_inner()
     }
 
-    /// Carries it to the other end of the hall after a scan at this one.
+    /// Carries it into another room after a scan in this one.
     async fn carry(&mut self) {
-        assert!(self.scan(&at(4.2, 5.2, 5.0), true).await.accepted);
+        assert!(self.scan(&pose(3), true).await.accepted);
         for k in 0..2 {
             let refused = self.scan(&there(k), false).await;
             assert!(!refused.accepted && refused.recovered == 0);
@@ -60,8 +60,8 @@ impl<'a> Carried<'a> {
 }
 
 /// Where the robot is carried to: it drives on there.
-fn there(k: u32) -> Pose {
-    at(15.5 - 0.1 * f64::from(k % 10), 7.5, 130.0)
+fn there(k: usize) -> Pose {
+    pose(63 + k % 50)
 }
 
 async fn mapped(recover: bool) -> Daemon {
@@ -76,7 +76,7 @@ async fn mapped(recover: bool) -> Daemon {
     let map = json!({"resolution_m": 0.1, "levels": 5});
     assert!(daemon.put("/v1/maps/a", map).await.status().is_success());
     let mut surveyor = Carried::new(&daemon, "surveyor");
-    for viewpoint in [at(4.0, 5.0, 0.0), at(8.0, 8.0, 0.0), at(12.0, 5.5, 0.0), at(16.0, 8.0, 0.0)] {
+    for viewpoint in (0..120).step_by(10).map(pose) {
         assert!(surveyor.scan(&viewpoint, true).await.accepted);
     }
     daemon

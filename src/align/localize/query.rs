@@ -83,6 +83,7 @@ impl SearchBox {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::align::gravity::MAP_DOWN;
 
     #[test]
     fn a_direction_may_have_any_length_but_none() {
