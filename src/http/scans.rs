@@ -230,7 +230,7 @@ fn guess_of(
 }
 
 fn covariance_of(rows: &[f64]) -> Result<PoseCovariance, ServiceError> {
-    Ok(PoseCovariance::new(rows).in_field("guess")?)
+    PoseCovariance::new(rows).in_field("guess")
 }
 
 fn yes() -> bool {

@@ -161,7 +161,7 @@ fn gravity_from(in_sensor: pb::Vector3) -> Result<Gravity, ServiceError> {
 /// The covariance of a guess; none where there are no numbers.
 fn covariance_from(guess: Option<&pb::Guess>) -> Result<Option<PoseCovariance>, ServiceError> {
     let rows = guess.map(|guess| &guess.covariance[..]).filter(|rows| !rows.is_empty());
-    Ok(rows.map(PoseCovariance::new).transpose().in_field("guess")?)
+    rows.map(PoseCovariance::new).transpose().in_field("guess")
 }
 
 impl From<ScanRequest> for pb::Scan {

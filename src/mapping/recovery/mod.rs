@@ -138,10 +138,10 @@ impl<'a> ScanMapper<'a> {
         let motion = before.as_ref().and_then(|before| {
             motion_between(&before.points, &kept, self.map.settings(), &self.settings.alignment, stop)
         });
-        let found = self.from_place(scan, before.as_ref(), motion.as_ref(), &points, stop);
+        let found = self.try_place(scan, before.as_ref(), motion.as_ref(), &points, stop);
         let found = match found {
             Some(found) => Ok(found),
-            None => self.from_other_guesses(scan, &located, before.as_ref(), motion.as_ref(), &points, stop),
+            None => self.try_other_guesses(scan, &located, before.as_ref(), motion.as_ref(), &points, stop),
         };
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
@@ -171,7 +171,7 @@ impl<'a> ScanMapper<'a> {
 
     /// Aligns the scan from where a search saw its robot, moved on since by `motion`: accepted where it is there, and fits
     /// as well as a search asks.
-    fn from_place(
+    fn try_place(
         &self,
         scan: &Scan<'_>,
         before: Option<&LostRobot>,
@@ -190,7 +190,7 @@ impl<'a> ScanMapper<'a> {
     ///
     /// # Errors
     /// When it fits from none of them; with a reason where it fits from several, at different places.
-    fn from_other_guesses(
+    fn try_other_guesses(
         &self,
         scan: &Scan<'_>,
         located: &LocatedScan,
