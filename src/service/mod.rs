@@ -226,6 +226,11 @@ impl MapService {
                 self.inner.budget.check_to_grow()?;
             }
             let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
+            // A scan of a lost robot most probably fits nowhere, which takes ten times as long to find out.
+            let _long_turn = match map.has_lost(&scan.robot) && !scan.at_guess {
+                true => Some(self.inner.mapping.long_turn().await?),
+                false => None,
+            };
             let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
             let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
             let submitted = self.submit_and_wait(&self.inner.mapping, None, {

@@ -30,8 +30,8 @@ pub(super) struct Pool {
     free: Arc<Semaphore>,
     /// One permit for each caller that waits for the turn of its map or robot.
     turns: Semaphore,
-    /// One permit for each thread that may do what nobody waits for: half of them.
-    spare: Arc<Semaphore>,
+    /// One permit for each thread that may do what takes long, and others shall not wait for: half of them.
+    half: Arc<Semaphore>,
     jobs_waiting_max: usize,
     counts: Arc<Counts>,
 }
@@ -80,7 +80,7 @@ impl Pool {
             places: Semaphore::new(free + jobs_waiting_max).into(),
             free: Semaphore::new(free).into(),
             turns: Semaphore::new(jobs_waiting_max),
-            spare: Semaphore::new(free.div_ceil(2)).into(),
+            half: Semaphore::new((free / 2).max(1)).into(),
             jobs_waiting_max,
             counts: Arc::default(),
         })
@@ -99,6 +99,16 @@ impl Pool {
         }
         let _place = self.turns.try_acquire().map_err(|_| self.full())?;
         Ok(turn.await)
+    }
+
+    /// Waits for its turn to take a thread for long, which half of them may be taken for: the others are left to those who
+    /// are done soon. The turn lasts until what is returned is dropped.
+    ///
+    /// # Errors
+    /// As for [`Pool::in_turn`].
+    pub(super) async fn long_turn(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
+        let turn = self.in_turn(Arc::clone(&self.half).acquire_owned()).await?;
+        turn.map_err(|_| failed())
     }
 
     fn full(&self) -> ServiceError {
@@ -165,7 +175,7 @@ impl Pool {
         if self.is_wanted() {
             return None;
         }
-        let spare = Arc::clone(&self.spare).try_acquire_owned().ok()?;
+        let spare = Arc::clone(&self.half).try_acquire_owned().ok()?;
         let place = Arc::clone(&self.places).try_acquire_owned().ok()?;
         let thread = Arc::clone(&self.free).try_acquire_owned().ok()?;
         let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
@@ -309,6 +319,25 @@ mod tests {
         waiting.await.unwrap().unwrap();
         drop(pool.in_turn(lock.lock_owned()).await.unwrap());
         assert_eq!(pool.turns.available_permits(), 1);
+    }
+
+    #[tokio::test]
+    async fn what_takes_long_leaves_half_of_the_threads() {
+        let pool = Pool::new("test", 4, 1).unwrap();
+        let (first, second) = (pool.long_turn().await.unwrap(), pool.long_turn().await.unwrap());
+        let mut third = pin!(pool.long_turn());
+        tokio::select! {
+            biased;
+            _ = &mut third => panic!("two of four threads are taken for long"),
+            () = std::future::ready(()) => {}
+        }
+        let refused = pool.long_turn().await.unwrap_err();
+        assert_eq!(refused.reason, Reason::Overloaded);
+        assert_eq!(pool.run(|_| 1).await.unwrap(), 1);
+        drop(first);
+        drop((third.await.unwrap(), second));
+        let single = Pool::new("test", 1, 1).unwrap();
+        drop(single.long_turn().await.unwrap());
     }
 
     #[tokio::test]
