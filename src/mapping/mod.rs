@@ -216,9 +216,10 @@ impl<'a> ScanMapper<'a> {
 
     /// Finds where a scan was taken; changes nothing.
     ///
-    /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other one is aligned from its guess, or only judged
-    /// there where the caller wants it at its guess. Points with times are deskewed: first by the motion that the guess
-    /// tells, then, once the alignment has found the pose, by the motion to that, and aligned again.
+    /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other
+    /// one is aligned from its guess, or only judged there where the caller wants it at its guess. Points with times are
+    /// deskewed: first by the motion that the guess tells, then, once the alignment has found the pose, by the motion to
+    /// that, and aligned again.
     ///
     /// # Errors
     /// The guess needs a pose that is not there, or `stop` said so.

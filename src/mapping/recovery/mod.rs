@@ -276,7 +276,8 @@ impl<'a> ScanMapper<'a> {
         stop: StopSignal<'_>,
     ) -> Option<Alignment> {
         let all = self.settings.alignment;
-        let first = AlignmentSettings { multi_start: MultiStartSettings { ascents: 0, ..all.multi_start }, ..all };
+        let first =
+            AlignmentSettings { multi_start: MultiStartSettings { ascents: 0, ..all.multi_start }, ..all };
         let fits = |settings| {
             let alignment = self.align_again(points, guess, gravity, settings, stop);
             (alignment.verdict == Verdict::Accepted).then_some(alignment)

@@ -18,9 +18,8 @@ const CANDIDATES: usize = 2;
 
 impl ScanMapper<'_> {
     /// What to search for after a scan of `robot`, taken at `timestamp_ns` and telling the direction of `gravity`, was
-    /// refused; none where the robot is not lost,
-    /// a place that a search found is to be confirmed first, or a search is under way or was not long ago. Whoever takes it
-    /// has to [search](Self::search).
+    /// refused. None where the robot is not lost, a place that a search found is to be confirmed first, or a search is
+    /// under way or was not long ago. Whoever takes it has to [search](Self::search).
     pub fn begin_search(
         &self,
         robot: &RobotName,
