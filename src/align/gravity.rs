@@ -25,9 +25,11 @@ impl Gravity {
     /// When one is not finite, or zero.
     pub fn new(in_sensor: [f64; 3], in_map: [f64; 3]) -> Result<Self, GravityError> {
         let direction = |name, vector: [f64; 3]| {
-            let length = Vector3::from(vector).norm();
-            let usable = length.is_finite() && length > 0.0;
-            let unit = usable.then(|| UnitVector3::new_normalize(Vector3::from(vector)));
+            let vector_of_any_length = Vector3::from(vector);
+            // The square of its length may be no number of this kind.
+            let largest = vector_of_any_length.amax();
+            let usable = vector_of_any_length.iter().all(|c| c.is_finite()) && largest > 0.0;
+            let unit = usable.then(|| UnitVector3::new_normalize(vector_of_any_length / largest));
             unit.ok_or(GravityError(name, vector))
         };
         Ok(Self {
@@ -44,5 +46,27 @@ impl Gravity {
     /// Direction of gravity in the map frame, a unit vector.
     pub fn in_map(&self) -> [f64; 3] {
         self.in_map.into_inner().into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_may_have_any_length_but_none() {
+        let gravity = Gravity::new([0.0, 3.0, 4.0], MAP_DOWN).unwrap();
+        assert_eq!(gravity.in_sensor(), [0.0, 0.6, 0.8]);
+        for length in [1e-320, 1e-162, 1e155, f64::MAX] {
+            let [x, y, z] = Gravity::new([0.0, 0.0, -length], MAP_DOWN).unwrap().in_sensor();
+            assert_eq!([x, y, z], [0.0, 0.0, -1.0]);
+        }
+        let diagonal = Gravity::new([f64::MAX, 0.0, -f64::MAX], MAP_DOWN).unwrap().in_sensor();
+        assert!((diagonal[0] - 0.5f64.sqrt()).abs() < 1e-12, "{diagonal:?}");
+        for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
+            let error = Gravity::new(bad, MAP_DOWN).unwrap_err().to_string();
+            assert!(error.contains("gravity.in_sensor"), "{error}");
+            assert!(Gravity::new(MAP_DOWN, bad).unwrap_err().to_string().contains("gravity.in_map"));
+        }
     }
 }

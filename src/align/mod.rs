@@ -96,12 +96,10 @@ pub fn align_until(
     let guess = prior.leveled_guess();
     let ascent = climb(map, &scan, guess, map.settings().levels - 1, settings);
     let found = finish(map, &scan, ascent, settings);
-    let found = match found.is_doubtful(&guess, map, settings) {
-        true if !stop.is_stopped() => {
-            let prior = PosePrior { guess, ..*prior };
-            multi_start::align(map, &scan, &prior, found, settings)
-        }
-        _ => found,
+    let found = match found.is_doubtful(&guess, map, settings) && !stop.is_stopped() {
+        true if settings.multi_start.ascents == 0 => Alignment { wants_more_starts: true, ..found },
+        true => multi_start::align(map, &scan, &PosePrior { guess, ..*prior }, found, settings),
+        false => found,
     };
     let found = found.within_max_correction(&guess, map, settings).within_prior(prior, map, settings);
     uncontradicted(found, map, &scan, &guess, settings)

@@ -118,6 +118,12 @@ impl PosePrior {
         Pose::from_parts(self.guess.translation, turn * self.guess.rotation)
     }
 
+    /// True of a pose (map_from_sensor) that contradicts what is known of it beforehand. Voxels of the finest level have
+    /// sides of `resolution_m`.
+    pub fn rules_out(&self, pose: &Pose, resolution_m: f64, settings: &AlignmentSettings) -> bool {
+        self.against(pose, resolution_m, settings).is_some()
+    }
+
     /// Why a pose (map_from_sensor) contradicts what is known of it beforehand; none where it does not. Voxels of the
     /// finest level have sides of `resolution_m`.
     pub(super) fn against(
@@ -129,7 +135,8 @@ impl PosePrior {
         let most = settings.covariance_deviations_max;
         if let Some(covariance) = self.covariance {
             let found_rad = FOUND_DEG.to_radians();
-            let deviations = covariance.deviations(&self.guess, pose, resolution_m, found_rad);
+            // What gravity says of the guess does not count as a deviation from it.
+            let deviations = covariance.deviations(&self.leveled_guess(), pose, resolution_m, found_rad);
             if deviations > most {
                 let words = "standard deviations of its covariance from the guess";
                 return Some(format!("it is {deviations:.1} {words}, at most {most} are accepted"));

@@ -65,6 +65,8 @@ pub struct Alignment {
     /// What free space says against the pose; nothing where it was not asked, because the pose is not believed anyway or
     /// the caller knows it.
     pub contradiction: Contradiction,
+    /// Other poses should have been looked for, and were not: [`MultiStartSettings::ascents`](super::MultiStartSettings) is 0.
+    pub wants_more_starts: bool,
     /// Number of steps that moved the pose, over all stages.
     pub iterations: u32,
     /// Number of look-ups, one for each point and candidate pose. Times the false positive rate it is the expected
@@ -88,9 +90,6 @@ impl Alignment {
     ) -> bool {
         let (resolution_m, multi_start) = (map.lattice().resolution_m(0), &settings.multi_start);
         let (meters, degrees) = pose_difference(guess, &self.map_from_sensor);
-        if multi_start.ascents == 0 {
-            return false;
-        }
         self.fitness < multi_start.fitness_below
             || self.refined_by_m > settings.refinement_max_correction * resolution_m
             || self.information.directions()[0].std_m > multi_start.std_above * resolution_m
@@ -187,6 +186,7 @@ impl Fit {
             undetermined,
             refined_by_m: self.refined_by_m,
             contradiction: Contradiction::default(),
+            wants_more_starts: false,
             iterations: self.iterations,
             lookups: self.lookups,
         }
@@ -207,6 +207,7 @@ impl Alignment {
             undetermined: Vec::new(),
             refined_by_m: 0.0,
             contradiction: Contradiction::default(),
+            wants_more_starts: false,
             iterations: 0,
             lookups: 0,
         }

@@ -214,6 +214,15 @@ impl<'a> ScanMapper<'a> {
         Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
     }
 
+    /// This mapper, which looks from one start alone, for no lost robot, and for some 30 ms: the answer holds where it is
+    /// accepted and [wants no more starts](Alignment::wants_more_starts).
+    #[must_use]
+    pub fn from_one_start(self) -> Self {
+        let mut settings = self.settings;
+        settings.alignment.multi_start.ascents = 0;
+        Self { settings, recovery: None, ..self }
+    }
+
     /// Finds where a scan was taken; changes nothing.
     ///
     /// The first scan of an empty map is taken at its guess, upright where it tells the direction of gravity. Every other
@@ -239,7 +248,9 @@ impl<'a> ScanMapper<'a> {
         if scan.times_s.is_some() && !scan.at_guess && alignment.verdict == Verdict::Accepted {
             let found = self.velocity(scan, &alignment.map_from_sensor);
             if found.is_some() && found != velocity {
+                let wants_more_starts = alignment.wants_more_starts;
                 alignment = self.align(scan, found.as_ref(), &alignment.map_from_sensor, stop);
+                alignment.wants_more_starts |= wants_more_starts;
                 velocity = found;
             }
         }

@@ -100,11 +100,6 @@ impl Sightings {
         standing.filter(|standing| standing.after == last.revision)
     }
 
-    /// True of a robot whose last scan did not fit.
-    pub fn is_lost(&self, robot: &RobotName) -> bool {
-        self.0.lock().get(robot).is_some_and(|entry| entry.last.verdict != Verdict::Accepted)
-    }
-
     /// The last sighting of each robot, by name.
     pub fn to_vec(&self) -> Vec<Sighting> {
         let mut all: Vec<_> = self.0.lock().values().map(|entry| entry.last.clone()).collect();
@@ -145,13 +140,11 @@ mod tests {
         let sightings = Sightings::default();
         assert_eq!(sightings.standing_since(&kept(3)), None);
         seen(&sightings, &robot, Verdict::Accepted);
-        assert!(!sightings.is_lost(&robot));
         sightings.note_standing(&kept(3), Pose::translation(0.01, 0.0, 0.0), Some(7));
         // A scan in between that does not fit tells nothing of where it stands.
         seen(&sightings, &robot, Verdict::LowOverlap);
         assert_eq!(sightings.standing_since(&kept(3)).unwrap().timestamp_ns, Some(7));
         assert_eq!(sightings.to_vec()[0].verdict, Verdict::LowOverlap);
-        assert!(sightings.is_lost(&robot));
         assert_eq!(sightings.standing_since(&kept(4)), None);
         // The scan after it was undone: what was seen since the one before it is not known.
         assert_eq!(sightings.standing_since(&kept(2)), None);

@@ -92,7 +92,7 @@ impl Catalog {
             .collect()
     }
 
-    fn all(&self) -> Vec<Arc<HostedMap>> {
+    pub(super) fn all(&self) -> Vec<Arc<HostedMap>> {
         self.maps.read().open.values().cloned().collect()
     }
 

@@ -187,11 +187,6 @@ impl HostedMap {
         turn.lock_owned().await
     }
 
-    /// True of a robot whose last scan did not fit.
-    pub(super) fn has_lost(&self, robot: &RobotName) -> bool {
-        self.sightings.is_lost(robot)
-    }
-
     /// Waits until `revision` is there. Who waits hears of the map's end at once.
     pub(super) async fn wait_for_revision(
         &self,

@@ -17,38 +17,60 @@ use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
 use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
 use crate::util::StopSignal;
 
+/// How far a scan is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// By one ascent, from its guess: some 30 ms.
+    OneStart,
+    /// From other starts too, and where lost robots may be: up to seconds.
+    Whole,
+}
+
 impl HostedMap {
-    /// Aligns the scan, and where it fits sets it on its way into the map.
+    /// Aligns the scan, and where it fits sets it on its way into the map. Its answer is none where one start is not
+    /// enough.
     pub(super) fn submit_scan(
         self: &Arc<Self>,
         request: &ScanRequest,
         turn: Turn,
+        effort: Effort,
         settings: &ServiceSettings,
         budget: &ResourceBudget,
         stop: StopSignal<'_>,
-    ) -> Result<Step<ScanAnswer>, ServiceError> {
+    ) -> Result<Step<Option<ScanAnswer>>, ServiceError> {
         self.check_writable()?;
         let scan = FilteredScan::of(request, settings)?;
         if let Some(answer) = self.replay(&scan)? {
-            return Ok(Step::Answered(answer));
+            return Ok(Step::Answered(Some(answer)));
         }
         self.check_voxels(settings)?;
         self.check_robots(&request.robot, &settings.limits)?;
         budget.check_to_grow()?;
-        let mapper = self.mapper(request.method, settings.recovers(request), settings);
+        let recovers = settings.recovers(request);
+        let mapper = self.mapper(request.method, recovers, settings);
+        let mapper = if effort == Effort::Whole { mapper } else { mapper.from_one_start() };
         let located = self.locate(&scan, &mapper, stop)?;
+        let takes_long = located.alignment.wants_more_starts || recovers && !located.is_accepted();
+        if takes_long && effort == Effort::OneStart {
+            return Ok(Step::Answered(None));
+        }
         let recovered = mapper.recover(&scan.to_map(), located, stop);
         check_not_stopped(stop)?;
         let located = mapper.told(&scan.to_map(), recovered?);
+        if located.is_accepted() || request.at_guess || request.force {
+            // Where nobody asks for it any more, too.
+            self.lost.found(&request.robot);
+        }
         self.sightings.note(&scan.to_map(), &located);
         let answer = self.answer(&scan, &located);
         if !answer.accepted && !request.force {
-            return Ok(Step::Answered(answer));
+            return Ok(Step::Answered(Some(answer)));
         }
         let scan_record = mapper.record(&scan.to_map(), &located)?;
         check_not_stopped(stop)?;
         if mapper.note_stationary(&scan.to_map(), &scan_record) {
-            return Ok(Step::Answered(ScanAnswer { accepted: true, stationary: true, ..answer }));
+            let answer = ScanAnswer { accepted: true, stationary: true, ..answer };
+            return Ok(Step::Answered(Some(answer)));
         }
         let ScanRecord { voxels, moments, .. } = &scan_record;
         let moments = moments.as_slice().len();
@@ -60,7 +82,7 @@ impl HostedMap {
         let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let answer = ScanAnswer { points_skipped, ..answer };
-        Ok(Step::Submitted(outcome, Box::new(move |committed| map.committed(answer, committed))))
+        Ok(Step::Submitted(outcome, Box::new(move |committed| Some(map.committed(answer, committed)))))
     }
 
     /// What to say of a scan that was committed.

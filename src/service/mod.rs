@@ -67,6 +67,7 @@ use crate::util::StopSignal;
 use catalog::Catalog;
 use commit_queue::{Refusal, Step};
 use hosted_map::HostedMap;
+use mapping::Effort;
 use pool::{FreeThread, Pool};
 use resource_budget::ResourceBudget;
 use time_limit::{TimeLimit, check_not_stopped, ended_early};
@@ -83,6 +84,8 @@ pub struct MapService {
     caller: Option<CallerName>,
 }
 
+/// Of the jobs that may wait for a thread, one in so many may wait for one of [`Inner::long_mapping`].
+const LONG_SHARE: usize = 4;
 /// See [`Inner::undo`].
 const UNDO_THREADS: usize = 1;
 /// Threads for map files.
@@ -96,6 +99,9 @@ struct Inner {
     queries: Pool,
     /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
     mapping: Pool,
+    /// For scans that take long, since they do not fit from their guess: a second and more each, while robots whose scans
+    /// fit map on.
+    long_mapping: Pool,
     /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
     alignment: Pool,
     /// For finding out what an undo takes back, which reads a snapshot and the journal behind it: one at a time, since each
@@ -106,6 +112,8 @@ struct Inner {
     map_files: Pool,
     /// For searches with no guess, which take seconds: no alignment waits for them.
     localization: Pool,
+    /// For searches for lost robots, which nobody waits for.
+    recovery: Pool,
     budget: Arc<ResourceBudget>,
 }
 
@@ -119,14 +127,18 @@ impl MapService {
         settings.alignment.checked().map_err(|e| ServiceError::new(Reason::BadSettings, e.to_string()))?;
         settings.filter.checked()?;
         let waiting = settings.limits.jobs_waiting_max;
+        let mapping = Pool::new("mapping", settings.mapping_threads, waiting)?;
+        let localization = Pool::new("localization", settings.localization_threads, waiting)?;
         let inner = Inner {
             catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
             queries: Pool::new("query", settings.query_threads, waiting)?,
-            mapping: Pool::new("mapping", settings.mapping_threads, waiting)?,
+            long_mapping: Pool::beside("long_mapping", &mapping, waiting.div_ceil(LONG_SHARE))?,
+            mapping,
             alignment: Pool::new("alignment", settings.alignment_threads, waiting)?,
             undo: Pool::new("undo", UNDO_THREADS, waiting)?,
             map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
-            localization: Pool::new("localization", settings.localization_threads, waiting)?,
+            recovery: Pool::beside("recovery", &localization, 0)?,
+            localization,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
         };
@@ -161,6 +173,7 @@ impl MapService {
 
     /// Looks how full disk and memory are; to be called every second or so. May block: not for an async thread.
     pub fn measure(&self) -> Readings {
+        self.inner.catalog.all().iter().for_each(|map| map.lost.forget_old());
         self.inner.budget.look()
     }
 
@@ -170,9 +183,12 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 6] {
-        let Inner { queries, mapping, alignment, localization, undo, map_files, .. } = &*self.inner;
-        [queries, mapping, alignment, localization, undo, map_files].map(Pool::in_use)
+    pub fn pools(&self) -> [PoolUse; 8] {
+        let Inner {
+            queries, mapping, long_mapping, alignment, localization, recovery, undo, map_files, ..
+        } = &*self.inner;
+        let all = [queries, mapping, long_mapping, alignment, localization, recovery, undo, map_files];
+        all.map(Pool::in_use)
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -226,22 +242,27 @@ impl MapService {
                 self.inner.budget.check_to_grow()?;
             }
             let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
-            // A scan of a lost robot most probably fits nowhere, which takes ten times as long to find out.
-            let _long_turn = match map.has_lost(&scan.robot) && !scan.at_guess {
-                true => Some(self.inner.mapping.long_turn().await?),
-                false => None,
-            };
-            let (inner, scan) = (Arc::clone(&self.inner), Arc::new(scan));
+            let scan = Arc::new(scan);
             let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
-            let submitted = self.submit_and_wait(&self.inner.mapping, None, {
-                let (map, scan) = (Arc::clone(&map), Arc::clone(&scan));
-                move |stop| {
+            let submit = |effort| {
+                let (inner, map, scan) = (Arc::clone(&self.inner), Arc::clone(&map), Arc::clone(&scan));
+                let (turn, limit) = (Arc::clone(&turn), limit.clone());
+                move |stop: StopSignal<'_>| {
                     limit.run(stop, |stop| {
-                        map.submit_scan(&scan, Arc::clone(&turn), &inner.settings, &inner.budget, stop)
+                        let turn = Arc::clone(&turn);
+                        map.submit_scan(&scan, turn, effort, &inner.settings, &inner.budget, stop)
                     })
                 }
-            });
-            let answer = submitted.await?;
+            };
+            let Inner { mapping, long_mapping, .. } = &*self.inner;
+            let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
+            let answer = loop {
+                if let Some(answer) = self.submit_and_wait(pool, thread.take(), submit(effort)).await? {
+                    break answer;
+                }
+                (pool, effort) = (long_mapping, Effort::Whole);
+                thread = Some(limit.wait(pool.thread()).await??);
+            };
             if !answer.accepted {
                 self.search_for_robot_of(map, &scan);
             }

@@ -14,6 +14,7 @@ use uuid::Uuid;
 
 use super::commit_queue::{CommitThread, Step};
 use super::hosted_map::{HostedMap, Saving};
+use super::mapping::Effort;
 use super::resource_budget::ResourceBudget;
 use super::{Deletion, DeletionTarget, Marks, ScanRequest, ServiceError, ServiceSettings};
 use crate::geometry::{Point, Pose};
@@ -52,8 +53,8 @@ fn insert_three(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>, robot: &str,
         };
         let turn = Arc::new(block_on(map.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
-        let step = map.submit_scan(&request, turn, &settings, budget, StopSignal::NEVER);
-        newest = outcome(step).unwrap().version.revision;
+        let step = map.submit_scan(&request, turn, Effort::Whole, &settings, budget, StopSignal::NEVER);
+        newest = outcome(step).unwrap().expect("a scan at its guess").version.revision;
     }
     newest
 }

@@ -19,6 +19,13 @@ use crate::util::{Durations, SharedDurations, StopSignal};
 /// now allows.
 pub(super) const INLINE_POINTS: usize = 10_240;
 
+/// How nice threads are to those of other pools: they get a tenth of a core that both want.
+#[cfg(all(feature = "server", target_os = "linux"))]
+const NICENESS: i32 = 10;
+/// The lowest priority that there is.
+#[cfg(all(feature = "server", target_os = "linux"))]
+const NICEST: i32 = 19;
+
 /// A fixed number of threads and a bounded queue before them.
 #[derive(Debug)]
 pub(super) struct Pool {
@@ -30,8 +37,6 @@ pub(super) struct Pool {
     free: Arc<Semaphore>,
     /// One permit for each caller that waits for the turn of its map or robot.
     turns: Semaphore,
-    /// One permit for each thread that may do what takes long, and others shall not wait for: half of them.
-    half: Arc<Semaphore>,
     jobs_waiting_max: usize,
     counts: Arc<Counts>,
 }
@@ -47,7 +52,7 @@ struct Counts {
 /// What became of the jobs of a pool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PoolUse {
-    /// The pool's: `query`, `mapping`, `alignment`, `localization`, `undo` or `map_file`.
+    /// The pool's: `query`, `mapping`, `long_mapping`, `alignment`, `localization`, `recovery`, `undo` or `map_file`.
     pub name: &'static str,
     /// Jobs that wait for a thread.
     pub waiting: usize,
@@ -68,9 +73,29 @@ impl Pool {
         threads: usize,
         jobs_waiting_max: usize,
     ) -> Result<Self, ServiceError> {
+        Self::started(name, threads, jobs_waiting_max, |_| ())
+    }
+
+    /// As many threads as half of those of `other`, one at least, which give way to those of other pools.
+    pub(super) fn beside(
+        name: &'static str,
+        other: &Self,
+        jobs_waiting_max: usize,
+    ) -> Result<Self, ServiceError> {
+        let threads = (other.threads.current_num_threads() / 2).max(1);
+        Self::started(name, threads, jobs_waiting_max, |_| give_way())
+    }
+
+    fn started(
+        name: &'static str,
+        threads: usize,
+        jobs_waiting_max: usize,
+        begin: impl Fn(usize) + Send + Sync + 'static,
+    ) -> Result<Self, ServiceError> {
         let threads = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(move |i| format!("mrol-{name}-{i}"))
+            .start_handler(begin)
             .build()
             .map_err(|e| ServiceError::new(Reason::NoThreads, e.to_string()))?;
         let free = threads.current_num_threads();
@@ -80,7 +105,6 @@ impl Pool {
             places: Semaphore::new(free + jobs_waiting_max).into(),
             free: Semaphore::new(free).into(),
             turns: Semaphore::new(jobs_waiting_max),
-            half: Semaphore::new((free / 2).max(1)).into(),
             jobs_waiting_max,
             counts: Arc::default(),
         })
@@ -99,16 +123,6 @@ impl Pool {
         }
         let _place = self.turns.try_acquire().map_err(|_| self.full())?;
         Ok(turn.await)
-    }
-
-    /// Waits for its turn to take a thread for long, which half of them may be taken for: the others are left to those who
-    /// are done soon. The turn lasts until what is returned is dropped.
-    ///
-    /// # Errors
-    /// As for [`Pool::in_turn`].
-    pub(super) async fn long_turn(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
-        let turn = self.in_turn(Arc::clone(&self.half).acquire_owned()).await?;
-        turn.map_err(|_| failed())
     }
 
     fn full(&self) -> ServiceError {
@@ -169,32 +183,6 @@ impl Pool {
         answered.await.map_err(|_| failed())
     }
 
-    /// A thread for what nobody waits for, where one is free that no job waits for, and not half of them do such work
-    /// already.
-    pub(super) fn spare_thread(&self) -> Option<SpareThread> {
-        if self.is_wanted() {
-            return None;
-        }
-        let spare = Arc::clone(&self.half).try_acquire_owned().ok()?;
-        let place = Arc::clone(&self.places).try_acquire_owned().ok()?;
-        let thread = Arc::clone(&self.free).try_acquire_owned().ok()?;
-        let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
-        Some(SpareThread { thread: FreeThread { _place: place, _thread: thread, unanswered }, _spare: spare })
-    }
-
-    /// [`Pool::run_on`] a thread that is spare.
-    ///
-    /// # Errors
-    /// `Internal` when the job panicked.
-    pub(super) async fn run_on_spare<T: Send + 'static>(
-        &self,
-        spare: SpareThread,
-        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
-    ) -> Result<T, ServiceError> {
-        let SpareThread { thread, _spare } = spare;
-        self.run_on(thread, job).await
-    }
-
     /// True while a job waits for a thread.
     pub(super) fn is_wanted(&self) -> bool {
         self.in_use().waiting > 0
@@ -223,13 +211,6 @@ pub(super) struct FreeThread {
     unanswered: Unanswered,
 }
 
-/// A thread of a pool for what nobody waits for.
-#[derive(Debug)]
-pub(super) struct SpareThread {
-    thread: FreeThread,
-    _spare: OwnedSemaphorePermit,
-}
-
 /// A job without an answer: cancelled where it is dropped as such.
 #[derive(Debug)]
 struct Unanswered {
@@ -250,6 +231,23 @@ impl Drop for Unanswered {
         }
     }
 }
+
+/// Lowers the priority of this thread. Where the system does not let it, it is as the others are.
+#[cfg(all(feature = "server", target_os = "linux"))]
+fn give_way() {
+    use rustix::process::{getpriority_process, setpriority_process};
+
+    // On Linux a thread has a priority of its own.
+    let lowered =
+        getpriority_process(None).and_then(|nice| setpriority_process(None, (nice + NICENESS).min(NICEST)));
+    if let Err(error) = lowered {
+        tracing::debug!(%error, "the priority of a thread cannot be lowered");
+    }
+}
+
+/// Elsewhere it would be the priority of the whole server.
+#[cfg(not(all(feature = "server", target_os = "linux")))]
+fn give_way() {}
 
 fn failed() -> ServiceError {
     ServiceError::new(Reason::JobPanicked, "the job failed by a defect of the server")
@@ -322,25 +320,6 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_takes_long_leaves_half_of_the_threads() {
-        let pool = Pool::new("test", 4, 1).unwrap();
-        let (first, second) = (pool.long_turn().await.unwrap(), pool.long_turn().await.unwrap());
-        let mut third = pin!(pool.long_turn());
-        tokio::select! {
-            biased;
-            _ = &mut third => panic!("two of four threads are taken for long"),
-            () = std::future::ready(()) => {}
-        }
-        let refused = pool.long_turn().await.unwrap_err();
-        assert_eq!(refused.reason, Reason::Overloaded);
-        assert_eq!(pool.run(|_| 1).await.unwrap(), 1);
-        drop(first);
-        drop((third.await.unwrap(), second));
-        let single = Pool::new("test", 1, 1).unwrap();
-        drop(single.long_turn().await.unwrap());
-    }
-
-    #[tokio::test]
     async fn a_job_that_nobody_waits_for_goes_at_once_with_its_place_and_what_it_holds() {
         let pool = pool(1);
         let (release, running) = kept_busy(&pool).await;
@@ -373,6 +352,21 @@ mod tests {
         gone.abort();
         until(|| pool.in_use().cancelled == 1).await;
         assert_eq!(pool.in_use().running, 0);
+    }
+
+    #[tokio::test]
+    async fn threads_beside_others_give_way_to_them() {
+        let other = Pool::new("test", 5, 1).unwrap();
+        let beside = Pool::beside("beside", &other, 1).unwrap();
+        assert_eq!(beside.threads.current_num_threads(), 2);
+        #[cfg(all(feature = "server", target_os = "linux"))]
+        {
+            let niceness = |_: StopSignal<'_>| rustix::process::getpriority_process(None).unwrap();
+            let expected = (other.run(niceness).await.unwrap() + NICENESS).min(NICEST);
+            assert_eq!(beside.run(niceness).await.unwrap(), expected);
+        }
+        let only = Pool::new("test", 1, 1).unwrap();
+        assert_eq!(Pool::beside("beside", &only, 1).unwrap().threads.current_num_threads(), 1);
     }
 
     #[tokio::test]

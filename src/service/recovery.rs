@@ -1,7 +1,7 @@
 //! The search for lost robots, beside everything else that the server does.
 //!
 //! A robot that asked for it (see [`RobotSettings::recover`](super::RobotSettings)) is searched for after a scan of it was
-//! refused: on a thread for searches with no guess that nobody else wants. The answer to the scan does not wait for it.
+//! refused: on a thread of its own that gives way to all others. The answer to the scan does not wait for it.
 //! Whether the robot is where the search saw it, its next scan tells.
 
 use std::sync::Arc;
@@ -19,26 +19,29 @@ use crate::util::StopSignal;
 const WHOM: &str = "a search for a lost robot";
 
 impl MapService {
-    /// Begins to search for the robot of a scan that was refused, if it asked for it and a thread has nothing better to do.
+    /// Begins to search for the robot of a scan that was refused, if it asked for it and nobody waits for a
+    /// search of their own.
     pub(super) fn search_for_robot_of(&self, map: Arc<HostedMap>, request: &ScanRequest) {
         let inner = Arc::clone(&self.inner);
         if !inner.settings.recovers(request) {
             return;
         }
-        let Some(spare) = inner.localization.spare_thread() else { return };
-        let (robot, timestamp_ns, gravity, method) =
-            (request.robot.clone(), request.timestamp_ns, request.gravity, request.method);
+        if inner.localization.is_wanted() {
+            return;
+        }
+        let (robot, method) = (request.robot.clone(), request.method);
         let pool = Arc::clone(&self.inner);
         tokio::spawn(async move {
             let search = move |_: StopSignal<'_>| {
                 let (settings, is_wanted) = (&inner.settings, || inner.localization.is_wanted());
                 let mapper = map.mapper(method, true, settings);
-                if let Some(task) = mapper.begin_search(&robot, timestamp_ns, gravity) {
+                if let Some(task) = mapper.begin_search(&robot) {
                     map.search(&mapper, &task, settings, &inner.budget, StopSignal::when(&is_wanted));
                 }
             };
-            // Nobody waits for the answer. What came of it is noted with the robot.
-            drop(pool.localization.run_on_spare(spare, search).await);
+            // Nobody waits for the answer. What came of it is noted with the robot; where others are searched for, the
+            // next scan asks again.
+            drop(pool.recovery.run(search).await);
         });
     }
 }

@@ -30,6 +30,16 @@ impl TimeLimit {
         job(stop.by(*self.ends.get_or_init(|| Instant::now() + self.most))).map_err(|error| self.named(error))
     }
 
+    /// Waits for `turn`, for as long as is left.
+    ///
+    /// # Errors
+    /// The limit, once it is over.
+    pub(super) async fn wait<T>(&self, turn: impl Future<Output = T>) -> Result<T, ServiceError> {
+        let ends = *self.ends.get_or_init(|| Instant::now() + self.most);
+        let waited = tokio::time::timeout_at(ends.into(), turn).await;
+        waited.map_err(|_| self.named(ServiceError::new(Reason::TimeLimit, "")))
+    }
+
     /// The error, and where it says that the time is up, which time.
     pub(super) fn named(&self, error: ServiceError) -> ServiceError {
         if error.reason != Reason::TimeLimit {

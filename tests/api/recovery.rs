@@ -114,7 +114,7 @@ async fn a_lost_robot_that_asked_for_it_is_found_again() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_lost_robot_that_did_not_ask_for_it_is_not_looked_for() {
     let daemon = mapped(false).await;
-    let searches = r#"mrol_jobs_begun_total{pool="localization"}"#;
+    let searches = r#"mrol_jobs_begun_total{pool="recovery"}"#;
     let before = daemon.metric(searches).await;
     assert_eq!(before, Some(0.0));
     let mut robot = Carried::new(&daemon, "r");

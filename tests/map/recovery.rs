@@ -1,5 +1,6 @@
 //! Robots that were carried away, or lost themselves, are found again, and none is found in the wrong place.
 
+use mrol::align::PoseCovariance;
 use mrol::geometry::{Point, Pose, pose_difference};
 use mrol::lab::simulate::{Scene, SpinningLidar, tours};
 use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
@@ -165,4 +166,42 @@ fn without_recovery_a_lost_robot_stays_lost() {
         let located = mapper.map_scan(&scan, StopSignal::NEVER).unwrap().located;
         assert!(!located.is_accepted() && located.recovered.is_none());
     }
+}
+
+#[test]
+fn a_pose_that_the_guesss_covariance_rules_out_is_not_recovered() {
+    let (mut building, tour) = building();
+    assert_at(&building.scan(&tour[3], Guess::Pose(tour[2])), &tour[3]);
+    let points = building.seen_from(&tour[3]);
+    let variances: [f64; 36] = std::array::from_fn(|k| if k % 7 == 0 { 1e-6 } else { 0.0 });
+    let scan = |guess_covariance| Scan {
+        guess: Guess::Pose(Pose::translation(2.0, 0.0, 0.0) * tour[3]),
+        guess_covariance,
+        ..Scan::new(&building.robot, &points)
+    };
+    let mapper = ScanMapper::new(&building.map, &building.sightings, MappingSettings::default());
+    let mapper = mapper.recovering(&building.lost, RecoverySettings::default());
+    let recover = |scan: &Scan<'_>| {
+        let located = mapper.locate(scan, StopSignal::NEVER).unwrap();
+        mapper.recover(scan, located, StopSignal::NEVER).unwrap()
+    };
+    let refused = recover(&scan(Some(PoseCovariance::new(&variances).unwrap())));
+    assert!(!refused.is_accepted() && refused.recovered.is_none(), "{}", refused.alignment.reason);
+    assert_at(&recover(&scan(None)), &tour[3]);
+}
+
+#[test]
+fn where_more_starts_are_wanted_the_answer_from_one_start_says_so() {
+    let (mut building, tour) = building();
+    let points = building.seen_from(&tour[3]);
+    let mapper = ScanMapper::new(&building.map, &building.sightings, MappingSettings::default());
+    let locate = |mapper: &ScanMapper<'_>, guess| {
+        let scan = Scan { guess: Guess::Pose(guess), ..Scan::new(&building.robot, &points) };
+        mapper.locate(&scan, StopSignal::NEVER).unwrap().alignment
+    };
+    let near = locate(&mapper.from_one_start(), tour[3]);
+    assert!(!near.wants_more_starts);
+    assert_eq!(near, locate(&mapper, tour[3]));
+    assert!(locate(&mapper.from_one_start(), tour[63]).wants_more_starts);
+    assert!(!locate(&mapper, tour[63]).wants_more_starts);
 }

@@ -53,6 +53,11 @@ impl SearchBox {
         self.max_m
     }
 
+    /// True where a point of the map lies in the box, borders included.
+    pub fn contains(&self, point_m: [f64; 3]) -> bool {
+        (0..3).all(|axis| (self.min_m[axis]..=self.max_m[axis]).contains(&point_m[axis]))
+    }
+
     /// The box of the voxels `low` to `high`.
     pub(super) fn of_voxels(low: [i32; 3], high: [i32; 3], resolution_m: f64) -> Self {
         let side = |i: i32| f64::from(i) * resolution_m;
@@ -83,18 +88,6 @@ impl SearchBox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::gravity::MAP_DOWN;
-
-    #[test]
-    fn a_direction_may_have_any_length_but_none() {
-        let gravity = Gravity::new([0.0, 3.0, 4.0], MAP_DOWN).unwrap();
-        assert_eq!(gravity.in_sensor(), [0.0, 0.6, 0.8]);
-        for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0], [0.0, f64::MAX, f64::MAX]] {
-            let error = Gravity::new(bad, MAP_DOWN).unwrap_err().to_string();
-            assert!(error.contains("gravity.in_sensor"), "{error}");
-            assert!(Gravity::new(MAP_DOWN, bad).unwrap_err().to_string().contains("gravity.in_map"));
-        }
-    }
 
     #[test]
     fn a_box_needs_corners_in_order_and_may_be_endless() {

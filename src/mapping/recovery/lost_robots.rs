@@ -4,13 +4,17 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::align::localize::LocalizationQuery;
+use crate::align::localize::{Gravity, LocalizationQuery};
 use crate::geometry::{Point, Pose};
-use crate::map::RobotName;
+use crate::map::{RobotName, SessionName};
 use crate::sync::{Mutex, Rank};
 
-/// Lost robots that are remembered, at most; beyond, the one goes whose last scan came longest ago.
+/// Lost robots that are remembered, at most; beyond, one goes that has no scan in the map, or else the one whose last scan
+/// came longest ago.
 pub const LOST_ROBOTS_MAX: usize = 64;
+
+/// For how long a robot is remembered whose scans no longer come.
+const REMEMBERED_FOR: Duration = Duration::from_secs(600);
 
 /// The robots whose last scan was refused, in memory.
 #[derive(Debug)]
@@ -21,6 +25,14 @@ struct All {
     robots: HashMap<RobotName, Lost>,
     /// Searches begun so far.
     searches: u64,
+}
+
+/// Since when a robot is lost. What is remembered of it is void once it restarted, or a scan of it was stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct LostSince {
+    pub(super) session: SessionName,
+    /// The revision of its last stored scan.
+    pub(super) stored: Option<u64>,
 }
 
 /// A robot whose last scan was refused.
@@ -37,6 +49,10 @@ pub(super) struct LostRobot {
 #[derive(Debug)]
 struct Lost {
     robot: LostRobot,
+    since: LostSince,
+    /// When its last scan was taken, nanoseconds since the Unix epoch, and which way was down.
+    timestamp_ns: Option<i64>,
+    gravity: Option<Gravity>,
     noted_at: Instant,
     /// Searches begun for this robot.
     searches: u64,
@@ -74,6 +90,9 @@ impl Default for LostRobots {
 #[derive(Debug)]
 pub(super) struct RefusedScan<'a> {
     pub(super) robot: &'a RobotName,
+    pub(super) since: LostSince,
+    pub(super) timestamp_ns: Option<i64>,
+    pub(super) gravity: Option<Gravity>,
     /// Its points, sensor frame, meters.
     pub(super) points: Vec<Point>,
     /// Motion of the sensor since the refused scan before it: before_from_now. None where there is none, or it is not
@@ -85,10 +104,23 @@ pub(super) struct RefusedScan<'a> {
     pub(super) is_not_in_place: bool,
 }
 
+impl Lost {
+    fn is_forgotten(&self) -> bool {
+        self.noted_at.elapsed() > REMEMBERED_FOR
+    }
+}
+
 impl LostRobots {
-    /// The robot, if it is lost.
-    pub(super) fn get(&self, robot: &RobotName) -> Option<LostRobot> {
-        self.0.lock().robots.get(robot).map(|lost| lost.robot.clone())
+    /// The robot, if it is lost since then.
+    pub(super) fn get(&self, robot: &RobotName, since: &LostSince) -> Option<LostRobot> {
+        let all = self.0.lock();
+        let lost = all.robots.get(robot).filter(|lost| lost.since == *since && !lost.is_forgotten());
+        lost.map(|lost| lost.robot.clone())
+    }
+
+    /// Forgets the robots whose scans no longer come.
+    pub fn forget_old(&self) {
+        self.0.lock().robots.retain(|_, lost| !lost.is_forgotten());
     }
 
     /// What the last search for the robot said.
@@ -97,16 +129,18 @@ impl LostRobots {
     }
 
     /// The robot is lost no longer.
-    pub(super) fn found(&self, robot: &RobotName) {
+    pub fn found(&self, robot: &RobotName) {
         self.0.lock().robots.remove(robot);
     }
 
     /// Notes a refused scan.
     pub(super) fn note(&self, scan: RefusedScan<'_>) {
-        let RefusedScan { robot, motion, probable_pose, .. } = scan;
+        let RefusedScan { robot, since, timestamp_ns, gravity, motion, probable_pose, .. } = scan;
         let points = scan.points.into();
         let mut all = self.0.lock();
-        if let Some(lost) = all.robots.get_mut(robot) {
+        all.robots.retain(|_, lost| !lost.is_forgotten());
+        if let Some(lost) = all.robots.get_mut(robot).filter(|lost| lost.since == since) {
+            (lost.timestamp_ns, lost.gravity) = (timestamp_ns, gravity);
             let moved = |pose: Pose| motion.map(|motion| pose * motion);
             let place = lost.robot.place.filter(|_| !scan.is_not_in_place).and_then(moved);
             let chained = moved(lost.robot.chained).unwrap_or(lost.robot.chained);
@@ -117,13 +151,18 @@ impl LostRobots {
             }
             return;
         }
-        if all.robots.len() >= LOST_ROBOTS_MAX {
-            let longest_ago = all.robots.iter().min_by_key(|(_, lost)| lost.noted_at);
-            if let Some(robot) = longest_ago.map(|(robot, _)| robot.clone()) {
+        if all.robots.len() >= LOST_ROBOTS_MAX && !all.robots.contains_key(robot) {
+            // Names that the map does not know are easily made up.
+            let first =
+                all.robots.iter().min_by_key(|(_, lost)| (lost.since.stored.is_some(), lost.noted_at));
+            if let Some(robot) = first.map(|(robot, _)| robot.clone()) {
                 all.robots.remove(&robot);
             }
         }
         let lost = Lost {
+            since,
+            timestamp_ns,
+            gravity,
             robot: LostRobot { points, chained: probable_pose, place: None },
             noted_at: Instant::now(),
             searches: 0,
@@ -135,12 +174,13 @@ impl LostRobots {
     }
 
     /// Begins a search for the scan of the robot that was noted last: one at a time, and no sooner after the one before
-    /// it than `interval`. `query` is told how many searches for the robot there are with it.
+    /// it than `interval`. `query` is told how many searches for the robot there are with it, when that scan was taken and
+    /// which way was down.
     pub(super) fn begin_search(
         &self,
         robot: &RobotName,
         interval: Duration,
-        query: impl FnOnce(u64) -> LocalizationQuery,
+        query: impl FnOnce(u64, Option<i64>, Option<Gravity>) -> LocalizationQuery,
     ) -> Option<SearchTask> {
         let mut all = self.0.lock();
         let All { robots, searches } = &mut *all;
@@ -153,9 +193,11 @@ impl LostRobots {
         lost.searches += 1;
         lost.searched_at = Some(Instant::now());
         lost.under_way = Some(UnderWay { number: *searches, since: Some(Pose::identity()) });
-        let (number, points, of_robot) = (*searches, Arc::clone(&lost.robot.points), lost.searches);
+        let (number, points) = (*searches, Arc::clone(&lost.robot.points));
+        let (of_robot, timestamp_ns, gravity) = (lost.searches, lost.timestamp_ns, lost.gravity);
         drop(all);
-        Some(SearchTask { number, robot: robot.clone(), points, query: query(of_robot) })
+        let query = query(of_robot, timestamp_ns, gravity);
+        Some(SearchTask { number, robot: robot.clone(), points, query })
     }
 
     /// Ends a search, which found the scan at a place (map_from_sensor), or tells why not.
@@ -169,5 +211,59 @@ impl LostRobots {
             Err(reason) => reason.clone(),
         });
         lost.robot.place = found.ok().zip(search.since).map(|(place, since)| place * since);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(text: &str) -> RobotName {
+        RobotName::new(text).unwrap()
+    }
+
+    fn since(session: &str, stored: Option<u64>) -> LostSince {
+        LostSince { session: SessionName::new(session).unwrap(), stored }
+    }
+
+    fn refuse(lost: &LostRobots, robot: &RobotName, since: LostSince) {
+        lost.note(RefusedScan {
+            robot,
+            since,
+            timestamp_ns: None,
+            gravity: None,
+            points: vec![Point::new(1.0, 0.0, 0.0)],
+            motion: None,
+            probable_pose: Pose::identity(),
+            is_not_in_place: false,
+        });
+    }
+
+    #[test]
+    fn what_is_remembered_is_void_after_a_restart_and_after_a_stored_scan() {
+        let (lost, robot) = (LostRobots::default(), name("r"));
+        refuse(&lost, &robot, since("a", Some(3)));
+        assert!(lost.get(&robot, &since("a", Some(3))).is_some());
+        for other in [since("b", Some(3)), since("a", Some(4)), since("a", None)] {
+            assert!(lost.get(&robot, &other).is_none(), "{other:?}");
+        }
+        // Nor does a search that began before say anything of it afterwards.
+        let task = lost.begin_search(&robot, Duration::ZERO, |_, _, _| LocalizationQuery::default()).unwrap();
+        refuse(&lost, &robot, since("a", Some(5)));
+        lost.end_search(&task, Ok(Pose::identity()));
+        assert!(lost.get(&robot, &since("a", Some(5))).unwrap().place.is_none());
+        lost.found(&robot);
+        assert!(lost.get(&robot, &since("a", Some(5))).is_none());
+    }
+
+    #[test]
+    fn names_that_the_map_does_not_know_take_no_place_from_robots_that_it_knows() {
+        let (lost, robot) = (LostRobots::default(), name("r"));
+        refuse(&lost, &robot, since("", Some(1)));
+        for k in 0..3 * LOST_ROBOTS_MAX {
+            refuse(&lost, &name(&format!("made-up-{k}")), since("", None));
+        }
+        assert!(lost.get(&robot, &since("", Some(1))).is_some());
+        assert_eq!(lost.0.lock().robots.len(), LOST_ROBOTS_MAX);
     }
 }

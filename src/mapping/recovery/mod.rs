@@ -22,11 +22,11 @@ use super::guess::last_seen;
 use super::{Guess, LocatedScan, MappingError, Scan, ScanMapper};
 use crate::align::localize::{Gravity, LocalizationSettings};
 use crate::align::{Alignment, AlignmentSettings, MultiStartSettings, PosePrior, Verdict, align_until};
-use crate::geometry::{Point, Pose, pose_difference};
+use crate::geometry::{Point, Pose, pose_difference, translation_m};
 use crate::map::RobotName;
 use crate::util::{Keyword, StopSignal};
 use crate::voxel::volumetric_sample_until;
-use lost_robots::{LostRobot, RefusedScan};
+use lost_robots::{LostRobot, LostSince, RefusedScan};
 use motion::motion_between;
 
 /// When and how a lost robot is looked for.
@@ -134,7 +134,11 @@ impl<'a> ScanMapper<'a> {
         let settings = &recovery.settings;
         let kept =
             volumetric_sample_until(&points, settings.points_kept, self.settings.alignment.seed, stop).points;
-        let before = recovery.lost.get(scan.robot);
+        let since = LostSince {
+            session: scan.session.clone(),
+            stored: self.map.trajectory().last_of(scan.robot).map(|last| last.revision),
+        };
+        let before = recovery.lost.get(scan.robot, &since);
         let motion = before.as_ref().and_then(|before| {
             motion_between(&before.points, &kept, self.map.settings(), &self.settings.alignment, stop)
         });
@@ -155,6 +159,9 @@ impl<'a> ScanMapper<'a> {
             Err(reason) => {
                 recovery.lost.note(RefusedScan {
                     robot: scan.robot,
+                    since,
+                    timestamp_ns: scan.timestamp_ns,
+                    gravity: scan.gravity,
                     points: kept,
                     motion,
                     probable_pose: self.probable_pose(scan, &located),
@@ -183,7 +190,10 @@ impl<'a> ScanMapper<'a> {
         let settings = &self.recovery?.settings;
         let alignment = self.align_again(points, &guess, scan.gravity, &self.settings.alignment, stop);
         let fits = alignment.overlap() >= settings.localization.overlap_min;
-        (fits && self.agrees(&alignment, &guess, settings)).then_some((Recovered::Localization, alignment))
+        let is_there = fits
+            && self.agrees(&alignment, &guess, settings)
+            && self.may_be_at(scan, &alignment.map_from_sensor);
+        is_there.then_some((Recovered::Localization, alignment))
     }
 
     /// Aligns the scan from other guesses than its own.
@@ -202,7 +212,10 @@ impl<'a> ScanMapper<'a> {
         let Some(Recovery { settings, .. }) = self.recovery else { return Err(None) };
         let mut found: Option<(Recovered, Alignment)> = None;
         for (how, guess) in self.other_guesses(scan, before, motion) {
-            let Some(alignment) = self.align_if_it_fits(points, &guess, scan.gravity, stop) else { continue };
+            let fits = self.align_if_it_fits(points, &guess, scan.gravity, stop);
+            let Some(alignment) = fits.filter(|fits| self.may_be_at(scan, &fits.map_from_sensor)) else {
+                continue;
+            };
             match &found {
                 Some((_, first))
                     if !self.is_near(&first.map_from_sensor, &alignment.map_from_sensor, &settings) =>
@@ -285,7 +298,7 @@ impl<'a> ScanMapper<'a> {
         fits(&first).and_then(|_| fits(&all))
     }
 
-    /// Aligns a scan from `guess`, in which what was known of its own guess says nothing.
+    /// Aligns a scan from `guess`.
     fn align_again(
         &self,
         points: &[Point],
@@ -305,6 +318,19 @@ impl<'a> ScanMapper<'a> {
     fn is_near(&self, a: &Pose, b: &Pose, settings: &RecoverySettings) -> bool {
         let (meters, degrees) = pose_difference(a, b);
         meters <= settings.agreement * self.map.settings().resolution_m && degrees <= settings.agreement_deg
+    }
+
+    /// True of a pose that the robot can have reached, and that the covariance of the scan's own guess does not rule out.
+    fn may_be_at(&self, scan: &Scan<'_>, pose: &Pose) -> bool {
+        let is_in_reach = self
+            .reachable(scan.robot, scan.timestamp_ns)
+            .is_none_or(|reachable| reachable.contains(translation_m(pose)));
+        let own =
+            scan.guess.resolve(scan.robot, scan.timestamp_ns, &self.map.trajectory(), self.sightings, false);
+        let is_ruled_out = own.is_ok_and(|guess| {
+            scan.prior(guess).rules_out(pose, self.map.settings().resolution_m, &self.settings.alignment)
+        });
+        is_in_reach && !is_ruled_out
     }
 
     /// The robot's last good pose, with its time.

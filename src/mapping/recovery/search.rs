@@ -17,20 +17,15 @@ use crate::util::StopSignal;
 const CANDIDATES: usize = 2;
 
 impl ScanMapper<'_> {
-    /// What to search for after a scan of `robot`, taken at `timestamp_ns` and telling the direction of `gravity`, was
-    /// refused. None where the robot is not lost, a place that a search found is to be confirmed first, or a search is
+    /// What to search for after a scan of `robot` was refused. None where the robot is not lost, a place that a search found is to be confirmed first, or a search is
     /// under way or was not long ago. Whoever takes it has to [search](Self::search).
-    pub fn begin_search(
-        &self,
-        robot: &RobotName,
-        timestamp_ns: Option<i64>,
-        gravity: Option<Gravity>,
-    ) -> Option<SearchTask> {
+    pub fn begin_search(&self, robot: &RobotName) -> Option<SearchTask> {
         let recovery = self.recovery?;
-        recovery.lost.begin_search(robot, recovery.settings.search_interval, |number| LocalizationQuery {
-            gravity,
-            ..self.search_query(robot, timestamp_ns, number)
-        })
+        let query = |number, timestamp_ns, gravity: Option<Gravity>| {
+            let query = self.search_query(robot, timestamp_ns, number);
+            LocalizationQuery { gravity: gravity.or(query.gravity), ..query }
+        };
+        recovery.lost.begin_search(robot, recovery.settings.search_interval, query)
     }
 
     /// Searches for a lost robot with no guess. What is found is not believed yet: the robot's next scan has to confirm it.
@@ -58,7 +53,7 @@ impl ScanMapper<'_> {
 
     /// Searches for the robot of a refused scan at once, and for as long as it takes.
     pub(in crate::mapping) fn search_at_once(&self, scan: &Scan<'_>, stop: StopSignal<'_>) {
-        let Some(task) = self.begin_search(scan.robot, scan.timestamp_ns, scan.gravity) else { return };
+        let Some(task) = self.begin_search(scan.robot) else { return };
         let alone =
             &mut Supervision { stop, search_stop: stop, progress: &mut |_| (), reserve: &mut |_| true };
         // An error is noted with the robot, and told with the scan.
@@ -81,18 +76,24 @@ impl ScanMapper<'_> {
 
     /// Where the robot may be, and which way up: within the reach of its last good pose.
     fn search_query(&self, robot: &RobotName, timestamp_ns: Option<i64>, number: u64) -> LocalizationQuery {
-        let Some((recovery, (last, last_ns))) = self.recovery.zip(self.last_good(robot)) else {
+        let Some((recovery, (last, _))) = self.recovery.zip(self.last_good(robot)) else {
             return LocalizationQuery { candidates: CANDIDATES, ..LocalizationQuery::default() };
         };
-        let settings = recovery.settings;
-        let elapsed_ns = last_ns.zip(timestamp_ns).and_then(|(last, now)| now.checked_sub(last));
-        let search_box = elapsed_ns.filter(|ns| *ns > 0).and_then(|ns| {
-            let distance_m = settings.distance_min_m + settings.speed_max_m_per_s * ns as f64 * 1e-9;
-            let center = translation_m(&last);
-            SearchBox::new(center.map(|c| c - distance_m), center.map(|c| c + distance_m)).ok()
-        });
+        let (settings, search_box) = (recovery.settings, self.reachable(robot, timestamp_ns));
         let gravity = (settings.keeps_tilt && number % 2 == 1).then(|| down_of(&last)).flatten();
         LocalizationQuery { gravity, search_box, candidates: CANDIDATES, seed: number }
+    }
+}
+
+impl ScanMapper<'_> {
+    /// Where a robot can have gone since its last good pose; none where that, or its time, is not known.
+    pub(super) fn reachable(&self, robot: &RobotName, timestamp_ns: Option<i64>) -> Option<SearchBox> {
+        let settings = self.recovery?.settings;
+        let (last, last_ns) = self.last_good(robot)?;
+        let elapsed_ns = timestamp_ns?.checked_sub(last_ns?).filter(|ns| *ns > 0)?;
+        let distance_m = settings.distance_min_m + settings.speed_max_m_per_s * elapsed_ns as f64 * 1e-9;
+        let center = translation_m(&last);
+        SearchBox::new(center.map(|c| c - distance_m), center.map(|c| c + distance_m)).ok()
     }
 }
 
