@@ -33,7 +33,7 @@ fn codec(criterion: &mut Criterion) {
         occupied: vec![0x5a; POINTS.div_ceil(8)].into(),
         points: POINTS,
         points_occupied: POINTS / 2,
-        version: MapVersion { revision: 7, map_uuid: uuid::Uuid::from_u128(7) },
+        version: MapVersion { revision: 7, map_uuid: uuid::Uuid::from_u128(7), content_hash: None },
     };
     group.bench_function("encode an answer", |bencher| {
         bencher.iter(|| pb::QueryPointsResponse::from(answer.clone()).encode_to_vec());

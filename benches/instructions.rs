@@ -117,7 +117,7 @@ fn answer() -> PointAnswer {
         occupied: vec![0x5a; POINTS / 8].into(),
         points: POINTS,
         points_occupied: POINTS / 2,
-        version: MapVersion { revision: 7, map_uuid: uuid::Uuid::from_u128(7) },
+        version: MapVersion { revision: 7, map_uuid: uuid::Uuid::from_u128(7), content_hash: None },
     }
 }
 

@@ -39,8 +39,9 @@ impl From<&MapInfo> for MapReport {
 impl Display for MapReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(map) = self;
-        let JsonVersion { revision, map_uuid } = &map.version;
-        writeln!(f, "map {} at revision {revision}, uuid {map_uuid}", map.map)?;
+        let JsonVersion { revision, map_uuid, content_hash } = &map.version;
+        let hash = content_hash.as_deref().unwrap_or("unknown");
+        writeln!(f, "map {} at revision {revision}, uuid {map_uuid}, content hash {hash}", map.map)?;
         let robots = if map.robots.is_empty() { "nobody".into() } else { map.robots.join(", ") };
         let (sets, moments) = (bytes(map.set_bytes), bytes(map.moment_bytes));
         let (scans, poses) = (count(map.scans), bytes(map.trajectory_bytes));

@@ -130,7 +130,7 @@ struct Answer {
 
 impl Answer {
     fn add(&mut self, answer: &PointAnswer) {
-        let MapVersion { revision, map_uuid } = answer.version;
+        let MapVersion { revision, map_uuid, .. } = answer.version;
         self.points += answer.points;
         self.occupied += answer.points_occupied;
         self.bitmap.extend_from_slice(&answer.occupied);

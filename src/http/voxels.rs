@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn the_pieces_are_one_json_object() {
-        let version = MapVersion { revision: 3, map_uuid: uuid::Uuid::nil() };
+        let version = MapVersion { revision: 3, map_uuid: uuid::Uuid::nil(), content_hash: None };
         for count in [0, 1, VOXELS_PER_CHUNK, VOXELS_PER_CHUNK + 2] {
             let keys: Vec<_> = (0..count as i32).map(|i| VoxelKey::new([i, -1, 2]).unwrap()).collect();
             let head = Head { level: 1, resolution_m: 0.1, version: version.into() };

@@ -1,5 +1,6 @@
 //! What adding voxels to a shard comes to.
 
+use super::ContentHash;
 use super::bulk::{count_each, find_each, write_plane_bits};
 use super::capacity_schedule::CapacitySchedule;
 use super::shard::{Block, Shard, levels_of};
@@ -18,6 +19,8 @@ const KEYS_PER_LOOK: usize = 64 << 10;
 pub(super) struct Addition {
     tiers: Vec<ClusterUpdate>,
     levels: Vec<OfLevel>,
+    /// Hash of the finest voxels that were absent.
+    hash: ContentHash,
 }
 
 /// What becomes of a level's filter.
@@ -33,7 +36,7 @@ impl Addition {
     /// Finds out what adding `blocks` of finest voxels to `shard` comes to, and counts them. Once stopped, what comes of it
     /// is not to be applied, and the shard of no use.
     pub(super) fn plan(shard: &Shard, blocks: &[&Block], stop: StopSignal<'_>) -> Self {
-        let mut plan = Self { tiers: Vec::new(), levels: Vec::new() };
+        let mut plan = Self { tiers: Vec::new(), levels: Vec::new(), hash: ContentHash::default() };
         let mut created = plan.tier(shard, 0, blocks, stop);
         for tier in 1..shard.tiers.len() {
             let blocks: VoxelSet = created.into_iter().collect();
@@ -60,9 +63,17 @@ impl Addition {
                 (0..).zip(&mut keys).for_each(|(up, keys)| before.keys_gained(voxels, block, up, keys));
             });
         }
+        if tier == 0 {
+            self.hash = ContentHash::of_keys(&keys[0]);
+        }
         self.tiers.push(ClusterUpdate::plan(table, &gains, stop));
         self.levels.extend(levels.zip(keys).map(|(level, keys)| OfLevel::plan(shard, level, keys, stop)));
         created
+    }
+
+    /// Hash of the finest voxels that were absent.
+    pub(super) fn hash(&self) -> ContentHash {
+        self.hash
     }
 
     /// Does it; the number of finest voxels that were absent.

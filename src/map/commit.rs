@@ -5,16 +5,14 @@
 //! the write locks of what it touches, for which it waits behind short readers only. Short readers therefore never
 //! queue behind a change that itself waits for a long one.
 
-use std::sync::atomic::Ordering;
-
 use super::addition::Addition;
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::removal::Removal;
 use super::shard::{Block, Shard};
 use super::sharding::SHARDS;
 use super::{
-    Change, CompletedRequest, MappedScan, MultiResolutionMap, Request, ScanRecord, TrajectorySpacing,
-    UndoRecord,
+    Change, CompletedRequest, ContentHash, ContentVersion, MappedScan, MultiResolutionMap, Request,
+    ScanRecord, TrajectorySpacing, UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::util::StopSignal;
@@ -32,8 +30,27 @@ pub struct Committer<'a> {
 pub struct Committed {
     /// The revision after it.
     pub revision: u64,
+    /// Hash of what the map holds after it.
+    pub hash: ContentHash,
     /// Finest voxels added or removed.
     pub voxels: usize,
+}
+
+impl Committed {
+    /// The revision after the change, with its hash.
+    pub fn version(&self) -> ContentVersion {
+        ContentVersion { revision: self.revision, hash: self.hash }
+    }
+
+    /// No change of a map at `version`.
+    pub fn none(version: ContentVersion) -> Self {
+        Self::at(version, 0)
+    }
+
+    /// A change at `version` of `voxels` finest voxels.
+    fn at(ContentVersion { revision, hash }: ContentVersion, voxels: usize) -> Self {
+        Self { revision, hash, voxels }
+    }
 }
 
 impl<'a> Committer<'a> {
@@ -48,7 +65,7 @@ impl<'a> Committer<'a> {
 
     /// Makes `change`, for the first time or again.
     pub fn apply(self, change: &Change) -> Committed {
-        let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
+        let unchanged = self.unchanged();
         // It is always made: nobody stops it.
         self.apply_until(change, StopSignal::NEVER).unwrap_or(unchanged)
     }
@@ -72,31 +89,38 @@ impl<'a> Committer<'a> {
         if stop.is_stopped() {
             return None;
         }
+        let version = self.next(|hash| hash.with(hash_added_by(&planned.0)));
         let (_locks, voxels) = self.add_to_shards(planned, stop);
         if stop.is_stopped() {
             return None;
         }
         let mut trajectory = self.map.trajectory.write();
-        let revision = self.map.revision() + 1;
-        trajectory.push(MappedScan { revision, new_voxels: voxels, ..scan.pose.clone() });
-        Some(self.publish(revision, voxels))
+        let committed = Committed::at(version, voxels);
+        trajectory.push(MappedScan { revision: committed.revision, new_voxels: voxels, ..scan.pose.clone() });
+        Some(self.publish(committed))
     }
 
     /// Adds finest voxels and moments, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins
-    /// with. False once stopped: the map is of no use then.
-    pub(super) fn add(self, voxels: &VoxelSet, moments: &MomentSet, stop: StopSignal<'_>) -> bool {
+    /// with. The hash of the voxels; none once stopped: the map is of no use then.
+    pub(super) fn add(
+        self,
+        voxels: &VoxelSet,
+        moments: &MomentSet,
+        stop: StopSignal<'_>,
+    ) -> Option<ContentHash> {
         let planned = self.plan_addition(voxels, moments, stop);
         if stop.is_stopped() {
-            return false;
+            return None;
         }
+        let hash = hash_added_by(&planned.0);
         self.add_to_shards(planned, stop);
-        !stop.is_stopped()
+        (!stop.is_stopped()).then_some(hash)
     }
 
     /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
     /// passed over; removing none makes no revision.
     pub fn remove(self, voxels: &VoxelSet) -> Committed {
-        let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
+        let unchanged = self.unchanged();
         self.delete(voxels, None, StopSignal::NEVER).unwrap_or(unchanged)
     }
 
@@ -108,12 +132,12 @@ impl<'a> Committer<'a> {
         }
         let removed = removed_by(&planned);
         if removed == 0 {
-            return Some(Committed { revision: self.map.revision(), voxels: 0 });
+            return Some(self.unchanged());
         }
+        let committed = Committed::at(self.next(|hash| hash.without(hash_removed_by(&planned))), removed);
         let _locks = self.take_out(planned, &Default::default());
-        let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         self.remember(request, committed, 0);
-        Some(self.publish(committed.revision, committed.voxels))
+        Some(self.publish(committed))
     }
 
     /// Takes scans out of the trajectory, and the voxels that they alone held; always makes a revision.
@@ -125,12 +149,12 @@ impl<'a> Committer<'a> {
             return None;
         }
         let removed = removed_by(&planned);
+        let committed = Committed::at(self.next(|hash| hash.without(hash_removed_by(&planned))), removed);
         let _locks = self.take_out(planned, &self.map.moments.group(&undo.moments));
         let mut trajectory = self.map.trajectory.write();
-        let committed = Committed { revision: self.map.revision() + 1, voxels: removed };
         trajectory.withdraw(&undo.scans, committed.revision);
         self.remember(undo.request.as_ref(), committed, undo.scans.len());
-        Some(self.publish(committed.revision, committed.voxels))
+        Some(self.publish(committed))
     }
 
     /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](super::Trajectory::thin); the number
@@ -143,16 +167,32 @@ impl<'a> Committer<'a> {
         gone
     }
 
-    fn remember(&self, request: Option<&Request>, Committed { revision, voxels }: Committed, scans: usize) {
+    fn remember(
+        &self,
+        request: Option<&Request>,
+        Committed { revision, voxels, .. }: Committed,
+        scans: usize,
+    ) {
         if let Some(Request { id, digest, caller }) = request.cloned() {
             self.map.requests.write().push(CompletedRequest { id, digest, caller, revision, voxels, scans });
         }
     }
 
     /// Makes the change visible: readers that get a lock from now on report this revision.
-    fn publish(&self, revision: u64, voxels: usize) -> Committed {
-        self.map.revision.store(revision, Ordering::Release);
-        Committed { revision, voxels }
+    fn publish(&self, committed: Committed) -> Committed {
+        self.map.published.publish(committed.version());
+        committed
+    }
+
+    /// The next version of the map, whose hash becomes what `change` says.
+    fn next(&self, change: impl FnOnce(ContentHash) -> ContentHash) -> ContentVersion {
+        let ContentVersion { revision, hash } = self.map.content_version();
+        ContentVersion { revision: revision + 1, hash: change(hash) }
+    }
+
+    /// The map as it is.
+    fn unchanged(&self) -> Committed {
+        Committed::none(self.map.content_version())
     }
 
     /// The blocks of `voxels`, shard by shard. A block lies in one region, and so in one shard.
@@ -244,6 +284,16 @@ struct Locks<'a> {
 /// The shards that have a part of a change, ascending.
 fn touched(by_shard: &[Vec<&Block>; SHARDS]) -> impl Iterator<Item = usize> {
     (0..SHARDS).filter(|&i| !by_shard[i].is_empty())
+}
+
+/// Hash of the finest voxels that are added.
+fn hash_added_by(planned: &Plans<Addition>) -> ContentHash {
+    planned.iter().fold(ContentHash::default(), |hash, (_, addition)| hash.with(addition.hash()))
+}
+
+/// Hash of the finest voxels that go.
+fn hash_removed_by(planned: &Plans<Removal>) -> ContentHash {
+    planned.iter().fold(ContentHash::default(), |hash, (_, removal)| hash.with(removal.hash()))
 }
 
 fn removed_by(planned: &Plans<Removal>) -> usize {

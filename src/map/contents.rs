@@ -1,8 +1,9 @@
 //! All that a map holds, at one revision: what is kept of it, and a map from what was kept.
 
-use std::sync::atomic::Ordering;
-
-use super::{IdempotencyLog, MapSettings, MapSettingsError, MultiResolutionMap, Trajectory};
+use super::{
+    ContentHash, ContentVersion, IdempotencyLog, MapSettings, MapSettingsError, MultiResolutionMap,
+    Trajectory,
+};
 use crate::util::StopSignal;
 use crate::voxel::{MomentSet, VoxelSet};
 
@@ -46,6 +47,11 @@ impl MapContents {
     /// Voxels alone, at a revision; their centers stand for the points.
     pub fn at(revision: u64, voxels: VoxelSet) -> Self {
         Self { revision, moments: MomentSet::of_centers(&voxels), voxels, ..Self::default() }
+    }
+
+    /// The revision, with the hash of the voxels.
+    pub fn version(&self) -> ContentVersion {
+        ContentVersion { revision: self.revision, hash: ContentHash::of(&self.voxels) }
     }
 
     /// These contents, when a map can hold them: what came from elsewhere is asked.
@@ -120,12 +126,12 @@ impl MultiResolutionMap {
 
     /// Fills an empty map; false once stopped.
     fn fill_until(&self, contents: MapContents, stop: StopSignal<'_>) -> bool {
-        if !self.committer().add(&contents.voxels, &contents.moments, stop) {
+        let Some(hash) = self.committer().add(&contents.voxels, &contents.moments, stop) else {
             return false;
-        }
+        };
         *self.trajectory.write() = contents.trajectory;
         *self.requests.write() = contents.requests;
-        self.revision.store(contents.revision, Ordering::Release);
+        self.published.publish(ContentVersion { revision: contents.revision, hash });
         true
     }
 }

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::shard::Shard;
-use super::{MapView, MultiResolutionMap};
+use super::{ContentVersion, MapView, MultiResolutionMap};
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
@@ -32,8 +32,8 @@ pub struct LevelInfo {
 /// What a map holds at one revision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapDescription {
-    /// Committed changes.
-    pub revision: u64,
+    /// Committed changes, and the hash of the finest voxels.
+    pub version: ContentVersion,
     /// Every level, finest first.
     pub levels: Vec<LevelInfo>,
     /// Bytes of memory of the exact sets of all levels.
@@ -65,7 +65,7 @@ impl MultiResolutionMap {
         let describe_level = |level| self.describe_level(&view, level, samples, seed, stop);
         let levels = (0..self.settings.levels).map(describe_level);
         MapDescription {
-            revision: view.revision(),
+            version: view.version(),
             levels: levels.collect(),
             set_bytes: view.shards().map(Shard::set_bytes).sum(),
             moment_bytes: moments.bytes(),

@@ -10,6 +10,7 @@ mod bulk;
 mod capacity_schedule;
 mod change;
 pub mod commit;
+mod content_hash;
 mod contents;
 mod filter_room;
 mod idempotency_log;
@@ -19,6 +20,7 @@ pub(crate) mod lookup;
 mod moments;
 mod name;
 mod occupied_voxel_list;
+mod published;
 mod region;
 mod removal;
 mod settings;
@@ -30,6 +32,7 @@ mod voxel_ownership;
 
 pub use change::{Change, DeletionRecord, Request, UndoRecord};
 pub use commit::{Committed, Committer};
+pub use content_hash::{ContentHash, ContentVersion};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
 pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
@@ -50,12 +53,11 @@ pub use trajectory::{
 pub use view::{LongRead, MapView};
 pub use voxel_ownership::{Leaving, VoxelOwnership};
 
-use std::sync::atomic::Ordering;
-
 use crate::geometry::{Point, Pose};
-use crate::sync::{AtomicU64, Mutex, Rank, RwLock, RwLockReadGuard};
+use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
 use crate::voxel::Lattice;
 use moments::ShardedMoments;
+use published::Published;
 use shard::Shard;
 use sharding::{Sharding, ShardsTouched};
 
@@ -75,7 +77,7 @@ pub struct MultiResolutionMap {
     shards: [RwLock<Shard>; SHARDS],
     trajectory: RwLock<Trajectory>,
     requests: RwLock<IdempotencyLog>,
-    revision: AtomicU64,
+    published: Published,
     commit_queue: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
     long_reads: RwLock<()>,
@@ -96,7 +98,7 @@ impl MultiResolutionMap {
             shards: std::array::from_fn(|i| RwLock::new(Rank::Shard(i as u8), Shard::new(i, &settings))),
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
-            revision: AtomicU64::new(0),
+            published: Published::default(),
             commit_queue: Mutex::new(Rank::Commit, ()),
             long_reads: RwLock::new(Rank::LongRead, ()),
         })
@@ -114,7 +116,12 @@ impl MultiResolutionMap {
 
     /// Committed changes so far.
     pub fn revision(&self) -> u64 {
-        self.revision.load(Ordering::Acquire)
+        self.published.revision()
+    }
+
+    /// The newest revision, with the hash of what the map holds then.
+    pub fn content_version(&self) -> ContentVersion {
+        self.published.read()
     }
 
     /// Number of occupied voxels of `level`.
@@ -132,11 +139,11 @@ impl MultiResolutionMap {
         self.trajectory.read().clone()
     }
 
-    /// The poses of the accepted scans, with a revision at which they are these.
-    pub fn trajectory_and_revision(&self) -> (Trajectory, u64) {
+    /// The poses of the accepted scans, with a version of the map at which they are these.
+    pub fn trajectory_and_version(&self) -> (Trajectory, ContentVersion) {
         // Who adds a pose publishes its revision before others may read.
         let trajectory = self.trajectory.read();
-        (trajectory.clone(), self.revision())
+        (trajectory.clone(), self.content_version())
     }
 
     /// The poses of the accepted scans, where they do not change just now: for threads that may not wait.

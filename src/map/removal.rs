@@ -2,7 +2,7 @@
 
 use super::bulk::{count_each, find_each, write_plane_bits};
 use super::shard::{Block, Shard, levels_of};
-use super::{MapSettings, moments::MomentsLost};
+use super::{ContentHash, MapSettings, moments::MomentsLost};
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCKS_PER_LOOK, ClusterUpdate, VoxelKey, VoxelSet};
@@ -15,6 +15,8 @@ use crate::voxel::{BLOCKS_PER_LOOK, ClusterUpdate, VoxelKey, VoxelSet};
 pub(super) struct Removal {
     /// Finest voxels that go.
     voxels: usize,
+    /// Hash of the finest voxels that go.
+    hash: ContentHash,
     /// Finest voxels that stay.
     left: Left,
     /// What becomes of the moments of voxels that lose descendants.
@@ -50,21 +52,30 @@ impl Removal {
     pub(super) fn plan(shard: &Shard, blocks: &[&Block], stop: StopSignal<'_>) -> Self {
         let voxels = voxels_there(shard, blocks);
         if voxels > 0 && voxels == shard.level(0).len() {
-            return Self { voxels, left: Left::Nothing, moments: MomentsLost::Everything };
+            let mut hash = ContentHash::default();
+            shard.level(0).for_some_keys(|keys| hash = hash.with(ContentHash::of_keys(keys)));
+            return Self { voxels, hash, left: Left::Nothing, moments: MomentsLost::Everything };
         }
         let (mut tiers, mut levels, mut moments) = (Vec::new(), Vec::new(), MomentsLost::default());
-        let mut emptied = Tier::of(shard, 0, blocks, &mut moments, stop).plan(&mut tiers, &mut levels, stop);
+        let finest = Tier::of(shard, 0, blocks, &mut moments, stop);
+        let hash = ContentHash::of_keys(&finest.keys[0]);
+        let mut emptied = finest.plan(&mut tiers, &mut levels, stop);
         for tier in 1..shard.tiers.len() {
             let blocks: VoxelSet = emptied.into_iter().collect();
             let blocks: Vec<_> = blocks.blocks().iter().collect();
             emptied = Tier::of(shard, tier, &blocks, &mut moments, stop).plan(&mut tiers, &mut levels, stop);
         }
-        Self { voxels, left: Left::Voxels { tiers, levels }, moments }
+        Self { voxels, hash, left: Left::Voxels { tiers, levels }, moments }
     }
 
     /// Number of finest voxels that go.
     pub(super) fn voxels(&self) -> usize {
         self.voxels
+    }
+
+    /// Hash of the finest voxels that go.
+    pub(super) fn hash(&self) -> ContentHash {
+        self.hash
     }
 
     /// What becomes of the moments of voxels that lose descendants.

@@ -4,7 +4,7 @@ use super::lookup::{self, LevelView, Lookup};
 use super::occupied_voxel_list::tier_of;
 use super::shard::Shard;
 use super::sharding::{SHARDS, ShardsTouched};
-use super::{MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
+use super::{ContentVersion, MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
@@ -18,7 +18,7 @@ use crate::voxel::{
 pub struct MapView<'a> {
     map: &'a MultiResolutionMap,
     shards: [Option<RwLockReadGuard<'a, Shard>>; SHARDS],
-    revision: u64,
+    version: ContentVersion,
 }
 
 /// A read that takes long, see [`MultiResolutionMap::long_read`].
@@ -45,7 +45,7 @@ impl<'a> MapView<'a> {
     /// read once they are held: a change that is published later touches none of these shards.
     pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
         let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
-        Self { map, shards, revision: map.revision() }
+        Self { map, shards, version: map.content_version() }
     }
 
     /// A view where no lock has to be waited for; none elsewhere.
@@ -54,12 +54,17 @@ impl<'a> MapView<'a> {
         for i in (0..SHARDS).filter(|&i| touched.contains(i)) {
             shards[i] = Some(map.shards[i].try_read()?);
         }
-        Some(Self { map, shards, revision: map.revision() })
+        Some(Self { map, shards, version: map.content_version() })
     }
 
     /// The revision that everything read through this view belongs to.
     pub fn revision(&self) -> u64 {
-        self.revision
+        self.version.revision
+    }
+
+    /// That revision, with the hash of what the whole map holds then.
+    pub fn version(&self) -> ContentVersion {
+        self.version
     }
 
     /// Says of each point whether its voxel of `level` is occupied: point i is bit i % 64 of `occupied[i / 64]`.

@@ -138,7 +138,7 @@ impl Catalog {
             Some(old) => self.replace(Arc::clone(old), uuid, build).await?,
         };
         // Only now does it change no more.
-        Ok((old.map(|old| old.version(old.map.revision())), map))
+        Ok((old.map(|old| old.version_now()), map))
     }
 
     /// Refuses a map file for which there is no place, before any work is done for it.
@@ -266,7 +266,7 @@ impl Catalog {
             // Who still holds the map may read it, but nothing is kept of it any more.
             map.commit_queue.end();
         }
-        let version = map.version(map.map.revision());
+        let version = map.version_now();
         removed.map(|_| version).map_err(|error| match is_gone {
             true => {
                 let message = format!(

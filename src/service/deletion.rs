@@ -31,7 +31,7 @@ impl HostedMap {
         });
         let former = former_digest(deletion);
         if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref(), former)? {
-            let version = self.version(answered.revision);
+            let version = self.version_at(answered.revision);
             return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, version, replayed: true }));
         }
         budget.check_to_shrink()?;
@@ -51,9 +51,9 @@ impl HostedMap {
         };
         let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
-        let answer = move |Committed { revision, voxels: removed }| DeletionAnswer {
-            removed,
-            version: map.version(revision),
+        let answer = move |committed: Committed| DeletionAnswer {
+            removed: committed.voxels,
+            version: map.version(committed.version()),
             replayed: false,
         };
         Ok(Step::Submitted(outcome, Box::new(answer)))

@@ -16,7 +16,7 @@ use super::{
     check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{MapName, MapView, MultiResolutionMap, Region, RobotName};
+use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, Region, RobotName};
 use crate::mapping::{LostRobots, Sightings};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
@@ -171,8 +171,20 @@ impl HostedMap {
         self.commit_queue.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
     }
 
-    pub(super) fn version(&self, revision: u64) -> MapVersion {
-        MapVersion { revision, map_uuid: self.uuid }
+    pub(super) fn version(&self, ContentVersion { revision, hash }: ContentVersion) -> MapVersion {
+        MapVersion { revision, map_uuid: self.uuid, content_hash: Some(hash) }
+    }
+
+    /// The map as it is.
+    pub(super) fn version_now(&self) -> MapVersion {
+        self.version(self.map.content_version())
+    }
+
+    /// The map as it was at a revision, of which a change told before.
+    pub(super) fn version_at(&self, revision: u64) -> MapVersion {
+        let now = self.version_now();
+        let content_hash = now.content_hash.filter(|_| now.revision == revision);
+        MapVersion { revision, content_hash, ..now }
     }
 
     /// Waits until the robot's earlier scans are done.
@@ -268,7 +280,7 @@ impl HostedMap {
             check_not_stopped(stop)?;
             all_have_a_voxel &= view.query(points, &quantize, query.level, query.lookup, words);
         }
-        let version = self.version(view.revision());
+        let version = self.version(view.version());
         drop(view);
         if !all_have_a_voxel {
             return Err(self.point_without_voxel(points, &quantize));
@@ -307,7 +319,7 @@ impl HostedMap {
         if whole > most {
             return Err(listing_too_large(level, whole, most));
         }
-        let (copy, revision) = (view.level_voxels(level, region, most, stop), view.revision());
+        let (copy, version) = (view.level_voxels(level, region, most, stop), view.version());
         drop(view);
         drop(long_read);
         if copy.len() > most {
@@ -317,7 +329,7 @@ impl HostedMap {
         copy.for_some(stop, |some| keys.extend_from_slice(some));
         check_not_stopped(stop)?;
         let resolution_m = self.map.lattice().resolution_m(level);
-        Ok(VoxelListing { resolution_m, keys, version: self.version(revision) })
+        Ok(VoxelListing { resolution_m, keys, version: self.version(version) })
     }
 
     pub(super) fn describe(
@@ -331,7 +343,7 @@ impl HostedMap {
         let (storage, trajectory) = (self.storage(), self.map.trajectory());
         Ok(MapInfo {
             name: self.name.clone(),
-            version: self.version(described.revision),
+            version: self.version(described.version),
             settings: *self.map.settings(),
             levels: described.levels,
             scans: trajectory.len(),

@@ -185,7 +185,7 @@ impl HostedMap {
         if stop.is_cancelled() {
             check_not_stopped(stop)?;
         }
-        let version = self.version(found.revision);
+        let version = self.version(found.version);
         Ok(LocalizationAnswer::of(found, all.len() - points.len(), start.elapsed(), version))
     }
 }

@@ -37,7 +37,7 @@ impl HostedMap {
             );
             return Err(ServiceError::new(Reason::MapFileTooLarge, message));
         }
-        Ok(MapFile { bytes: bytes.into(), version: self.version(snapshot.contents.revision) })
+        Ok(MapFile { bytes: bytes.into(), version: self.version(snapshot.contents.version()) })
     }
 }
 

@@ -87,8 +87,8 @@ impl HostedMap {
 
     /// What to say of a scan that was committed.
     fn committed(&self, answer: ScanAnswer, committed: Committed) -> ScanAnswer {
-        let Committed { revision, voxels: new_voxels } = committed;
-        ScanAnswer { accepted: true, new_voxels, version: self.version(revision), ..answer }
+        let version = self.version(committed.version());
+        ScanAnswer { accepted: true, new_voxels: committed.voxels, version, ..answer }
     }
 
     /// Says what [`HostedMap::submit_scan`] would; changes nothing.
@@ -246,7 +246,7 @@ impl HostedMap {
             points_skipped: pose.points_skipped,
             new_voxels: pose.new_voxels,
             foreground: None,
-            version: self.version(pose.revision),
+            version: self.version_at(pose.revision),
             replayed: true,
             stationary: false,
             recovered: None,
@@ -271,7 +271,7 @@ impl HostedMap {
             points_skipped: scan.skipped(),
             new_voxels: 0,
             foreground: None,
-            version: self.version(self.map.revision()),
+            version: self.version_now(),
             replayed: false,
             stationary: false,
             recovered: located.recovered,

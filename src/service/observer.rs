@@ -90,7 +90,8 @@ impl Change {
         replayed: bool,
     ) -> Self {
         let made_revision = !replayed && (voxels_removed > 0 || scans_undone > 0);
-        let before = MapVersion { revision: after.revision - u64::from(made_revision), ..after };
+        let before =
+            MapVersion { revision: after.revision - u64::from(made_revision), content_hash: None, ..after };
         let replayed = !made_revision;
         Self { before: Some(before), after: Some(after), voxels_removed, scans_undone, replayed }
     }

@@ -29,8 +29,8 @@ impl MapService {
         let work = async {
             let (map, most) = (self.map(map)?, self.limits().page(query.limit)?);
             let page_of = move |_: StopSignal<'_>| {
-                let (trajectory, revision) = map.map.trajectory_and_revision();
-                page(&trajectory, map.version(revision), &query, most)
+                let (trajectory, version) = map.map.trajectory_and_version();
+                page(&trajectory, map.version(version), &query, most)
             };
             self.inner.queries.run(page_of).await
         };
@@ -51,9 +51,9 @@ impl MapService {
             let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
             let map = self.map(map)?;
             let shared = Arc::clone(&map);
-            let copy = self.inner.queries.run(move |_| shared.map.trajectory_and_revision()).await?;
-            let (trajectory, revision) = copy;
-            let version = map.version(revision);
+            let copy = self.inner.queries.run(move |_| shared.map.trajectory_and_version()).await?;
+            let (trajectory, version) = copy;
+            let version = map.version(version);
             Ok(TrajectoryPieces { service: self.clone(), trajectory, version, query, left, ended: false })
         };
         self.observed("StreamTrajectory", Some(map), work, |_| Outcome::Read).await

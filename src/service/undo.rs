@@ -86,14 +86,14 @@ impl HostedMap {
         let former = former_digest(&undo.target);
         if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref(), former)? {
             let (scans, removed, version) =
-                (answered.scans, answered.voxels, self.version(answered.revision));
+                (answered.scans, answered.voxels, self.version_at(answered.revision));
             return Ok(Step::Answered(UndoAnswer { scans, removed, version, replayed: true }));
         }
         budget.check_to_shrink()?;
         let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
         let (scans, withdrawn) = self.targets_of_undo(&undo.target)?;
         if scans.is_empty() {
-            let version = self.version(self.map.revision());
+            let version = self.version_now();
             return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, version, replayed: false }));
         }
         let count = scans.len();
@@ -109,10 +109,10 @@ impl HostedMap {
         };
         let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
-        let answer = move |Committed { revision, voxels: removed }| UndoAnswer {
+        let answer = move |committed: Committed| UndoAnswer {
             scans: count,
-            removed,
-            version: map.version(revision),
+            removed: committed.voxels,
+            version: map.version(committed.version()),
             replayed: false,
         };
         Ok(Step::Submitted(outcome, Box::new(answer)))

@@ -128,12 +128,17 @@ pub(super) fn keys_from(bits: &[u64]) -> Result<Vec<VoxelKey>, ServiceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::ContentHash;
     use crate::service::MapVersion;
     use uuid::Uuid;
 
     #[test]
     fn a_listing_is_cut_into_chunks_that_hold_all_of_it() {
-        let version = MapVersion { revision: 3, map_uuid: Uuid::from_u128(7) };
+        let version = MapVersion {
+            revision: 3,
+            map_uuid: Uuid::from_u128(7),
+            content_hash: Some(ContentHash::from_bits(u64::MAX)),
+        };
         for count in [0, 1, KEYS_PER_CHUNK, KEYS_PER_CHUNK + 1] {
             let keys: Vec<_> = (0..count as u64).map(|bits| VoxelKey::from_bits(bits).unwrap()).collect();
             let chunks: Vec<_> =

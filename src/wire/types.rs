@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use super::{InField, pb, required};
 use crate::geometry::{self, Point, Pose};
-use crate::map::{Lookup, Region, RequestId};
+use crate::map::{ContentHash, Lookup, Region, RequestId};
 use crate::service::{MapVersion, PointCloud, Reason, ServiceError};
 
 impl TryFrom<pb::Points> for PointCloud {
@@ -111,13 +111,21 @@ impl TryFrom<pb::MapVersion> for MapVersion {
     type Error = ServiceError;
 
     fn try_from(version: pb::MapVersion) -> Result<Self, ServiceError> {
-        Ok(Self { revision: version.revision, map_uuid: uuid_from(&version.map_uuid)? })
+        Ok(Self {
+            revision: version.revision,
+            map_uuid: uuid_from(&version.map_uuid)?,
+            content_hash: version.content_hash.map(ContentHash::from_bits),
+        })
     }
 }
 
 impl From<MapVersion> for pb::MapVersion {
     fn from(version: MapVersion) -> Self {
-        Self { revision: version.revision, map_uuid: version.map_uuid.to_string() }
+        Self {
+            revision: version.revision,
+            map_uuid: version.map_uuid.to_string(),
+            content_hash: version.content_hash.map(ContentHash::to_bits),
+        }
     }
 }
 

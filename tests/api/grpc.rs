@@ -260,7 +260,9 @@ async fn a_scan_sent_again_is_answered_as_the_first_time_and_another_under_its_i
     daemon.put_in("a", &row(9)).await;
     let again = robot.insert_scan(scan(&row(4))).await.unwrap().into_inner();
     assert!(again.replayed && again.accepted);
-    assert_eq!((&again.version, again.new_voxels), (&first.version, first.new_voxels));
+    // What the map held then is not known any more.
+    let first_version = first.version.clone().map(|version| pb::MapVersion { content_hash: None, ..version });
+    assert_eq!((&again.version, again.new_voxels), (&first_version, first.new_voxels));
     let poses = [&again, &first].map(|answer| answer.alignment.as_ref().unwrap().map_from_sensor);
     assert_eq!(poses[0], poses[1]);
     assert_eq!(daemon.contents("a").await.0, 2);

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use crate::support::daemon::{
     Daemon, bits_of, bytes_of, client, corner, identity_json, json_of, pose_json, row,
 };
+use crate::support::plain_set::content_hash;
 
 fn reason(error: &Value) -> (&str, &str) {
     (error["code"].as_str().unwrap_or_default(), error["reason"].as_str().unwrap_or_default())
@@ -54,12 +55,13 @@ async fn a_scan_in_json_is_answered_in_full() {
     let answer = json_of(daemon.post("/v1/maps/a/scans", scan.clone()).await).await;
     let uuid = answer["map_uuid"].clone();
     assert_eq!(uuid.as_str().unwrap().len(), 36);
+    let hash = format!("{:016x}", content_hash(&[[10, 0, 0], [11, 0, 0]].into()));
     let expected = json!({
         "accepted": true, "verdict": "accepted", "reason": "the first scan of the map",
         "map_from_sensor": pose_json([1.0, 0.0, 0.0]), "overlap": 0.0, "level_overlaps": vec![0.0; 4],
         "inliers": 0.0, "fitness": 0.0, "information": vec![vec![0.0; 6]; 6], "undetermined": [], "iterations": 0,
         "new_voxels": 2, "points_skipped": 1, "replayed": false, "stationary": false, "recovered": null, "revision": 1,
-        "map_uuid": uuid,
+        "map_uuid": uuid, "content_hash": hash,
     });
     assert!(answer["align_ms"].as_f64().unwrap() >= 0.0);
     let timeless = |mut answer: Value| {
@@ -69,13 +71,14 @@ async fn a_scan_in_json_is_answered_in_full() {
     assert_eq!(timeless(answer), expected);
     let again = json_of(daemon.post("/v1/maps/a/scans", scan).await).await;
     assert_eq!((&again["replayed"], &again["revision"]), (&json!(true), &json!(1)));
+    assert_eq!(again["content_hash"], hash);
 
     let trajectory = json_of(daemon.get("/v1/maps/a/trajectory?robot=r1").await).await;
     let pose = json!({
         "robot": "r1", "session": "", "scan_id": 7, "timestamp_ns": 5, "map_from_sensor": pose_json([1.0, 0.0, 0.0]),
         "revision": 1, "overlap": 0.0, "new_voxels": 2,
     });
-    assert_eq!(trajectory, json!({"poses": [pose], "revision": 1, "map_uuid": uuid}));
+    assert_eq!(trajectory, json!({"poses": [pose], "revision": 1, "map_uuid": uuid, "content_hash": hash}));
     let nobody = json_of(daemon.get("/v1/maps/a/trajectory?robot=r2").await).await;
     assert_eq!(nobody["poses"], json!([]));
 }
@@ -175,6 +178,7 @@ async fn occupancy_is_told_in_json_or_as_a_bitmap() {
     let expected: Vec<bool> = (0..10).map(|i| i < 3).collect();
     let whole = json!({
         "occupied": expected, "points_occupied": 3, "revision": 1, "map_uuid": put["map_uuid"],
+        "content_hash": put["content_hash"],
     });
     assert_eq!(answer, whole);
 
@@ -191,6 +195,7 @@ async fn occupancy_is_told_in_json_or_as_a_bitmap() {
         assert_eq!(header("content-type"), "application/octet-stream");
         assert_eq!([header("mrol-revision"), header("mrol-points")], ["1", "10"]);
         assert_eq!(header("mrol-map-uuid"), put["map_uuid"].as_str().unwrap());
+        assert_eq!(header("mrol-content-hash"), put["content_hash"].as_str().unwrap());
         assert_eq!(answer.bytes().await.unwrap()[..], [occupied, 0], "{parameters}");
     }
     let bloom = daemon.post_bytes("/v1/maps/a/occupancy?lookup=bloom", bytes_of(&row(10))).await;
@@ -248,6 +253,7 @@ async fn voxels_are_listed_by_level_and_box() {
     let coarse = json_of(daemon.get("/v1/maps/a/voxels?level=2").await).await;
     let whole = json!({
         "level": 2, "resolution_m": 0.4, "revision": 1, "map_uuid": put["map_uuid"],
+        "content_hash": put["content_hash"],
         "voxels": [[0, 0, 0], [1, 0, 0], [2, 0, 0]],
     });
     assert_eq!(coarse, whole);

@@ -182,7 +182,9 @@ async fn maps_survive_a_restart() {
     // It still knows the scans it has accepted.
     let again = daemon.mapping().await.insert_scan(scan).await.unwrap().into_inner();
     assert!(again.replayed && again.accepted);
-    assert_eq!((&again.version, again.new_voxels), (&first.version, first.new_voxels));
+    // What the map held then is not known any more.
+    let first_version = first.version.map(|version| pb::MapVersion { content_hash: None, ..version });
+    assert_eq!((again.version, again.new_voxels), (first_version, first.new_voxels));
 }
 
 #[tokio::test]

@@ -13,11 +13,25 @@ pub fn up(index: [i32; 3], level: u32) -> [i32; 3] {
     index.map(|i| i >> level)
 }
 
-/// At every level: the set, the filters (nothing denied, counters equal a recount), and single look-ups.
+/// The hash of the voxels, as the documentation of [`ContentHash`](mrol::map::ContentHash) defines it.
+pub fn content_hash(set: &PlainSet) -> u64 {
+    let field = |i: i32| i as u64 & ((1 << 21) - 1);
+    let mixed = |&[x, y, z]: &[i32; 3]| {
+        let key = field(x) | field(y) << 21 | field(z) << 42;
+        let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    set.iter().map(mixed).fold(0, u64::wrapping_add)
+}
+
+/// The content hash, and at every level: the set, the filters (nothing denied, counters equal a recount), and single look-ups.
 pub fn assert_equal(map: &MultiResolutionMap, model: &PlainSet) {
     // Before the view, which holds the locks that these take.
     let counts: Vec<usize> = (0..map.settings().levels).map(|level| map.voxels(level)).collect();
     let view = map.view();
+    assert_eq!(view.version().hash.to_bits(), content_hash(model), "the content hash");
     for (level, count) in (0..).zip(counts) {
         let expected: PlainSet = model.iter().map(|&i| up(i, level)).collect();
         let found: PlainSet = view.lists(level).flat_map(|list| list.iter()).map(VoxelKey::index).collect();

@@ -2,6 +2,7 @@
 
 use crate::align::{Alignment, Verdict};
 use crate::geometry::Pose;
+use crate::map::ContentVersion;
 
 /// Result of a global localization: where a scan may have been taken, and whether to believe it.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,8 +20,8 @@ pub struct Localization {
     pub cut_short: bool,
     /// Number of cells of poses whose bound was computed.
     pub cells: u64,
-    /// The revision of the map that was searched.
-    pub revision: u64,
+    /// The version of the map that was searched.
+    pub version: ContentVersion,
 }
 
 /// A place that a scan fits.

@@ -6,7 +6,7 @@ use super::slabs::{BLOCKS_PER_LOOK, Slabs, VoxelBox};
 use super::supervision::{Unbuilt, check};
 use super::{LocalizationError, LocalizationSettings, SearchBox, Supervision};
 use crate::geometry::translation_m;
-use crate::map::MultiResolutionMap;
+use crate::map::{ContentVersion, MultiResolutionMap};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, VoxelKey};
 
@@ -16,8 +16,8 @@ pub(super) struct DilatedLevels {
     fields: Vec<DistanceField>,
     /// Box in which the sensor is searched for.
     pub(super) domain: SearchBox,
-    /// The revision of the map that the levels were taken from.
-    pub(super) revision: u64,
+    /// The version of the map that the levels were taken from.
+    pub(super) version: ContentVersion,
 }
 
 /// Voxels along the side of a cell in the field that it reads, where there is a field as fine: rounding up to whole
@@ -37,7 +37,7 @@ const POSES_PER_LOOK: usize = 16 << 10;
 /// Blocks of one revision of a map, in no particular order.
 struct Blocks {
     blocks: Vec<(VoxelKey, BlockMask)>,
-    revision: u64,
+    version: ContentVersion,
 }
 
 impl Blocks {
@@ -54,7 +54,7 @@ impl Blocks {
             }
             blocks.push((block, *mask));
         }
-        Ok(Self { blocks, revision: view.revision() })
+        Ok(Self { blocks, version: view.version() })
     }
 
     /// Calls `f` with the voxels of `level` within a box of finest voxels. A coarse voxel comes once for each block
@@ -135,7 +135,7 @@ impl DilatedLevels {
             field.spread(stop)?;
             fields.push(field);
         }
-        Ok(Self { fields, domain, revision: blocks.revision })
+        Ok(Self { fields, domain, version: blocks.version })
     }
 
     /// The levels without a search box or supervision.

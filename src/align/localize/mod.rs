@@ -38,7 +38,7 @@ pub use supervision::Supervision;
 use super::extent::within_extent;
 use super::{AlignmentSettings, Verdict};
 use crate::geometry::Point;
-use crate::map::MultiResolutionMap;
+use crate::map::{ContentVersion, MultiResolutionMap};
 use crate::util::StopSignal;
 use crate::voxel::sample_bytes_max;
 use basins::Basins;
@@ -93,7 +93,7 @@ pub fn localize_supervised(
 ) -> Result<Localization, LocalizationError> {
     match search_and_refine(map, points, query, settings, alignment, supervision) {
         Ok(found) => Ok(found),
-        Err(Unbuilt::Stopped) => Ok(Localization::cut_short_at_once(map.revision())),
+        Err(Unbuilt::Stopped) => Ok(Localization::cut_short_at_once(map.content_version())),
         Err(Unbuilt::Refused(error)) => Err(error),
     }
 }
@@ -149,13 +149,13 @@ fn search_and_refine(
         exhaustive: !cut_short && orientations.all,
         cut_short,
         cells: found.cells,
-        revision: levels.revision,
+        version: levels.version,
     })
 }
 
 impl Localization {
     /// The answer of a search that was stopped before its data structures were built.
-    fn cut_short_at_once(revision: u64) -> Self {
+    fn cut_short_at_once(version: ContentVersion) -> Self {
         Self {
             verdict: Verdict::Ambiguous,
             reason: "the search was cut short before it began".into(),
@@ -163,7 +163,7 @@ impl Localization {
             exhaustive: false,
             cut_short: true,
             cells: 0,
-            revision,
+            version,
         }
     }
 }

@@ -130,7 +130,11 @@ enum MapSource {
 impl MapSource {
     fn open(file: &Path) -> Result<Self, CliError> {
         let snapshot = Snapshot::read(&Disk::default(), file)?;
-        let version = MapVersion { revision: snapshot.contents.revision, map_uuid: snapshot.uuid };
+        let version = MapVersion {
+            revision: snapshot.contents.revision,
+            map_uuid: snapshot.uuid,
+            content_hash: Some(snapshot.contents.version().hash),
+        };
         Ok(Self::File(Box::new(snapshot.restore().map_err(CliError::failed)?), version))
     }
 

@@ -112,7 +112,7 @@ impl Worker {
     }
 
     fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {
-        let unchanged = Committed { revision: self.map.revision(), voxels: 0 };
+        let unchanged = Committed::none(self.map.content_version());
         let caller_gone = || answer.is_closed();
         let decided = || match decide(&self.map, StopSignal::when(&caller_gone))? {
             Some(Decided { change, record, lent, pin }) => {

@@ -11,10 +11,17 @@ pub struct JsonVersion {
     pub revision: u64,
     /// The uuid of the map's incarnation.
     pub map_uuid: String,
+    /// Hash of the map's finest voxels, 16 hexadecimal digits: a number of JavaScript has too few bits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub content_hash: Option<String>,
 }
 
 impl From<MapVersion> for JsonVersion {
     fn from(version: MapVersion) -> Self {
-        Self { revision: version.revision, map_uuid: version.map_uuid.to_string() }
+        Self {
+            revision: version.revision,
+            map_uuid: version.map_uuid.to_string(),
+            content_hash: version.content_hash.map(|hash| hash.to_string()),
+        }
     }
 }
