@@ -42,7 +42,7 @@
 //! let (voxels, _out_of_range) = VoxelSet::of_points(&scan, &map.lattice().from_points(&map_from_sensor));
 //! let pose = MappedScan::new(RobotName::new("r1")?, map_from_sensor);
 //! let committed = map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels));
-//! assert_eq!((committed.revision, committed.voxels), (1, 2));
+//! assert_eq!((committed.revision, committed.added), (1, 2));
 //!
 //! let quantize = map.lattice().from_points(&map_from_sensor);
 //! let view = map.view_of(&scan, &map_from_sensor);

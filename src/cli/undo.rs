@@ -1,4 +1,4 @@
-//! `mrol undo`: removes scans from a map.
+//! `mrol undo`: takes scans and deletions back.
 
 use std::fmt::{self, Display};
 
@@ -15,13 +15,14 @@ use crate::service::{self, UndoAnswer, UndoTarget};
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol undo --map office --robot r1 --scan-id 7          one scan, by the robot's own number
-  mrol undo --map office --revision 41                   one scan, by the revision that it made
+  mrol undo --map office --revision 41                   one scan or deletion, by the revision that it made
   mrol undo --map office --robot r1 --since 40           all that r1 sent after revision 40
 
-Removes the voxels that only these scans touched; everything else stays as it is. The same scans sent
-again are not inserted: send them under new numbers. `mrol maps show` prints how far back undo can go.";
+Of scans, removes the voxels that only they touched; of a deletion, brings back what it removed. Everything
+else stays as it is. Undone scans sent again are not inserted: send them under new numbers. An undo is not
+undone. `mrol maps show` prints how far back undo can go.";
 
-/// Remove scans from a map on a server
+/// Take back scans or a deletion of a map on a server
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Undo {
@@ -39,7 +40,7 @@ pub(super) struct Undo {
     /// All of the robot's scans that made a revision after this one
     #[arg(long, value_name = "REVISION", requires = "robot", conflicts_with = "scan_id")]
     since: Option<u64>,
-    /// The scan that made this revision
+    /// The scan or deletion that made this revision
     #[arg(long, value_name = "N", conflicts_with_all = ["robot", "scan_id", "since"])]
     revision: Option<u64>,
     /// An id of this undo, which makes it safe to send again
@@ -57,7 +58,7 @@ impl Undo {
             (None, .., Some(revision)) => UndoTarget::Revision(revision),
             _ => {
                 return Err(CliError::usage(
-                    "no scan is named: give --robot with --scan-id or --since, or --revision",
+                    "nothing to undo is named: give --robot with --scan-id or --since, or --revision",
                 ));
             }
         };
@@ -71,26 +72,31 @@ impl Undo {
 #[derive(Serialize)]
 struct Undone {
     scans: usize,
+    deletions: usize,
     removed: usize,
+    restored: usize,
     replayed: bool,
     revision: u64,
     map_uuid: String,
 }
 
 impl From<UndoAnswer> for Undone {
-    fn from(UndoAnswer { scans, removed, version, replayed }: UndoAnswer) -> Self {
-        Self { scans, removed, replayed, revision: version.revision, map_uuid: version.map_uuid.to_string() }
+    fn from(answer: UndoAnswer) -> Self {
+        let UndoAnswer { scans, deletions, removed, restored, version, replayed } = answer;
+        let (revision, map_uuid) = (version.revision, version.map_uuid.to_string());
+        Self { scans, deletions, removed, restored, replayed, revision, map_uuid }
     }
 }
 
 impl Display for Undone {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scans, removed, revision, .. } = self;
-        write!(
-            f,
-            "{} scans taken out, {} voxels with them; revision {revision}",
-            count(*scans),
-            count(*removed)
-        )
+        let &Self { scans, deletions, removed, restored, revision, .. } = self;
+        let what = match deletions {
+            0 => format!("{} scans", count(scans)),
+            1 => "a deletion".to_owned(),
+            more => format!("{} deletions", count(more)),
+        };
+        let (removed, restored) = (count(removed), count(restored));
+        write!(f, "{what} undone: {removed} voxels removed, {restored} restored; revision {revision}")
     }
 }

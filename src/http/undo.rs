@@ -1,4 +1,4 @@
-//! `POST /v1/maps/{map}/undo`: take scans out again.
+//! `POST /v1/maps/{map}/undo`: take scans or a deletion back.
 
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,9 @@ pub(super) struct UndoBody {
 #[derive(Serialize)]
 pub(super) struct UndoResponse {
     scans: usize,
+    deletions: usize,
     removed: usize,
+    restored: usize,
     replayed: bool,
     #[serde(flatten)]
     version: JsonVersion,
@@ -66,7 +68,8 @@ impl TryFrom<UndoBody> for Undo {
 }
 
 impl From<UndoAnswer> for UndoResponse {
-    fn from(UndoAnswer { scans, removed, version, replayed }: UndoAnswer) -> Self {
-        Self { scans, removed, replayed, version: version.into() }
+    fn from(answer: UndoAnswer) -> Self {
+        let UndoAnswer { scans, deletions, removed, restored, version, replayed } = answer;
+        Self { scans, deletions, removed, restored, replayed, version: version.into() }
     }
 }

@@ -1,6 +1,6 @@
 //! Many blocks, or keys, at once: their cache misses are under way together.
 
-use super::shard::Block;
+use super::update::BlockChange;
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::prefetch;
 use crate::voxel::{BlockInCluster, BlockMask, ClusterTable, VoxelKey};
@@ -8,16 +8,20 @@ use crate::voxel::{BlockInCluster, BlockMask, ClusterTable, VoxelKey};
 /// Cache misses that are under way at once.
 const AT_ONCE: usize = 32;
 
-/// Calls `f(block, voxels there)` for each block: what leads to the next of them is fetched in three steps.
-pub(super) fn find_each(table: &ClusterTable, blocks: &[&Block], mut f: impl FnMut(&Block, &BlockMask)) {
-    for blocks in blocks.chunks(AT_ONCE) {
+/// Calls `f(change, voxels there)` for each block that changes: what leads to the next of them is fetched in three steps.
+pub(super) fn find_each(
+    table: &ClusterTable,
+    changes: &[BlockChange<'_>],
+    mut f: impl FnMut(&BlockChange<'_>, &BlockMask),
+) {
+    for changes in changes.chunks(AT_ONCE) {
         let mut places = [(VoxelKey::default(), BlockInCluster::default()); AT_ONCE];
-        for (place, block) in places.iter_mut().zip(blocks) {
-            *place = BlockInCluster::of(block.0);
+        for (place, change) in places.iter_mut().zip(changes) {
+            *place = BlockInCluster::of(change.block);
             prefetch(table.home(place.0));
         }
         let (mut clusters, mut last) = ([None; AT_ONCE], None);
-        for (i, &(key, _)) in places[..blocks.len()].iter().enumerate() {
+        for (i, &(key, _)) in places[..changes.len()].iter().enumerate() {
             // Blocks come row by row: the last cluster is met again more often than not.
             if last != Some(key) {
                 last = Some(key);
@@ -32,7 +36,7 @@ pub(super) fn find_each(table: &ClusterTable, blocks: &[&Block], mut f: impl FnM
             *found = cluster.map_or(&BlockMask::EMPTY, |cluster| cluster.get(place));
             prefetch(*found);
         }
-        blocks.iter().zip(found).for_each(|(block, before)| f(block, before));
+        changes.iter().zip(found).for_each(|(change, before)| f(change, before));
     }
 }
 

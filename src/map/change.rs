@@ -12,7 +12,7 @@ pub enum Change {
     Insertion(ScanRecord),
     /// Voxels were taken out.
     Deletion(DeletionRecord),
-    /// Scans were taken out again.
+    /// Scans and deletions were taken back.
     Undo(UndoRecord),
 }
 
@@ -25,15 +25,21 @@ pub struct DeletionRecord {
     pub request: Option<Request>,
 }
 
-/// Scans that were taken out again.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Scans and deletions that were taken back.
+///
+/// The map after it is what replaying all other changes would give, with the deletions and what scans carved as they were.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct UndoRecord {
     /// The revisions that the scans had made, ascending.
     pub scans: Vec<u64>,
-    /// The finest voxels that no other scan holds, all of them there before.
-    pub voxels: VoxelSet,
-    /// What the moments of the voxels that the scans touched are without them, see
-    /// [`Leaving::moments`](super::Leaving::moments).
+    /// The revisions that the deletions had made, ascending.
+    pub deletions: Vec<u64>,
+    /// The finest voxels that go, all of them there before: no other scan holds them.
+    pub removed: VoxelSet,
+    /// The finest voxels that come back, none of them there before.
+    pub restored: VoxelSet,
+    /// What the moments of the voxels that the changes touched are without them, see
+    /// [`Reversal::moments`](super::Reversal::moments).
     pub moments: MomentSet,
     /// Under which id it was asked for.
     pub request: Option<Request>,
@@ -51,15 +57,6 @@ pub struct Request {
 }
 
 impl Change {
-    /// The finest voxels that it touches.
-    pub fn voxels(&self) -> &VoxelSet {
-        match self {
-            Self::Insertion(scan) => &scan.voxels,
-            Self::Deletion(deletion) => &deletion.voxels,
-            Self::Undo(undo) => &undo.voxels,
-        }
-    }
-
     /// Under which id it was asked for, where that is not a scan's.
     pub fn request(&self) -> Option<&Request> {
         match self {
@@ -67,5 +64,12 @@ impl Change {
             Self::Deletion(deletion) => deletion.request.as_ref(),
             Self::Undo(undo) => undo.request.as_ref(),
         }
+    }
+}
+
+impl UndoRecord {
+    /// The revisions that all that was taken back had made: the scans' and the deletions'.
+    pub fn changes(&self) -> impl Iterator<Item = u64> {
+        self.scans.iter().chain(&self.deletions).copied()
     }
 }

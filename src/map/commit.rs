@@ -5,13 +5,12 @@
 //! the write locks of what it touches, for which it waits behind short readers only. Short readers therefore never
 //! queue behind a change that itself waits for a long one.
 
-use super::addition::Addition;
 use super::moments::{MomentLocks, MomentsOfShard};
-use super::removal::Removal;
-use super::shard::{Block, Shard};
+use super::shard::Shard;
 use super::sharding::SHARDS;
+use super::update::{BlockChange, Moved, ShardUpdate, block_changes};
 use super::{
-    Change, CompletedRequest, ContentHash, ContentVersion, MappedScan, MultiResolutionMap, Request,
+    Change, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, MappedScan, MultiResolutionMap,
     ScanRecord, TrajectorySpacing, UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
@@ -32,8 +31,10 @@ pub struct Committed {
     pub revision: u64,
     /// Hash of what the map holds after it.
     pub hash: ContentHash,
-    /// Finest voxels added or removed.
-    pub voxels: usize,
+    /// Finest voxels that it added.
+    pub added: usize,
+    /// Finest voxels that it took out.
+    pub removed: usize,
 }
 
 impl Committed {
@@ -43,13 +44,8 @@ impl Committed {
     }
 
     /// No change of a map at `version`.
-    pub fn none(version: ContentVersion) -> Self {
-        Self::at(version, 0)
-    }
-
-    /// A change at `version` of `voxels` finest voxels.
-    fn at(ContentVersion { revision, hash }: ContentVersion, voxels: usize) -> Self {
-        Self { revision, hash, voxels }
+    pub fn none(ContentVersion { revision, hash }: ContentVersion) -> Self {
+        Self { revision, hash, added: 0, removed: 0 }
     }
 }
 
@@ -74,7 +70,7 @@ impl<'a> Committer<'a> {
     pub fn apply_until(self, change: &Change, stop: StopSignal<'_>) -> Option<Committed> {
         match change {
             Change::Insertion(scan) => self.insert(scan, stop),
-            Change::Deletion(deletion) => self.delete(&deletion.voxels, deletion.request.as_ref(), stop),
+            Change::Deletion(deletion) => self.delete(deletion, stop),
             Change::Undo(undo) => self.undo(undo, stop),
         }
     }
@@ -84,19 +80,21 @@ impl<'a> Committer<'a> {
         self.apply(&Change::Insertion(scan))
     }
 
+    /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
+    /// passed over; removing none makes no revision.
+    pub fn remove(self, voxels: &VoxelSet) -> Committed {
+        self.apply(&Change::Deletion(DeletionRecord { voxels: voxels.clone(), request: None }))
+    }
+
     fn insert(self, scan: &ScanRecord, stop: StopSignal<'_>) -> Option<Committed> {
-        let planned = self.plan_addition(&scan.voxels, &scan.moments, stop);
-        if stop.is_stopped() {
-            return None;
-        }
-        let version = self.next(|hash| hash.with(hash_added_by(&planned.0)));
-        let (_locks, voxels) = self.add_to_shards(planned, stop);
-        if stop.is_stopped() {
-            return None;
-        }
+        let update = self.plan(&scan.carved, &scan.voxels, stop)?;
+        let committed = self.next(&update);
+        let _locks =
+            self.carry_out(update, &self.map.moments.group(&scan.moments), &Default::default(), stop)?;
         let mut trajectory = self.map.trajectory.write();
-        let committed = Committed::at(version, voxels);
-        trajectory.push(MappedScan { revision: committed.revision, new_voxels: voxels, ..scan.pose.clone() });
+        let pose =
+            MappedScan { revision: committed.revision, new_voxels: committed.added, ..scan.pose.clone() };
+        trajectory.push(pose);
         Some(self.publish(committed))
     }
 
@@ -108,52 +106,42 @@ impl<'a> Committer<'a> {
         moments: &MomentSet,
         stop: StopSignal<'_>,
     ) -> Option<ContentHash> {
-        let planned = self.plan_addition(voxels, moments, stop);
-        if stop.is_stopped() {
-            return None;
-        }
-        let hash = hash_added_by(&planned.0);
-        self.add_to_shards(planned, stop);
-        (!stop.is_stopped()).then_some(hash)
+        let update = self.plan(&VoxelSet::default(), voxels, stop)?;
+        let hash = update.added.hash;
+        self.carry_out(update, &self.map.moments.group(moments), &Default::default(), stop)?;
+        Some(hash)
     }
 
-    /// Takes finest voxels out, and every coarser one that loses its last child. Voxels that are not there are
-    /// passed over; removing none makes no revision.
-    pub fn remove(self, voxels: &VoxelSet) -> Committed {
-        let unchanged = self.unchanged();
-        self.delete(voxels, None, StopSignal::NEVER).unwrap_or(unchanged)
-    }
-
-    fn delete(self, voxels: &VoxelSet, request: Option<&Request>, stop: StopSignal<'_>) -> Option<Committed> {
-        let by_shard = self.group(voxels);
-        let planned = self.plan(touched(&by_shard), |i, shard| Removal::plan(shard, &by_shard[i], stop));
-        if stop.is_stopped() {
-            return None;
-        }
-        let removed = removed_by(&planned);
-        if removed == 0 {
+    fn delete(self, deletion: &DeletionRecord, stop: StopSignal<'_>) -> Option<Committed> {
+        let update = self.plan(&deletion.voxels, &VoxelSet::default(), stop)?;
+        if update.removed.voxels == 0 {
             return Some(self.unchanged());
         }
-        let committed = Committed::at(self.next(|hash| hash.without(hash_removed_by(&planned))), removed);
-        let _locks = self.take_out(planned, &Default::default());
-        self.remember(request, committed, 0);
+        let committed = self.next(&update);
+        let _locks = self.carry_out(update, &Default::default(), &Default::default(), StopSignal::NEVER)?;
+        if let Some(request) = &deletion.request {
+            self.remember(CompletedRequest::of_deletion(request, &committed));
+        }
         Some(self.publish(committed))
     }
 
-    /// Takes scans out of the trajectory, and the voxels that they alone held; always makes a revision.
+    /// Takes changes back: the scans leave the trajectory, what they alone held goes, and what they or deletions took away
+    /// comes back. Always makes a revision.
     fn undo(self, undo: &UndoRecord, stop: StopSignal<'_>) -> Option<Committed> {
-        let by_shard = self.group(&undo.voxels);
-        // All of them, so that nobody who has a view of the whole map sees the trajectory change.
-        let planned = self.plan(0..SHARDS, |i, shard| Removal::plan(shard, &by_shard[i], stop));
-        if stop.is_stopped() {
-            return None;
-        }
-        let removed = removed_by(&planned);
-        let committed = Committed::at(self.next(|hash| hash.without(hash_removed_by(&planned))), removed);
-        let _locks = self.take_out(planned, &self.map.moments.group(&undo.moments));
+        // All shards, so that nobody who has a view of the whole map sees the trajectory change.
+        let update = self.plan_in(&undo.removed, &undo.restored, 0..SHARDS, stop)?;
+        let committed = self.next(&update);
+        let _locks = self.carry_out(
+            update,
+            &Default::default(),
+            &self.map.moments.group(&undo.moments),
+            StopSignal::NEVER,
+        )?;
         let mut trajectory = self.map.trajectory.write();
-        trajectory.withdraw(&undo.scans, committed.revision);
-        self.remember(undo.request.as_ref(), committed, undo.scans.len());
+        trajectory.withdraw(undo.changes(), committed.revision);
+        if let Some(request) = &undo.request {
+            self.remember(CompletedRequest::of_undo(request, undo, &committed));
+        }
         Some(self.publish(committed))
     }
 
@@ -167,15 +155,8 @@ impl<'a> Committer<'a> {
         gone
     }
 
-    fn remember(
-        &self,
-        request: Option<&Request>,
-        Committed { revision, voxels, .. }: Committed,
-        scans: usize,
-    ) {
-        if let Some(Request { id, digest, caller }) = request.cloned() {
-            self.map.requests.write().push(CompletedRequest { id, digest, caller, revision, voxels, scans });
-        }
+    fn remember(&self, request: CompletedRequest) {
+        self.map.requests.write().push(request);
     }
 
     /// Makes the change visible: readers that get a lock from now on report this revision.
@@ -184,10 +165,16 @@ impl<'a> Committer<'a> {
         committed
     }
 
-    /// The next version of the map, whose hash becomes what `change` says.
-    fn next(&self, change: impl FnOnce(ContentHash) -> ContentHash) -> ContentVersion {
+    /// What the change is once it is made: the next revision.
+    fn next(&self, update: &MapUpdate) -> Committed {
         let ContentVersion { revision, hash } = self.map.content_version();
-        ContentVersion { revision: revision + 1, hash: change(hash) }
+        let MapUpdate { added, removed, .. } = update;
+        Committed {
+            revision: revision + 1,
+            hash: hash.with(added.hash).without(removed.hash),
+            added: added.voxels,
+            removed: removed.voxels,
+        }
     }
 
     /// The map as it is.
@@ -195,82 +182,77 @@ impl<'a> Committer<'a> {
         Committed::none(self.map.content_version())
     }
 
-    /// The blocks of `voxels`, shard by shard. A block lies in one region, and so in one shard.
-    fn group<'v>(&self, voxels: &'v VoxelSet) -> [Vec<&'v Block>; SHARDS] {
+    /// Finds out what it comes to that voxels go and others come, and builds what it needs, while readers go on; none once
+    /// stopped.
+    fn plan(&self, removed: &VoxelSet, added: &VoxelSet, stop: StopSignal<'_>) -> Option<MapUpdate> {
+        self.plan_in(removed, added, [], stop)
+    }
+
+    /// [`Committer::plan`], with all `shards` even where nothing changes in them.
+    fn plan_in(
+        &self,
+        removed: &VoxelSet,
+        added: &VoxelSet,
+        shards: impl IntoIterator<Item = usize>,
+        stop: StopSignal<'_>,
+    ) -> Option<MapUpdate> {
+        let by_shard = self.group(removed, added);
+        let mut is_planned = by_shard.each_ref().map(|changes| !changes.is_empty());
+        shards.into_iter().for_each(|i| is_planned[i] = true);
+        let plan = |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], stop));
+        let shards: Vec<_> = (0..SHARDS).filter(|&i| is_planned[i]).map(plan).collect();
+        let total = |of: fn(&ShardUpdate) -> Moved| {
+            shards.iter().fold(Moved::default(), |all, (_, update)| all.and(of(update)))
+        };
+        let (removed, added) = (total(|update| update.removed), total(|update| update.added));
+        (!stop.is_stopped()).then_some(MapUpdate { removed, added, shards })
+    }
+
+    /// What becomes of the blocks, shard by shard. A block lies in one region, and so in one shard.
+    fn group<'v>(&self, removed: &'v VoxelSet, added: &'v VoxelSet) -> [Vec<BlockChange<'v>>; SHARDS] {
         let mut by_shard: [Vec<_>; SHARDS] = Default::default();
-        for block in voxels.blocks() {
-            let finest = block.0.index().map(|i| i << BLOCK_LEVELS);
-            by_shard[self.map.sharding.shard_of(finest, 0)].push(block);
+        for change in block_changes(removed, added) {
+            let finest = change.block.index().map(|i| i << BLOCK_LEVELS);
+            by_shard[self.map.sharding.shard_of(finest, 0)].push(change);
         }
         by_shard
     }
 
-    /// Finds out what adding voxels and the moments of points in them comes to.
-    fn plan_addition(&self, voxels: &VoxelSet, moments: &MomentSet, stop: StopSignal<'_>) -> PlannedAddition {
-        let (by_shard, moments) = (self.group(voxels), self.map.moments.group(moments));
-        let planned = self.plan(touched(&by_shard), |i, shard| Addition::plan(shard, &by_shard[i], stop));
-        (planned, moments)
-    }
-
-    /// Adds what is planned, or some of it once stopped; the number of voxels that were absent.
-    fn add_to_shards(&self, (planned, moments): PlannedAddition, stop: StopSignal<'_>) -> (Locks<'a>, usize) {
+    /// Does what is planned under the write locks, which are taken in ascending order. Moments of voxels that lose
+    /// descendants are rebuilt from what remains; then those of points are `added`, and those that are `known` take the
+    /// place of what is there. None once stopped.
+    fn carry_out(
+        &self,
+        update: MapUpdate,
+        added: &[MomentsOfShard; SHARDS],
+        known: &[MomentsOfShard; SHARDS],
+        stop: StopSignal<'_>,
+    ) -> Option<Locks<'a>> {
         let no_long_read = self.map.long_reads.write();
-        let added_moments = moments.iter().enumerate().filter(|(_, moments)| !moments.is_empty());
-        let moments = self.map.moments.change(added_moments, |shard, moments| shard.add(moments, stop));
-        let mut added = 0;
-        let shards = self.carry_out(planned, |shard, addition| added += addition.apply(shard));
-        (
-            Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: Vec::new() },
-            added,
-        )
-    }
-
-    /// Takes voxels out. Their moments are rebuilt from what remains, or become `moments` where those are known.
-    fn take_out(&self, planned: Plans<Removal>, moments: &[MomentsOfShard; SHARDS]) -> Locks<'a> {
-        let no_long_read = self.map.long_reads.write();
-        let changed = planned.iter().map(|(i, removal)| (*i, (removal.moments(), &moments[*i])));
-        let moments = self.map.moments.change(changed, |shard, (lost, known)| {
-            shard.lose(lost);
-            shard.set(known);
-            shard.reset_if_empty();
-        });
+        let lost = update.shards.iter().map(|(i, update)| (*i, &update.moments));
+        let moments = self.map.moments.change(lost, added, known, stop);
         let mut emptied = Vec::new();
-        let shards = self.carry_out(planned, |shard, removal| {
-            emptied.extend(removal.apply(shard, &self.map.settings));
-        });
-        Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: emptied }
-    }
-
-    /// Finds out what a change of some shards comes to, and builds what it needs, while readers go on.
-    fn plan<P>(
-        &self,
-        shards: impl IntoIterator<Item = usize>,
-        mut plan: impl FnMut(usize, &Shard) -> P,
-    ) -> Plans<P> {
-        shards.into_iter().map(|i| (i, plan(i, &self.map.shards[i].read()))).collect()
-    }
-
-    /// Does what is planned under the write locks, which are taken in ascending order.
-    fn carry_out<P>(
-        &self,
-        planned: Plans<P>,
-        mut apply: impl FnMut(&mut Shard, P),
-    ) -> Vec<RwLockWriteGuard<'a, Shard>> {
-        let lock = |(i, plan): (usize, P)| {
+        let lock = |(i, update): (usize, ShardUpdate)| {
             let mut shard = self.map.shards[i].write();
-            apply(&mut shard, plan);
+            emptied.extend(update.apply(&mut shard, &self.map.settings));
             shard
         };
-        planned.into_iter().map(lock).collect()
+        let shards = update.shards.into_iter().map(lock).collect();
+        let locks =
+            Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: emptied };
+        (!stop.is_stopped()).then_some(locks)
     }
 }
 
-/// Parts of a change, each with the number of its shard, ascending. A shard is as it was planned for until the change
-/// is carried out, since the turn to change the map is held meanwhile.
-type Plans<P> = Vec<(usize, P)>;
-
-/// An addition shard by shard, and the moments that it adds.
-type PlannedAddition = (Plans<Addition>, [MomentsOfShard; SHARDS]);
+/// What is to be done to a map. A shard is as it was planned for until the change is carried out, since the turn to change
+/// the map is held meanwhile.
+struct MapUpdate {
+    /// The finest voxels that go, and those that come.
+    removed: Moved,
+    added: Moved,
+    /// Each with the number of its shard, ascending.
+    shards: Vec<(usize, ShardUpdate)>,
+}
 
 /// Keeps readers of what changed waiting until the change is published.
 struct Locks<'a> {
@@ -279,23 +261,4 @@ struct Locks<'a> {
     _no_long_read: RwLockWriteGuard<'a, ()>,
     /// What was in shards that lost everything: to give back its memory takes a while, so it comes last.
     _emptied: Vec<Shard>,
-}
-
-/// The shards that have a part of a change, ascending.
-fn touched(by_shard: &[Vec<&Block>; SHARDS]) -> impl Iterator<Item = usize> {
-    (0..SHARDS).filter(|&i| !by_shard[i].is_empty())
-}
-
-/// Hash of the finest voxels that are added.
-fn hash_added_by(planned: &Plans<Addition>) -> ContentHash {
-    planned.iter().fold(ContentHash::default(), |hash, (_, addition)| hash.with(addition.hash()))
-}
-
-/// Hash of the finest voxels that go.
-fn hash_removed_by(planned: &Plans<Removal>) -> ContentHash {
-    planned.iter().fold(ContentHash::default(), |hash, (_, removal)| hash.with(removal.hash()))
-}
-
-fn removed_by(planned: &Plans<Removal>) -> usize {
-    planned.iter().map(|(_, removal)| removal.voxels()).sum()
 }

@@ -64,7 +64,7 @@ impl MapContents {
         }
         let (scans, withdrawn) = (self.trajectory.stored(), self.trajectory.withdrawn());
         self.check_order("scans", scans.map(|scan| scan.revision))?;
-        self.check_order("withdrawn scans", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
+        self.check_order("withdrawn changes", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
         self.check_order("requests", self.requests.iter().map(|request| request.revision))?;
         Ok(self)
     }

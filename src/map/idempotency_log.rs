@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use super::{CallerName, RequestId};
+use super::{CallerName, Committed, Request, RequestId, UndoRecord};
 
 /// Requests that a map remembers, those of all callers together.
 pub const REQUESTS_KEPT: usize = 65_536;
@@ -23,9 +23,13 @@ pub struct CompletedRequest {
     /// The revision that it made.
     pub revision: u64,
     /// Finest voxels that it took out.
-    pub voxels: usize,
-    /// Scans that it took out.
+    pub removed: usize,
+    /// Finest voxels that it put back.
+    pub restored: usize,
+    /// Scans that it took back.
     pub scans: usize,
+    /// Deletions that it took back.
+    pub deletions: usize,
 }
 
 /// The last answered requests of each caller, in the order of their revisions.
@@ -50,14 +54,27 @@ type Key = (Option<CallerName>, RequestKind, RequestId);
 pub enum RequestKind {
     /// Voxels taken out.
     Deletion,
-    /// Scans taken out again.
+    /// Scans and deletions taken back.
     Undo,
 }
 
 impl CompletedRequest {
-    /// The request's kind: an undo takes out a scan at least, a deletion none.
+    /// The request for a deletion that was made.
+    pub(super) fn of_deletion(request: &Request, committed: &Committed) -> Self {
+        Self::of_undo(request, &UndoRecord::default(), committed)
+    }
+
+    /// The request for an undo that was made.
+    pub(super) fn of_undo(request: &Request, undo: &UndoRecord, committed: &Committed) -> Self {
+        let Request { id, digest, caller } = request.clone();
+        let &Committed { revision, added, removed, .. } = committed;
+        let (scans, deletions) = (undo.scans.len(), undo.deletions.len());
+        Self { id, digest, caller, revision, removed, restored: added, scans, deletions }
+    }
+
+    /// The request's kind: an undo takes back a scan or a deletion at least, a deletion none.
     pub fn kind(&self) -> RequestKind {
-        if self.scans > 0 { RequestKind::Undo } else { RequestKind::Deletion }
+        if self.scans + self.deletions > 0 { RequestKind::Undo } else { RequestKind::Deletion }
     }
 
     fn key(&self) -> Key {
@@ -147,7 +164,16 @@ mod tests {
 
     fn request(n: u64) -> CompletedRequest {
         let id = RequestId::new(&format!("r{n}")).unwrap();
-        CompletedRequest { id, digest: n, caller: None, revision: n * 3, voxels: 1, scans: 0 }
+        CompletedRequest {
+            id,
+            digest: n,
+            caller: None,
+            revision: n * 3,
+            removed: 1,
+            restored: 0,
+            scans: 0,
+            deletions: 0,
+        }
     }
 
     fn of_caller(caller: &str, n: u64) -> CompletedRequest {
@@ -160,10 +186,12 @@ mod tests {
 
     #[test]
     fn an_undo_answers_for_no_deletion_of_the_same_id() {
-        let undo = CompletedRequest { scans: 1, ..request(1) };
-        let requests: IdempotencyLog = [undo.clone()].into_iter().collect();
-        assert_eq!(requests.find(RequestKind::Deletion, &undo.id, None), None);
-        assert_eq!(requests.find(RequestKind::Undo, &undo.id, None), Some(&undo));
+        for (scans, deletions) in [(1, 0), (0, 1)] {
+            let undo = CompletedRequest { scans, deletions, ..request(1) };
+            let requests: IdempotencyLog = [undo.clone()].into_iter().collect();
+            assert_eq!(requests.find(RequestKind::Deletion, &undo.id, None), None);
+            assert_eq!(requests.find(RequestKind::Undo, &undo.id, None), Some(&undo));
+        }
     }
 
     #[test]

@@ -4,7 +4,6 @@
 //! Reading order: [`OccupiedVoxelList`] is one level of the paper, `shard` all levels of one part of space,
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
-mod addition;
 mod bounds;
 mod bulk;
 mod capacity_schedule;
@@ -15,6 +14,7 @@ mod contents;
 mod filter_room;
 mod idempotency_log;
 mod info;
+mod level_update;
 mod level_voxels;
 pub(crate) mod lookup;
 mod moments;
@@ -22,11 +22,11 @@ mod name;
 mod occupied_voxel_list;
 mod published;
 mod region;
-mod removal;
 mod settings;
 mod shard;
 mod sharding;
 mod trajectory;
+mod update;
 pub mod view;
 mod voxel_ownership;
 
@@ -48,10 +48,10 @@ pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
-    ScanRecord, Trajectory, TrajectorySpacing, WithdrawnScan,
+    ScanRecord, Trajectory, TrajectorySpacing, WithdrawnChange,
 };
 pub use view::{LongRead, MapView};
-pub use voxel_ownership::{Leaving, VoxelOwnership};
+pub use voxel_ownership::{Reversal, VoxelOwnership};
 
 use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};

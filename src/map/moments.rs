@@ -46,6 +46,13 @@ pub(super) enum MomentsLost {
     Some { gone: Vec<VoxelKey>, rebuilt: MomentsOfShard },
 }
 
+impl MomentsLost {
+    /// True where no moments change.
+    fn is_empty(&self) -> bool {
+        matches!(self, Self::Some { gone, rebuilt } if gone.is_empty() && rebuilt.is_empty())
+    }
+}
+
 impl Default for MomentsLost {
     fn default() -> Self {
         Self::Some { gone: Vec::new(), rebuilt: Vec::new() }
@@ -78,18 +85,28 @@ impl ShardedMoments {
         MomentsView { sharding: self.sharding, shards }
     }
 
-    /// Changes some shards, in ascending order, each by what comes with its number.
-    pub(super) fn change<T>(
+    /// Changes shards, in ascending order: what voxels `lost` is taken out, moments are `added`, and last those that are
+    /// `known` take the place of what is there. Shards without any of this are passed over; some of it is done once
+    /// stopped.
+    pub(super) fn change<'l>(
         &self,
-        parts: impl IntoIterator<Item = (usize, T)>,
-        mut change: impl FnMut(&mut MomentShard, T),
+        lost: impl IntoIterator<Item = (usize, &'l MomentsLost)>,
+        added: &[MomentsOfShard; SHARDS],
+        known: &[MomentsOfShard; SHARDS],
+        stop: StopSignal<'_>,
     ) -> MomentLocks<'_> {
-        let changed = |(number, part): (usize, T)| {
-            let mut shard = self.shards[number].write();
-            change(&mut shard, part);
+        let mut losses = [const { None }; SHARDS];
+        lost.into_iter().filter(|(_, lost)| !lost.is_empty()).for_each(|(i, lost)| losses[i] = Some(lost));
+        let changes = |&i: &usize| losses[i].is_some() || !added[i].is_empty() || !known[i].is_empty();
+        let changed = |i: usize| {
+            let mut shard = self.shards[i].write();
+            losses[i].into_iter().for_each(|lost| shard.lose(lost));
+            shard.add(&added[i], stop);
+            shard.set(&known[i]);
+            shard.reset_if_empty();
             shard
         };
-        parts.into_iter().map(changed).collect()
+        (0..SHARDS).filter(changes).map(changed).collect()
     }
 
     /// The moments of `set`, shard by shard.
@@ -104,14 +121,14 @@ impl ShardedMoments {
 
 impl MomentShard {
     /// Adds the moments of points whose voxels are, or are about to be, occupied; some of them once stopped.
-    pub(super) fn add(&mut self, moments: &[(VoxelKey, Moments)], stop: StopSignal<'_>) {
+    fn add(&mut self, moments: &[(VoxelKey, Moments)], stop: StopSignal<'_>) {
         for &(voxel, added) in stop.pieces(moments, VOXELS_PER_LOOK).flatten() {
             *self.0.entry(voxel).or_default() += added;
         }
     }
 
     /// Takes out what voxels that lose descendants lose.
-    pub(super) fn lose(&mut self, lost: &MomentsLost) {
+    fn lose(&mut self, lost: &MomentsLost) {
         match lost {
             MomentsLost::Everything => *self = Self::default(),
             MomentsLost::Some { gone, rebuilt } => {
@@ -124,7 +141,7 @@ impl MomentShard {
     }
 
     /// Puts moments in the place of those that are there; none of no points are kept.
-    pub(super) fn set(&mut self, moments: &[(VoxelKey, Moments)]) {
+    fn set(&mut self, moments: &[(VoxelKey, Moments)]) {
         for &(voxel, moments) in moments {
             match moments.is_empty() {
                 true => drop(self.0.remove(&voxel)),
@@ -134,7 +151,7 @@ impl MomentShard {
     }
 
     /// Gives back the memory of a shard that lost its last moments.
-    pub(super) fn reset_if_empty(&mut self) {
+    fn reset_if_empty(&mut self) {
         if self.0.is_empty() {
             *self = Self::default();
         }

@@ -1,43 +1,44 @@
-//! Which voxels would not be there without certain scans.
+//! Which voxels a map would hold without certain changes.
 
 use std::collections::BTreeSet;
 
 use hashbrown::HashMap;
 
-use super::{Change, MapContents, ScanRecord, WithdrawnScan};
+use super::{Change, MapContents, ScanRecord, WithdrawnChange};
 use crate::util::StopSignal;
-use crate::voxel::{BlockMask, MomentSet, Moments, VoxelKey, VoxelSet};
+use crate::voxel::{BlockMask, MOMENT_LEVEL, MomentSet, Moments, VoxelKey, VoxelSet};
 
-/// Who holds each voxel that scans which are to be undone, the targets, have touched: they, others, or both.
+/// What a map holds of the voxels that scans and deletions which are to be undone, the targets, have touched: as it is,
+/// and as it would be without them.
 ///
-/// A scan holds the voxels that it touched, until a deletion takes them from everybody or the scan is undone; a
-/// voxel is occupied as long as somebody holds it. So a map without certain scans follows from its changes: it is
-/// what replaying them without those scans would give, with the deletions as they were.
+/// A map without certain changes is what replaying all others gives, with the deletions and what scans carved as they
+/// were. So both are replayed side by side, in the blocks that the targets touched: no other voxel can differ. What is
+/// there with the targets alone goes with them, and what is there only without them comes back.
 ///
 /// VoxelOwnership are made in this order: each target is [touched](VoxelOwnership::touch), so that nothing else need be
 /// remembered; the [base](VoxelOwnership::begin) and every change after it, the targets among them, are
-/// [observed](VoxelOwnership::observe); what leaves with the targets is [found out](VoxelOwnership::leaving); and what is
+/// [observed](VoxelOwnership::observe); what undoing the targets does is [found out](VoxelOwnership::reversal); and what is
 /// observed after that [renews](VoxelOwnership::renew) it. They take memory by what the targets touched, whatever else
 /// the map held.
 #[derive(Debug)]
 pub struct VoxelOwnership {
     /// By revision, ascending.
     targets: Vec<u64>,
-    /// Scans that hold nothing any more, ascending.
+    /// Changes that were taken back before, ascending.
     withdrawn: Vec<u64>,
     /// Blocks that the targets touched.
-    blocks: HashMap<VoxelKey, Holders>,
+    blocks: HashMap<VoxelKey, Sides>,
     /// Voxels whose moments the targets changed, as they are without them.
     moments: HashMap<VoxelKey, Moments>,
-    /// What of both changed since it was found out what leaves.
+    /// What of both changed since it was found out what undoing does.
     since: Option<Since>,
 }
 
-/// Who holds which voxels of a block.
+/// The voxels of a block, with the targets and without them.
 #[derive(Debug, Clone, Copy)]
-struct Holders {
-    targets: BlockMask,
-    others: BlockMask,
+struct Sides {
+    with: BlockMask,
+    without: BlockMask,
 }
 
 #[derive(Debug, Default)]
@@ -46,11 +47,13 @@ struct Since {
     moments: BTreeSet<VoxelKey>,
 }
 
-/// What leaves a map with the scans that are undone.
+/// What undoing changes does to a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Leaving {
-    /// The voxels that nobody but the targets holds.
-    pub voxels: VoxelSet,
+pub struct Reversal {
+    /// The voxels that go: those that are there with the targets alone.
+    pub removed: VoxelSet,
+    /// The voxels that come back: those that the targets took away.
+    pub restored: VoxelSet,
     /// The moments of all voxels that the targets touched, as they are without them: what they were, and of no points where
     /// nothing is left.
     pub moments: MomentSet,
@@ -60,47 +63,53 @@ pub struct Leaving {
 const ENTRIES_PER_LOOK: usize = 16 << 10;
 
 impl VoxelOwnership {
-    /// The ownership of scans that are to be undone, by revision; those of `withdrawn` hold nothing any more.
-    pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnScan]) -> Self {
+    /// The ownership of changes that are to be undone, by revision; those of `withdrawn` were taken back before.
+    pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnChange]) -> Self {
         targets.sort_unstable();
-        let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();
+        let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.change).collect();
         withdrawn.sort_unstable();
         Self { targets, withdrawn, blocks: HashMap::new(), moments: HashMap::new(), since: None }
     }
 
     /// Bytes of memory that touching `target` takes at most: an entry of each of its blocks and voxels with moments, in
     /// tables that grow to twice their size beside the old ones.
-    pub fn bytes_of(target: &ScanRecord) -> usize {
-        const OF_BLOCK: usize = 4 * size_of::<(VoxelKey, Holders)>();
+    pub fn bytes_of(target: &Change) -> usize {
+        const OF_BLOCK: usize = 4 * size_of::<(VoxelKey, Sides)>();
         const OF_MOMENTS: usize = 4 * size_of::<(VoxelKey, Moments)>();
-        target.voxels.blocks().len() * OF_BLOCK + target.moments.as_slice().len() * OF_MOMENTS
+        let coarse = |(_, mask): &(VoxelKey, BlockMask)| mask.count(MOMENT_LEVEL);
+        let touched = touched_by(target).into_iter();
+        let bytes_of = |voxels: &VoxelSet| {
+            let moments: usize = voxels.blocks().iter().map(coarse).sum();
+            voxels.blocks().len() * OF_BLOCK + moments * OF_MOMENTS
+        };
+        touched.map(bytes_of).sum()
     }
 
-    /// Bytes of memory that finding out what leaves takes at most: it, once more while it is renewed, and what is noted
-    /// meanwhile.
-    pub fn leaving_bytes(&self) -> usize {
-        const OF_BLOCK: usize = 2 * size_of::<(VoxelKey, BlockMask)>() + 2 * size_of::<VoxelKey>();
+    /// Bytes of memory that finding out what undoing does takes at most: it, once more while it is renewed, and what is
+    /// noted meanwhile.
+    pub fn reversal_bytes(&self) -> usize {
+        const OF_BLOCK: usize = 4 * size_of::<(VoxelKey, BlockMask)>() + 2 * size_of::<VoxelKey>();
         const OF_MOMENTS: usize = 2 * size_of::<(VoxelKey, Moments)>() + 2 * size_of::<VoxelKey>();
         self.blocks.len() * OF_BLOCK + self.moments.len() * OF_MOMENTS
     }
 
     /// Takes note of what a target touches.
-    pub fn touch(&mut self, target: &ScanRecord) {
-        let nobody = Holders { targets: BlockMask::EMPTY, others: BlockMask::EMPTY };
-        for (block, _) in target.voxels.blocks() {
-            self.blocks.entry(*block).or_insert(nobody);
-        }
-        for (voxel, _) in target.moments.as_slice() {
-            self.moments.entry(*voxel).or_default();
+    pub fn touch(&mut self, target: &Change) {
+        let nothing = Sides { with: BlockMask::EMPTY, without: BlockMask::EMPTY };
+        for (block, mask) in touched_by(target).into_iter().flat_map(VoxelSet::blocks) {
+            self.blocks.entry(*block).or_insert(nothing);
+            for cell in mask.cells(MOMENT_LEVEL) {
+                self.moments.entry(cell.voxel(*block).ancestor(MOMENT_LEVEL)).or_default();
+            }
         }
     }
 
-    /// Begins with `base`, what the map held at a revision before that of any target; its holders are others. False once
-    /// stopped. No scan may lie before the base and be withdrawn after it.
+    /// Begins with `base`, what the map held at a revision before that of any target. False once stopped. No change may lie
+    /// before the base and be taken back after it.
     pub fn begin(&mut self, base: &MapContents, stop: StopSignal<'_>) -> bool {
         for (block, mask) in stop.pieces(base.voxels.blocks(), ENTRIES_PER_LOOK).flatten() {
-            if let Some(holders) = self.blocks.get_mut(block) {
-                holders.others = *mask;
+            if let Some(sides) = self.blocks.get_mut(block) {
+                *sides = Sides { with: *mask, without: *mask };
             }
         }
         for (voxel, moments) in stop.pieces(base.moments.as_slice(), ENTRIES_PER_LOOK).flatten() {
@@ -113,20 +122,28 @@ impl VoxelOwnership {
 
     /// Takes note of the next change after the base.
     pub fn observe(&mut self, revision: u64, change: &Change) {
+        if self.withdrawn.binary_search(&revision).is_ok() {
+            return;
+        }
+        let is_target = self.targets.binary_search(&revision).is_ok();
         match change {
-            Change::Insertion(_) if self.withdrawn.binary_search(&revision).is_ok() => {}
-            Change::Insertion(scan) => self.observe_scan(scan, self.targets.binary_search(&revision).is_ok()),
-            Change::Deletion(deletion) => self.observe_deletion(&deletion.voxels),
-            // The scans that it took out were passed over where they went in.
+            Change::Insertion(scan) => {
+                self.observe_removal(&scan.carved, is_target);
+                self.observe_scan(scan, is_target);
+            }
+            Change::Deletion(deletion) => self.observe_removal(&deletion.voxels, is_target),
+            // What it took back was passed over where it was made.
             Change::Undo(_) => {}
         }
     }
 
     fn observe_scan(&mut self, scan: &ScanRecord, is_target: bool) {
         for (block, mask) in scan.voxels.blocks() {
-            let Some(holders) = self.blocks.get_mut(block) else { continue };
-            let of = if is_target { &mut holders.targets } else { &mut holders.others };
-            *of = of.union(mask);
+            let Some(sides) = self.blocks.get_mut(block) else { continue };
+            sides.with = sides.with.union(mask);
+            if !is_target {
+                sides.without = sides.without.union(mask);
+            }
             self.since.iter_mut().for_each(|since| since.blocks.extend([*block]));
         }
         for &(voxel, moments) in scan.moments.as_slice().iter().filter(|_| !is_target) {
@@ -136,14 +153,17 @@ impl VoxelOwnership {
         }
     }
 
-    fn observe_deletion(&mut self, voxels: &VoxelSet) {
+    fn observe_removal(&mut self, voxels: &VoxelSet, is_target: bool) {
         for (block, mask) in voxels.blocks() {
-            let Some(holders) = self.blocks.get_mut(block) else { continue };
-            let before = holders.others;
-            holders.targets = holders.targets.difference(mask);
-            holders.others = before.difference(mask);
+            let Some(sides) = self.blocks.get_mut(block) else { continue };
+            sides.with = sides.with.difference(mask);
             self.since.iter_mut().for_each(|since| since.blocks.extend([*block]));
-            for (voxel, rebuilt) in holders.others.rebuilt_moments(&before, *block) {
+            if is_target {
+                continue;
+            }
+            let before = sides.without;
+            sides.without = before.difference(mask);
+            for (voxel, rebuilt) in sides.without.rebuilt_moments(&before, *block) {
                 let Some(without) = self.moments.get_mut(&voxel) else { continue };
                 *without = rebuilt;
                 self.since.iter_mut().for_each(|since| since.moments.extend([voxel]));
@@ -151,32 +171,47 @@ impl VoxelOwnership {
         }
     }
 
-    /// What leaves with the targets; none once stopped. What is observed afterwards is noted, for
+    /// What undoing the targets does; none once stopped. What is observed afterwards is noted, for
     /// [`VoxelOwnership::renew`].
-    pub fn leaving(&mut self, stop: StopSignal<'_>) -> Option<Leaving> {
-        let blocks = stop.paced(&self.blocks, ENTRIES_PER_LOOK);
-        let blocks = blocks.map(|(&block, holders)| (block, holders.targets_alone())).collect();
+    pub fn reversal(&mut self, stop: StopSignal<'_>) -> Option<Reversal> {
+        let of_blocks = |of: fn(&Sides) -> BlockMask| {
+            let blocks = stop.paced(&self.blocks, ENTRIES_PER_LOOK);
+            VoxelSet::of_blocks_until(blocks.map(|(&block, sides)| (block, of(sides))).collect(), stop)
+        };
+        let (removed, restored) = (of_blocks(Sides::removed), of_blocks(Sides::restored));
         let moments = stop.paced(&self.moments, ENTRIES_PER_LOOK).map(|(&voxel, without)| (voxel, *without));
         let moments = MomentSet::of_voxels_until(moments.collect(), stop);
-        let leaving = Leaving { voxels: VoxelSet::of_blocks_until(blocks, stop), moments };
         self.since = Some(Since::default());
-        (!stop.is_stopped()).then_some(leaving)
+        (!stop.is_stopped()).then_some(Reversal { removed, restored, moments })
     }
 
-    /// Makes what left with the targets what leaves now; true where that may be something else. It takes as long as what was
-    /// observed since, and where that was something, a copy.
-    pub fn renew(&self, voxels: &mut VoxelSet, moments: &mut MomentSet) -> bool {
+    /// Makes what undoing the targets did what it does now; true where that may be something else. It takes as long as what
+    /// was observed since, and where that was something, a copy.
+    pub fn renew(&self, removed: &mut VoxelSet, restored: &mut VoxelSet, moments: &mut MomentSet) -> bool {
         let Some(since) = self.since.as_ref().filter(|since| !since.is_empty()) else { return false };
-        let changed = |block: &VoxelKey| Some((*block, self.blocks.get(block)?.targets_alone()));
-        *voxels = merged(voxels.blocks(), since.blocks.iter().filter_map(changed)).collect();
+        for (voxels, of) in
+            [(removed, Sides::removed as fn(&Sides) -> BlockMask), (restored, Sides::restored)]
+        {
+            let changed = |block: &VoxelKey| Some((*block, of(self.blocks.get(block)?)));
+            *voxels = merged(voxels.blocks(), since.blocks.iter().filter_map(changed)).collect();
+        }
         let changed = |voxel: &VoxelKey| Some((*voxel, *self.moments.get(voxel)?));
         *moments = merged(moments.as_slice(), since.moments.iter().filter_map(changed)).collect();
         true
     }
 
-    /// The scans that are to be undone, by revision, ascending.
+    /// The changes that are to be undone, by revision, ascending.
     pub fn targets(&self) -> &[u64] {
         &self.targets
+    }
+}
+
+/// The sets of finest voxels that a change touches.
+fn touched_by(change: &Change) -> Vec<&VoxelSet> {
+    match change {
+        Change::Insertion(scan) => vec![&scan.voxels, &scan.carved],
+        Change::Deletion(deletion) => vec![&deletion.voxels],
+        Change::Undo(undo) => vec![&undo.removed, &undo.restored],
     }
 }
 
@@ -186,9 +221,13 @@ impl Since {
     }
 }
 
-impl Holders {
-    fn targets_alone(&self) -> BlockMask {
-        self.targets.difference(&self.others)
+impl Sides {
+    fn removed(&self) -> BlockMask {
+        self.with.difference(&self.without)
+    }
+
+    fn restored(&self) -> BlockMask {
+        self.without.difference(&self.with)
     }
 }
 
@@ -242,11 +281,8 @@ mod tests {
     /// Of targets among `changes`, the first of which makes revision 2.
     fn begun(targets: &[u64], changes: &[Change], base: &MapContents) -> VoxelOwnership {
         let mut observations = VoxelOwnership::of(targets.to_vec(), &[]);
-        for (revision, change) in (2..).zip(changes) {
-            match change {
-                Change::Insertion(scan) if targets.contains(&revision) => observations.touch(scan),
-                _ => {}
-            }
+        for (_, change) in (2..).zip(changes).filter(|(revision, _)| targets.contains(revision)) {
+            observations.touch(change);
         }
         assert!(observations.begin(base, StopSignal::NEVER));
         observations
@@ -267,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_becomes_what_is_found_out_at_the_end_whatever_comes_between() {
+    fn what_undoing_does_becomes_what_is_found_out_at_the_end_whatever_comes_between() {
         let changes = [
             insertion(2, 0..100),
             insertion(3, 50..60),
@@ -281,18 +317,18 @@ mod tests {
         ];
         for found_out_after in 0..=changes.len() {
             let (mut early, mut late) =
-                (begun(&[2, 4], &changes, &base(3)), begun(&[2, 4], &changes, &base(3)));
-            let mut leaving = None;
+                (begun(&[2, 4, 5], &changes, &base(3)), begun(&[2, 4, 5], &changes, &base(3)));
+            let mut reversal = None;
             for (at, (revision, change)) in (2..).zip(&changes).enumerate() {
                 if at == found_out_after {
-                    leaving = early.leaving(StopSignal::NEVER);
+                    reversal = early.reversal(StopSignal::NEVER);
                 }
                 early.observe(revision, change);
                 late.observe(revision, change);
-                if let Some(leaving) = &leaving {
-                    let mut now = Leaving::clone(leaving);
-                    early.renew(&mut now.voxels, &mut now.moments);
-                    assert_eq!(now, late.leaving(StopSignal::NEVER).unwrap(), "{found_out_after}, {at}");
+                if let Some(reversal) = &reversal {
+                    let mut now = Reversal::clone(reversal);
+                    early.renew(&mut now.removed, &mut now.restored, &mut now.moments);
+                    assert_eq!(now, late.reversal(StopSignal::NEVER).unwrap(), "{found_out_after}, {at}");
                 }
             }
         }
@@ -302,33 +338,35 @@ mod tests {
     fn what_the_targets_did_not_touch_changes_nothing_and_takes_no_memory() {
         let mut observations = begun(&[2], &[insertion(2, 0..10)], &base(300));
         observations.observe(2, &insertion(2, 0..10));
-        let mut leaving = observations.leaving(StopSignal::NEVER).unwrap();
+        let mut reversal = observations.reversal(StopSignal::NEVER).unwrap();
         observations.observe(3, &insertion(3, 1000..100_000));
         observations.observe(4, &deletion(2000..90_000));
-        assert!(!observations.renew(&mut leaving.voxels, &mut leaving.moments));
+        let Reversal { removed, restored, moments } = &mut reversal;
+        assert!(!observations.renew(removed, restored, moments));
         assert_eq!((observations.blocks.len(), observations.moments.len()), (2, 3));
     }
 
     #[test]
-    fn what_leaves_with_the_targets_is_found_out_with_looks_in_proportion_to_what_they_touched() {
+    fn what_undoing_does_is_found_out_with_looks_in_proportion_to_what_they_touched() {
         let target = insertion(2, 0..1_000_000);
         let mut observations = begun(&[2], std::slice::from_ref(&target), &base(400));
         observations.observe(2, &target);
         let looks = Cell::new(0);
         let count = || looks.replace(looks.get() + 1) == usize::MAX;
-        assert!(observations.leaving(StopSignal::when(&count)).is_some());
+        assert!(observations.reversal(StopSignal::when(&count)).is_some());
         let entries = observations.blocks.len() + observations.moments.len();
         assert!(looks.get() >= entries / ENTRIES_PER_LOOK && entries > 10 * ENTRIES_PER_LOOK, "{entries}");
         let gone = || true;
-        assert_eq!(observations.leaving(StopSignal::when(&gone)), None);
+        assert_eq!(observations.reversal(StopSignal::when(&gone)), None);
     }
 
     #[test]
     fn what_a_target_is_said_to_add_covers_its_tables() {
-        let scan = scan(2, 0..100_000);
-        let mut observations = VoxelOwnership::of(vec![2], &[]);
-        observations.touch(&scan);
-        let tables = observations.blocks.allocation_size() + observations.moments.allocation_size();
-        assert!(tables <= VoxelOwnership::bytes_of(&scan), "{tables} bytes");
+        for target in [insertion(2, 0..100_000), deletion(0..100_000)] {
+            let mut observations = VoxelOwnership::of(vec![2], &[]);
+            observations.touch(&target);
+            let tables = observations.blocks.allocation_size() + observations.moments.allocation_size();
+            assert!(tables <= VoxelOwnership::bytes_of(&target), "{tables} bytes");
+        }
     }
 }

@@ -32,7 +32,7 @@ impl HostedMap {
         let former = former_digest(deletion);
         if let Some(answered) = self.answered(RequestKind::Deletion, request.as_ref(), former)? {
             let version = self.version_at(answered.revision);
-            return Ok(Step::Answered(DeletionAnswer { removed: answered.voxels, version, replayed: true }));
+            return Ok(Step::Answered(DeletionAnswer { removed: answered.removed, version, replayed: true }));
         }
         budget.check_to_shrink()?;
         let (map, deletion, budget) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(budget));
@@ -52,7 +52,7 @@ impl HostedMap {
         let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |committed: Committed| DeletionAnswer {
-            removed: committed.voxels,
+            removed: committed.removed,
             version: map.version(committed.version()),
             replayed: false,
         };

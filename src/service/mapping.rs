@@ -88,7 +88,7 @@ impl HostedMap {
     /// What to say of a scan that was committed.
     fn committed(&self, answer: ScanAnswer, committed: Committed) -> ScanAnswer {
         let version = self.version(committed.version());
-        ScanAnswer { accepted: true, new_voxels: committed.voxels, version, ..answer }
+        ScanAnswer { accepted: true, new_voxels: committed.added, version, ..answer }
     }
 
     /// Says what [`HostedMap::submit_scan`] would; changes nothing.

@@ -344,19 +344,18 @@ impl MapService {
                 move |_: StopSignal<'_>| map.submit_deletion(&deletion, caller.as_ref(), &inner.budget);
             self.submit_and_wait(&self.inner.mapping, None, submit).await
         };
-        self.observed("DeleteVoxels", Some(map), work, |answer| {
-            Outcome::Changed(Change::of_voxels(answer.version, answer.removed, 0, answer.replayed))
-        })
-        .await
+        self.observed("DeleteVoxels", Some(map), work, |answer| Outcome::Changed(Change::of_deletion(answer)))
+            .await
     }
 
-    /// Takes scans out again: of the voxels that they touched, those that no other scan holds go. Without them the map
-    /// is as if they had never been accepted.
+    /// Takes scans or a deletion back: the map is then what all other changes make of it, with the deletions as they were. Of
+    /// the voxels that a scan touched, those that no other scan holds go; those that a deletion took out come back.
     ///
     /// # Errors
-    /// `NotFound` without such a map or scan; `FailedPrecondition` for a scan from before what undo reaches, or where
-    /// maps are kept in memory only; `ResourceExhausted` while the disk is nearly full, or where there is no memory to
-    /// find out in who holds which voxels; `DeadlineExceeded` with `time_limit` beyond `undo_time_max`.
+    /// `NotFound` without such a map, scan or revision; `FailedPrecondition` for a change from before what undo reaches, for
+    /// a revision that an undo made, or where maps are kept in memory only; `ResourceExhausted` while the disk is nearly
+    /// full, where there is no memory to find out in what the map would be, or none for what comes back; `DeadlineExceeded`
+    /// with `time_limit` beyond `undo_time_max`.
     pub async fn undo(&self, map: &MapName, undo: Undo) -> Result<UndoAnswer, ServiceError> {
         let work = async {
             self.scans.permit_undo(&undo.target)?;
@@ -374,11 +373,7 @@ impl MapService {
             })
             .await
         };
-        self.observed("Undo", Some(map), work, |answer| {
-            let UndoAnswer { version, removed, scans, replayed } = *answer;
-            Outcome::Changed(Change::of_voxels(version, removed, scans, replayed))
-        })
-        .await
+        self.observed("Undo", Some(map), work, |answer| Outcome::Changed(Change::of_undo(answer))).await
     }
 
     /// The occupied voxels of a level, in a region or everywhere, all at one revision.

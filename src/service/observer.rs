@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::{MapService, MapVersion, ServiceError};
+use super::{DeletionAnswer, MapService, MapVersion, ServiceError, UndoAnswer};
 use crate::align::Verdict;
 use crate::map::{CallerName, Lookup, MapName, RobotName};
 use crate::mapping::Recovered;
@@ -67,7 +67,7 @@ pub enum Outcome {
 }
 
 /// What a change by an operator did.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Change {
     /// The map's version before: another uuid where another map was replaced; none of a map that was not there.
     pub before: Option<MapVersion>,
@@ -75,30 +75,44 @@ pub struct Change {
     pub after: Option<MapVersion>,
     /// Voxels of level 0 that were removed.
     pub voxels_removed: usize,
-    /// Scans that were taken out.
+    /// Voxels of level 0 that were put back.
+    pub voxels_restored: usize,
+    /// Scans that were taken back.
     pub scans_undone: usize,
+    /// Deletions that were taken back.
+    pub deletions_undone: usize,
     /// True of a change that was done before under its request id, or had nothing to do.
     pub replayed: bool,
 }
 
 impl Change {
-    /// A deletion or an undo that led to `after`, by a revision of its own unless it was `replayed` or had nothing to do.
-    pub(super) fn of_voxels(
-        after: MapVersion,
-        voxels_removed: usize,
-        scans_undone: usize,
-        replayed: bool,
-    ) -> Self {
-        let made_revision = !replayed && (voxels_removed > 0 || scans_undone > 0);
+    /// A deletion that led to `after`.
+    pub(super) fn of_deletion(&DeletionAnswer { version, removed, replayed }: &DeletionAnswer) -> Self {
+        Self { voxels_removed: removed, ..Self::of_revision(version, !replayed && removed > 0) }
+    }
+
+    /// An undo that led to `after`.
+    pub(super) fn of_undo(answer: &UndoAnswer) -> Self {
+        let &UndoAnswer { scans, deletions, removed, restored, version, replayed } = answer;
+        Self {
+            voxels_removed: removed,
+            voxels_restored: restored,
+            scans_undone: scans,
+            deletions_undone: deletions,
+            ..Self::of_revision(version, !replayed && scans + deletions > 0)
+        }
+    }
+
+    /// What led to `after`, by a revision of its own unless it was replayed or had nothing to do.
+    fn of_revision(after: MapVersion, made_revision: bool) -> Self {
         let before =
             MapVersion { revision: after.revision - u64::from(made_revision), content_hash: None, ..after };
-        let replayed = !made_revision;
-        Self { before: Some(before), after: Some(after), voxels_removed, scans_undone, replayed }
+        Self { replayed: !made_revision, ..Self::of_map(Some(before), Some(after)) }
     }
 
     /// A map was made, deleted or replaced.
     pub(super) fn of_map(before: Option<MapVersion>, after: Option<MapVersion>) -> Self {
-        Self { before, after, voxels_removed: 0, scans_undone: 0, replayed: before == after }
+        Self { before, after, replayed: before == after, ..Self::default() }
     }
 }
 

@@ -129,7 +129,7 @@ reasons! {
     NotFound {
         MapNotFound "map_not_found" Both: "no such map, or it was deleted meanwhile", "make it; `GET /v1/maps` lists them";
         RouteNotFound "route_not_found" Http: "no such path", "see [operations](#operations-over-http)";
-        ScanNotFound "scan_not_found" Both: "no such accepted scan, or it was undone already", "read the trajectory";
+        ScanNotFound "scan_not_found" Both: "no such accepted scan, or it was undone already; no such revision", "read the trajectory";
     }
     Conflict {
         MapExists "map_exists" Both: "a map of this name with other settings, or where one is to be restored", "another name, or `replace`";
@@ -141,7 +141,8 @@ reasons! {
         MapEmpty "map_empty" Both: "the map has nothing to localize in", "insert a scan first";
         MapReplaced "map_replaced" Both: "the map is another one by now", "read its `map_uuid` and start again";
         NoJournal "no_journal" Both: "the server keeps maps in memory only, and undo needs a journal", "start it with `--data-dir`";
-        OutsideUndoWindow "outside_undo_window" Both: "the scan is from before `storage.undo_from_revision`", "delete by region; `store.undo_revisions`, `store.undo_bytes_max`";
+        NotUndoable "not_undoable" Both: "the revision was made by an undo, or what it made was undone already", "send what was undone again, or delete it again";
+        OutsideUndoWindow "outside_undo_window" Both: "the scan or deletion is from before `storage.undo_from_revision`", "delete by region; `store.undo_revisions`, `store.undo_bytes_max`";
         RevisionsUsedUp "revisions_used_up" Both: "revision 2^53 was reached", "make another map";
         ScanIdTooOld "scan_id_too_old" Both: "the id is from before the undo window, where ids are not kept, or its session from long ago", "number new scans upwards, or choose another session";
         ScanWithdrawn "scan_withdrawn" Both: "the scan was accepted and undone since", "send it under a new id to have it back";

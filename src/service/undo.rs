@@ -1,4 +1,4 @@
-//! How scans leave a map again.
+//! How scans and deletions are taken back.
 
 use std::sync::Arc;
 
@@ -7,14 +7,15 @@ use tokio::sync::OwnedMutexGuard;
 use super::commit_queue::{Decided, Refusal, Step, Stop, Submission, record_of};
 use super::deletion::removal_bytes;
 use super::digest::{Digest, FormerDigest};
+use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
 use super::resource_budget::{Reservation, ResourceBudget};
 use super::time_limit::TimeLimit;
 use super::trajectory::{scan_id_too_old, scan_name};
 use super::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget, check_not_stopped, ended_early};
 use crate::map::{
-    CallerName, Change, Committed, KnownScan, Leaving, MappedScan, MultiResolutionMap, Request, RequestKind,
-    Trajectory, UndoRecord, WithdrawnScan,
+    CallerName, Change, Committed, CompletedRequest, KnownScan, MultiResolutionMap, Request, RequestKind,
+    Reversal, UndoRecord, WithdrawnChange,
 };
 use crate::store::{MapFolder, NotObserved, Observed, Record, StoreError};
 use crate::util::StopSignal;
@@ -43,7 +44,9 @@ impl PlannedUndo {
         check_not_stopped(stop)?;
         let Observed { observations, pin, .. } = observed;
         let is_other = match &mut change {
-            Change::Undo(undo) => observations.renew(&mut undo.voxels, &mut undo.moments),
+            Change::Undo(undo) => {
+                observations.renew(&mut undo.removed, &mut undo.restored, &mut undo.moments)
+            }
             Change::Insertion(_) | Change::Deletion(_) => false,
         };
         Ok(Decided { change, record: Some(record).filter(|_| !is_other), lent, pin: Some(pin) })
@@ -85,19 +88,23 @@ impl HostedMap {
         });
         let former = former_digest(&undo.target);
         if let Some(answered) = self.answered(RequestKind::Undo, request.as_ref(), former)? {
-            let (scans, removed, version) =
-                (answered.scans, answered.voxels, self.version_at(answered.revision));
-            return Ok(Step::Answered(UndoAnswer { scans, removed, version, replayed: true }));
+            let CompletedRequest { scans, deletions, removed, restored, revision, .. } = answered;
+            let version = self.version_at(revision);
+            let answer = UndoAnswer { scans, deletions, removed, restored, version, replayed: true };
+            return Ok(Step::Answered(answer));
         }
         budget.check_to_shrink()?;
         let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
-        let (scans, withdrawn) = self.targets_of_undo(&undo.target)?;
-        if scans.is_empty() {
-            let version = self.version_now();
-            return Ok(Step::Answered(UndoAnswer { scans: 0, removed: 0, version, replayed: false }));
+        let withdrawn = self.map.trajectory().withdrawn().to_vec();
+        let targets = self.targets_of_undo(&undo.target, &folder, &withdrawn)?;
+        let (scans, deletions) = (targets.scans.len(), targets.deletions.len());
+        if targets.changes().next().is_none() {
+            let (version, replayed) = (self.version_now(), false);
+            let answer = UndoAnswer { scans, deletions, removed: 0, restored: 0, version, replayed };
+            return Ok(Step::Answered(answer));
         }
-        let count = scans.len();
-        let planned = self.plan_undo(&folder, scans, &withdrawn, request.clone(), budget, stop)?;
+        let targets = UndoRecord { request: request.clone(), ..targets };
+        let planned = self.plan_undo(&folder, targets, &withdrawn, budget, stop)?;
         let (map, limit) = (Arc::clone(self), limit.clone());
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Undo, request.as_ref(), former)?;
@@ -110,43 +117,51 @@ impl HostedMap {
         let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         let map = Arc::clone(self);
         let answer = move |committed: Committed| UndoAnswer {
-            scans: count,
-            removed: committed.voxels,
+            scans,
+            deletions,
+            removed: committed.removed,
+            restored: committed.added,
             version: map.version(committed.version()),
             replayed: false,
         };
         Ok(Step::Submitted(outcome, Box::new(answer)))
     }
 
-    /// What leaves with `scans`, as the map is now: what takes long is done here, on a thread of its own.
+    /// What undoing `targets` does, as the map is now: what takes long is done here, on a thread of its own.
     fn plan_undo(
         &self,
         folder: &MapFolder,
-        scans: Vec<u64>,
-        withdrawn: &[WithdrawnScan],
-        request: Option<Request>,
+        mut targets: UndoRecord,
+        withdrawn: &[WithdrawnChange],
         budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<PlannedUndo, ServiceError> {
-        let mut observed = self.observe(folder, &scans, withdrawn, budget, stop)?;
-        let finding_out = budget.reserve_transient(observed.observations.leaving_bytes() as u64, UNDO)?;
-        let leaving = observed.observations.leaving(stop).ok_or_else(|| ended_early(stop))?;
-        let Leaving { mut voxels, mut moments } = leaving;
+        let changes: Vec<u64> = targets.changes().collect();
+        let mut observed = self.observe(folder, &changes, withdrawn, budget, stop)?;
+        let finding_out = budget.reserve_transient(observed.observations.reversal_bytes() as u64, UNDO)?;
+        let reversal = observed.observations.reversal(stop).ok_or_else(|| ended_early(stop))?;
+        let Reversal { mut removed, mut restored, mut moments } = reversal;
         folder.observe(&mut observed, stop).map_err(|e| self.unreadable(&e))?;
         check_not_stopped(stop)?;
-        observed.observations.renew(&mut voxels, &mut moments);
-        let removal = budget.reserve_transient(removal_bytes(&self.map, &voxels), UNDO)?;
-        let change = Change::Undo(UndoRecord { scans, voxels, moments, request });
+        observed.observations.renew(&mut removed, &mut restored, &mut moments);
+        let removal = budget.reserve_transient(removal_bytes(&self.map, &removed), UNDO)?;
+        let mut lent = vec![finding_out, removal];
+        if !restored.is_empty() {
+            let growth = growth_bytes(self.map.settings(), &restored, moments.as_slice().len());
+            lent.push(budget.reserve_growth(growth)?);
+        }
+        (targets.removed, targets.restored, targets.moments) = (removed, restored, moments);
+        let change = Change::Undo(targets);
         let record = record_of(&change)?;
-        Ok(PlannedUndo { change, record, observed, lent: vec![finding_out, removal] })
+        Ok(PlannedUndo { change, record, observed, lent })
     }
 
-    /// Who holds which of the voxels that `scans` touched. Memory is lent for each part before it is built.
+    /// What the map holds without `changes`. Memory is lent for each part before it is built.
     fn observe(
         &self,
         folder: &MapFolder,
-        scans: &[u64],
-        withdrawn: &[WithdrawnScan],
+        changes: &[u64],
+        withdrawn: &[WithdrawnChange],
         budget: &ResourceBudget,
         stop: StopSignal<'_>,
     ) -> Result<Observed, ServiceError> {
@@ -157,50 +172,79 @@ impl HostedMap {
             part = Some(budget.reserve_transient(bytes, UNDO)?);
             Ok(())
         };
-        folder.observations(scans, withdrawn, reserve, stop).map_err(|why| match why {
-            NotObserved::OutsideUndoWindow => self.outside_undo_window(folder, scans[0], withdrawn),
+        folder.observations(changes, withdrawn, reserve, stop).map_err(|why| match why {
+            NotObserved::OutsideUndoWindow => self.outside_undo_window(folder, changes[0], withdrawn),
             NotObserved::Stopped => ended_early(stop),
             NotObserved::NoMemory(refusal) => refusal,
             NotObserved::Unreadable(error) => self.unreadable(&error),
         })
     }
 
-    /// The revisions of the scans that are meant, ascending, and the scans that were withdrawn before.
-    fn targets_of_undo(&self, target: &UndoTarget) -> Result<(Vec<u64>, Vec<WithdrawnScan>), ServiceError> {
+    /// The changes that are meant, of which those of `withdrawn` were taken back before.
+    fn targets_of_undo(
+        &self,
+        target: &UndoTarget,
+        folder: &MapFolder,
+        withdrawn: &[WithdrawnChange],
+    ) -> Result<UndoRecord, ServiceError> {
         let trajectory = self.map.trajectory();
-        let one = |found: Option<&MappedScan>, what: String| {
-            let missing = || {
-                let message = format!("map {} has no accepted scan {what}", self.name);
-                ServiceError::new(Reason::ScanNotFound, message)
-            };
-            found.map(|pose| vec![pose.revision]).ok_or_else(missing)
-        };
         let scans = match target {
             UndoTarget::Scan { robot, session, scan_id } => {
-                let found = match trajectory.known(robot, session, *scan_id) {
-                    Some(KnownScan::Kept(pose)) => Some(pose),
+                match trajectory.known(robot, session, *scan_id) {
+                    Some(KnownScan::Kept(pose)) => vec![pose.revision],
                     Some(KnownScan::TooOld) => return Err(scan_id_too_old(robot, session, *scan_id)),
-                    Some(KnownScan::Undone(_)) | None => None,
-                };
-                one(found, format!("of {}", scan_name(robot, session, *scan_id)))?
+                    Some(KnownScan::Undone(_)) | None => {
+                        return Err(self.no_scan(&format!("of {}", scan_name(robot, session, *scan_id))));
+                    }
+                }
             }
-            UndoTarget::Revision(revision) => {
-                self.check_undo_window(&trajectory, *revision)?;
-                one(trajectory.at(*revision), format!("that made revision {revision}"))?
-            }
+            UndoTarget::Revision(revision) => match trajectory.at(*revision) {
+                Some(pose) => vec![pose.revision],
+                None if trajectory.is_undone(*revision) => {
+                    let what = format!("that made revision {revision}: it was undone already");
+                    return Err(self.no_scan(&what));
+                }
+                None => return self.deletion_to_undo(*revision, folder, withdrawn),
+            },
             UndoTarget::RobotSince { robot, revision } => {
                 trajectory.poses_after(*revision, Some(robot)).map(|pose| pose.revision).collect()
             }
         };
-        Ok((scans, trajectory.withdrawn().to_vec()))
+        Ok(UndoRecord { scans, ..UndoRecord::default() })
     }
 
-    /// Refuses a scan that may be outside the undo window and is not kept.
-    fn check_undo_window(&self, trajectory: &Trajectory, revision: u64) -> Result<(), ServiceError> {
-        let folder = self.folder.as_ref().filter(|_| trajectory.at(revision).is_none());
-        let outside_undo_window = folder.filter(|folder| revision < folder.undo_from(trajectory.withdrawn()));
-        outside_undo_window
-            .map_or(Ok(()), |folder| Err(self.outside_undo_window(folder, revision, trajectory.withdrawn())))
+    /// The deletion that made `revision`, which no accepted scan made.
+    fn deletion_to_undo(
+        &self,
+        revision: u64,
+        folder: &MapFolder,
+        withdrawn: &[WithdrawnChange],
+    ) -> Result<UndoRecord, ServiceError> {
+        let what = || format!("that made revision {revision}, and no deletion that did");
+        if revision > self.map.revision() {
+            return Err(self.no_scan(&what()));
+        }
+        let not_undoable = |why: String| {
+            let message = format!("revision {revision} of map {} {why}", self.name);
+            Err(ServiceError::new(Reason::NotUndoable, message))
+        };
+        if let Some(undone) = withdrawn.iter().find(|withdrawn| withdrawn.change == revision) {
+            return not_undoable(format!("was undone already, by revision {}", undone.revision));
+        }
+        match folder.change_at::<ServiceError>(revision, withdrawn) {
+            Ok(Some(Change::Deletion(_))) => {
+                Ok(UndoRecord { deletions: vec![revision], ..UndoRecord::default() })
+            }
+            Ok(Some(Change::Undo(_))) => not_undoable("was made by an undo, which is not undone".to_owned()),
+            Ok(Some(Change::Insertion(_)) | None) => Err(self.no_scan(&what())),
+            Err(NotObserved::Unreadable(error)) => Err(self.unreadable(&error)),
+            Err(_) => Err(self.outside_undo_window(folder, revision, withdrawn)),
+        }
+    }
+
+    fn no_scan(&self, what: &str) -> ServiceError {
+        let message = format!("map {} has no accepted scan {what}", self.name);
+        ServiceError::new(Reason::ScanNotFound, message)
     }
 
     /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
@@ -221,11 +265,11 @@ impl HostedMap {
         &self,
         folder: &MapFolder,
         first: u64,
-        withdrawn: &[WithdrawnScan],
+        withdrawn: &[WithdrawnChange],
     ) -> ServiceError {
         let message = format!(
-            "undo reaches back to revision {} of map {}, and the first of the scans made revision {first}: it takes a \
-             snapshot from before it, without scans that were undone later, and the journal from there on, which are kept \
+            "undo reaches back to revision {} of map {}, and the first of the changes made revision {first}: it takes a \
+             snapshot from before it, without changes that were undone later, and the journal from there on, which are kept \
              within store.undo_revisions, {}, and store.undo_bytes_max, {}, and not where the map was restored since",
             folder.undo_from(withdrawn),
             self.name,

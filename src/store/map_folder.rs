@@ -29,7 +29,7 @@ use super::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
 use super::retention::UndoWindow;
 use super::snapshot_files::{Sizes, forget_damaged, snapshot_name};
 use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
-use crate::map::WithdrawnScan;
+use crate::map::WithdrawnChange;
 use crate::sync::{Mutex, Rank};
 use facts::Facts;
 
@@ -182,7 +182,7 @@ impl MapFolder {
     }
 
     /// Removes snapshots and journal that are no longer needed; the caller holds the lock of the snapshots.
-    fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnScan]) -> Result<(), StoreError> {
+    fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnChange]) -> Result<(), StoreError> {
         let path = self.path.get();
         let sizes = Sizes::of(&*self.files, &path)?;
         let kept = self.facts.forget(window, withdrawn, &sizes);
@@ -205,7 +205,7 @@ impl MapFolder {
 
     /// The oldest revision that undo can return to, where the scans of `withdrawn` were removed before. Does not wait
     /// for a disk.
-    pub fn undo_from(&self, withdrawn: &[WithdrawnScan]) -> u64 {
+    pub fn undo_from(&self, withdrawn: &[WithdrawnChange]) -> u64 {
         self.facts.undo_from(withdrawn)
     }
 

@@ -11,7 +11,7 @@
 //! ```
 
 use super::snapshot_files::Sizes;
-use crate::map::WithdrawnScan;
+use crate::map::WithdrawnChange;
 
 /// Number of snapshots that are kept for recovery: the newest, and one more in case that is damaged.
 pub(super) const FOR_RECOVERY: usize = 2;
@@ -21,7 +21,7 @@ pub(super) fn kept(
     snapshots: &[u64],
     head: u64,
     undo_revisions: u64,
-    withdrawn: &[WithdrawnScan],
+    withdrawn: &[WithdrawnChange],
 ) -> Vec<u64> {
     let can_be_base = |snapshot: &&u64| is_base(**snapshot, withdrawn);
     let oldest = head.saturating_sub(undo_revisions);
@@ -50,7 +50,7 @@ pub(super) fn kept_within(
     snapshots: &[u64],
     head: u64,
     window: UndoWindow,
-    withdrawn: &[WithdrawnScan],
+    withdrawn: &[WithdrawnChange],
     sizes: &Sizes,
 ) -> Vec<u64> {
     let mut candidates = snapshots;
@@ -77,8 +77,8 @@ fn undo_bytes(kept: &[u64], sizes: &Sizes) -> u64 {
 
 /// True when undo can begin with a snapshot: it holds nothing of a scan that was withdrawn later, whose voxels could
 /// not be told apart.
-pub(super) fn is_base(snapshot: u64, withdrawn: &[WithdrawnScan]) -> bool {
-    withdrawn.iter().all(|withdrawn| snapshot < withdrawn.scan || withdrawn.revision <= snapshot)
+pub(super) fn is_base(snapshot: u64, withdrawn: &[WithdrawnChange]) -> bool {
+    withdrawn.iter().all(|withdrawn| snapshot < withdrawn.change || withdrawn.revision <= snapshot)
 }
 
 #[cfg(test)]
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn a_snapshot_that_holds_a_scan_withdrawn_later_is_no_base() {
-        let withdrawn = [WithdrawnScan { scan: 15, revision: 45 }];
+        let withdrawn = [WithdrawnChange { change: 15, revision: 45 }];
         let bases: Vec<u64> = (1..7).map(|i| i * 10).filter(|&s| is_base(s, &withdrawn)).collect();
         assert_eq!(bases, [10, 50, 60]);
         assert_eq!(kept(&[10, 20, 30, 40, 50, 60, 70], 70, 30, &withdrawn), [10, 50, 60, 70]);
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn what_is_kept_for_undo_begins_with_a_base_where_there_is_one() {
-        let withdrawn = [WithdrawnScan { scan: 5, revision: 45 }];
+        let withdrawn = [WithdrawnChange { change: 5, revision: 45 }];
         let snapshots = [10, 20, 30, 50, 60, 70];
         assert_eq!(kept(&snapshots, 70, 1000, &withdrawn), [50, 60, 70]);
         assert_eq!(kept(&[10, 20, 30, 40], 40, 1000, &withdrawn), [30, 40]);

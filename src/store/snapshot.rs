@@ -37,8 +37,9 @@ use writing::body_of;
 
 /// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
 /// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
-/// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored.
-pub const FORMAT_VERSION: u32 = 5;
+/// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored; up to
+/// version 5 no deletion was taken back.
+pub const FORMAT_VERSION: u32 = 6;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 pub(super) const HEADER_BYTES: usize = 48;
 /// Bytes of the header up to version 3.
@@ -297,7 +298,7 @@ mod tests {
     use crate::geometry;
     use crate::map::{
         CallerName, CompletedRequest, ForgottenIds, MappedScan, RequestId, RobotName, SessionName,
-        Trajectory, WithdrawnScan,
+        Trajectory, WithdrawnChange,
     };
     use crate::store::codec::moments;
     use crate::store::pb;
@@ -322,7 +323,16 @@ mod tests {
         moments += Moments::of_offset([-2048, 2048, 0]);
         let id = RequestId::new("undo-1").unwrap();
         let caller = Some(CallerName::new("r1").unwrap());
-        let request = CompletedRequest { id, digest: 9, caller, revision: 42, voxels: 0, scans: 1 };
+        let request = CompletedRequest {
+            id,
+            digest: 9,
+            caller,
+            revision: 42,
+            removed: 0,
+            restored: 3,
+            scans: 1,
+            deletions: 1,
+        };
         Snapshot {
             uuid: Uuid::from_bytes([7; 16]),
             settings: MapSettings::new(0.05, 4),
@@ -350,7 +360,7 @@ mod tests {
             .with_forgotten(&r0, &ids(Some(&SessionName::default()), 0))
             .with_forgotten(&r0, &ids(Some(&session), 17))
             .with_forgotten(&r0, &ids(None, 0))
-            .with_poses([undone, pose], vec![WithdrawnScan { scan: 39, revision: 42 }])
+            .with_poses([undone, pose], vec![WithdrawnChange { change: 39, revision: 42 }])
     }
 
     /// All of it in one message.

@@ -84,7 +84,8 @@ impl Observer for Audit {
         let map = map.map(|map| map.as_str());
         match end {
             End::Done(Outcome::Changed(change)) => {
-                let Change { before, after, voxels_removed, scans_undone, replayed } = change;
+                let Change { before, after, voxels_removed, voxels_restored, .. } = change;
+                let Change { scans_undone, deletions_undone, replayed, .. } = change;
                 let uuid = after.or(*before).map(|version| version.map_uuid.to_string());
                 let uuid_before =
                     before.filter(|before| after.is_some_and(|after| after.map_uuid != before.map_uuid));
@@ -94,7 +95,7 @@ impl Observer for Audit {
                 let outcome = if *replayed { "unchanged" } else { "done" };
                 tracing::info!(
                     target: AUDIT, operation, map, uuid, uuid_before, revision_before, revision, voxels_removed,
-                    scans_undone, outcome, "change"
+                    voxels_restored, scans_undone, deletions_undone, outcome, "change"
                 );
             }
             End::Done(_) => {}

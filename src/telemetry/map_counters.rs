@@ -14,34 +14,47 @@ use crate::mapping::Recovered;
 /// A counter with the map as its first label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Family {
+    DeletionsUndone,
     PointsQueried,
     RobotsRecovered,
     Scans,
     ScansUndone,
     VoxelsRemoved,
+    VoxelsRestored,
 }
 
 impl Family {
-    pub(super) const ALL: [Self; 5] =
-        [Self::PointsQueried, Self::RobotsRecovered, Self::Scans, Self::ScansUndone, Self::VoxelsRemoved];
+    pub(super) const ALL: [Self; 7] = [
+        Self::DeletionsUndone,
+        Self::PointsQueried,
+        Self::RobotsRecovered,
+        Self::Scans,
+        Self::ScansUndone,
+        Self::VoxelsRemoved,
+        Self::VoxelsRestored,
+    ];
 
     pub(super) fn name(self) -> &'static str {
         match self {
+            Self::DeletionsUndone => "mrol_deletions_undone_total",
             Self::PointsQueried => "mrol_points_queried_total",
             Self::RobotsRecovered => "mrol_robots_recovered_total",
             Self::Scans => "mrol_scans_total",
             Self::ScansUndone => "mrol_scans_undone_total",
             Self::VoxelsRemoved => "mrol_voxels_removed_total",
+            Self::VoxelsRestored => "mrol_voxels_restored_total",
         }
     }
 
     pub(super) fn help(self) -> &'static str {
         match self {
+            Self::DeletionsUndone => "Deletions taken back by undos, by map",
             Self::PointsQueried => "Points answered, by map and look-up",
             Self::RobotsRecovered => "Scans by which a lost robot was found again, by map and how",
             Self::Scans => "Scans judged for insertion, by map and verdict",
             Self::ScansUndone => "Scans taken out again, by map",
             Self::VoxelsRemoved => "Finest voxels removed by deletions and undos, by map",
+            Self::VoxelsRestored => "Finest voxels put back by undos, by map",
         }
     }
 }

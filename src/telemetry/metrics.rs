@@ -20,7 +20,7 @@ use super::{exposition, families};
 use crate::align::Verdict;
 use crate::map::{MapName, RobotName};
 use crate::service::{
-    Change, End, Ended, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
+    End, Ended, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
 };
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
@@ -281,12 +281,15 @@ impl Observer for Metrics {
                     self.0.maps.recovered(map, *how);
                 }
             }
-            Outcome::Changed(Change { voxels_removed, scans_undone, replayed: false, .. }) => {
-                if *voxels_removed > 0 {
-                    self.0.maps.count(map, (Family::VoxelsRemoved, None), *voxels_removed);
-                }
-                if *scans_undone > 0 {
-                    self.0.maps.count(map, (Family::ScansUndone, None), *scans_undone);
+            Outcome::Changed(change) if !change.replayed => {
+                let counted = [
+                    (Family::VoxelsRemoved, change.voxels_removed),
+                    (Family::VoxelsRestored, change.voxels_restored),
+                    (Family::ScansUndone, change.scans_undone),
+                    (Family::DeletionsUndone, change.deletions_undone),
+                ];
+                for (family, count) in counted.into_iter().filter(|(_, count)| *count > 0) {
+                    self.0.maps.count(map, (family, None), count);
                 }
             }
             Outcome::Read | Outcome::Scan { .. } | Outcome::Changed(_) => {}
@@ -298,6 +301,7 @@ impl Observer for Metrics {
 mod tests {
     use super::*;
     use crate::map::Lookup;
+    use crate::service::Change;
 
     /// Tells `metrics` that something was done to `map`.
     fn tell(metrics: &Metrics, map: &MapName, outcome: Outcome) {
@@ -336,8 +340,7 @@ mod tests {
         for map in [&kept, &gone] {
             tell(&metrics, map, Outcome::Points { lookup: Lookup::Exact, points: 1 });
             metrics.scan(map, &RobotName::new("r").unwrap(), Verdict::Accepted);
-            let undone =
-                Change { before: None, after: None, voxels_removed: 1, scans_undone: 1, replayed: false };
+            let undone = Change { voxels_removed: 1, scans_undone: 1, ..Change::default() };
             tell(&metrics, map, Outcome::Changed(undone));
         }
         let names = std::slice::from_ref(&kept);

@@ -57,6 +57,16 @@ impl VoxelSet {
         self.blocks.is_empty()
     }
 
+    /// True where the two share no voxel.
+    pub fn is_disjoint(&self, other: &Self) -> bool {
+        let mut others = other.blocks.iter().peekable();
+        self.blocks.iter().all(|(block, mask)| {
+            while others.next_if(|(other, _)| other < block).is_some() {}
+            let same = others.peek().filter(|(other, _)| other == block);
+            same.is_none_or(|(_, other)| mask.intersection(other).is_empty())
+        })
+    }
+
     /// The finest voxels, block by block.
     pub fn iter(&self) -> impl Iterator<Item = VoxelKey> + '_ {
         self.blocks.iter().flat_map(|(block, mask)| mask.cells(0).map(|cell| cell.voxel(*block)))

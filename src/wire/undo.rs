@@ -1,4 +1,4 @@
-//! Undoing scans (`mapping.proto`).
+//! Undoing scans and deletions (`mapping.proto`).
 
 use super::types::{count_from, request_id_from, text_of};
 use super::{InField, pb, required};
@@ -44,8 +44,16 @@ impl From<(&MapName, Undo)> for pb::UndoRequest {
 }
 
 impl From<UndoAnswer> for pb::UndoResponse {
-    fn from(UndoAnswer { scans, removed, version, replayed }: UndoAnswer) -> Self {
-        Self { scans: scans as u64, removed: removed as u64, version: Some(version.into()), replayed }
+    fn from(answer: UndoAnswer) -> Self {
+        let UndoAnswer { scans, deletions, removed, restored, version, replayed } = answer;
+        Self {
+            scans: scans as u64,
+            deletions: deletions as u64,
+            removed: removed as u64,
+            restored: restored as u64,
+            version: Some(version.into()),
+            replayed,
+        }
     }
 }
 
@@ -55,7 +63,9 @@ impl TryFrom<pb::UndoResponse> for UndoAnswer {
     fn try_from(answer: pb::UndoResponse) -> Result<Self, ServiceError> {
         Ok(Self {
             scans: count_from(answer.scans),
+            deletions: count_from(answer.deletions),
             removed: count_from(answer.removed),
+            restored: count_from(answer.restored),
             version: required(answer.version, "version")?.try_into()?,
             replayed: answer.replayed,
         })

@@ -209,7 +209,7 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
         Event::Inserted { points, map_from_sensor, .. } => {
             let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_points(map_from_sensor));
             let pose = MappedScan::new(RobotName::new("replay").unwrap(), *map_from_sensor);
-            map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels)).voxels
+            map.committer().insert_scan(ScanRecord::of_voxels(pose, voxels)).added
         }
         Event::Deleted { deletion, .. } => {
             let view = map.view();
@@ -224,7 +224,7 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
             };
             let voxels = view.descendants_of(keys, deletion.level);
             drop(view);
-            map.committer().remove(&voxels).voxels
+            map.committer().remove(&voxels).removed
         }
         Event::Queried { .. } => 0,
     }

@@ -87,7 +87,7 @@ fn delete_some(map: &MultiResolutionMap, model: &mut HashSet<[i32; 3]>, random: 
     voxels.sort_unstable();
     let chosen: HashSet<_> = voxels.iter().copied().filter(|_| random.random_bool(0.33)).collect();
     let keys = chosen.iter().map(|&i| VoxelKey::new(i).unwrap());
-    assert_eq!(map.committer().remove(&keys.collect()).voxels, chosen.len());
+    assert_eq!(map.committer().remove(&keys.collect()).removed, chosen.len());
     model.retain(|i| !chosen.contains(i));
 
     let coarse: HashSet<_> =
@@ -96,7 +96,7 @@ fn delete_some(map: &MultiResolutionMap, model: &mut HashSet<[i32; 3]>, random: 
     let below = map.view().descendants_of(keys, 3);
     let before = model.len();
     model.retain(|i| !coarse.contains(&i.map(|c| c >> 3)));
-    assert_eq!(map.committer().remove(&below).voxels, before - model.len());
+    assert_eq!(map.committer().remove(&below).removed, before - model.len());
 }
 
 /// Prints each level's rate as measured, by the closed form and by eq. (1), and holds it to 1.2 x the form.

@@ -214,6 +214,27 @@ async fn a_data_folder_of_version_4_is_opened_with_its_journal() {
     assert_eq!(daemon.contents("office").await, before);
 }
 
+/// The same, of map files of version 5 and journals of version 4: no undo put voxels back there.
+#[tokio::test]
+async fn a_data_folder_of_version_5_is_opened_with_its_journal() {
+    let daemon = Daemon::start_in(released("data-5"), |_| {}).await;
+    let office = json_of(daemon.get("/v1/maps/office").await).await;
+    assert_eq!((&office["revision"], &office["content_hash"]), (&json!(7), &json!("510fcafce6989f8b")));
+    let again = json!({"revision": 2, "request_id": "u-2"});
+    let again = json_of(daemon.post("/v1/maps/office/undo", again).await).await;
+    assert_eq!(
+        (&again["replayed"], &again["removed"], &again["restored"]),
+        (&json!(true), &json!(77), &json!(0))
+    );
+    // Of the 34 voxels that went, the undone scan alone had held some.
+    let undone = json_of(daemon.post("/v1/maps/office/undo", json!({"revision": 4})).await).await;
+    assert_eq!((&undone["deletions"], &undone["removed"]), (&json!(1), &json!(0)));
+    assert!((1..34).contains(&undone["restored"].as_u64().unwrap()), "{undone}");
+    let before = daemon.contents("office").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("office").await, before);
+}
+
 #[tokio::test]
 async fn a_damaged_snapshot_is_set_aside_and_goes_with_those_of_its_age() {
     let daemon = Daemon::start_with(|config| config.store.undo_revisions = 1).await;

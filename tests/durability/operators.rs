@@ -105,7 +105,9 @@ async fn a_map_file_is_held_to_the_limits_of_a_map() {
             caller: None,
             digest: 1,
             revision,
-            voxels: 1,
+            removed: 1,
+            restored: 0,
+            deletions: 0,
             scans,
         };
         file_with(|contents| contents.requests = of.iter().map(request).collect())

@@ -1,14 +1,14 @@
 //! Long random histories of a map that is kept: scans, deletions, undo, snapshots and restarts, against a plain model
-//! that remembers who holds each voxel.
+//! that replays what was not undone.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
 use mrol::map::{
-    Change, DeletionRecord, Leaving, MapName, MapSettings, MappedScan, MultiResolutionMap, RobotName,
+    Change, DeletionRecord, MapName, MapSettings, MappedScan, MultiResolutionMap, Reversal, RobotName,
     ScanRecord, UndoRecord,
 };
 use mrol::store::{DataDir, MapFolder, NotObserved, OpeningProgress, Record, Snapshot, StoreSettings};
@@ -23,10 +23,22 @@ use crate::support::simulated_disk::SimulatedDisk;
 
 #[derive(Debug, Clone)]
 enum Step {
-    Insert { robot: usize, indices: Vec<[i32; 3]> },
-    Delete { level: u32, indices: Vec<[i32; 3]> },
+    /// A scan of the first that saw through the others.
+    Insert {
+        robot: usize,
+        indices: Vec<[i32; 3]>,
+        carved: Vec<[i32; 3]>,
+    },
+    Delete {
+        level: u32,
+        indices: Vec<[i32; 3]>,
+    },
     UndoScan(Index),
-    UndoSince { robot: usize, scan: Index },
+    UndoSince {
+        robot: usize,
+        scan: Index,
+    },
+    UndoDeletion(Index),
     Snapshot,
     Restart,
 }
@@ -39,67 +51,69 @@ fn index() -> impl Strategy<Value = [i32; 3]> {
 fn step() -> impl Strategy<Value = Step> {
     let indices = || prop::collection::vec(index(), 1..60);
     prop_oneof![
-        8 => (0usize..2, indices()).prop_map(|(robot, indices)| Step::Insert { robot, indices }),
+        8 => (0usize..2, indices(), prop::collection::vec(index(), 0..20))
+            .prop_map(|(robot, indices, carved)| Step::Insert { robot, indices, carved }),
         3 => (0u32..6, prop::collection::vec(index(), 1..8))
             .prop_map(|(level, indices)| Step::Delete { level, indices }),
         3 => any::<Index>().prop_map(Step::UndoScan),
         1 => (0usize..2, any::<Index>()).prop_map(|(robot, scan)| Step::UndoSince { robot, scan }),
+        2 => any::<Index>().prop_map(Step::UndoDeletion),
         2 => Just(Step::Snapshot),
         2 => Just(Step::Restart),
     ]
 }
 
-/// Who holds each voxel, the scans that are accepted, and all that happened.
+/// All that happened, and what of it was not undone.
 #[derive(Default)]
 struct Model {
-    holders: BTreeMap<[i32; 3], BTreeSet<u64>>,
     trajectory: Vec<(u64, RobotName)>,
-    events: Vec<Event>,
+    deletions: Vec<u64>,
+    events: BTreeMap<u64, Event>,
 }
 
-enum Event {
-    /// A scan of the centers of these voxels.
-    Scan(u64, Vec<[i32; 3]>),
-    /// The finest voxels that went.
-    Deletion(PlainSet),
+/// A change by the revision that it made, as it was recorded.
+#[derive(Default)]
+struct Event {
+    /// Finest voxels that went first.
+    removed: PlainSet,
+    /// Finest voxels in whose centers the points of a scan lay.
+    points: Vec<[i32; 3]>,
+}
+
+/// What a map holds: voxels, and the moments of the points in each voxel of level 2.
+#[derive(Default)]
+struct Held {
+    voxels: PlainSet,
+    moments: BTreeMap<[i32; 3], Moments>,
 }
 
 impl Model {
-    fn voxels(&self) -> PlainSet {
-        self.holders.keys().copied().collect()
+    /// What happened, without what was undone, from the start.
+    fn held(&self) -> Held {
+        let mut held = Held::default();
+        self.events.values().for_each(|event| held.change(event));
+        held
     }
 
-    /// Of the points in each voxel of level 2: what happened, without the scans that were undone, from the start.
-    fn moments(&self) -> BTreeMap<[i32; 3], Moments> {
-        let (mut occupied, mut moments) = (PlainSet::new(), BTreeMap::<[i32; 3], Moments>::new());
-        for event in &self.events {
-            match event {
-                Event::Scan(scan, points) if self.trajectory.iter().any(|(kept, _)| kept == scan) => {
-                    occupied.extend(points);
-                    points.iter().for_each(|&i| *moments.entry(up(i, 2)).or_default() += of_center(i));
-                }
-                Event::Scan(..) => {}
-                Event::Deletion(voxels) => {
-                    for cell in voxels.intersection(&occupied).map(|&i| up(i, 2)).collect::<PlainSet>() {
-                        let mut rest = Moments::default();
-                        let left = occupied.difference(voxels).filter(|&&i| up(i, 2) == cell);
-                        left.for_each(|&i| rest += of_center(i));
-                        moments.insert(cell, rest);
-                    }
-                    occupied = occupied.difference(voxels).copied().collect();
-                }
-            }
+    fn undo(&mut self, changes: &[u64]) {
+        self.events.retain(|revision, _| !changes.contains(revision));
+        self.trajectory.retain(|(scan, _)| !changes.contains(scan));
+        self.deletions.retain(|deletion| !changes.contains(deletion));
+    }
+}
+
+impl Held {
+    fn change(&mut self, Event { removed, points }: &Event) {
+        let gone: PlainSet = self.voxels.intersection(removed).copied().collect();
+        self.voxels.retain(|voxel| !gone.contains(voxel));
+        for cell in gone.into_iter().map(|i| up(i, 2)).collect::<PlainSet>() {
+            let mut rest = Moments::default();
+            self.voxels.iter().filter(|&&i| up(i, 2) == cell).for_each(|&i| rest += of_center(i));
+            self.moments.insert(cell, rest);
         }
-        moments.retain(|_, moments| !moments.is_empty());
-        moments
-    }
-
-    fn undo(&mut self, scans: &[u64]) {
-        self.holders.retain(|_, holders| {
-            holders.retain(|scan| !scans.contains(scan));
-            !holders.is_empty()
-        });
-        self.trajectory.retain(|(scan, _)| !scans.contains(scan));
+        self.voxels.extend(points);
+        points.iter().for_each(|&i| *self.moments.entry(up(i, 2)).or_default() += of_center(i));
+        self.moments.retain(|_, moments| !moments.is_empty());
     }
 }
 
@@ -154,62 +168,73 @@ impl Kept {
         (self.folder, self.map) = (opened.folder, opened.map);
     }
 
-    /// False where the journal does not reach back to the scans.
-    fn undo(&self, scans: &[u64]) -> bool {
+    /// False where the journal does not reach back to the changes.
+    fn undo(&self, targets: UndoRecord) -> bool {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
-        let all = |_| Ok::<_, Infallible>(());
-        let mut observed = match self.folder.observations(scans, &withdrawn, all, StopSignal::NEVER) {
+        let (all, changes) = (|_| Ok::<_, Infallible>(()), targets.changes().collect::<Vec<_>>());
+        let mut observed = match self.folder.observations(&changes, &withdrawn, all, StopSignal::NEVER) {
             Err(NotObserved::OutsideUndoWindow) => {
                 let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
-                assert!(scans[0] <= reach, "scan {} is out of reach at {}", scans[0], self.map.revision());
+                assert!(changes[0] <= reach, "{} is out of reach at {}", changes[0], self.map.revision());
                 return false;
             }
             observed => observed.unwrap(),
         };
         assert_eq!(observed.revision, self.map.revision());
-        let Leaving { voxels, moments } = observed.observations.leaving(StopSignal::NEVER).unwrap();
-        self.commit(&Change::Undo(UndoRecord { scans: scans.to_vec(), voxels, moments, request: None }));
+        let Reversal { removed, restored, moments } =
+            observed.observations.reversal(StopSignal::NEVER).unwrap();
+        self.commit(&Change::Undo(UndoRecord { removed, restored, moments, ..targets }));
         true
+    }
+
+    fn undo_scans(&self, scans: Vec<u64>, model: &mut Model) {
+        if !scans.is_empty() && self.undo(UndoRecord { scans: scans.clone(), ..UndoRecord::default() }) {
+            model.undo(&scans);
+        }
     }
 
     fn step(&mut self, step: &Step, model: &mut Model) {
         match step {
-            Step::Insert { robot: number, indices } => {
+            Step::Insert { robot: number, indices, carved } => {
                 let points: Vec<Point> = indices.iter().map(|i| i.map(|i| i as f32 + 0.5).into()).collect();
                 let pose = MappedScan::new(robot(*number), Pose::identity());
+                let there = model.held().voxels;
+                let removed: PlainSet =
+                    carved.iter().filter(|&i| there.contains(i) && !indices.contains(i)).copied().collect();
+                let carved = removed.iter().filter_map(|&i| VoxelKey::new(i)).collect();
                 let record = ScanRecord::of_points(pose, &points, self.map.lattice());
-                let revision = self.commit(&Change::Insertion(record));
-                model.events.push(Event::Scan(revision, indices.clone()));
-                for &i in indices {
-                    model.holders.entry(i).or_default().insert(revision);
-                }
+                let revision = self.commit(&Change::Insertion(ScanRecord { carved, ..record }));
+                model.events.insert(revision, Event { removed, points: indices.clone() });
                 model.trajectory.push((revision, robot(*number)));
             }
             Step::Delete { level, indices } => {
                 let level = level % self.map.settings().levels;
                 let keys = indices.iter().filter_map(|&i| VoxelKey::new(up(i, level)));
                 let voxels: VoxelSet = self.map.view().descendants_of(keys, level);
-                if !voxels.is_empty() {
-                    self.commit(&Change::Deletion(DeletionRecord { voxels, request: None }));
-                }
                 let gone: PlainSet = indices.iter().map(|&i| up(i, level)).collect();
-                let deleted = model.voxels().into_iter().filter(|&i| gone.contains(&up(i, level)));
-                model.events.push(Event::Deletion(deleted.collect()));
-                model.holders.retain(|&i, _| !gone.contains(&up(i, level)));
+                let removed: PlainSet =
+                    model.held().voxels.into_iter().filter(|&i| gone.contains(&up(i, level))).collect();
+                if !voxels.is_empty() {
+                    let revision = self.commit(&Change::Deletion(DeletionRecord { voxels, request: None }));
+                    model.events.insert(revision, Event { removed, ..Event::default() });
+                    model.deletions.push(revision);
+                }
             }
             Step::UndoScan(which) => {
-                if let Some(scan) = pick(&model.trajectory, which)
-                    && self.undo(&[scan])
-                {
-                    model.undo(&[scan]);
-                }
+                let scans: Vec<u64> = model.trajectory.iter().map(|(scan, _)| *scan).collect();
+                self.undo_scans(pick(&scans, which).into_iter().collect(), model);
             }
             Step::UndoSince { robot: number, scan } => {
-                let Some(since) = pick(&model.trajectory, scan) else { return };
+                let scans: Vec<u64> = model.trajectory.iter().map(|(scan, _)| *scan).collect();
+                let Some(since) = pick(&scans, scan) else { return };
                 let meant = |(scan, who): &&(u64, RobotName)| *scan > since && *who == robot(*number);
-                let scans: Vec<u64> = model.trajectory.iter().filter(meant).map(|(scan, _)| *scan).collect();
-                if !scans.is_empty() && self.undo(&scans) {
-                    model.undo(&scans);
+                let scans = model.trajectory.iter().filter(meant).map(|(scan, _)| *scan).collect();
+                self.undo_scans(scans, model);
+            }
+            Step::UndoDeletion(which) => {
+                let Some(deletion) = pick(&model.deletions, which) else { return };
+                if self.undo(UndoRecord { deletions: vec![deletion], ..UndoRecord::default() }) {
+                    model.undo(&[deletion]);
                 }
             }
             Step::Snapshot => self.folder.save(&Snapshot::of(&self.map, self.uuid), u64::MAX).unwrap(),
@@ -218,8 +243,8 @@ impl Kept {
     }
 }
 
-fn pick(trajectory: &[(u64, RobotName)], which: &Index) -> Option<u64> {
-    (!trajectory.is_empty()).then(|| which.get(trajectory).0)
+fn pick(revisions: &[u64], which: &Index) -> Option<u64> {
+    (!revisions.is_empty()).then(|| *which.get(revisions))
 }
 
 proptest! {
@@ -237,15 +262,16 @@ proptest! {
         let (mut kept, mut model) = (Kept::new(levels, settings), Model::default());
         for step in &steps {
             kept.step(step, &mut model);
-            assert_equal(&kept.map, &model.voxels());
+            let held = model.held();
+            assert_equal(&kept.map, &held.voxels);
             let found: Vec<_> =
                 kept.map.trajectory().poses().map(|pose| (pose.revision, pose.robot.clone())).collect();
             prop_assert_eq!(&found, &model.trajectory);
             let moments: BTreeMap<_, _> =
                 kept.map.moments().to_set().as_slice().iter().map(|(key, moments)| (key.index(), *moments)).collect();
-            prop_assert_eq!(moments, model.moments());
+            prop_assert_eq!(moments, held.moments);
         }
         kept.restart(7);
-        assert_equal(&kept.map, &model.voxels());
+        assert_equal(&kept.map, &model.held().voxels);
     }
 }

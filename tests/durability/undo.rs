@@ -164,3 +164,79 @@ async fn what_is_out_of_reach_cannot_be_undone_and_the_error_says_how_far_it_rea
     let refused = in_memory.post("/v1/maps/a/undo", json!({"revision": 1})).await;
     assert_eq!(json_of(refused).await["reason"], "no_journal");
 }
+
+/// The answer to an undo, and the map's finest voxels after it.
+async fn undo(daemon: &Daemon, undo: Value) -> (StatusCode, Value) {
+    let answer = daemon.post("/v1/maps/a/undo", undo).await;
+    (answer.status(), json_of(answer).await)
+}
+
+#[tokio::test]
+async fn a_deletion_is_taken_back_once_and_its_undo_not_at_all() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    for (scan_id, points) in [(1, 5), (2, 9)] {
+        let scan = scan_of("r", scan_id, &row(points));
+        assert_eq!(daemon.post("/v1/maps/a/scans", scan).await.status(), StatusCode::OK);
+    }
+    let before = daemon.contents("a").await.1;
+    let hash = async || json_of(daemon.get("/v1/maps/a").await).await["content_hash"].clone();
+    let first_hash = hash().await;
+    let everything = json!({"box": {"min_m": [-9, -9, -9], "max_m": [9, 9, 9]}, "request_id": "all"});
+    let deleted = json_of(daemon.post("/v1/maps/a/deletions", everything.clone()).await).await;
+    assert_eq!((&deleted["removed"], &deleted["revision"]), (&json!(9), &json!(3)));
+
+    let (status, undone) = undo(&daemon, json!({"revision": 3, "request_id": "back"})).await;
+    let counts = ["scans", "deletions", "removed", "restored", "revision"].map(|field| undone[field].clone());
+    assert_eq!((status, counts), (StatusCode::OK, [json!(0), json!(1), json!(0), json!(9), json!(4)]));
+    assert_eq!((daemon.contents("a").await.1, hash().await), (before, first_hash));
+    // The same again is the first answer, and the deletion is answered as before, under its own id.
+    let (_, again) = undo(&daemon, json!({"revision": 3, "request_id": "back"})).await;
+    assert_eq!((&again["replayed"], &again["restored"]), (&json!(true), &json!(9)));
+    let deleted = json_of(daemon.post("/v1/maps/a/deletions", everything).await).await;
+    assert_eq!((&deleted["replayed"], &deleted["removed"]), (&json!(true), &json!(9)));
+
+    for (revision, reason, why) in [
+        (3, "not_undoable", "revision 3 of map a was undone already, by revision 4"),
+        (4, "not_undoable", "revision 4 of map a was made by an undo"),
+        (5, "scan_not_found", "revision 5"),
+    ] {
+        let (_, refused) = undo(&daemon, json!({"revision": revision})).await;
+        assert_eq!(refused["reason"], reason, "{refused}");
+        assert!(refused["detail"].as_str().unwrap().contains(why), "{refused}");
+    }
+    // It survives a restart, and so does that it was taken back.
+    let before = daemon.contents("a").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("a").await, before);
+    assert_eq!(undo(&daemon, json!({"revision": 3})).await.1["reason"], "not_undoable");
+    let metrics = daemon.get("/metrics").await.text().await.unwrap();
+    assert!(!metrics.contains(r#"mrol_deletions_undone_total{map="a"}"#), "{metrics}");
+}
+
+#[tokio::test]
+async fn scans_and_deletions_are_undone_in_any_order() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    let voxels = async || daemon.contents("a").await.1.len();
+    for (scan_id, points) in [(1, 5), (2, 9)] {
+        let scan = scan_of("r", scan_id, &row(points));
+        assert_eq!(daemon.post("/v1/maps/a/scans", scan).await.status(), StatusCode::OK);
+    }
+    for points in [row(3), row(7)] {
+        let deleted = daemon.post("/v1/maps/a/deletions", json!({"points": points})).await;
+        assert_eq!(deleted.status(), StatusCode::OK);
+    }
+    assert_eq!(voxels().await, 2);
+    // The second deletion took only what the first had left.
+    assert_eq!(undo(&daemon, json!({"revision": 3})).await.1["restored"], 3);
+    assert_eq!(voxels().await, 5);
+    // Of the second scan, what nobody deleted and the first scan does not hold goes.
+    let (_, undone) = undo(&daemon, json!({"robot": "r", "scan_id": 2})).await;
+    assert_eq!((&undone["removed"], voxels().await), (&json!(2), 3));
+    // What the second deletion took of the first scan comes back, and nothing of the second scan.
+    assert_eq!(undo(&daemon, json!({"revision": 4})).await.1["restored"], 2);
+    assert_eq!(voxels().await, 5);
+    let (_, undone) = undo(&daemon, json!({"robot": "r", "scan_id": 1})).await;
+    assert_eq!((&undone["removed"], voxels().await), (&json!(5), 0));
+}

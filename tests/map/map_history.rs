@@ -48,12 +48,12 @@ fn apply(map: &mut MultiResolutionMap, change: &Change) -> usize {
     let key = |index: &[i32; 3]| VoxelKey::new(*index).unwrap();
     let remove = |map: &MultiResolutionMap, keys: Vec<VoxelKey>, level: u32| {
         let voxels = map.view().descendants_of(keys, level);
-        map.committer().remove(&voxels).voxels
+        map.committer().remove(&voxels).removed
     };
     match change {
         Change::Insert(indices) => {
             let voxels: VoxelSet = indices.iter().map(key).collect();
-            map.committer().insert_scan(ScanRecord::of_voxels(pose_of("r"), voxels)).voxels
+            map.committer().insert_scan(ScanRecord::of_voxels(pose_of("r"), voxels)).added
         }
         Change::DeleteKeys(level, indices) => {
             let level = level % levels;
@@ -150,6 +150,6 @@ fn a_voxel_that_was_never_there_can_be_removed_without_harm() {
     let absent: VoxelSet =
         [VoxelKey::new([2, 0, 0]).unwrap(), VoxelKey::new([500, 0, 0]).unwrap()].into_iter().collect();
     let committed = map.committer().remove(&absent);
-    assert_eq!((committed.voxels, committed.revision), (0, 1));
+    assert_eq!((committed.removed, committed.revision), (0, 1));
     assert_equal(&map, &[[0, 0, 0], [1, 0, 0]].into_iter().collect());
 }

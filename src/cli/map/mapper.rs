@@ -103,7 +103,7 @@ impl Mapper {
         }
         let outcome = mapper.map_scan(&scan, StopSignal::NEVER)?;
         Ok(Mapped {
-            new_voxels: outcome.committed.map_or(0, |committed| committed.voxels),
+            new_voxels: outcome.committed.map_or(0, |committed| committed.added),
             voxels: self.map.voxels(0),
             false_positive_rate,
             align_time: outcome.located.align_time,

@@ -23,7 +23,7 @@ mod thinning;
 
 pub use id_ranges::ID_RANGES_PER_SESSION_MAX;
 pub use robot_scans::SESSIONS_PER_ROBOT_MAX;
-pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, WithdrawnScan};
+pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, WithdrawnChange};
 pub use thinning::TrajectorySpacing;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -47,7 +47,7 @@ pub struct Trajectory {
     robots: Arc<BTreeMap<RobotName, Arc<RobotScans>>>,
     /// Revisions of the scans of `poses` that were taken out again.
     marked: Arc<BTreeSet<u64>>,
-    withdrawn: Arc<Vec<WithdrawnScan>>,
+    withdrawn: Arc<Vec<WithdrawnChange>>,
     /// Bytes that poses point to.
     overlap_bytes: usize,
 }
@@ -117,8 +117,13 @@ impl Trajectory {
         self.poses.get(revision).filter(|pose| !self.marked.contains(&pose.revision))
     }
 
-    /// The scans that were taken out again, in the order in which that was done: all that undo has to know of.
-    pub fn withdrawn(&self) -> &[WithdrawnScan] {
+    /// True of a revision that a scan made which was taken back and whose pose is still stored.
+    pub fn is_undone(&self, revision: u64) -> bool {
+        self.marked.contains(&revision)
+    }
+
+    /// The scans and deletions that were taken back, in the order in which that was done: all that undo has to know of.
+    pub fn withdrawn(&self) -> &[WithdrawnChange] {
         &self.withdrawn
     }
 
@@ -178,7 +183,7 @@ impl Trajectory {
         const OF_ENTRY: usize = 64;
         let robots: usize = self.robots.values().map(|robot| robot.bytes() + OF_ENTRY).sum();
         let marked = self.marked.len() * 2 * size_of::<u64>();
-        let withdrawn = self.withdrawn.capacity() * size_of::<WithdrawnScan>();
+        let withdrawn = self.withdrawn.capacity() * size_of::<WithdrawnChange>();
         size_of::<Self>() + self.poses.bytes() + self.overlap_bytes + robots + marked + withdrawn
     }
 
@@ -212,7 +217,7 @@ impl Trajectory {
 
 impl Trajectory {
     /// The trajectory of these poses, in ascending order of their revisions, of which those of `withdrawn` were undone.
-    pub fn new(poses: impl IntoIterator<Item = MappedScan>, withdrawn: Vec<WithdrawnScan>) -> Self {
+    pub fn new(poses: impl IntoIterator<Item = MappedScan>, withdrawn: Vec<WithdrawnChange>) -> Self {
         Self::default().with_poses(poses, withdrawn)
     }
 
@@ -220,9 +225,9 @@ impl Trajectory {
     pub fn with_poses(
         mut self,
         poses: impl IntoIterator<Item = MappedScan>,
-        withdrawn: Vec<WithdrawnScan>,
+        withdrawn: Vec<WithdrawnChange>,
     ) -> Self {
-        let undone: BTreeSet<u64> = withdrawn.iter().map(|withdrawn| withdrawn.scan).collect();
+        let undone: BTreeSet<u64> = withdrawn.iter().map(|withdrawn| withdrawn.change).collect();
         for pose in poses {
             let is_undone = undone.contains(&pose.revision);
             self.put(pose, is_undone);
@@ -239,13 +244,14 @@ impl Trajectory {
         self
     }
 
-    /// Takes out the scans that made the revisions `scans`, ascending, at `revision`.
-    pub(super) fn withdraw(&mut self, scans: &[u64], revision: u64) {
-        let there: Vec<u64> = scans.iter().copied().filter(|&scan| self.at(scan).is_some()).collect();
+    /// Takes back the changes that made the revisions `changes`, at `revision`: the scans among them, which ascend, go.
+    pub(super) fn withdraw(&mut self, changes: impl Iterator<Item = u64>, revision: u64) {
+        let changes: Vec<_> = changes.map(|change| WithdrawnChange { change, revision }).collect();
+        let scans = changes.iter().map(|withdrawn| withdrawn.change);
+        let there: Vec<u64> = scans.filter(|&scan| self.at(scan).is_some()).collect();
         self.take_from_robots(&there);
         Arc::make_mut(&mut self.marked).extend(there);
-        let withdrawn = Arc::make_mut(&mut self.withdrawn);
-        withdrawn.extend(scans.iter().map(|&scan| WithdrawnScan { scan, revision }));
+        Arc::make_mut(&mut self.withdrawn).extend(changes);
     }
 
     /// Thins the poses of scans that made a revision before `before`, which no undo may reach; the number of poses that

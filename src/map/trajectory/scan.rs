@@ -12,6 +12,8 @@ pub struct ScanRecord {
     pub pose: MappedScan,
     /// Every distinct finest voxel that the scan touches, known before or not.
     pub voxels: VoxelSet,
+    /// Finest voxels that were there and go, since the scan saw through them: none of `voxels`. They go before its own come.
+    pub carved: VoxelSet,
     /// What its points add to the moments of their voxels.
     pub moments: MomentSet,
 }
@@ -23,12 +25,12 @@ impl ScanRecord {
         let quantize = lattice.from_points(&pose.map_from_sensor);
         let (voxels, out_of_range) = VoxelSet::of_points(points, &quantize);
         pose.points_skipped += out_of_range;
-        Self { pose, voxels, moments: MomentSet::of_points(points, &quantize) }
+        Self { pose, voxels, carved: VoxelSet::default(), moments: MomentSet::of_points(points, &quantize) }
     }
 
     /// A record of voxels whose points are not known: the refinement of alignments learns nothing from it.
     pub fn of_voxels(pose: MappedScan, voxels: VoxelSet) -> Self {
-        Self { pose, voxels, moments: MomentSet::default() }
+        Self { pose, voxels, carved: VoxelSet::default(), moments: MomentSet::default() }
     }
 }
 
@@ -102,11 +104,11 @@ pub struct OverlapOfNoLevel {
     pub levels: u32,
 }
 
-/// A scan that was taken out again.
+/// A scan or a deletion that was taken back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WithdrawnScan {
-    /// The revision that the scan had made.
-    pub scan: u64,
-    /// The revision that took it out.
+pub struct WithdrawnChange {
+    /// The revision that it had made.
+    pub change: u64,
+    /// The revision that took it back.
     pub revision: u64,
 }

@@ -37,7 +37,7 @@ fn robot(n: u8) -> RobotName {
 struct Model {
     all: Vec<MappedScan>,
     gone: BTreeSet<u64>,
-    withdrawn: Vec<WithdrawnScan>,
+    withdrawn: Vec<WithdrawnChange>,
     revision: u64,
     base: u64,
 }
@@ -130,10 +130,10 @@ proptest! {
                     let reached = model.accepted().filter(|pose| pose.revision >= model.base);
                     let scans: Vec<u64> = reached.map(|pose| pose.revision).step_by(every).collect();
                     model.revision += 1;
-                    trajectory.withdraw(&scans, model.revision);
+                    trajectory.withdraw(scans.iter().copied(), model.revision);
                     model.gone.extend(&scans);
                     let revision = model.revision;
-                    model.withdrawn.extend(scans.into_iter().map(|scan| WithdrawnScan { scan, revision }));
+                    model.withdrawn.extend(scans.into_iter().map(|change| WithdrawnChange { change, revision }));
                 }
                 Step::Thin(behind) => {
                     model.base = model.base.max((model.revision + 1).saturating_sub(behind));
@@ -168,7 +168,7 @@ fn scan(revision: u64, session: &SessionName, id: u64) -> MappedScan {
 fn the_id_of_an_undone_scan_stays_known_and_may_be_that_of_a_later_one_in_old_journals() {
     let none = SessionName::default();
     let mut trajectory: Trajectory = [scan(1, &none, 7)].into_iter().collect();
-    trajectory.withdraw(&[1], 2);
+    trajectory.withdraw([1].into_iter(), 2);
     let known = |trajectory: &Trajectory| {
         trajectory.known(&robot(0), &none, 7).map(|known| match known {
             KnownScan::Kept(pose) => ("kept", pose.revision),

@@ -3,7 +3,7 @@
 use super::version::MapVersion;
 use crate::map::{RequestId, RobotName, SessionName};
 
-/// Which scans to take out again.
+/// Which changes to take back.
 #[derive(Debug, Clone)]
 pub struct Undo {
     /// Which.
@@ -12,10 +12,10 @@ pub struct Undo {
     pub request_id: Option<RequestId>,
 }
 
-/// The ways to name accepted scans.
+/// The ways to name accepted scans, and deletions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum UndoTarget {
-    /// One, by the robot's own number.
+    /// A scan, by the robot's own number.
     Scan {
         /// The robot that sent the scan.
         robot: RobotName,
@@ -24,9 +24,9 @@ pub enum UndoTarget {
         /// The scan's number.
         scan_id: u64,
     },
-    /// One, by the revision that it made.
+    /// A scan or a deletion, by the revision that it made.
     Revision(u64),
-    /// All of a robot's that made a revision after this one.
+    /// All of a robot's scans that made a revision after this one.
     RobotSince {
         /// The robot that sent the scans.
         robot: RobotName,
@@ -38,10 +38,14 @@ pub enum UndoTarget {
 /// What an undo did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UndoAnswer {
-    /// Scans taken out.
+    /// Scans taken back.
     pub scans: usize,
-    /// Finest voxels that went with them.
+    /// Deletions taken back.
+    pub deletions: usize,
+    /// Finest voxels that went: no other scan holds them.
     pub removed: usize,
+    /// Finest voxels that came back.
+    pub restored: usize,
     /// After it.
     pub version: MapVersion,
     /// True of an undo that was done before under its id: this is that answer.

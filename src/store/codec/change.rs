@@ -3,6 +3,7 @@
 use super::{Unreadable, count, required};
 use crate::map::{CallerName, Change, CompletedRequest, DeletionRecord, Request, RequestId, UndoRecord};
 use crate::store::pb;
+use crate::voxel::VoxelSet;
 
 impl From<&Change> for pb::Change {
     fn from(change: &Change) -> Self {
@@ -50,7 +51,9 @@ impl From<&UndoRecord> for pb::Undo {
     fn from(undo: &UndoRecord) -> Self {
         Self {
             scans: undo.scans.clone(),
-            voxels: Some((&undo.voxels).into()),
+            deletions: undo.deletions.clone(),
+            removed: Some((&undo.removed).into()),
+            restored: (!undo.restored.is_empty()).then(|| (&undo.restored).into()),
             moments: Some((&undo.moments).into()),
             request: undo.request.as_ref().map(Into::into),
         }
@@ -61,12 +64,19 @@ impl TryFrom<pb::Undo> for UndoRecord {
     type Error = Unreadable;
 
     fn try_from(message: pb::Undo) -> Result<Self, Unreadable> {
-        if !message.scans.is_sorted() {
-            return Err("undo.scans must ascend".into());
+        if !message.scans.is_sorted() || !message.deletions.is_sorted() {
+            return Err("undo.scans and undo.deletions must ascend".into());
+        }
+        let removed = required(message.removed, "undo.removed")?.try_into()?;
+        let restored = message.restored.unwrap_or_default().try_into()?;
+        if !VoxelSet::is_disjoint(&removed, &restored) {
+            return Err("undo.restored has voxels of undo.removed".into());
         }
         Ok(Self {
             scans: message.scans,
-            voxels: required(message.voxels, "undo.voxels")?.try_into()?,
+            deletions: message.deletions,
+            removed,
+            restored,
             moments: message.moments.unwrap_or_default().try_into()?,
             request: message.request.map(Request::try_from).transpose()?,
         })
@@ -102,8 +112,10 @@ impl From<&CompletedRequest> for pb::CompletedRequest {
         Self {
             request: Some((&request).into()),
             revision: answered.revision,
-            voxels: answered.voxels as u64,
+            removed: answered.removed as u64,
             scans: answered.scans as u64,
+            restored: answered.restored as u64,
+            deletions: answered.deletions as u64,
         }
     }
 }
@@ -118,8 +130,10 @@ impl TryFrom<pb::CompletedRequest> for CompletedRequest {
             digest,
             caller,
             revision: message.revision,
-            voxels: count(message.voxels),
+            removed: count(message.removed),
+            restored: count(message.restored),
             scans: count(message.scans),
+            deletions: count(message.deletions),
         })
     }
 }

@@ -4,10 +4,11 @@ use super::{Unreadable, count, moments, required};
 use crate::geometry::{self, rotation_xyzw, translation_m};
 use crate::map::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, MappedScan, RobotName, ScanRecord, SessionName, Trajectory,
-    WithdrawnScan,
+    WithdrawnChange,
 };
 use crate::store::pb;
 use crate::util::StopSignal;
+use crate::voxel::VoxelSet;
 
 impl From<&MappedScan> for pb::ScanPose {
     fn from(pose: &MappedScan) -> Self {
@@ -58,6 +59,7 @@ impl From<&ScanRecord> for pb::Insertion {
             pose: Some((&scan.pose).into()),
             voxels: Some((&scan.voxels).into()),
             moments: Some(moments::beside(&scan.voxels, &scan.moments, StopSignal::NEVER)),
+            carved: (!scan.carved.is_empty()).then(|| (&scan.carved).into()),
         }
     }
 }
@@ -67,23 +69,28 @@ impl TryFrom<pb::Insertion> for ScanRecord {
 
     fn try_from(message: pb::Insertion) -> Result<Self, Unreadable> {
         let voxels = required(message.voxels, "insertion.voxels")?.try_into()?;
+        let carved = message.carved.unwrap_or_default().try_into()?;
+        if !VoxelSet::is_disjoint(&voxels, &carved) {
+            return Err("insertion.carved has voxels of insertion.voxels".into());
+        }
         Ok(Self {
             pose: required(message.pose, "insertion.pose")?.try_into()?,
             moments: moments::read(&message.moments.unwrap_or_default(), &voxels, StopSignal::NEVER)?,
             voxels,
+            carved,
         })
     }
 }
 
-impl From<&WithdrawnScan> for pb::WithdrawnScan {
-    fn from(&WithdrawnScan { scan, revision }: &WithdrawnScan) -> Self {
-        Self { scan, revision }
+impl From<&WithdrawnChange> for pb::WithdrawnChange {
+    fn from(&WithdrawnChange { change, revision }: &WithdrawnChange) -> Self {
+        Self { change, revision }
     }
 }
 
-impl From<pb::WithdrawnScan> for WithdrawnScan {
-    fn from(pb::WithdrawnScan { scan, revision }: pb::WithdrawnScan) -> Self {
-        Self { scan, revision }
+impl From<pb::WithdrawnChange> for WithdrawnChange {
+    fn from(pb::WithdrawnChange { change, revision }: pb::WithdrawnChange) -> Self {
+        Self { change, revision }
     }
 }
 

@@ -73,6 +73,11 @@ mod tests {
         (0..n).filter_map(|i| VoxelKey::new([i % 70 - 35, i / 70 - 40, i % 3])).collect()
     }
 
+    /// None of those.
+    fn other_voxels() -> VoxelSet {
+        (0..30).filter_map(|i| VoxelKey::new([i, 0, 9])).collect()
+    }
+
     fn moments() -> MomentSet {
         MomentSet::of_centers(&voxels(500))
     }
@@ -94,9 +99,21 @@ mod tests {
             caller: Some(CallerName::new("r1").unwrap()),
         });
         for change in [
-            Change::Insertion(ScanRecord { pose, voxels: voxels(5000), moments: moments() }),
+            Change::Insertion(ScanRecord {
+                pose,
+                voxels: voxels(5000),
+                carved: other_voxels(),
+                moments: moments(),
+            }),
             Change::Deletion(DeletionRecord { voxels: voxels(10), request: None }),
-            Change::Undo(UndoRecord { scans: vec![3, 9], voxels: voxels(0), moments: moments(), request }),
+            Change::Undo(UndoRecord {
+                scans: vec![3, 9],
+                deletions: vec![5],
+                removed: voxels(20),
+                restored: other_voxels(),
+                moments: moments(),
+                request,
+            }),
         ] {
             let record = Record::of(&change).unwrap();
             assert_eq!(change_of(&record.payload, record.bytes).unwrap(), change);

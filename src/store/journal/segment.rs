@@ -3,7 +3,7 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-JNL"
-//!      8  4      format version, u32 little-endian: 4
+//!      8  4      format version, u32 little-endian: 5
 //!     12  4      CRC-32C of bytes 16 to 64, u32 little-endian
 //!     16  16     uuid of the map
 //!     32  8      revision of the first frame, u64 little-endian
@@ -24,8 +24,9 @@ use crate::map::REVISION_MAX;
 use crate::store::StoreError;
 
 /// Format version that this build writes; it reads this one and all earlier ones. In version 1 moments have no forms;
-/// up to version 2 segments have no head; up to version 3 scans have no session.
-pub const JOURNAL_VERSION: u32 = 4;
+/// up to version 2 segments have no head; up to version 3 scans have no session; up to version 4 no undo
+/// put voxels back, and no scan carved.
+pub const JOURNAL_VERSION: u32 = 5;
 const MAGIC: &[u8; 8] = b"MROL-JNL";
 const CHECKED_FROM: usize = 16;
 const UUID_BYTES: usize = 16;

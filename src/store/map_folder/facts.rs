@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::map::WithdrawnScan;
+use crate::map::WithdrawnChange;
 use crate::store::StoreSettings;
 use crate::store::journal::{Journal, JournalUse, SegmentedJournal};
 use crate::store::retention::{self, UndoWindow};
@@ -195,14 +195,14 @@ impl Facts {
     }
 
     /// The oldest revision that undo can return to, where the scans of `withdrawn` were removed before.
-    pub(super) fn undo_from(&self, withdrawn: &[WithdrawnScan]) -> u64 {
+    pub(super) fn undo_from(&self, withdrawn: &[WithdrawnChange]) -> u64 {
         let known = self.lock();
         let fits = |snapshot: &&u64| known.is_base(**snapshot, withdrawn);
         known.snapshots.iter().find(fits).map_or(known.head, |base| *base) + 1
     }
 
     /// Pins the newest snapshot that an undo of `scans` can begin with.
-    pub(super) fn pin_base_of(&self, scans: &[u64], withdrawn: &[WithdrawnScan]) -> Option<Pin> {
+    pub(super) fn pin_base_of(&self, scans: &[u64], withdrawn: &[WithdrawnChange]) -> Option<Pin> {
         let first = *scans.iter().min()?;
         let mut known = self.lock();
         let fits = |&&snapshot: &&u64| snapshot < first && known.is_base(snapshot, withdrawn);
@@ -214,7 +214,12 @@ impl Facts {
 
     /// Drops snapshots that are no longer needed, so that no reader begins with them from now on; returns those that
     /// are kept.
-    pub(super) fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnScan], sizes: &Sizes) -> Vec<u64> {
+    pub(super) fn forget(
+        &self,
+        window: UndoWindow,
+        withdrawn: &[WithdrawnChange],
+        sizes: &Sizes,
+    ) -> Vec<u64> {
         let mut known = self.lock();
         let head = known.snapshots.last().copied().unwrap_or_default();
         let mut kept = retention::kept_within(&known.snapshots, head, window, withdrawn, sizes);
@@ -233,7 +238,7 @@ impl Facts {
 impl Known {
     /// True of a snapshot that undo can begin with: the journal is kept from there on, and it holds nothing of a scan
     /// that was withdrawn later.
-    fn is_base(&self, snapshot: u64, withdrawn: &[WithdrawnScan]) -> bool {
+    fn is_base(&self, snapshot: u64, withdrawn: &[WithdrawnChange]) -> bool {
         let is_kept = self.segments.first().is_some_and(|tail| *tail <= snapshot + 1);
         is_kept && retention::is_base(snapshot, withdrawn)
     }

@@ -1,13 +1,13 @@
-//! Reads from a map's folder which scans touched which voxels, for undo.
+//! Reads from a map's folder what the map would hold without some changes, for undo.
 
 use super::MapFolder;
 use super::facts::Pin;
-use crate::map::{Change, VoxelOwnership, WithdrawnScan};
+use crate::map::{Change, VoxelOwnership, WithdrawnChange};
 use crate::store::snapshot_files::snapshot_name;
 use crate::store::{MapFileError, MapFileLimits, Snapshot, StoreError, folder};
 use crate::util::StopSignal;
 
-/// Ownership of the voxels that some scans touched.
+/// Ownership of the voxels that some changes touched.
 #[derive(Debug)]
 pub struct Observed {
     /// Ownership up to `revision`.
@@ -21,8 +21,8 @@ pub struct Observed {
 /// Why the ownership of voxels could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum NotObserved<E> {
-    /// The journal does not reach back to the first of the scans.
-    #[error("the journal does not reach back to the first of the scans")]
+    /// The journal does not reach back to the first of the changes.
+    #[error("the journal does not reach back to the first of the changes")]
     OutsideUndoWindow,
     /// Reading was stopped: the caller cancelled it, or its time is up.
     #[error("it was stopped")]
@@ -36,23 +36,23 @@ pub enum NotObserved<E> {
 }
 
 impl MapFolder {
-    /// Reads which scans own the voxels that `scans` touched, up to the present head of the journal. `reserve` is
-    /// called with the bytes of each part before it is built, when all parts before it exist.
+    /// Reads what the map holds without `targets`, scans and deletions by revision, up to the present head of the journal.
+    /// `reserve` is called with the bytes of each part before it is built, when all parts before it exist.
     ///
-    /// The journal is read twice: for the voxels that the scans touched, so that nothing else need be remembered, and
+    /// The journal is read twice: for the voxels that the targets touched, so that nothing else need be remembered, and
     /// from the base on.
     ///
     /// # Errors
     /// When the journal does not reach back far enough, something cannot be read, `reserve` refuses, or `stop` is set.
     pub fn observations<E: std::fmt::Display>(
         &self,
-        scans: &[u64],
-        withdrawn: &[WithdrawnScan],
+        targets: &[u64],
+        withdrawn: &[WithdrawnChange],
         mut reserve: impl FnMut(u64) -> Result<(), E>,
         stop: StopSignal<'_>,
     ) -> Result<Observed, NotObserved<E>> {
-        let pin = self.facts.pin_base_of(scans, withdrawn).ok_or(NotObserved::OutsideUndoWindow)?;
-        let mut observations = VoxelOwnership::of(scans.to_vec(), withdrawn);
+        let pin = self.facts.pin_base_of(targets, withdrawn).ok_or(NotObserved::OutsideUndoWindow)?;
+        let mut observations = VoxelOwnership::of(targets.to_vec(), withdrawn);
         self.touch(&mut observations, &mut reserve, stop)?;
         let (revision, path) = (pin.snapshot, self.path.file(&snapshot_name(pin.snapshot)));
         let bytes = self.files.size(&path).map_err(StoreError::io(&path))?;
@@ -76,7 +76,22 @@ impl MapFolder {
         if stop.is_stopped() { Err(NotObserved::Stopped) } else { Ok(observed) }
     }
 
-    /// Reads which voxels the scans to undo touched.
+    /// Reads the change that made `revision`; none where there is no such revision.
+    ///
+    /// # Errors
+    /// When undo does not reach back to it, or the journal cannot be read.
+    pub fn change_at<E>(
+        &self,
+        revision: u64,
+        withdrawn: &[WithdrawnChange],
+    ) -> Result<Option<Change>, NotObserved<E>> {
+        let _pin = self.facts.pin_base_of(&[revision], withdrawn).ok_or(NotObserved::OutsideUndoWindow)?;
+        let (segments, head) = self.facts.journal();
+        let change = self.place.read_at(vec![revision], &segments, head).next().transpose()?;
+        Ok(change.map(|(_, change)| change))
+    }
+
+    /// Reads which voxels the changes to undo touched.
     fn touch<E>(
         &self,
         observations: &mut VoxelOwnership,
@@ -89,10 +104,9 @@ impl MapFolder {
             if stop.is_stopped() {
                 return Err(NotObserved::Stopped);
             }
-            if let (_, Change::Insertion(scan)) = change? {
-                reserve(VoxelOwnership::bytes_of(&scan) as u64).map_err(NotObserved::NoMemory)?;
-                observations.touch(&scan);
-            }
+            let (_, change) = change?;
+            reserve(VoxelOwnership::bytes_of(&change) as u64).map_err(NotObserved::NoMemory)?;
+            observations.touch(&change);
         }
         Ok(())
     }

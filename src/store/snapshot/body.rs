@@ -188,7 +188,7 @@ impl<'a> Body<'a> {
 
     fn check_counts<E>(&self, limits: &MapFileLimits) -> Result<(), MapFileError<E>> {
         let (limit, most) = ("map_file_scans_max", limits.scans_max);
-        for (what, count) in [("scans", self.scans), ("withdrawn scans", self.withdrawn)] {
+        for (what, count) in [("scans", self.scans), ("withdrawn changes", self.withdrawn)] {
             // Each made a revision of its own.
             if count as u64 > self.revision {
                 return Err(MapFileError::Bad(format!(
@@ -310,10 +310,10 @@ impl<'a> Body<'a> {
         Ok(requests.into_iter().collect())
     }
 
-    fn withdrawn(&self) -> Result<Vec<crate::map::WithdrawnScan>, Unreadable> {
+    fn withdrawn(&self) -> Result<Vec<crate::map::WithdrawnChange>, Unreadable> {
         let mut withdrawn = Vec::with_capacity(self.withdrawn);
         for record in self.records(number::WITHDRAWN) {
-            withdrawn.push(decoded::<pb::WithdrawnScan>(record?, "a withdrawn scan")?.into());
+            withdrawn.push(decoded::<pb::WithdrawnChange>(record?, "a withdrawn change")?.into());
         }
         Ok(withdrawn)
     }

@@ -175,7 +175,7 @@ mod tests {
             uuid: vec![7; 16].into(),
             levels: 300,
             block_keys: vec![1, 2],
-            withdrawn: vec![pb::WithdrawnScan { scan: 1, revision: 2 }; 2],
+            withdrawn: vec![pb::WithdrawnChange { change: 1, revision: 2 }; 2],
             ..pb::Snapshot::default()
         };
         let bytes = message.encode_to_vec();

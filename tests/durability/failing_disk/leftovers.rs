@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::convert::Infallible;
 use std::path::Path;
 
-use mrol::map::WithdrawnScan;
+use mrol::map::WithdrawnChange;
 use mrol::store::{FileSystem, NotObserved, OpeningProgress, Record, Snapshot, StoreError};
 use mrol::util::StopSignal;
 use uuid::Uuid;
@@ -195,7 +195,7 @@ fn undo_reaches_what_it_is_said_to_reach() {
     }
     (0..5).for_each(|i| commit(&folder, &map, i));
     folder.give_up_undo().unwrap();
-    let reach = |withdrawn: &[WithdrawnScan]| {
+    let reach = |withdrawn: &[WithdrawnChange]| {
         let from = folder.undo_from(withdrawn);
         let observe =
             |scan| folder.observations(&[scan], withdrawn, |_| Ok::<_, Infallible>(()), StopSignal::NEVER);
@@ -205,9 +205,9 @@ fn undo_reaches_what_it_is_said_to_reach() {
     };
     // The snapshots of revisions 10 and 20 are left.
     assert_eq!(reach(&[]), 11);
-    assert_eq!(reach(&[WithdrawnScan { scan: 5, revision: 18 }]), 21);
-    assert_eq!(reach(&[WithdrawnScan { scan: 15, revision: 24 }]), 11);
-    assert_eq!(reach(&[WithdrawnScan { scan: 5, revision: 24 }]), 26);
+    assert_eq!(reach(&[WithdrawnChange { change: 5, revision: 18 }]), 21);
+    assert_eq!(reach(&[WithdrawnChange { change: 15, revision: 24 }]), 11);
+    assert_eq!(reach(&[WithdrawnChange { change: 5, revision: 24 }]), 26);
 }
 
 #[test]

@@ -140,9 +140,11 @@ fn change(revision: u64) -> Change {
         3 => Change::Deletion(DeletionRecord { voxels: voxels(40, 5), request: request("d") }),
         6 => Change::Undo(UndoRecord {
             scans: vec![5],
-            voxels: voxels(160, 20),
-            moments: Default::default(),
+            deletions: vec![3],
+            removed: voxels(160, 20),
+            restored: voxels(40, 5),
             request: request("u"),
+            ..UndoRecord::default()
         }),
         _ => {
             let robot = RobotName::new("r1").expect("a name");

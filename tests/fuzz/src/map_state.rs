@@ -66,7 +66,7 @@ fn can_be_changed(map: &MultiResolutionMap, aligned: bool) {
     let region = Region::ball(near, 3.0 * map.lattice().resolution_m(0)).expect("a ball");
     let inside = map.view().voxels_in(&region, 0);
     let removed = map.committer().remove(&inside.iter().copied().collect());
-    assert_eq!(removed.voxels, inside.len());
+    assert_eq!(removed.removed, inside.len());
     levels_agree(map);
 }
 
