@@ -58,6 +58,7 @@ operations! {
     QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
     ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
+    Watch:             Some(Read),  grpc "/mrol.v1.Occupancy/Watch",             http GET "/v1/maps/{map}/watch";
     InsertScan:        Some(Insert), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
     InsertScanStream:  Some(Insert), grpc "/mrol.v1.Mapping/InsertScanStream";
     AlignScan:         Some(Read),  grpc "/mrol.v1.Mapping/AlignScan",           http POST "/v1/maps/{map}/alignment";
@@ -113,7 +114,14 @@ impl Operation {
 
     /// True for calls that last as long as their client wishes.
     pub fn is_stream(self) -> bool {
-        matches!(self, Self::QueryPointsStream | Self::InsertScanStream | Self::Reflect | Self::HealthWatch)
+        matches!(
+            self,
+            Self::QueryPointsStream
+                | Self::InsertScanStream
+                | Self::Watch
+                | Self::Reflect
+                | Self::HealthWatch
+        )
     }
 
     /// True for streams whose messages are requests of their own, each counted when it is answered.

@@ -208,7 +208,12 @@ impl Bodies {
 
     pub(super) fn in_use(&self) -> InUse {
         let known = self.0.known.lock();
-        InUse { requests: self.0.requests.taken(), arriving: known.arriving, streams: 0, bytes: known.bytes }
+        InUse {
+            requests: self.0.requests.taken(),
+            arriving: known.arriving,
+            bytes: known.bytes,
+            ..InUse::default()
+        }
     }
 
     /// Ends silent bodies other than `own`, and then answers that nobody reads, until there is room for `bytes`.

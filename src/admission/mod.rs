@@ -62,6 +62,7 @@ struct Inner {
     /// Requests of a key at once, where it says nothing of that.
     at_once_max: Option<NonZeroU32>,
     streams: Quota,
+    watches: Quota,
     bodies: Bodies,
     probes: Probes,
 }
@@ -90,6 +91,7 @@ impl Admission {
             rates: Rates::new(limits),
             at_once_max: NonZeroU32::new(limits.caller_requests_at_once_max),
             streams: Quota::new("streams_max", limits.streams_max),
+            watches: Quota::new("watches_max", limits.watches_max),
             bodies: Bodies::new(limits),
             probes: Probes::new(limits),
         }))
@@ -114,7 +116,10 @@ impl Admission {
         if operation.is_probe() {
             return self.0.probes.answer(operation, request, endings, handle).await;
         }
-        let place = operation.is_stream().then(|| self.0.streams.take()).transpose()?;
+        let place = match operation {
+            Operation::Watch => Some(self.0.watches.take()?),
+            _ => operation.is_stream().then(|| self.0.streams.take()).transpose()?,
+        };
         let asking = RateLimitKey::of(request.extensions());
         self.check_rate(&asking)?;
         let own_place = asking.begin(self.0.at_once_max)?;
@@ -160,6 +165,15 @@ impl Admission {
         &self.0.lifecycle
     }
 
+    /// Comes when the server is going down: what ends an answer that lasts as long as its client wishes.
+    pub fn told_to_drain(&self) -> impl Future<Output = ServiceError> + Send + use<> {
+        let lifecycle = self.0.lifecycle.clone();
+        async move {
+            lifecycle.draining().await;
+            draining()
+        }
+    }
+
     /// Memory that an answer takes until it is sent.
     ///
     /// # Errors
@@ -193,7 +207,8 @@ impl Admission {
 
     /// What is in use now.
     pub fn in_use(&self) -> InUse {
-        InUse { streams: self.0.streams.taken(), ..self.0.bodies.in_use() }
+        let (streams, watches) = (self.0.streams.taken(), self.0.watches.taken());
+        InUse { streams, watches, ..self.0.bodies.in_use() }
     }
 
     /// The request with a body that is counted as it arrives; a handler finds the [`InboundBody`] among its extensions.

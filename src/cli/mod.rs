@@ -32,6 +32,7 @@ mod snapshot;
 mod statistics;
 mod truth;
 mod undo;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -79,6 +80,7 @@ enum Command {
     Query(query::Query),
     Delete(delete::Delete),
     Undo(undo::Undo),
+    Watch(watch::Watch),
     Maps(maps::Maps),
     Health(health::Health),
     Key(key::Keys),
@@ -115,6 +117,7 @@ impl Command {
             Self::Query(query) => runtime::block_on(query.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
+            Self::Watch(watch) => runtime::block_on(watch.run(output)),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
             Self::Health(health) => runtime::block_on(health.run(output)),
             Self::Key(key) => key.run(&output),

@@ -29,12 +29,15 @@ mod connection;
 mod credentials;
 mod error;
 mod new_map;
+mod replica;
 mod streams;
+mod watch;
 
 pub use answers::Answers;
 pub use credentials::Credentials;
 pub use error::ClientError;
 pub use new_map::NewMap;
+pub use replica::{BLOCKS_MAX_DEFAULT, Replica, ReplicaError, ReplicaOptions, ReplicaStatus};
 
 use std::time::Duration;
 

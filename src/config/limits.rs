@@ -19,6 +19,7 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.probe_body_bytes_max", limits.probe_body_bytes_max, 64, "64 to 1048576"),
         ("limits.scrapes_max", limits.scrapes_max, 1, "1 to 1048576"),
         ("limits.health_watches_max", limits.health_watches_max, 0, "0 to 1048576"),
+        ("limits.watches_max", limits.watches_max, 0, "0 to 1048576"),
         ("limits.connections_reserved", limits.connections_reserved, 0, "0 to 1048576"),
     ] {
         if !(least..=1 << 20).contains(&value) {
@@ -41,18 +42,23 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.probe_time_max_s", limits.probe_time_max_s),
         ("limits.scrape_kept_s", limits.scrape_kept_s),
         ("limits.health_watch_max_s", limits.health_watch_max_s),
+        ("limits.watch_unread_max_s", limits.watch_unread_max_s),
     ] {
         if !(0.0..=86_400.0).contains(&seconds) {
             return range(key, "0 to 86400", seconds.to_string());
         }
+    }
+    if !(0.01..=86_400.0).contains(&limits.watch_heartbeat_s) {
+        let value = limits.watch_heartbeat_s.to_string();
+        return range("limits.watch_heartbeat_s", "0.01 to 86400", value);
     }
     if limits.body_bytes_max < limits.message_bytes_max {
         let least = "at least limits.message_bytes_max";
         return range("limits.body_bytes_max", least, limits.body_bytes_max.to_string());
     }
     // Each request may be on a connection of its own, in work or arriving, and each stream.
-    if limits.connections_max <= 2 * limits.requests_max + limits.streams_max {
-        let least = "more than twice limits.requests_max and limits.streams_max";
+    if limits.connections_max <= 2 * limits.requests_max + limits.streams_max + limits.watches_max {
+        let least = "more than twice limits.requests_max, limits.streams_max and limits.watches_max";
         return range("limits.connections_max", least, limits.connections_max.to_string());
     }
     check_marks(limits)

@@ -24,6 +24,8 @@ pub struct StoreConfig {
     pub undo_revisions: u64,
     /// Most bytes of snapshots and journal that are kept for undo alone. 4 GiB.
     pub undo_bytes_max: u64,
+    /// Bytes of each map's last changes that are kept in memory for who watches it. 16 MiB.
+    pub watch_bytes_max: usize,
     /// Permissions of the folders that the server makes in the data folder, in octal; files have the same but for
     /// execution. `0700`.
     #[serde(with = "as_text")]
@@ -45,6 +47,7 @@ impl Default for StoreConfig {
             snapshot_interval_s: store.snapshot_interval.as_secs(),
             undo_revisions: store.undo_revisions,
             undo_bytes_max: store.undo_bytes_max,
+            watch_bytes_max: store.watch_bytes_max,
             mode: store.mode,
             trajectory_spacing_m: store.trajectory_spacing.distance_m,
             trajectory_spacing_deg: store.trajectory_spacing.rotation_deg,
@@ -75,6 +78,7 @@ impl StoreConfig {
             snapshot_interval: Duration::from_secs(self.snapshot_interval_s),
             undo_revisions: self.undo_revisions,
             undo_bytes_max: self.undo_bytes_max,
+            watch_bytes_max: self.watch_bytes_max,
             mode: self.mode,
             trajectory_spacing: TrajectorySpacing {
                 distance_m: self.trajectory_spacing_m,

@@ -1,5 +1,6 @@
 //! The Occupancy service: what planners ask.
 
+use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
@@ -13,6 +14,7 @@ use pb::occupancy_server::Occupancy;
 impl Occupancy for Adapter {
     type QueryPointsStreamStream = Answers<pb::QueryPointsResponse>;
     type ListVoxelsStream = BoxStream<pb::ListVoxelsResponse>;
+    type WatchStream = BoxStream<pb::WatchResponse>;
 
     async fn query_points(
         &self,
@@ -54,6 +56,13 @@ impl Occupancy for Adapter {
             Ok(chunk)
         });
         Ok(Response::new(Box::pin(tokio_stream::iter(chunks))))
+    }
+
+    async fn watch(&self, request: Request<pb::WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {
+        let service = service_of(&request)?;
+        let (map, request) = request.into_inner().try_into()?;
+        let messages = service.watch(&map, request).await?.into_stream(self.admission.told_to_drain());
+        Ok(Response::new(Box::pin(messages.map(|message| Ok(message?.into())))))
     }
 }
 

@@ -5,7 +5,7 @@ use tonic::{Code, Status};
 
 use crate::service::{ErrorCode, Reason, ServiceError};
 use crate::telemetry::RequestOutcome;
-use crate::wire::pb;
+use crate::wire::status_code;
 
 /// The metadata that holds the word for programs.
 pub(super) const REASON: &str = "mrol-reason";
@@ -13,40 +13,14 @@ pub(super) const REASON: &str = "mrol-reason";
 /// The metadata that tells gRPC's own retries how many milliseconds to wait.
 const PUSHBACK: &str = "grpc-retry-pushback-ms";
 
-/// The gRPC code of a failure.
-fn code(code: ErrorCode) -> Code {
-    match code {
-        ErrorCode::InvalidArgument => Code::InvalidArgument,
-        ErrorCode::Unauthenticated => Code::Unauthenticated,
-        ErrorCode::PermissionDenied => Code::PermissionDenied,
-        ErrorCode::NotFound => Code::NotFound,
-        ErrorCode::Conflict => Code::AlreadyExists,
-        ErrorCode::FailedPrecondition => Code::FailedPrecondition,
-        ErrorCode::ResourceExhausted => Code::ResourceExhausted,
-        ErrorCode::DeadlineExceeded => Code::DeadlineExceeded,
-        ErrorCode::Unavailable => Code::Unavailable,
-        ErrorCode::Internal => Code::Internal,
-    }
-}
-
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
-        let mut status = Self::new(code(error.code()), error.message);
+        let mut status = Self::new(status_code(error.code()), error.message);
         status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason.as_str()));
         if let Some(wait) = error.retry_after {
             status.metadata_mut().insert(PUSHBACK, MetadataValue::from(wait.as_millis() as u64));
         }
         status
-    }
-}
-
-/// A failure as an answer of a stream that goes on.
-pub(super) fn failure(error: &ServiceError) -> pb::Failure {
-    pb::Failure {
-        code: code(error.code()) as i32,
-        reason: error.reason.as_str().to_owned(),
-        message: error.message.clone(),
-        retry_after_s: error.retry_after.map(|wait| wait.as_secs_f64()),
     }
 }
 

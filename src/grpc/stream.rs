@@ -200,7 +200,7 @@ impl<A: prost::Message, H> Worker<A, H> {
                 told = self
                     .failed
                     .filter(|_| !status::ends_stream(&error))
-                    .map(|failed| failed(status::failure(&error)));
+                    .map(|failed| failed(error.clone().into()));
                 Status::from(error)
             }),
             Err(unreadable) => Err(unreadable),

@@ -21,6 +21,7 @@ mod trajectory;
 mod undo;
 mod unreadable;
 mod voxels;
+mod watch;
 
 pub use starting::starting;
 

@@ -12,7 +12,7 @@ use super::error::HttpError;
 use super::unreadable;
 use crate::access::Authorized;
 use crate::geometry::{self, Pose};
-use crate::map::{MapName, RequestId};
+use crate::map::{MapName, Region, RequestId};
 use crate::service::{Reason, ServiceError};
 use crate::util::excerpt;
 use crate::wire::InField;
@@ -74,6 +74,15 @@ pub(super) fn from_query<T: DeserializeOwned>(uri: &Uri) -> Result<T, HttpError>
         ServiceError::new(Reason::BadQuery, unreadable::query(&said))
     })?;
     Ok(parameters)
+}
+
+/// The box from `min` to `max`, where they are given.
+pub(super) fn region_of(min: Option<&str>, max: Option<&str>) -> Result<Option<Region>, ServiceError> {
+    match (min, max) {
+        (None, None) => Ok(None),
+        (Some(min), Some(max)) => Ok(Some(Region::cuboid(numbers(min, "min")?, numbers(max, "max")?)?)),
+        _ => Err(ServiceError::new(Reason::HalfABox, "min and max go together, got one of them")),
+    }
 }
 
 /// `N` numbers with commas between them.

@@ -6,6 +6,7 @@ use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
     Adapter, deletions, localization, map_file, maps, occupancy, probes, scans, trajectory, undo, voxels,
+    watch,
 };
 use crate::access::Operation;
 
@@ -38,6 +39,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::Undo => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),
         Operation::ListVoxels => on(method, voxels::list),
+        Operation::Watch => on(method, watch::watch),
         Operation::SnapshotMap => on(method, map_file::take),
         Operation::RestoreMap => on(method, map_file::restore),
         Operation::Live => on(method, probes::live),

@@ -12,8 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, numbers};
-use crate::map::Region;
+use super::params::{Map, Params, region_of};
 use crate::service::{Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::json::JsonVersion;
@@ -54,7 +53,8 @@ pub(super) async fn list(
     Map(map): Map,
     Params(query): Params<VoxelsParams>,
 ) -> Result<Response, HttpError> {
-    let (level, region) = (query.level, query.region()?);
+    let region = region_of(query.min.as_deref(), query.max.as_deref())?;
+    let level = query.level;
     let listing = service.list_voxels(&map, level, region).await?;
     let head = Head { level, resolution_m: listing.resolution_m, version: listing.version.into() };
     let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;
@@ -64,16 +64,6 @@ pub(super) async fn list(
     });
     let body = Body::from_stream(tokio_stream::iter(chunks));
     Ok(([(header::CONTENT_TYPE, "application/json")], body).into_response())
-}
-
-impl VoxelsParams {
-    fn region(&self) -> Result<Option<Region>, ServiceError> {
-        match (&self.min, &self.max) {
-            (None, None) => Ok(None),
-            (Some(min), Some(max)) => Ok(Some(Region::cuboid(numbers(min, "min")?, numbers(max, "max")?)?)),
-            _ => Err(ServiceError::new(Reason::HalfABox, "min and max go together, got one of them")),
-        }
-    }
 }
 
 /// `{<head>,"voxels":[[i,j,k],...]}` in pieces, each made when it is asked for: a listing may be larger than any

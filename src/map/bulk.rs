@@ -1,6 +1,6 @@
 //! Many blocks, or keys, at once: their cache misses are under way together.
 
-use super::update::BlockChange;
+use super::block_change::BlockChange;
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::prefetch;
 use crate::voxel::{BlockInCluster, BlockMask, ClusterTable, VoxelKey};

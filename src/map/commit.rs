@@ -5,13 +5,14 @@
 //! the write locks of what it touches, for which it waits behind short readers only. Short readers therefore never
 //! queue behind a change that itself waits for a long one.
 
+use super::block_change::{BlockChange, block_changes};
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::shard::Shard;
 use super::sharding::SHARDS;
-use super::update::{BlockChange, Moved, ShardUpdate, block_changes};
+use super::update::{Moved, ShardUpdate};
 use super::{
-    Change, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, MappedScan, MultiResolutionMap,
-    ScanRecord, TrajectorySpacing, UndoRecord,
+    Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, LevelChange, LevelSet,
+    MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::util::StopSignal;
@@ -21,37 +22,14 @@ use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 #[derive(Debug)]
 pub struct Committer<'a> {
     map: &'a MultiResolutionMap,
+    /// The levels of which it is noted what the change does.
+    noted: LevelSet,
     _turn: MutexGuard<'a, ()>,
-}
-
-/// A change that was made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Committed {
-    /// The revision after it.
-    pub revision: u64,
-    /// Hash of what the map holds after it.
-    pub hash: ContentHash,
-    /// Finest voxels that it added.
-    pub added: usize,
-    /// Finest voxels that it took out.
-    pub removed: usize,
-}
-
-impl Committed {
-    /// The revision after the change, with its hash.
-    pub fn version(&self) -> ContentVersion {
-        ContentVersion { revision: self.revision, hash: self.hash }
-    }
-
-    /// No change of a map at `version`.
-    pub fn none(ContentVersion { revision, hash }: ContentVersion) -> Self {
-        Self { revision, hash, added: 0, removed: 0 }
-    }
 }
 
 impl<'a> Committer<'a> {
     pub(super) fn begin(map: &'a MultiResolutionMap) -> Self {
-        Self { map, _turn: map.commit_queue.lock() }
+        Self { map, noted: LevelSet::default(), _turn: map.commit_queue.lock() }
     }
 
     /// The map, which nobody else changes meanwhile.
@@ -61,13 +39,22 @@ impl<'a> Committer<'a> {
 
     /// Makes `change`, for the first time or again.
     pub fn apply(self, change: &Change) -> Committed {
+        self.apply_noting(change, LevelSet::default()).0
+    }
+
+    /// [`Committer::apply`], with what the change does to the levels of `noted`, ascending.
+    pub fn apply_noting(self, change: &Change, noted: LevelSet) -> (Committed, Vec<LevelChange>) {
         let unchanged = self.unchanged();
         // It is always made: nobody stops it.
-        self.apply_until(change, StopSignal::NEVER).unwrap_or(unchanged)
+        Self { noted, ..self }.make(change, StopSignal::NEVER).unwrap_or((unchanged, Vec::new()))
     }
 
     /// [`Committer::apply`] under a stop signal; none once stopped, and the map is of no use then.
     pub fn apply_until(self, change: &Change, stop: StopSignal<'_>) -> Option<Committed> {
+        Some(self.make(change, stop)?.0)
+    }
+
+    fn make(self, change: &Change, stop: StopSignal<'_>) -> Option<Made> {
         match change {
             Change::Insertion(scan) => self.insert(scan, stop),
             Change::Deletion(deletion) => self.delete(deletion, stop),
@@ -86,16 +73,32 @@ impl<'a> Committer<'a> {
         self.apply(&Change::Deletion(DeletionRecord { voxels: voxels.clone(), request: None }))
     }
 
-    fn insert(self, scan: &ScanRecord, stop: StopSignal<'_>) -> Option<Committed> {
-        let update = self.plan(&scan.carved, &scan.voxels, stop)?;
-        let committed = self.next(&update);
+    /// Takes finest voxels out and then adds others, as another map did; always makes a revision, with neither pose nor
+    /// moments. For copies of a map.
+    pub fn exchange(self, removed: &VoxelSet, added: &VoxelSet) -> Committed {
+        let unchanged = self.unchanged();
+        let exchange = || {
+            let mut update = self.plan(removed, added, StopSignal::NEVER)?;
+            let made = self.next(&mut update);
+            let _locks =
+                self.carry_out(update, &Default::default(), &Default::default(), StopSignal::NEVER)?;
+            Some(self.publish(made).0)
+        };
+        // It is always made: nobody stops it.
+        exchange().unwrap_or(unchanged)
+    }
+
+    fn insert(self, scan: &ScanRecord, stop: StopSignal<'_>) -> Option<Made> {
+        let mut update = self.plan(&scan.carved, &scan.voxels, stop)?;
+        let made = self.next(&mut update);
+        let committed = &made.0;
         let _locks =
             self.carry_out(update, &self.map.moments.group(&scan.moments), &Default::default(), stop)?;
         let mut trajectory = self.map.trajectory.write();
         let pose =
             MappedScan { revision: committed.revision, new_voxels: committed.added, ..scan.pose.clone() };
         trajectory.push(pose);
-        Some(self.publish(committed))
+        Some(self.publish(made))
     }
 
     /// Adds finest voxels and moments, with neither pose nor revision: what [`MultiResolutionMap::restore`] begins
@@ -112,25 +115,25 @@ impl<'a> Committer<'a> {
         Some(hash)
     }
 
-    fn delete(self, deletion: &DeletionRecord, stop: StopSignal<'_>) -> Option<Committed> {
-        let update = self.plan(&deletion.voxels, &VoxelSet::default(), stop)?;
+    fn delete(self, deletion: &DeletionRecord, stop: StopSignal<'_>) -> Option<Made> {
+        let mut update = self.plan(&deletion.voxels, &VoxelSet::default(), stop)?;
         if update.removed.voxels == 0 {
-            return Some(self.unchanged());
+            return Some((self.unchanged(), Vec::new()));
         }
-        let committed = self.next(&update);
+        let made = self.next(&mut update);
         let _locks = self.carry_out(update, &Default::default(), &Default::default(), StopSignal::NEVER)?;
         if let Some(request) = &deletion.request {
-            self.remember(CompletedRequest::of_deletion(request, &committed));
+            self.remember(CompletedRequest::of_deletion(request, &made.0));
         }
-        Some(self.publish(committed))
+        Some(self.publish(made))
     }
 
     /// Takes changes back: the scans leave the trajectory, what they alone held goes, and what they or deletions took away
     /// comes back. Always makes a revision.
-    fn undo(self, undo: &UndoRecord, stop: StopSignal<'_>) -> Option<Committed> {
+    fn undo(self, undo: &UndoRecord, stop: StopSignal<'_>) -> Option<Made> {
         // All shards, so that nobody who has a view of the whole map sees the trajectory change.
-        let update = self.plan_in(&undo.removed, &undo.restored, 0..SHARDS, stop)?;
-        let committed = self.next(&update);
+        let mut update = self.plan_in(&undo.removed, &undo.restored, 0..SHARDS, stop)?;
+        let made = self.next(&mut update);
         let _locks = self.carry_out(
             update,
             &Default::default(),
@@ -138,11 +141,11 @@ impl<'a> Committer<'a> {
             StopSignal::NEVER,
         )?;
         let mut trajectory = self.map.trajectory.write();
-        trajectory.withdraw(undo.changes(), committed.revision);
+        trajectory.withdraw(undo.changes(), made.0.revision);
         if let Some(request) = &undo.request {
-            self.remember(CompletedRequest::of_undo(request, undo, &committed));
+            self.remember(CompletedRequest::of_undo(request, undo, &made.0));
         }
-        Some(self.publish(committed))
+        Some(self.publish(made))
     }
 
     /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](super::Trajectory::thin); the number
@@ -160,21 +163,23 @@ impl<'a> Committer<'a> {
     }
 
     /// Makes the change visible: readers that get a lock from now on report this revision.
-    fn publish(&self, committed: Committed) -> Committed {
-        self.map.published.publish(committed.version());
-        committed
+    fn publish(&self, made: Made) -> Made {
+        self.map.published.publish(made.0.version());
+        made
     }
 
-    /// What the change is once it is made: the next revision.
-    fn next(&self, update: &MapUpdate) -> Committed {
+    /// What the change is once it is made: the next revision, and what was noted of it.
+    fn next(&self, update: &mut MapUpdate) -> Made {
         let ContentVersion { revision, hash } = self.map.content_version();
-        let MapUpdate { added, removed, .. } = update;
-        Committed {
+        let MapUpdate { added, removed, shards } = update;
+        let committed = Committed {
             revision: revision + 1,
             hash: hash.with(added.hash).without(removed.hash),
             added: added.voxels,
             removed: removed.voxels,
-        }
+        };
+        let noted = shards.iter_mut().flat_map(|(_, update)| std::mem::take(&mut update.noted));
+        (committed, LevelChange::of(self.noted, noted))
     }
 
     /// The map as it is.
@@ -199,7 +204,8 @@ impl<'a> Committer<'a> {
         let by_shard = self.group(removed, added);
         let mut is_planned = by_shard.each_ref().map(|changes| !changes.is_empty());
         shards.into_iter().for_each(|i| is_planned[i] = true);
-        let plan = |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], stop));
+        let plan =
+            |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], self.noted, stop));
         let shards: Vec<_> = (0..SHARDS).filter(|&i| is_planned[i]).map(plan).collect();
         let total = |of: fn(&ShardUpdate) -> Moved| {
             shards.iter().fold(Moved::default(), |all, (_, update)| all.and(of(update)))
@@ -243,6 +249,9 @@ impl<'a> Committer<'a> {
         (!stop.is_stopped()).then_some(locks)
     }
 }
+
+/// A change that was made, and what it did to the levels that are noted.
+type Made = (Committed, Vec<LevelChange>);
 
 /// What is to be done to a map. A shard is as it was planned for until the change is carried out, since the turn to change
 /// the map is held meanwhile.

@@ -4,16 +4,20 @@
 //! Reading order: [`OccupiedVoxelList`] is one level of the paper, `shard` all levels of one part of space,
 //! [`MultiResolutionMap`] the shards, [`view`] how it is read and [`commit`] how it is changed.
 
+mod block_change;
 mod bounds;
 mod bulk;
 mod capacity_schedule;
 mod change;
 pub mod commit;
+mod committed;
 mod content_hash;
 mod contents;
 mod filter_room;
 mod idempotency_log;
 mod info;
+mod level_blocks;
+mod level_changes;
 mod level_update;
 mod level_voxels;
 pub(crate) mod lookup;
@@ -31,13 +35,15 @@ pub mod view;
 mod voxel_ownership;
 
 pub use change::{Change, DeletionRecord, Request, UndoRecord};
-pub use commit::{Committed, Committer};
+pub use commit::Committer;
+pub use committed::Committed;
 pub use content_hash::{ContentHash, ContentVersion};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
 pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
 pub use info::{LevelInfo, MapDescription};
+pub use level_changes::{LevelChange, LevelSet};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;

@@ -1,20 +1,14 @@
 //! What a change of a shard comes to: voxels that go, and voxels that come.
 
+use super::block_change::{BlockChange, block_changes};
 use super::bulk::find_each;
+use super::level_changes::{KeysOfLevel, LevelSet};
 use super::level_update::LevelUpdate;
 use super::moments::MomentsLost;
 use super::shard::{Shard, levels_of};
 use super::{ContentHash, MapSettings};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, ClusterUpdate, VoxelKey, VoxelSet};
-
-/// What a change does to a block: voxels go first, where they are there, and then voxels come.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BlockChange<'a> {
-    pub(super) block: VoxelKey,
-    pub(super) removed: &'a BlockMask,
-    pub(super) added: &'a BlockMask,
-}
 
 /// What is to be done to a shard so that voxels go and come at every level, found out and built while readers go on. Under
 /// the write lock pointers are exchanged, and filters' bits cleared and set; nothing is counted, and nothing is rebuilt. It
@@ -27,6 +21,8 @@ pub(super) struct ShardUpdate {
     pub(super) added: Moved,
     /// What becomes of the moments of voxels that lose descendants, before points are added to any.
     pub(super) moments: MomentsLost,
+    /// The keys that go and come of the levels that somebody watches.
+    pub(super) noted: Vec<KeysOfLevel>,
     outcome: Outcome,
 }
 
@@ -58,45 +54,34 @@ impl Moved {
     }
 }
 
-/// The changes, in ascending order of their blocks, by which the voxels of `removed` go and those of `added` come.
-pub(super) fn block_changes<'a>(
-    removed: &'a VoxelSet,
-    added: &'a VoxelSet,
-) -> impl Iterator<Item = BlockChange<'a>> {
-    let (mut removed, mut added) = (removed.blocks().iter().peekable(), added.blocks().iter().peekable());
-    std::iter::from_fn(move || {
-        let next = match (removed.peek(), added.peek()) {
-            (Some((one, _)), Some((other, _))) => *one.min(other),
-            (Some((block, _)), None) | (None, Some((block, _))) => *block,
-            (None, None) => return None,
-        };
-        let removed =
-            removed.next_if(|(block, _)| *block == next).map_or(&BlockMask::EMPTY, |(_, mask)| mask);
-        let added = added.next_if(|(block, _)| *block == next).map_or(&BlockMask::EMPTY, |(_, mask)| mask);
-        Some(BlockChange { block: next, removed, added })
-    })
-}
-
 impl ShardUpdate {
     /// Finds out what `changes` of blocks of finest voxels come to in `shard`, and counts them: voxels to remove that are not
     /// there are passed over, and so the set says which keys the filters are told to forget (paper II-A). Once stopped, what
-    /// comes of it is not to be applied, and the shard of no use.
-    pub(super) fn plan(shard: &Shard, changes: &[BlockChange<'_>], stop: StopSignal<'_>) -> Self {
+    /// comes of it is not to be applied, and the shard of no use. What becomes of the levels `noted` is kept.
+    pub(super) fn plan(
+        shard: &Shard,
+        changes: &[BlockChange<'_>],
+        noted: LevelSet,
+        stop: StopSignal<'_>,
+    ) -> Self {
         if let Some(removed) = removes_everything(shard, changes) {
             let (moments, outcome) = (MomentsLost::Everything, Outcome::Nothing);
-            return Self { removed, added: Moved::default(), moments, outcome };
+            let noted = noted.iter().map(|level| all_keys(shard, level)).collect();
+            return Self { removed, added: Moved::default(), moments, noted, outcome };
         }
         let (mut tiers, mut levels, mut moments) = (Vec::new(), Vec::new(), MomentsLost::default());
         let finest = Tier::of(shard, 0, changes, &mut moments, stop);
         let (removed, added) = (Moved::of_keys(&finest.lost[0]), Moved::of_keys(&finest.gained[0]));
+        let mut kept = finest.keys_of(noted);
         let (mut emptied, mut created) = finest.plan(&mut tiers, &mut levels, stop);
         for tier in 1..shard.tiers.len() {
             let (removed, added) = (VoxelSet::from_iter(emptied), VoxelSet::from_iter(created));
             let changes: Vec<_> = block_changes(&removed, &added).collect();
             let tier = Tier::of(shard, tier, &changes, &mut moments, stop);
+            kept.extend(tier.keys_of(noted));
             (emptied, created) = tier.plan(&mut tiers, &mut levels, stop);
         }
-        Self { removed, added, moments, outcome: Outcome::Voxels { tiers, levels } }
+        Self { removed, added, moments, noted: kept, outcome: Outcome::Voxels { tiers, levels } }
     }
 
     /// Does it, but for the moments. What the shard held and holds no more is for the caller to drop, once nobody
@@ -133,6 +118,13 @@ fn removes_everything(shard: &Shard, changes: &[BlockChange<'_>]) -> Option<Move
         shard.level(0).for_some_keys(|keys| hash = hash.with(ContentHash::of_keys(keys)));
         Moved { voxels, hash }
     })
+}
+
+/// All keys of a level, of which none is left.
+fn all_keys(shard: &Shard, level: u32) -> KeysOfLevel {
+    let mut lost = Vec::new();
+    shard.level(level).for_some_keys(|keys| lost.extend_from_slice(keys));
+    KeysOfLevel { level, lost, gained: Vec::new() }
 }
 
 /// The part of an update in one tier of blocks.
@@ -191,6 +183,18 @@ impl<'a> Tier<'a> {
             // What is gone is what would be gained if all came back.
             (0..).zip(&mut self.lost).for_each(|(up, keys)| after.keys_gained(before, block, up, keys));
         }
+    }
+
+    /// The keys that go and come, of those of its levels that are noted.
+    fn keys_of(&self, noted: LevelSet) -> Vec<KeysOfLevel> {
+        let levels = levels_of(self.tier, self.shard.filters.len()).zip(self.lost.iter().zip(&self.gained));
+        let levels = levels.map(|(level, keys)| (level as u32, keys));
+        let of_level = |(level, (lost, gained)): (u32, (&Vec<u64>, &Vec<u64>))| KeysOfLevel {
+            level,
+            lost: lost.clone(),
+            gained: gained.clone(),
+        };
+        levels.filter(|(level, _)| noted.contains(*level)).map(of_level).collect()
     }
 
     /// Plans for the tier; the blocks that lose their last voxel, and those that get their first.

@@ -19,6 +19,7 @@ use std::sync::{Arc, OnceLock};
 
 use tokio::sync::{OwnedMutexGuard, oneshot, watch};
 
+use super::recent_changes::RecentChanges;
 use super::resource_budget::Reservation;
 use super::{Reason, ServiceError};
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
@@ -94,6 +95,14 @@ pub(super) enum Step<A> {
     Submitted(oneshot::Receiver<Outcome>, Box<dyn FnOnce(Committed) -> A + Send>),
 }
 
+/// Who is told of a change when it is visible.
+pub(super) struct Told {
+    /// Those who wait for a revision.
+    pub(super) announced: watch::Sender<u64>,
+    /// Those who watch the map.
+    pub(super) recent: Arc<RecentChanges>,
+}
+
 /// A submission with the one who waits for it.
 struct Waiting {
     submission: Submission,
@@ -140,20 +149,20 @@ impl CommitThread {
 }
 
 impl CommitQueue {
-    /// Gives `thread` a map. `announced` is told of each revision.
+    /// Gives `thread` a map.
     pub(super) fn begin(
         thread: CommitThread,
         name: MapName,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
-        announced: watch::Sender<u64>,
+        told: Told,
         settings: &StoreSettings,
     ) -> Self {
         let (inbox, waiting) = sync_channel(GROUP_MAX);
         let stopped = Arc::new(OnceLock::new());
         let durations = Arc::<SharedDurations>::default();
         let worker =
-            Worker::new(name, map, folder, announced, Arc::clone(&stopped), Arc::clone(&durations), settings);
+            Worker::new(name, map, folder, told, Arc::clone(&stopped), Arc::clone(&durations), settings);
         // It waits for just this.
         drop(thread.0.send((worker, waiting)));
         Self { inbox, stopped, ended: watch::Sender::new(false), durations }

@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
 use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
-use super::commit_queue::{CommitQueue, CommitThread, Stop};
+use super::commit_queue::{CommitQueue, CommitThread, Stop, Told};
+use super::full_state::FullStates;
+use super::point_query::{POINTS_PER_STEP, point_without_voxel};
+use super::recent_changes::RecentChanges;
 use super::resource_budget::ResourceBudget;
 use super::{
     MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing,
@@ -43,6 +45,10 @@ pub(super) struct HostedMap {
     pub(super) commit_queue: CommitQueue,
     /// The last revision that was published.
     announced: watch::Receiver<u64>,
+    /// The last changes, for who watches the map.
+    pub(super) recent: Arc<RecentChanges>,
+    /// Whole states that watchers are being told of.
+    pub(super) full_states: FullStates,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
     /// Where and when robots were last seen.
@@ -57,9 +63,6 @@ pub(super) struct HostedMap {
 
 /// Robots whose turns are remembered before those that nobody waits for are dropped.
 const TURNS_KEPT: usize = 1024;
-/// Points that are looked up before it is asked whether somebody waits for the answer: a millisecond or less. A multiple
-/// of the bits in a word.
-const POINTS_PER_STEP: usize = 64 << 10;
 /// Seed of the sample on which false positives are measured: the same map gives the same figures.
 const RATE_SEED: u64 = 1;
 
@@ -90,8 +93,10 @@ impl HostedMap {
         settings: &StoreSettings,
     ) -> Self {
         let (announcing, announced) = watch::channel(map.revision());
+        let recent = Arc::new(RecentChanges::new(map.revision(), settings.watch_bytes_max));
+        let told = Told { announced: announcing, recent: Arc::clone(&recent) };
         let commit_queue =
-            CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), announcing, settings);
+            CommitQueue::begin(thread, name.clone(), Arc::clone(&map), folder.clone(), told, settings);
         Self {
             name,
             uuid,
@@ -99,6 +104,8 @@ impl HostedMap {
             folder,
             commit_queue,
             announced,
+            recent,
+            full_states: FullStates::default(),
             turns: Mutex::new(Rank::Brief, HashMap::new()),
             sightings: Sightings::default(),
             lost: LostRobots::default(),
@@ -271,38 +278,12 @@ impl HostedMap {
         query: &PointQuery,
         stop: StopSignal<'_>,
     ) -> Result<PointAnswer, ServiceError> {
-        let points = query.points.as_slice();
-        let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
-        let quantize = self.map.lattice().from_points(&map_from_points);
-        let mut occupied = vec![0; points.len().div_ceil(64)];
-        let mut all_have_a_voxel = true;
-        for (points, words) in points.chunks(POINTS_PER_STEP).zip(occupied.chunks_mut(POINTS_PER_STEP / 64)) {
-            check_not_stopped(stop)?;
-            all_have_a_voxel &= view.query(points, &quantize, query.level, query.lookup, words);
-        }
-        let version = self.version(view.version());
-        drop(view);
-        if !all_have_a_voxel {
-            return Err(self.point_without_voxel(points, &quantize));
-        }
-        Ok(PointAnswer {
-            points: points.len(),
-            points_occupied: occupied.iter().map(|word| word.count_ones() as usize).sum(),
-            occupied: bitmap(occupied, points.len()),
-            version,
-        })
+        query.answer_in(view, self.uuid, self.map.lattice(), stop)
     }
 
     /// Names the first point that falls in no voxel.
     pub(super) fn point_without_voxel(&self, points: &[Point], quantize: &LatticeFromPoints) -> ServiceError {
-        let place = points.iter().position(|&point| quantize.index(point).is_none()).unwrap_or_default();
-        let point = points[place];
-        let (min_m, end_m) = self.map.lattice().range_m();
-        let (reason, what) = match point.is_finite() {
-            true => (Reason::PointOutOfRange, format!("outside the map's range of {min_m} to {end_m} m")),
-            false => (Reason::PointNotFinite, "not finite".to_owned()),
-        };
-        ServiceError::new(reason, format!("points[{place}] is {what}: {point:?}"))
+        point_without_voxel(points, quantize, self.map.lattice())
     }
 
     pub(super) fn list(
@@ -387,18 +368,6 @@ fn listing_too_large(level: u32, found: usize, most: usize) -> ServiceError {
         "level {level} has {found} voxels there or more, listed_voxels_max is {most}: ask for a region or a coarser level"
     );
     ServiceError::new(Reason::ListingTooLarge, message)
-}
-
-/// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.
-pub(super) fn bitmap(words: Vec<u64>, points: usize) -> Bytes {
-    struct Owner(Vec<u64>);
-    impl AsRef<[u8]> for Owner {
-        fn as_ref(&self) -> &[u8] {
-            bytemuck::cast_slice(&self.0)
-        }
-    }
-    let words = if cfg!(target_endian = "big") { words.into_iter().map(u64::to_le).collect() } else { words };
-    Bytes::from_owner(Owner(words)).slice(..points.div_ceil(8))
 }
 
 /// Bytes of memory that a snapshot of `map` takes while it is made: 55 to 70 % of the map's were measured.

@@ -59,6 +59,12 @@ pub struct Limits {
     pub health_watches_max: usize,
     /// How long a health watch lasts that came without a key, seconds. 600.
     pub health_watch_max_s: f64,
+    /// Watches of maps at once, over both protocols. 256.
+    pub watches_max: usize,
+    /// Longest time between two messages of a watch, where nothing changes. 10 s.
+    pub watch_heartbeat_s: f64,
+    /// How long a watch's client may take no message, until the watch ends. 30 s.
+    pub watch_unread_max_s: f64,
     /// Points of one query, deletion or scan. 2,000,000.
     pub points_per_request_max: usize,
     /// How far the time of a scan's point may lie from the scan's timestamp. 2 s.
@@ -135,6 +141,9 @@ impl Default for Limits {
             scrape_kept_s: 1.0,
             health_watches_max: 16,
             health_watch_max_s: 600.0,
+            watches_max: 256,
+            watch_heartbeat_s: 10.0,
+            watch_unread_max_s: 30.0,
             points_per_request_max: 2_000_000,
             point_times_max_s: 2.0,
             keys_per_request_max: 2_000_000,

@@ -11,6 +11,7 @@ mod digest;
 mod error;
 mod error_code;
 mod filtered_scan;
+mod full_state;
 mod gauges;
 mod growth;
 mod hosted_map;
@@ -24,8 +25,10 @@ mod maps;
 #[cfg(all(test, feature = "shuttle"))]
 mod modeled;
 mod observer;
+mod point_query;
 mod pool;
 mod reason;
+mod recent_changes;
 mod recovery;
 mod request;
 mod resource_budget;
@@ -34,6 +37,7 @@ mod shortage;
 mod time_limit;
 mod trajectory;
 mod undo;
+mod watch;
 mod watermarks;
 
 pub use allowed_maps::AllowedMaps;
@@ -50,13 +54,16 @@ pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
 pub use reason::{Reason, ToldBy};
 pub use request::{
-    Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo, MapList, MapStorage, MapVersion,
-    PointAnswer, PointCloud, PointQuery, PointTimes, ScanAnswer, ScanRequest, TimeReference,
-    TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing,
+    BlockBytes, Cause, ChangePart, Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo,
+    MapList, MapStorage, MapVersion, PointAnswer, PointCloud, PointQuery, PointTimes, ScanAnswer,
+    ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo,
+    UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
+    WatchedSince,
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;
 pub use trajectory::TrajectoryPieces;
+pub use watch::Watch;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -88,6 +95,8 @@ pub struct MapService {
 const LONG_SHARE: usize = 4;
 /// See [`Inner::undo`].
 const UNDO_THREADS: usize = 1;
+/// See [`Inner::watch`].
+const WATCH_THREADS: usize = 1;
 /// Threads for map files.
 const MAP_FILE_THREADS: usize = 1;
 
@@ -114,6 +123,9 @@ struct Inner {
     localization: Pool,
     /// For searches for lost robots, which nobody waits for.
     recovery: Pool,
+    /// For what watches are told of besides the last changes: whole states, and changes that the journal has. One at a time,
+    /// since each takes memory as a part of the map or a segment of the journal does.
+    watch: Pool,
     budget: Arc<ResourceBudget>,
 }
 
@@ -138,6 +150,7 @@ impl MapService {
             undo: Pool::new("undo", UNDO_THREADS, waiting)?,
             map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
             recovery: Pool::beside("recovery", &localization, 0)?,
+            watch: Pool::new("watch", WATCH_THREADS, waiting.max(settings.limits.watches_max))?,
             localization,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
@@ -183,11 +196,20 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 8] {
+    pub fn pools(&self) -> [PoolUse; 9] {
         let Inner {
-            queries, mapping, long_mapping, alignment, localization, recovery, undo, map_files, ..
+            queries,
+            mapping,
+            long_mapping,
+            alignment,
+            localization,
+            recovery,
+            undo,
+            map_files,
+            watch,
+            ..
         } = &*self.inner;
-        let all = [queries, mapping, long_mapping, alignment, localization, recovery, undo, map_files];
+        let all = [queries, mapping, long_mapping, alignment, localization, recovery, undo, map_files, watch];
         all.map(Pool::in_use)
     }
 

@@ -67,6 +67,7 @@ reasons! {
         AmbiguousGuess "ambiguous_guess" Http: "several of `guess`, `motion` and `constant_velocity` are given", "give one";
         AmbiguousPoints "ambiguous_points" Grpc: "both `xyz_f32le` and `xyz` are filled", "fill one";
         AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo", "give one";
+        BadBlocks "bad_blocks" Client: "the server's answer has blocks of voxels that are none", "update the client";
         BadCovariance "bad_covariance" Both: "the guess's covariance is not 36 finite numbers of a symmetric, positive semidefinite matrix", "send it row by row: x y z in meters, then turns about the map's axes in radians";
         BadDirection "bad_direction" Client: "the server's answer has a direction that is none", "update the client";
         BadFilter "bad_filter" Both: "range limits or body box are not numbers in order", "correct them";
@@ -167,6 +168,7 @@ reasons! {
         HealthWatchOver "health_watch_over" Grpc: "a watch without a key lasts `health_watch_max_s`", "watch again";
         ProbeLate "probe_late" Both: "a health check did not come within `probe_time_max_s`", "send it faster";
         RevisionNotReached "revision_not_reached" Both: "`min_revision` did not come in time", "wait longer";
+        WatchStalled "watch_stalled" Both: "a watch's client took no message for `watch_unread_max_s`", "read on, or watch again from the last revision";
         TimeLimit "time_limit" Both: "the scan or undo took longer than `alignment_time_max_s`, `insertion_time_max_s` or `undo_time_max_s`", "send a smaller scan, or raise the limit";
     }
     Unavailable {

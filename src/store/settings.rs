@@ -73,6 +73,8 @@ pub struct StoreSettings {
     pub trajectory_spacing: TrajectorySpacing,
     /// Size from which on a segment of the journal is ended, bytes. 64 MiB.
     pub segment_bytes_max: u64,
+    /// Most bytes of a map's last changes that are kept in memory for who watches it. 16 MiB.
+    pub watch_bytes_max: usize,
 }
 
 impl Default for StoreSettings {
@@ -86,6 +88,7 @@ impl Default for StoreSettings {
             mode: StoreMode::default(),
             trajectory_spacing: TrajectorySpacing::default(),
             segment_bytes_max: 64 << 20,
+            watch_bytes_max: 16 << 20,
         }
     }
 }

@@ -15,6 +15,7 @@ pub(super) const CERTIFICATE_EXPIRES: &str = "mrol_certificate_expires_timestamp
 pub(super) const HANDSHAKES_FAILED: &str = "mrol_tls_handshakes_failed_total";
 pub(super) const REQUESTS_IN_FLIGHT: &str = "mrol_requests_in_flight";
 pub(super) const STREAMS_OPEN: &str = "mrol_streams_open";
+pub(super) const WATCHES_OPEN: &str = "mrol_watches_open";
 pub(super) const BODY_BYTES: &str = "mrol_body_bytes";
 pub(super) const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
 pub(super) const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
@@ -45,6 +46,7 @@ pub(super) fn describe() {
     describe_counter!(HANDSHAKES_FAILED, "TLS handshakes that failed, by protocol");
     describe_gauge!(REQUESTS_IN_FLIGHT, "Requests in work, and those whose bodies are arriving, by state");
     describe_gauge!(STREAMS_OPEN, "Calls whose client streams messages");
+    describe_gauge!(WATCHES_OPEN, "Watches of maps");
     describe_gauge!(
         BODY_BYTES,
         "Bytes of bodies that have arrived, and of listings and map files on their way out"

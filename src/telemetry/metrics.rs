@@ -12,7 +12,7 @@ use parking_lot::Mutex;
 use super::families::{
     BODY_BYTES, BUILD_INFO, CERTIFICATE_EXPIRES, CONNECTIONS_ACCEPTED, CONNECTIONS_OPEN, CONNECTIONS_REFUSED,
     DISK_FREE_BYTES, FILE_RELOAD_OK, HANDSHAKES_FAILED, KEY_REQUESTS, MEMORY_RESIDENT_BYTES, REQUEST_SECONDS,
-    REQUESTS, REQUESTS_DENIED, REQUESTS_IN_FLIGHT, ROBOT_SCANS, STREAMS_OPEN, WRITES_REFUSED,
+    REQUESTS, REQUESTS_DENIED, REQUESTS_IN_FLIGHT, ROBOT_SCANS, STREAMS_OPEN, WATCHES_OPEN, WRITES_REFUSED,
 };
 use super::log::TelemetryError;
 use super::map_counters::{Family, MapCounters};
@@ -46,7 +46,7 @@ const COMMIT: &str = match option_env!("MROL_COMMIT") {
 };
 
 /// How much of what admission limits is in use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InUse {
     /// Requests in work.
     pub requests: usize,
@@ -54,6 +54,8 @@ pub struct InUse {
     pub arriving: usize,
     /// Streams.
     pub streams: usize,
+    /// Watches of maps.
+    pub watches: usize,
     /// Bytes of bodies and answers.
     pub bytes: usize,
 }
@@ -159,11 +161,12 @@ impl Metrics {
 
     /// Says how much of what is limited is in use.
     pub fn in_use(&self, in_use: &InUse) {
-        let InUse { requests, arriving, streams, bytes } = *in_use;
+        let InUse { requests, arriving, streams, watches, bytes } = *in_use;
         self.record(|| {
             gauge!(REQUESTS_IN_FLIGHT, "state" => "in_work").set(requests as f64);
             gauge!(REQUESTS_IN_FLIGHT, "state" => "arriving").set(arriving as f64);
             gauge!(STREAMS_OPEN).set(streams as f64);
+            gauge!(WATCHES_OPEN).set(watches as f64);
             gauge!(BODY_BYTES).set(bytes as f64);
         });
     }

@@ -5,6 +5,7 @@
 //! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
 
 mod deletion;
+mod failure;
 mod field;
 #[cfg(feature = "server")]
 pub mod json;
@@ -18,7 +19,9 @@ mod trajectory;
 pub mod transport;
 mod types;
 mod undo;
+mod watch;
 
+pub use failure::status_code;
 pub(crate) use field::{InField, required};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::create_map;
@@ -26,3 +29,4 @@ pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};
 #[cfg(feature = "server")]
 pub(crate) use scan::gravity_in_sensor;
 pub(crate) use types::uuid_from;
+pub use watch::framed;

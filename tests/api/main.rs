@@ -20,4 +20,5 @@ mod sessions;
 mod support;
 mod trajectory;
 mod unix_socket;
+mod watch;
 mod watermarks;

@@ -3,14 +3,15 @@
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use tokio::sync::{oneshot, watch};
+use tokio::sync::oneshot;
 
 use super::{
-    Decided, Decision, GROUP_MAX, Outcome, Prepared, Refusal, Stop, Submission, Turn, Waiting,
+    Decided, Decision, GROUP_MAX, Outcome, Prepared, Refusal, Stop, Submission, Told, Turn, Waiting,
     outcome_unknown, record_of, revisions_used_up,
 };
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
 use crate::service::ServiceError;
+use crate::service::recent_changes::WatchedChange;
 use crate::service::resource_budget::Reservation;
 use crate::store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -24,7 +25,7 @@ pub(super) struct Worker {
     name: MapName,
     map: Arc<MultiResolutionMap>,
     folder: Option<Arc<MapFolder>>,
-    announced: watch::Sender<u64>,
+    told: Told,
     stopped: Arc<OnceLock<Stop>>,
     durations: Arc<SharedDurations>,
     settings: StoreSettings,
@@ -50,14 +51,14 @@ impl Worker {
         name: MapName,
         map: Arc<MultiResolutionMap>,
         folder: Option<Arc<MapFolder>>,
-        announced: watch::Sender<u64>,
+        told: Told,
         stopped: Arc<OnceLock<Stop>>,
         durations: Arc<SharedDurations>,
         settings: &StoreSettings,
     ) -> Self {
         let thinned = map.revision();
         let settings = settings.clone();
-        Self { name, map, folder, announced, stopped, durations, settings, unsynced: None, thinned }
+        Self { name, map, folder, told, stopped, durations, settings, unsynced: None, thinned }
     }
 
     /// Makes changes until nobody can send one any more.
@@ -150,13 +151,23 @@ impl Worker {
             return;
         }
         for Pending { change, answer, .. } in group.drain(..) {
-            let committed = self.map.committer().apply(&change);
-            debug_assert_ne!(committed.revision, *self.announced.borrow(), "every record makes a revision");
-            self.announced.send_replace(committed.revision);
+            let Told { announced, recent } = &self.told;
+            let (committed, levels) = self.map.committer().apply_noting(&change, recent.levels());
+            debug_assert_ne!(committed.revision, *announced.borrow(), "every record makes a revision");
+            announced.send_replace(committed.revision);
             drop(answer.send(Ok(committed)));
+            recent.push(WatchedChange::of(committed.revision, Some(committed.hash), change, levels));
         }
+        self.tell_durable();
         self.durations.record(begin.elapsed());
         self.thin_in_memory();
+    }
+
+    /// Tells who watches the map how far it is durable.
+    fn tell_durable(&self) {
+        let visible = self.map.revision();
+        let durable = self.folder.as_ref().map_or(visible, |folder| folder.used().durable.min(visible));
+        self.told.recent.tell_durable(durable);
     }
 
     /// Thins the trajectory of a map without a folder every now and then, as far behind the newest revision as undo would
@@ -229,6 +240,7 @@ impl Worker {
         {
             self.stop(&error);
         }
+        self.tell_durable();
     }
 }
 

@@ -9,6 +9,7 @@ mod scan;
 mod trajectory;
 mod undo;
 mod version;
+mod watch;
 
 pub use deletion::{Deletion, DeletionAnswer, DeletionTarget};
 pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
@@ -19,3 +20,7 @@ pub use scan::{Foreground, ScanAnswer, ScanRequest};
 pub use trajectory::{TrajectoryAnswer, TrajectoryQuery};
 pub use undo::{Undo, UndoAnswer, UndoTarget};
 pub use version::MapVersion;
+pub use watch::{
+    BlockBytes, Cause, ChangePart, StatePart, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
+    WatchedSince,
+};

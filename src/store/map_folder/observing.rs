@@ -4,7 +4,7 @@ use super::MapFolder;
 use super::facts::Pin;
 use crate::map::{Change, VoxelOwnership, WithdrawnChange};
 use crate::store::snapshot_files::snapshot_name;
-use crate::store::{MapFileError, MapFileLimits, Snapshot, StoreError, folder};
+use crate::store::{Changes, MapFileError, MapFileLimits, Snapshot, StoreError, folder};
 use crate::util::StopSignal;
 
 /// Ownership of the voxels that some changes touched.
@@ -89,6 +89,14 @@ impl MapFolder {
         let (segments, head) = self.facts.journal();
         let change = self.place.read_at(vec![revision], &segments, head).next().transpose()?;
         Ok(change.map(|(_, change)| change))
+    }
+
+    /// Reads the changes from `revision` on, up to the journal's present head; none where that revision is not kept any
+    /// more. What is removed meanwhile is an error among them.
+    pub fn changes_from(&self, revision: u64) -> Option<Changes> {
+        let (segments, head) = self.facts.journal();
+        let is_kept = segments.first().is_some_and(|tail| *tail <= revision);
+        is_kept.then(|| self.place.read_from(revision, &segments, head))
     }
 
     /// Reads which voxels the changes to undo touched.

@@ -34,6 +34,7 @@ fn body(operation: Operation) -> Body {
         | Operation::GetMap
         | Operation::DeleteMap
         | Operation::ListVoxels
+        | Operation::Watch
         | Operation::GetTrajectory
         | Operation::StreamTrajectory
         | Operation::SnapshotMap

@@ -19,6 +19,7 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
     match operation {
         Operation::QueryPoints | Operation::QueryPointsStream => query_pb(&map, &POINTS).encode_to_vec(),
         Operation::ListVoxels => pb::ListVoxelsRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::Watch => pb::WatchRequest { map, ..Default::default() }.encode_to_vec(),
         Operation::InsertScan | Operation::InsertScanStream => scan_pb(&map, "r", &POINTS).encode_to_vec(),
         Operation::AlignScan => {
             let scan = Some(pb::Scan { robot: "r".into(), points: points_pb(&POINTS), ..Default::default() });
@@ -82,6 +83,7 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
+        | Operation::Watch
         | Operation::InsertScan
         | Operation::InsertScanStream
         | Operation::AlignScan

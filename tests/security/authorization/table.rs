@@ -18,6 +18,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
+        | Operation::Watch
         | Operation::AlignScan
         | Operation::Localize
         | Operation::GetTrajectory

@@ -1,0 +1,62 @@
+//! How the whole of what a map holds is found out.
+
+use std::sync::Arc;
+
+use crate::map::Region;
+use crate::service::full_state::FullState;
+use crate::service::hosted_map::HostedMap;
+use crate::service::resource_budget::ResourceBudget;
+use crate::service::{BlockBytes, ServiceError, WatchForm, check_not_stopped};
+use crate::util::StopSignal;
+
+/// Whom memory is lent to, in refusals.
+const WATCH: &str = "a watch";
+/// Bytes of memory of a block.
+const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
+
+impl HostedMap {
+    /// What the map holds, of `region` where there is one: as it is, or as it was shortly before where that is at hand and can
+    /// be followed from.
+    pub(super) fn full_state(
+        &self,
+        form: WatchForm,
+        region: Option<&Region>,
+        budget: &ResourceBudget,
+        stop: StopSignal<'_>,
+    ) -> Result<Arc<FullState>, ServiceError> {
+        let whole = self.whole_state(form, budget, stop)?;
+        let Some(region) = region else { return Ok(whole) };
+        let memory = budget.reserve_transient((whole.voxels.blocks().len() * BLOCK_BYTES) as u64, WATCH)?;
+        let voxels = whole.voxels.part_in(region, self.map.lattice(), whole.level);
+        let (version, level) = (whole.version, whole.level);
+        Ok(Arc::new(FullState { version, level, voxels, _memory: memory }))
+    }
+
+    fn whole_state(
+        &self,
+        form: WatchForm,
+        budget: &ResourceBudget,
+        stop: StopSignal<'_>,
+    ) -> Result<Arc<FullState>, ServiceError> {
+        let (key, level) = match form {
+            WatchForm::Changes => (None, 0),
+            WatchForm::Deltas { level } => (Some(level), level),
+        };
+        if let Some(known) =
+            self.full_states.get(key).filter(|state| self.recent.can_follow(state.version.revision, form))
+        {
+            return Ok(known);
+        }
+        let long_read = self.map.long_read();
+        let view = long_read.view();
+        let stored: usize = view.lists(level).map(|list| list.blocks().len()).sum();
+        let memory = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
+        let (voxels, version) = (view.level_blocks(level, stop), view.version());
+        drop(view);
+        drop(long_read);
+        check_not_stopped(stop)?;
+        let state = Arc::new(FullState { version, level, voxels, _memory: memory });
+        self.full_states.put(key, &state);
+        Ok(state)
+    }
+}
