@@ -89,7 +89,7 @@ fn crowd() {
     });
     let mut changes: Vec<_> = writers.into_iter().flat_map(|writer| writer.join().unwrap()).collect();
     let (answers, seen) = (asking.join().unwrap(), looking.join().unwrap());
-    changes.retain(|(committed, _)| committed.voxels > 0);
+    changes.retain(|(committed, _)| committed.added + committed.removed > 0);
     changes.sort_unstable_by_key(|(committed, _)| committed.revision);
     check(&changes, &answers, &[seen, map.contents()]);
 }
