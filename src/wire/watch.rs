@@ -86,7 +86,7 @@ impl TryFrom<pb::WatchResponse> for WatchMessage {
     }
 }
 
-impl From<StatePart> for pb::MapState {
+impl From<StatePart> for pb::WatchedState {
     fn from(part: StatePart) -> Self {
         Self {
             reset: part.is_first,
@@ -101,10 +101,10 @@ impl From<StatePart> for pb::MapState {
     }
 }
 
-impl TryFrom<pb::MapState> for StatePart {
+impl TryFrom<pb::WatchedState> for StatePart {
     type Error = ServiceError;
 
-    fn try_from(part: pb::MapState) -> Result<Self, ServiceError> {
+    fn try_from(part: pb::WatchedState) -> Result<Self, ServiceError> {
         let hash = ContentHash::from_bits(part.content_hash);
         Ok(Self {
             is_first: part.reset,
@@ -118,9 +118,9 @@ impl TryFrom<pb::MapState> for StatePart {
     }
 }
 
-impl From<ChangePart> for pb::MapChange {
+impl From<ChangePart> for pb::WatchedChange {
     fn from(part: ChangePart) -> Self {
-        use pb::map_change::Cause as Of;
+        use pb::watched_change::Cause as Of;
         let cause = match part.cause {
             Cause::Scan(scan) => Of::Scan((*scan).into()),
             Cause::Deletion => Of::Deletion(pb::WatchedDeletion {}),
@@ -137,11 +137,11 @@ impl From<ChangePart> for pb::MapChange {
     }
 }
 
-impl TryFrom<pb::MapChange> for ChangePart {
+impl TryFrom<pb::WatchedChange> for ChangePart {
     type Error = ServiceError;
 
-    fn try_from(part: pb::MapChange) -> Result<Self, ServiceError> {
-        use pb::map_change::Cause as Of;
+    fn try_from(part: pb::WatchedChange) -> Result<Self, ServiceError> {
+        use pb::watched_change::Cause as Of;
         let cause = match required(part.cause, "change.cause")? {
             Of::Scan(scan) => Cause::Scan(Box::new(scan.try_into()?)),
             Of::Deletion(pb::WatchedDeletion {}) => Cause::Deletion,

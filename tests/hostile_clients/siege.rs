@@ -19,6 +19,7 @@ pub(crate) const MESSAGE_BYTES_MAX: usize = 32 * MIB;
 pub(crate) const BODY_BYTES_MAX: usize = 64 * MIB;
 const REQUESTS_MAX: usize = 256;
 const STREAMS_MAX: usize = 16;
+const WATCHES_MAX: usize = 4;
 const CONNECTIONS_MAX: usize = 600;
 const THREADS: usize = 2;
 /// So short that a test sees their end.
@@ -108,6 +109,7 @@ fn settings() -> String {
     format!(
         "[threads]\nquery = {THREADS}\nmapping = {THREADS}\n\n[limits]\nmessage_bytes_max = {MESSAGE_BYTES_MAX}\n\
          body_bytes_max = {BODY_BYTES_MAX}\nrequests_max = {REQUESTS_MAX}\nstreams_max = {STREAMS_MAX}\n\
+         watches_max = {WATCHES_MAX}\n\
          connections_max = {CONNECTIONS_MAX}\n{SECONDS}"
     )
 }

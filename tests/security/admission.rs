@@ -275,6 +275,7 @@ async fn idle_connections_give_way_to_new_ones() {
     let daemon = daemon(|config| {
         config.limits.requests_max = 1;
         config.limits.streams_max = 1;
+        config.limits.watches_max = 0;
         config.limits.connections_max = 4;
     })
     .await;

@@ -66,7 +66,10 @@ impl Follower {
     pub(super) async fn copy_first(&mut self) -> Result<(Arc<Shared>, Answers<WatchMessage>), ReplicaError> {
         let mut watched = self.watch().await?;
         loop {
-            let Some(message) = watched.next().await else {
+            let silence_max = self.options.silence_max;
+            let message = tokio::time::timeout(silence_max, watched.next()).await;
+            let message = message.map_err(|_| ReplicaError::Silent(silence_max))?;
+            let Some(message) = message else {
                 return Err(ReplicaError::Damaged("the watch ended before the state was complete".into()));
             };
             let message = message?;
@@ -108,7 +111,7 @@ impl Follower {
         loop {
             let silence_max = self.options.silence_max;
             let message = match tokio::time::timeout(silence_max, watched.next()).await {
-                Err(_) => return Some(format!("the server was silent for {silence_max:?}")),
+                Err(_) => return Some(ReplicaError::Silent(silence_max).to_string()),
                 Ok(None) => return None,
                 Ok(Some(Err(error))) => return Some(error.to_string()),
                 Ok(Some(Ok(message))) => message,

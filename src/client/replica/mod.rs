@@ -92,6 +92,9 @@ pub enum ReplicaError {
     /// What the server sent makes no sense.
     #[error("the server's messages are damaged: {0}")]
     Damaged(String),
+    /// The server sent nothing for so long, not even a heartbeat.
+    #[error("the server was silent for {0:?}, silence_max of the replica")]
+    Silent(Duration),
     /// The map has more blocks than the replica may have.
     #[error("the map has more than blocks_max, {0}, blocks: copy a region, or raise blocks_max")]
     TooLarge(usize),

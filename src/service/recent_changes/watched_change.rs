@@ -66,6 +66,11 @@ impl WatchedChange {
         size_of::<Self>() + undone + sets.map(Exchanged::memory_bytes).sum::<usize>()
     }
 
+    /// Blocks of the finest voxels that went and came.
+    pub(in crate::service) fn blocks(&self) -> usize {
+        self.finest.removed.blocks().len() + self.finest.added.blocks().len()
+    }
+
     /// True where it can be told in this form.
     pub(in crate::service) fn has(&self, form: WatchForm) -> bool {
         self.of_form(form).is_some()

@@ -22,7 +22,7 @@ use tokio_stream::{Stream, StreamExt};
 
 use super::full_state::StateParts;
 use super::hosted_map::HostedMap;
-use super::recent_changes::{ChangeParts, WatchedChange, WatchedLevel};
+use super::recent_changes::{BLOCKS_PER_PART, ChangeParts, WatchedChange, WatchedLevel};
 use super::{MapService, Outcome, Reason, ServiceError, WatchEvent, WatchForm, WatchMessage, WatchRequest};
 use crate::map::{MapName, Region};
 use crate::sync::polled_by_runtime;
@@ -63,7 +63,7 @@ pub struct Watch {
     /// What is being told.
     parts: Parts,
     /// Changes that were read from the journal and come next.
-    read: VecDeque<WatchedChange>,
+    read: VecDeque<Arc<WatchedChange>>,
     is_greeted: bool,
 }
 
@@ -156,20 +156,21 @@ impl Watch {
 
     /// Begins to tell of the change that made `revision`; where that is out of reach, the whole state is next.
     async fn begin_change(&mut self, revision: u64) -> Result<(), ServiceError> {
-        let (form, region, lattice) = (self.form, self.region.as_ref(), self.map.map.lattice());
-        let is_next = |change: &WatchedChange| change.revision == revision;
-        let parts = match self.read.pop_front().filter(is_next) {
-            Some(read) => read.parts(form, region, lattice),
-            None => match self.map.recent.get(revision) {
-                Some(recent) => recent.parts(form, region, lattice),
-                None => {
-                    self.read_journal(revision).await?;
-                    if self.read.is_empty() {
-                        self.told = None;
-                    }
-                    return Ok(());
-                }
-            },
+        let read = self.read.pop_front().filter(|change| change.revision == revision);
+        let Some(change) = read.or_else(|| self.map.recent.get(revision)) else {
+            self.read_journal(revision).await?;
+            if self.read.is_empty() {
+                self.told = None;
+            }
+            return Ok(());
+        };
+        let (map, form, region) = (Arc::clone(&self.map), self.form, self.region);
+        let is_small = change.blocks() <= BLOCKS_PER_PART;
+        let parts = move || change.parts(form, region.as_ref(), map.map.lattice());
+        // What takes long keeps no thread of the runtime.
+        let parts = match is_small {
+            true => parts(),
+            false => self.service.inner.watch.run(move |_| parts()).await?,
         };
         self.told = parts.is_some().then_some(revision);
         self.parts = parts.map_or(Parts::Nothing, Parts::Change);
@@ -191,7 +192,7 @@ impl Watch {
                 }
                 let change = WatchedChange::of(revision, None, change, Vec::new());
                 bytes += change.memory_bytes();
-                batch.push_back(change);
+                batch.push_back(Arc::new(change));
                 if batch.len() >= BATCH_MAX || bytes >= BATCH_BYTES {
                     break;
                 }
