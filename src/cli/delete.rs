@@ -22,7 +22,7 @@ EXAMPLES:
   mrol delete --map office --point 1.0,2.5,0.3 --level 2        a coarse voxel with all it contains
   mrol delete --map office --points gone.ply
 
-A box or sphere deletes the voxels whose centers are inside. Voxels that do not exist are no error.";
+A region deletes the voxels whose centers are inside. Voxels that do not exist are no error.";
 
 /// Delete voxels from a map on a server
 #[derive(Debug, clap::Args)]
@@ -55,6 +55,9 @@ struct Target {
     /// The voxels in a sphere: center and radius, meters
     #[arg(long, value_name = "X Y Z R", allow_hyphen_values = true, value_parser = parse::ball)]
     sphere: Option<Region>,
+    /// The voxels in a box of any orientation: its center, its rotation as a unit quaternion, and its sides, meters
+    #[arg(long, value_name = "X Y Z QX QY QZ QW SX SY SZ", allow_hyphen_values = true, value_parser = parse::oriented_box)]
+    oriented_box: Option<Region>,
 }
 
 impl Delete {
@@ -69,7 +72,7 @@ impl Delete {
 
 impl Target {
     fn resolve(self) -> Result<DeletionTarget, CliError> {
-        if let Some(region) = self.cuboid.or(self.sphere) {
+        if let Some(region) = self.cuboid.or(self.sphere).or(self.oriented_box) {
             return Ok(DeletionTarget::Region(region));
         }
         let points = match self.points {

@@ -54,6 +54,14 @@ pub(super) fn ball(text: &str) -> Result<Region, String> {
     Region::ball([x, y, z], radius_m).map_err(|error| error.to_string())
 }
 
+/// Parses a box of any orientation "x y z qx qy qz qw sx sy sz": its center, its rotation and its sides, meters.
+pub(super) fn oriented_box(text: &str) -> Result<Region, String> {
+    let form = "x y z qx qy qz qw sx sy sz";
+    let [x, y, z, qx, qy, qz, qw, sx, sy, sz] = numbers(text, form)?;
+    let map_from_box = geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|error| error.to_string())?;
+    Region::oriented_box(map_from_box, [sx, sy, sz]).map_err(|error| error.to_string())
+}
+
 /// Parses the name of a map.
 pub(super) fn map_name(text: &str) -> Result<MapName, String> {
     MapName::new(text).map_err(|error| error.to_string())
@@ -103,5 +111,6 @@ mod tests {
         assert!(pose("1 2 3 0 0 0 2").unwrap_err().contains("norm 2"));
         assert!(cuboid("1 0 0 0 1 1").unwrap_err().contains("must not exceed"));
         assert!(ball("0 0 0 -1").unwrap_err().contains("radius"));
+        assert!(oriented_box("0 0 0 0 0 0 1 1 -1 1").unwrap_err().contains("size_m must not be negative"));
     }
 }

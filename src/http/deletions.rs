@@ -9,10 +9,12 @@ use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{Map, request_id_of};
+use crate::geometry::Pose;
 use crate::map::Region;
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
-use crate::wire::json::JsonVersion;
+use crate::wire::InField;
+use crate::wire::json::{JsonPose, JsonVersion};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -21,6 +23,7 @@ pub(super) struct DeletionBody {
     voxels: Option<Vec<[i32; 3]>>,
     r#box: Option<Object<BoxBody>>,
     sphere: Option<Object<SphereBody>>,
+    oriented_box: Option<Object<OrientedBoxBody>>,
     #[serde(default)]
     level: u32,
     request_id: Option<String>,
@@ -38,6 +41,13 @@ struct BoxBody {
 struct SphereBody {
     center_m: [f64; 3],
     radius_m: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OrientedBoxBody {
+    map_from_box: Object<JsonPose>,
+    size_m: [f64; 3],
 }
 
 #[derive(Deserialize)]
@@ -89,17 +99,27 @@ impl TryFrom<DeletionBody> for DeletionTarget {
     type Error = ServiceError;
 
     fn try_from(json: DeletionBody) -> Result<Self, ServiceError> {
-        match (json.points, json.voxels, json.r#box, json.sphere) {
-            (Some(points), None, None, None) => Ok(Self::Points(points.into())),
-            (None, Some(voxels), None, None) => Ok(Self::Keys(keys_of(&voxels)?)),
-            (None, None, Some(Object(BoxBody { min_m, max_m })), None) => {
+        match (json.points, json.voxels, json.r#box, json.sphere, json.oriented_box) {
+            (Some(points), None, None, None, None) => Ok(Self::Points(points.into())),
+            (None, Some(voxels), None, None, None) => Ok(Self::Keys(keys_of(&voxels)?)),
+            (None, None, Some(Object(BoxBody { min_m, max_m })), None, None) => {
                 Ok(Self::Region(Region::cuboid(min_m, max_m)?))
             }
-            (None, None, None, Some(Object(SphereBody { center_m, radius_m }))) => {
+            (None, None, None, Some(Object(SphereBody { center_m, radius_m })), None) => {
                 Ok(Self::Region(Region::ball(center_m, radius_m)?))
             }
+            (
+                None,
+                None,
+                None,
+                None,
+                Some(Object(OrientedBoxBody { map_from_box: Object(pose), size_m })),
+            ) => {
+                let map_from_box = Pose::try_from(pose).in_field("oriented_box.map_from_box")?;
+                Ok(Self::Region(Region::oriented_box(map_from_box, size_m)?))
+            }
             _ => {
-                let message = "exactly one of points, voxels, box and sphere must be given";
+                let message = "exactly one of points, voxels, box, sphere and oriented_box must be given";
                 Err(ServiceError::new(Reason::AmbiguousTarget, message))
             }
         }

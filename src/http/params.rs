@@ -76,12 +76,36 @@ pub(super) fn from_query<T: DeserializeOwned>(uri: &Uri) -> Result<T, HttpError>
     Ok(parameters)
 }
 
-/// The box from `min` to `max`, where they are given.
-pub(super) fn region_of(min: Option<&str>, max: Option<&str>) -> Result<Option<Region>, ServiceError> {
-    match (min, max) {
-        (None, None) => Ok(None),
-        (Some(min), Some(max)) => Ok(Some(Region::cuboid(numbers(min, "min")?, numbers(max, "max")?)?)),
-        _ => Err(ServiceError::new(Reason::HalfABox, "min and max go together, got one of them")),
+/// A region as parameters: `min` and `max` of a box along the map's axes, or `map_from_box` and `size` of one with any
+/// orientation.
+#[derive(Debug, Default)]
+pub(super) struct RegionParams {
+    pub(super) min: Option<String>,
+    pub(super) max: Option<String>,
+    pub(super) map_from_box: Option<String>,
+    pub(super) size: Option<String>,
+}
+
+impl RegionParams {
+    /// The region, where one is given.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for half of one, for two, and for numbers that bound nothing.
+    pub(super) fn region(&self) -> Result<Option<Region>, ServiceError> {
+        match [&self.min, &self.max, &self.map_from_box, &self.size].map(Option::as_deref) {
+            [None, None, None, None] => Ok(None),
+            [Some(min), Some(max), None, None] => {
+                Ok(Some(Region::cuboid(numbers(min, "min")?, numbers(max, "max")?)?))
+            }
+            [None, None, Some(placed), Some(size)] => {
+                Ok(Some(Region::oriented_box(pose(placed, "map_from_box")?, numbers(size, "size")?)?))
+            }
+            _ => {
+                let message =
+                    "a region takes min and max, or map_from_box and size, and not half of them or both";
+                Err(ServiceError::new(Reason::HalfABox, message))
+            }
+        }
     }
 }
 
@@ -104,6 +128,21 @@ pub(super) fn pose(text: &str, field: &str) -> Result<Pose, ServiceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_region_is_one_box_and_whole() {
+        let region = |given: [Option<&str>; 4]| {
+            let [min, max, map_from_box, size] = given.map(|text| text.map(str::to_owned));
+            RegionParams { min, max, map_from_box, size }.region()
+        };
+        let (corner, placed) = (Some("0,0,0"), Some("1,2,3,0,0,0,1"));
+        assert_eq!(region([None; 4]).unwrap(), None);
+        assert!(matches!(region([corner, corner, None, None]), Ok(Some(Region::Box { .. }))));
+        assert!(matches!(region([None, None, placed, corner]), Ok(Some(Region::OrientedBox(_)))));
+        for half in [[corner, None, None, None], [None, None, placed, None], [corner, corner, placed, None]] {
+            assert_eq!(region(half).unwrap_err().reason, Reason::HalfABox, "{half:?}");
+        }
+    }
 
     #[test]
     fn a_pose_is_seven_numbers() {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, region_of};
+use super::params::{Map, Params, RegionParams};
 use crate::service::{Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::json::JsonVersion;
@@ -27,6 +27,8 @@ pub(super) struct VoxelsParams {
     level: u32,
     min: Option<String>,
     max: Option<String>,
+    map_from_box: Option<String>,
+    size: Option<String>,
 }
 
 /// Bytes of a voxel in JSON, at most: three numbers of eight characters, and what stands between them.
@@ -53,8 +55,8 @@ pub(super) async fn list(
     Map(map): Map,
     Params(query): Params<VoxelsParams>,
 ) -> Result<Response, HttpError> {
-    let region = region_of(query.min.as_deref(), query.max.as_deref())?;
-    let level = query.level;
+    let VoxelsParams { level, min, max, map_from_box, size } = query;
+    let region = RegionParams { min, max, map_from_box, size }.region()?;
     let listing = service.list_voxels(&map, level, region).await?;
     let head = Head { level, resolution_m: listing.resolution_m, version: listing.version.into() };
     let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;

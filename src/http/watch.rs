@@ -15,7 +15,7 @@ use tokio_stream::StreamExt;
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, region_of};
+use super::params::{Map, Params, RegionParams};
 use crate::map::MapName;
 use crate::service::{ServiceError, WatchRequest};
 use crate::wire::{framed, pb};
@@ -28,6 +28,8 @@ pub(super) struct WatchParams {
     delta_level: Option<u32>,
     min: Option<String>,
     max: Option<String>,
+    map_from_box: Option<String>,
+    size: Option<String>,
 }
 
 pub(super) async fn watch(
@@ -54,11 +56,13 @@ pub(super) async fn watch(
 
 impl WatchParams {
     fn request(self, map: &MapName) -> Result<WatchRequest, ServiceError> {
+        let Self { min, max, map_from_box, size, .. } = self;
+        let region = RegionParams { min, max, map_from_box, size }.region()?;
         let request = pb::WatchRequest {
             map: map.to_string(),
             since_revision: self.since_revision,
             map_uuid: self.map_uuid.unwrap_or_default(),
-            region: region_of(self.min.as_deref(), self.max.as_deref())?.map(Into::into),
+            region: region.map(Into::into),
             delta_level: self.delta_level,
         };
         let (_, request) = request.try_into()?;

@@ -59,6 +59,7 @@ impl VoxelSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Pose;
     use crate::map::{MapContents, MapSettings, MultiResolutionMap};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
@@ -70,6 +71,7 @@ mod tests {
             level in 0u32..6,
             low in prop::array::uniform3(-40.0f64..40.0),
             size in prop::array::uniform3(0.0f64..40.0),
+            turned in prop::array::uniform3(-3.0f64..3.0),
         ) {
             let voxels = indices.into_iter().filter_map(VoxelKey::new).collect();
             let settings = MapSettings::new(1.0, 6);
@@ -78,9 +80,19 @@ mod tests {
             let blocks = view.level_blocks(level, StopSignal::NEVER);
             let expected: BTreeSet<VoxelKey> = view.lists(level).flat_map(|list| list.iter()).collect();
             prop_assert_eq!(blocks.iter().collect::<BTreeSet<_>>(), expected);
-            let region = Region::cuboid(low, std::array::from_fn(|i| low[i] + size[i])).unwrap();
-            let part: BTreeSet<VoxelKey> = blocks.part_in(&region, map.lattice(), level).iter().collect();
-            prop_assert_eq!(part, view.voxels_in(&region, level).into_iter().collect::<BTreeSet<_>>());
+            let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turned.into());
+            let map_from_box = Pose::from_parts(nalgebra::Translation3::from(nalgebra::Vector3::from(low)), rotation);
+            for region in [
+                Region::cuboid(low, std::array::from_fn(|i| low[i] + size[i])).unwrap(),
+                Region::oriented_box(map_from_box, size).unwrap(),
+                Region::ball(low, size[0]).unwrap(),
+            ] {
+                let inside = |voxel: &VoxelKey| region.contains(map.lattice().center_m(*voxel, level));
+                let expected: BTreeSet<VoxelKey> = blocks.iter().filter(inside).collect();
+                let part = blocks.part_in(&region, map.lattice(), level);
+                prop_assert_eq!(&part.iter().collect::<BTreeSet<_>>(), &expected);
+                prop_assert_eq!(view.voxels_in(&region, level).into_iter().collect::<BTreeSet<_>>(), expected);
+            }
         }
     }
 }

@@ -49,7 +49,7 @@ pub use lookup::Lookup;
 pub use moments::MomentsView;
 pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName};
 pub use occupied_voxel_list::OccupiedVoxelList;
-pub use region::{Region, RegionError, SPHERE_M_MAX};
+pub use region::{OrientedBox, REGION_M_MAX, Region, RegionError};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
 pub use trajectory::{

@@ -7,7 +7,7 @@ use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
 use super::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError, check_not_stopped};
-use crate::geometry::Point;
+use crate::geometry::{Point, rotation_xyzw, translation_m};
 use crate::map::{
     CallerName, Change, Committed, CompletedRequest, DeletionRecord, MultiResolutionMap, Region, Request,
     RequestKind, SHARDS,
@@ -168,6 +168,11 @@ fn digest(deletion: &Deletion) -> u64 {
         DeletionTarget::Region(Region::Sphere { center_m, radius_m }) => {
             digest.bytes(b"sphere").numbers(center_m).numbers(&[*radius_m])
         }
+        DeletionTarget::Region(Region::OrientedBox(of)) => {
+            let (pose, size_m) = (of.map_from_box(), of.size_m());
+            let digest = digest.bytes(b"oriented_box").numbers(&translation_m(pose));
+            digest.numbers(&rotation_xyzw(pose)).numbers(&size_m)
+        }
     }
     .finish()
 }
@@ -184,6 +189,8 @@ fn former_digest(deletion: &Deletion) -> u64 {
         DeletionTarget::Region(Region::Sphere { center_m, radius_m }) => {
             digest.numbers(center_m).numbers(&[*radius_m])
         }
+        // There were none then: this is no digest of theirs.
+        DeletionTarget::Region(Region::OrientedBox(_)) => return self::digest(deletion),
     }
     .finish()
 }

@@ -94,7 +94,7 @@ reasons! {
         BodyTooLarge "body_too_large" Http 413: "the body exceeds `message_bytes_max`, of a map file `map_file_bytes_max`", "split it, or raise the limit";
         BodyUnreadable "body_unreadable" Http: "the body broke off", "send it again";
         EmptyBatch "empty_batch" Both: "there is no point, or no key", "leave the request out";
-        HalfABox "half_a_box" Http: "only one of `min` and `max` is given", "give both";
+        HalfABox "half_a_box" Http: "only one of `min` and `max`, or of `map_from_box` and `size`, is given, or all of them", "give both of one pair";
         KeyOutOfRange "key_out_of_range" Both: "a voxel key outside the range of its level", "correct it";
         LevelOutOfRange "level_out_of_range" Both: "the map has no such level", "the message names the levels";
         MethodNotAllowed "method_not_allowed" Http 405: "the route has other methods; `Allow` names them", "correct it";

@@ -89,6 +89,12 @@ impl TryFrom<pb::Region> for Region {
                 let center_m = required(center_m, "region.sphere.center_m")?.into();
                 Self::ball(center_m, radius_m).in_field("region")
             }
+            pb::region::Shape::OrientedBox(pb::OrientedBox { map_from_box, size_m }) => {
+                let map_from_box = required(map_from_box, "region.oriented_box.map_from_box")?;
+                let map_from_box = map_from_box.try_into().in_field("region.oriented_box.map_from_box")?;
+                let size_m = required(size_m, "region.oriented_box.size_m")?.into();
+                Self::oriented_box(map_from_box, size_m).in_field("region")
+            }
         }
     }
 }
@@ -102,6 +108,10 @@ impl From<Region> for pb::Region {
             Region::Sphere { center_m, radius_m } => {
                 pb::region::Shape::Sphere(pb::Sphere { center_m: Some(center_m.into()), radius_m })
             }
+            Region::OrientedBox(of) => pb::region::Shape::OrientedBox(pb::OrientedBox {
+                map_from_box: Some(of.map_from_box().into()),
+                size_m: Some(of.size_m().into()),
+            }),
         };
         Self { shape: Some(shape) }
     }
@@ -214,7 +224,13 @@ mod tests {
 
     #[test]
     fn regions_survive_the_wire_and_half_of_one_is_refused() {
-        for region in [Region::cuboid([0.0; 3], [1.0; 3]).unwrap(), Region::ball([1.0; 3], 2.0).unwrap()] {
+        let turned = geometry::pose([1.0, 2.0, 3.0], [0.0, 0.6, 0.0, 0.8]).unwrap();
+        for region in [
+            Region::cuboid([0.0; 3], [1.0; 3]),
+            Region::ball([1.0; 3], 2.0),
+            Region::oriented_box(turned, [1.0, 2.0, 0.5]),
+        ] {
+            let region = region.unwrap();
             assert_eq!(Region::try_from(pb::Region::from(region)).unwrap(), region);
         }
         let half = pb::Box { min_m: Some([0.0; 3].into()), max_m: None };

@@ -14,6 +14,7 @@ mod localize;
 mod memory_returns;
 #[cfg(feature = "lab")]
 mod recovery;
+mod regions;
 mod scan_requests;
 mod sessions;
 #[path = "../support/mod.rs"]

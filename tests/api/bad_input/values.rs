@@ -123,7 +123,10 @@ async fn batches_are_neither_empty_nor_beyond_the_limit() {
     assert_invalid(&robot.delete_voxels(neither).await.unwrap_err(), &["target is missing"]);
     for body in [json!({}), json!({"points": row(1), "voxels": [[0, 0, 0]]})] {
         let answer = daemon.post("/v1/maps/a/deletions", body).await;
-        assert_refused(refused(answer).await, &["exactly one of points, voxels, box and sphere"]);
+        assert_refused(
+            refused(answer).await,
+            &["exactly one of points, voxels, box, sphere and oriented_box"],
+        );
     }
     assert_unchanged(&daemon).await;
 }

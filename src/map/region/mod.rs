@@ -1,5 +1,11 @@
 //! Parts of space that a caller names.
 
+mod oriented_box;
+
+pub use oriented_box::OrientedBox;
+
+use crate::geometry::Pose;
+
 /// A part of space in the map frame; borders belong to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Region {
@@ -17,10 +23,13 @@ pub enum Region {
         /// The radius, meters.
         radius_m: f64,
     },
+    /// A box with any orientation.
+    OrientedBox(OrientedBox),
 }
 
-/// How far from the origin a sphere may lie and reach, meters: ten thousand times as far as the largest map goes.
-pub const SPHERE_M_MAX: f64 = 1e12;
+/// How far from the origin a sphere or an oriented box may lie and reach, meters: ten thousand times as far as the largest
+/// map goes.
+pub const REGION_M_MAX: f64 = 1e12;
 
 /// Why numbers are not a region.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -31,11 +40,20 @@ pub enum RegionError {
     /// A center or radius that is not finite, or a negative radius.
     #[error("sphere.center_m must be finite and sphere.radius_m not negative, got {0:?} and {1}")]
     Sphere([f64; 3], f64),
-    /// A center or radius beyond [`SPHERE_M_MAX`].
+    /// A center or radius beyond [`REGION_M_MAX`].
     #[error(
-        "sphere.center_m and sphere.radius_m must lie within {SPHERE_M_MAX:e} m, got {0:?} and {1}: no map goes as far"
+        "sphere.center_m and sphere.radius_m must lie within {REGION_M_MAX:e} m, got {0:?} and {1}: no map goes as far"
     )]
     SphereTooFar([f64; 3], f64),
+    /// A side that is negative or NaN.
+    #[error("oriented_box.size_m must not be negative in any axis, got {0:?}")]
+    OrientedBox([f64; 3]),
+    /// A center or side beyond [`REGION_M_MAX`].
+    #[error(
+        "oriented_box.map_from_box and oriented_box.size_m must lie within {REGION_M_MAX:e} m, got the center {0:?} and the \
+         sides {1:?}: no map goes as far"
+    )]
+    OrientedBoxTooFar([f64; 3], [f64; 3]),
 }
 
 impl Region {
@@ -51,10 +69,10 @@ impl Region {
     /// The ball about `center_m`.
     ///
     /// # Errors
-    /// When a number is not finite or beyond [`SPHERE_M_MAX`], or the radius negative.
+    /// When a number is not finite or beyond [`REGION_M_MAX`], or the radius negative.
     pub fn ball(center_m: [f64; 3], radius_m: f64) -> Result<Self, RegionError> {
         let finite = center_m.iter().all(|c| c.is_finite()) && radius_m.is_finite();
-        let within = center_m.iter().all(|c| c.abs() <= SPHERE_M_MAX) && radius_m <= SPHERE_M_MAX;
+        let within = center_m.iter().all(|c| c.abs() <= REGION_M_MAX) && radius_m <= REGION_M_MAX;
         match (finite && radius_m >= 0.0, within) {
             (true, true) => Ok(Self::Sphere { center_m, radius_m }),
             (true, false) => Err(RegionError::SphereTooFar(center_m, radius_m)),
@@ -77,16 +95,26 @@ impl Region {
                 // Too far for squares, which only a sphere that nobody checked can be: shares of the radius.
                 (0..3).map(|axis| (from_center(axis) / radius_m).powi(2)).sum::<f64>() <= 1.0
             }
+            Self::OrientedBox(of) => of.contains(point_m),
         }
     }
 
-    /// The smallest box around it: (smallest, largest) coordinates.
+    /// The box of sides `size_m` about the origin of a frame that `map_from_box` places in the map.
+    ///
+    /// # Errors
+    /// As [`OrientedBox::new`].
+    pub fn oriented_box(map_from_box: Pose, size_m: [f64; 3]) -> Result<Self, RegionError> {
+        OrientedBox::new(map_from_box, size_m).map(Self::OrientedBox)
+    }
+
+    /// The smallest box along the map's axes around it: (smallest, largest) coordinates.
     pub(super) fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         match *self {
             Self::Box { min_m, max_m } => (min_m, max_m),
             Self::Sphere { center_m, radius_m } => {
                 (center_m.map(|c| c - radius_m), center_m.map(|c| c + radius_m))
             }
+            Self::OrientedBox(ref of) => of.bounds_m(),
         }
     }
 }
