@@ -50,6 +50,7 @@ fn question() -> pb::QueryPointsRequest {
         lookup: Lookup::Bloom,
         min_revision: None,
         map_uuid: None,
+        keep_out: false,
     };
     (&MapName::new("bench").expect("a name"), query).into()
 }

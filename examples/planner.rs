@@ -32,6 +32,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
         lookup: Lookup::Exact,
         min_revision: None,
         map_uuid: None,
+        keep_out: false,
     };
     let client = Client::connect_with(&url, &credentials()?).await?;
     let answer = client.query_points(&map, query).await?;

@@ -58,6 +58,7 @@ operations! {
     QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
     ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
+    ListKeepOuts:      Some(Read),  grpc "/mrol.v1.Occupancy/ListKeepOuts",      http GET "/v1/maps/{map}/keep-outs";
     Watch:             Some(Read),  grpc "/mrol.v1.Occupancy/Watch",             http GET "/v1/maps/{map}/watch";
     InsertScan:        Some(Insert), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
     InsertScanStream:  Some(Insert), grpc "/mrol.v1.Mapping/InsertScanStream";
@@ -65,6 +66,8 @@ operations! {
     Localize:          Some(Read),  grpc "/mrol.v1.Mapping/Localize",            http POST "/v1/maps/{map}/localize";
     DeleteVoxels:      Some(Write), grpc "/mrol.v1.Mapping/DeleteVoxels",        http POST "/v1/maps/{map}/deletions";
     Undo:         Some(Insert), grpc "/mrol.v1.Mapping/Undo",           http POST "/v1/maps/{map}/undo";
+    PutKeepOut:        Some(Write), grpc "/mrol.v1.Mapping/PutKeepOut",          http PUT "/v1/maps/{map}/keep-outs/{name}";
+    DeleteKeepOut:     Some(Write), grpc "/mrol.v1.Mapping/DeleteKeepOut",       http DELETE "/v1/maps/{map}/keep-outs/{name}";
     GetTrajectory:     Some(Read),  grpc "/mrol.v1.Mapping/GetTrajectory",       http GET "/v1/maps/{map}/trajectory";
     StreamTrajectory:  Some(Read),  grpc "/mrol.v1.Mapping/StreamTrajectory";
     CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";

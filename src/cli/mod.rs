@@ -11,6 +11,7 @@ mod doctor;
 mod error;
 mod health;
 mod insert;
+mod keepout;
 mod key;
 #[cfg(feature = "lab")]
 mod lab;
@@ -80,6 +81,7 @@ enum Command {
     Query(query::Query),
     Delete(delete::Delete),
     Undo(undo::Undo),
+    Keepout(keepout::KeepOuts),
     Watch(watch::Watch),
     Maps(maps::Maps),
     Health(health::Health),
@@ -117,6 +119,7 @@ impl Command {
             Self::Query(query) => runtime::block_on(query.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
+            Self::Keepout(keepout) => runtime::block_on(keepout.run(output)),
             Self::Watch(watch) => runtime::block_on(watch.run(output)),
             Self::Maps(maps) => runtime::block_on(maps.run(output)),
             Self::Health(health) => runtime::block_on(health.run(output)),

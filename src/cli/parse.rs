@@ -1,10 +1,12 @@
 //! Parsers for values of options: poses, points, regions, names.
 
+use std::time::Duration;
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::align::localize::SearchBox;
 use crate::geometry::{self, Point, Pose};
-use crate::map::{MapName, Region, RequestId, RobotName, SessionName};
+use crate::map::{KeepOutName, MapName, Region, RequestId, RobotName, SessionName};
 use crate::util::Keyword;
 
 /// A parser for keywords; `--help` lists them.
@@ -62,6 +64,40 @@ pub(super) fn oriented_box(text: &str) -> Result<Region, String> {
     Region::oriented_box(map_from_box, [sx, sy, sz]).map_err(|error| error.to_string())
 }
 
+/// Corners of a polygon, x and y of each, meters.
+#[derive(Debug, Clone)]
+pub(super) struct Polygon(pub(super) Vec<[f64; 2]>);
+
+/// Parses the corners of a polygon "x y x y x y ...", meters.
+pub(super) fn polygon(text: &str) -> Result<Polygon, String> {
+    let all = number_list(text, "x y x y x y ...")?;
+    match all.as_chunks() {
+        (corners, []) => Ok(Polygon(corners.to_vec())),
+        _ => Err(format!("two numbers a corner are needed, got {}", all.len())),
+    }
+}
+
+/// Parses two heights "from to", meters.
+pub(super) fn heights(text: &str) -> Result<[f64; 2], String> {
+    numbers(text, "from to")
+}
+
+/// Parses a time such as 90s, 15m, 8h or 2d.
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
+    const UNITS: [(char, u64); 4] = [('s', 1), ('m', 60), ('h', 3600), ('d', 86_400)];
+    let unit = UNITS.iter().find(|(unit, _)| text.ends_with(*unit));
+    let seconds = unit.and_then(|(unit, seconds)| {
+        let count: u32 = text.strip_suffix(*unit)?.parse().ok().filter(|count| *count > 0)?;
+        Some(u64::from(count) * seconds)
+    });
+    seconds.map(Duration::from_secs).ok_or_else(|| format!("{text:?} is no time such as 90s, 15m, 8h or 2d"))
+}
+
+/// Parses the name of a keep-out.
+pub(super) fn keep_out_name(text: &str) -> Result<KeepOutName, String> {
+    KeepOutName::new(text).map_err(|error| error.to_string())
+}
+
 /// Parses the name of a map.
 pub(super) fn map_name(text: &str) -> Result<MapName, String> {
     MapName::new(text).map_err(|error| error.to_string())
@@ -84,12 +120,16 @@ pub(super) fn request_id(text: &str) -> Result<RequestId, String> {
 
 /// Parses `N` numbers, separated by spaces or commas.
 fn numbers<const N: usize>(text: &str, form: &str) -> Result<[f64; N], String> {
+    <[f64; N]>::try_from(number_list(text, form)?)
+        .map_err(|numbers| format!("{N} numbers are needed, \"{form}\", got {}", numbers.len()))
+}
+
+/// Parses any number of numbers, separated by spaces or commas.
+fn number_list(text: &str, form: &str) -> Result<Vec<f64>, String> {
     let words = text.split([' ', ',']).filter(|word| !word.is_empty());
     let number =
         |word: &str| word.parse().map_err(|_| format!("{word:?} is no number; the form is \"{form}\""));
-    let numbers: Vec<f64> = words.map(number).collect::<Result<_, String>>()?;
-    <[f64; N]>::try_from(numbers)
-        .map_err(|numbers| format!("{N} numbers are needed, \"{form}\", got {}", numbers.len()))
+    words.map(number).collect()
 }
 
 #[cfg(test)]
@@ -102,6 +142,22 @@ mod tests {
             assert_eq!(geometry::translation_m(&pose(text).unwrap()), [1.0, -2.0, 3.0]);
         }
         assert_eq!(point("1e-3,2,-3").unwrap(), Point::new(0.001, 2.0, -3.0));
+    }
+
+    #[test]
+    fn a_time_is_a_number_with_its_unit() {
+        for (text, seconds) in [("90s", 90), ("15m", 900), ("8h", 28_800), ("2d", 172_800)] {
+            assert_eq!(duration(text), Ok(Duration::from_secs(seconds)));
+        }
+        for bad in ["", "s", "0s", "-1s", "1.5h", "8", "8 h", "8hh", "99999999999d"] {
+            assert!(duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_polygon_is_two_numbers_a_corner() {
+        assert_eq!(polygon("0 0, 1 0, 0 1").unwrap().0, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        assert!(polygon("0 0 1").unwrap_err().contains("two numbers a corner are needed, got 3"));
     }
 
     #[test]

@@ -50,6 +50,9 @@ pub(super) struct Query {
     /// Where the points' frame lies in the map: "x y z qx qy qz qw" [default: the map's own frame]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose)]
     pose: Option<Pose>,
+    /// Points in keep-outs count as occupied
+    #[arg(long)]
+    keep_out: bool,
     /// Write the answers as a bitmap
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -97,6 +100,7 @@ impl Query {
             lookup: self.lookup,
             min_revision: None,
             map_uuid: None,
+            keep_out: self.keep_out,
         }
     }
 }

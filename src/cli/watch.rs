@@ -10,7 +10,7 @@ use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
 use crate::geometry::translation_m;
-use crate::map::{ContentHash, Region};
+use crate::map::{ContentHash, KeepOutAct, Region};
 use crate::service::{Cause, ChangePart, StatePart, WatchEvent, WatchForm, WatchMessage, WatchRequest};
 
 const EXAMPLES: &str = "\
@@ -73,6 +73,8 @@ struct Line {
     translation_m: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     undone: Vec<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    keep_out: Option<String>,
 }
 
 impl Line {
@@ -110,6 +112,14 @@ impl Line {
                 self.what = "undo";
                 self.undone = [scans, deletions].concat();
             }
+            Cause::KeepOut(change) => {
+                self.what = match change.act {
+                    KeepOutAct::Put { .. } => "keep-out put",
+                    KeepOutAct::Removed { .. } => "keep-out removed",
+                    KeepOutAct::Expired => "keep-out expired",
+                };
+                self.keep_out = Some(change.name.to_string());
+            }
         }
         Ok(part.is_last)
     }
@@ -124,6 +134,9 @@ impl Display for Line {
         }
         if !self.undone.is_empty() {
             write!(f, " of {:?}", self.undone)?;
+        }
+        if let Some(keep_out) = &self.keep_out {
+            return write!(f, ": {keep_out}");
         }
         match *what {
             "state" => write!(f, ", {} voxels", count(*added)),

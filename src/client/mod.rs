@@ -15,6 +15,7 @@
 //!     lookup: Lookup::Exact,
 //!     min_revision: None,
 //!     map_uuid: None,
+//!     keep_out: false,
 //! };
 //! let answer = client.query_points(&MapName::new("demo")?, query).await?;
 //! println!("{} of {} points are occupied", answer.points_occupied, answer.points);
@@ -28,6 +29,7 @@ mod answers;
 mod connection;
 mod credentials;
 mod error;
+mod keep_outs;
 mod new_map;
 mod replica;
 mod streams;
@@ -45,11 +47,11 @@ use bytes::{Bytes, BytesMut};
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status};
 
-use crate::map::{MapName, Region, RobotName, SessionName};
+use crate::map::{MapName, RobotName, SessionName};
 use crate::service::{
     Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, MapList, PointAnswer,
     PointQuery, Reason, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo,
-    UndoAnswer, VoxelListing,
+    UndoAnswer, VoxelListing, VoxelQuery,
 };
 use crate::wire::{pb, restore_pieces};
 use connection::Connection;
@@ -187,10 +189,9 @@ impl Client {
     pub async fn list_voxels(
         &self,
         map: &MapName,
-        level: u32,
-        region: Option<Region>,
+        query: VoxelQuery,
     ) -> Result<VoxelListing, ClientError> {
-        let request = self.request((map, level, region));
+        let request = self.request((map, query));
         let chunks = self.connection.occupancy().list_voxels(request).await;
         let mut chunks = self.connection.answers::<_, VoxelListing>(chunks)?;
         let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_message("listing")))?;

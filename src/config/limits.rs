@@ -1,6 +1,7 @@
 //! Checks of the section `limits`. The limits themselves are [`Limits`].
 
 use super::ConfigError;
+use crate::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
 use crate::service::Limits;
 
 /// Refuses limits that would keep the server from working at all.
@@ -25,6 +26,12 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         if !(least..=1 << 20).contains(&value) {
             return range(key, allowed, value.to_string());
         }
+    }
+    if limits.keep_outs_max > KEEP_OUTS_MAX {
+        return range("limits.keep_outs_max", "0 to 256", limits.keep_outs_max.to_string());
+    }
+    if !(3..=PRISM_CORNERS_MAX).contains(&limits.keep_out_corners_max) {
+        return range("limits.keep_out_corners_max", "3 to 64", limits.keep_out_corners_max.to_string());
     }
     for (key, seconds) in [
         ("limits.point_times_max_s", limits.point_times_max_s),
@@ -96,6 +103,16 @@ fn check_marks(limits: &Limits) -> Result<(), ConfigError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keep_outs_lie_within_what_a_map_can_have() {
+        for (keep_outs_max, keep_out_corners_max, is_fine) in
+            [(0, 3, true), (256, 64, true), (257, 64, false), (256, 65, false), (256, 2, false)]
+        {
+            let limits = Limits { keep_outs_max, keep_out_corners_max, ..Limits::default() };
+            assert_eq!(check(&limits).is_ok(), is_fine, "{keep_outs_max}, {keep_out_corners_max}");
+        }
+    }
 
     #[test]
     fn times_lie_within_a_day() {

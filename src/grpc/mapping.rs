@@ -77,6 +77,26 @@ impl Mapping for Adapter {
         Ok(answered(answer.into()))
     }
 
+    async fn put_keep_out(
+        &self,
+        request: Request<pb::PutKeepOutRequest>,
+    ) -> Result<Response<pb::PutKeepOutResponse>, Status> {
+        let service = service_of(&request)?;
+        let (map, put) = request.into_inner().try_into()?;
+        let answer = service.put_keep_out(&map, put).await?;
+        Ok(answered(answer.into()))
+    }
+
+    async fn delete_keep_out(
+        &self,
+        request: Request<pb::DeleteKeepOutRequest>,
+    ) -> Result<Response<pb::DeleteKeepOutResponse>, Status> {
+        let service = service_of(&request)?;
+        let (map, deletion) = request.into_inner().try_into()?;
+        let answer = service.delete_keep_out(&map, deletion).await?;
+        Ok(answered(answer.into()))
+    }
+
     async fn get_trajectory(
         &self,
         request: Request<pb::GetTrajectoryRequest>,

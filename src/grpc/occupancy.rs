@@ -7,6 +7,8 @@ use tonic::{Request, Response, Status, Streaming};
 use super::stream::{Answers, Message};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
+use crate::map::MapName;
+use crate::service::ServiceError;
 use crate::wire::{listing_bytes, pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
 
@@ -48,14 +50,24 @@ impl Occupancy for Adapter {
         request: Request<pb::ListVoxelsRequest>,
     ) -> Result<Response<Self::ListVoxelsStream>, Status> {
         let service = service_of(&request)?;
-        let (map, level, region) = request.into_inner().try_into()?;
-        let listing = service.list_voxels(&map, level, region).await?;
+        let (map, query) = request.into_inner().try_into()?;
+        let listing = service.list_voxels(&map, query).await?;
         let kept = self.admission.keep(listing_bytes(listing.keys.len()))?;
         let chunks = voxel_chunks(listing).map(move |chunk| {
             let _until_sent = &kept;
             Ok(chunk)
         });
         Ok(Response::new(Box::pin(tokio_stream::iter(chunks))))
+    }
+
+    async fn list_keep_outs(
+        &self,
+        request: Request<pb::ListKeepOutsRequest>,
+    ) -> Result<Response<pb::ListKeepOutsResponse>, Status> {
+        let service = service_of(&request)?;
+        let map = MapName::new(&request.into_inner().map).map_err(ServiceError::from)?;
+        let listing = service.list_keep_outs(&map).await?;
+        Ok(answered(listing.into()))
     }
 
     async fn watch(&self, request: Request<pb::WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {

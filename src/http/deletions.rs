@@ -9,12 +9,10 @@ use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{Map, request_id_of};
-use crate::geometry::Pose;
-use crate::map::Region;
+use super::shapes::{BoxBody, OrientedBoxBody, SphereBody};
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
-use crate::wire::InField;
-use crate::wire::json::{JsonPose, JsonVersion};
+use crate::wire::json::JsonVersion;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,27 +25,6 @@ pub(super) struct DeletionBody {
     #[serde(default)]
     level: u32,
     request_id: Option<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct BoxBody {
-    min_m: [f64; 3],
-    max_m: [f64; 3],
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SphereBody {
-    center_m: [f64; 3],
-    radius_m: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct OrientedBoxBody {
-    map_from_box: Object<JsonPose>,
-    size_m: [f64; 3],
 }
 
 #[derive(Deserialize)]
@@ -102,22 +79,9 @@ impl TryFrom<DeletionBody> for DeletionTarget {
         match (json.points, json.voxels, json.r#box, json.sphere, json.oriented_box) {
             (Some(points), None, None, None, None) => Ok(Self::Points(points.into())),
             (None, Some(voxels), None, None, None) => Ok(Self::Keys(keys_of(&voxels)?)),
-            (None, None, Some(Object(BoxBody { min_m, max_m })), None, None) => {
-                Ok(Self::Region(Region::cuboid(min_m, max_m)?))
-            }
-            (None, None, None, Some(Object(SphereBody { center_m, radius_m })), None) => {
-                Ok(Self::Region(Region::ball(center_m, radius_m)?))
-            }
-            (
-                None,
-                None,
-                None,
-                None,
-                Some(Object(OrientedBoxBody { map_from_box: Object(pose), size_m })),
-            ) => {
-                let map_from_box = Pose::try_from(pose).in_field("oriented_box.map_from_box")?;
-                Ok(Self::Region(Region::oriented_box(map_from_box, size_m)?))
-            }
+            (None, None, Some(Object(body)), None, None) => Ok(Self::Region(body.try_into()?)),
+            (None, None, None, Some(Object(body)), None) => Ok(Self::Region(body.try_into()?)),
+            (None, None, None, None, Some(Object(body))) => Ok(Self::Region(body.try_into()?)),
             _ => {
                 let message = "exactly one of points, voxels, box, sphere and oriented_box must be given";
                 Err(ServiceError::new(Reason::AmbiguousTarget, message))

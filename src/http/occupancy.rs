@@ -29,6 +29,8 @@ pub(super) struct QueryBody {
     lookup: ByKeyword<Lookup>,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    keep_out: bool,
 }
 
 #[derive(Deserialize)]
@@ -41,6 +43,8 @@ pub(super) struct QueryParams {
     lookup: ByKeyword<Lookup>,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    keep_out: bool,
 }
 
 #[derive(Serialize)]
@@ -77,6 +81,7 @@ impl TryFrom<QueryBody> for PointQuery {
             lookup: query.lookup.0,
             min_revision: query.min_revision,
             map_uuid: query.map_uuid.map(|uuid| uuid_from(&uuid)).transpose()?,
+            keep_out: query.keep_out,
         })
     }
 }
@@ -90,6 +95,7 @@ impl QueryParams {
             lookup: self.lookup.0,
             min_revision: self.min_revision,
             map_uuid: self.map_uuid.map(|uuid| uuid_from(&uuid)).transpose()?,
+            keep_out: self.keep_out,
         })
     }
 }

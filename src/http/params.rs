@@ -12,7 +12,7 @@ use super::error::HttpError;
 use super::unreadable;
 use crate::access::Authorized;
 use crate::geometry::{self, Pose};
-use crate::map::{MapName, Region, RequestId};
+use crate::map::{KeepOutName, MapName, Region, RequestId};
 use crate::service::{Reason, ServiceError};
 use crate::util::excerpt;
 use crate::wire::InField;
@@ -24,12 +24,37 @@ impl FromRequestParts<Adapter> for Map {
     type Rejection = HttpError;
 
     async fn from_request_parts(parts: &mut Parts, adapter: &Adapter) -> Result<Self, HttpError> {
-        let path = Path::<String>::from_request_parts(parts, adapter).await;
-        let text = path.map_err(|rejection| ServiceError::new(Reason::BadName, rejection.body_text()))?;
-        let name = MapName::new(&text).map_err(ServiceError::from)?;
-        Authorized::of(&parts.extensions)?.caller.allowed_maps().permit(&name)?;
-        Ok(Self(name))
+        let text = path::<String>(parts, adapter).await?;
+        permitted(&text, parts).map(Self)
     }
+}
+
+/// The `{map}` and the `{name}` of a route, the map as in [`Map`].
+pub(super) struct KeepOutOfMap(pub(super) MapName, pub(super) KeepOutName);
+
+impl FromRequestParts<Adapter> for KeepOutOfMap {
+    type Rejection = HttpError;
+
+    async fn from_request_parts(parts: &mut Parts, adapter: &Adapter) -> Result<Self, HttpError> {
+        let (map, name) = path::<(String, String)>(parts, adapter).await?;
+        let map = permitted(&map, parts)?;
+        Ok(Self(map, KeepOutName::new(&name).map_err(ServiceError::from)?))
+    }
+}
+
+/// What stands in the path.
+async fn path<T: DeserializeOwned + Send>(parts: &mut Parts, adapter: &Adapter) -> Result<T, ServiceError> {
+    let path = Path::<T>::from_request_parts(parts, adapter).await;
+    let Path(path) =
+        path.map_err(|rejection| ServiceError::new(Reason::BadName, rejection.body_text()))?;
+    Ok(path)
+}
+
+/// The map of that name, which the caller may name.
+fn permitted(text: &str, parts: &Parts) -> Result<MapName, HttpError> {
+    let name = MapName::new(text).map_err(ServiceError::from)?;
+    Authorized::of(&parts.extensions)?.caller.allowed_maps().permit(&name)?;
+    Ok(name)
 }
 
 /// The id of a change, where one is given.

@@ -5,8 +5,8 @@ use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
-    Adapter, deletions, localization, map_file, maps, occupancy, probes, scans, trajectory, undo, voxels,
-    watch,
+    Adapter, deletions, keep_outs, localization, map_file, maps, occupancy, probes, scans, trajectory, undo,
+    voxels, watch,
 };
 use crate::access::Operation;
 
@@ -40,6 +40,9 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::GetTrajectory => on(method, trajectory::get),
         Operation::ListVoxels => on(method, voxels::list),
         Operation::Watch => on(method, watch::watch),
+        Operation::ListKeepOuts => on(method, keep_outs::list),
+        Operation::PutKeepOut => on(method, keep_outs::put),
+        Operation::DeleteKeepOut => on(method, keep_outs::delete),
         Operation::SnapshotMap => on(method, map_file::take),
         Operation::RestoreMap => on(method, map_file::restore),
         Operation::Live => on(method, probes::live),

@@ -1,4 +1,4 @@
-//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z`: the occupied voxels of a level.
+//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z&keep_out=`: the occupied voxels of a level.
 
 use std::convert::Infallible;
 use std::fmt::Write;
@@ -13,7 +13,7 @@ use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, Params, RegionParams};
-use crate::service::{Reason, ServiceError};
+use crate::service::{Reason, ServiceError, VoxelQuery};
 use crate::voxel::VoxelKey;
 use crate::wire::json::JsonVersion;
 
@@ -29,6 +29,8 @@ pub(super) struct VoxelsParams {
     max: Option<String>,
     map_from_box: Option<String>,
     size: Option<String>,
+    #[serde(default)]
+    keep_out: bool,
 }
 
 /// Bytes of a voxel in JSON, at most: three numbers of eight characters, and what stands between them.
@@ -55,9 +57,9 @@ pub(super) async fn list(
     Map(map): Map,
     Params(query): Params<VoxelsParams>,
 ) -> Result<Response, HttpError> {
-    let VoxelsParams { level, min, max, map_from_box, size } = query;
+    let VoxelsParams { level, min, max, map_from_box, size, keep_out } = query;
     let region = RegionParams { min, max, map_from_box, size }.region()?;
-    let listing = service.list_voxels(&map, level, region).await?;
+    let listing = service.list_voxels(&map, VoxelQuery { level, region, keep_out }).await?;
     let head = Head { level, resolution_m: listing.resolution_m, version: listing.version.into() };
     let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;
     let chunks = chunks(head, listing.keys)?.map(move |chunk| {

@@ -1,7 +1,7 @@
 //! What one revision did to a map: everything that doing it again needs, and nothing that would have to be computed
 //! again in floating point.
 
-use super::{CallerName, RequestId, ScanRecord};
+use super::{CallerName, KeepOutChange, RequestId, ScanRecord};
 use crate::voxel::{MomentSet, VoxelSet};
 
 /// One committed change. A map is what its changes made of it, in the order of revisions: the same changes make
@@ -14,6 +14,8 @@ pub enum Change {
     Deletion(DeletionRecord),
     /// Scans and deletions were taken back.
     Undo(UndoRecord),
+    /// A keep-out was put or ended.
+    KeepOut(KeepOutRecord),
 }
 
 /// Voxels that were taken out.
@@ -45,6 +47,15 @@ pub struct UndoRecord {
     pub request: Option<Request>,
 }
 
+/// A keep-out that was put or ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeepOutRecord {
+    /// What happened to which.
+    pub change: KeepOutChange,
+    /// Under which id it was asked for.
+    pub request: Option<Request>,
+}
+
 /// The caller's own name of a change, by which it is told when it comes again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Request {
@@ -63,6 +74,7 @@ impl Change {
             Self::Insertion(_) => None,
             Self::Deletion(deletion) => deletion.request.as_ref(),
             Self::Undo(undo) => undo.request.as_ref(),
+            Self::KeepOut(keep_out) => keep_out.request.as_ref(),
         }
     }
 }

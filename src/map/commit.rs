@@ -5,14 +5,16 @@
 //! the write locks of what it touches, for which it waits behind short readers only. Short readers therefore never
 //! queue behind a change that itself waits for a long one.
 
+use std::sync::Arc;
+
 use super::block_change::{BlockChange, block_changes};
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::shard::Shard;
 use super::sharding::SHARDS;
 use super::update::{Moved, ShardUpdate};
 use super::{
-    Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, LevelChange, LevelSet,
-    MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
+    Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, KeepOutRecord, LevelChange,
+    LevelSet, MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::util::StopSignal;
@@ -59,6 +61,7 @@ impl<'a> Committer<'a> {
             Change::Insertion(scan) => self.insert(scan, stop),
             Change::Deletion(deletion) => self.delete(deletion, stop),
             Change::Undo(undo) => self.undo(undo, stop),
+            Change::KeepOut(keep_out) => Some(self.change_keep_outs(keep_out)),
         }
     }
 
@@ -146,6 +149,20 @@ impl<'a> Committer<'a> {
             self.remember(CompletedRequest::of_undo(request, undo, &made.0));
         }
         Some(self.publish(made))
+    }
+
+    /// Puts or ends a keep-out; always makes a revision. The lock of the keep-outs is held until that is published, for some
+    /// instructions, so that nobody who has it sees one without the other. No voxel changes, so no shard is locked.
+    fn change_keep_outs(self, KeepOutRecord { change, request }: &KeepOutRecord) -> Made {
+        let before = self.unchanged();
+        let committed = Committed { revision: before.revision + 1, ..before };
+        let changed = Arc::new(self.map.keep_outs().after(change, committed.revision));
+        let mut keep_outs = self.map.keep_outs.write();
+        *keep_outs = changed;
+        if let Some(request) = request {
+            self.remember(CompletedRequest::of_keep_out(request, &committed));
+        }
+        self.publish((committed, LevelChange::of(self.noted, [])))
     }
 
     /// Thins the trajectory before the revision `before`, see [`Trajectory::thin`](super::Trajectory::thin); the number

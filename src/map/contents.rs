@@ -1,8 +1,10 @@
 //! All that a map holds, at one revision: what is kept of it, and a map from what was kept.
 
+use std::sync::Arc;
+
 use super::{
-    ContentHash, ContentVersion, IdempotencyLog, MapSettings, MapSettingsError, MultiResolutionMap,
-    Trajectory,
+    ContentHash, ContentVersion, IdempotencyLog, KEEP_OUTS_MAX, KeepOuts, MapSettings, MapSettingsError,
+    MultiResolutionMap, Trajectory,
 };
 use crate::util::StopSignal;
 use crate::voxel::{MomentSet, VoxelSet};
@@ -25,6 +27,12 @@ pub enum ContentsError {
         /// The map's.
         revision: u64,
     },
+    /// More keep-outs than a map has.
+    #[error("{0} keep-outs, a map has at most {KEEP_OUTS_MAX}")]
+    KeepOuts(usize),
+    /// A keep-out that was made at a revision beyond the map's.
+    #[error("the keep-out {0} was made at revision {1}, the map is at {2}")]
+    KeepOutRevision(String, u64, u64),
 }
 
 /// What a map holds at one revision, besides its settings. Coarser levels and filters follow from the finest
@@ -41,6 +49,8 @@ pub struct MapContents {
     pub trajectory: Trajectory,
     /// Answers to changes that were asked for under an id.
     pub requests: IdempotencyLog,
+    /// Where no robot may go.
+    pub keep_outs: Arc<KeepOuts>,
 }
 
 impl MapContents {
@@ -57,7 +67,7 @@ impl MapContents {
     /// These contents, when a map can hold them: what came from elsewhere is asked.
     ///
     /// # Errors
-    /// When revisions are out of range or out of order.
+    /// When revisions are out of range or out of order, or there are more keep-outs than a map has.
     pub fn checked(self) -> Result<Self, ContentsError> {
         if self.revision > REVISION_MAX {
             return Err(ContentsError::Revision(self.revision));
@@ -66,7 +76,21 @@ impl MapContents {
         self.check_order("scans", scans.map(|scan| scan.revision))?;
         self.check_order("withdrawn changes", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
         self.check_order("requests", self.requests.iter().map(|request| request.revision))?;
+        self.check_keep_outs()?;
         Ok(self)
+    }
+
+    fn check_keep_outs(&self) -> Result<(), ContentsError> {
+        if self.keep_outs.len() > KEEP_OUTS_MAX {
+            return Err(ContentsError::KeepOuts(self.keep_outs.len()));
+        }
+        match self.keep_outs.iter().find(|keep_out| keep_out.made_revision > self.revision) {
+            None => Ok(()),
+            Some(late) => {
+                let (name, made) = (late.name.to_string(), late.made_revision);
+                Err(ContentsError::KeepOutRevision(name, made, self.revision))
+            }
+        }
     }
 
     fn check_order(
@@ -92,13 +116,16 @@ impl MultiResolutionMap {
 
     /// Some of it, once stopped.
     fn taken_until(&self, stop: StopSignal<'_>) -> MapContents {
-        // Every change of the trajectory or the requests holds a shard meanwhile, so that the view keeps both as they
-        // are.
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
+        // Every change of the trajectory or the requests holds a shard meanwhile, or the keep-outs, so that all of them are
+        // of one revision.
+        let locked = self.keep_outs.read();
+        let (revision, keep_outs) = (self.revision(), Arc::clone(&locked));
         let (trajectory, requests) = (self.trajectory(), self.requests().clone());
+        drop(locked);
         let (voxels, moments) = (view.voxels_until(stop), moments.to_set_until(stop));
-        MapContents { revision: view.revision(), voxels, moments, trajectory, requests }
+        MapContents { revision, voxels, moments, trajectory, requests, keep_outs }
     }
 
     /// The map of `settings` that holds `contents`.
@@ -131,6 +158,7 @@ impl MultiResolutionMap {
         };
         *self.trajectory.write() = contents.trajectory;
         *self.requests.write() = contents.requests;
+        *self.keep_outs.write() = contents.keep_outs;
         self.published.publish(ContentVersion { revision: contents.revision, hash });
         true
     }

@@ -30,6 +30,8 @@ pub struct CompletedRequest {
     pub scans: usize,
     /// Deletions that it took back.
     pub deletions: usize,
+    /// What was asked for.
+    pub kind: RequestKind,
 }
 
 /// The last answered requests of each caller, in the order of their revisions.
@@ -49,19 +51,26 @@ pub struct IdempotencyLog {
 /// Whose id it is, and for what: callers do not know of each other's ids.
 type Key = (Option<CallerName>, RequestKind, RequestId);
 
-/// What was asked for. Ids of one kind say nothing of those of the other: who may undo scans is not always who may delete.
+/// What was asked for. Ids of one kind say nothing of those of another: who may undo scans is not always who may delete.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RequestKind {
     /// Voxels taken out.
     Deletion,
     /// Scans and deletions taken back.
     Undo,
+    /// A keep-out put or removed.
+    KeepOut,
 }
 
 impl CompletedRequest {
     /// The request for a deletion that was made.
     pub(super) fn of_deletion(request: &Request, committed: &Committed) -> Self {
-        Self::of_undo(request, &UndoRecord::default(), committed)
+        Self { kind: RequestKind::Deletion, ..Self::of_undo(request, &UndoRecord::default(), committed) }
+    }
+
+    /// The request for a keep-out, put or removed, that was granted.
+    pub(super) fn of_keep_out(request: &Request, committed: &Committed) -> Self {
+        Self { kind: RequestKind::KeepOut, ..Self::of_deletion(request, committed) }
     }
 
     /// The request for an undo that was made.
@@ -69,16 +78,12 @@ impl CompletedRequest {
         let Request { id, digest, caller } = request.clone();
         let &Committed { revision, added, removed, .. } = committed;
         let (scans, deletions) = (undo.scans.len(), undo.deletions.len());
-        Self { id, digest, caller, revision, removed, restored: added, scans, deletions }
-    }
-
-    /// The request's kind: an undo takes back a scan or a deletion at least, a deletion none.
-    pub fn kind(&self) -> RequestKind {
-        if self.scans + self.deletions > 0 { RequestKind::Undo } else { RequestKind::Deletion }
+        let kind = RequestKind::Undo;
+        Self { id, digest, caller, revision, removed, restored: added, scans, deletions, kind }
     }
 
     fn key(&self) -> Key {
-        (self.caller.clone(), self.kind(), self.id.clone())
+        (self.caller.clone(), self.kind, self.id.clone())
     }
 }
 
@@ -173,6 +178,7 @@ mod tests {
             restored: 0,
             scans: 0,
             deletions: 0,
+            kind: RequestKind::Deletion,
         }
     }
 
@@ -185,12 +191,15 @@ mod tests {
     }
 
     #[test]
-    fn an_undo_answers_for_no_deletion_of_the_same_id() {
-        for (scans, deletions) in [(1, 0), (0, 1)] {
-            let undo = CompletedRequest { scans, deletions, ..request(1) };
-            let requests: IdempotencyLog = [undo.clone()].into_iter().collect();
-            assert_eq!(requests.find(RequestKind::Deletion, &undo.id, None), None);
-            assert_eq!(requests.find(RequestKind::Undo, &undo.id, None), Some(&undo));
+    fn a_request_of_one_kind_answers_for_none_of_another_of_the_same_id() {
+        const KINDS: [RequestKind; 3] = [RequestKind::Deletion, RequestKind::Undo, RequestKind::KeepOut];
+        for kind in KINDS {
+            let of_kind = CompletedRequest { kind, ..request(1) };
+            let requests: IdempotencyLog = [of_kind.clone()].into_iter().collect();
+            for other in KINDS {
+                let found = requests.find(other, &of_kind.id, None);
+                assert_eq!(found, Some(&of_kind).filter(|_| other == kind), "{kind:?} {other:?}");
+            }
         }
     }
 

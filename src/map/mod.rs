@@ -16,6 +16,7 @@ mod contents;
 mod filter_room;
 mod idempotency_log;
 mod info;
+mod keep_out;
 mod level_blocks;
 mod level_changes;
 mod level_update;
@@ -34,7 +35,7 @@ mod update;
 pub mod view;
 mod voxel_ownership;
 
-pub use change::{Change, DeletionRecord, Request, UndoRecord};
+pub use change::{Change, DeletionRecord, KeepOutRecord, Request, UndoRecord};
 pub use commit::Committer;
 pub use committed::Committed;
 pub use content_hash::{ContentHash, ContentVersion};
@@ -43,11 +44,15 @@ pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
 pub use info::{LevelInfo, MapDescription};
+pub use keep_out::{
+    KEEP_OUTS_MAX, KeepOut, KeepOutAct, KeepOutChange, KeepOutShape, KeepOutShapeError, KeepOuts,
+    KeepOutsFull, PRISM_CORNERS_MAX, Prism, PrismError, TooManyVoxels,
+};
 pub use level_changes::{LevelChange, LevelSet};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;
-pub use name::{CallerName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName};
+pub use name::{CallerName, KeepOutName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName};
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{OrientedBox, REGION_M_MAX, Region, RegionError};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
@@ -58,6 +63,8 @@ pub use trajectory::{
 };
 pub use view::{LongRead, MapView};
 pub use voxel_ownership::{Reversal, VoxelOwnership};
+
+use std::sync::Arc;
 
 use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
@@ -83,6 +90,7 @@ pub struct MultiResolutionMap {
     shards: [RwLock<Shard>; SHARDS],
     trajectory: RwLock<Trajectory>,
     requests: RwLock<IdempotencyLog>,
+    keep_outs: RwLock<Arc<KeepOuts>>,
     published: Published,
     commit_queue: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
@@ -104,6 +112,7 @@ impl MultiResolutionMap {
             shards: std::array::from_fn(|i| RwLock::new(Rank::Shard(i as u8), Shard::new(i, &settings))),
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
+            keep_outs: RwLock::new(Rank::KeepOuts, Arc::default()),
             published: Published::default(),
             commit_queue: Mutex::new(Rank::Commit, ()),
             long_reads: RwLock::new(Rank::LongRead, ()),
@@ -155,6 +164,23 @@ impl MultiResolutionMap {
     /// The poses of the accepted scans, where they do not change just now: for threads that may not wait.
     pub fn try_trajectory(&self) -> Option<RwLockReadGuard<'_, Trajectory>> {
         self.trajectory.try_read()
+    }
+
+    /// The keep-outs, as they are now.
+    pub fn keep_outs(&self) -> Arc<KeepOuts> {
+        Arc::clone(&self.keep_outs.read())
+    }
+
+    /// The keep-outs, where they do not change just now: for threads that may not wait.
+    pub fn try_keep_outs(&self) -> Option<Arc<KeepOuts>> {
+        self.keep_outs.try_read().map(|keep_outs| Arc::clone(&keep_outs))
+    }
+
+    /// The keep-outs, with a version of the map at which they are these.
+    pub fn keep_outs_and_version(&self) -> (Arc<KeepOuts>, ContentVersion) {
+        // Who changes them publishes the revision before others may read.
+        let keep_outs = self.keep_outs.read();
+        (Arc::clone(&keep_outs), self.content_version())
     }
 
     /// Answers to changes that were asked for under an id.

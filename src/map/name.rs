@@ -13,6 +13,9 @@ pub enum NameError {
     /// Not a map's name.
     #[error("map must match [a-z0-9][a-z0-9_-]{{0,63}}, got {0:?}")]
     Map(String),
+    /// Not a keep-out's name.
+    #[error("keep-out must match [a-z0-9][a-z0-9_-]{{0,63}}, got {0:?}")]
+    KeepOut(String),
     /// Not a robot's name.
     #[error("robot must be 1 to {NAME_LENGTH_MAX} of [A-Za-z0-9_.-], got {0:?}")]
     Robot(String),
@@ -37,13 +40,26 @@ impl MapName {
     /// # Errors
     /// Names the text and what a name looks like.
     pub fn new(text: &str) -> Result<Self, NameError> {
-        let first = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();
-        let rest = |c: u8| first(c) || c == b'_' || c == b'-';
-        let bytes = text.as_bytes();
-        let fits = bytes.len() <= NAME_LENGTH_MAX
-            && bytes.first().is_some_and(|&c| first(c))
-            && bytes.iter().all(|&c| rest(c));
-        if fits { Ok(Self(text.into())) } else { Err(NameError::Map(excerpt(text))) }
+        path_segment(text).map(Self).ok_or_else(|| NameError::Map(excerpt(text)))
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// The name of a keep-out: `[a-z0-9][a-z0-9_-]{0,63}`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct KeepOutName(Arc<str>);
+
+impl KeepOutName {
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// Names the text and what a name looks like.
+    pub fn new(text: &str) -> Result<Self, NameError> {
+        path_segment(text).map(Self).ok_or_else(|| NameError::KeepOut(excerpt(text)))
     }
 
     /// The text.
@@ -139,6 +155,17 @@ impl CallerName {
     }
 }
 
+/// `[a-z0-9][a-z0-9_-]{0,63}`.
+fn path_segment(text: &str) -> Option<Arc<str>> {
+    let first = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let rest = |c: u8| first(c) || c == b'_' || c == b'-';
+    let bytes = text.as_bytes();
+    let fits = bytes.len() <= NAME_LENGTH_MAX
+        && bytes.first().is_some_and(|&c| first(c))
+        && bytes.iter().all(|&c| rest(c));
+    fits.then(|| text.into())
+}
+
 /// 1 to 64 of `[A-Za-z0-9_.-]`.
 fn word(text: &str) -> Option<Arc<str>> {
     let fits = |c: u8| c.is_ascii_alphanumeric() || b"_.-".contains(&c);
@@ -146,6 +173,12 @@ fn word(text: &str) -> Option<Arc<str>> {
 }
 
 impl std::fmt::Display for MapName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::fmt::Display for KeepOutName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0)
     }
@@ -176,10 +209,10 @@ mod tests {
     #[test]
     fn a_map_name_can_be_no_path() {
         for good in ["a", "0", "floor-2_b", &"x".repeat(64)] {
-            assert!(MapName::new(good).is_ok(), "{good}");
+            assert!(MapName::new(good).is_ok() && KeepOutName::new(good).is_ok(), "{good}");
         }
         for bad in ["", "A", "-a", "_a", "a/b", "..", "a.b", "ä", "a b", "a\0", &"x".repeat(65)] {
-            assert!(MapName::new(bad).is_err(), "{bad}");
+            assert!(MapName::new(bad).is_err() && KeepOutName::new(bad).is_err(), "{bad}");
         }
         assert!(MapName::new(&"x".repeat(1 << 20)).unwrap_err().to_string().len() < 200);
     }

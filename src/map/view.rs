@@ -1,10 +1,12 @@
 //! How a map is read: all the locks it takes, at once, and so one revision.
 
+use std::sync::Arc;
+
 use super::lookup::{self, LevelView, Lookup};
 use super::occupied_voxel_list::tier_of;
 use super::shard::Shard;
 use super::sharding::{SHARDS, ShardsTouched};
-use super::{ContentVersion, MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
+use super::{ContentVersion, KeepOuts, MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
@@ -19,6 +21,8 @@ pub struct MapView<'a> {
     map: &'a MultiResolutionMap,
     shards: [Option<RwLockReadGuard<'a, Shard>>; SHARDS],
     version: ContentVersion,
+    /// Where they were asked for.
+    keep_outs: Option<Arc<KeepOuts>>,
 }
 
 /// A read that takes long, see [`MultiResolutionMap::long_read`].
@@ -45,7 +49,7 @@ impl<'a> MapView<'a> {
     /// read once they are held: a change that is published later touches none of these shards.
     pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
         let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
-        Self { map, shards, version: map.content_version() }
+        Self { map, shards, version: map.content_version(), keep_outs: None }
     }
 
     /// A view where no lock has to be waited for; none elsewhere.
@@ -54,7 +58,29 @@ impl<'a> MapView<'a> {
         for i in (0..SHARDS).filter(|&i| touched.contains(i)) {
             shards[i] = Some(map.shards[i].try_read()?);
         }
-        Some(Self { map, shards, version: map.content_version() })
+        Some(Self { map, shards, version: map.content_version(), keep_outs: None })
+    }
+
+    /// This view with the keep-outs of the map, all at one revision, which may be a later one: what the view covers has not
+    /// changed since.
+    #[must_use]
+    pub fn with_keep_outs(self) -> Self {
+        // Nobody publishes a change of what is locked: of the shards before, of the keep-outs now.
+        let keep_outs = self.map.keep_outs.read();
+        let (keep_outs, version) = (Some(Arc::clone(&keep_outs)), self.map.content_version());
+        Self { keep_outs, version, ..self }
+    }
+
+    /// [`MapView::with_keep_outs`] where no lock has to be waited for; none elsewhere.
+    pub fn try_with_keep_outs(self) -> Option<Self> {
+        let keep_outs = self.map.keep_outs.try_read()?;
+        let (keep_outs, version) = (Some(Arc::clone(&keep_outs)), self.map.content_version());
+        Some(Self { keep_outs, version, ..self })
+    }
+
+    /// The keep-outs, where the view was asked for them.
+    pub fn keep_outs(&self) -> Option<&Arc<KeepOuts>> {
+        self.keep_outs.as_ref()
     }
 
     /// The revision that everything read through this view belongs to.

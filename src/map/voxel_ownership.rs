@@ -134,6 +134,8 @@ impl VoxelOwnership {
             Change::Deletion(deletion) => self.observe_removal(&deletion.voxels, is_target),
             // What it took back was passed over where it was made.
             Change::Undo(_) => {}
+            // No voxel has to do with it.
+            Change::KeepOut(_) => {}
         }
     }
 
@@ -212,6 +214,7 @@ fn touched_by(change: &Change) -> Vec<&VoxelSet> {
         Change::Insertion(scan) => vec![&scan.voxels, &scan.carved],
         Change::Deletion(deletion) => vec![&deletion.voxels],
         Change::Undo(undo) => vec![&undo.removed, &undo.restored],
+        Change::KeepOut(_) => Vec::new(),
     }
 }
 

@@ -7,7 +7,7 @@ use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
 use super::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError, check_not_stopped};
-use crate::geometry::{Point, rotation_xyzw, translation_m};
+use crate::geometry::Point;
 use crate::map::{
     CallerName, Change, Committed, CompletedRequest, DeletionRecord, MultiResolutionMap, Region, Request,
     RequestKind, SHARDS,
@@ -162,17 +162,7 @@ fn digest(deletion: &Deletion) -> u64 {
             let bits: Vec<u64> = keys.iter().map(|key| key.to_bits()).collect();
             digest.bytes(b"keys").bytes(bytemuck::cast_slice(&bits))
         }
-        DeletionTarget::Region(Region::Box { min_m, max_m }) => {
-            digest.bytes(b"box").numbers(min_m).numbers(max_m)
-        }
-        DeletionTarget::Region(Region::Sphere { center_m, radius_m }) => {
-            digest.bytes(b"sphere").numbers(center_m).numbers(&[*radius_m])
-        }
-        DeletionTarget::Region(Region::OrientedBox(of)) => {
-            let (pose, size_m) = (of.map_from_box(), of.size_m());
-            let digest = digest.bytes(b"oriented_box").numbers(&translation_m(pose));
-            digest.numbers(&rotation_xyzw(pose)).numbers(&size_m)
-        }
+        DeletionTarget::Region(region) => digest.region(region),
     }
     .finish()
 }

@@ -2,6 +2,9 @@
 
 use sha2::{Digest as _, Sha256};
 
+use crate::geometry::{rotation_xyzw, translation_m};
+use crate::map::Region;
+
 /// The beginning of the SHA-256 hash of what was asked for. A checksum would not do: with one it takes a few equations to
 /// make a request that another is then mistaken for. Every field has its length before it.
 #[derive(Debug, Clone)]
@@ -25,6 +28,20 @@ impl Digest {
 
     pub(super) fn numbers(self, numbers: &[f64]) -> Self {
         numbers.iter().fold(self, |digest, number| digest.number(number.to_bits()))
+    }
+
+    pub(super) fn region(self, region: &Region) -> Self {
+        match region {
+            Region::Box { min_m, max_m } => self.bytes(b"box").numbers(min_m).numbers(max_m),
+            Region::Sphere { center_m, radius_m } => {
+                self.bytes(b"sphere").numbers(center_m).numbers(&[*radius_m])
+            }
+            Region::OrientedBox(of) => {
+                let (pose, size_m) = (of.map_from_box(), of.size_m());
+                let digest = self.bytes(b"oriented_box").numbers(&translation_m(pose));
+                digest.numbers(&rotation_xyzw(pose)).numbers(&size_m)
+            }
+        }
     }
 
     /// The first eight bytes of the hash.

@@ -6,7 +6,7 @@ use super::error_code::ErrorCode;
 use super::reason::Reason;
 use crate::bloom::FilterSettingsError;
 use crate::geometry::PoseError;
-use crate::map::{MapSettingsError, NameError, RegionError};
+use crate::map::{KeepOutShapeError, MapSettingsError, NameError, PrismError, RegionError};
 use crate::voxel::SettingError;
 
 /// A failed request: nothing was changed.
@@ -70,6 +70,22 @@ impl From<FilterSettingsError> for ServiceError {
 impl From<MapSettingsError> for ServiceError {
     fn from(error: MapSettingsError) -> Self {
         Self::new(Reason::BadSettings, error.to_string())
+    }
+}
+
+impl From<PrismError> for ServiceError {
+    fn from(error: PrismError) -> Self {
+        Self::new(Reason::BadKeepOut, error.to_string())
+    }
+}
+
+impl From<KeepOutShapeError> for ServiceError {
+    fn from(error: KeepOutShapeError) -> Self {
+        match error {
+            KeepOutShapeError::Region(error) => error.into(),
+            KeepOutShapeError::Prism(error) => error.into(),
+            KeepOutShapeError::TooFar(..) => Self::new(Reason::BadKeepOut, error.to_string()),
+        }
     }
 }
 

@@ -7,16 +7,17 @@ use std::sync::{Arc, Weak};
 use super::recent_changes::BLOCKS_PER_PART;
 use super::resource_budget::Reservation;
 use super::{BlockBytes, StatePart};
-use crate::map::{ContentVersion, MapSettings};
+use crate::map::{ContentVersion, KeepOuts, MapSettings};
 use crate::sync::{Mutex, Rank};
 use crate::voxel::VoxelSet;
 
-/// The voxels of a level at one revision. Those who begin to watch at about the same time share it.
+/// The voxels of a level and the keep-outs at one revision. Those who begin to watch at about the same time share it.
 #[derive(Debug)]
 pub(super) struct FullState {
     pub(super) version: ContentVersion,
     pub(super) level: u32,
     pub(super) voxels: VoxelSet,
+    pub(super) keep_outs: Arc<KeepOuts>,
     pub(super) _memory: Reservation,
 }
 
@@ -68,6 +69,7 @@ impl Iterator for StateParts {
         let blocks = self.state.voxels.blocks();
         let Range { start, end } = self.next.map(|start| start..blocks.len().min(start + BLOCKS_PER_PART))?;
         self.next = (end < blocks.len()).then_some(end);
+        let keep_outs = if start == 0 { self.state.keep_outs.iter().cloned().collect() } else { Vec::new() };
         Some(StatePart {
             is_first: start == 0,
             is_last: self.next.is_none(),
@@ -76,6 +78,7 @@ impl Iterator for StateParts {
             levels: self.levels,
             level: self.state.level,
             voxels: BlockBytes::of(&blocks[start..end]),
+            keep_outs,
         })
     }
 }

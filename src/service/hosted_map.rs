@@ -14,16 +14,16 @@ use super::point_query::{POINTS_PER_STEP, point_without_voxel};
 use super::recent_changes::RecentChanges;
 use super::resource_budget::ResourceBudget;
 use super::{
-    MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing,
+    MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing, VoxelQuery,
     check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, Region, RobotName};
+use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, RobotName};
 use crate::mapping::{LostRobots, Sightings};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
-use crate::voxel::LatticeFromPoints;
+use crate::voxel::{LatticeFromPoints, VoxelKey};
 
 /// Which maps to write snapshots of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,8 +59,15 @@ pub(super) struct HostedMap {
     pub(super) undo_turn: Arc<tokio::sync::Mutex<()>>,
     /// A snapshot is due, and there is no room for it.
     is_put_off: AtomicBool,
+    /// Held while keep-outs are ended whose time is up.
+    pub(super) expiring: tokio::sync::Mutex<()>,
+    /// They cannot be ended, which was said.
+    pub(super) is_expiry_put_off: AtomicBool,
 }
 
+/// Sides of keep-outs that points are compared with where they arrive, less than a millisecond; see
+/// [`INLINE_POINTS`](super::pool::INLINE_POINTS).
+const INLINE_SIDES: usize = 1 << 17;
 /// Robots whose turns are remembered before those that nobody waits for are dropped.
 const TURNS_KEPT: usize = 1024;
 /// Seed of the sample on which false positives are measured: the same map gives the same figures.
@@ -111,6 +118,8 @@ impl HostedMap {
             lost: LostRobots::default(),
             undo_turn: Arc::default(),
             is_put_off: AtomicBool::default(),
+            expiring: tokio::sync::Mutex::default(),
+            is_expiry_put_off: AtomicBool::default(),
         }
     }
 
@@ -262,13 +271,22 @@ impl HostedMap {
         let points = query.points.as_slice();
         let _long_read = (points.len() > POINTS_PER_STEP).then(|| self.map.long_read());
         let view = self.map.view_of(points, &query.map_from_points.unwrap_or_else(Pose::identity));
+        let view = if query.keep_out { view.with_keep_outs() } else { view };
         self.query_in(view, query, stop)
     }
 
-    /// Answers a query where it need not wait for a lock.
+    /// Answers a query where it need not wait for a lock, and its points are not compared with many keep-outs.
     pub(super) fn try_query(&self, query: &PointQuery) -> Option<Result<PointAnswer, ServiceError>> {
         let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
-        let view = self.map.try_view_of(query.points.as_slice(), &map_from_points)?;
+        let points = query.points.as_slice();
+        let mut view = self.map.try_view_of(points, &map_from_points)?;
+        if query.keep_out {
+            view = view.try_with_keep_outs()?;
+            let sides = view.keep_outs().map_or(0, |keep_outs| keep_outs.sides());
+            if points.len() * sides > INLINE_SIDES {
+                return None;
+            }
+        }
         Some(self.query_in(view, query, StopSignal::NEVER))
     }
 
@@ -288,27 +306,37 @@ impl HostedMap {
 
     pub(super) fn list(
         &self,
-        level: u32,
-        region: Option<&Region>,
+        &VoxelQuery { level, region, keep_out }: &VoxelQuery,
         most: usize,
         stop: StopSignal<'_>,
     ) -> Result<VoxelListing, ServiceError> {
+        let region = region.as_ref();
         let long_read = self.map.long_read();
         let view = long_read.view();
+        let view = if keep_out { view.with_keep_outs() } else { view };
         // How many there are of a whole level is known: nothing is copied of more than may be listed.
         let whole = if region.is_none() { view.lists(level).map(|list| list.len()).sum() } else { 0 };
         if whole > most {
             return Err(listing_too_large(level, whole, most));
         }
         let (copy, version) = (view.level_voxels(level, region, most, stop), view.version());
+        let keep_outs = view.keep_outs().cloned().unwrap_or_default();
         drop(view);
         drop(long_read);
         if copy.len() > most {
             return Err(listing_too_large(level, copy.len(), most));
         }
-        let mut keys = Vec::with_capacity(copy.len());
-        copy.for_some(stop, |some| keys.extend_from_slice(some));
+        let kept_out = keep_outs.voxels_of(level, region, self.map.lattice(), most, stop);
         check_not_stopped(stop)?;
+        let kept_out = kept_out.map_err(|_| keep_outs_too_large(level, most))?;
+        let mut keys = Vec::with_capacity(copy.len() + kept_out.len());
+        let is_other = |key: &VoxelKey| kept_out.is_empty() || !kept_out.contains(*key);
+        copy.for_some(stop, |some| keys.extend(some.iter().copied().filter(is_other)));
+        check_not_stopped(stop)?;
+        keys.extend(kept_out.iter());
+        if keys.len() > most {
+            return Err(listing_too_large(level, keys.len(), most));
+        }
         let resolution_m = self.map.lattice().resolution_m(level);
         Ok(VoxelListing { resolution_m, keys, version: self.version(version) })
     }
@@ -366,6 +394,13 @@ impl HostedMap {
 fn listing_too_large(level: u32, found: usize, most: usize) -> ServiceError {
     let message = format!(
         "level {level} has {found} voxels there or more, listed_voxels_max is {most}: ask for a region or a coarser level"
+    );
+    ServiceError::new(Reason::ListingTooLarge, message)
+}
+
+fn keep_outs_too_large(level: u32, most: usize) -> ServiceError {
+    let message = format!(
+        "the keep-outs take more of level {level} there than listed_voxels_max, which is {most}, allows to look through: ask          for a region, a coarser level, or without keep_out"
     );
     ServiceError::new(Reason::ListingTooLarge, message)
 }

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Reason, ServiceError};
+use crate::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
 
 /// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is named
 /// in the error of a request beyond it, and is a setting of the section `limits`.
@@ -79,6 +80,10 @@ pub struct Limits {
     pub listed_voxels_max: usize,
     /// Poses of one page of a trajectory, and of one that is asked for without a limit. 5,000.
     pub trajectory_page_max: usize,
+    /// Keep-outs of one map. 256, which is also the most.
+    pub keep_outs_max: usize,
+    /// Corners of a keep-out that is a prism. 64, which is also the most.
+    pub keep_out_corners_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
     pub robots_per_map_max: usize,
     /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
@@ -151,6 +156,8 @@ impl Default for Limits {
             voxels_per_map_max: 200_000_000,
             listed_voxels_max: 20_000_000,
             trajectory_page_max: 5_000,
+            keep_outs_max: KEEP_OUTS_MAX,
+            keep_out_corners_max: PRISM_CORNERS_MAX,
             robots_per_map_max: 4_096,
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,
@@ -210,6 +217,17 @@ impl Limits {
     /// When a request has no key, or more than `keys_per_request_max`.
     pub(super) fn check_keys(&self, keys: usize) -> Result<(), ServiceError> {
         within("keys", "keys_per_request_max", keys, self.keys_per_request_max)
+    }
+
+    /// # Errors
+    /// When the prism of a keep-out has more corners than `keep_out_corners_max`.
+    pub(super) fn check_corners(&self, corners: usize) -> Result<(), ServiceError> {
+        let most = self.keep_out_corners_max;
+        if corners <= most {
+            return Ok(());
+        }
+        let message = format!("prism.corners_m has {corners} corners, keep_out_corners_max is {most}");
+        Err(ServiceError::new(Reason::BadKeepOut, message))
     }
 
     /// The poses of a page, where `limit` of them are asked for.
@@ -286,6 +304,14 @@ mod tests {
         assert!(limits.check_points(0).unwrap_err().message.contains("points must not be empty"));
         let error = limits.check_points(11).unwrap_err();
         assert!(error.message.contains("11") && error.message.contains("points_per_request_max is 10"));
+    }
+
+    #[test]
+    fn a_prism_has_as_many_corners_as_the_limit_says_and_no_more() {
+        let limits = Limits { keep_out_corners_max: 5, ..Limits::default() };
+        assert!(limits.check_corners(0).is_ok() && limits.check_corners(5).is_ok());
+        let refused = limits.check_corners(6).unwrap_err().message;
+        assert_eq!(refused, "prism.corners_m has 6 corners, keep_out_corners_max is 5");
     }
 
     #[test]

@@ -15,6 +15,8 @@ mod full_state;
 mod gauges;
 mod growth;
 mod hosted_map;
+mod keep_out;
+mod keep_out_expiry;
 mod limits;
 mod localization;
 #[cfg(test)]
@@ -54,11 +56,11 @@ pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
 pub use reason::{Reason, ToldBy};
 pub use request::{
-    BlockBytes, Cause, ChangePart, Deletion, DeletionAnswer, DeletionTarget, Foreground, MapFile, MapInfo,
-    MapList, MapStorage, MapVersion, PointAnswer, PointCloud, PointQuery, PointTimes, ScanAnswer,
-    ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo,
-    UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
-    WatchedSince,
+    BlockBytes, Cause, ChangePart, DeleteKeepOut, Deletion, DeletionAnswer, DeletionTarget, Foreground,
+    KeepOutAnswer, KeepOutList, MapFile, MapInfo, MapList, MapStorage, MapVersion, PointAnswer, PointCloud,
+    PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanRequest, StatePart, TimeReference, TrajectoryAnswer,
+    TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing, VoxelQuery, WatchEvent,
+    WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;
@@ -68,7 +70,7 @@ pub use watch::Watch;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::map::{CallerName, MapName, Region};
+use crate::map::{CallerName, MapName};
 use crate::store::OpeningProgress;
 use crate::util::StopSignal;
 use catalog::Catalog;
@@ -403,17 +405,12 @@ impl MapService {
     /// # Errors
     /// `InvalidArgument` for a level that is none; `ResourceExhausted` when there are more than
     /// `listed_voxels_max`; `NotFound`.
-    pub async fn list_voxels(
-        &self,
-        map: &MapName,
-        level: u32,
-        region: Option<Region>,
-    ) -> Result<VoxelListing, ServiceError> {
+    pub async fn list_voxels(&self, map: &MapName, query: VoxelQuery) -> Result<VoxelListing, ServiceError> {
         let work = async {
             let map = self.map(map)?;
-            map.check_level(level)?;
+            map.check_level(query.level)?;
             let most = self.limits().listed_voxels_max;
-            self.inner.queries.run(move |stop| map.list(level, region.as_ref(), most, stop)).await?
+            self.inner.queries.run(move |stop| map.list(&query, most, stop)).await?
         };
         self.observed("ListVoxels", Some(map), work, |_| Outcome::Read).await
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::{DeletionAnswer, MapService, MapVersion, ServiceError, UndoAnswer};
+use super::{DeletionAnswer, KeepOutAnswer, MapService, MapVersion, ServiceError, UndoAnswer};
 use crate::align::Verdict;
 use crate::map::{CallerName, Lookup, MapName, RobotName};
 use crate::mapping::Recovered;
@@ -101,6 +101,11 @@ impl Change {
             deletions_undone: deletions,
             ..Self::of_revision(version, !replayed && scans + deletions > 0)
         }
+    }
+
+    /// A keep-out that was put or removed.
+    pub(super) fn of_keep_out(&KeepOutAnswer { version, replayed }: &KeepOutAnswer) -> Self {
+        Self::of_revision(version, !replayed)
     }
 
     /// What led to `after`, by a revision of its own unless it was replayed or had nothing to do.

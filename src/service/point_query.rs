@@ -14,7 +14,8 @@ use crate::voxel::{Lattice, LatticeFromPoints};
 pub(super) const POINTS_PER_STEP: usize = 64 << 10;
 
 impl PointQuery {
-    /// The answer in `view`, which covers the points, of the map `map_uuid` on `lattice`.
+    /// The answer in `view`, which covers the points and has the keep-outs where they count, of the map `map_uuid` on
+    /// `lattice`.
     ///
     /// # Errors
     /// `InvalidArgument` for a point in no voxel, named by its place.
@@ -35,9 +36,14 @@ impl PointQuery {
             all_have_a_voxel &= view.query(points, &quantize, self.level, self.lookup, words);
         }
         let ContentVersion { revision, hash } = view.version();
+        let keep_outs = view.keep_outs().filter(|_| self.keep_out).cloned();
         drop(view);
         if !all_have_a_voxel {
             return Err(point_without_voxel(points, &quantize, lattice));
+        }
+        if let Some(keep_outs) = keep_outs {
+            keep_outs.mark(points, &map_from_points, &mut occupied, stop);
+            check_not_stopped(stop)?;
         }
         Ok(PointAnswer {
             points: points.len(),

@@ -73,15 +73,17 @@ reasons! {
         BadFilter "bad_filter" Both: "range limits or body box are not numbers in order", "correct them";
         BadGuess "bad_guess" Grpc: "`constant_velocity` is false", "leave the guess out";
         BadGravity "bad_gravity" Both: "a scan's `gravity_in_sensor` is zero or not finite", "send the direction in which things fall, in the sensor frame; an accelerometer at rest reads the opposite";
+        BadExpiry "bad_expiry" Both: "the `expires_at_ns` of a keep-out lies in the past", "send nanoseconds since 1970, in the future";
         BadInformation "bad_information" Client: "the server's answer has an information matrix that is none", "update the client";
         BadJson "bad_json" Http: "the body is no JSON of this request: place, what is there, what belongs there", "correct it; unknown fields are errors";
+        BadKeepOut "bad_keep_out" Both: "a prism with too few corners or more than `keep_out_corners_max`, a corner twice or not finite, no area, sides that cross, or heights out of order; a box without an end", "correct it";
         BadKey "bad_key" Both: "a voxel key or index out of range", "correct it";
         BadLookup "bad_lookup" Grpc: "a number that is none of the enum's", "use the generated constants";
         BadMapFile "bad_map_file" Both: "the file is no map file, or is damaged", "take another backup; `mrol map` and `mrol snapshot` write such files";
         BadMessage "bad_message" Grpc: "the message cannot be read", "check encoding and compression";
         BadPointTimes "bad_point_times" Both: "`point_times` are not one for each point, not finite, beyond `point_times_max_s`, or without `timestamp_ns`", "send seconds from `timestamp_ns`, one for each point";
         BadMethod "bad_method" Grpc: "a number that is none of the enum's", "use the generated constants";
-        BadName "bad_name" Both: "the name of a map, robot or request is not valid", "see [names](#rules-for-all-requests)";
+        BadName "bad_name" Both: "the name of a map, keep-out, robot or request is not valid", "see [names](#rules-for-all-requests)";
         BadNumbers "bad_numbers" Http: "a parameter is not so many numbers with commas", "correct it";
         BadPose "bad_pose" Both: "not finite, or the quaternion is no unit quaternion", "normalize it";
         BadQuery "bad_query" Both: "unknown or malformed parameter; in a localization, a gravity or box that is none", "correct it";
@@ -128,6 +130,7 @@ reasons! {
         ScopeTooSmall "scope_too_small" Both: "the operation takes a larger scope; undo of a revision takes `write`", "use another key";
     }
     NotFound {
+        KeepOutNotFound "keep_out_not_found" Both: "the map has no keep-out of this name, or it has ended", "list them";
         MapNotFound "map_not_found" Both: "no such map, or it was deleted meanwhile", "make it; `GET /v1/maps` lists them";
         RouteNotFound "route_not_found" Http: "no such path", "see [operations](#operations-over-http)";
         ScanNotFound "scan_not_found" Both: "no such accepted scan, or it was undone already; no such revision", "read the trajectory";
@@ -142,7 +145,7 @@ reasons! {
         MapEmpty "map_empty" Both: "the map has nothing to localize in", "insert a scan first";
         MapReplaced "map_replaced" Both: "the map is another one by now", "read its `map_uuid` and start again";
         NoJournal "no_journal" Both: "the server keeps maps in memory only, and undo needs a journal", "start it with `--data-dir`";
-        NotUndoable "not_undoable" Both: "the revision was made by an undo, or what it made was undone already", "send what was undone again, or delete it again";
+        NotUndoable "not_undoable" Both: "the revision was made by an undo or a keep-out, or what it made was undone already", "send what was undone again, or delete it again; put or delete the keep-out again";
         OutsideUndoWindow "outside_undo_window" Both: "the scan or deletion is from before `storage.undo_from_revision`", "delete by region; `store.undo_revisions`, `store.undo_bytes_max`";
         RevisionsUsedUp "revisions_used_up" Both: "revision 2^53 was reached", "make another map";
         ScanIdTooOld "scan_id_too_old" Both: "the id is from before the undo window, where ids are not kept, or its session from long ago", "number new scans upwards, or choose another session";
@@ -150,7 +153,7 @@ reasons! {
     }
     ResourceExhausted {
         DiskFull "disk_full" Both 507: "little room on the disk of the data folder; changes are refused until there is more", "make room, or delete a map";
-        ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`", "ask for a region or a coarser level";
+        ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`, with those that keep-outs take where they are asked for", "ask for a region or a coarser level";
         MapFileTooLarge "map_file_too_large" Both: "a map's file, or one that is to be restored, exceeds `map_file_bytes_max`", "raise the limit, here and where the file is to be restored";
         MapFull "map_full" Both: "the map would exceed `voxels_per_map_max`; a restored file also `map_file_scans_max` or `robots_per_map_max`", "make the map coarser, or raise the limit";
         MemoryFull "memory_full" Both 503: "little memory; what makes maps grow is refused", "delete a map, or give more memory";
@@ -158,6 +161,7 @@ reasons! {
         Overloaded "overloaded" Both: "a limit on what is done at once, or on a caller's rate, is reached; the message names it", "wait as told, and retry";
         RecordTooLarge "record_too_large" Both: "one change of more than 2 GiB", "delete in parts";
         SearchTooLarge "search_too_large" Both: "the map exceeds `localization_grid_bytes_max`", "give a `search_box`";
+        TooManyKeepOuts "too_many_keep_outs" Both: "the map has `keep_outs_max` keep-outs", "delete one, or raise the limit";
         TooManyMaps "too_many_maps" Both: "the server has `maps_max` maps", "delete one, or raise the limit";
         TooManyRobots "too_many_robots" Both: "the map has scans of `robots_per_map_max` robots", "use their names, or raise the limit";
     }

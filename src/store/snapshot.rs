@@ -3,7 +3,7 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 5
+//!      8  4      format version, u32 little-endian: 7
 //!     12  4      CRC-32C of the version, from version 3 on, and of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
 //!     24  8      from version 4 on: head of the map's journal when the file was written, the last revision that may
@@ -38,8 +38,8 @@ use writing::body_of;
 /// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
 /// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
 /// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored; up to
-/// version 5 no deletion was taken back.
-pub const FORMAT_VERSION: u32 = 6;
+/// version 5 no deletion was taken back; up to version 6 there are no keep-outs.
+pub const FORMAT_VERSION: u32 = 7;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 pub(super) const HEADER_BYTES: usize = 48;
 /// Bytes of the header up to version 3.
@@ -292,13 +292,15 @@ fn u32_at(bytes: &[u8], offset: usize) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use prost::Message;
 
     use super::*;
     use crate::geometry;
     use crate::map::{
-        CallerName, CompletedRequest, ForgottenIds, MappedScan, RequestId, RobotName, SessionName,
-        Trajectory, WithdrawnChange,
+        CallerName, CompletedRequest, ForgottenIds, KeepOut, KeepOutName, KeepOutShape, KeepOuts, MappedScan,
+        Prism, Region, RequestId, RequestKind, RobotName, SessionName, Trajectory, WithdrawnChange,
     };
     use crate::store::codec::moments;
     use crate::store::pb;
@@ -332,6 +334,7 @@ mod tests {
             restored: 3,
             scans: 1,
             deletions: 1,
+            kind: RequestKind::Undo,
         };
         Snapshot {
             uuid: Uuid::from_bytes([7; 16]),
@@ -342,8 +345,29 @@ mod tests {
                 voxels: keys.collect(),
                 trajectory: trajectory_of(pose),
                 requests: [request].into_iter().collect(),
+                keep_outs: Arc::new(keep_outs()),
             },
         }
+    }
+
+    /// One of each shape.
+    fn keep_outs() -> KeepOuts {
+        let turned = geometry::pose([1.0, -2.0, 0.5], [0.0, 0.6, 0.0, 0.8]).unwrap();
+        let of_region = |region| KeepOutShape::of_region(region).unwrap();
+        let shapes = [
+            of_region(Region::cuboid([0.0; 3], [1.0, 2.0, 1.0 / 3.0]).unwrap()),
+            of_region(Region::ball([0.1; 3], 2.0).unwrap()),
+            of_region(Region::oriented_box(turned, [1.0, 2.0, 3.0]).unwrap()),
+            KeepOutShape::Prism(Prism::new(&[[0.0, 0.1], [2.0, 0.0], [1.0, 3.0]], [-1.0, 1.0]).unwrap()),
+        ];
+        let keep_out = |(i, shape)| KeepOut {
+            name: KeepOutName::new(&format!("k{i}")).unwrap(),
+            shape,
+            made_by: (i != 1).then(|| CallerName::new("ops").unwrap()),
+            made_revision: 42 - i as u64,
+            expires_at_ns: (i == 2).then_some(-9),
+        };
+        shapes.into_iter().enumerate().map(keep_out).collect()
     }
 
     /// A trajectory with a scan, one that was undone, and ids of which nothing else is known.
@@ -365,7 +389,7 @@ mod tests {
 
     /// All of it in one message.
     fn message(snapshot: &Snapshot) -> pb::Snapshot {
-        let MapContents { revision, voxels, moments, trajectory, requests } = &snapshot.contents;
+        let MapContents { revision, voxels, moments, trajectory, requests, keep_outs } = &snapshot.contents;
         pb::Snapshot {
             uuid: snapshot.uuid.as_bytes().to_vec().into(),
             resolution_m: snapshot.settings.resolution_m,
@@ -381,6 +405,7 @@ mod tests {
             requests: requests.iter().map(Into::into).collect(),
             moments: Some(moments::beside(voxels, moments, StopSignal::NEVER)),
             forgotten: trajectory.forgotten().map(Into::into).collect(),
+            keep_outs: keep_outs.iter().map(Into::into).collect(),
         }
     }
 
@@ -486,6 +511,35 @@ mod tests {
         message.requests.insert(0, older);
         let refused = read(&message).unwrap_err().to_string();
         assert!(refused.contains("their ids must differ"), "{refused}");
+    }
+
+    #[test]
+    fn keep_outs_that_no_map_has_are_refused() {
+        let message = message(&snapshot());
+        let refused = |change: &dyn Fn(&mut Vec<pb::KeepOut>)| {
+            let mut message = message.clone();
+            change(&mut message.keep_outs);
+            read(&message).unwrap_err().to_string()
+        };
+        assert!(refused(&|all| all.swap(0, 1)).contains("must ascend"));
+        assert!(refused(&|all| all.push(all[3].clone())).contains("must ascend"));
+        assert!(refused(&|all| all[0].made_revision = 43).contains("k0 was made at revision 43"));
+        assert!(refused(&|all| all[0].name = "K".into()).contains("keep-out must match"));
+        assert!(refused(&|all| *all = vec![all[0].clone(); 257]).contains("257 keep-outs"));
+        let with_numbers = |i: usize, numbers: Vec<f64>| {
+            refused(&move |all| {
+                use pb::keep_out_shape::Shape;
+                let shape = all[i].put.as_mut().unwrap().shape.as_mut().unwrap().shape.as_mut().unwrap();
+                let (Shape::Box(of) | Shape::Sphere(of) | Shape::OrientedBox(of) | Shape::Prism(of)) = shape;
+                of.numbers.clone_from(&numbers);
+            })
+        };
+        assert!(with_numbers(0, vec![0.0; 5]).contains("the box of a keep-out has 5 numbers, 6 are one"));
+        assert!(with_numbers(1, vec![0.0, 0.0, f64::NAN, 1.0]).contains("sphere.center_m must be finite"));
+        assert!(with_numbers(2, vec![0.0; 10]).contains("unit quaternion"));
+        assert!(with_numbers(3, vec![0.0, 1.0, 0.0]).contains("half a corner"));
+        assert!(with_numbers(3, vec![0.0; 600]).contains("a record of"));
+        assert!(with_numbers(3, vec![1.0; 132]).contains("got 65"));
     }
 
     #[test]

@@ -50,6 +50,8 @@ pub(crate) enum Rank {
     Moments(u8),
     /// The voxels of shard i. Several are taken in ascending order.
     Shard(u8),
+    /// The keep-outs of a map.
+    KeepOuts,
     /// The trajectory of a map.
     Trajectory,
     /// The answers to requests that a map remembers.

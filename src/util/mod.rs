@@ -2,6 +2,8 @@
 //! stop signal of long work.
 
 pub(crate) mod bits;
+#[cfg(feature = "client")]
+mod clock;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod cpu;
 mod durations;
@@ -11,6 +13,8 @@ mod prefetch;
 mod sorting;
 mod stop_signal;
 
+#[cfg(feature = "client")]
+pub(crate) use clock::unix_time_ns;
 pub use durations::{Durations, SharedDurations};
 pub use excerpt::excerpt;
 pub use keyword::{Keyword, words};

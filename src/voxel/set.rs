@@ -2,7 +2,7 @@
 
 use super::block_sort::blocks_of;
 use super::{
-    BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL, VoxelKey, quantize,
+    BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL, VoxelKey, quantize,
 };
 use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_until};
@@ -55,6 +55,13 @@ impl VoxelSet {
     /// True without a voxel.
     pub fn is_empty(&self) -> bool {
         self.blocks.is_empty()
+    }
+
+    /// True where the voxel is in the set.
+    pub fn contains(&self, voxel: VoxelKey) -> bool {
+        let (block, cell) = Cell::of(voxel.index());
+        let found = self.blocks.binary_search_by_key(&block, |(block, _)| *block);
+        found.is_ok_and(|i| self.blocks[i].1.contains(cell, 0))
     }
 
     /// True where the two share no voxel.
@@ -137,6 +144,10 @@ mod tests {
             prop_assert_eq!(skipped, 0);
             prop_assert_eq!(set.len(), keys.len());
             prop_assert_eq!(&set.iter().collect::<BTreeSet<_>>(), &keys);
+            for index in [[0, 0, 0], [1, -1, 0], [-7, 3, 2]].into_iter().chain(keys.iter().map(|key| key.index())) {
+                let key = VoxelKey::new(index).unwrap();
+                prop_assert_eq!(set.contains(key), keys.contains(&key));
+            }
             prop_assert_eq!(set, keys.into_iter().collect::<VoxelSet>());
         }
     }

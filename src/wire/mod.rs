@@ -9,6 +9,7 @@ mod failure;
 mod field;
 #[cfg(feature = "server")]
 pub mod json;
+mod keep_out;
 mod localization;
 mod map_file;
 mod maps;

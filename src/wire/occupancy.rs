@@ -3,7 +3,7 @@
 use super::types::{count_from, lookup_from};
 use super::{InField, pb, required, uuid_from};
 use crate::map::{MapName, Region};
-use crate::service::{PointAnswer, PointQuery, Reason, ServiceError, VoxelListing};
+use crate::service::{PointAnswer, PointQuery, Reason, ServiceError, VoxelListing, VoxelQuery};
 use crate::voxel::VoxelKey;
 
 /// Keys of one message of a listing, at most: half a MiB.
@@ -23,6 +23,7 @@ impl TryFrom<pb::QueryPointsRequest> for (MapName, PointQuery) {
             lookup: lookup_from(request.lookup)?,
             min_revision: request.min_revision,
             map_uuid: (!request.map_uuid.is_empty()).then(|| uuid_from(&request.map_uuid)).transpose()?,
+            keep_out: request.keep_out,
         };
         Ok((MapName::new(&request.map)?, query))
     }
@@ -38,6 +39,7 @@ impl From<(&MapName, PointQuery)> for pb::QueryPointsRequest {
             lookup: pb::Lookup::from(query.lookup).into(),
             min_revision: query.min_revision,
             map_uuid: query.map_uuid.map(|uuid| uuid.to_string()).unwrap_or_default(),
+            keep_out: query.keep_out,
         }
     }
 }
@@ -66,18 +68,19 @@ impl TryFrom<pb::QueryPointsResponse> for PointAnswer {
     }
 }
 
-impl TryFrom<pb::ListVoxelsRequest> for (MapName, u32, Option<Region>) {
+impl TryFrom<pb::ListVoxelsRequest> for (MapName, VoxelQuery) {
     type Error = ServiceError;
 
     fn try_from(request: pb::ListVoxelsRequest) -> Result<Self, ServiceError> {
         let region = request.region.map(Region::try_from).transpose()?;
-        Ok((MapName::new(&request.map)?, request.level, region))
+        let query = VoxelQuery { level: request.level, region, keep_out: request.keep_out };
+        Ok((MapName::new(&request.map)?, query))
     }
 }
 
-impl From<(&MapName, u32, Option<Region>)> for pb::ListVoxelsRequest {
-    fn from((map, level, region): (&MapName, u32, Option<Region>)) -> Self {
-        Self { map: map.to_string(), level, region: region.map(Into::into) }
+impl From<(&MapName, VoxelQuery)> for pb::ListVoxelsRequest {
+    fn from((map, VoxelQuery { level, region, keep_out }): (&MapName, VoxelQuery)) -> Self {
+        Self { map: map.to_string(), level, region: region.map(Into::into), keep_out }
     }
 }
 

@@ -97,6 +97,7 @@ impl From<StatePart> for pb::WatchedState {
             levels: part.levels,
             level: part.level,
             blocks: part.voxels.into_bytes(),
+            keep_outs: part.keep_outs.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -106,6 +107,7 @@ impl TryFrom<pb::WatchedState> for StatePart {
 
     fn try_from(part: pb::WatchedState) -> Result<Self, ServiceError> {
         let hash = ContentHash::from_bits(part.content_hash);
+        let keep_outs = part.keep_outs.into_iter().map(TryInto::try_into);
         Ok(Self {
             is_first: part.reset,
             is_last: part.complete,
@@ -114,6 +116,7 @@ impl TryFrom<pb::WatchedState> for StatePart {
             levels: part.levels,
             level: part.level,
             voxels: BlockBytes::new(part.blocks)?,
+            keep_outs: keep_outs.collect::<Result<_, _>>()?,
         })
     }
 }
@@ -125,6 +128,7 @@ impl From<ChangePart> for pb::WatchedChange {
             Cause::Scan(scan) => Of::Scan((*scan).into()),
             Cause::Deletion => Of::Deletion(pb::WatchedDeletion {}),
             Cause::Undo { scans, deletions } => Of::Undo(pb::WatchedUndo { scans, deletions }),
+            Cause::KeepOut(change) => Of::KeepOut((change, part.revision).into()),
         };
         Self {
             revision: part.revision,
@@ -146,6 +150,7 @@ impl TryFrom<pb::WatchedChange> for ChangePart {
             Of::Scan(scan) => Cause::Scan(Box::new(scan.try_into()?)),
             Of::Deletion(pb::WatchedDeletion {}) => Cause::Deletion,
             Of::Undo(pb::WatchedUndo { scans, deletions }) => Cause::Undo { scans, deletions },
+            Of::KeepOut(change) => Cause::KeepOut(change.try_into()?),
         };
         Ok(Self {
             revision: part.revision,

@@ -47,6 +47,7 @@ async fn both_protocols_answer_on_their_sockets_and_take_the_files_away() {
         lookup: Lookup::Exact,
         min_revision: None,
         map_uuid: None,
+        keep_out: false,
     };
     let answer = client.query_points(&MapName::new("a").unwrap(), query).await.unwrap();
     assert_eq!(answer.occupied[0], 0b01);

@@ -20,7 +20,7 @@ use mrol::map::{
     Lookup, MapName, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord,
 };
 use mrol::mapping::Guess;
-use mrol::service::{Deletion, DeletionTarget, PointQuery, ScanRequest};
+use mrol::service::{Deletion, DeletionTarget, PointQuery, ScanRequest, VoxelQuery};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -131,6 +131,7 @@ async fn grpc_client(url: String, seed: u64, end: Instant, heart: Beat) -> Histo
                     lookup: Lookup::Exact,
                     min_revision: None,
                     map_uuid: None,
+                    keep_out: false,
                 };
                 let answer = client.query_points(&map, query).await.expect("an answer");
                 let bit = |i: usize| answer.occupied[i / 8] >> (i % 8) & 1 == 1;
@@ -293,7 +294,7 @@ async fn what_eight_clients_were_told_is_a_serial_history() {
     let replayed = assert_serial(history);
     let expected: VoxelSet = replayed.view().voxels();
     let client = Client::connect(&url).await.unwrap();
-    let listing = client.list_voxels(&MapName::new(MAP).unwrap(), 0, None).await.unwrap();
+    let listing = client.list_voxels(&MapName::new(MAP).unwrap(), VoxelQuery::default()).await.unwrap();
     assert_eq!(listing.version.revision, replayed.revision());
     assert_eq!(listing.keys.into_iter().collect::<VoxelSet>(), expected);
     daemon.stop().await;

@@ -5,8 +5,11 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::ReplicaError;
-use crate::map::{ContentHash, ContentVersion, MapContents, MapSettings, MultiResolutionMap};
-use crate::service::{ChangePart, StatePart, WatchEvent, WatchMessage};
+use crate::map::{
+    Change, ContentHash, ContentVersion, KEEP_OUTS_MAX, KeepOutRecord, KeepOuts, MapContents, MapSettings,
+    MultiResolutionMap,
+};
+use crate::service::{Cause, ChangePart, StatePart, WatchEvent, WatchMessage};
 use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 
 /// A map as a replica has it.
@@ -46,6 +49,7 @@ struct StateSoFar {
     settings: MapSettings,
     version: ContentVersion,
     blocks: Vec<(VoxelKey, BlockMask)>,
+    keep_outs: Arc<KeepOuts>,
 }
 
 #[derive(Debug)]
@@ -95,8 +99,9 @@ impl Builder {
             let settings = MapSettings::new(part.resolution_m, part.levels).checked();
             let settings = settings.map_err(|e| damaged(format!("the map's settings: {e}")))?;
             let (version, blocks) = (part.version, Vec::new());
+            let keep_outs = Arc::new(part.keep_outs.into_iter().collect());
             self.change = None;
-            self.state = Some(StateSoFar { map_uuid, settings, version, blocks });
+            self.state = Some(StateSoFar { map_uuid, settings, version, blocks, keep_outs });
         }
         let state = self.state.as_mut().ok_or_else(|| damaged("a state without its first part"))?;
         if (state.map_uuid, state.version) != (map_uuid, part.version) || part.level != 0 {
@@ -104,13 +109,14 @@ impl Builder {
         }
         let voxels = part.voxels.to_set().map_err(|e| damaged(e.message))?;
         extend(&mut state.blocks, &voxels, self.blocks_max)?;
-        let Some(StateSoFar { map_uuid, settings, version, blocks }) = self.state.take_if(|_| part.is_last)
-        else {
+        let Some(state) = self.state.take_if(|_| part.is_last) else {
             return Ok(Applied::Nothing);
         };
+        let StateSoFar { map_uuid, settings, version, blocks, keep_outs } = state;
         let voxels: VoxelSet = blocks.into_iter().collect();
         self.check_hash(ContentHash::of(&voxels), Some(version.hash))?;
-        let contents = MapContents { revision: version.revision, voxels, ..MapContents::default() };
+        let contents =
+            MapContents { revision: version.revision, voxels, keep_outs, ..MapContents::default() };
         let contents = contents.checked().map_err(|e| damaged(e.to_string()))?;
         let map = MultiResolutionMap::restore(settings, contents);
         let map = Arc::new(map.map_err(|e| damaged(format!("the map's settings: {e}")))?);
@@ -140,7 +146,13 @@ impl Builder {
             return Ok(Applied::Nothing);
         };
         let [removed, added] = [removed, added].map(|blocks| blocks.into_iter().collect::<VoxelSet>());
-        let committed = map.committer().exchange(&removed, &added);
+        let committed = match part.cause {
+            Cause::KeepOut(change) => {
+                map.keep_outs().check_room_for(&change.name, KEEP_OUTS_MAX).map_err(|e| damaged(e.to_string()))?;
+                map.committer().apply(&Change::KeepOut(KeepOutRecord { change, request: None }))
+            }
+            Cause::Scan(_) | Cause::Deletion | Cause::Undo { .. } => map.committer().exchange(&removed, &added),
+        };
         self.check_hash(committed.hash, part.content_hash)?;
         Ok(Applied::Changed)
     }

@@ -164,7 +164,8 @@ impl Replica {
         Arc::clone(&self.shared.copied.read().map)
     }
 
-    /// Says of each point whether its voxel is occupied, all at one revision; `min_revision` is not waited for.
+    /// Says of each point whether its voxel is occupied, or with `keep_out` whether it lies in a keep-out, all at one
+    /// revision; `min_revision` is not waited for.
     ///
     /// # Errors
     /// For a point in no voxel or outside of the region that is copied, named by its place; a level that is none; another
@@ -183,6 +184,7 @@ impl Replica {
         self.check_region(query, &map)?;
         let map_from_points = query.map_from_points.unwrap_or_else(Pose::identity);
         let view = map.view_of(query.points.as_slice(), &map_from_points);
+        let view = if query.keep_out { view.with_keep_outs() } else { view };
         if query.min_revision.is_some_and(|least| least > view.revision()) {
             let message = format!("min_revision was not reached: the copy is at {}", view.revision());
             return Err(ServiceError::new(Reason::RevisionNotReached, message).into());

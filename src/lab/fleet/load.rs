@@ -49,6 +49,7 @@ impl Question {
             lookup: self.lookup,
             min_revision: None,
             map_uuid: None,
+            keep_out: false,
         }
     }
 

@@ -1,5 +1,6 @@
 //! Parts of space that a caller names.
 
+mod distance;
 mod oriented_box;
 
 pub use oriented_box::OrientedBox;

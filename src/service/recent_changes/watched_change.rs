@@ -51,6 +51,9 @@ impl WatchedChange {
                 let cause = Cause::Undo { scans: undo.scans, deletions: undo.deletions };
                 (cause, undo.removed, undo.restored)
             }
+            Change::KeepOut(keep_out) => {
+                (Cause::KeepOut(keep_out.change), VoxelSet::default(), VoxelSet::default())
+            }
         };
         let levels = levels.into_iter().map(|of| (of.level, Exchanged::new(of.removed, of.added))).collect();
         Self { revision, hash, cause, finest: Exchanged::new(removed, added), levels }
@@ -59,11 +62,12 @@ impl WatchedChange {
     /// Bytes of memory that it takes at most.
     pub(in crate::service) fn memory_bytes(&self) -> usize {
         let sets = std::iter::once(&self.finest).chain(self.levels.iter().map(|(_, of)| of));
-        let undone = match &self.cause {
+        let of_cause = match &self.cause {
             Cause::Undo { scans, deletions } => (scans.len() + deletions.len()) * size_of::<u64>(),
+            Cause::KeepOut(change) => change.corner_bytes(),
             Cause::Scan(_) | Cause::Deletion => 0,
         };
-        size_of::<Self>() + undone + sets.map(Exchanged::memory_bytes).sum::<usize>()
+        size_of::<Self>() + of_cause + sets.map(Exchanged::memory_bytes).sum::<usize>()
     }
 
     /// Blocks of the finest voxels that went and came.

@@ -1,6 +1,7 @@
 //! Requests and answers of the service, in domain types; a file for each kind of operation.
 
 mod deletion;
+mod keep_out;
 mod map;
 mod occupancy;
 mod point_cloud;
@@ -12,8 +13,9 @@ mod version;
 mod watch;
 
 pub use deletion::{Deletion, DeletionAnswer, DeletionTarget};
+pub use keep_out::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};
 pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
-pub use occupancy::{PointAnswer, PointQuery, VoxelListing};
+pub use occupancy::{PointAnswer, PointQuery, VoxelListing, VoxelQuery};
 pub use point_cloud::PointCloud;
 pub use point_times::{PointTimes, TimeReference};
 pub use scan::{Foreground, ScanAnswer, ScanRequest};

@@ -6,7 +6,7 @@ use uuid::Uuid;
 use super::point_cloud::PointCloud;
 use super::version::MapVersion;
 use crate::geometry::Pose;
-use crate::map::Lookup;
+use crate::map::{Lookup, Region};
 use crate::voxel::VoxelKey;
 
 /// Are these points in occupied voxels?
@@ -24,6 +24,8 @@ pub struct PointQuery {
     pub min_revision: Option<u64>,
     /// The incarnation that `min_revision` belongs to.
     pub map_uuid: Option<Uuid>,
+    /// Points in keep-outs count as occupied.
+    pub keep_out: bool,
 }
 
 /// The answer to a [`PointQuery`], all at one revision.
@@ -37,6 +39,17 @@ pub struct PointAnswer {
     pub points_occupied: usize,
     /// At this state.
     pub version: MapVersion,
+}
+
+/// Which voxels are occupied?
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct VoxelQuery {
+    /// 0 is the finest.
+    pub level: u32,
+    /// Those whose centers lie inside; everywhere where none.
+    pub region: Option<Region>,
+    /// Voxels whose centers lie in keep-outs count as occupied.
+    pub keep_out: bool,
 }
 
 /// The occupied voxels of a level.

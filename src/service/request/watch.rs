@@ -4,7 +4,9 @@ use bytes::Bytes;
 use uuid::Uuid;
 
 use crate::geometry::Pose;
-use crate::map::{ContentHash, ContentVersion, MappedScan, Region, RobotName, SessionName};
+use crate::map::{
+    ContentHash, ContentVersion, KeepOut, KeepOutChange, MappedScan, Region, RobotName, SessionName,
+};
 use crate::service::{Reason, ServiceError};
 use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 
@@ -80,6 +82,8 @@ pub struct StatePart {
     pub level: u32,
     /// Occupied voxels.
     pub voxels: BlockBytes,
+    /// All keep-outs of the map, by name, wherever they lie: in the first part.
+    pub keep_outs: Vec<KeepOut>,
 }
 
 /// A part of a change: the voxels of `removed` go, then those of `added` come. No voxel is in both.
@@ -116,6 +120,8 @@ pub enum Cause {
         /// The revisions of the deletions that were taken back, ascending.
         deletions: Vec<u64>,
     },
+    /// A keep-out that was put or ended. No voxel changes.
+    KeepOut(KeepOutChange),
 }
 
 /// A scan, as a watch tells of it.

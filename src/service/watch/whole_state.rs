@@ -28,8 +28,8 @@ impl HostedMap {
         let Some(region) = region else { return Ok(whole) };
         let memory = budget.reserve_transient((whole.voxels.blocks().len() * BLOCK_BYTES) as u64, WATCH)?;
         let voxels = whole.voxels.part_in(region, self.map.lattice(), whole.level);
-        let (version, level) = (whole.version, whole.level);
-        Ok(Arc::new(FullState { version, level, voxels, _memory: memory }))
+        let (version, level, keep_outs) = (whole.version, whole.level, Arc::clone(&whole.keep_outs));
+        Ok(Arc::new(FullState { version, level, voxels, keep_outs, _memory: memory }))
     }
 
     fn whole_state(
@@ -48,14 +48,15 @@ impl HostedMap {
             return Ok(known);
         }
         let long_read = self.map.long_read();
-        let view = long_read.view();
+        let view = long_read.view().with_keep_outs();
         let stored: usize = view.lists(level).map(|list| list.blocks().len()).sum();
         let memory = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
         let (voxels, version) = (view.level_blocks(level, stop), view.version());
+        let keep_outs = view.keep_outs().cloned().unwrap_or_default();
         drop(view);
         drop(long_read);
         check_not_stopped(stop)?;
-        let state = Arc::new(FullState { version, level, voxels, _memory: memory });
+        let state = Arc::new(FullState { version, level, voxels, keep_outs, _memory: memory });
         self.full_states.put(key, &state);
         Ok(state)
     }

@@ -1,7 +1,9 @@
 //! Encoding of changes, and of the requests that made them.
 
 use super::{Unreadable, count, required};
-use crate::map::{CallerName, Change, CompletedRequest, DeletionRecord, Request, RequestId, UndoRecord};
+use crate::map::{
+    CallerName, Change, CompletedRequest, DeletionRecord, Request, RequestId, RequestKind, UndoRecord,
+};
 use crate::store::pb;
 use crate::voxel::VoxelSet;
 
@@ -12,6 +14,7 @@ impl From<&Change> for pb::Change {
             Change::Insertion(scan) => Kind::Insertion(scan.into()),
             Change::Deletion(deletion) => Kind::Deletion(deletion.into()),
             Change::Undo(undo) => Kind::Undo(undo.into()),
+            Change::KeepOut(keep_out) => Kind::KeepOut(keep_out.into()),
         };
         Self { kind: Some(kind) }
     }
@@ -26,6 +29,7 @@ impl TryFrom<pb::Change> for Change {
             Kind::Insertion(scan) => Ok(Self::Insertion(scan.try_into()?)),
             Kind::Deletion(deletion) => Ok(Self::Deletion(deletion.try_into()?)),
             Kind::Undo(undo) => Ok(Self::Undo(undo.try_into()?)),
+            Kind::KeepOut(keep_out) => Ok(Self::KeepOut(keep_out.try_into()?)),
         }
     }
 }
@@ -85,12 +89,8 @@ impl TryFrom<pb::Undo> for UndoRecord {
 
 impl From<&Request> for pb::Request {
     fn from(request: &Request) -> Self {
-        let caller = request.caller.as_ref().map(|caller| caller.as_str().to_owned());
-        Self {
-            id: request.id.as_str().to_owned(),
-            digest: request.digest,
-            caller: caller.unwrap_or_default(),
-        }
+        let caller = text_of(request.caller.as_ref());
+        Self { id: request.id.as_str().to_owned(), digest: request.digest, caller }
     }
 }
 
@@ -99,10 +99,19 @@ impl TryFrom<pb::Request> for Request {
 
     fn try_from(message: pb::Request) -> Result<Self, Unreadable> {
         let id = RequestId::new(&message.id).map_err(|e| e.to_string())?;
-        let caller = Some(&message.caller).filter(|caller| !caller.is_empty());
-        let caller = caller.map(|caller| CallerName::new(caller)).transpose().map_err(|e| e.to_string())?;
-        Ok(Self { id, digest: message.digest, caller })
+        Ok(Self { id, digest: message.digest, caller: caller_from(&message.caller)? })
     }
+}
+
+/// The name of a caller as text; empty where there was none.
+pub(super) fn text_of(caller: Option<&CallerName>) -> String {
+    caller.map(|caller| caller.as_str().to_owned()).unwrap_or_default()
+}
+
+/// The inverse of [`text_of`].
+pub(super) fn caller_from(text: &str) -> Result<Option<CallerName>, Unreadable> {
+    let caller = (!text.is_empty()).then(|| CallerName::new(text));
+    caller.transpose().map_err(|e| e.to_string())
 }
 
 impl From<&CompletedRequest> for pb::CompletedRequest {
@@ -116,6 +125,7 @@ impl From<&CompletedRequest> for pb::CompletedRequest {
             scans: answered.scans as u64,
             restored: answered.restored as u64,
             deletions: answered.deletions as u64,
+            is_of_keep_out: answered.kind == RequestKind::KeepOut,
         }
     }
 }
@@ -125,6 +135,12 @@ impl TryFrom<pb::CompletedRequest> for CompletedRequest {
 
     fn try_from(message: pb::CompletedRequest) -> Result<Self, Unreadable> {
         let Request { id, digest, caller } = required(message.request, "requests.request")?.try_into()?;
+        // An undo takes back a scan or a deletion at least.
+        let kind = match (message.is_of_keep_out, message.scans.max(message.deletions)) {
+            (true, _) => RequestKind::KeepOut,
+            (false, 0) => RequestKind::Deletion,
+            (false, _) => RequestKind::Undo,
+        };
         Ok(Self {
             id,
             digest,
@@ -134,6 +150,7 @@ impl TryFrom<pb::CompletedRequest> for CompletedRequest {
             restored: count(message.restored),
             scans: count(message.scans),
             deletions: count(message.deletions),
+            kind,
         })
     }
 }

@@ -3,6 +3,7 @@
 //! Numbers are restored bit for bit. What cannot be read is described in a sentence; the caller adds file and offset.
 
 mod change;
+mod keep_out;
 pub(super) mod moments;
 mod scan;
 pub(super) mod voxels;

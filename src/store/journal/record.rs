@@ -63,7 +63,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
     use crate::map::{
-        CallerName, DeletionRecord, MappedScan, Request, RequestId, RobotName, ScanRecord, UndoRecord,
+        CallerName, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape,
+        MappedScan, Prism, Request, RequestId, RobotName, ScanRecord, UndoRecord,
     };
     use crate::voxel::{Lattice, MomentSet, VoxelKey, VoxelSet};
     use rand::{RngExt, SeedableRng};
@@ -98,7 +99,17 @@ mod tests {
             digest: 3,
             caller: Some(CallerName::new("r1").unwrap()),
         });
+        let prism = Prism::new(&[[0.0, 0.1], [2.0, 0.0], [1.0, 3.0]], [-1.0, 1.0]).unwrap();
+        let by = Some(CallerName::new("ops").unwrap());
+        let (shape, made_by) = (KeepOutShape::Prism(prism), by.clone());
+        let keep_out = |act| {
+            let change = KeepOutChange { name: KeepOutName::new("dock").unwrap(), act };
+            Change::KeepOut(KeepOutRecord { change, request: request.clone() })
+        };
         for change in [
+            keep_out(KeepOutAct::Put { shape, made_by, expires_at_ns: Some(i64::MIN) }),
+            keep_out(KeepOutAct::Removed { by }),
+            keep_out(KeepOutAct::Expired),
             Change::Insertion(ScanRecord {
                 pose,
                 voxels: voxels(5000),
@@ -112,7 +123,7 @@ mod tests {
                 removed: voxels(20),
                 restored: other_voxels(),
                 moments: moments(),
-                request,
+                request: request.clone(),
             }),
         ] {
             let record = Record::of(&change).unwrap();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use super::{FolderPath, MapFolder};
-use crate::map::{Change, MultiResolutionMap};
+use crate::map::{Change, KEEP_OUTS_MAX, KeepOutRecord, MultiResolutionMap};
 use crate::store::journal::{Known, Recovered, SegmentedJournal};
 use crate::store::snapshot_files::{
     Newest, check_owner, newest_good, not_understood, set_aside, snapshot_name, snapshot_revisions,
@@ -102,6 +102,9 @@ impl MapFolder {
             // What a snapshot may not hold, no change may bring in.
             if let Change::Insertion(scan) = &change {
                 scan.pose.check_levels(levels).map_err(|e| e.to_string())?;
+            }
+            if let Change::KeepOut(KeepOutRecord { change, .. }) = &change {
+                map.keep_outs().check_room_for(&change.name, KEEP_OUTS_MAX).map_err(|e| e.to_string())?;
             }
             let committed = map.committer().apply_until(&change, stop).ok_or("it was stopped")?;
             let made = format!("replayed, it makes revision {}", committed.revision);

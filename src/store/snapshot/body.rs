@@ -1,6 +1,7 @@
 //! The body of a map file. Its contents are counted first, so that memory for each part is reserved before it is built.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use prost::Message;
 use uuid::Uuid;
@@ -12,7 +13,8 @@ use super::fields::{
 use super::limits::{MapFileError, MapFileLimits, Memory};
 use crate::bloom::FilterSettings;
 use crate::map::{
-    CompletedRequest, IdempotencyLog, MapContents, MapSettings, MappedScan, REQUESTS_KEPT, Trajectory,
+    CompletedRequest, IdempotencyLog, KEEP_OUTS_MAX, KeepOut, KeepOuts, MapContents, MapSettings, MappedScan,
+    REQUESTS_KEPT, Trajectory,
 };
 use crate::store::codec::{Unreadable, moments, voxels, with_forgotten};
 use crate::store::pb;
@@ -35,6 +37,7 @@ pub(super) mod number {
     pub(in crate::store::snapshot) const REQUESTS: u64 = 12;
     pub(in crate::store::snapshot) const MOMENTS: u64 = 13;
     pub(in crate::store::snapshot) const FORGOTTEN: u64 = 14;
+    pub(in crate::store::snapshot) const KEEP_OUTS: u64 = 15;
 
     /// Field of `Voxels` and of `Moments`.
     pub(in crate::store::snapshot) const KEY_GAPS: u64 = 1;
@@ -90,6 +93,7 @@ pub(super) struct Body<'a> {
     withdrawn: usize,
     requests: usize,
     forgotten: Vec<&'a [u8]>,
+    keep_outs: usize,
 }
 
 impl<'a> Body<'a> {
@@ -114,6 +118,7 @@ impl<'a> Body<'a> {
             withdrawn: 0,
             requests: 0,
             forgotten: Vec::new(),
+            keep_outs: 0,
         };
         for field in stop.paced(Fields::of(all), FIELDS_PER_LOOK) {
             body.take(field?)?;
@@ -144,7 +149,8 @@ impl<'a> Body<'a> {
                 return Err(format!("forgotten scans of more than {SESSIONS_MAX} sessions"));
             }
             (number::FORGOTTEN, Bytes(robot)) => self.forgotten.push(robot),
-            (known @ number::UUID..=number::FORGOTTEN, _) => {
+            (number::KEEP_OUTS, Bytes(_)) => self.keep_outs += 1,
+            (known @ number::UUID..=number::KEEP_OUTS, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
             // A field of a newer version, which is reported where it matters.
@@ -174,6 +180,7 @@ impl<'a> Body<'a> {
             moments,
             trajectory: self.trajectory(memory)?,
             requests: self.requests()?,
+            keep_outs: Arc::new(self.keep_outs()?),
         };
         let contents = contents.checked().map_err(|e| e.to_string())?;
         Ok(Snapshot { uuid, settings, contents })
@@ -202,6 +209,10 @@ impl<'a> Body<'a> {
         }
         if self.requests > REQUESTS_KEPT {
             let message = format!("{} requests, a map remembers {REQUESTS_KEPT}", self.requests);
+            return Err(MapFileError::Bad(message));
+        }
+        if self.keep_outs > KEEP_OUTS_MAX {
+            let message = format!("{} keep-outs, a map has at most {KEEP_OUTS_MAX}", self.keep_outs);
             return Err(MapFileError::Bad(message));
         }
         Ok(())
@@ -303,11 +314,22 @@ impl<'a> Body<'a> {
             self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?;
         let ascend = requests.is_sorted_by(|one, next| one.revision < next.revision);
         let ids: HashSet<_> =
-            requests.iter().map(|request| (&request.caller, &request.id, request.kind())).collect();
+            requests.iter().map(|request| (&request.caller, &request.id, request.kind)).collect();
         if !ascend || ids.len() != requests.len() {
             return Err("the revisions of its requests must ascend, and their ids must differ".into());
         }
         Ok(requests.into_iter().collect())
+    }
+
+    /// Decodes the keep-outs, of which no two have the same name.
+    fn keep_outs(&self) -> Result<KeepOuts, Unreadable> {
+        let keep_out = |record: Result<_, Unreadable>| decoded::<pb::KeepOut>(record?, "a keep-out")?.try_into();
+        let keep_outs: Vec<KeepOut> =
+            self.records(number::KEEP_OUTS).map(keep_out).collect::<Result<_, _>>()?;
+        match keep_outs.is_sorted_by(|one, next| one.name < next.name) {
+            true => Ok(keep_outs.into_iter().collect()),
+            false => Err("the names of its keep-outs must ascend".into()),
+        }
     }
 
     fn withdrawn(&self) -> Result<Vec<crate::map::WithdrawnChange>, Unreadable> {

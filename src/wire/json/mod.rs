@@ -1,5 +1,6 @@
 //! JSON, written once for the HTTP interface, `--json` and the settings file.
 
+mod keep_out;
 mod keyword;
 mod localization;
 mod map;
@@ -7,6 +8,7 @@ mod pose;
 mod scan;
 mod version;
 
+pub use keep_out::{JsonKeepOut, JsonShape};
 pub use keyword::ByKeyword;
 pub use localization::{JsonCandidate, JsonLocalization};
 pub use map::{JsonFilter, JsonLevel, JsonMap, JsonSettings, JsonSighting, JsonStorage};

@@ -115,6 +115,7 @@ fn query(points: PointCloud) -> PointQuery {
         lookup: Lookup::Exact,
         min_revision: None,
         map_uuid: None,
+        keep_out: false,
     }
 }
 
