@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
 use mrol::map::{
-    Change, Committed, DeletionRecord, Lookup, MapContents, MapSettings, MappedScan, MultiResolutionMap,
-    RobotName, ScanRecord,
+    Change, Committed, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape,
+    Lookup, MapContents, MapSettings, MappedScan, MultiResolutionMap, Region, Request, RequestId, RobotName,
+    ScanRecord,
 };
 use mrol::voxel::VoxelSet;
 use shuttle::thread;
@@ -45,27 +46,41 @@ fn deletion(map: &MultiResolutionMap, regions: &[u8], each: usize) -> Change {
     Change::Deletion(DeletionRecord { voxels, request: None })
 }
 
-/// What a reader was told: a revision, and what is occupied of three points of each of two regions, exactly and by
+/// A keep-out that is put, or removed.
+fn keep_out(name: &str, is_there: bool) -> Change {
+    let shape = KeepOutShape::of_region(Region::ball([0.0; 3], 1.0).unwrap()).unwrap();
+    let act = match is_there {
+        true => KeepOutAct::Put { shape, made_by: None, expires_at_ns: None },
+        false => KeepOutAct::Removed { by: None },
+    };
+    let id = RequestId::new(&format!("{name}-{is_there}")).unwrap();
+    let change = KeepOutChange { name: KeepOutName::new(name).unwrap(), act };
+    Change::KeepOut(KeepOutRecord { change, request: Some(Request { id, digest: 1, caller: None }) })
+}
+
+/// What a reader was told: a revision, its keep-outs by the revisions that they made, and what is occupied of three points of each of two regions, exactly and by
 /// the filter, finest and at level 3.
 #[derive(Debug, PartialEq)]
 struct Answer {
     revision: u64,
+    keep_outs: Vec<u64>,
     occupied: [u64; 4],
 }
 
 fn ask(map: &MultiResolutionMap) -> Answer {
     let (points, quantize) = (points(&[0, 2], 3), map.lattice().from_map());
-    let view = map.view_of(&points, &Pose::identity());
+    let view = map.view_of(&points, &Pose::identity()).with_keep_outs();
     let ways = [(0, Lookup::Exact), (0, Lookup::Bloom), (3, Lookup::Exact), (3, Lookup::Bloom)];
     let occupied = ways.map(|(level, lookup)| {
         let mut bits = [0];
         view.query(&points, &quantize, level, lookup, &mut bits);
         bits[0]
     });
-    Answer { revision: view.revision(), occupied }
+    let keep_outs = view.keep_outs().unwrap().iter().map(|it| it.made_revision).collect();
+    Answer { revision: view.revision(), keep_outs, occupied }
 }
 
-/// Two writers, one who asks twice, and one who takes the picture of the whole map.
+/// Two writers of voxels and one of keep-outs, one who asks twice, and one who takes the picture of the whole map.
 fn crowd() {
     let map = Arc::new(new_map());
     let write = |changes: Vec<Change>| {
@@ -78,6 +93,7 @@ fn crowd() {
     let writers = [
         write(vec![insertion(&map, "one", &[0, 1, 2], 3), deletion(&map, &[0, 2], 2)]),
         write(vec![insertion(&map, "two", &[0, 2], 120), deletion(&map, &[1, 2], 120)]),
+        write(vec![keep_out("a", true), keep_out("b", true), keep_out("a", false)]),
     ];
     let asking = thread::spawn({
         let map = Arc::clone(&map);
@@ -89,7 +105,10 @@ fn crowd() {
     });
     let mut changes: Vec<_> = writers.into_iter().flat_map(|writer| writer.join().unwrap()).collect();
     let (answers, seen) = (asking.join().unwrap(), looking.join().unwrap());
-    changes.retain(|(committed, _)| committed.added + committed.removed > 0);
+    let is_made = |(committed, change): &(Committed, Change)| {
+        committed.added + committed.removed > 0 || matches!(change, Change::KeepOut(_))
+    };
+    changes.retain(is_made);
     changes.sort_unstable_by_key(|(committed, _)| committed.revision);
     check(&changes, &answers, &[seen, map.contents()]);
 }

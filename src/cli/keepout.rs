@@ -47,7 +47,7 @@ enum Action {
 #[derive(Debug, clap::Args)]
 struct Put {
     /// Name of the keep-out: [a-z0-9][a-z0-9_-]{0,63}
-    #[arg(value_parser = parse::keep_out_name)]
+    #[arg(id = "keep_out", value_name = "NAME", value_parser = parse::keep_out_name)]
     name: KeepOutName,
     #[command(flatten)]
     map: MapOptions,
@@ -90,7 +90,7 @@ struct OneShape {
 #[derive(Debug, clap::Args)]
 struct Delete {
     /// Name of the keep-out
-    #[arg(value_parser = parse::keep_out_name)]
+    #[arg(id = "keep_out", value_name = "NAME", value_parser = parse::keep_out_name)]
     name: KeepOutName,
     #[command(flatten)]
     map: MapOptions,
@@ -134,7 +134,9 @@ impl Shape {
             (None, Some(corners), Some(height)) => {
                 Prism::new(&corners.0, height).map(KeepOutShape::Prism).map_err(Into::into)
             }
-            _ => return Err(CliError::usage("give --box, --sphere, --oriented-box, or --prism with --height")),
+            _ => {
+                return Err(CliError::usage("give --box, --sphere, --oriented-box, or --prism with --height"));
+            }
         };
         shape.map_err(|error| CliError::usage(error.to_string()))
     }
@@ -197,7 +199,9 @@ impl Display for Listed {
         write!(f, "{name:<24} ")?;
         match shape {
             JsonShape::Box { min_m, max_m } => write!(f, "box {min_m:?} to {max_m:?} m")?,
-            JsonShape::Sphere { center_m, radius_m } => write!(f, "sphere about {center_m:?} m, radius {radius_m} m")?,
+            JsonShape::Sphere { center_m, radius_m } => {
+                write!(f, "sphere about {center_m:?} m, radius {radius_m} m")?
+            }
             JsonShape::OrientedBox { map_from_box, size_m } => {
                 write!(f, "box of {size_m:?} m about {:?} m", map_from_box.translation_m)?;
             }

@@ -186,11 +186,7 @@ impl Client {
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
-    pub async fn list_voxels(
-        &self,
-        map: &MapName,
-        query: VoxelQuery,
-    ) -> Result<VoxelListing, ClientError> {
+    pub async fn list_voxels(&self, map: &MapName, query: VoxelQuery) -> Result<VoxelListing, ClientError> {
         let request = self.request((map, query));
         let chunks = self.connection.occupancy().list_voxels(request).await;
         let mut chunks = self.connection.answers::<_, VoxelListing>(chunks)?;

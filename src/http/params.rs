@@ -45,8 +45,7 @@ impl FromRequestParts<Adapter> for KeepOutOfMap {
 /// What stands in the path.
 async fn path<T: DeserializeOwned + Send>(parts: &mut Parts, adapter: &Adapter) -> Result<T, ServiceError> {
     let path = Path::<T>::from_request_parts(parts, adapter).await;
-    let Path(path) =
-        path.map_err(|rejection| ServiceError::new(Reason::BadName, rejection.body_text()))?;
+    let Path(path) = path.map_err(|rejection| ServiceError::new(Reason::BadName, rejection.body_text()))?;
     Ok(path)
 }
 

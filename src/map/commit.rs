@@ -13,8 +13,8 @@ use super::shard::Shard;
 use super::sharding::SHARDS;
 use super::update::{Moved, ShardUpdate};
 use super::{
-    Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, KeepOutRecord, LevelChange,
-    LevelSet, MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
+    Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, KeepOutRecord,
+    LevelChange, LevelSet, MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::util::StopSignal;

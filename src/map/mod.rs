@@ -52,7 +52,9 @@ pub use level_changes::{LevelChange, LevelSet};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;
 pub use moments::MomentsView;
-pub use name::{CallerName, KeepOutName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName};
+pub use name::{
+    CallerName, KeepOutName, MapName, NAME_LENGTH_MAX, NameError, RequestId, RobotName, SessionName,
+};
 pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{OrientedBox, REGION_M_MAX, Region, RegionError};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};

@@ -44,8 +44,10 @@ impl MapService {
     ) -> Result<KeepOutAnswer, ServiceError> {
         let act = KeepOutAct::Removed { by: self.caller.clone() };
         let work = self.change_keep_out(map, KeepOutChange { name, act }, request_id);
-        self.observed("DeleteKeepOut", Some(map), work, |answer| Outcome::Changed(Change::of_keep_out(answer)))
-            .await
+        self.observed("DeleteKeepOut", Some(map), work, |answer| {
+            Outcome::Changed(Change::of_keep_out(answer))
+        })
+        .await
     }
 
     /// The keep-outs of a map, all at one revision.
@@ -67,7 +69,8 @@ impl MapService {
         request_id: Option<RequestId>,
     ) -> Result<KeepOutAnswer, ServiceError> {
         let map = self.map(map)?;
-        let request = request_id.map(|id| Request { id, digest: digest(&change), caller: self.caller.clone() });
+        let request =
+            request_id.map(|id| Request { id, digest: digest(&change), caller: self.caller.clone() });
         let (inner, record) = (Arc::clone(&self.inner), KeepOutRecord { change, request });
         let submit = move |_: StopSignal<'_>| {
             map.submit_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
@@ -116,10 +119,16 @@ impl HostedMap {
         Ok(self.answered(RequestKind::KeepOut, request, former)?.map(|answered| answered.revision))
     }
 
-    fn check_keep_out(&self, all: &KeepOuts, change: &KeepOutChange, most: usize) -> Result<(), ServiceError> {
+    fn check_keep_out(
+        &self,
+        all: &KeepOuts,
+        change: &KeepOutChange,
+        most: usize,
+    ) -> Result<(), ServiceError> {
         match change.act {
             KeepOutAct::Put { .. } => {
-                let full = |full: map::KeepOutsFull| ServiceError::new(Reason::TooManyKeepOuts, full.to_string());
+                let full =
+                    |full: map::KeepOutsFull| ServiceError::new(Reason::TooManyKeepOuts, full.to_string());
                 all.check_room_for(&change.name, most).map_err(full)
             }
             KeepOutAct::Removed { .. } | KeepOutAct::Expired if all.get(&change.name).is_none() => {
@@ -206,7 +215,9 @@ mod tests {
 
     #[test]
     fn an_expiry_must_lie_in_the_future() {
-        assert!(check_expiry(&put("a", 1.0, Some(8)), 7).is_ok() && check_expiry(&put("a", 1.0, None), 7).is_ok());
+        assert!(
+            check_expiry(&put("a", 1.0, Some(8)), 7).is_ok() && check_expiry(&put("a", 1.0, None), 7).is_ok()
+        );
         let refused = check_expiry(&put("a", 1.0, Some(7)), 7).unwrap_err();
         assert_eq!(refused.reason, Reason::BadExpiry);
         assert_eq!(refused.message, "expires_at_ns must lie in the future, got 7, and it is 7");

@@ -66,11 +66,13 @@ impl HostedMap {
         self.check_writable()?;
         budget.check_to_shrink()?;
         let change = KeepOutChange { name: name.clone(), act: KeepOutAct::Expired };
-        let decide = move |core: &MultiResolutionMap, _: StopSignal<'_>| {
-            match core.keep_outs().expired(now_ns).any(|it| it.name == change.name) {
-                true => Ok(Some(decided(KeepOutRecord { change, request: None }))),
-                false => Err(Refusal::Stale),
-            }
+        let decide = move |core: &MultiResolutionMap, _: StopSignal<'_>| match core
+            .keep_outs()
+            .expired(now_ns)
+            .any(|it| it.name == change.name)
+        {
+            true => Ok(Some(decided(KeepOutRecord { change, request: None }))),
+            false => Err(Refusal::Stale),
         };
         let outcome = self.commit_queue.submit(Submission::Undecided(Box::new(decide)))?;
         match outcome.await.map_err(commit_thread_ended)? {

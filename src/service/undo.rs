@@ -236,9 +236,9 @@ impl HostedMap {
                 Ok(UndoRecord { deletions: vec![revision], ..UndoRecord::default() })
             }
             Ok(Some(Change::Undo(_))) => not_undoable("was made by an undo, which is not undone".to_owned()),
-            Ok(Some(Change::KeepOut(_))) => {
-                not_undoable("put or ended a keep-out, which is not undone: put or delete it again".to_owned())
-            }
+            Ok(Some(Change::KeepOut(_))) => not_undoable(
+                "put or ended a keep-out, which is not undone: put or delete it again".to_owned(),
+            ),
             Ok(Some(Change::Insertion(_)) | None) => Err(self.no_scan(&what())),
             Err(NotObserved::Unreadable(error)) => Err(self.unreadable(&error)),
             Err(_) => Err(self.outside_undo_window(folder, revision, withdrawn)),

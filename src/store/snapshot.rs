@@ -498,14 +498,15 @@ mod tests {
         }
     }
 
+    fn read(message: &pb::Snapshot) -> Result<Snapshot, MapFileError<Infallible>> {
+        let body = message.encode_to_vec();
+        let body = Body::of(&body, StopSignal::NEVER).unwrap();
+        body.read(&MapFileLimits::OWN, &mut Memory(|_| Ok::<_, Infallible>(())))
+    }
+
     #[test]
     fn a_request_that_is_there_twice_is_an_error() {
         let mut message = message(&snapshot());
-        let read = |message: &pb::Snapshot| {
-            let body = message.encode_to_vec();
-            let body = Body::of(&body, StopSignal::NEVER).unwrap();
-            body.read(&MapFileLimits::OWN, &mut Memory(|_| Ok::<_, Infallible>(())))
-        };
         assert!(read(&message).is_ok());
         let older = pb::CompletedRequest { revision: 41, ..message.requests[0].clone() };
         message.requests.insert(0, older);

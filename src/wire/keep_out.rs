@@ -2,7 +2,9 @@
 
 use super::types::{request_id_from, text_of};
 use super::{InField, pb, required};
-use crate::map::{CallerName, KeepOut, KeepOutAct, KeepOutChange, KeepOutName, KeepOutShape, MapName, Prism, Region};
+use crate::map::{
+    CallerName, KeepOut, KeepOutAct, KeepOutChange, KeepOutName, KeepOutShape, MapName, Prism, Region,
+};
 use crate::service::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut, Reason, ServiceError};
 
 impl TryFrom<pb::PutKeepOutRequest> for (MapName, PutKeepOut) {
@@ -128,7 +130,8 @@ impl TryFrom<pb::KeepOutShape> for KeepOutShape {
                 let (corners, rest) = corners_m.as_chunks();
                 if !rest.is_empty() {
                     let count = corners_m.len();
-                    let message = format!("shape: prism.corners_m must be two numbers a corner, got {count} numbers");
+                    let message =
+                        format!("shape: prism.corners_m must be two numbers a corner, got {count} numbers");
                     return Err(ServiceError::new(Reason::BadKeepOut, message));
                 }
                 Prism::new(corners, [z_from_m, z_to_m]).map(Self::Prism).in_field("shape")

@@ -8,6 +8,7 @@ mod callers_gone;
 mod deskewing;
 mod grpc;
 mod http;
+mod keep_outs;
 mod lifecycle;
 #[cfg(feature = "lab")]
 mod localize;

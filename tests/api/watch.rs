@@ -386,6 +386,7 @@ async fn a_replica_answers_as_the_server_does_at_the_same_revision() {
                     lookup,
                     min_revision: Some(revision),
                     map_uuid: Some(replica.status().map_uuid),
+                    keep_out: false,
                 };
                 let own = replica.query_points(&query).unwrap();
                 assert_eq!(own, client.query_points(&map("a"), query.clone()).await.unwrap());

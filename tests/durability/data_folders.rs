@@ -235,6 +235,32 @@ async fn a_data_folder_of_version_5_is_opened_with_its_journal() {
     assert_eq!(daemon.contents("office").await, before);
 }
 
+/// The same, of map files of version 6 and journals of version 5, with the undo of a deletion: there were no keep-outs.
+#[tokio::test]
+async fn a_data_folder_of_version_6_is_opened_with_its_journal() {
+    let daemon = Daemon::start_in(released("data-6"), |_| {}).await;
+    let office = json_of(daemon.get("/v1/maps/office").await).await;
+    assert_eq!((&office["revision"], &office["content_hash"]), (&json!(8), &json!("c229d97eea012c0c")));
+    for (body, removed, restored) in [
+        (json!({"revision": 2, "request_id": "u-2"}), 44, 0),
+        (json!({"revision": 4, "request_id": "u-4"}), 0, 8),
+    ] {
+        let again = json_of(daemon.post("/v1/maps/office/undo", body).await).await;
+        assert_eq!((&again["replayed"], &again["removed"]), (&json!(true), &json!(removed)));
+        assert_eq!(again["restored"], restored);
+    }
+    let keep_outs = json_of(daemon.get("/v1/maps/office/keep-outs").await).await;
+    assert_eq!(keep_outs["keep_outs"], json!([]));
+    let sphere = json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}});
+    let put = daemon.put("/v1/maps/office/keep-outs/dock", sphere).await;
+    assert_eq!(json_of(put).await["revision"], 9);
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    let office = json_of(daemon.get("/v1/maps/office").await).await;
+    assert_eq!((&office["revision"], &office["content_hash"]), (&json!(9), &json!("c229d97eea012c0c")));
+    let keep_outs = json_of(daemon.get("/v1/maps/office/keep-outs").await).await;
+    assert_eq!(keep_outs["keep_outs"][0]["made_revision"], 9);
+}
+
 #[tokio::test]
 async fn a_damaged_snapshot_is_set_aside_and_goes_with_those_of_its_age() {
     let daemon = Daemon::start_with(|config| config.store.undo_revisions = 1).await;

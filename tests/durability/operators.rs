@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use mrol::geometry::Pose;
-use mrol::map::{CompletedRequest, MapContents, MapSettings, MappedScan, RequestId, RobotName, Trajectory};
+use mrol::map::{
+    CompletedRequest, MapContents, MapSettings, MappedScan, RequestId, RequestKind, RobotName, Trajectory,
+};
 use mrol::store::{Durability, Snapshot};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use reqwest::StatusCode;
@@ -109,6 +111,7 @@ async fn a_map_file_is_held_to_the_limits_of_a_map() {
             restored: 0,
             deletions: 0,
             scans,
+            kind: if scans > 0 { RequestKind::Undo } else { RequestKind::Deletion },
         };
         file_with(|contents| contents.requests = of.iter().map(request).collect())
     };

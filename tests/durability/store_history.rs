@@ -1,4 +1,4 @@
-//! Long random histories of a map that is kept: scans, deletions, undo, snapshots and restarts, against a plain model
+//! Long random histories of a map that is kept: scans, deletions, undo, keep-outs, snapshots and restarts, against a plain model
 //! that replays what was not undone.
 
 use std::collections::BTreeMap;
@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use mrol::geometry::{Point, Pose};
 use mrol::map::{
-    Change, DeletionRecord, MapName, MapSettings, MappedScan, MultiResolutionMap, Reversal, RobotName,
+    CallerName, Change, DeletionRecord, KeepOut, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord,
+    KeepOutShape, MapName, MapSettings, MappedScan, MultiResolutionMap, Region, Reversal, RobotName,
     ScanRecord, UndoRecord,
 };
 use mrol::store::{DataDir, MapFolder, NotObserved, OpeningProgress, Record, Snapshot, StoreSettings};
@@ -39,6 +40,16 @@ enum Step {
         scan: Index,
     },
     UndoDeletion(Index),
+    PutKeepOut {
+        name: usize,
+        radius: u8,
+        expires_at_ns: Option<i64>,
+    },
+    RemoveKeepOut {
+        name: usize,
+    },
+    /// Time goes on to here.
+    ExpireKeepOuts(i64),
     Snapshot,
     Restart,
 }
@@ -58,6 +69,10 @@ fn step() -> impl Strategy<Value = Step> {
         3 => any::<Index>().prop_map(Step::UndoScan),
         1 => (0usize..2, any::<Index>()).prop_map(|(robot, scan)| Step::UndoSince { robot, scan }),
         2 => any::<Index>().prop_map(Step::UndoDeletion),
+        2 => (0usize..3, 1u8..9, prop::option::of(0i64..9))
+            .prop_map(|(name, radius, expires_at_ns)| Step::PutKeepOut { name, radius, expires_at_ns }),
+        1 => (0usize..3).prop_map(|name| Step::RemoveKeepOut { name }),
+        1 => (0i64..9).prop_map(Step::ExpireKeepOuts),
         2 => Just(Step::Snapshot),
         2 => Just(Step::Restart),
     ]
@@ -69,6 +84,7 @@ struct Model {
     trajectory: Vec<(u64, RobotName)>,
     deletions: Vec<u64>,
     events: BTreeMap<u64, Event>,
+    keep_outs: BTreeMap<KeepOutName, KeepOut>,
 }
 
 /// A change by the revision that it made, as it was recorded.
@@ -237,10 +253,42 @@ impl Kept {
                     model.undo(&[deletion]);
                 }
             }
+            Step::PutKeepOut { name, radius, expires_at_ns } => {
+                let (name, expires_at_ns) = (keep_out_name(*name), *expires_at_ns);
+                let ball = Region::ball([0.5; 3], f64::from(*radius)).unwrap();
+                let (shape, made_by) = (KeepOutShape::of_region(ball).unwrap(), CallerName::new("ops").ok());
+                let act = KeepOutAct::Put { shape: shape.clone(), made_by: made_by.clone(), expires_at_ns };
+                let made_revision = self.commit(&keep_out_change(&name, act));
+                let made = KeepOut { name: name.clone(), shape, made_by, made_revision, expires_at_ns };
+                model.keep_outs.insert(name, made);
+            }
+            Step::RemoveKeepOut { name } => {
+                let name = keep_out_name(*name);
+                if model.keep_outs.remove(&name).is_some() {
+                    self.commit(&keep_out_change(&name, KeepOutAct::Removed { by: None }));
+                }
+            }
+            Step::ExpireKeepOuts(now_ns) => {
+                let expired: Vec<_> =
+                    self.map.keep_outs().expired(*now_ns).map(|it| it.name.clone()).collect();
+                for name in &expired {
+                    self.commit(&keep_out_change(name, KeepOutAct::Expired));
+                }
+                model.keep_outs.retain(|_, it| it.expires_at_ns.is_none_or(|at| at > *now_ns));
+            }
             Step::Snapshot => self.folder.save(&Snapshot::of(&self.map, self.uuid), u64::MAX).unwrap(),
             Step::Restart => self.restart(self.map.revision()),
         }
     }
+}
+
+fn keep_out_name(number: usize) -> KeepOutName {
+    KeepOutName::new(["dock", "spill", "stage"][number]).unwrap()
+}
+
+fn keep_out_change(name: &KeepOutName, act: KeepOutAct) -> Change {
+    let change = KeepOutChange { name: name.clone(), act };
+    Change::KeepOut(KeepOutRecord { change, request: None })
 }
 
 fn pick(revisions: &[u64], which: &Index) -> Option<u64> {
@@ -270,8 +318,11 @@ proptest! {
             let moments: BTreeMap<_, _> =
                 kept.map.moments().to_set().as_slice().iter().map(|(key, moments)| (key.index(), *moments)).collect();
             prop_assert_eq!(moments, held.moments);
+            let keep_outs = kept.map.keep_outs();
+            prop_assert!(keep_outs.iter().eq(model.keep_outs.values()), "{:?}", keep_outs);
         }
         kept.restart(7);
         assert_equal(&kept.map, &model.held().voxels);
+        prop_assert!(kept.map.keep_outs().iter().eq(model.keep_outs.values()));
     }
 }

@@ -1,8 +1,13 @@
 //! Long random histories of a map against a plain set of voxels, at every level.
 
+use std::collections::BTreeMap;
+
 use mrol::bloom::FilterSettings;
 use mrol::geometry::Pose;
-use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord};
+use mrol::map::{
+    self, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapSettings, MappedScan,
+    MultiResolutionMap, Region, RobotName, ScanRecord,
+};
 use mrol::store::Snapshot;
 use mrol::voxel::{VoxelKey, VoxelSet};
 use proptest::prelude::*;
@@ -16,6 +21,8 @@ enum Change {
     DeleteKeys(u32, Vec<[i32; 3]>),
     DeleteBox(u32, [i32; 3], i32),
     DeleteBall(u32, [i32; 3], i32),
+    PutKeepOut(KeepOutName, i32),
+    EndKeepOut(KeepOutName),
     Restart,
 }
 
@@ -34,8 +41,25 @@ fn change() -> impl Strategy<Value = Change> {
         3 => (level.clone(), prop::collection::vec(index(), 1..40)).prop_map(|(n, keys)| Change::DeleteKeys(n, keys)),
         1 => (level.clone(), index(), 0i32..40).prop_map(|(n, at, side)| Change::DeleteBox(n, at, side)),
         1 => (level, index(), 0i32..20).prop_map(|(n, at, radius)| Change::DeleteBall(n, at, radius)),
+        1 => (keep_out_name(), 1i32..9).prop_map(|(name, radius)| Change::PutKeepOut(name, radius)),
+        1 => keep_out_name().prop_map(Change::EndKeepOut),
         1 => Just(Change::Restart),
     ]
+}
+
+/// So few names that most are put again, or ended.
+fn keep_out_name() -> impl Strategy<Value = KeepOutName> {
+    (0..3).prop_map(|i| KeepOutName::new(&format!("k{i}")).unwrap())
+}
+
+fn keep_out_shape(radius: i32) -> KeepOutShape {
+    KeepOutShape::of_region(Region::ball([0.0; 3], f64::from(radius)).unwrap()).unwrap()
+}
+
+fn change_keep_out(map: &MultiResolutionMap, name: &KeepOutName, act: KeepOutAct) -> usize {
+    let change = KeepOutChange { name: name.clone(), act };
+    let committed = map.committer().apply(&map::Change::KeepOut(KeepOutRecord { change, request: None }));
+    committed.added + committed.removed
 }
 
 fn pose_of(robot: &str) -> MappedScan {
@@ -64,6 +88,11 @@ fn apply(map: &mut MultiResolutionMap, change: &Change) -> usize {
             let keys = map.view().voxels_in(&region(change), level);
             remove(map, keys, level)
         }
+        Change::PutKeepOut(name, radius) => {
+            let shape = keep_out_shape(*radius);
+            change_keep_out(map, name, KeepOutAct::Put { shape, made_by: None, expires_at_ns: None })
+        }
+        Change::EndKeepOut(name) => change_keep_out(map, name, KeepOutAct::Expired),
         Change::Restart => {
             let bytes = Snapshot::of(map, Uuid::nil()).encode().unwrap();
             *map = Snapshot::decode(&bytes).unwrap().restore().unwrap();
@@ -97,9 +126,23 @@ fn apply_to_model(model: &mut Model, change: &Change, levels: u32) -> usize {
             let side = f64::from(1 << level);
             model.retain(|&i| !region.contains(up(i, level).map(|c| (f64::from(c) + 0.5) * side)));
         }
-        Change::Restart => {}
+        Change::PutKeepOut(..) | Change::EndKeepOut(_) | Change::Restart => {}
     }
     before.abs_diff(model.len())
+}
+
+/// The revision and the radius of each keep-out after the change that made `revision`.
+fn apply_to_keep_outs(keep_outs: &mut BTreeMap<KeepOutName, (u64, i32)>, change: &Change, revision: u64) {
+    match change {
+        Change::PutKeepOut(name, radius) => drop(keep_outs.insert(name.clone(), (revision, *radius))),
+        Change::EndKeepOut(name) => drop(keep_outs.remove(name)),
+        _ => {}
+    }
+}
+
+fn keep_outs_of(map: &MultiResolutionMap) -> Vec<(KeepOutName, u64, KeepOutShape)> {
+    let keep_outs = map.keep_outs();
+    keep_outs.iter().map(|it| (it.name.clone(), it.made_revision, it.shape.clone())).collect()
 }
 
 proptest! {
@@ -115,14 +158,19 @@ proptest! {
     ) {
         let filter = FilterSettings { hashes, bits_per_key };
         let mut map = MultiResolutionMap::new(MapSettings { resolution_m: 1.0, levels, filter }).unwrap();
-        let mut model = Model::new();
+        let (mut model, mut keep_outs) = (Model::new(), BTreeMap::new());
         for change in &changes {
-            let before = map.revision();
+            let before = map.content_version();
             let changed = apply(&mut map, change);
             prop_assert_eq!(changed, apply_to_model(&mut model, change, levels));
-            let makes_a_revision = changed > 0 || matches!(change, Change::Insert(_));
-            prop_assert_eq!(map.revision(), before + u64::from(makes_a_revision));
+            let is_keep_out = matches!(change, Change::PutKeepOut(..) | Change::EndKeepOut(_));
+            let makes_a_revision = changed > 0 || is_keep_out || matches!(change, Change::Insert(_));
+            prop_assert_eq!(map.revision(), before.revision + u64::from(makes_a_revision));
+            prop_assert!(!is_keep_out || map.content_version().hash == before.hash);
             assert_equal(&map, &model);
+            apply_to_keep_outs(&mut keep_outs, change, map.revision());
+            let expected = keep_outs.iter().map(|(name, (made, radius))| (name.clone(), *made, keep_out_shape(*radius)));
+            prop_assert_eq!(keep_outs_of(&map), expected.collect::<Vec<_>>());
         }
     }
 }

@@ -148,10 +148,14 @@ impl Builder {
         let [removed, added] = [removed, added].map(|blocks| blocks.into_iter().collect::<VoxelSet>());
         let committed = match part.cause {
             Cause::KeepOut(change) => {
-                map.keep_outs().check_room_for(&change.name, KEEP_OUTS_MAX).map_err(|e| damaged(e.to_string()))?;
+                map.keep_outs()
+                    .check_room_for(&change.name, KEEP_OUTS_MAX)
+                    .map_err(|e| damaged(e.to_string()))?;
                 map.committer().apply(&Change::KeepOut(KeepOutRecord { change, request: None }))
             }
-            Cause::Scan(_) | Cause::Deletion | Cause::Undo { .. } => map.committer().exchange(&removed, &added),
+            Cause::Scan(_) | Cause::Deletion | Cause::Undo { .. } => {
+                map.committer().exchange(&removed, &added)
+            }
         };
         self.check_hash(committed.hash, part.content_hash)?;
         Ok(Applied::Changed)

@@ -92,7 +92,8 @@ impl KeepOuts {
         let (name, mut all) = (change.name.clone(), self.0.clone());
         match change.act.clone() {
             KeepOutAct::Put { shape, made_by, expires_at_ns } => {
-                let made = KeepOut { name: name.clone(), shape, made_by, made_revision: revision, expires_at_ns };
+                let made =
+                    KeepOut { name: name.clone(), shape, made_by, made_revision: revision, expires_at_ns };
                 all.insert(name, made);
             }
             KeepOutAct::Removed { .. } | KeepOutAct::Expired => drop(all.remove(&name)),

@@ -12,13 +12,7 @@ const WORDS_PER_LOOK: usize = 4;
 impl KeepOuts {
     /// Sets the bit of each point that lies in a keep-out, and leaves the others: point i is bit i % 64 of
     /// `occupied[i / 64]`. `map_from_points` places the points in the map. Once stopped, of some of them.
-    pub fn mark(
-        &self,
-        points: &[Point],
-        map_from_points: &Pose,
-        occupied: &mut [u64],
-        stop: StopSignal<'_>,
-    ) {
+    pub fn mark(&self, points: &[Point], map_from_points: &Pose, occupied: &mut [u64], stop: StopSignal<'_>) {
         let bounded: Vec<Bounded<'_>> = self.iter().map(Bounded::of).collect();
         let words = points.chunks(POINTS_PER_WORD).zip(occupied);
         for (points, word) in stop.paced(words, WORDS_PER_LOOK) {

@@ -141,10 +141,15 @@ mod tests {
     /// The smallest distance of many points on the sides.
     fn sampled_distance(corners: &[Point2], point: Point2) -> f64 {
         let on_side = |(a, b): (Point2, Point2)| {
-            (0..=2000).map(move |i| std::array::from_fn(|axis| a[axis] + (b[axis] - a[axis]) * f64::from(i) / 2000.0))
+            (0..=2000).map(move |i| {
+                std::array::from_fn(|axis| a[axis] + (b[axis] - a[axis]) * f64::from(i) / 2000.0)
+            })
         };
         let away = |on: Point2| minus(on, point);
-        sides(corners).flat_map(on_side).map(|on| away(on)[0].hypot(away(on)[1])).fold(f64::INFINITY, f64::min)
+        sides(corners)
+            .flat_map(on_side)
+            .map(|on| away(on)[0].hypot(away(on)[1]))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// True when two of the sides share a point, of so many that are looked at; whole numbers tell it exactly in halves.

@@ -25,7 +25,9 @@ pub enum PrismError {
     #[error("prism.corners_m[{0}] must be finite and within {REGION_M_MAX:e} m, got {1:?}")]
     Corner(usize, [f64; 2]),
     /// Two corners at one place.
-    #[error("prism.corners_m[{0}] and prism.corners_m[{1}] are the same: name each corner once, the first one too")]
+    #[error(
+        "prism.corners_m[{0}] and prism.corners_m[{1}] are the same: name each corner once, the first one too"
+    )]
     Repeated(usize, usize),
     /// All corners on one line.
     #[error("prism.corners_m must enclose an area: all of its corners lie on one line")]
@@ -36,9 +38,7 @@ pub enum PrismError {
     )]
     Crossing(usize, usize),
     /// Heights that are not finite, too far away, or not in order.
-    #[error(
-        "prism.z_from_m must be less than prism.z_to_m, both within {REGION_M_MAX:e} m, got {0} and {1}"
-    )]
+    #[error("prism.z_from_m must be less than prism.z_to_m, both within {REGION_M_MAX:e} m, got {0} and {1}")]
     Heights(f64, f64),
 }
 
@@ -130,7 +130,9 @@ mod tests {
         assert!(with(3, [0.0, f64::INFINITY]).starts_with("prism.corners_m[3] must be finite"));
         assert!(with(2, [1.1e12, 0.0]).contains("within 1e12 m"));
         assert!(with(3, [0.0, 0.0]).starts_with("prism.corners_m[0] and prism.corners_m[3] are the same"));
-        assert!(with(2, [1.0, -1.0]).contains("the side from corner 0 crosses or touches that from corner 2"));
+        assert!(
+            with(2, [1.0, -1.0]).contains("the side from corner 0 crosses or touches that from corner 2")
+        );
         assert!(said(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]], [0.0, 1.0]).contains("on one line"));
         for z_m in [[1.0, 1.0], [1.0, 0.0], [f64::NAN, 1.0], [0.0, f64::INFINITY], [-1e13, 0.0]] {
             assert!(said(&SQUARE, z_m).starts_with("prism.z_from_m must be less than"), "{z_m:?}");

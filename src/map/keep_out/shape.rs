@@ -22,7 +22,9 @@ pub enum KeepOutShapeError {
     #[error(transparent)]
     Prism(#[from] PrismError),
     /// A box that goes on for ever, or as far as no map does.
-    #[error("the box of a keep-out must lie within {REGION_M_MAX:e} m, got {0:?} to {1:?}: no map goes as far")]
+    #[error(
+        "the box of a keep-out must lie within {REGION_M_MAX:e} m, got {0:?} to {1:?}: no map goes as far"
+    )]
     TooFar([f64; 3], [f64; 3]),
 }
 

@@ -9,7 +9,7 @@ use crate::voxel::{BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice,
 /// thin as a voxel, its neighbors are looked at too.
 const PLACES_PER_VOXEL: usize = 4;
 /// Places that may be looked at besides.
-const PLACES_MIN: usize = 4096;
+const PLACES_MIN: usize = 64 << 10;
 /// Places between two looks at the stop signal: a millisecond or less of a prism with many corners.
 const PLACES_PER_LOOK: usize = 1024;
 
@@ -182,8 +182,8 @@ impl Target<'_> {
 mod tests {
     use super::*;
     use crate::geometry::Pose;
-    use crate::map::keep_out::{KeepOut, Prism};
     use crate::map::KeepOutName;
+    use crate::map::keep_out::{KeepOut, Prism};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -207,20 +207,23 @@ mod tests {
                 let max = std::array::from_fn(|axis| min[axis] + size[axis]);
                 region(Region::cuboid(min, max).unwrap())
             }),
-            (place(), 0.0..9.0f64).prop_map(move |(center, radius)| region(Region::ball(center, radius).unwrap())),
+            (place(), 0.0..9.0f64)
+                .prop_map(move |(center, radius)| region(Region::ball(center, radius).unwrap())),
             (place(), place(), size()).prop_map(move |(center, turned, size)| {
                 let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turned.into());
                 let moved = nalgebra::Translation3::from(nalgebra::Vector3::from(center));
                 region(Region::oriented_box(Pose::from_parts(moved, rotation), size).unwrap())
             }),
-            (place(), prop::collection::vec(1.0..9.0f64, 3..12), 0.1..9.0f64).prop_map(|([x, y, z], radii, height)| {
-                let corner = |(i, radius): (usize, &f64)| {
-                    let (sin, cos) = (i as f64 * std::f64::consts::TAU / radii.len() as f64).sin_cos();
-                    [x + cos * radius, y + sin * radius]
-                };
-                let corners: Vec<_> = radii.iter().enumerate().map(corner).collect();
-                KeepOutShape::Prism(Prism::new(&corners, [z, z + height]).unwrap())
-            }),
+            (place(), prop::collection::vec(1.0..9.0f64, 3..12), 0.1..9.0f64).prop_map(
+                |([x, y, z], radii, height)| {
+                    let corner = |(i, radius): (usize, &f64)| {
+                        let (sin, cos) = (i as f64 * std::f64::consts::TAU / radii.len() as f64).sin_cos();
+                        [x + cos * radius, y + sin * radius]
+                    };
+                    let corners: Vec<_> = radii.iter().enumerate().map(corner).collect();
+                    KeepOutShape::Prism(Prism::new(&corners, [z, z + height]).unwrap())
+                }
+            ),
         ]
     }
 
@@ -261,7 +264,9 @@ mod tests {
         let lattice = Lattice::new(0.05, 1).unwrap();
         let huge = |region: Region| keep_outs([KeepOutShape::of_region(region).unwrap()]);
         let sheet = Region::cuboid([-5e4, -5e4, 0.026], [5e4, 5e4, 0.027]).unwrap();
-        for region in [Region::cuboid([-1e12; 3], [1e12; 3]).unwrap(), Region::ball([0.0; 3], 1e12).unwrap(), sheet] {
+        for region in
+            [Region::cuboid([-1e12; 3], [1e12; 3]).unwrap(), Region::ball([0.0; 3], 1e12).unwrap(), sheet]
+        {
             let found = huge(region).voxels_of(0, None, &lattice, 1000, StopSignal::NEVER);
             assert_eq!(found, Err(TooManyVoxels));
             // Of a small part of it there are few.

@@ -58,7 +58,8 @@ mod tests {
     fn sampled_distance(region: &Region, point: [f64; 3], steps: usize) -> f64 {
         let (min, max) = region.bounds_m();
         let at = |axis: usize, i: usize| min[axis] + (max[axis] - min[axis]) * i as f64 / steps as f64;
-        let all = (0..=steps).flat_map(|x| (0..=steps).flat_map(move |y| (0..=steps).map(move |z| [x, y, z])));
+        let all =
+            (0..=steps).flat_map(|x| (0..=steps).flat_map(move |y| (0..=steps).map(move |z| [x, y, z])));
         let places = all.map(|[x, y, z]| [at(0, x), at(1, y), at(2, z)]);
         let away = |place: [f64; 3]| norm(|axis| (place[axis] - point[axis]).abs());
         places.filter(|&place| region.contains(place)).map(away).fold(f64::INFINITY, f64::min)

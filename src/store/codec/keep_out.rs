@@ -20,11 +20,7 @@ impl From<&KeepOutRecord> for pb::KeepOutChange {
             KeepOutAct::Removed { by } => Act::Removal(pb::KeepOutRemoval { by: text_of(by.as_ref()) }),
             KeepOutAct::Expired => Act::Expiry(pb::KeepOutExpiry {}),
         };
-        Self {
-            name: change.name.to_string(),
-            act: Some(act),
-            request: request.as_ref().map(Into::into),
-        }
+        Self { name: change.name.to_string(), act: Some(act), request: request.as_ref().map(Into::into) }
     }
 }
 
@@ -134,7 +130,9 @@ fn of_region<E: ToString>(region: Result<Region, E>) -> Result<KeepOutShape, Unr
 
 fn exactly<const N: usize>(of: &pb::Numbers, shape: &str) -> Result<[f64; N], Unreadable> {
     let count = of.numbers.len();
-    of.numbers[..].try_into().map_err(|_| format!("the {shape} of a keep-out has {count} numbers, {N} are one"))
+    of.numbers[..]
+        .try_into()
+        .map_err(|_| format!("the {shape} of a keep-out has {count} numbers, {N} are one"))
 }
 
 fn name_from(text: &str) -> Result<KeepOutName, Unreadable> {

@@ -323,7 +323,8 @@ impl<'a> Body<'a> {
 
     /// Decodes the keep-outs, of which no two have the same name.
     fn keep_outs(&self) -> Result<KeepOuts, Unreadable> {
-        let keep_out = |record: Result<_, Unreadable>| decoded::<pb::KeepOut>(record?, "a keep-out")?.try_into();
+        let keep_out =
+            |record: Result<_, Unreadable>| decoded::<pb::KeepOut>(record?, "a keep-out")?.try_into();
         let keep_outs: Vec<KeepOut> =
             self.records(number::KEEP_OUTS).map(keep_out).collect::<Result<_, _>>()?;
         match keep_outs.is_sorted_by(|one, next| one.name < next.name) {

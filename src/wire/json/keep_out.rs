@@ -75,7 +75,9 @@ impl From<&KeepOutShape> for JsonShape {
     fn from(shape: &KeepOutShape) -> Self {
         match shape {
             &KeepOutShape::Region(Region::Box { min_m, max_m }) => Self::Box { min_m, max_m },
-            &KeepOutShape::Region(Region::Sphere { center_m, radius_m }) => Self::Sphere { center_m, radius_m },
+            &KeepOutShape::Region(Region::Sphere { center_m, radius_m }) => {
+                Self::Sphere { center_m, radius_m }
+            }
             KeepOutShape::Region(Region::OrientedBox(of)) => {
                 Self::OrientedBox { map_from_box: of.map_from_box().into(), size_m: of.size_m() }
             }

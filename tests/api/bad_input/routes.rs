@@ -28,12 +28,15 @@ fn body(operation: Operation) -> Body {
         Operation::DeleteVoxels => Body::Points(json!({"points": [[9.0, 9.0, 9.0]]}), ""),
         Operation::InsertScan | Operation::AlignScan => Body::Points(scan(), "robot=r&"),
         Operation::Undo => Body::Json(json!({"revision": 1})),
+        Operation::PutKeepOut => Body::Json(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Body::Json(json!({"resolution_m": 0.1})),
         Operation::RestoreMap => Body::File,
         Operation::ListMaps
         | Operation::GetMap
         | Operation::DeleteMap
         | Operation::ListVoxels
+        | Operation::ListKeepOuts
+        | Operation::DeleteKeepOut
         | Operation::Watch
         | Operation::GetTrajectory
         | Operation::StreamTrajectory
@@ -53,7 +56,7 @@ fn body(operation: Operation) -> Body {
 fn routes() -> impl Iterator<Item = (Operation, Method, String)> {
     Operation::ALL.iter().filter_map(|&operation| {
         let Route { method, path } = operation.route()?;
-        Some((operation, method.parse().unwrap(), path.replace("{map}", "a")))
+        Some((operation, method.parse().unwrap(), path.replace("{map}", "a").replace("{name}", "dock")))
     })
 }
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use mrol::geometry::Pose;
 use mrol::map::{
-    Change, DeletionRecord, MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Request,
-    RequestId, RobotName, ScanRecord,
+    Change, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapContents,
+    MapName, MapSettings, MappedScan, MultiResolutionMap, Region, Request, RequestId, RobotName, ScanRecord,
 };
 use mrol::store::{
     DataDir, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
@@ -121,6 +121,9 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
             return Change::Deletion(DeletionRecord { voxels, request });
         }
     }
+    if rng.random_bool(0.1) {
+        return keep_out(revision, rng);
+    }
     let keys = (0..rng.random_range(20..200)).filter_map(|_| {
         VoxelKey::new([rng.random_range(-20..20), rng.random_range(-20..20), rng.random_range(-3..3)])
     });
@@ -133,4 +136,18 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
         ..MappedScan::new(robot, Pose::translation(rng.random(), 0.0, 1.0 / 3.0))
     };
     Change::Insertion(ScanRecord::of_voxels(pose, voxels))
+}
+
+/// One of a few keep-outs is put, or ends.
+fn keep_out(revision: u64, rng: &mut ChaCha8Rng) -> Change {
+    let ball = Region::ball([0.0; 3], rng.random_range(0.5..5.0)).unwrap();
+    let put = KeepOutAct::Put {
+        shape: KeepOutShape::of_region(ball).unwrap(),
+        made_by: None,
+        expires_at_ns: rng.random_bool(0.5).then_some(revision as i64),
+    };
+    let act = if rng.random_bool(0.7) { put } else { KeepOutAct::Expired };
+    let change =
+        KeepOutChange { name: KeepOutName::new(["dock", "spill"][rng.random_range(0..2)]).unwrap(), act };
+    Change::KeepOut(KeepOutRecord { change, request: None })
 }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use mrol::geometry::Pose;
 use mrol::map::{
-    Change, DeletionRecord, MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Request,
-    RequestId, RobotName, ScanRecord, UndoRecord,
+    CallerName, Change, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape,
+    MapContents, MapName, MapSettings, MappedScan, MultiResolutionMap, Prism, Request, RequestId, RobotName,
+    ScanRecord, UndoRecord,
 };
 use mrol::store::{
     DataDir, FileSystem, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
@@ -138,6 +139,14 @@ fn change(revision: u64) -> Change {
         |id: &str| Some(Request { id: RequestId::new(id).expect("an id"), digest: revision, caller: None });
     match revision {
         3 => Change::Deletion(DeletionRecord { voxels: voxels(40, 5), request: request("d") }),
+        4 => keep_out(KeepOutAct::Put {
+            shape: KeepOutShape::Prism(
+                Prism::new(&[[0.0, 0.0], [2.0, 0.0], [1.0, 2.0]], [0.0, 1.0]).expect("a prism"),
+            ),
+            made_by: CallerName::new("ops").ok(),
+            expires_at_ns: Some(9),
+        }),
+        7 => keep_out(KeepOutAct::Expired),
         6 => Change::Undo(UndoRecord {
             scans: vec![5],
             deletions: vec![3],
@@ -161,6 +170,11 @@ fn change(revision: u64) -> Change {
             Change::Insertion(ScanRecord::of_points(pose, &points.collect::<Vec<_>>(), &lattice))
         }
     }
+}
+
+fn keep_out(act: KeepOutAct) -> Change {
+    let change = KeepOutChange { name: KeepOutName::new("dock").expect("a name"), act };
+    Change::KeepOut(KeepOutRecord { change, request: None })
 }
 
 fn commit(folder: &MapFolder, map: &MultiResolutionMap, change: &Change) {

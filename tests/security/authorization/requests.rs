@@ -19,6 +19,16 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
     match operation {
         Operation::QueryPoints | Operation::QueryPointsStream => query_pb(&map, &POINTS).encode_to_vec(),
         Operation::ListVoxels => pb::ListVoxelsRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::ListKeepOuts => pb::ListKeepOutsRequest { map }.encode_to_vec(),
+        Operation::PutKeepOut => {
+            let prism =
+                pb::Prism { corners_m: vec![0.0, 0.0, 1.0, 0.0, 0.0, 1.0], z_from_m: 0.0, z_to_m: 1.0 };
+            let shape = Some(pb::KeepOutShape { shape: Some(pb::keep_out_shape::Shape::Prism(prism)) });
+            pb::PutKeepOutRequest { map, name: "dock".into(), shape, ..Default::default() }.encode_to_vec()
+        }
+        Operation::DeleteKeepOut => {
+            pb::DeleteKeepOutRequest { map, name: "dock".into(), ..Default::default() }.encode_to_vec()
+        }
         Operation::Watch => pb::WatchRequest { map, ..Default::default() }.encode_to_vec(),
         Operation::InsertScan | Operation::InsertScanStream => scan_pb(&map, "r", &POINTS).encode_to_vec(),
         Operation::AlignScan => {
@@ -72,6 +82,7 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
             Some(json!({"robot": "r", "points": POINTS, "guess": identity_json(), "align": false}))
         }
         Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
+        Operation::PutKeepOut => Some(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Some(json!({"resolution_m": 0.1, "levels": 2})),
         _ => None,
     }
@@ -83,6 +94,9 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
+        | Operation::ListKeepOuts
+        | Operation::PutKeepOut
+        | Operation::DeleteKeepOut
         | Operation::Watch
         | Operation::InsertScan
         | Operation::InsertScanStream

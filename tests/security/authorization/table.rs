@@ -18,6 +18,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
+        | Operation::ListKeepOuts
         | Operation::Watch
         | Operation::AlignScan
         | Operation::Localize
@@ -29,7 +30,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::Reflect
         | Operation::Metrics => Some(Scope::Read),
         Operation::InsertScan | Operation::InsertScanStream | Operation::Undo => Some(Scope::Insert),
-        Operation::DeleteVoxels => Some(Scope::Write),
+        Operation::DeleteVoxels | Operation::PutKeepOut | Operation::DeleteKeepOut => Some(Scope::Write),
         Operation::CreateMap | Operation::DeleteMap | Operation::RestoreMap => Some(Scope::Admin),
     }
 }
