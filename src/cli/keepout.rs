@@ -135,7 +135,9 @@ impl Shape {
                 Prism::new(&corners.0, height).map(KeepOutShape::Prism).map_err(Into::into)
             }
             _ => {
-                return Err(CliError::usage("give --box, --sphere, --oriented-box, or --prism with --height"));
+                return Err(CliError::usage(
+                    "give --box, --sphere, --oriented-box, or --prism with --height",
+                ));
             }
         };
         shape.map_err(|error| CliError::usage(error.to_string()))

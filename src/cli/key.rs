@@ -30,7 +30,7 @@ EXAMPLES:
 Scopes, each with all rights of the one before:
   read     everything that changes nothing, including downloads of whole maps and metrics
   insert   scans of the key's robots, and undo of those
-  write    deletions, and undo of any scan
+  write    deletions, keep-outs, and undo of any scan
   admin    create, restore and delete maps
 Without --maps and --robots a key is valid for all of them.
 

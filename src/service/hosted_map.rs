@@ -329,14 +329,15 @@ impl HostedMap {
         let kept_out = keep_outs.voxels_of(level, region, self.map.lattice(), most, stop);
         check_not_stopped(stop)?;
         let kept_out = kept_out.map_err(|_| keep_outs_too_large(level, most))?;
-        let mut keys = Vec::with_capacity(copy.len() + kept_out.len());
+        let mut keys = Vec::with_capacity((copy.len() + kept_out.len()).min(most));
         let is_other = |key: &VoxelKey| kept_out.is_empty() || !kept_out.contains(*key);
         copy.for_some(stop, |some| keys.extend(some.iter().copied().filter(is_other)));
         check_not_stopped(stop)?;
-        keys.extend(kept_out.iter());
-        if keys.len() > most {
-            return Err(listing_too_large(level, keys.len(), most));
+        let found = keys.len() + kept_out.len();
+        if found > most {
+            return Err(listing_too_large(level, found, most));
         }
+        keys.extend(kept_out.iter());
         let resolution_m = self.map.lattice().resolution_m(level);
         Ok(VoxelListing { resolution_m, keys, version: self.version(version) })
     }

@@ -66,7 +66,7 @@ reasons! {
         AllPointsFiltered "all_points_filtered" Both: "no point of the scan passes the robot's range limits and body box", "check them; is the unit meters?";
         AmbiguousGuess "ambiguous_guess" Http: "several of `guess`, `motion` and `constant_velocity` are given", "give one";
         AmbiguousPoints "ambiguous_points" Grpc: "both `xyz_f32le` and `xyz` are filled", "fill one";
-        AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo", "give one";
+        AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo, or shape of a keep-out", "give one";
         BadBlocks "bad_blocks" Client: "the server's answer has blocks of voxels that are none", "update the client";
         BadCovariance "bad_covariance" Both: "the guess's covariance is not 36 finite numbers of a symmetric, positive semidefinite matrix", "send it row by row: x y z in meters, then turns about the map's axes in radians";
         BadDirection "bad_direction" Client: "the server's answer has a direction that is none", "update the client";
