@@ -58,6 +58,8 @@ operations! {
     QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
     ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
+    GetBlock:          Some(Read),  grpc "/mrol.v1.Occupancy/GetBlock",          http GET "/v1/maps/{map}/block";
+    ListObservers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListObservers",     http GET "/v1/maps/{map}/observers";
     Watch:             Some(Read),  grpc "/mrol.v1.Occupancy/Watch",             http GET "/v1/maps/{map}/watch";
     InsertScan:        Some(Insert), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
     InsertScanStream:  Some(Insert), grpc "/mrol.v1.Mapping/InsertScanStream";

@@ -14,11 +14,11 @@ use super::point_query::{POINTS_PER_STEP, point_without_voxel};
 use super::recent_changes::RecentChanges;
 use super::resource_budget::ResourceBudget;
 use super::{
-    MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing,
-    check_not_stopped, ended_early,
+    ListingRequest, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError,
+    VoxelListing, check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, Region, RobotName};
+use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, RobotName};
 use crate::mapping::{LostRobots, Sightings};
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
@@ -286,31 +286,48 @@ impl HostedMap {
         point_without_voxel(points, quantize, self.map.lattice())
     }
 
+    /// The voxels that are asked for, at most `most` of them.
     pub(super) fn list(
         &self,
-        level: u32,
-        region: Option<&Region>,
+        request: &ListingRequest,
         most: usize,
         stop: StopSignal<'_>,
     ) -> Result<VoxelListing, ServiceError> {
+        let ListingRequest { level, selection, .. } = *request;
         let long_read = self.map.long_read();
         let view = long_read.view();
         // How many there are of a whole level is known: nothing is copied of more than may be listed.
-        let whole = if region.is_none() { view.lists(level).map(|list| list.len()).sum() } else { 0 };
+        let whole = if selection.is_everything() { view.count_voxels(level, &selection, stop) } else { 0 };
         if whole > most {
             return Err(listing_too_large(level, whole, most));
         }
-        let (copy, version) = (view.level_voxels(level, region, most, stop), view.version());
+        let (copy, version) = (view.level_voxels(level, &selection, most, stop), view.version());
         drop(view);
         drop(long_read);
         if copy.len() > most {
             return Err(listing_too_large(level, copy.len(), most));
         }
-        let mut keys = Vec::with_capacity(copy.len());
+        let voxels_total = copy.len();
+        let mut keys = Vec::with_capacity(voxels_total);
         copy.for_some(stop, |some| keys.extend_from_slice(some));
         check_not_stopped(stop)?;
         let resolution_m = self.map.lattice().resolution_m(level);
-        Ok(VoxelListing { resolution_m, keys, version: self.version(version) })
+        Ok(VoxelListing { resolution_m, voxels_total, keys, version: self.version(version) })
+    }
+
+    /// The number of voxels that are asked for.
+    pub(super) fn count(
+        &self,
+        request: &ListingRequest,
+        stop: StopSignal<'_>,
+    ) -> Result<VoxelListing, ServiceError> {
+        let ListingRequest { level, selection, .. } = *request;
+        let long_read = self.map.long_read();
+        let view = long_read.view();
+        let (voxels_total, version) = (view.count_voxels(level, &selection, stop), view.version());
+        check_not_stopped(stop)?;
+        let resolution_m = self.map.lattice().resolution_m(level);
+        Ok(VoxelListing { resolution_m, voxels_total, keys: Vec::new(), version: self.version(version) })
     }
 
     pub(super) fn describe(

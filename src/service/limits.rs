@@ -77,6 +77,14 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
+    /// Bytes of a block that is given out: one a cell of a dense one, 72 for 8 x 8 x 8 voxels of another. 16 MiB.
+    pub block_bytes_max: usize,
+    /// Cells of a dense block and as far around it as its distances go. 67,108,864.
+    pub block_cells_max: usize,
+    /// Scans that one list of those that touched a voxel has at most, the newest. 100.
+    pub observers_max: usize,
+    /// How long the journal is looked through for the scans that touched a voxel. 10 s.
+    pub observers_time_max_s: f64,
     /// Poses of one page of a trajectory, and of one that is asked for without a limit. 5,000.
     pub trajectory_page_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
@@ -150,6 +158,10 @@ impl Default for Limits {
             maps_max: 64,
             voxels_per_map_max: 200_000_000,
             listed_voxels_max: 20_000_000,
+            block_bytes_max: 16 << 20,
+            block_cells_max: 64 << 20,
+            observers_max: 100,
+            observers_time_max_s: 10.0,
             trajectory_page_max: 5_000,
             robots_per_map_max: 4_096,
             jobs_waiting_max: 256,
@@ -210,6 +222,19 @@ impl Limits {
     /// When a request has no key, or more than `keys_per_request_max`.
     pub(super) fn check_keys(&self, keys: usize) -> Result<(), ServiceError> {
         within("keys", "keys_per_request_max", keys, self.keys_per_request_max)
+    }
+
+    /// # Errors
+    /// When a block is larger than `block_bytes_max`.
+    pub(super) fn check_block_bytes(&self, bytes: usize) -> Result<(), ServiceError> {
+        let most = self.block_bytes_max;
+        if bytes <= most {
+            return Ok(());
+        }
+        let message = format!(
+            "the block has {bytes} bytes or more, block_bytes_max is {most}: ask for a smaller part or a coarser level"
+        );
+        Err(ServiceError::new(Reason::BlockTooLarge, message))
     }
 
     /// The poses of a page, where `limit` of them are asked for.

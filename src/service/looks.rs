@@ -9,7 +9,8 @@ use super::hosted_map::HostedMap;
 use super::map_file::from_file;
 use super::resource_budget::ResourceBudget;
 use super::{
-    LocalizationRequest, Marks, PointCloud, PointQuery, Reason, ScanRequest, ServiceError, ServiceSettings,
+    ListingRequest, LocalizationRequest, Marks, PointCloud, PointQuery, Reason, ScanRequest, ServiceError,
+    ServiceSettings,
 };
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
@@ -77,10 +78,11 @@ fn a_listing_looks_at_the_signal_before_each_shard() {
     for region in [None, Some(Region::cuboid([-100.0; 3], [100.0; 3]).unwrap())] {
         let looks = Cell::new(0);
         let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
-        let listing = map.list(0, region.as_ref(), usize::MAX, StopSignal::when(&count_look)).unwrap();
+        let listing =
+            map.list(&ListingRequest::of(0, region), usize::MAX, StopSignal::when(&count_look)).unwrap();
         assert!(listing.keys.len() > 5000 && looks.get() >= SHARDS, "{} looks", looks.get());
         let gone = || true;
-        let gone = map.list(0, region.as_ref(), usize::MAX, StopSignal::when(&gone)).unwrap_err();
+        let gone = map.list(&ListingRequest::of(0, region), usize::MAX, StopSignal::when(&gone)).unwrap_err();
         assert_eq!(gone.reason, Reason::CallerGone);
     }
 }
@@ -170,7 +172,7 @@ fn a_deletion_finds_what_it_means_with_looks_in_proportion_to_the_map() {
         assert_eq!(blocks, (side * side) as usize);
         assert!(blocks / looks.get() <= 16 << 10, "{blocks} blocks, {} looks", looks.get());
         let gone = || true;
-        let listed = map.list(0, Some(&everywhere), usize::MAX, StopSignal::when(&gone));
+        let listed = map.list(&ListingRequest::of(0, Some(everywhere)), usize::MAX, StopSignal::when(&gone));
         assert_eq!(listed.unwrap_err().reason, Reason::CallerGone);
     }
 }

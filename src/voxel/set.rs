@@ -2,7 +2,7 @@
 
 use super::block_sort::blocks_of;
 use super::{
-    BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL, VoxelKey, quantize,
+    BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints, MOMENT_LEVEL, VoxelKey, quantize,
 };
 use crate::geometry::Point;
 use crate::util::{StopSignal, sort_by_key_until};
@@ -65,6 +65,18 @@ impl VoxelSet {
             let same = others.peek().filter(|(other, _)| other == block);
             same.is_none_or(|(_, other)| mask.intersection(other).is_empty())
         })
+    }
+
+    /// True where one of these lies in `voxel` of `level`.
+    pub fn touches(&self, voxel: VoxelKey, level: u32) -> bool {
+        match level.checked_sub(BLOCK_LEVELS) {
+            Some(above) => self.blocks.iter().any(|(block, _)| block.ancestor(above) == voxel),
+            None => {
+                let (block, cell) = Cell::of(voxel.index().map(|i| i << level));
+                let found = self.blocks.binary_search_by_key(&block, |(block, _)| *block);
+                found.is_ok_and(|place| self.blocks[place].1.contains(cell, level))
+            }
+        }
     }
 
     /// The finest voxels, block by block.

@@ -4,6 +4,7 @@
 //! back, so that the daemon and the client share one definition. What cannot be converted is an error that
 //! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
 
+mod block;
 mod deletion;
 mod failure;
 mod field;
@@ -12,6 +13,7 @@ pub mod json;
 mod localization;
 mod map_file;
 mod maps;
+mod observers;
 mod occupancy;
 pub mod pb;
 mod scan;

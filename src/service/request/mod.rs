@@ -1,7 +1,9 @@
 //! Requests and answers of the service, in domain types; a file for each kind of operation.
 
+mod block;
 mod deletion;
 mod map;
+mod observers;
 mod occupancy;
 mod point_cloud;
 mod point_times;
@@ -11,9 +13,11 @@ mod undo;
 mod version;
 mod watch;
 
+pub use block::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
 pub use deletion::{Deletion, DeletionAnswer, DeletionTarget};
 pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
-pub use occupancy::{PointAnswer, PointQuery, VoxelListing};
+pub use observers::{ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan};
+pub use occupancy::{ListingRequest, PointAnswer, PointQuery, VoxelListing};
 pub use point_cloud::PointCloud;
 pub use point_times::{PointTimes, TimeReference};
 pub use scan::{Foreground, ScanAnswer, ScanRequest};

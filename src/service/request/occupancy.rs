@@ -6,7 +6,7 @@ use uuid::Uuid;
 use super::point_cloud::PointCloud;
 use super::version::MapVersion;
 use crate::geometry::Pose;
-use crate::map::Lookup;
+use crate::map::{Lookup, Region, VoxelSelection};
 use crate::voxel::VoxelKey;
 
 /// Are these points in occupied voxels?
@@ -39,12 +39,32 @@ pub struct PointAnswer {
     pub version: MapVersion,
 }
 
+/// Which occupied voxels of a level are there, or how many?
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ListingRequest {
+    /// 0 is the finest.
+    pub level: u32,
+    /// Which of its voxels.
+    pub selection: VoxelSelection,
+    /// Count them, and list none: any number may be counted.
+    pub count_only: bool,
+}
+
+impl ListingRequest {
+    /// All voxels of a level, in a region or everywhere.
+    pub fn of(level: u32, region: Option<Region>) -> Self {
+        Self { level, selection: region.into(), count_only: false }
+    }
+}
+
 /// The occupied voxels of a level.
 #[derive(Debug, Clone)]
 pub struct VoxelListing {
     /// The side of the voxels, meters.
     pub resolution_m: f64,
-    /// In no order.
+    /// How many they are.
+    pub voxels_total: usize,
+    /// In no order; none where they were to be counted.
     pub keys: Vec<VoxelKey>,
     /// At this state.
     pub version: MapVersion,

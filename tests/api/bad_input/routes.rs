@@ -34,6 +34,8 @@ fn body(operation: Operation) -> Body {
         | Operation::GetMap
         | Operation::DeleteMap
         | Operation::ListVoxels
+        | Operation::GetBlock
+        | Operation::ListObservers
         | Operation::Watch
         | Operation::GetTrajectory
         | Operation::StreamTrajectory

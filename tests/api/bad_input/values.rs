@@ -198,7 +198,7 @@ async fn settings_and_levels_out_of_range_are_named_with_the_range() {
     let mut planner = daemon.occupancy().await;
     let query = pb::QueryPointsRequest { level: 4, ..query_pb("a", &row(1)) };
     assert_invalid(&planner.query_points(query).await.unwrap_err(), &["level", "4"]);
-    let list = pb::ListVoxelsRequest { map: "a".into(), level: u32::MAX, region: None };
+    let list = pb::ListVoxelsRequest { map: "a".into(), level: u32::MAX, ..Default::default() };
     assert_invalid(&planner.list_voxels(list).await.unwrap_err(), &["level", "4294967295"]);
     let lookup = pb::QueryPointsRequest { lookup: 9, ..query_pb("a", &row(1)) };
     assert_invalid(&planner.query_points(lookup).await.unwrap_err(), &["lookup", "9"]);

@@ -18,6 +18,8 @@ fn meant(operation: Operation) -> Option<Scope> {
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
+        | Operation::GetBlock
+        | Operation::ListObservers
         | Operation::Watch
         | Operation::AlignScan
         | Operation::Localize
