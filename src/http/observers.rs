@@ -1,17 +1,15 @@
 //! `GET /v1/maps/{map}/observers?point=x,y,z&level=`, or with `voxel=i,j,k`: the scans that touched a voxel.
 
 use axum::response::Json;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, Params, numbers};
 use crate::geometry::Point;
-use crate::service::{
-    ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan, Reason, ServiceError, WatchedScan,
-};
+use crate::service::{ObservedVoxel, ObserversRequest, Reason, ServiceError};
 use crate::voxel::VoxelKey;
-use crate::wire::json::{JsonPose, JsonVersion};
+use crate::wire::json::JsonObservers;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,30 +20,11 @@ pub(super) struct ObserversParams {
     level: u32,
 }
 
-#[derive(Serialize)]
-pub(super) struct ObserversResponse {
-    voxel: [i32; 3],
-    scans: Vec<ScanResponse>,
-    older_scans: bool,
-    #[serde(flatten)]
-    version: JsonVersion,
-}
-
-#[derive(Serialize)]
-struct ScanResponse {
-    robot: String,
-    session: String,
-    scan_id: Option<u64>,
-    timestamp_ns: Option<i64>,
-    map_from_sensor: JsonPose,
-    revision: u64,
-}
-
 pub(super) async fn list(
     Service(service): Service,
     Map(map): Map,
     Params(params): Params<ObserversParams>,
-) -> Result<Json<ObserversResponse>, HttpError> {
+) -> Result<Json<JsonObservers>, HttpError> {
     let answer = service.list_observers(&map, params.try_into()?).await?;
     Ok(Json(answer.into()))
 }
@@ -77,26 +56,4 @@ fn key_of(text: &str) -> Result<VoxelKey, ServiceError> {
     VoxelKey::new(index.map(|i| i as i32)).filter(|_| is_whole).ok_or_else(|| {
         ServiceError::new(Reason::BadKey, format!("voxel must be whole indices in range, got {index:?}"))
     })
-}
-
-impl From<ObserversAnswer> for ObserversResponse {
-    fn from(answer: ObserversAnswer) -> Self {
-        let ObserversAnswer { voxel, scans, older_scans, version } = answer;
-        let scans = scans.into_iter().map(ScanResponse::from).collect();
-        Self { voxel: voxel.index(), scans, older_scans, version: version.into() }
-    }
-}
-
-impl From<ObservingScan> for ScanResponse {
-    fn from(ObservingScan { revision, scan }: ObservingScan) -> Self {
-        let WatchedScan { robot, session, scan_id, timestamp_ns, map_from_sensor } = scan;
-        Self {
-            robot: robot.to_string(),
-            session: session.to_string(),
-            scan_id,
-            timestamp_ns,
-            map_from_sensor: (&map_from_sensor).into(),
-            revision,
-        }
-    }
 }

@@ -13,8 +13,9 @@ use crate::geometry::Pose;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frustum {
     map_from_camera: Pose,
-    horizontal_rad: f64,
-    vertical_rad: f64,
+    angles_rad: [f64; 2],
+    /// How far its sides lie from the axis, right and down, for each meter in front of the camera.
+    slopes: [f64; 2],
     near_m: f64,
     far_m: f64,
 }
@@ -36,7 +37,7 @@ pub enum FrustumError {
 }
 
 impl Frustum {
-    /// The view of a camera at `map_from_camera` with fields of view `horizontal_rad` and `vertical_rad` (from edge to edge,
+    /// The view of a camera at `map_from_camera` with a horizontal and a vertical field of view (from edge to edge,
     /// radians), of what lies from `near_m` to `far_m` in front of it (along its z axis, meters).
     ///
     /// # Errors
@@ -44,11 +45,12 @@ impl Frustum {
     /// or beyond [`REGION_M_MAX`].
     pub fn new(
         map_from_camera: Pose,
-        [horizontal_rad, vertical_rad]: [f64; 2],
+        angles_rad: [f64; 2],
         [near_m, far_m]: [f64; 2],
     ) -> Result<Self, FrustumError> {
         let is_angle = |rad: f64| rad > 0.0 && rad < PI;
-        if !is_angle(horizontal_rad) || !is_angle(vertical_rad) {
+        if !angles_rad.into_iter().all(is_angle) {
+            let [horizontal_rad, vertical_rad] = angles_rad;
             return Err(FrustumError::Angles(horizontal_rad, vertical_rad));
         }
         if !(near_m >= 0.0 && near_m < far_m && far_m <= REGION_M_MAX) {
@@ -58,7 +60,8 @@ impl Frustum {
         if !camera_m.iter().all(|c| c.abs() <= REGION_M_MAX) {
             return Err(FrustumError::TooFar(camera_m.into()));
         }
-        Ok(Self { map_from_camera, horizontal_rad, vertical_rad, near_m, far_m })
+        let slopes = angles_rad.map(|rad| (rad / 2.0).tan());
+        Ok(Self { map_from_camera, angles_rad, slopes, near_m, far_m })
     }
 
     /// Where the camera is.
@@ -68,7 +71,7 @@ impl Frustum {
 
     /// The horizontal and vertical field of view, radians.
     pub fn angles_rad(&self) -> [f64; 2] {
-        [self.horizontal_rad, self.vertical_rad]
+        self.angles_rad
     }
 
     /// Where the view begins and ends, meters in front of the camera.
@@ -79,7 +82,7 @@ impl Frustum {
     /// True when the point (map frame, meters) lies inside or on the border.
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
         let [x, y, z] = self.in_camera(point_m);
-        let [right, down] = self.slopes();
+        let [right, down] = self.slopes;
         (self.near_m..=self.far_m).contains(&z) && x.abs() <= z * right && y.abs() <= z * down
     }
 
@@ -88,7 +91,7 @@ impl Frustum {
         let [x, y, z] = self.in_camera(center_m);
         let is_near_side =
             |across: f64, slope: f64| across.abs() - z * slope <= radius_m * (1.0 + slope * slope).sqrt();
-        let [right, down] = self.slopes();
+        let [right, down] = self.slopes;
         z + radius_m >= self.near_m
             && z - radius_m <= self.far_m
             && is_near_side(x, right)
@@ -97,7 +100,7 @@ impl Frustum {
 
     /// The smallest box around it: (smallest, largest) coordinates, map frame, meters.
     pub(super) fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
-        let [right, down] = self.slopes();
+        let [right, down] = self.slopes;
         let corner = |i: usize| {
             let sign = |bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
             let z = if i >> 2 == 0 { self.near_m } else { self.far_m };
@@ -113,11 +116,6 @@ impl Frustum {
 
     fn in_camera(&self, point_m: [f64; 3]) -> [f64; 3] {
         self.map_from_camera.inverse_transform_point(&Point3::from(point_m)).coords.into()
-    }
-
-    /// How far its sides lie from the axis, right and down, for each meter in front of the camera.
-    fn slopes(&self) -> [f64; 2] {
-        self.angles_rad().map(|rad| (rad / 2.0).tan())
     }
 }
 

@@ -66,7 +66,7 @@ impl BlockRequest {
         let (voxels, version) = match self.form {
             BlockForm::Sparse { region } => {
                 let selection = VoxelSelection::from(region);
-                let most = limits.block_bytes_max / BlockBytes::OF_BLOCK;
+                let most = limits.block_bytes().0 / BlockBytes::OF_BLOCK;
                 let copy = Copy::of(map, level, &selection, most, &reserve, stop)?;
                 limits.check_block_bytes(copy.voxels.blocks().len() * BlockBytes::OF_BLOCK)?;
                 (BlockVoxels::Sparse(BlockBytes::of(copy.voxels.blocks())), copy.version)

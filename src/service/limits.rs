@@ -187,6 +187,8 @@ impl Default for Limits {
 impl Limits {
     /// Bytes of one message where nothing is set.
     pub const MESSAGE_BYTES_MAX: usize = 32 << 20;
+    /// Bytes of a message besides those of a block, at most.
+    const BESIDE_BLOCK_BYTES: usize = 1 << 10;
 
     /// These limits for a process that may have so many bytes in memory, if that is known: what may lie in bodies, be
     /// restored or be searched in at once is an eighth of that at most.
@@ -224,15 +226,24 @@ impl Limits {
         within("keys", "keys_per_request_max", keys, self.keys_per_request_max)
     }
 
+    /// The bytes that a block may have, and the limit that says so: one message has to hold it.
+    pub(super) fn block_bytes(&self) -> (usize, &'static str) {
+        let message = self.message_bytes_max.saturating_sub(Self::BESIDE_BLOCK_BYTES);
+        match self.block_bytes_max <= message {
+            true => (self.block_bytes_max, "block_bytes_max"),
+            false => (message, "message_bytes_max, less 1 KiB,"),
+        }
+    }
+
     /// # Errors
-    /// When a block is larger than `block_bytes_max`.
+    /// When a block is larger than it may be.
     pub(super) fn check_block_bytes(&self, bytes: usize) -> Result<(), ServiceError> {
-        let most = self.block_bytes_max;
+        let (most, limit) = self.block_bytes();
         if bytes <= most {
             return Ok(());
         }
         let message = format!(
-            "the block has {bytes} bytes or more, block_bytes_max is {most}: ask for a smaller part or a coarser level"
+            "the block has {bytes} bytes or more, {limit} is {most}: ask for a smaller part or a coarser level"
         );
         Err(ServiceError::new(Reason::BlockTooLarge, message))
     }
@@ -311,6 +322,21 @@ mod tests {
         assert!(limits.check_points(0).unwrap_err().message.contains("points must not be empty"));
         let error = limits.check_points(11).unwrap_err();
         assert!(error.message.contains("11") && error.message.contains("points_per_request_max is 10"));
+    }
+
+    #[test]
+    fn a_block_has_room_in_one_message() {
+        let of = |block_bytes_max, message_bytes_max| Limits {
+            block_bytes_max,
+            message_bytes_max,
+            ..Limits::default()
+        };
+        assert_eq!(of(1000, 2024).block_bytes(), (1000, "block_bytes_max"));
+        for (limits, most) in [(of(1001, 2024), 1000), (of(1000, 5), 0)] {
+            assert!(limits.check_block_bytes(most).is_ok());
+            let error = limits.check_block_bytes(most + 1).unwrap_err();
+            assert!(error.message.contains(&format!("message_bytes_max, less 1 KiB, is {most}")), "{error}");
+        }
     }
 
     #[test]

@@ -9,8 +9,8 @@ use super::hosted_map::HostedMap;
 use super::map_file::from_file;
 use super::resource_budget::ResourceBudget;
 use super::{
-    ListingRequest, LocalizationRequest, Marks, PointCloud, PointQuery, Reason, ScanRequest, ServiceError,
-    ServiceSettings,
+    BlockForm, BlockRequest, Limits, ListingRequest, LocalizationRequest, Marks, PointCloud, PointQuery,
+    Reason, ScanRequest, ServiceError, ServiceSettings,
 };
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
@@ -174,5 +174,30 @@ fn a_deletion_finds_what_it_means_with_looks_in_proportion_to_the_map() {
         let gone = || true;
         let listed = map.list(&ListingRequest::of(0, Some(everywhere)), usize::MAX, StopSignal::when(&gone));
         assert_eq!(listed.unwrap_err().reason, Reason::CallerGone);
+    }
+}
+
+#[test]
+fn a_block_and_a_count_are_made_with_looks_in_proportion_to_the_map_and_given_up_at_the_next_one() {
+    let everywhere = Region::cuboid([-1e3; 3], [1e3; 3]).unwrap();
+    let (limits, counted) = (
+        Limits { block_bytes_max: 1 << 30, message_bytes_max: usize::MAX, ..Limits::default() },
+        ListingRequest { count_only: true, ..ListingRequest::of(0, Some(everywhere)) },
+    );
+    let request = BlockRequest { level: 0, form: BlockForm::Sparse { region: None } };
+    for side in [40, 160, 320] {
+        let (map, _) = sheet(side);
+        let blocks = (side * side) as usize;
+        let block =
+            |stop: StopSignal<'_>| request.answer_in(&map.map, map.uuid, &limits, |_| Ok(()), stop).map(drop);
+        let count = |stop: StopSignal<'_>| map.count(&counted, stop).map(drop);
+        for work in [&block as &dyn Fn(StopSignal<'_>) -> Result<(), ServiceError>, &count] {
+            let looks = Cell::new(0);
+            let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
+            work(StopSignal::when(&count_look)).unwrap();
+            assert!(blocks / looks.get() <= 16 << 10, "{blocks} blocks, {} looks", looks.get());
+            let gone = || true;
+            assert_eq!(work(StopSignal::when(&gone)).unwrap_err().reason, Reason::CallerGone);
+        }
     }
 }

@@ -3,6 +3,7 @@
 mod keyword;
 mod localization;
 mod map;
+mod observers;
 mod pose;
 mod scan;
 mod version;
@@ -10,6 +11,7 @@ mod version;
 pub use keyword::ByKeyword;
 pub use localization::{JsonCandidate, JsonLocalization};
 pub use map::{JsonFilter, JsonLevel, JsonMap, JsonSettings, JsonSighting, JsonStorage};
+pub use observers::{JsonObservers, JsonObservingScan};
 pub use pose::JsonPose;
 pub use scan::{JsonDirection, JsonScan};
 pub use version::JsonVersion;
