@@ -20,7 +20,7 @@ use mrol::geometry::{Point, Pose};
 use mrol::map::{Lookup, MapContents, MapName, MapSettings, Region, RobotName};
 use mrol::mapping::Guess;
 use mrol::service::{
-    Deletion, DeletionTarget, Limits, MapService, PointQuery, ScanRequest, ServiceSettings, VoxelQuery,
+    Deletion, DeletionTarget, Limits, ListingRequest, MapService, PointQuery, ScanRequest, ServiceSettings,
 };
 use mrol::store::{OpeningProgress, Snapshot};
 use mrol::voxel::{VoxelKey, VoxelSet};
@@ -175,7 +175,7 @@ async fn queries(service: MapService, floors: usize, enough: Arc<AtomicBool>, he
 async fn listings(service: MapService, enough: Arc<AtomicBool>, heart: Beat) -> usize {
     let mut listed = 0;
     while !enough.load(Ordering::Relaxed) {
-        service.list_voxels(&map(), VoxelQuery::default()).await.expect("a listing");
+        service.list_voxels(&map(), ListingRequest::default()).await.expect("a listing");
         listed += 1;
         heart.beat();
     }

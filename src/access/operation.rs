@@ -59,6 +59,8 @@ operations! {
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
     ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
     ListKeepOuts:      Some(Read),  grpc "/mrol.v1.Occupancy/ListKeepOuts",      http GET "/v1/maps/{map}/keep-outs";
+    GetBlock:          Some(Read),  grpc "/mrol.v1.Occupancy/GetBlock",          http GET "/v1/maps/{map}/block";
+    ListObservers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListObservers",     http GET "/v1/maps/{map}/observers";
     Watch:             Some(Read),  grpc "/mrol.v1.Occupancy/Watch",             http GET "/v1/maps/{map}/watch";
     InsertScan:        Some(Insert), grpc "/mrol.v1.Mapping/InsertScan",          http POST "/v1/maps/{map}/scans";
     InsertScanStream:  Some(Insert), grpc "/mrol.v1.Mapping/InsertScanStream";

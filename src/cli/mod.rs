@@ -5,6 +5,7 @@
 //! makes no sense, and 3 when a scan was answered and not accepted (`insert` and `localize`).
 
 mod alignment_options;
+mod block;
 mod config;
 mod delete;
 mod doctor;
@@ -22,6 +23,7 @@ mod localize;
 mod map;
 mod map_report;
 mod maps;
+mod observers;
 mod output;
 mod parse;
 mod query;
@@ -79,6 +81,8 @@ enum Command {
     Insert(insert::Insert),
     Localize(localize::Localize),
     Query(query::Query),
+    Block(block::Block),
+    Observers(observers::Observers),
     Delete(delete::Delete),
     Undo(undo::Undo),
     Keepout(keepout::KeepOuts),
@@ -117,6 +121,8 @@ impl Command {
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
             Self::Localize(localize) => runtime::block_on(localize.run(output)),
             Self::Query(query) => runtime::block_on(query.run(output)),
+            Self::Block(block) => runtime::block_on(block.run(output)),
+            Self::Observers(observers) => runtime::block_on(observers.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
             Self::Keepout(keepout) => runtime::block_on(keepout.run(output)),

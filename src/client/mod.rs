@@ -49,9 +49,10 @@ use tonic::{Request, Response, Status};
 
 use crate::map::{MapName, RobotName, SessionName};
 use crate::service::{
-    Deletion, DeletionAnswer, LocalizationAnswer, LocalizationRequest, MapInfo, MapList, PointAnswer,
-    PointQuery, Reason, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo,
-    UndoAnswer, VoxelListing, VoxelQuery,
+    BlockAnswer, BlockRequest, Deletion, DeletionAnswer, ListingRequest, LocalizationAnswer,
+    LocalizationRequest, MapInfo, MapList, ObserversAnswer, ObserversRequest, PointAnswer, PointQuery,
+    Reason, ScanAnswer, ScanRequest, ServiceError, TrajectoryAnswer, TrajectoryQuery, Undo, UndoAnswer,
+    VoxelListing,
 };
 use crate::wire::{pb, restore_pieces};
 use connection::Connection;
@@ -186,8 +187,12 @@ impl Client {
     ///
     /// # Errors
     /// When the server refuses, or cannot be reached.
-    pub async fn list_voxels(&self, map: &MapName, query: VoxelQuery) -> Result<VoxelListing, ClientError> {
-        let request = self.request((map, query));
+    pub async fn list_voxels(
+        &self,
+        map: &MapName,
+        request: ListingRequest,
+    ) -> Result<VoxelListing, ClientError> {
+        let request = self.request((map, request));
         let chunks = self.connection.occupancy().list_voxels(request).await;
         let mut chunks = self.connection.answers::<_, VoxelListing>(chunks)?;
         let mut listing = chunks.next().await.unwrap_or_else(|| Err(missing_message("listing")))?;
@@ -195,6 +200,28 @@ impl Client {
             listing.keys.extend(chunk?.keys);
         }
         Ok(listing)
+    }
+
+    /// Returns a part of a level as it is stored, or the distance of each of its cells from what is occupied, at one revision.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn get_block(&self, map: &MapName, request: BlockRequest) -> Result<BlockAnswer, ClientError> {
+        let request = self.request((map, request));
+        self.domain(self.connection.occupancy().get_block(request).await)
+    }
+
+    /// Lists the scans that touched a voxel and were not undone, newest first, as far back as the journal reaches.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn list_observers(
+        &self,
+        map: &MapName,
+        request: ObserversRequest,
+    ) -> Result<ObserversAnswer, ClientError> {
+        let request = self.request((map, request));
+        self.domain(self.connection.occupancy().list_observers(request).await)
     }
 
     /// Aligns a scan and, where it fits, adds it. A scan that does not align is an answer, not an error.

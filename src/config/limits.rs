@@ -42,6 +42,7 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.localization_time_max_s", limits.localization_time_max_s),
         ("limits.recovery_search_time_max_s", limits.recovery_search_time_max_s),
         ("limits.recovery_search_interval_s", limits.recovery_search_interval_s),
+        ("limits.observers_time_max_s", limits.observers_time_max_s),
         ("limits.connection_opening_max_s", limits.connection_opening_max_s),
         ("limits.http_idle_max_s", limits.http_idle_max_s),
         ("limits.grpc_idle_max_s", limits.grpc_idle_max_s),

@@ -50,8 +50,8 @@ impl Occupancy for Adapter {
         request: Request<pb::ListVoxelsRequest>,
     ) -> Result<Response<Self::ListVoxelsStream>, Status> {
         let service = service_of(&request)?;
-        let (map, query) = request.into_inner().try_into()?;
-        let listing = service.list_voxels(&map, query).await?;
+        let (map, request) = request.into_inner().try_into()?;
+        let listing = service.list_voxels(&map, request).await?;
         let kept = self.admission.keep(listing_bytes(listing.keys.len()))?;
         let chunks = voxel_chunks(listing).map(move |chunk| {
             let _until_sent = &kept;
@@ -68,6 +68,26 @@ impl Occupancy for Adapter {
         let map = MapName::new(&request.into_inner().map).map_err(ServiceError::from)?;
         let listing = service.list_keep_outs(&map).await?;
         Ok(answered(listing.into()))
+    }
+
+    async fn get_block(
+        &self,
+        request: Request<pb::GetBlockRequest>,
+    ) -> Result<Response<pb::GetBlockResponse>, Status> {
+        let service = service_of(&request)?;
+        let (map, request) = request.into_inner().try_into()?;
+        let answer = service.get_block(&map, request).await?;
+        Ok(answered(answer.into()))
+    }
+
+    async fn list_observers(
+        &self,
+        request: Request<pb::ListObserversRequest>,
+    ) -> Result<Response<pb::ListObserversResponse>, Status> {
+        let service = service_of(&request)?;
+        let (map, request) = request.into_inner().try_into()?;
+        let answer = service.list_observers(&map, request).await?;
+        Ok(answered(answer.into()))
     }
 
     async fn watch(&self, request: Request<pb::WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {

@@ -1,5 +1,6 @@
 //! The HTTP adapters, with the same meaning as gRPC: JSON for people, bytes for programs.
 
+mod block;
 mod body;
 mod deletions;
 mod error;
@@ -11,8 +12,10 @@ mod map_file;
 mod maps;
 mod middleware;
 mod object;
+mod observers;
 mod occupancy;
 mod params;
+mod pieces;
 mod probes;
 mod routes;
 mod scans;

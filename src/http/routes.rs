@@ -5,8 +5,8 @@ use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
-    Adapter, deletions, keep_outs, localization, map_file, maps, occupancy, probes, scans, trajectory, undo,
-    voxels, watch,
+    Adapter, block, deletions, keep_outs, localization, map_file, maps, observers, occupancy, probes, scans,
+    trajectory, undo, voxels, watch,
 };
 use crate::access::Operation;
 
@@ -39,6 +39,8 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::Undo => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),
         Operation::ListVoxels => on(method, voxels::list),
+        Operation::GetBlock => on(method, block::get),
+        Operation::ListObservers => on(method, observers::list),
         Operation::Watch => on(method, watch::watch),
         Operation::ListKeepOuts => on(method, keep_outs::list),
         Operation::PutKeepOut => on(method, keep_outs::put),

@@ -1,24 +1,25 @@
-//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z&keep_out=`: the occupied voxels of a level.
+//! `GET /v1/maps/{map}/voxels?level=&min=x,y,z&max=x,y,z&keep_out=&count_only=`: the occupied voxels of a level, those in a
+//! box or those that a camera sees (`map_from_camera=x,y,z,qx,qy,qz,qw&fov=h,v&range=near,far`), or their number.
 
-use std::convert::Infallible;
 use std::fmt::Write;
 
-use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
 
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, RegionParams};
-use crate::service::{Reason, ServiceError, VoxelQuery};
+use super::params::{Map, Params, RegionParams, numbers, pose};
+use super::pieces::{self, Pieces};
+use crate::map::{Frustum, VoxelSelection};
+use crate::service::{ListingRequest, Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::json::JsonVersion;
 
-/// Voxels that are written to JSON at once: about half a MiB.
-const VOXELS_PER_CHUNK: usize = 32_768;
+/// Voxels that are written to JSON at once, about half a MiB, and the bytes of one at most: three numbers of eight characters,
+/// and what stands between them.
+const VOXELS: Pieces = Pieces { field: "voxels", items: 32_768, item_bytes: 29 };
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -31,15 +32,11 @@ pub(super) struct VoxelsParams {
     size: Option<String>,
     #[serde(default)]
     keep_out: bool,
-}
-
-/// Bytes of a voxel in JSON, at most: three numbers of eight characters, and what stands between them.
-const VOXEL_BYTES_MAX: usize = 28;
-
-/// Bytes of memory that a listing of so many voxels takes until it is sent: its keys, and two pieces of text, one that is made
-/// and one that is sent, either in twice the room where the first guess at it was too small.
-fn listing_bytes(voxels: usize) -> usize {
-    voxels * size_of::<VoxelKey>() + 4 * voxels.min(VOXELS_PER_CHUNK) * VOXEL_BYTES_MAX
+    map_from_camera: Option<String>,
+    fov: Option<String>,
+    range: Option<String>,
+    #[serde(default)]
+    count_only: bool,
 }
 
 /// What stands before the voxels.
@@ -47,6 +44,7 @@ fn listing_bytes(voxels: usize) -> usize {
 struct Head {
     level: u32,
     resolution_m: f64,
+    voxels_total: usize,
     #[serde(flatten)]
     version: JsonVersion,
 }
@@ -55,63 +53,63 @@ pub(super) async fn list(
     State(adapter): State<Adapter>,
     Service(service): Service,
     Map(map): Map,
-    Params(query): Params<VoxelsParams>,
+    Params(params): Params<VoxelsParams>,
 ) -> Result<Response, HttpError> {
-    let VoxelsParams { level, min, max, map_from_box, size, keep_out } = query;
-    let region = RegionParams { min, max, map_from_box, size }.region()?;
-    let listing = service.list_voxels(&map, VoxelQuery { level, region, keep_out }).await?;
-    let head = Head { level, resolution_m: listing.resolution_m, version: listing.version.into() };
-    let kept = adapter.admission.keep(listing_bytes(listing.keys.len()))?;
-    let chunks = chunks(head, listing.keys)?.map(move |chunk| {
-        let _until_sent = &kept;
-        Ok::<_, Infallible>(Bytes::from(chunk))
-    });
-    let body = Body::from_stream(tokio_stream::iter(chunks));
-    Ok(([(header::CONTENT_TYPE, "application/json")], body).into_response())
-}
-
-/// `{<head>,"voxels":[[i,j,k],...]}` in pieces, each made when it is asked for: a listing may be larger than any
-/// other answer.
-fn chunks(head: Head, keys: Vec<VoxelKey>) -> Result<impl Iterator<Item = String> + Send, ServiceError> {
-    let head = serde_json::to_string(&head)
-        .map_err(|error| ServiceError::new(Reason::NotWritten, error.to_string()))?;
-    let first = format!("{},\"voxels\":[", head.trim_end_matches('}'));
-    let pieces = (0..keys.len()).step_by(VOXELS_PER_CHUNK).map(move |start| {
-        let end = keys.len().min(start + VOXELS_PER_CHUNK);
-        piece(&keys[start..end], start == 0)
-    });
-    Ok(std::iter::once(first).chain(pieces).chain(std::iter::once("]}".to_owned())))
-}
-
-fn piece(keys: &[VoxelKey], first: bool) -> String {
-    let mut text = String::with_capacity(keys.len() * 16);
-    for (i, key) in keys.iter().enumerate() {
-        let [x, y, z] = key.index();
-        let comma = if first && i == 0 { "" } else { "," };
-        // Writing to a String cannot fail.
-        let _ = write!(text, "{comma}[{x},{y},{z}]");
+    let request = ListingRequest::try_from(params)?;
+    let listing = service.list_voxels(&map, request).await?;
+    let (resolution_m, voxels_total, version) =
+        (listing.resolution_m, listing.voxels_total, listing.version.into());
+    let head = Head { level: request.level, resolution_m, voxels_total, version };
+    if request.count_only {
+        return Ok(Json(head).into_response());
     }
-    text
+    let (keys, count) = (listing.keys, voxels_total);
+    let kept = adapter.admission.keep(count * size_of::<VoxelKey>() + VOXELS.bytes(count))?;
+    let write = move |text: &mut String, item: usize| write_voxel(text, keys[item]);
+    Ok(pieces::response(VOXELS.of(&head, count, write)?, kept))
+}
+
+fn write_voxel(text: &mut String, key: VoxelKey) {
+    let [x, y, z] = key.index();
+    // Writing to a String cannot fail.
+    let _ = write!(text, "[{x},{y},{z}]");
+}
+
+impl TryFrom<VoxelsParams> for ListingRequest {
+    type Error = ServiceError;
+
+    fn try_from(params: VoxelsParams) -> Result<Self, ServiceError> {
+        let VoxelsParams { level, min, max, map_from_box, size, .. } = params;
+        let region = RegionParams { min, max, map_from_box, size }.region()?;
+        let view = match [params.map_from_camera, params.fov, params.range] {
+            [None, None, None] => None,
+            [Some(placed), Some(fov), Some(range)] => Some(Frustum::new(
+                pose(&placed, "map_from_camera")?,
+                numbers(&fov, "fov")?,
+                numbers(&range, "range")?,
+            )?),
+            _ => {
+                let message = "a view takes map_from_camera, fov and range, and not some of them alone";
+                return Err(ServiceError::new(Reason::MissingField, message));
+            }
+        };
+        let (keep_out, count_only) = (params.keep_out, params.count_only);
+        Ok(Self { level, selection: VoxelSelection { region, view }, keep_out, count_only })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::MapVersion;
+    use crate::voxel::{INDEX_MAX, INDEX_MIN};
 
     #[test]
-    fn the_pieces_are_one_json_object() {
-        let version = MapVersion { revision: 3, map_uuid: uuid::Uuid::nil(), content_hash: None };
-        for count in [0, 1, VOXELS_PER_CHUNK, VOXELS_PER_CHUNK + 2] {
-            let keys: Vec<_> = (0..count as i32).map(|i| VoxelKey::new([i, -1, 2]).unwrap()).collect();
-            let head = Head { level: 1, resolution_m: 0.1, version: version.into() };
-            let text: String = chunks(head, keys).unwrap().collect();
-            let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-            let voxels = json["voxels"].as_array().unwrap();
-            assert_eq!(voxels.len(), count);
-            assert_eq!((json["level"].as_u64(), json["revision"].as_u64()), (Some(1), Some(3)));
-            let last = voxels.last().map(|voxel| voxel.to_string());
-            assert_eq!(last, count.checked_sub(1).map(|i| format!("[{i},-1,2]")));
+    fn a_voxel_takes_no_more_text_than_is_kept_for_it() {
+        for index in [[INDEX_MIN; 3], [INDEX_MAX; 3], [0, -1, 2]] {
+            let mut text = String::new();
+            write_voxel(&mut text, VoxelKey::new(index).unwrap());
+            assert_eq!(serde_json::from_str::<[i32; 3]>(&text).unwrap(), index);
+            assert!(text.len() < VOXELS.item_bytes);
         }
     }
 }

@@ -1,14 +1,14 @@
 //! The voxels of one level, copied out of the map.
 
 use super::occupied_voxel_list::tier_of;
-use super::{MapView, Region};
+use super::{MapView, VoxelSelection};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelKey};
 
 /// A block with at least so many voxels is copied as it is stored, one with fewer voxel by voxel: whichever is smaller.
 const VOXELS_OF_BLOCK_MIN: usize = size_of::<(VoxelKey, BlockMask)>() / size_of::<VoxelKey>();
 
-/// The occupied voxels of one level, of a region or of the whole map, at one revision.
+/// The occupied voxels of one level, some or all of them, at one revision.
 ///
 /// It is a copy of the map's blocks, 8 bytes a voxel at most and some 1 byte of a surface: taking it is short, so that
 /// changes need not wait for a long listing that is made of it.
@@ -60,13 +60,12 @@ impl LevelVoxels {
 }
 
 impl MapView<'_> {
-    /// Copies the voxels of `level`, those whose centers lie in `region` where there is one. Looks at `stop` and at
-    /// `most` shard by shard: where it ends early for one of them the copy is not whole, and longer than `most` for the
-    /// latter.
+    /// Copies the selected voxels of `level`. Looks at `stop` and at `most` shard by shard: where it ends early for one of
+    /// them the copy is not whole, and longer than `most` for the latter.
     pub fn level_voxels(
         &self,
         level: u32,
-        region: Option<&Region>,
+        selection: &VoxelSelection,
         most: usize,
         stop: StopSignal<'_>,
     ) -> LevelVoxels {
@@ -76,15 +75,25 @@ impl MapView<'_> {
             if stop.is_stopped() || copy.len > most {
                 break;
             }
-            match region {
-                Some(region) => self.for_each_block(&list, region, stop, |block, mask| {
-                    copy.push(block, &self.part_in(region, level, block, mask));
-                }),
-                None => stop
-                    .paced(list.blocks().iter(), BLOCKS_PER_LOOK)
-                    .for_each(|(block, mask)| copy.push(block, mask)),
-            }
+            self.for_each_block(&list, selection, stop, |block, mask| {
+                copy.push(block, &self.part_in(selection, level, block, mask));
+            });
         }
         copy
+    }
+
+    /// Number of selected voxels of `level`; once stopped, of some of them.
+    pub fn count_voxels(&self, level: u32, selection: &VoxelSelection, stop: StopSignal<'_>) -> usize {
+        if selection.is_everything() {
+            return self.lists(level).map(|list| list.len()).sum();
+        }
+        let (_, up) = tier_of(level);
+        let mut count = 0;
+        for list in self.lists(level) {
+            self.for_each_block(&list, selection, stop, |block, mask| {
+                count += self.part_in(selection, level, block, mask).count(up);
+            });
+        }
+        count
     }
 }

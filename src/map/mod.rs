@@ -8,12 +8,15 @@ mod block_change;
 mod bounds;
 mod bulk;
 mod capacity_schedule;
+mod cell_box;
 mod change;
 pub mod commit;
 mod committed;
 mod content_hash;
 mod contents;
+mod distance_block;
 mod filter_room;
+mod frustum;
 mod idempotency_log;
 mod info;
 mod keep_out;
@@ -34,12 +37,16 @@ mod trajectory;
 mod update;
 pub mod view;
 mod voxel_ownership;
+mod voxel_selection;
 
+pub use cell_box::CellBox;
 pub use change::{Change, DeletionRecord, KeepOutRecord, Request, UndoRecord};
 pub use commit::Committer;
 pub use committed::Committed;
 pub use content_hash::{ContentHash, ContentVersion};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
+pub use distance_block::{DISTANCE_CAP_MAX, DistanceBlock, margin_of};
+pub use frustum::{Frustum, FrustumError};
 pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
@@ -65,6 +72,7 @@ pub use trajectory::{
 };
 pub use view::{LongRead, MapView};
 pub use voxel_ownership::{Reversal, VoxelOwnership};
+pub use voxel_selection::VoxelSelection;
 
 use std::sync::Arc;
 

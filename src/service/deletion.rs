@@ -96,7 +96,7 @@ impl HostedMap {
         let keys: Vec<VoxelKey> = match &deletion.target {
             DeletionTarget::Points(points) => self.keys_of(points.as_slice(), level)?,
             DeletionTarget::Keys(keys) => {
-                keys.iter().map(|&key| in_range(key, level)).collect::<Result<_, _>>()?
+                keys.iter().map(|&key| in_range("keys", key, level)).collect::<Result<_, _>>()?
             }
             DeletionTarget::Region(region) => {
                 let found = self.map.long_read().view().finest_in_until(region, level, stop);
@@ -138,13 +138,14 @@ pub(super) fn removal_bytes(map: &MultiResolutionMap, voxels: &VoxelSet) -> u64 
 /// A block's key and mask.
 const BLOCK_BYTES: usize = size_of::<(VoxelKey, BlockMask)>();
 
-fn in_range(key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
+/// The key, which is one of a voxel of `level`.
+pub(super) fn in_range(field: &str, key: VoxelKey, level: u32) -> Result<VoxelKey, ServiceError> {
     let range = INDEX_MIN >> level..=INDEX_MAX >> level;
     if key.index().iter().all(|i| range.contains(i)) {
         return Ok(key);
     }
     let message = format!(
-        "keys has {key:?}, whose indices must lie in {}..={} at level {level}",
+        "{field} has {key:?}, whose indices must lie in {}..={} at level {level}",
         range.start(),
         range.end()
     );

@@ -6,7 +6,7 @@ use super::error_code::ErrorCode;
 use super::reason::Reason;
 use crate::bloom::FilterSettingsError;
 use crate::geometry::PoseError;
-use crate::map::{KeepOutShapeError, MapSettingsError, NameError, PrismError, RegionError};
+use crate::map::{FrustumError, KeepOutShapeError, MapSettingsError, NameError, PrismError, RegionError};
 use crate::voxel::SettingError;
 
 /// A failed request: nothing was changed.
@@ -92,5 +92,11 @@ impl From<KeepOutShapeError> for ServiceError {
 impl From<RegionError> for ServiceError {
     fn from(error: RegionError) -> Self {
         Self::new(Reason::BadRegion, error.to_string())
+    }
+}
+
+impl From<FrustumError> for ServiceError {
+    fn from(error: FrustumError) -> Self {
+        Self::new(Reason::BadView, error.to_string())
     }
 }

@@ -14,8 +14,8 @@ use super::point_query::{POINTS_PER_STEP, point_without_voxel};
 use super::recent_changes::RecentChanges;
 use super::resource_budget::ResourceBudget;
 use super::{
-    MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing, VoxelQuery,
-    check_not_stopped, ended_early,
+    ListingRequest, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError,
+    VoxelListing, check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
 use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, RobotName};
@@ -304,29 +304,30 @@ impl HostedMap {
         point_without_voxel(points, quantize, self.map.lattice())
     }
 
+    /// The voxels that are asked for, at most `most` of them.
     pub(super) fn list(
         &self,
-        &VoxelQuery { level, region, keep_out }: &VoxelQuery,
+        request: &ListingRequest,
         most: usize,
         stop: StopSignal<'_>,
     ) -> Result<VoxelListing, ServiceError> {
-        let region = region.as_ref();
+        let ListingRequest { level, selection, keep_out, .. } = *request;
         let long_read = self.map.long_read();
         let view = long_read.view();
         let view = if keep_out { view.with_keep_outs() } else { view };
         // How many there are of a whole level is known: nothing is copied of more than may be listed.
-        let whole = if region.is_none() { view.lists(level).map(|list| list.len()).sum() } else { 0 };
+        let whole = if selection.is_everything() { view.count_voxels(level, &selection, stop) } else { 0 };
         if whole > most {
             return Err(listing_too_large(level, whole, most));
         }
-        let (copy, version) = (view.level_voxels(level, region, most, stop), view.version());
+        let (copy, version) = (view.level_voxels(level, &selection, most, stop), view.version());
         let keep_outs = view.keep_outs().cloned().unwrap_or_default();
         drop(view);
         drop(long_read);
         if copy.len() > most {
             return Err(listing_too_large(level, copy.len(), most));
         }
-        let kept_out = keep_outs.voxels_of(level, region, self.map.lattice(), most, stop);
+        let kept_out = keep_outs.voxels_of(level, &selection, self.map.lattice(), most, stop);
         check_not_stopped(stop)?;
         let kept_out = kept_out.map_err(|_| keep_outs_too_large(level, most))?;
         let mut keys = Vec::with_capacity((copy.len() + kept_out.len()).min(most));
@@ -338,8 +339,30 @@ impl HostedMap {
             return Err(listing_too_large(level, found, most));
         }
         keys.extend(kept_out.iter());
+        let (resolution_m, voxels_total) = (self.map.lattice().resolution_m(level), keys.len());
+        Ok(VoxelListing { resolution_m, voxels_total, keys, version: self.version(version) })
+    }
+
+    /// The number of voxels that are asked for; of those of keep-outs, at most `most` are looked for.
+    pub(super) fn count(
+        &self,
+        request: &ListingRequest,
+        most: usize,
+        stop: StopSignal<'_>,
+    ) -> Result<VoxelListing, ServiceError> {
+        let ListingRequest { level, selection, keep_out, .. } = *request;
+        let long_read = self.map.long_read();
+        let view = long_read.view();
+        let view = if keep_out { view.with_keep_outs() } else { view };
+        let (occupied, version) = (view.count_voxels(level, &selection, stop), view.version());
+        let keep_outs = view.keep_outs().cloned().unwrap_or_default();
+        let kept_out = keep_outs.voxels_of(level, &selection, self.map.lattice(), most, stop);
+        check_not_stopped(stop)?;
+        let kept_out = kept_out.map_err(|_| keep_outs_too_large(level, most))?;
+        let is_other = |key: &VoxelKey| !view.contains(*key, level);
+        let voxels_total = occupied + kept_out.iter().filter(is_other).count();
         let resolution_m = self.map.lattice().resolution_m(level);
-        Ok(VoxelListing { resolution_m, keys, version: self.version(version) })
+        Ok(VoxelListing { resolution_m, voxels_total, keys: Vec::new(), version: self.version(version) })
     }
 
     pub(super) fn describe(

@@ -78,6 +78,14 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
+    /// Bytes of a block that is given out: one a cell of a dense one, 72 for 8 x 8 x 8 voxels of another. 16 MiB.
+    pub block_bytes_max: usize,
+    /// Cells of a dense block and as far around it as its distances go. 67,108,864.
+    pub block_cells_max: usize,
+    /// Scans that one list of those that touched a voxel has at most, the newest. 100.
+    pub observers_max: usize,
+    /// How long the journal is looked through for the scans that touched a voxel. 10 s.
+    pub observers_time_max_s: f64,
     /// Poses of one page of a trajectory, and of one that is asked for without a limit. 5,000.
     pub trajectory_page_max: usize,
     /// Keep-outs of one map. 256, which is also the most.
@@ -155,6 +163,10 @@ impl Default for Limits {
             maps_max: 64,
             voxels_per_map_max: 200_000_000,
             listed_voxels_max: 20_000_000,
+            block_bytes_max: 16 << 20,
+            block_cells_max: 64 << 20,
+            observers_max: 100,
+            observers_time_max_s: 10.0,
             trajectory_page_max: 5_000,
             keep_outs_max: KEEP_OUTS_MAX,
             keep_out_corners_max: PRISM_CORNERS_MAX,
@@ -182,6 +194,8 @@ impl Default for Limits {
 impl Limits {
     /// Bytes of one message where nothing is set.
     pub const MESSAGE_BYTES_MAX: usize = 32 << 20;
+    /// Bytes of a message besides those of a block, at most.
+    const BESIDE_BLOCK_BYTES: usize = 1 << 10;
 
     /// These limits for a process that may have so many bytes in memory, if that is known: what may lie in bodies, be
     /// restored or be searched in at once is an eighth of that at most.
@@ -228,6 +242,28 @@ impl Limits {
         }
         let message = format!("prism.corners_m has {corners} corners, keep_out_corners_max is {most}");
         Err(ServiceError::new(Reason::BadKeepOut, message))
+    }
+
+    /// The bytes that a block may have, and the limit that says so: one message has to hold it.
+    pub(super) fn block_bytes(&self) -> (usize, &'static str) {
+        let message = self.message_bytes_max.saturating_sub(Self::BESIDE_BLOCK_BYTES);
+        match self.block_bytes_max <= message {
+            true => (self.block_bytes_max, "block_bytes_max"),
+            false => (message, "message_bytes_max, less 1 KiB,"),
+        }
+    }
+
+    /// # Errors
+    /// When a block is larger than it may be.
+    pub(super) fn check_block_bytes(&self, bytes: usize) -> Result<(), ServiceError> {
+        let (most, limit) = self.block_bytes();
+        if bytes <= most {
+            return Ok(());
+        }
+        let message = format!(
+            "the block has {bytes} bytes or more, {limit} is {most}: ask for a smaller part or a coarser level"
+        );
+        Err(ServiceError::new(Reason::BlockTooLarge, message))
     }
 
     /// The poses of a page, where `limit` of them are asked for.
@@ -312,6 +348,21 @@ mod tests {
         assert!(limits.check_corners(0).is_ok() && limits.check_corners(5).is_ok());
         let refused = limits.check_corners(6).unwrap_err().message;
         assert_eq!(refused, "prism.corners_m has 6 corners, keep_out_corners_max is 5");
+    }
+
+    #[test]
+    fn a_block_has_room_in_one_message() {
+        let of = |block_bytes_max, message_bytes_max| Limits {
+            block_bytes_max,
+            message_bytes_max,
+            ..Limits::default()
+        };
+        assert_eq!(of(1000, 2024).block_bytes(), (1000, "block_bytes_max"));
+        for (limits, most) in [(of(1001, 2024), 1000), (of(1000, 5), 0)] {
+            assert!(limits.check_block_bytes(most).is_ok());
+            let error = limits.check_block_bytes(most + 1).unwrap_err();
+            assert!(error.message.contains(&format!("message_bytes_max, less 1 KiB, is {most}")), "{error}");
+        }
     }
 
     #[test]

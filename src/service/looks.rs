@@ -9,8 +9,8 @@ use super::hosted_map::HostedMap;
 use super::map_file::from_file;
 use super::resource_budget::ResourceBudget;
 use super::{
-    LocalizationRequest, Marks, PointCloud, PointQuery, Reason, ScanRequest, ServiceError, ServiceSettings,
-    VoxelQuery,
+    BlockForm, BlockRequest, Limits, ListingRequest, LocalizationRequest, Marks, PointCloud, PointQuery,
+    Reason, ScanRequest, ServiceError, ServiceSettings,
 };
 use crate::align::localize::LocalizationQuery;
 use crate::geometry::{Point, Pose};
@@ -79,14 +79,11 @@ fn a_listing_looks_at_the_signal_before_each_shard() {
     for region in [None, Some(Region::cuboid([-100.0; 3], [100.0; 3]).unwrap())] {
         let looks = Cell::new(0);
         let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
-        let listing = map
-            .list(&VoxelQuery { region, ..VoxelQuery::default() }, usize::MAX, StopSignal::when(&count_look))
-            .unwrap();
+        let listing =
+            map.list(&ListingRequest::of(0, region), usize::MAX, StopSignal::when(&count_look)).unwrap();
         assert!(listing.keys.len() > 5000 && looks.get() >= SHARDS, "{} looks", looks.get());
         let gone = || true;
-        let gone = map
-            .list(&VoxelQuery { region, ..VoxelQuery::default() }, usize::MAX, StopSignal::when(&gone))
-            .unwrap_err();
+        let gone = map.list(&ListingRequest::of(0, region), usize::MAX, StopSignal::when(&gone)).unwrap_err();
         assert_eq!(gone.reason, Reason::CallerGone);
     }
 }
@@ -176,11 +173,32 @@ fn a_deletion_finds_what_it_means_with_looks_in_proportion_to_the_map() {
         assert_eq!(blocks, (side * side) as usize);
         assert!(blocks / looks.get() <= 16 << 10, "{blocks} blocks, {} looks", looks.get());
         let gone = || true;
-        let listed = map.list(
-            &VoxelQuery { region: Some(everywhere), ..VoxelQuery::default() },
-            usize::MAX,
-            StopSignal::when(&gone),
-        );
+        let listed = map.list(&ListingRequest::of(0, Some(everywhere)), usize::MAX, StopSignal::when(&gone));
         assert_eq!(listed.unwrap_err().reason, Reason::CallerGone);
+    }
+}
+
+#[test]
+fn a_block_and_a_count_are_made_with_looks_in_proportion_to_the_map_and_given_up_at_the_next_one() {
+    let everywhere = Region::cuboid([-1e3; 3], [1e3; 3]).unwrap();
+    let (limits, counted) = (
+        Limits { block_bytes_max: 1 << 30, message_bytes_max: usize::MAX, ..Limits::default() },
+        ListingRequest { count_only: true, ..ListingRequest::of(0, Some(everywhere)) },
+    );
+    let request = BlockRequest { level: 0, form: BlockForm::Sparse { region: None } };
+    for side in [40, 160, 320] {
+        let (map, _) = sheet(side);
+        let blocks = (side * side) as usize;
+        let block =
+            |stop: StopSignal<'_>| request.answer_in(&map.map, map.uuid, &limits, |_| Ok(()), stop).map(drop);
+        let count = |stop: StopSignal<'_>| map.count(&counted, usize::MAX, stop).map(drop);
+        for work in [&block as &dyn Fn(StopSignal<'_>) -> Result<(), ServiceError>, &count] {
+            let looks = Cell::new(0);
+            let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
+            work(StopSignal::when(&count_look)).unwrap();
+            assert!(blocks / looks.get() <= 16 << 10, "{blocks} blocks, {} looks", looks.get());
+            let gone = || true;
+            assert_eq!(work(StopSignal::when(&gone)).unwrap_err().reason, Reason::CallerGone);
+        }
     }
 }

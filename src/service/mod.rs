@@ -4,6 +4,7 @@
 
 mod allowed_maps;
 mod allowed_scans;
+mod block;
 mod catalog;
 mod commit_queue;
 mod deletion;
@@ -27,6 +28,7 @@ mod maps;
 #[cfg(all(test, feature = "shuttle"))]
 mod modeled;
 mod observer;
+mod observers;
 mod point_query;
 mod pool;
 mod reason;
@@ -56,11 +58,12 @@ pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
 pub use reason::{Reason, ToldBy};
 pub use request::{
-    BlockBytes, Cause, ChangePart, DeleteKeepOut, Deletion, DeletionAnswer, DeletionTarget, Foreground,
-    KeepOutAnswer, KeepOutList, MapFile, MapInfo, MapList, MapStorage, MapVersion, PointAnswer, PointCloud,
-    PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanRequest, StatePart, TimeReference, TrajectoryAnswer,
-    TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing, VoxelQuery, WatchEvent,
-    WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
+    BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
+    Deletion, DeletionAnswer, DeletionTarget, Foreground, KeepOutAnswer, KeepOutList, ListingRequest,
+    MapFile, MapInfo, MapList, MapStorage, MapVersion, ObservedVoxel, ObserversAnswer, ObserversRequest,
+    ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanRequest,
+    StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer,
+    UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;
@@ -97,6 +100,8 @@ pub struct MapService {
 const LONG_SHARE: usize = 4;
 /// See [`Inner::undo`].
 const UNDO_THREADS: usize = 1;
+/// See [`Inner::observers`].
+const OBSERVERS_THREADS: usize = 1;
 /// See [`Inner::watch`].
 const WATCH_THREADS: usize = 1;
 /// Threads for map files.
@@ -128,6 +133,9 @@ struct Inner {
     /// For what watches are told of besides the last changes: whole states, and changes that the journal has. One at a time,
     /// since each takes memory as a part of the map or a segment of the journal does.
     watch: Pool,
+    /// For finding the scans that touched a voxel, which may read much of the journal: one at a time, since each takes memory
+    /// as a segment of it does.
+    observers: Pool,
     budget: Arc<ResourceBudget>,
 }
 
@@ -153,6 +161,7 @@ impl MapService {
             map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
             recovery: Pool::beside("recovery", &localization, 0)?,
             watch: Pool::new("watch", WATCH_THREADS, waiting.max(settings.limits.watches_max))?,
+            observers: Pool::new("observers", OBSERVERS_THREADS, waiting)?,
             localization,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
@@ -198,7 +207,7 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 9] {
+    pub fn pools(&self) -> [PoolUse; 10] {
         let Inner {
             queries,
             mapping,
@@ -209,9 +218,21 @@ impl MapService {
             undo,
             map_files,
             watch,
+            observers,
             ..
         } = &*self.inner;
-        let all = [queries, mapping, long_mapping, alignment, localization, recovery, undo, map_files, watch];
+        let all = [
+            queries,
+            mapping,
+            long_mapping,
+            alignment,
+            localization,
+            recovery,
+            undo,
+            map_files,
+            watch,
+            observers,
+        ];
         all.map(Pool::in_use)
     }
 
@@ -400,17 +421,25 @@ impl MapService {
         self.observed("Undo", Some(map), work, |answer| Outcome::Changed(Change::of_undo(answer))).await
     }
 
-    /// The occupied voxels of a level, in a region or everywhere, all at one revision.
+    /// The occupied voxels of a level that are asked for, or their number, all at one revision.
     ///
     /// # Errors
-    /// `InvalidArgument` for a level that is none; `ResourceExhausted` when there are more than
-    /// `listed_voxels_max`; `NotFound`.
-    pub async fn list_voxels(&self, map: &MapName, query: VoxelQuery) -> Result<VoxelListing, ServiceError> {
+    /// `InvalidArgument` for a level that is none; `ResourceExhausted` when more than `listed_voxels_max` are to be listed;
+    /// `NotFound`.
+    pub async fn list_voxels(
+        &self,
+        map: &MapName,
+        request: ListingRequest,
+    ) -> Result<VoxelListing, ServiceError> {
         let work = async {
             let map = self.map(map)?;
-            map.check_level(query.level)?;
+            map.check_level(request.level)?;
             let most = self.limits().listed_voxels_max;
-            self.inner.queries.run(move |stop| map.list(&query, most, stop)).await?
+            let list = move |stop: StopSignal<'_>| match request.count_only {
+                true => map.count(&request, most, stop),
+                false => map.list(&request, most, stop),
+            };
+            self.inner.queries.run(list).await?
         };
         self.observed("ListVoxels", Some(map), work, |_| Outcome::Read).await
     }

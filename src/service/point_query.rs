@@ -61,13 +61,17 @@ pub(super) fn point_without_voxel(
     lattice: &Lattice,
 ) -> ServiceError {
     let place = points.iter().position(|&point| quantize.index(point).is_none()).unwrap_or_default();
-    let point = points[place];
+    without_voxel(&format!("points[{place}]"), points[place], lattice)
+}
+
+/// Says why the point of a field falls in no voxel.
+pub(super) fn without_voxel(field: &str, point: Point, lattice: &Lattice) -> ServiceError {
     let (min_m, end_m) = lattice.range_m();
     let (reason, what) = match point.is_finite() {
         true => (Reason::PointOutOfRange, format!("outside the map's range of {min_m} to {end_m} m")),
         false => (Reason::PointNotFinite, "not finite".to_owned()),
     };
-    ServiceError::new(reason, format!("points[{place}] is {what}: {point:?}"))
+    ServiceError::new(reason, format!("{field} is {what}: {point:?}"))
 }
 
 /// The first `points` bits of `words`, as bytes: bit i % 8 (lowest first) of byte i / 8.

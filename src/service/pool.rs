@@ -52,8 +52,8 @@ struct Counts {
 /// What became of the jobs of a pool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PoolUse {
-    /// The pool's: `query`, `mapping`, `long_mapping`, `alignment`, `localization`, `recovery`, `undo`, `map_file`
-    /// or `watch`.
+    /// The pool's: `query`, `mapping`, `long_mapping`, `alignment`, `localization`, `recovery`, `undo`, `map_file`,
+    /// `watch` or `observers`.
     pub name: &'static str,
     /// Jobs that wait for a thread.
     pub waiting: usize,

@@ -66,8 +66,9 @@ reasons! {
         AllPointsFiltered "all_points_filtered" Both: "no point of the scan passes the robot's range limits and body box", "check them; is the unit meters?";
         AmbiguousGuess "ambiguous_guess" Http: "several of `guess`, `motion` and `constant_velocity` are given", "give one";
         AmbiguousPoints "ambiguous_points" Grpc: "both `xyz_f32le` and `xyz` are filled", "fill one";
-        AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo, or shape of a keep-out", "give one";
+        AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo, shape of a keep-out, or voxel of a list of observers", "give one";
         BadBlocks "bad_blocks" Client: "the server's answer has blocks of voxels that are none", "update the client";
+        BadCap "bad_cap" Both: "`cap_m` of a dense block is not more than 0", "send meters";
         BadCovariance "bad_covariance" Both: "the guess's covariance is not 36 finite numbers of a symmetric, positive semidefinite matrix", "send it row by row: x y z in meters, then turns about the map's axes in radians";
         BadDirection "bad_direction" Client: "the server's answer has a direction that is none", "update the client";
         BadFilter "bad_filter" Both: "range limits or body box are not numbers in order", "correct them";
@@ -92,6 +93,7 @@ reasons! {
         BadTimeLimit "bad_time_limit" Both: "`time_limit_s` is negative or no number", "correct it";
         BadUuid "bad_uuid" Both: "`map_uuid` is no uuid", "send what an answer named";
         BadVerdict "bad_verdict" Client: "the server's answer has a verdict that this client does not know", "update the client";
+        BadView "bad_view" Both: "angles not between 0 and pi, `far_m` not beyond `near_m`, or a camera that is too far", "correct it";
         BatchTooLarge "batch_too_large" Both: "more than `points_per_request_max` or `keys_per_request_max`", "split it, or use a stream";
         BodyTooLarge "body_too_large" Http 413: "the body exceeds `message_bytes_max`, of a map file `map_file_bytes_max`", "split it, or raise the limit";
         BodyUnreadable "body_unreadable" Http: "the body broke off", "send it again";
@@ -144,7 +146,7 @@ reasons! {
         GuessRequired "guess_required" Both: "the robot has no accepted scan here, the map is not empty, and there is no guess", "give `guess`, or use `localize` first";
         MapEmpty "map_empty" Both: "the map has nothing to localize in", "insert a scan first";
         MapReplaced "map_replaced" Both: "the map is another one by now", "read its `map_uuid` and start again";
-        NoJournal "no_journal" Both: "the server keeps maps in memory only, and undo needs a journal", "start it with `--data-dir`";
+        NoJournal "no_journal" Both: "the server keeps maps in memory only; undo and the list of observers need a journal", "start it with `--data-dir`";
         NotUndoable "not_undoable" Both: "the revision was made by an undo or a keep-out, or what it made was undone already", "send what was undone again, or delete it again; put or delete the keep-out again";
         OutsideUndoWindow "outside_undo_window" Both: "the scan or deletion is from before `storage.undo_from_revision`", "delete by region; `store.undo_revisions`, `store.undo_bytes_max`";
         RevisionsUsedUp "revisions_used_up" Both: "revision 2^53 was reached", "make another map";
@@ -152,6 +154,7 @@ reasons! {
         ScanWithdrawn "scan_withdrawn" Both: "the scan was accepted and undone since", "send it under a new id to have it back";
     }
     ResourceExhausted {
+        BlockTooLarge "block_too_large" Both: "a block exceeds `block_bytes_max`, or with what lies around it `block_cells_max`", "ask for a smaller part, a coarser level or a smaller `cap_m`";
         DiskFull "disk_full" Both 507: "little room on the disk of the data folder; changes are refused until there is more", "make room, or delete a map";
         ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`, with those that keep-outs take where they are asked for", "ask for a region or a coarser level";
         MapFileTooLarge "map_file_too_large" Both: "a map's file, or one that is to be restored, exceeds `map_file_bytes_max`", "raise the limit, here and where the file is to be restored";

@@ -94,7 +94,7 @@ impl HostedMap {
             return Ok(Step::Answered(answer));
         }
         budget.check_to_shrink()?;
-        let folder = self.folder.clone().ok_or_else(|| self.no_observations())?;
+        let folder = self.folder.clone().ok_or_else(|| self.no_journal(UNDO))?;
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
         let targets = self.targets_of_undo(&undo.target, &folder, &withdrawn)?;
         let (scans, deletions) = (targets.scans.len(), targets.deletions.len());
@@ -251,16 +251,17 @@ impl HostedMap {
     }
 
     /// The journal cannot be read; that of a map that was deleted meanwhile need not be.
-    fn unreadable(&self, error: &StoreError) -> ServiceError {
+    pub(super) fn unreadable(&self, error: &StoreError) -> ServiceError {
         match self.folder.as_deref().is_some_and(MapFolder::is_gone) {
             true => Stop::Deleted.refusal(&self.name),
             false => ServiceError::new(Reason::JournalUnreadable, error.to_string()),
         }
     }
 
-    fn no_observations(&self) -> ServiceError {
+    /// Of a map in memory only, of which `what` would need the journal.
+    pub(super) fn no_journal(&self, what: &str) -> ServiceError {
         let message =
-            format!("map {} is kept in memory only: undo needs the journal of a data folder", self.name);
+            format!("map {} is kept in memory only: {what} needs the journal of a data folder", self.name);
         ServiceError::new(Reason::NoJournal, message)
     }
 

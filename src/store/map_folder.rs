@@ -11,10 +11,12 @@
 //! them. What readers ask is in [`Facts`].
 
 mod facts;
+mod newest_first;
 mod observing;
 mod opening;
 
 pub use facts::{FolderUse, Pin};
+pub use newest_first::JournalPart;
 pub use observing::{NotObserved, Observed};
 pub use opening::OpenedMap;
 

@@ -43,7 +43,7 @@ pub use journal::{
     Changes, Cut, JOURNAL_VERSION, Journal, JournalUse, RECORD_BYTES_MAX, Record, Recovered, Revised,
     SegmentedJournal,
 };
-pub use map_folder::{FolderUse, MapFolder, NotObserved, Observed, OpenedMap, Pin};
+pub use map_folder::{FolderUse, JournalPart, MapFolder, NotObserved, Observed, OpenedMap, Pin};
 pub use mode::{StoreMode, StoreModeError};
 pub use progress::{Opened, OpeningProgress};
 pub use settings::{Durability, DurabilityError, StoreSettings};

@@ -66,7 +66,12 @@ impl Lattice {
 
     /// Center of voxel `key` of `level` in the map frame, meters.
     pub fn center_m(&self, key: VoxelKey, level: u32) -> [f64; 3] {
-        key.index().map(|i| (f64::from(i) + 0.5) * self.resolution_m(level))
+        key.index().map(|i| self.center_along_m(i, level))
+    }
+
+    /// Center of the voxels of `level` with index `i` along an axis, meters along it.
+    pub fn center_along_m(&self, i: i32, level: u32) -> f64 {
+        (f64::from(i) + 0.5) * self.resolution_m(level)
     }
 
     /// The transform from points of a frame placed at `map_from_points` to voxel indices.

@@ -74,6 +74,18 @@ impl VoxelSet {
         })
     }
 
+    /// True where one of these lies in `voxel` of `level`.
+    pub fn touches(&self, voxel: VoxelKey, level: u32) -> bool {
+        match level.checked_sub(BLOCK_LEVELS) {
+            Some(above) => self.blocks.iter().any(|(block, _)| block.ancestor(above) == voxel),
+            None => {
+                let (block, cell) = Cell::of(voxel.index().map(|i| i << level));
+                let found = self.blocks.binary_search_by_key(&block, |(block, _)| *block);
+                found.is_ok_and(|place| self.blocks[place].1.contains(cell, level))
+            }
+        }
+    }
+
     /// The finest voxels, block by block.
     pub fn iter(&self) -> impl Iterator<Item = VoxelKey> + '_ {
         self.blocks.iter().flat_map(|(block, mask)| mask.cells(0).map(|cell| cell.voxel(*block)))

@@ -4,6 +4,7 @@
 //! back, so that the daemon and the client share one definition. What cannot be converted is an error that
 //! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
 
+mod block;
 mod deletion;
 mod failure;
 mod field;
@@ -13,6 +14,7 @@ mod keep_out;
 mod localization;
 mod map_file;
 mod maps;
+mod observers;
 mod occupancy;
 pub mod pb;
 mod scan;

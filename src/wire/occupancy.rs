@@ -2,8 +2,9 @@
 
 use super::types::{count_from, lookup_from};
 use super::{InField, pb, required, uuid_from};
-use crate::map::{MapName, Region};
-use crate::service::{PointAnswer, PointQuery, Reason, ServiceError, VoxelListing, VoxelQuery};
+use crate::geometry::Pose;
+use crate::map::{Frustum, MapName, Region, VoxelSelection};
+use crate::service::{ListingRequest, PointAnswer, PointQuery, Reason, ServiceError, VoxelListing};
 use crate::voxel::VoxelKey;
 
 /// Keys of one message of a listing, at most: half a MiB.
@@ -68,19 +69,43 @@ impl TryFrom<pb::QueryPointsResponse> for PointAnswer {
     }
 }
 
-impl TryFrom<pb::ListVoxelsRequest> for (MapName, VoxelQuery) {
+impl TryFrom<pb::ListVoxelsRequest> for (MapName, ListingRequest) {
     type Error = ServiceError;
 
     fn try_from(request: pb::ListVoxelsRequest) -> Result<Self, ServiceError> {
-        let region = request.region.map(Region::try_from).transpose()?;
-        let query = VoxelQuery { level: request.level, region, keep_out: request.keep_out };
-        Ok((MapName::new(&request.map)?, query))
+        let pb::ListVoxelsRequest { map, level, region, keep_out, count_only, view } = request;
+        let region = region.map(Region::try_from).transpose()?;
+        let view = view.map(Frustum::try_from).transpose().in_field("view")?;
+        let selection = VoxelSelection { region, view };
+        Ok((MapName::new(&map)?, ListingRequest { level, selection, keep_out, count_only }))
     }
 }
 
-impl From<(&MapName, VoxelQuery)> for pb::ListVoxelsRequest {
-    fn from((map, VoxelQuery { level, region, keep_out }): (&MapName, VoxelQuery)) -> Self {
-        Self { map: map.to_string(), level, region: region.map(Into::into), keep_out }
+impl From<(&MapName, ListingRequest)> for pb::ListVoxelsRequest {
+    fn from((map, request): (&MapName, ListingRequest)) -> Self {
+        let ListingRequest { level, selection: VoxelSelection { region, view }, keep_out, count_only } =
+            request;
+        let (region, view) = (region.map(Into::into), view.map(Into::into));
+        Self { map: map.to_string(), level, region, keep_out, count_only, view }
+    }
+}
+
+impl TryFrom<pb::View> for Frustum {
+    type Error = ServiceError;
+
+    fn try_from(view: pb::View) -> Result<Self, ServiceError> {
+        let pb::View { map_from_camera, horizontal_rad, vertical_rad, near_m, far_m } = view;
+        let map_from_camera: Pose =
+            required(map_from_camera, "map_from_camera")?.try_into().in_field("map_from_camera")?;
+        Ok(Self::new(map_from_camera, [horizontal_rad, vertical_rad], [near_m, far_m])?)
+    }
+}
+
+impl From<Frustum> for pb::View {
+    fn from(view: Frustum) -> Self {
+        let ([horizontal_rad, vertical_rad], [near_m, far_m]) = (view.angles_rad(), view.distances_m());
+        let map_from_camera = Some(view.map_from_camera().into());
+        Self { map_from_camera, horizontal_rad, vertical_rad, near_m, far_m }
     }
 }
 
@@ -93,7 +118,7 @@ pub fn listing_bytes(voxels: usize) -> usize {
 /// A listing as messages of at most [`KEYS_PER_CHUNK`] keys, each made when it is asked for; one without keys
 /// where there is no voxel, so that the state is told.
 pub fn voxel_chunks(listing: VoxelListing) -> impl Iterator<Item = pb::ListVoxelsResponse> + Send {
-    let VoxelListing { resolution_m, keys, version } = listing;
+    let VoxelListing { resolution_m, voxels_total, keys, version } = listing;
     let chunks = keys.len().div_ceil(KEYS_PER_CHUNK).max(1);
     (0..chunks).map(move |chunk| {
         let start = chunk * KEYS_PER_CHUNK;
@@ -102,6 +127,7 @@ pub fn voxel_chunks(listing: VoxelListing) -> impl Iterator<Item = pb::ListVoxel
             keys: keys[start..end].iter().map(|key| key.to_bits()).collect(),
             version: Some(version.into()),
             resolution_m,
+            voxels_total: voxels_total as u64,
         }
     })
 }
@@ -112,6 +138,7 @@ impl TryFrom<pb::ListVoxelsResponse> for VoxelListing {
     fn try_from(chunk: pb::ListVoxelsResponse) -> Result<Self, ServiceError> {
         Ok(Self {
             resolution_m: chunk.resolution_m,
+            voxels_total: count_from(chunk.voxels_total),
             keys: keys_from(&chunk.keys)?,
             version: required(chunk.version, "version")?.try_into()?,
         })
@@ -144,12 +171,37 @@ mod tests {
         };
         for count in [0, 1, KEYS_PER_CHUNK, KEYS_PER_CHUNK + 1] {
             let keys: Vec<_> = (0..count as u64).map(|bits| VoxelKey::from_bits(bits).unwrap()).collect();
-            let chunks: Vec<_> =
-                voxel_chunks(VoxelListing { resolution_m: 0.1, keys: keys.clone(), version }).collect();
+            let listing =
+                VoxelListing { resolution_m: 0.1, voxels_total: count, keys: keys.clone(), version };
+            let chunks: Vec<_> = voxel_chunks(listing).collect();
+            assert!(chunks.iter().all(|chunk| chunk.voxels_total == count as u64));
             assert_eq!(chunks.len(), count.div_ceil(KEYS_PER_CHUNK).max(1));
             let back = chunks.into_iter().flat_map(|chunk| VoxelListing::try_from(chunk).unwrap().keys);
             assert_eq!(back.collect::<Vec<_>>(), keys);
         }
+    }
+
+    #[test]
+    fn a_request_for_a_listing_survives_the_wire_and_a_view_that_is_none_is_named() {
+        let map = MapName::new("a").unwrap();
+        let pose = crate::geometry::pose([1.0, 2.0, 3.0], [0.0, 0.6, 0.0, 0.8]).unwrap();
+        let view = Frustum::new(pose, [1.5, 1.0], [0.1, 20.0]).unwrap();
+        let region = Region::cuboid([0.0; 3], [1.0; 3]).unwrap();
+        for (region, view) in [(None, None), (Some(region), None), (Some(region), Some(view))] {
+            let selection = VoxelSelection { region, view };
+            let request =
+                ListingRequest { level: 2, selection, keep_out: view.is_none(), count_only: view.is_some() };
+            let message = pb::ListVoxelsRequest::from((&map, request));
+            assert_eq!(<(MapName, ListingRequest)>::try_from(message).unwrap(), (map.clone(), request));
+        }
+        let view = pb::View { far_m: f64::NAN, ..view.into() };
+        let request = pb::ListVoxelsRequest { map: "a".into(), view: Some(view), ..Default::default() };
+        let error = <(MapName, ListingRequest)>::try_from(request.clone()).unwrap_err();
+        assert_eq!(error.reason, Reason::BadView);
+        assert!(error.message.starts_with("view: near_m must not be negative"), "{error}");
+        let blind = pb::ListVoxelsRequest { view: Some(pb::View::default()), ..request };
+        let error = <(MapName, ListingRequest)>::try_from(blind).unwrap_err();
+        assert_eq!(error.message, "view: map_from_camera is missing");
     }
 
     #[test]

@@ -385,7 +385,7 @@ async fn a_listing_is_streamed_whole_by_region_and_by_level() {
     daemon.mapping().await.insert_scan(scan_pb("a", "r", &floor)).await.unwrap();
     let mut planner = daemon.occupancy().await;
     let mut list = async |level, region| {
-        let request = pb::ListVoxelsRequest { map: "a".into(), level, region, keep_out: false };
+        let request = pb::ListVoxelsRequest { map: "a".into(), level, region, ..Default::default() };
         let chunks = planner.list_voxels(request).await.unwrap().into_inner();
         let chunks: Vec<_> = chunks.map(|chunk| chunk.unwrap()).collect().await;
         assert!(chunks.iter().all(|chunk| chunk.keys.len() <= 65_536 && chunk.version.is_some()));

@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use mrol::client::{Client, Replica, ReplicaOptions};
 use mrol::map::{KeepOutAct, KeepOutChange, KeepOutName, KeepOutShape, Lookup, MapName, Prism, Region};
 use mrol::service::{
-    Cause, DeleteKeepOut, PointQuery, PutKeepOut, VoxelQuery, WatchEvent, WatchForm, WatchRequest,
+    Cause, DeleteKeepOut, ListingRequest, PointQuery, PutKeepOut, WatchEvent, WatchForm, WatchRequest,
     WatchedSince,
 };
 use mrol::wire::pb;
@@ -150,9 +150,17 @@ async fn queries_and_listings_regard_keep_outs_where_they_are_asked_to() {
     let around = (-5..60).flat_map(|x| (-5..5).flat_map(move |y| (-5..5).map(move |z| [x, y, z])));
     assert_eq!(voxels, around.filter(|&index| is_near(index)).collect::<Vec<_>>());
     let region = Some(Region::cuboid([0.0, 0.0, 0.0], [0.5, 1.0, 1.0]).unwrap());
-    let query = VoxelQuery { level: 0, region, keep_out: true };
+    let query = ListingRequest { keep_out: true, ..ListingRequest::of(0, region) };
     let part = client.list_voxels(&map("a"), query).await.unwrap().keys;
     assert_eq!(part.len(), 5 + 2, "{part:?}");
+    // Counted, each of them once.
+    for (query, count) in
+        [(query, part.len()), (ListingRequest { keep_out: true, ..Default::default() }, voxels.len())]
+    {
+        let counted =
+            client.list_voxels(&map("a"), ListingRequest { count_only: true, ..query }).await.unwrap();
+        assert_eq!((counted.voxels_total, counted.keys.len()), (count, 0));
+    }
 }
 
 #[tokio::test]
@@ -162,7 +170,7 @@ async fn a_listing_of_more_than_may_be_listed_is_refused_and_one_of_a_part_is_no
     daemon.put_in("a", &row(10)).await;
     let client = client_of(&daemon).await;
     let cube = |side: f64| KeepOutShape::of_region(Region::cuboid([0.0; 3], [side; 3]).unwrap()).unwrap();
-    let query = VoxelQuery { keep_out: true, ..VoxelQuery::default() };
+    let query = ListingRequest { keep_out: true, ..ListingRequest::default() };
     client.put_keep_out(&map("a"), put("cube", cube(1.0))).await.unwrap();
     assert_eq!(client.list_voxels(&map("a"), query).await.unwrap().keys.len(), 1000);
     client.put_keep_out(&map("a"), put("cube", cube(1e12))).await.unwrap();
@@ -170,9 +178,12 @@ async fn a_listing_of_more_than_may_be_listed_is_refused_and_one_of_a_part_is_no
     assert_eq!(refused["reason"], "listing_too_large", "{refused}");
     assert!(refused["detail"].as_str().unwrap().contains("listed_voxels_max, which is 1000"), "{refused}");
     let region = Some(Region::cuboid([0.0; 3], [0.42; 3]).unwrap());
-    let part = client.list_voxels(&map("a"), VoxelQuery { region, ..query }).await.unwrap();
+    let part = client
+        .list_voxels(&map("a"), ListingRequest { keep_out: true, ..ListingRequest::of(0, region) })
+        .await
+        .unwrap();
     assert_eq!(part.keys.len(), 64);
-    assert_eq!(client.list_voxels(&map("a"), VoxelQuery::default()).await.unwrap().keys.len(), 10);
+    assert_eq!(client.list_voxels(&map("a"), ListingRequest::default()).await.unwrap().keys.len(), 10);
 }
 
 #[tokio::test]

@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod bad_input;
+mod blocks;
 mod callers_gone;
 mod deskewing;
 mod grpc;
@@ -13,6 +14,7 @@ mod lifecycle;
 #[cfg(feature = "lab")]
 mod localize;
 mod memory_returns;
+mod observers;
 #[cfg(feature = "lab")]
 mod recovery;
 mod regions;

@@ -2,13 +2,15 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 19] = [
     "serve",
     "demo",
     "map",
     "insert",
     "localize",
     "query",
+    "block",
+    "observers",
     "delete",
     "undo",
     "maps",

@@ -104,6 +104,15 @@ fn what_was_inserted_is_found_and_what_was_deleted_is_not() {
         lines.iter().map(|line| line["occupied"].as_bool().unwrap()).collect::<Vec<_>>()
     };
     assert_eq!(of_points(&["1.01,1,1", "-1,2,0.5", "-1,2,0.7"]), [true, true, false]);
+    let block = daemon.call(&["block", "--map", "b"]);
+    assert_eq!((&block[0]["voxels"], &block[0]["blocks"]), (&json!(2), &json!(2)));
+    let distances = sequence.path("distances");
+    let dense = ["block", "--map", "b", "--box", "0.9 1 1 1.2 1.1 1.1", "--dense", "--out", &distances];
+    let dense = &daemon.call(&dense)[0];
+    assert_eq!((&dense["origin"], &dense["size"]), (&json!([9, 10, 10]), &json!([3, 1, 1])));
+    assert_eq!(std::fs::read(&distances).unwrap(), [2, 0, 2]);
+    let refused = daemon.refuses(&["observers", "--map", "b", "--point", "1.01,1,1"]);
+    assert!(refused.contains("kept in memory only"), "{refused}");
     assert_eq!(daemon.call(&["delete", "--map", "b", "--box", "-2 0 0 0 3 1"])[0]["removed"], 1);
     assert_eq!(of_points(&["1,1,1", "-1,2,0.5"]), [true, false]);
     assert_eq!(daemon.call(&["delete", "--map", "b", "--points", &file])[0]["removed"], 1);

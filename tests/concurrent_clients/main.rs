@@ -20,7 +20,7 @@ use mrol::map::{
     Lookup, MapName, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord,
 };
 use mrol::mapping::Guess;
-use mrol::service::{Deletion, DeletionTarget, PointQuery, ScanRequest, VoxelQuery};
+use mrol::service::{Deletion, DeletionTarget, ListingRequest, PointQuery, ScanRequest};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -294,7 +294,7 @@ async fn what_eight_clients_were_told_is_a_serial_history() {
     let replayed = assert_serial(history);
     let expected: VoxelSet = replayed.view().voxels();
     let client = Client::connect(&url).await.unwrap();
-    let listing = client.list_voxels(&MapName::new(MAP).unwrap(), VoxelQuery::default()).await.unwrap();
+    let listing = client.list_voxels(&MapName::new(MAP).unwrap(), ListingRequest::default()).await.unwrap();
     assert_eq!(listing.version.revision, replayed.revision());
     assert_eq!(listing.keys.into_iter().collect::<VoxelSet>(), expected);
     daemon.stop().await;

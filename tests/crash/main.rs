@@ -22,7 +22,7 @@ use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RequestId, RobotName, SessionName};
 use mrol::mapping::Guess;
-use mrol::service::{Deletion, DeletionTarget, ScanRequest, Undo, UndoTarget, VoxelQuery};
+use mrol::service::{Deletion, DeletionTarget, ListingRequest, ScanRequest, Undo, UndoTarget};
 use mrol::voxel::{Lattice, VoxelKey};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -208,7 +208,7 @@ impl Model {
     }
 
     async fn assert_equals(&self, client: &Client, round: usize) {
-        let listing = client.list_voxels(&office(), VoxelQuery::default()).await.unwrap();
+        let listing = client.list_voxels(&office(), ListingRequest::default()).await.unwrap();
         assert_eq!(listing.version.revision, self.revision, "round {round}");
         let found: BTreeSet<VoxelKey> = listing.keys.into_iter().collect();
         let count = self.holders.len();

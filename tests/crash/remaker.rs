@@ -10,7 +10,7 @@ use mrol::client::{Client, ClientError, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RobotName};
 use mrol::mapping::Guess;
-use mrol::service::{MapInfo, ScanRequest, VoxelQuery};
+use mrol::service::{ListingRequest, MapInfo, ScanRequest};
 use mrol::voxel::{Lattice, VoxelKey};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -253,7 +253,7 @@ impl Remaker {
             assert!(is_not_found(&error), "round {round}: {error}");
             return;
         };
-        let listing = client.list_voxels(&depot(), VoxelQuery::default()).await.unwrap();
+        let listing = client.list_voxels(&depot(), ListingRequest::default()).await.unwrap();
         let trajectory = client.trajectory(&depot(), None).await.unwrap();
         let found = Incarnation {
             uuid: listing.version.map_uuid,

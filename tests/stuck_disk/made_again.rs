@@ -8,7 +8,7 @@ use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose};
 use mrol::map::{MapName, RobotName};
 use mrol::mapping::Guess;
-use mrol::service::{ScanRequest, VoxelQuery};
+use mrol::service::{ListingRequest, ScanRequest};
 use mrol::voxel::VoxelKey;
 use uuid::Uuid;
 
@@ -86,7 +86,7 @@ async fn a_snapshot_that_hangs_does_not_bring_a_deleted_map_back() {
 
     let server = crate::server(&disk);
     let client = Client::connect(&server.grpc).await.unwrap();
-    let listing = client.list_voxels(&depot(), VoxelQuery::default()).await.unwrap();
+    let listing = client.list_voxels(&depot(), ListingRequest::default()).await.unwrap();
     assert_eq!((listing.version.map_uuid, listing.version.revision), (uuid, 1), "another map");
     let mut expected: Vec<VoxelKey> = (0..7).map(|x| VoxelKey::new([x, 0, 0]).unwrap()).collect();
     let mut found = listing.keys;

@@ -14,6 +14,7 @@
 //! # }
 //! ```
 
+mod block;
 mod copy;
 mod follow;
 
@@ -172,11 +173,7 @@ impl Replica {
     /// uuid than the map's; a `min_revision` that the copy has not.
     pub fn query_points(&self, query: &PointQuery) -> Result<PointAnswer, ReplicaError> {
         let Copied { map, map_uuid } = self.shared.copied.read().clone();
-        let levels = map.settings().levels;
-        if query.level >= levels {
-            let message = format!("level must lie in 0..={}, got {}", levels - 1, query.level);
-            return Err(ServiceError::new(Reason::LevelOutOfRange, message).into());
-        }
+        check_level(query.level, &map)?;
         if query.map_uuid.is_some_and(|uuid| uuid != map_uuid) {
             let message = format!("map_uuid is {map_uuid}: the map was deleted and made again");
             return Err(ServiceError::new(Reason::MapReplaced, message).into());
@@ -210,4 +207,14 @@ impl Replica {
         let message = format!("points[{place}] is outside of the region that the replica copies");
         Err(ServiceError::new(Reason::PointOutOfRange, message).into())
     }
+}
+
+/// Refuses a level that the map has not.
+fn check_level(level: u32, map: &MultiResolutionMap) -> Result<(), ReplicaError> {
+    let levels = map.settings().levels;
+    if level < levels {
+        return Ok(());
+    }
+    let message = format!("level must lie in 0..={}, got {level}", levels - 1);
+    Err(ServiceError::new(Reason::LevelOutOfRange, message).into())
 }

@@ -1,7 +1,7 @@
 //! The voxels of a level that keep-outs take: a search that halves space and leaves out what no shape meets.
 
 use super::{KeepOutShape, KeepOuts};
-use crate::map::Region;
+use crate::map::{Region, VoxelSelection};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey, VoxelSet};
 
@@ -19,22 +19,23 @@ const PLACES_PER_LOOK: usize = 1024;
 pub struct TooManyVoxels;
 
 impl KeepOuts {
-    /// The voxels of `level` whose centers lie in a keep-out, and in `region` where there is one; without meaning once
-    /// stopped.
+    /// The voxels of `level` whose centers lie in a keep-out, and that are among those of `selection`; without meaning
+    /// once stopped.
     ///
     /// # Errors
     /// When there are more than `most`, or finding them out takes many times as long as there could be as many.
     pub fn voxels_of(
         &self,
         level: u32,
-        region: Option<&Region>,
+        selection: &VoxelSelection,
         lattice: &Lattice,
         most: usize,
         stop: StopSignal<'_>,
     ) -> Result<VoxelSet, TooManyVoxels> {
         let places = most.saturating_mul(PLACES_PER_VOXEL).saturating_add(PLACES_MIN);
         let mut found = VoxelSet::default();
-        let mut search = Search { region, lattice, level, places, most, stop, blocks: Vec::new(), voxels: 0 };
+        let mut search =
+            Search { selection, lattice, level, places, most, stop, blocks: Vec::new(), voxels: 0 };
         for keep_out in self.iter() {
             search.voxels = 0;
             search.look_in(&keep_out.shape)?;
@@ -51,7 +52,7 @@ impl KeepOuts {
 
 /// What is looked for, and what was found.
 struct Search<'a> {
-    region: Option<&'a Region>,
+    selection: &'a VoxelSelection,
     lattice: &'a Lattice,
     level: u32,
     /// Places that may still be looked at.
@@ -75,8 +76,11 @@ impl Search<'_> {
     fn look_in(&mut self, shape: &KeepOutShape) -> Result<(), TooManyVoxels> {
         let (min_m, max_m) = shape.bounds_m();
         let farthest_m = min_m.iter().chain(&max_m).fold(0.0f64, |far, c| far.max(c.abs()));
-        let of_region = |region: &Region| self.ranges(region.bounds_m());
-        let bounds = self.region.map_or([(i32::MIN, i32::MAX); 3], of_region);
+        let everything = [(i32::MIN, i32::MAX); 3];
+        let bounds = match self.selection.is_everything() {
+            true => everything,
+            false => self.ranges(self.selection.bounds_m()),
+        };
         let of_shape = self.ranges((min_m, max_m));
         let ranges: [(i32, i32); 3] = std::array::from_fn(|axis| {
             (of_shape[axis].0.max(bounds[axis].0), of_shape[axis].1.min(bounds[axis].1))
@@ -122,8 +126,7 @@ impl Search<'_> {
     fn look_at_voxel(&mut self, target: &Target<'_>, index: [i32; 3]) -> Result<(), TooManyVoxels> {
         let Some(key) = VoxelKey::new(index) else { return Ok(()) };
         let center_m = self.lattice.center_m(key, self.level);
-        let is_inside = |region: &Region| region.contains(center_m);
-        if !target.shape.contains(center_m) || !self.region.is_none_or(is_inside) {
+        if !target.shape.contains(center_m) || !self.selection.contains(center_m) {
             return Ok(());
         }
         self.voxels += 1;
@@ -153,7 +156,9 @@ impl Search<'_> {
         let center_m = first.map(|i| (f64::from(i) + side / 2.0) * voxel_m);
         let reach_m = side * voxel_m * (3f64.sqrt() / 2.0 + 1e-9);
         let is_near = |region: &Region| region.distance_m(center_m) <= reach_m + target.rounding_m;
-        target.shape.distance_m(center_m) <= reach_m + target.rounding_m && self.region.is_none_or(is_near)
+        target.shape.distance_m(center_m) <= reach_m + target.rounding_m
+            && self.selection.region.as_ref().is_none_or(is_near)
+            && self.selection.may_meet(center_m, reach_m)
     }
 
     /// The voxels of the level that a box meets, with one more on each side; none of them out of the level's range.
@@ -250,10 +255,10 @@ mod tests {
             }));
             let expected: BTreeSet<VoxelKey> = indices.filter_map(VoxelKey::new).filter(is_inside).collect();
             let most = expected.len().max(1);
-            let found = all.voxels_of(level, region.as_ref(), &lattice, 1 << 20, StopSignal::NEVER).unwrap();
+            let found = all.voxels_of(level, &region.into(), &lattice, 1 << 20, StopSignal::NEVER).unwrap();
             prop_assert_eq!(&found.iter().collect::<BTreeSet<_>>(), &expected);
             if expected.len() > 1 {
-                let fewer = all.voxels_of(level, region.as_ref(), &lattice, most - 1, StopSignal::NEVER);
+                let fewer = all.voxels_of(level, &region.into(), &lattice, most - 1, StopSignal::NEVER);
                 prop_assert_eq!(fewer, Err(TooManyVoxels));
             }
         }
@@ -267,11 +272,13 @@ mod tests {
         for region in
             [Region::cuboid([-1e12; 3], [1e12; 3]).unwrap(), Region::ball([0.0; 3], 1e12).unwrap(), sheet]
         {
-            let found = huge(region).voxels_of(0, None, &lattice, 1000, StopSignal::NEVER);
+            let found =
+                huge(region).voxels_of(0, &VoxelSelection::default(), &lattice, 1000, StopSignal::NEVER);
             assert_eq!(found, Err(TooManyVoxels));
             // Of a small part of it there are few.
             let part = Region::cuboid([0.0; 3], [0.1; 3]).unwrap();
-            let found = huge(region).voxels_of(0, Some(&part), &lattice, 1000, StopSignal::NEVER).unwrap();
+            let found =
+                huge(region).voxels_of(0, &Some(part).into(), &lattice, 1000, StopSignal::NEVER).unwrap();
             assert_eq!(found.len(), if region == sheet { 0 } else { 8 });
         }
     }
@@ -281,15 +288,24 @@ mod tests {
         let cube = KeepOutShape::of_region(Region::cuboid([0.0; 3], [10.0; 3]).unwrap()).unwrap();
         let all = keep_outs([cube.clone(), cube.clone(), cube]);
         let lattice = Lattice::new(1.0, 1).unwrap();
-        assert_eq!(all.voxels_of(0, None, &lattice, 1000, StopSignal::NEVER).unwrap().len(), 1000);
-        assert!(all.voxels_of(0, None, &lattice, 999, StopSignal::NEVER).is_err());
+        assert_eq!(
+            all.voxels_of(0, &VoxelSelection::default(), &lattice, 1000, StopSignal::NEVER).unwrap().len(),
+            1000
+        );
+        assert!(all.voxels_of(0, &VoxelSelection::default(), &lattice, 999, StopSignal::NEVER).is_err());
     }
 
     #[test]
     fn once_stopped_it_ends() {
         let cube = KeepOutShape::of_region(Region::cuboid([-1e3; 3], [1e3; 3]).unwrap()).unwrap();
         let (lattice, gone) = (Lattice::new(0.001, 1).unwrap(), || true);
-        let found = keep_outs([cube]).voxels_of(0, None, &lattice, 1 << 40, StopSignal::when(&gone));
+        let found = keep_outs([cube]).voxels_of(
+            0,
+            &VoxelSelection::default(),
+            &lattice,
+            1 << 40,
+            StopSignal::when(&gone),
+        );
         assert!(found.is_err());
     }
 }

@@ -1,8 +1,10 @@
 //! Requests and answers of the service, in domain types; a file for each kind of operation.
 
+mod block;
 mod deletion;
 mod keep_out;
 mod map;
+mod observers;
 mod occupancy;
 mod point_cloud;
 mod point_times;
@@ -12,10 +14,12 @@ mod undo;
 mod version;
 mod watch;
 
+pub use block::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
 pub use deletion::{Deletion, DeletionAnswer, DeletionTarget};
 pub use keep_out::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};
 pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
-pub use occupancy::{PointAnswer, PointQuery, VoxelListing, VoxelQuery};
+pub use observers::{ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan};
+pub use occupancy::{ListingRequest, PointAnswer, PointQuery, VoxelListing};
 pub use point_cloud::PointCloud;
 pub use point_times::{PointTimes, TimeReference};
 pub use scan::{Foreground, ScanAnswer, ScanRequest};

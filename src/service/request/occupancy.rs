@@ -6,7 +6,7 @@ use uuid::Uuid;
 use super::point_cloud::PointCloud;
 use super::version::MapVersion;
 use crate::geometry::Pose;
-use crate::map::{Lookup, Region};
+use crate::map::{Lookup, Region, VoxelSelection};
 use crate::voxel::VoxelKey;
 
 /// Are these points in occupied voxels?
@@ -41,15 +41,24 @@ pub struct PointAnswer {
     pub version: MapVersion,
 }
 
-/// Which voxels are occupied?
+/// Which occupied voxels of a level are there, or how many?
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct VoxelQuery {
+pub struct ListingRequest {
     /// 0 is the finest.
     pub level: u32,
-    /// Those whose centers lie inside; everywhere where none.
-    pub region: Option<Region>,
+    /// Which of its voxels.
+    pub selection: VoxelSelection,
     /// Voxels whose centers lie in keep-outs count as occupied.
     pub keep_out: bool,
+    /// Count them, and list none: any number may be counted.
+    pub count_only: bool,
+}
+
+impl ListingRequest {
+    /// All voxels of a level, in a region or everywhere.
+    pub fn of(level: u32, region: Option<Region>) -> Self {
+        Self { level, selection: region.into(), ..Self::default() }
+    }
 }
 
 /// The occupied voxels of a level.
@@ -57,7 +66,9 @@ pub struct VoxelQuery {
 pub struct VoxelListing {
     /// The side of the voxels, meters.
     pub resolution_m: f64,
-    /// In no order.
+    /// How many they are.
+    pub voxels_total: usize,
+    /// In no order; none where they were to be counted.
     pub keys: Vec<VoxelKey>,
     /// At this state.
     pub version: MapVersion,

@@ -183,15 +183,22 @@ impl BlockBytes {
     /// # Errors
     /// `InvalidArgument` for the key of no block.
     pub fn to_set(&self) -> Result<VoxelSet, ServiceError> {
+        self.blocks().collect()
+    }
+
+    /// The blocks, one by one.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for the key of no block.
+    pub fn blocks(&self) -> impl Iterator<Item = Result<(VoxelKey, BlockMask), ServiceError>> + '_ {
         let (blocks, _) = self.0.as_chunks::<{ Self::OF_BLOCK }>();
-        let block = |bytes: &[u8; Self::OF_BLOCK]| {
+        blocks.iter().map(|bytes| {
             let key = u64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
             let mask = BlockMask::from_le_bytes(&std::array::from_fn(|i| bytes[size_of::<u64>() + i]));
             let no_key =
                 || ServiceError::new(Reason::BadBlocks, format!("block key {key:#x} is out of range"));
             Ok((VoxelSet::block_key(key).ok_or_else(no_key)?, mask))
-        };
-        blocks.iter().map(block).collect()
+        })
     }
 
     /// Number of blocks.

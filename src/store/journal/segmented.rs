@@ -219,6 +219,12 @@ impl SegmentFolder {
         }))
     }
 
+    /// Bytes of the segment that begins with revision `first`.
+    pub(in crate::store) fn bytes(&self, first: u64) -> Result<u64, StoreError> {
+        let path = self.path(first);
+        self.files.size(&path).map_err(StoreError::io(&path))
+    }
+
     /// Creates a segment without a frame, in the place of one that exists.
     pub(super) fn begin_segment(&self, first: u64) -> std::io::Result<Box<dyn Appending>> {
         let mut file = self.files.create(&self.path(first))?;

@@ -37,6 +37,8 @@ fn body(operation: Operation) -> Body {
         | Operation::ListVoxels
         | Operation::ListKeepOuts
         | Operation::DeleteKeepOut
+        | Operation::GetBlock
+        | Operation::ListObservers
         | Operation::Watch
         | Operation::GetTrajectory
         | Operation::StreamTrajectory

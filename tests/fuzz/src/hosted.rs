@@ -128,6 +128,8 @@ fn limits() -> Limits {
         maps_max: 3,
         voxels_per_map_max: 20_000,
         listed_voxels_max: 10_000,
+        block_bytes_max: 256 << 10,
+        block_cells_max: 1 << 20,
         map_file_bytes_max: MESSAGE_BYTES_MAX,
         min_revision_wait_max_s: 0.001,
         alignment_time_max_s: 0.2,

@@ -29,6 +29,11 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
         Operation::DeleteKeepOut => {
             pb::DeleteKeepOutRequest { map, name: "dock".into(), ..Default::default() }.encode_to_vec()
         }
+        Operation::GetBlock => pb::GetBlockRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::ListObservers => {
+            let voxel = Some(pb::list_observers_request::Voxel::Key(0));
+            pb::ListObserversRequest { map, voxel, ..Default::default() }.encode_to_vec()
+        }
         Operation::Watch => pb::WatchRequest { map, ..Default::default() }.encode_to_vec(),
         Operation::InsertScan | Operation::InsertScanStream => scan_pb(&map, "r", &POINTS).encode_to_vec(),
         Operation::AlignScan => {
@@ -97,6 +102,8 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::ListKeepOuts
         | Operation::PutKeepOut
         | Operation::DeleteKeepOut
+        | Operation::GetBlock
+        | Operation::ListObservers
         | Operation::Watch
         | Operation::InsertScan
         | Operation::InsertScanStream

@@ -19,6 +19,8 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::QueryPointsStream
         | Operation::ListVoxels
         | Operation::ListKeepOuts
+        | Operation::GetBlock
+        | Operation::ListObservers
         | Operation::Watch
         | Operation::AlignScan
         | Operation::Localize
