@@ -3,6 +3,7 @@
 mod body;
 mod deletions;
 mod error;
+mod filter_choice;
 mod headers;
 mod json;
 mod localization;

@@ -12,6 +12,7 @@ mod lifecycle;
 #[cfg(feature = "lab")]
 mod localize;
 mod memory_returns;
+mod query_only;
 #[cfg(feature = "lab")]
 mod recovery;
 mod scan_requests;
