@@ -195,7 +195,7 @@ fn climb_sub_voxel(
     }
 }
 
-/// 5) as in the paper, or by [`refine`] in its place; and a verdict.
+/// 5) as in the paper, or by [`refine`] in its place where the map keeps moments; and a verdict.
 fn finish(
     map: &MultiResolutionMap,
     scan: &SampledScan<'_>,
@@ -204,12 +204,12 @@ fn finish(
 ) -> Alignment {
     let climbed = ascent.pose;
     match settings.method {
-        Method::Refined => {
+        Method::Refined if map.settings().moments => {
             let refined = refine(map, &scan.surface_sample, &climbed, &settings.refinement, scan.stop);
             ascent.pose = refined.map_from_sensor;
             ascent.iterations += refined.iterations;
         }
-        Method::Overlap => climb_sub_voxel(map, scan, &mut ascent, settings),
+        Method::Refined | Method::Overlap => climb_sub_voxel(map, scan, &mut ascent, settings),
     }
     let (meters, degrees) = pose_difference(&climbed, &ascent.pose);
     fit(

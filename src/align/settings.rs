@@ -28,7 +28,7 @@ impl Keyword for Method {
 /// Settings of the alignment; the defaults are the original implementation's where it had them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignmentSettings {
-    /// The method of alignment. [`Method::Refined`].
+    /// The method of alignment. [`Method::Refined`]. In a map that keeps no moments it is always [`Method::Overlap`].
     pub method: Method,
     /// Approximate number of points of the volumetric sample. 1000 (paper III-A).
     pub sample_points: usize,

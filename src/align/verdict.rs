@@ -173,7 +173,9 @@ impl Fit {
             (Verdict::Undetermined, reason)
         } else {
             let held_m = self.surfaces.information.directions()[0].std_m;
-            (Verdict::Accepted, format!("overlap {overlap:.3}, held to {held_m:.4} m in every direction"))
+            let by = if map.settings().moments { "" } else { "; by overlap alone, the map keeps no moments" };
+            let reason = format!("overlap {overlap:.3}, held to {held_m:.4} m in every direction{by}");
+            (Verdict::Accepted, reason)
         };
         Alignment {
             map_from_sensor: self.map_from_sensor,

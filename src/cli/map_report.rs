@@ -7,7 +7,9 @@ use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
 use crate::service::MapInfo;
-use crate::wire::json::{JsonFilter, JsonLevel, JsonMap, JsonSighting, JsonStorage, JsonVersion};
+use crate::wire::json::{
+    JsonFilter, JsonFilterInfo, JsonLevel, JsonMap, JsonSighting, JsonStorage, JsonVersion,
+};
 
 /// A map's description, to be printed.
 #[derive(Serialize)]
@@ -43,7 +45,8 @@ impl Display for MapReport {
         let hash = content_hash.as_deref().unwrap_or("unknown");
         writeln!(f, "map {} at revision {revision}, uuid {map_uuid}, content hash {hash}", map.map)?;
         let robots = if map.robots.is_empty() { "nobody".into() } else { map.robots.join(", ") };
-        let (sets, moments) = (bytes(map.set_bytes), bytes(map.moment_bytes));
+        let moments = if map.settings.moments { bytes(map.moment_bytes) } else { "none kept".into() };
+        let sets = bytes(map.set_bytes);
         let (scans, poses) = (count(map.scans), bytes(map.trajectory_bytes));
         writeln!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}")?;
         map.sightings.iter().try_for_each(|sighting| write_sighting(f, sighting))?;
@@ -51,10 +54,17 @@ impl Display for MapReport {
             Some(storage) => write_storage(f, storage)?,
             None => writeln!(f, "in memory only: it ends with the server")?,
         }
-        let JsonFilter { hashes, bits_per_key } = map.settings.filter;
-        writeln!(f, "filters of {hashes} hashes, {bits_per_key} bits a voxel at least\n")?;
-        write!(f, "level  resolution          voxels   filter plane      counters   false positives:")?;
-        write!(f, " expected   eq. (1)   measured")?;
+        match &map.settings.filter {
+            Some(JsonFilter { hashes, bits_per_key }) => {
+                writeln!(f, "filters of {hashes} hashes, {bits_per_key} bits a voxel at least\n")?;
+                write!(
+                    f,
+                    "level  resolution          voxels   filter plane      counters   false positives:"
+                )?;
+                write!(f, " expected   eq. (1)   measured")?;
+            }
+            None => write!(f, "no filters\n\nlevel  resolution          voxels")?,
+        }
         map.levels.iter().try_for_each(|level| write_level(f, level))
     }
 }
@@ -76,17 +86,20 @@ fn write_storage(f: &mut fmt::Formatter<'_>, storage: &JsonStorage) -> fmt::Resu
 }
 
 fn write_level(f: &mut fmt::Formatter<'_>, level: &JsonLevel) -> fmt::Result {
-    let measured = level.measured_false_positive_rate.map_or("-".into(), percent);
+    let JsonLevel { level, resolution_m, voxels, filter } = level;
+    write!(f, "\n{level:>5} {resolution_m:>9} m {:>15}", count(*voxels))?;
+    filter.iter().try_for_each(|filter| write_filter(f, filter))
+}
+
+fn write_filter(f: &mut fmt::Formatter<'_>, filter: &JsonFilterInfo) -> fmt::Result {
+    let measured = filter.measured_false_positive_rate.map_or("-".into(), percent);
     write!(
         f,
-        "\n{:>5} {:>9} m {:>15} {:>14} {:>13} {:>26} {:>9} {measured:>10}",
-        level.level,
-        level.resolution_m,
-        count(level.voxels),
-        bytes(level.plane_bytes),
-        bytes(level.counter_bytes),
-        percent(level.expected_false_positive_rate),
-        percent(level.ideal_false_positive_rate),
+        " {:>14} {:>13} {:>26} {:>9} {measured:>10}",
+        bytes(filter.plane_bytes),
+        bytes(filter.counter_bytes),
+        percent(filter.expected_false_positive_rate),
+        percent(filter.ideal_false_positive_rate),
     )
 }
 

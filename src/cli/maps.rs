@@ -10,13 +10,15 @@ use super::map_report::MapReport;
 use super::output::Output;
 use super::parse;
 use super::remote::ServerOptions;
-use crate::client::NewMap;
+use crate::client::{NewFilter, NewMap};
 use crate::map::MapName;
 use crate::service::{MapList, UnavailableMap};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol maps create office --resolution 0.05 --levels 5
+  mrol maps create yard --resolution 0.1 --no-filter --no-moments
+                                                 for queries, in a small part of the memory
   mrol maps list
   mrol maps show office                          voxels, memory and false positives of each level
   mrol maps show office --json
@@ -88,21 +90,27 @@ pub(super) struct OptionalSettings {
     /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
     #[arg(long, value_name = "BITS")]
     filter_bits_per_key: Option<f64>,
+    /// No filters: the exact set answers every look-up
+    #[arg(long, conflicts_with_all = ["filter_hashes", "filter_bits_per_key"])]
+    no_filter: bool,
+    /// No moments of points: scans are aligned by overlap alone
+    #[arg(long)]
+    no_moments: bool,
 }
 
 impl OptionalSettings {
     /// True when at least one setting is given.
     pub(super) fn is_any(&self) -> bool {
-        self.levels.is_some() || self.filter_hashes.is_some() || self.filter_bits_per_key.is_some()
+        self.with_resolution(0.0) != NewMap::of(0.0)
     }
 
     pub(super) fn with_resolution(&self, resolution_m: f64) -> NewMap {
-        NewMap {
-            resolution_m,
-            levels: self.levels,
-            filter_hashes: self.filter_hashes,
-            filter_bits_per_key: self.filter_bits_per_key,
-        }
+        let filter = match self.no_filter {
+            true => NewFilter::NoFilter,
+            false => NewFilter::Filter { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key },
+        };
+        let moments = self.no_moments.then_some(false);
+        NewMap { resolution_m, levels: self.levels, filter, moments }
     }
 }
 

@@ -38,7 +38,7 @@ mod watch;
 pub use answers::Answers;
 pub use credentials::Credentials;
 pub use error::ClientError;
-pub use new_map::NewMap;
+pub use new_map::{NewFilter, NewMap};
 pub use replica::{BLOCKS_MAX_DEFAULT, Replica, ReplicaError, ReplicaOptions, ReplicaStatus};
 
 use std::time::Duration;

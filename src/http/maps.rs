@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::body;
 use super::error::HttpError;
+use super::filter_choice::FilterChoice;
 use super::middleware::Service;
-use super::object::Object;
 use super::params::{Map, NoParams};
 use crate::bloom::FilterSettings;
 use crate::map::{LEVELS_DEFAULT, MapSettings};
@@ -20,26 +20,17 @@ pub(super) struct SettingsBody {
     resolution_m: f64,
     levels: Option<u32>,
     #[serde(default)]
-    filter: Object<FilterBody>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FilterBody {
-    hashes: Option<u32>,
-    bits_per_key: Option<f64>,
+    filter: FilterChoice,
+    moments: Option<bool>,
 }
 
 impl SettingsBody {
     fn or(self, filter: FilterSettings) -> MapSettings {
-        let Object(given) = self.filter;
         MapSettings {
             resolution_m: self.resolution_m,
             levels: self.levels.unwrap_or(LEVELS_DEFAULT),
-            filter: FilterSettings {
-                hashes: given.hashes.unwrap_or(filter.hashes),
-                bits_per_key: given.bits_per_key.unwrap_or(filter.bits_per_key),
-            },
+            filter: self.filter.or(filter),
+            moments: self.moments.unwrap_or(true),
         }
     }
 }

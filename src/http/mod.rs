@@ -4,6 +4,7 @@ mod block;
 mod body;
 mod deletions;
 mod error;
+mod filter_choice;
 mod headers;
 mod json;
 mod keep_outs;

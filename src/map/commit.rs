@@ -11,7 +11,7 @@ use super::block_change::{BlockChange, block_changes};
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::shard::Shard;
 use super::sharding::SHARDS;
-use super::update::{Moved, ShardUpdate};
+use super::update::{Moved, ShardUpdate, Wanted};
 use super::{
     Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, KeepOutRecord,
     LevelChange, LevelSet, MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
@@ -83,8 +83,7 @@ impl<'a> Committer<'a> {
         let exchange = || {
             let mut update = self.plan(removed, added, StopSignal::NEVER)?;
             let made = self.next(&mut update);
-            let _locks =
-                self.carry_out(update, &Default::default(), &Default::default(), StopSignal::NEVER)?;
+            let _locks = self.carry_out(update, Gained::default(), StopSignal::NEVER)?;
             Some(self.publish(made).0)
         };
         // It is always made: nobody stops it.
@@ -95,8 +94,7 @@ impl<'a> Committer<'a> {
         let mut update = self.plan(&scan.carved, &scan.voxels, stop)?;
         let made = self.next(&mut update);
         let committed = &made.0;
-        let _locks =
-            self.carry_out(update, &self.map.moments.group(&scan.moments), &Default::default(), stop)?;
+        let _locks = self.carry_out(update, self.adding(&scan.moments), stop)?;
         let mut trajectory = self.map.trajectory.write();
         let pose =
             MappedScan { revision: committed.revision, new_voxels: committed.added, ..scan.pose.clone() };
@@ -114,7 +112,7 @@ impl<'a> Committer<'a> {
     ) -> Option<ContentHash> {
         let update = self.plan(&VoxelSet::default(), voxels, stop)?;
         let hash = update.added.hash;
-        self.carry_out(update, &self.map.moments.group(moments), &Default::default(), stop)?;
+        self.carry_out(update, self.adding(moments), stop)?;
         Some(hash)
     }
 
@@ -124,7 +122,7 @@ impl<'a> Committer<'a> {
             return Some((self.unchanged(), Vec::new()));
         }
         let made = self.next(&mut update);
-        let _locks = self.carry_out(update, &Default::default(), &Default::default(), StopSignal::NEVER)?;
+        let _locks = self.carry_out(update, Gained::default(), StopSignal::NEVER)?;
         if let Some(request) = &deletion.request {
             self.remember(CompletedRequest::of_deletion(request, &made.0));
         }
@@ -137,12 +135,8 @@ impl<'a> Committer<'a> {
         // All shards, so that nobody who has a view of the whole map sees the trajectory change.
         let mut update = self.plan_in(&undo.removed, &undo.restored, 0..SHARDS, stop)?;
         let made = self.next(&mut update);
-        let _locks = self.carry_out(
-            update,
-            &Default::default(),
-            &self.map.moments.group(&undo.moments),
-            StopSignal::NEVER,
-        )?;
+        let known = self.grouped(&undo.moments);
+        let _locks = self.carry_out(update, Gained { known, ..Gained::default() }, StopSignal::NEVER)?;
         let mut trajectory = self.map.trajectory.write();
         trajectory.withdraw(undo.changes(), made.0.revision);
         if let Some(request) = &undo.request {
@@ -221,8 +215,8 @@ impl<'a> Committer<'a> {
         let by_shard = self.group(removed, added);
         let mut is_planned = by_shard.each_ref().map(|changes| !changes.is_empty());
         shards.into_iter().for_each(|i| is_planned[i] = true);
-        let plan =
-            |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], self.noted, stop));
+        let wanted = Wanted { levels: self.noted, moments: self.map.moments.is_some() };
+        let plan = |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], wanted, stop));
         let shards: Vec<_> = (0..SHARDS).filter(|&i| is_planned[i]).map(plan).collect();
         let total = |of: fn(&ShardUpdate) -> Moved| {
             shards.iter().fold(Moved::default(), |all, (_, update)| all.and(of(update)))
@@ -241,19 +235,23 @@ impl<'a> Committer<'a> {
         by_shard
     }
 
+    /// The moments of points that come.
+    fn adding(&self, moments: &MomentSet) -> Gained {
+        Gained { added: self.grouped(moments), ..Gained::default() }
+    }
+
+    /// Moments shard by shard; none in a map that keeps none.
+    fn grouped(&self, moments: &MomentSet) -> [MomentsOfShard; SHARDS] {
+        self.map.moments.as_ref().map(|kept| kept.group(moments)).unwrap_or_default()
+    }
+
     /// Does what is planned under the write locks, which are taken in ascending order. Moments of voxels that lose
-    /// descendants are rebuilt from what remains; then those of points are `added`, and those that are `known` take the
-    /// place of what is there. None once stopped.
-    fn carry_out(
-        &self,
-        update: MapUpdate,
-        added: &[MomentsOfShard; SHARDS],
-        known: &[MomentsOfShard; SHARDS],
-        stop: StopSignal<'_>,
-    ) -> Option<Locks<'a>> {
+    /// descendants are rebuilt from what remains, before others are `gained`. None once stopped.
+    fn carry_out(&self, update: MapUpdate, gained: Gained, stop: StopSignal<'_>) -> Option<Locks<'a>> {
         let no_long_read = self.map.long_reads.write();
         let lost = update.shards.iter().map(|(i, update)| (*i, &update.moments));
-        let moments = self.map.moments.change(lost, added, known, stop);
+        let Gained { added, known } = &gained;
+        let moments = self.map.moments.as_ref().map(|kept| kept.change(lost, added, known, stop));
         let mut emptied = Vec::new();
         let lock = |(i, update): (usize, ShardUpdate)| {
             let mut shard = self.map.shards[i].write();
@@ -261,8 +259,12 @@ impl<'a> Committer<'a> {
             shard
         };
         let shards = update.shards.into_iter().map(lock).collect();
-        let locks =
-            Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: emptied };
+        let locks = Locks {
+            _shards: shards,
+            _moments: moments.unwrap_or_default(),
+            _no_long_read: no_long_read,
+            _emptied: emptied,
+        };
         (!stop.is_stopped()).then_some(locks)
     }
 }
@@ -278,6 +280,15 @@ struct MapUpdate {
     added: Moved,
     /// Each with the number of its shard, ascending.
     shards: Vec<(usize, ShardUpdate)>,
+}
+
+/// Moments that a change brings, shard by shard.
+#[derive(Default)]
+struct Gained {
+    /// Of points, which add to those that are there.
+    added: [MomentsOfShard; SHARDS],
+    /// Those that take the place of what is there.
+    known: [MomentsOfShard; SHARDS],
 }
 
 /// Keeps readers of what changed waiting until the change is published.

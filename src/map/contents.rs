@@ -43,7 +43,7 @@ pub struct MapContents {
     pub revision: u64,
     /// The finest voxels.
     pub voxels: VoxelSet,
-    /// Moments of the points in the voxels.
+    /// Moments of the points in the voxels; none of a map that keeps none.
     pub moments: MomentSet,
     /// The accepted scans.
     pub trajectory: Trajectory,
@@ -124,11 +124,12 @@ impl MultiResolutionMap {
         let (revision, keep_outs) = (self.revision(), Arc::clone(&locked));
         let (trajectory, requests) = (self.trajectory(), self.requests().clone());
         drop(locked);
-        let (voxels, moments) = (view.voxels_until(stop), moments.to_set_until(stop));
+        let moments = moments.map_or_else(MomentSet::default, |moments| moments.to_set_until(stop));
+        let voxels = view.voxels_until(stop);
         MapContents { revision, voxels, moments, trajectory, requests, keep_outs }
     }
 
-    /// The map of `settings` that holds `contents`.
+    /// The map of `settings` that holds `contents`, without their moments where it keeps none.
     ///
     /// # Errors
     /// When a setting is out of range.

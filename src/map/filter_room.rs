@@ -26,7 +26,7 @@ impl MapSettings {
     }
 
     fn filter_bytes_a_key(&self) -> f64 {
-        self.filter.bits_per_key * BITS_A_BIT / 8.0
+        self.filter.map_or(0.0, |filter| filter.bits_per_key * BITS_A_BIT / 8.0)
     }
 }
 
@@ -39,7 +39,8 @@ mod tests {
 
     fn filter_bytes(settings: MapSettings, voxels: VoxelSet) -> u64 {
         let map = MultiResolutionMap::restore(settings, MapContents::at(1, voxels)).unwrap();
-        map.describe(0, 0).levels.iter().map(|level| (level.plane_bytes + level.counter_bytes) as u64).sum()
+        let levels = map.describe(0, 0).levels;
+        levels.iter().filter_map(|level| level.filter).map(|filter| filter.bytes() as u64).sum()
     }
 
     #[test]
@@ -48,8 +49,8 @@ mod tests {
         let dense = (0..8000).map(|i| VoxelKey::new([i % 20, i / 20 % 20, i / 400]).unwrap());
         for voxels in [VoxelSet::default(), scattered.collect(), dense.collect()] {
             for (levels, bits_per_key) in [(1, 4096.0), (4, 14.0), (12, 300.0)] {
-                let filter = FilterSettings { hashes: 2, bits_per_key };
-                let settings = MapSettings { resolution_m: 0.1, levels, filter };
+                let filter = Some(FilterSettings { hashes: 2, bits_per_key });
+                let settings = MapSettings { filter, ..MapSettings::new(0.1, levels) };
                 let said = settings.empty_filter_bytes() + settings.filter_bytes_of(&voxels);
                 let taken = filter_bytes(settings, voxels.clone());
                 // A word for each filter that is smaller than one.
@@ -57,5 +58,13 @@ mod tests {
                 assert!(taken >= said / 12, "{taken} of {said} bytes");
             }
         }
+    }
+
+    #[test]
+    fn a_map_without_filters_takes_nothing_for_them() {
+        let settings = MapSettings::query_only(0.1, 12);
+        let voxels: VoxelSet = (0..3000).map(|i| VoxelKey::new([i, 0, 0]).unwrap()).collect();
+        assert_eq!((settings.empty_filter_bytes(), settings.filter_bytes_of(&voxels)), (0, 0));
+        assert_eq!(filter_bytes(settings, voxels), 0);
     }
 }

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::shard::Shard;
 use super::{ContentVersion, MapView, MultiResolutionMap};
+use crate::bloom::CountingBloomFilter;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
@@ -17,6 +18,13 @@ pub struct LevelInfo {
     pub resolution_m: f64,
     /// Occupied voxels.
     pub voxels: usize,
+    /// Its filter; none in a map without filters.
+    pub filter: Option<FilterInfo>,
+}
+
+/// Size and false positive rates of a level's filter.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FilterInfo {
     /// Bytes of the filter's bit plane, which look-ups read.
     pub plane_bytes: usize,
     /// Bytes of the filter's counters, which only changes read.
@@ -68,7 +76,7 @@ impl MultiResolutionMap {
             version: view.version(),
             levels: levels.collect(),
             set_bytes: view.shards().map(Shard::set_bytes).sum(),
-            moment_bytes: moments.bytes(),
+            moment_bytes: moments.map_or(0, |moments| moments.bytes()),
             trajectory_bytes: self.trajectory().memory_bytes(),
         }
     }
@@ -78,7 +86,7 @@ impl MultiResolutionMap {
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
         view.shards().map(Shard::set_bytes).sum::<usize>()
-            + moments.bytes()
+            + moments.map_or(0, |moments| moments.bytes())
             + self.trajectory().memory_bytes()
     }
 
@@ -90,8 +98,8 @@ impl MultiResolutionMap {
     /// Bytes of memory of the bit planes of all levels' filters.
     pub fn plane_bytes(&self) -> usize {
         let view = self.view();
-        let of_level = |level| view.lists(level).map(|list| list.filter().bytes().0).sum::<usize>();
-        (0..self.settings.levels).map(of_level).sum()
+        let filters = (0..self.settings.levels).flat_map(|level| filters(&view, level));
+        filters.map(|filter| filter.bytes().0).sum()
     }
 
     fn describe_level(
@@ -102,30 +110,40 @@ impl MultiResolutionMap {
         seed: u64,
         stop: StopSignal<'_>,
     ) -> LevelInfo {
-        let mut info = LevelInfo {
-            level,
-            resolution_m: self.lattice.resolution_m(level),
-            voxels: 0,
-            plane_bytes: 0,
-            counter_bytes: 0,
-            expected_rate: 0.0,
-            ideal_false_positive_rate: 0.0,
+        let voxels = view.lists(level).map(|list| list.len()).sum();
+        let has_filter = self.settings.filter.is_some();
+        let filter = has_filter.then(|| FilterInfo {
             measured_rate: measured_rate(view, level, samples, seed, stop),
-        };
-        for list in view.lists(level) {
-            let filter = list.filter();
-            let (plane, counters) = filter.bytes();
-            info.voxels += filter.len();
+            ..FilterInfo::of(filters(view, level), voxels)
+        });
+        LevelInfo { level, resolution_m: self.lattice.resolution_m(level), voxels, filter }
+    }
+}
+
+impl FilterInfo {
+    /// What the filters of a level with so many voxels say of themselves.
+    fn of<'a>(filters: impl Iterator<Item = &'a CountingBloomFilter>, voxels: usize) -> Self {
+        let mut info = Self::default();
+        let of_all = voxels.max(1) as f64;
+        for filter in filters {
+            let ((plane, counters), share) = (filter.bytes(), filter.len() as f64 / of_all);
             info.plane_bytes += plane;
             info.counter_bytes += counters;
-            info.expected_rate += filter.expected_rate() * filter.len() as f64;
-            info.ideal_false_positive_rate += filter.ideal_false_positive_rate() * filter.len() as f64;
+            info.expected_rate += filter.expected_rate() * share;
+            info.ideal_false_positive_rate += filter.ideal_false_positive_rate() * share;
         }
-        let voxels = info.voxels.max(1) as f64;
-        info.expected_rate /= voxels;
-        info.ideal_false_positive_rate /= voxels;
         info
     }
+
+    /// Bytes of the plane and the counters.
+    pub fn bytes(&self) -> usize {
+        self.plane_bytes + self.counter_bytes
+    }
+}
+
+/// The filters of a level, shard by shard.
+fn filters<'v>(view: &'v MapView<'_>, level: u32) -> impl Iterator<Item = &'v CountingBloomFilter> {
+    view.lists(level).filter_map(|list| list.filter())
 }
 
 /// The share of about `samples` absent neighbors of occupied voxels that the filter takes for occupied.

@@ -1,8 +1,10 @@
-//! What becomes of a level's filter when keys go and come.
+//! What becomes of a level, and of its filter, when keys go and come.
 
 use super::bulk::{count_each, write_plane_bits};
 use super::capacity_schedule::CapacitySchedule;
+use super::level_moves::LevelMoves;
 use super::shard::Shard;
+use super::shard_level::ShardLevel;
 use crate::bloom::{CountingBloomFilter, Probe};
 use crate::util::StopSignal;
 
@@ -13,10 +15,37 @@ const KEYS_PER_LOOK: usize = 64 << 10;
 /// beforehand, which takes longer in all and keeps nobody waiting.
 const CLEARED_IN_PLACE: usize = 2048;
 
-/// What becomes of a filter. Its counters count the change already.
+/// What becomes of a level. The counters of its filter count the change already.
 #[derive(Debug)]
 #[must_use = "what is planned is counted already"]
-pub(super) enum LevelUpdate {
+pub(super) struct LevelUpdate {
+    /// Occupied voxels afterwards.
+    voxels: usize,
+    /// None in a map without filters.
+    filter: Option<FilterUpdate>,
+}
+
+impl LevelUpdate {
+    /// Finds out what becomes of a level of `shard` where `moves` go and come, and counts them in its filter.
+    pub(super) fn plan(shard: &Shard, moves: LevelMoves, stop: StopSignal<'_>) -> Self {
+        let level = &shard.levels[moves.level()];
+        let voxels = moves.voxels_after(level.voxels);
+        let filter = level.filter.as_ref().map(|filter| FilterUpdate::plan(shard, filter, moves, stop));
+        Self { voxels, filter }
+    }
+
+    /// Does it, while readers wait.
+    pub(super) fn apply(self, level: &mut ShardLevel) {
+        level.voxels = self.voxels;
+        if let (Some(filter), Some(update)) = (&mut level.filter, self.filter) {
+            update.apply(filter);
+        }
+    }
+}
+
+/// What becomes of a filter.
+#[derive(Debug)]
+enum FilterUpdate {
     /// The bits of keys that go are cleared, and then those of keys that come are set.
     Bits { cleared: Vec<Probe>, set: Vec<Probe> },
     /// The plane gives way to one without the bits of so many keys; then bits are set.
@@ -25,17 +54,11 @@ pub(super) enum LevelUpdate {
     Grown(CountingBloomFilter),
 }
 
-impl LevelUpdate {
-    /// Finds out what becomes of the filter of `level` when the keys `lost` go and the keys `gained` come, and counts them. A
-    /// larger filter also forgets saturated counters.
-    pub(super) fn plan(
-        shard: &Shard,
-        level: usize,
-        lost: Vec<u64>,
-        gained: Vec<u64>,
-        stop: StopSignal<'_>,
-    ) -> Self {
-        let filter = &shard.filters[level];
+impl FilterUpdate {
+    /// Finds out what becomes of a filter of `shard` when the keys of `moves` go and come, and counts them. A larger filter
+    /// also forgets saturated counters.
+    fn plan(shard: &Shard, filter: &CountingBloomFilter, moves: LevelMoves, stop: StopSignal<'_>) -> Self {
+        let (level, (lost, gained)) = (moves.level(), moves.into_keys());
         let need = filter.len() + gained.len();
         if need > filter.capacity() {
             let capacity = CapacitySchedule::of(shard.number, level).for_items(need);
@@ -61,7 +84,7 @@ impl LevelUpdate {
     }
 
     /// Does it, while readers wait.
-    pub(super) fn apply(self, filter: &mut CountingBloomFilter) {
+    fn apply(self, filter: &mut CountingBloomFilter) {
         let set = match self {
             Self::Grown(larger) => {
                 *filter = larger;

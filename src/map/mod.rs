@@ -22,6 +22,7 @@ mod info;
 mod keep_out;
 mod level_blocks;
 mod level_changes;
+mod level_moves;
 mod level_update;
 mod level_voxels;
 pub(crate) mod lookup;
@@ -32,6 +33,7 @@ mod published;
 mod region;
 mod settings;
 mod shard;
+mod shard_level;
 mod sharding;
 mod trajectory;
 mod update;
@@ -50,7 +52,7 @@ pub use frustum::{Frustum, FrustumError};
 pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
-pub use info::{LevelInfo, MapDescription};
+pub use info::{FilterInfo, LevelInfo, MapDescription};
 pub use keep_out::{
     KEEP_OUTS_MAX, KeepOut, KeepOutAct, KeepOutChange, KeepOutShape, KeepOutShapeError, KeepOuts,
     KeepOutsFull, PRISM_CORNERS_MAX, Prism, PrismError, TooManyVoxels,
@@ -78,7 +80,7 @@ use std::sync::Arc;
 
 use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
-use crate::voxel::Lattice;
+use crate::voxel::{Cell, Lattice, MOMENT_LEVEL, Moments, VoxelKey};
 use moments::ShardedMoments;
 use published::Published;
 use shard::Shard;
@@ -96,7 +98,8 @@ pub struct MultiResolutionMap {
     settings: MapSettings,
     lattice: Lattice,
     sharding: Sharding,
-    moments: ShardedMoments,
+    /// None of a map that keeps no moments.
+    moments: Option<ShardedMoments>,
     shards: [RwLock<Shard>; SHARDS],
     trajectory: RwLock<Trajectory>,
     requests: RwLock<IdempotencyLog>,
@@ -118,7 +121,7 @@ impl MultiResolutionMap {
             settings,
             lattice,
             sharding,
-            moments: ShardedMoments::new(sharding),
+            moments: settings.moments.then(|| ShardedMoments::new(sharding)),
             shards: std::array::from_fn(|i| RwLock::new(Rank::Shard(i as u8), Shard::new(i, &settings))),
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
@@ -223,9 +226,18 @@ impl MultiResolutionMap {
     }
 
     /// Locks the moments of the map's points for reading, at one revision; before a view of the voxels, where both
-    /// are needed.
-    pub fn moments(&self) -> MomentsView<'_> {
-        self.moments.view()
+    /// are needed. None of a map that keeps no moments.
+    pub fn moments(&self) -> Option<MomentsView<'_>> {
+        self.moments.as_ref().map(ShardedMoments::view)
+    }
+
+    /// The moments of the centers of the finest voxels in a voxel of [`MOMENT_LEVEL`], which stand for points that are not
+    /// known; none where there is no voxel. Locks one shard.
+    pub(crate) fn center_moments(&self, voxel: VoxelKey) -> Option<Moments> {
+        let (block, cell) = Cell::of(voxel.index().map(|i| i << MOMENT_LEVEL));
+        let shard = self.shards[self.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].read();
+        let word = shard.level(0).blocks().get(block).0[cell.word()];
+        (word != 0).then(|| Moments::of_descendants(word))
     }
 
     /// Waits for the turn to change the map.

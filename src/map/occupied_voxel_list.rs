@@ -3,11 +3,12 @@
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 
+use super::shard_level::ShardLevel;
 use crate::bloom::CountingBloomFilter;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, ClusterTable, VoxelKey};
 
-/// The occupied voxels of one level, of one shard: an exact set and the counting Bloom filter in front of it,
-/// which always hold the same keys.
+/// The occupied voxels of one level, of one shard: an exact set and, in maps that have filters, the counting Bloom filter
+/// in front of it, which always hold the same keys.
 ///
 /// The exact set is a table of 8^3 blocks that serves three levels at once, so this is a view: which table, and
 /// how many levels up in its blocks.
@@ -15,7 +16,7 @@ use crate::voxel::{BLOCK_LEVELS, BlockMask, ClusterTable, VoxelKey};
 pub struct OccupiedVoxelList<'a> {
     level: u32,
     blocks: &'a ClusterTable,
-    filter: &'a CountingBloomFilter,
+    of_level: &'a ShardLevel,
 }
 
 /// The table that serves `level`, and how many levels up in its blocks: (tier, levels up).
@@ -24,8 +25,8 @@ pub(super) fn tier_of(level: u32) -> (usize, u32) {
 }
 
 impl<'a> OccupiedVoxelList<'a> {
-    pub(super) fn new(level: u32, blocks: &'a ClusterTable, filter: &'a CountingBloomFilter) -> Self {
-        Self { level, blocks, filter }
+    pub(super) fn new(level: u32, blocks: &'a ClusterTable, of_level: &'a ShardLevel) -> Self {
+        Self { level, blocks, of_level }
     }
 
     /// The list's level, 0 the finest.
@@ -35,22 +36,29 @@ impl<'a> OccupiedVoxelList<'a> {
 
     /// True when `voxel` of this level is occupied: the filter, then the set for what it lets through.
     pub fn contains(&self, voxel: VoxelKey) -> bool {
-        self.may_contain(voxel) && self.blocks.contains(voxel.index(), tier_of(self.level).1)
+        self.filter().is_none_or(|filter| filter.contains(voxel.to_bits())) && self.set_contains(voxel)
     }
 
-    /// False only when `voxel` of this level is certainly not occupied: the filter alone.
+    /// False only when `voxel` of this level is certainly not occupied: the filter alone, or the set where there is none.
     pub fn may_contain(&self, voxel: VoxelKey) -> bool {
-        self.filter.contains(voxel.to_bits())
+        match self.filter() {
+            Some(filter) => filter.contains(voxel.to_bits()),
+            None => self.set_contains(voxel),
+        }
+    }
+
+    fn set_contains(&self, voxel: VoxelKey) -> bool {
+        self.blocks.contains(voxel.index(), tier_of(self.level).1)
     }
 
     /// Number of occupied voxels.
     pub fn len(&self) -> usize {
-        self.filter.len()
+        self.of_level.voxels
     }
 
     /// True without an occupied voxel.
     pub fn is_empty(&self) -> bool {
-        self.filter.is_empty()
+        self.len() == 0
     }
 
     /// The occupied voxels, in no order.
@@ -92,9 +100,9 @@ impl<'a> OccupiedVoxelList<'a> {
         sample
     }
 
-    /// The filter.
-    pub fn filter(&self) -> &'a CountingBloomFilter {
-        self.filter
+    /// The filter; none in a map without filters.
+    pub fn filter(&self) -> Option<&'a CountingBloomFilter> {
+        self.of_level.filter.as_ref()
     }
 
     /// The exact set, shared with up to two other levels.

@@ -3,9 +3,8 @@
 use std::ops::Range;
 
 use super::MapSettings;
-use super::capacity_schedule::CapacitySchedule;
 use super::occupied_voxel_list::{OccupiedVoxelList, tier_of};
-use crate::bloom::CountingBloomFilter;
+use super::shard_level::ShardLevel;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, ClusterTable, VoxelKey, VoxelSet};
 
 /// A block of a tier and its voxels.
@@ -20,28 +19,22 @@ pub(super) type Block = (VoxelKey, BlockMask);
 /// ```
 ///
 /// So a coarse voxel is there exactly as long as it has a child, and nothing counts children. Every level has a
-/// counting Bloom filter of its own.
+/// counting Bloom filter of its own, in maps that have filters.
 #[derive(Debug)]
 pub(super) struct Shard {
     /// Which of the map's shards it is.
     pub(super) number: usize,
     pub(super) tiers: Vec<ClusterTable>,
-    pub(super) filters: Vec<CountingBloomFilter>,
+    pub(super) levels: Vec<ShardLevel>,
 }
 
 impl Shard {
     pub(super) fn new(number: usize, settings: &MapSettings) -> Self {
-        let filter = |level| {
-            CountingBloomFilter::with_capacity(
-                CapacitySchedule::of(number, level).for_items(1),
-                settings.filter,
-            )
-        };
         let tiers = tier_of(settings.levels - 1).0 + 1;
         Self {
             number,
             tiers: std::iter::repeat_with(ClusterTable::default).take(tiers).collect(),
-            filters: (0..settings.levels as usize).map(filter).collect(),
+            levels: (0..settings.levels as usize).map(|n| ShardLevel::empty(number, n, settings)).collect(),
         }
     }
 
@@ -50,7 +43,7 @@ impl Shard {
     }
 
     pub(super) fn level(&self, level: u32) -> OccupiedVoxelList<'_> {
-        OccupiedVoxelList::new(level, &self.tiers[tier_of(level).0], &self.filters[level as usize])
+        OccupiedVoxelList::new(level, &self.tiers[tier_of(level).0], &self.levels[level as usize])
     }
 
     /// Bytes of memory of the exact sets.

@@ -3,6 +3,7 @@
 use super::block_change::{BlockChange, block_changes};
 use super::bulk::find_each;
 use super::level_changes::{KeysOfLevel, LevelSet};
+use super::level_moves::LevelMoves;
 use super::level_update::LevelUpdate;
 use super::moments::MomentsLost;
 use super::shard::{Shard, levels_of};
@@ -19,7 +20,8 @@ pub(super) struct ShardUpdate {
     /// The finest voxels that go, and those that come.
     pub(super) removed: Moved,
     pub(super) added: Moved,
-    /// What becomes of the moments of voxels that lose descendants, before points are added to any.
+    /// What becomes of the moments of voxels that lose descendants, before points are added to any; nothing where none are
+    /// wanted.
     pub(super) moments: MomentsLost,
     /// The keys that go and come of the levels that somebody watches.
     pub(super) noted: Vec<KeysOfLevel>,
@@ -42,6 +44,15 @@ enum Outcome {
     Voxels { tiers: Vec<ClusterUpdate>, levels: Vec<LevelUpdate> },
 }
 
+/// What is to be found out of a change, besides what becomes of the voxels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    /// The levels whose keys that go and come are noted.
+    pub(super) levels: LevelSet,
+    /// What becomes of the moments.
+    pub(super) moments: bool,
+}
+
 impl Moved {
     /// The finest voxels with these keys.
     fn of_keys(keys: &[u64]) -> Self {
@@ -57,31 +68,33 @@ impl Moved {
 impl ShardUpdate {
     /// Finds out what `changes` of blocks of finest voxels come to in `shard`, and counts them: voxels to remove that are not
     /// there are passed over, and so the set says which keys the filters are told to forget (paper II-A). Once stopped, what
-    /// comes of it is not to be applied, and the shard of no use. What becomes of the levels `noted` is kept.
+    /// comes of it is not to be applied, and the shard of no use.
     pub(super) fn plan(
         shard: &Shard,
         changes: &[BlockChange<'_>],
-        noted: LevelSet,
+        wanted: Wanted,
         stop: StopSignal<'_>,
     ) -> Self {
         if let Some(removed) = removes_everything(shard, changes) {
             let (moments, outcome) = (MomentsLost::Everything, Outcome::Nothing);
-            let noted = noted.iter().map(|level| all_keys(shard, level)).collect();
+            let noted = wanted.levels.iter().map(|level| all_keys(shard, level)).collect();
             return Self { removed, added: Moved::default(), moments, noted, outcome };
         }
-        let (mut tiers, mut levels, mut moments) = (Vec::new(), Vec::new(), MomentsLost::default());
-        let finest = Tier::of(shard, 0, changes, &mut moments, stop);
-        let (removed, added) = (Moved::of_keys(&finest.lost[0]), Moved::of_keys(&finest.gained[0]));
-        let mut kept = finest.keys_of(noted);
+        let (mut tiers, mut levels) = (Vec::new(), Vec::new());
+        let mut finest = Tier::of(shard, 0, changes, wanted, stop);
+        let moments = std::mem::take(&mut finest.moments);
+        let (lost, gained) = finest.levels[0].keys();
+        let (removed, added) = (Moved::of_keys(lost), Moved::of_keys(gained));
+        let mut noted = finest.keys_of(wanted.levels);
         let (mut emptied, mut created) = finest.plan(&mut tiers, &mut levels, stop);
         for tier in 1..shard.tiers.len() {
             let (removed, added) = (VoxelSet::from_iter(emptied), VoxelSet::from_iter(created));
             let changes: Vec<_> = block_changes(&removed, &added).collect();
-            let tier = Tier::of(shard, tier, &changes, &mut moments, stop);
-            kept.extend(tier.keys_of(noted));
+            let tier = Tier::of(shard, tier, &changes, wanted, stop);
+            noted.extend(tier.keys_of(wanted.levels));
             (emptied, created) = tier.plan(&mut tiers, &mut levels, stop);
         }
-        Self { removed, added, moments, noted: kept, outcome: Outcome::Voxels { tiers, levels } }
+        Self { removed, added, moments, noted, outcome: Outcome::Voxels { tiers, levels } }
     }
 
     /// Does it, but for the moments. What the shard held and holds no more is for the caller to drop, once nobody
@@ -94,8 +107,8 @@ impl ShardUpdate {
         for (table, update) in shard.tiers.iter_mut().zip(tiers) {
             update.apply(table);
         }
-        for (filter, update) in shard.filters.iter_mut().zip(levels) {
-            update.apply(filter);
+        for (level, update) in shard.levels.iter_mut().zip(levels) {
+            update.apply(level);
         }
         None
     }
@@ -131,14 +144,16 @@ fn all_keys(shard: &Shard, level: u32) -> KeysOfLevel {
 struct Tier<'a> {
     shard: &'a Shard,
     tier: usize,
+    /// Moments are wanted of what its blocks lose.
+    keeps_moments: bool,
     /// The blocks that change, as they are afterwards.
     blocks: Vec<(VoxelKey, BlockMask)>,
     /// The blocks that lose their last voxel, and those that get their first.
     emptied: Vec<VoxelKey>,
     created: Vec<VoxelKey>,
-    /// The keys that go and come, level by level.
-    lost: Vec<Vec<u64>>,
-    gained: Vec<Vec<u64>>,
+    /// What goes and comes, level by level.
+    levels: Vec<LevelMoves>,
+    moments: MomentsLost,
 }
 
 impl<'a> Tier<'a> {
@@ -146,22 +161,32 @@ impl<'a> Tier<'a> {
         shard: &'a Shard,
         tier: usize,
         changes: &[BlockChange<'_>],
-        moments: &mut MomentsLost,
+        wanted: Wanted,
         stop: StopSignal<'_>,
     ) -> Self {
-        let levels = levels_of(tier, shard.filters.len()).len();
-        let keys = || vec![Vec::new(); levels];
-        let blocks = Vec::with_capacity(changes.len());
-        let (emptied, created, lost, gained) = (Vec::new(), Vec::new(), keys(), keys());
-        let mut of = Self { shard, tier, blocks, emptied, created, lost, gained };
+        // Filters need the keys, and so does the hash of the finest voxels.
+        let keeps_keys = |level: usize| {
+            level == 0 || shard.levels[level].filter.is_some() || wanted.levels.contains(level as u32)
+        };
+        let levels = levels_of(tier, shard.levels.len());
+        let mut of = Self {
+            shard,
+            tier,
+            keeps_moments: wanted.moments && tier == 0,
+            blocks: Vec::with_capacity(changes.len()),
+            emptied: Vec::new(),
+            created: Vec::new(),
+            levels: levels.map(|level| LevelMoves::none(level, keeps_keys(level))).collect(),
+            moments: MomentsLost::default(),
+        };
         for changes in stop.pieces(changes, BLOCKS_PER_LOOK) {
-            find_each(&shard.tiers[tier], changes, |change, before| of.block(change, before, moments));
+            find_each(&shard.tiers[tier], changes, |change, before| of.block(change, before));
         }
         of
     }
 
     /// What becomes of a block.
-    fn block(&mut self, change: &BlockChange<'_>, before: &BlockMask, moments: &mut MomentsLost) {
+    fn block(&mut self, change: &BlockChange<'_>, before: &BlockMask) {
         let &BlockChange { block, removed, added } = change;
         let (loses, gains) = (!before.intersection(removed).is_empty(), !added.difference(before).is_empty());
         if !loses && !gains {
@@ -169,8 +194,8 @@ impl<'a> Tier<'a> {
         }
         let stays = before.difference(removed);
         let after = stays.union(added);
-        if loses && self.tier == 0 {
-            moments.extend(stays.rebuilt_moments(before, block));
+        if loses && self.keeps_moments {
+            self.moments.extend(stays.rebuilt_moments(before, block));
         }
         if before.is_empty() {
             self.created.push(block);
@@ -178,23 +203,13 @@ impl<'a> Tier<'a> {
             self.emptied.push(block);
         }
         self.blocks.push((block, after));
-        (0..).zip(&mut self.gained).for_each(|(up, keys)| before.keys_gained(&after, block, up, keys));
-        if loses {
-            // What is gone is what would be gained if all came back.
-            (0..).zip(&mut self.lost).for_each(|(up, keys)| after.keys_gained(before, block, up, keys));
-        }
+        self.levels.iter_mut().for_each(|level| level.note(block, before, &after, loses));
     }
 
     /// The keys that go and come, of those of its levels that are noted.
     fn keys_of(&self, noted: LevelSet) -> Vec<KeysOfLevel> {
-        let levels = levels_of(self.tier, self.shard.filters.len()).zip(self.lost.iter().zip(&self.gained));
-        let levels = levels.map(|(level, keys)| (level as u32, keys));
-        let of_level = |(level, (lost, gained)): (u32, (&Vec<u64>, &Vec<u64>))| KeysOfLevel {
-            level,
-            lost: lost.clone(),
-            gained: gained.clone(),
-        };
-        levels.filter(|(level, _)| noted.contains(*level)).map(of_level).collect()
+        let levels = self.levels.iter().filter(|level| noted.contains(level.level() as u32));
+        levels.map(LevelMoves::to_keys_of_level).collect()
     }
 
     /// Plans for the tier; the blocks that lose their last voxel, and those that get their first.
@@ -204,12 +219,10 @@ impl<'a> Tier<'a> {
         levels: &mut Vec<LevelUpdate>,
         stop: StopSignal<'_>,
     ) -> (Vec<VoxelKey>, Vec<VoxelKey>) {
-        let Self { shard, tier, blocks, emptied, created, lost, gained } = self;
+        let Self { shard, tier, blocks, emptied, created, levels: moves, .. } = self;
         tiers.push(ClusterUpdate::plan(&shard.tiers[tier], &blocks, stop));
         drop(blocks);
-        let keys = lost.into_iter().zip(gained);
-        let of_level = |(level, (lost, gained))| LevelUpdate::plan(shard, level, lost, gained, stop);
-        levels.extend(levels_of(tier, shard.filters.len()).zip(keys).map(of_level));
+        levels.extend(moves.into_iter().map(|moves| LevelUpdate::plan(shard, moves, stop)));
         (emptied, created)
     }
 }

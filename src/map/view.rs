@@ -40,8 +40,9 @@ impl LongRead<'_> {
         self.map.view()
     }
 
-    /// Locks the moments of the map's points for reading; before a view, where both are needed.
-    pub fn moments(&self) -> MomentsView<'_> {
+    /// Locks the moments of the map's points for reading; before a view, where both are needed. None of a map that keeps
+    /// no moments.
+    pub fn moments(&self) -> Option<MomentsView<'_>> {
         self.map.moments()
     }
 }
@@ -130,7 +131,8 @@ impl<'a> MapView<'a> {
     pub(crate) fn level_view(&self, level: u32) -> LevelView<'_> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
         let (_, up) = tier_of(level);
-        LevelView::new(level, up, self.map.sharding.shift_at(level), self.map.settings.filter.hashes, list)
+        let hashes = self.map.settings.filter.map(|filter| filter.hashes);
+        LevelView::new(level, up, self.map.sharding.shift_at(level), hashes, list)
     }
 
     /// The lists of `level`, one a shard that the view covers.
@@ -144,7 +146,7 @@ impl<'a> MapView<'a> {
         self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).contains(voxel))
     }
 
-    /// True when the filter lets `voxel` of `level` through.
+    /// True when the filter lets `voxel` of `level` through, or where there is no filter, when it is occupied.
     pub fn may_contain(&self, voxel: VoxelKey, level: u32) -> bool {
         let shard = self.map.sharding.shard_of(voxel.index(), level);
         self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).may_contain(voxel))

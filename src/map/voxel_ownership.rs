@@ -30,6 +30,8 @@ pub struct VoxelOwnership {
     blocks: HashMap<VoxelKey, Sides>,
     /// Voxels whose moments the targets changed, as they are without them.
     moments: HashMap<VoxelKey, Moments>,
+    /// False of a map that keeps no moments: there are none to find out about.
+    keeps_moments: bool,
     /// What of both changed since it was found out what undoing does.
     since: Option<Since>,
 }
@@ -63,23 +65,26 @@ pub struct Reversal {
 const ENTRIES_PER_LOOK: usize = 16 << 10;
 
 impl VoxelOwnership {
-    /// The ownership of changes that are to be undone, by revision; those of `withdrawn` were taken back before.
-    pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnChange]) -> Self {
+    /// The ownership of changes that are to be undone, by revision, in a map with moments or without; those of `withdrawn`
+    /// were taken back before.
+    pub fn of(mut targets: Vec<u64>, withdrawn: &[WithdrawnChange], keeps_moments: bool) -> Self {
         targets.sort_unstable();
         let mut withdrawn: Vec<u64> = withdrawn.iter().map(|withdrawn| withdrawn.change).collect();
         withdrawn.sort_unstable();
-        Self { targets, withdrawn, blocks: HashMap::new(), moments: HashMap::new(), since: None }
+        let (blocks, moments) = (HashMap::new(), HashMap::new());
+        Self { targets, withdrawn, blocks, moments, keeps_moments, since: None }
     }
 
     /// Bytes of memory that touching `target` takes at most: an entry of each of its blocks and voxels with moments, in
     /// tables that grow to twice their size beside the old ones.
-    pub fn bytes_of(target: &Change) -> usize {
+    pub fn bytes_of(&self, target: &Change) -> usize {
         const OF_BLOCK: usize = 4 * size_of::<(VoxelKey, Sides)>();
         const OF_MOMENTS: usize = 4 * size_of::<(VoxelKey, Moments)>();
         let coarse = |(_, mask): &(VoxelKey, BlockMask)| mask.count(MOMENT_LEVEL);
         let touched = touched_by(target).into_iter();
         let bytes_of = |voxels: &VoxelSet| {
-            let moments: usize = voxels.blocks().iter().map(coarse).sum();
+            let with_moments = voxels.blocks().iter().filter(|_| self.keeps_moments);
+            let moments: usize = with_moments.map(coarse).sum();
             voxels.blocks().len() * OF_BLOCK + moments * OF_MOMENTS
         };
         touched.map(bytes_of).sum()
@@ -98,7 +103,7 @@ impl VoxelOwnership {
         let nothing = Sides { with: BlockMask::EMPTY, without: BlockMask::EMPTY };
         for (block, mask) in touched_by(target).into_iter().flat_map(VoxelSet::blocks) {
             self.blocks.entry(*block).or_insert(nothing);
-            for cell in mask.cells(MOMENT_LEVEL) {
+            for cell in mask.cells(MOMENT_LEVEL).filter(|_| self.keeps_moments) {
                 self.moments.entry(cell.voxel(*block).ancestor(MOMENT_LEVEL)).or_default();
             }
         }
@@ -283,7 +288,7 @@ mod tests {
 
     /// Of targets among `changes`, the first of which makes revision 2.
     fn begun(targets: &[u64], changes: &[Change], base: &MapContents) -> VoxelOwnership {
-        let mut observations = VoxelOwnership::of(targets.to_vec(), &[]);
+        let mut observations = VoxelOwnership::of(targets.to_vec(), &[], true);
         for (_, change) in (2..).zip(changes).filter(|(revision, _)| targets.contains(revision)) {
             observations.touch(change);
         }
@@ -366,10 +371,10 @@ mod tests {
     #[test]
     fn what_a_target_is_said_to_add_covers_its_tables() {
         for target in [insertion(2, 0..100_000), deletion(0..100_000)] {
-            let mut observations = VoxelOwnership::of(vec![2], &[]);
+            let mut observations = VoxelOwnership::of(vec![2], &[], true);
             observations.touch(&target);
             let tables = observations.blocks.allocation_size() + observations.moments.allocation_size();
-            assert!(tables <= VoxelOwnership::bytes_of(&target), "{tables} bytes");
+            assert!(tables <= observations.bytes_of(&target), "{tables} bytes");
         }
     }
 }

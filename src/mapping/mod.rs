@@ -285,7 +285,8 @@ impl<'a> ScanMapper<'a> {
         self.settings.deskew.velocity((&last, last_ns), (map_from_sensor, scan.timestamp_ns))
     }
 
-    /// The record of a scan where it was found: every voxel it touches, the moments of its points, and its pose.
+    /// The record of a scan where it was found: every voxel it touches, the moments of its points where the map keeps them,
+    /// and its pose.
     ///
     /// # Errors
     /// No point lies within the map's range.
@@ -305,7 +306,10 @@ impl<'a> ScanMapper<'a> {
             digest: scan.digest,
         };
         let points = scan.points_at(located.velocity.as_ref());
-        let record = ScanRecord::of_points(pose, &points, self.map.lattice());
+        let record = match self.map.settings().moments {
+            true => ScanRecord::of_points(pose, &points, self.map.lattice()),
+            false => ScanRecord::without_moments(pose, &points, self.map.lattice()),
+        };
         if record.voxels.is_empty() {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });

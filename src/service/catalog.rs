@@ -342,16 +342,19 @@ fn same_settings(map: Arc<HostedMap>, settings: MapSettings) -> Result<Arc<Hoste
     if *there == settings {
         return Ok(map);
     }
-    let describe = |s: &MapSettings| {
-        let FilterSettings { hashes, bits_per_key } = s.filter;
-        format!(
-            "resolution_m {}, levels {}, filter_hashes {hashes}, filter_bits_per_key {bits_per_key}",
-            s.resolution_m, s.levels
-        )
-    };
-    let message =
-        format!("map {} exists with {}, not with {}", map.name, describe(there), describe(&settings));
+    let (there, wanted) = (description(there), description(&settings));
+    let message = format!("map {} exists with {there}, not with {wanted}", map.name);
     Err(ServiceError::new(Reason::MapExists, message))
+}
+
+/// All settings of a map as text.
+fn description(settings: &MapSettings) -> String {
+    let MapSettings { resolution_m, levels, filter, moments } = settings;
+    let filter = filter.map_or("no filter".to_owned(), |FilterSettings { hashes, bits_per_key }| {
+        format!("filter_hashes {hashes}, filter_bits_per_key {bits_per_key}")
+    });
+    let moments = if *moments { "moments" } else { "no moments" };
+    format!("resolution_m {resolution_m}, levels {levels}, {filter}, {moments}")
 }
 
 fn not_stored(error: StoreError) -> ServiceError {

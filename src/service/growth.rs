@@ -23,7 +23,7 @@ mod tests {
     #[test]
     fn wide_filters_are_counted() {
         let settings = |bits_per_key| MapSettings {
-            filter: FilterSettings { hashes: 2, bits_per_key },
+            filter: Some(FilterSettings { hashes: 2, bits_per_key }),
             ..MapSettings::new(0.1, 4)
         };
         let voxels = (0..1000).map(|i| VoxelKey::new([8 * i, 0, 0]).unwrap()).collect();
@@ -31,5 +31,6 @@ mod tests {
         assert_eq!(growth(1.0) / 1000, 512 + 32 + 256 + 3);
         // Four levels of 4096 bits and their counters.
         assert!(growth(4096.0) > 1000 * 4 * 2560);
+        assert_eq!(growth_bytes(&MapSettings::query_only(0.1, 4), &voxels, 0) / 1000, 512 + 32);
     }
 }

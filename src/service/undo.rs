@@ -172,7 +172,8 @@ impl HostedMap {
             part = Some(budget.reserve_transient(bytes, UNDO)?);
             Ok(())
         };
-        folder.observations(changes, withdrawn, reserve, stop).map_err(|why| match why {
+        let settings = self.map.settings();
+        folder.observations(settings, changes, withdrawn, reserve, stop).map_err(|why| match why {
             NotObserved::OutsideUndoWindow => self.outside_undo_window(folder, changes[0], withdrawn),
             NotObserved::Stopped => ended_early(stop),
             NotObserved::NoMemory(refusal) => refusal,

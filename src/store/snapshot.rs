@@ -38,7 +38,7 @@ use writing::body_of;
 /// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
 /// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
 /// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored; up to
-/// version 5 no deletion was taken back; up to version 6 there are no keep-outs.
+/// version 5 no deletion was taken back; up to version 6 there are no keep-outs, and all maps have filters and moments.
 pub const FORMAT_VERSION: u32 = 7;
 const MAGIC: &[u8; 8] = b"MROL-MAP";
 pub(super) const HEADER_BYTES: usize = 48;
@@ -394,8 +394,8 @@ mod tests {
             uuid: snapshot.uuid.as_bytes().to_vec().into(),
             resolution_m: snapshot.settings.resolution_m,
             levels: snapshot.settings.levels,
-            filter_hashes: snapshot.settings.filter.hashes,
-            filter_bits_per_key: snapshot.settings.filter.bits_per_key,
+            filter_hashes: snapshot.settings.filter.map_or(0, |filter| filter.hashes),
+            filter_bits_per_key: snapshot.settings.filter.map_or(0.0, |filter| filter.bits_per_key),
             revision: *revision,
             block_keys: Vec::new(),
             block_masks: Vec::new().into(),
@@ -403,9 +403,11 @@ mod tests {
             voxels: Some(voxels.into()),
             withdrawn: trajectory.withdrawn().iter().map(Into::into).collect(),
             requests: requests.iter().map(Into::into).collect(),
-            moments: Some(moments::beside(voxels, moments, StopSignal::NEVER)),
+            moments: snapshot.settings.moments.then(|| moments::beside(voxels, moments, StopSignal::NEVER)),
             forgotten: trajectory.forgotten().map(Into::into).collect(),
             keep_outs: keep_outs.iter().map(Into::into).collect(),
+            no_filter: snapshot.settings.filter.is_none(),
+            no_moments: !snapshot.settings.moments,
         }
     }
 
@@ -415,6 +417,29 @@ mod tests {
         let contents = MapContents::default();
         let empty = Snapshot { contents, ..snapshot() };
         assert!(body_of(&empty, StopSignal::NEVER) == message(&empty).encode_to_vec());
+        let query_only = query_only(true, true);
+        assert!(body_of(&query_only, StopSignal::NEVER) == message(&query_only).encode_to_vec());
+    }
+
+    /// The snapshot of a map without filters, without moments, or without either.
+    fn query_only(no_filter: bool, no_moments: bool) -> Snapshot {
+        let Snapshot { uuid, settings, contents } = snapshot();
+        let filter = settings.filter.filter(|_| !no_filter);
+        let moments = if no_moments { MomentSet::default() } else { contents.moments.clone() };
+        let settings = MapSettings { filter, moments: !no_moments, ..settings };
+        Snapshot { uuid, settings, contents: MapContents { moments, ..contents } }
+    }
+
+    #[test]
+    fn a_map_without_filters_or_moments_is_restored_without_them() {
+        for (no_filter, no_moments) in [(true, false), (false, true), (true, true)] {
+            let written = query_only(no_filter, no_moments);
+            let read = Snapshot::decode(&written.encode().unwrap()).unwrap();
+            assert!(read == written);
+            let map = read.restore().unwrap();
+            assert_eq!(*map.settings(), written.settings);
+            assert!(Snapshot::of(&map, written.uuid) == written);
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::{Display, Write};
 
 use super::map_counters::{self, Series};
-use crate::map::{LevelInfo, MapName};
+use crate::map::{FilterInfo, LevelInfo, MapName};
 use crate::service::{MapInfo, MapStorage, PoolUse, UnavailableMap};
 use crate::util::Durations;
 
@@ -103,19 +103,19 @@ pub(super) fn write_unavailable(text: &mut String, maps: &[UnavailableMap]) {
 fn write_filters(text: &mut String, maps: &[MapInfo]) {
     let what = "Bytes of the filters, by map, level and part: the plane that look-ups read, the counters";
     let mut family = Family::begin(text, "mrol_map_filter_bytes", Kind::Gauge, what);
-    for (map, level) in levels(maps) {
-        for (part, bytes) in [("plane", level.plane_bytes), ("counters", level.counter_bytes)] {
+    for (map, level, filter) in filters(maps) {
+        for (part, bytes) in [("plane", filter.plane_bytes), ("counters", filter.counter_bytes)] {
             family.sample(&[("map", &map.name), ("level", &level.level), ("part", &part)], bytes);
         }
     }
     let what = "False positive rate of the filters, by map, level and kind: by the closed form of their layout, \
                 by eq. (1) of the paper, as measured now";
     let mut family = Family::begin(text, "mrol_filter_false_positive_rate", Kind::Gauge, what);
-    for (map, level) in levels(maps) {
+    for (map, level, filter) in filters(maps) {
         let rates = [
-            ("expected", Some(level.expected_rate)),
-            ("ideal", Some(level.ideal_false_positive_rate)),
-            ("measured", level.measured_rate),
+            ("expected", Some(filter.expected_rate)),
+            ("ideal", Some(filter.ideal_false_positive_rate)),
+            ("measured", filter.measured_rate),
         ];
         for (kind, rate) in rates {
             if let Some(rate) = rate {
@@ -123,6 +123,11 @@ fn write_filters(text: &mut String, maps: &[MapInfo]) {
             }
         }
     }
+}
+
+/// The filters of the levels that have one.
+fn filters(maps: &[MapInfo]) -> impl Iterator<Item = (&MapInfo, &LevelInfo, FilterInfo)> {
+    levels(maps).filter_map(|(map, level)| Some((map, level, level.filter?)))
 }
 
 fn levels(maps: &[MapInfo]) -> impl Iterator<Item = (&MapInfo, &LevelInfo)> {

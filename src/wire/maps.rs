@@ -6,43 +6,63 @@ use super::scan::verdict_from;
 use super::types::count_from;
 use super::{InField, pb, required};
 use crate::bloom::FilterSettings;
-use crate::map::{LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
+use crate::map::{FilterInfo, LEVELS_DEFAULT, LevelInfo, MapName, MapSettings, RobotName};
 use crate::mapping::Sighting;
-use crate::service::{MapInfo, MapList, MapStorage, ServiceError, UnavailableMap};
+use crate::service::{MapInfo, MapList, MapStorage, Reason, ServiceError, UnavailableMap};
 use crate::store::JournalUse;
 use crate::util::Durations;
 
 /// The name and settings of a map to make; `filter` fills in what the request leaves to the server.
 ///
 /// # Errors
-/// When the name is none or the settings are missing.
+/// When the name is none, the settings are missing, or they have a filter and none.
 pub fn create_map(
     request: pb::CreateMapRequest,
     filter: FilterSettings,
 ) -> Result<(MapName, MapSettings), ServiceError> {
     let settings = required(request.settings, "settings")?;
-    Ok((MapName::new(&request.map)?, settings_from(&settings, filter)))
+    Ok((MapName::new(&request.map)?, settings_from(&settings, filter)?))
 }
 
-fn settings_from(settings: &pb::MapSettings, default: FilterSettings) -> MapSettings {
-    let filter = settings.filter.unwrap_or_default();
-    MapSettings {
+fn settings_from(settings: &pb::MapSettings, default: FilterSettings) -> Result<MapSettings, ServiceError> {
+    let filter = match (settings.no_filter, settings.filter) {
+        (true, None) => None,
+        (true, Some(_)) => {
+            let message = "settings.filter and settings.no_filter are given: leave one out".to_owned();
+            return Err(ServiceError::new(Reason::UnexpectedField, message));
+        }
+        (false, filter) => Some(filter_from(filter.unwrap_or_default(), default)),
+    };
+    Ok(MapSettings {
         resolution_m: settings.resolution_m,
         levels: settings.levels.unwrap_or(LEVELS_DEFAULT),
-        filter: FilterSettings {
-            hashes: filter.hashes.unwrap_or(default.hashes),
-            bits_per_key: filter.bits_per_key.unwrap_or(default.bits_per_key),
-        },
+        filter,
+        moments: settings.moments.unwrap_or(true),
+    })
+}
+
+fn filter_from(filter: pb::FilterSettings, default: FilterSettings) -> FilterSettings {
+    FilterSettings {
+        hashes: filter.hashes.unwrap_or(default.hashes),
+        bits_per_key: filter.bits_per_key.unwrap_or(default.bits_per_key),
+    }
+}
+
+impl From<FilterSettings> for pb::FilterSettings {
+    fn from(FilterSettings { hashes, bits_per_key }: FilterSettings) -> Self {
+        Self { hashes: Some(hashes), bits_per_key: Some(bits_per_key) }
     }
 }
 
 impl From<MapSettings> for pb::MapSettings {
     fn from(settings: MapSettings) -> Self {
-        let filter = pb::FilterSettings {
-            hashes: Some(settings.filter.hashes),
-            bits_per_key: Some(settings.filter.bits_per_key),
-        };
-        Self { resolution_m: settings.resolution_m, levels: Some(settings.levels), filter: Some(filter) }
+        Self {
+            resolution_m: settings.resolution_m,
+            levels: Some(settings.levels),
+            filter: settings.filter.map(Into::into),
+            no_filter: settings.filter.is_none(),
+            moments: Some(settings.moments),
+        }
     }
 }
 
@@ -141,12 +161,17 @@ impl TryFrom<pb::MapInfo> for MapInfo {
 
     fn try_from(info: pb::MapInfo) -> Result<Self, ServiceError> {
         let settings = required(info.settings, "map.settings")?;
+        let settings = settings_from(&settings, FilterSettings::default()).in_field("map")?;
+        let level = |level: &pb::LevelInfo| LevelInfo {
+            filter: settings.filter.map(|_| level.into()),
+            ..level_without_filter(level)
+        };
         let robots = info.robots.iter().map(|robot| RobotName::new(robot)).collect::<Result<_, _>>();
         Ok(Self {
             name: MapName::new(&info.map)?,
             version: required(info.version, "map.version")?.try_into()?,
-            settings: settings_from(&settings, FilterSettings::default()),
-            levels: info.levels.iter().map(Into::into).collect(),
+            settings,
+            levels: info.levels.iter().map(level).collect(),
             scans: count_from(info.scans),
             robots: robots.in_field("map.robots")?,
             sightings: info.sightings.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
@@ -223,25 +248,28 @@ impl From<pb::MapStorage> for MapStorage {
 
 impl From<&LevelInfo> for pb::LevelInfo {
     fn from(info: &LevelInfo) -> Self {
+        let filter = info.filter.unwrap_or_default();
         Self {
             level: info.level,
             resolution_m: info.resolution_m,
             voxels: info.voxels as u64,
-            plane_bytes: info.plane_bytes as u64,
-            counter_bytes: info.counter_bytes as u64,
-            expected_false_positive_rate: info.expected_rate,
-            ideal_false_positive_rate: info.ideal_false_positive_rate,
-            measured_false_positive_rate: info.measured_rate,
+            plane_bytes: filter.plane_bytes as u64,
+            counter_bytes: filter.counter_bytes as u64,
+            expected_false_positive_rate: filter.expected_rate,
+            ideal_false_positive_rate: filter.ideal_false_positive_rate,
+            measured_false_positive_rate: filter.measured_rate,
         }
     }
 }
 
-impl From<&pb::LevelInfo> for LevelInfo {
+fn level_without_filter(info: &pb::LevelInfo) -> LevelInfo {
+    let pb::LevelInfo { level, resolution_m, voxels, .. } = *info;
+    LevelInfo { level, resolution_m, voxels: count_from(voxels), filter: None }
+}
+
+impl From<&pb::LevelInfo> for FilterInfo {
     fn from(info: &pb::LevelInfo) -> Self {
         Self {
-            level: info.level,
-            resolution_m: info.resolution_m,
-            voxels: count_from(info.voxels),
             plane_bytes: count_from(info.plane_bytes),
             counter_bytes: count_from(info.counter_bytes),
             expected_rate: info.expected_false_positive_rate,

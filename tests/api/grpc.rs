@@ -14,7 +14,7 @@ use crate::support::daemon::{
 };
 
 fn settings(resolution_m: f64, levels: u32) -> Option<pb::MapSettings> {
-    Some(pb::MapSettings { resolution_m, levels: Some(levels), filter: None })
+    Some(pb::MapSettings { resolution_m, levels: Some(levels), ..Default::default() })
 }
 
 fn reason(status: &Status) -> String {

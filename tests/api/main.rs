@@ -15,6 +15,7 @@ mod lifecycle;
 mod localize;
 mod memory_returns;
 mod observers;
+mod query_only;
 #[cfg(feature = "lab")]
 mod recovery;
 mod regions;

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use mrol::bloom::FilterSettings;
 use mrol::client::{Answers, Client, Replica, ReplicaOptions};
 use mrol::map::{Lookup, MapName, Region};
 use mrol::service::{
@@ -364,7 +365,9 @@ async fn a_replica_answers_as_the_server_does_at_the_same_revision() {
     daemon.make_map("a").await;
     daemon.put_in("a", &row(4)).await;
     let client = client_of(&daemon).await;
-    let replica = Replica::open(client.clone(), map("a"), ReplicaOptions::default()).await.unwrap();
+    let filter = Some(FilterSettings::default());
+    let options = ReplicaOptions { filter, ..ReplicaOptions::default() };
+    let replica = Replica::open(client.clone(), map("a"), options).await.unwrap();
     let region = Region::cuboid([0.0, -1.0, -1.0], [1.0, 1.0, 1.0]).unwrap();
     let options = ReplicaOptions { region: Some(region), ..ReplicaOptions::default() };
     let part = Replica::open(client.clone(), map("a"), options).await.unwrap();
@@ -400,6 +403,9 @@ async fn a_replica_answers_as_the_server_does_at_the_same_revision() {
         let status = replica.status();
         assert_eq!((status.version.revision, status.resets, status.is_connected), (revision, 1, true));
     }
+    assert_eq!(replica.map().settings().filter, filter);
+    let of_part = *part.map().settings();
+    assert_eq!((of_part.filter, of_part.moments), (None, false));
     let inside: BTreeSet<_> = part.map().view().voxels().iter().collect();
     let expected: BTreeSet<_> = replica.map().view().voxels_in(&region, 0).into_iter().collect();
     assert_eq!(inside, expected);

@@ -43,7 +43,8 @@ fn map_sequence(scans: &[Vec<Point>], settings: MapSettings, lookup: Lookup, met
         if k > 0 {
             let aligned = align(&map, points, &run.poses[k - 1], &alignment);
             let levels = map.describe(0, 0).levels;
-            let rate = levels.iter().map(|level| level.expected_rate).fold(0.0, f64::max);
+            let rates = levels.iter().filter_map(|level| level.filter).map(|filter| filter.expected_rate);
+            let rate = rates.fold(0.0, f64::max);
             run.expected_false_positives += aligned.lookups as f64 * rate;
             run.poses.push(aligned.map_from_sensor);
         }
@@ -64,8 +65,10 @@ fn assert_identical(name: &str, scans: &[Vec<Point>], resolution_m: f64, levels:
 }
 
 fn assert_identical_by(method: Method, name: &str, scans: &[Vec<Point>], resolution_m: f64, levels: u32) {
-    let map =
-        |filter, lookup| map_sequence(scans, MapSettings { resolution_m, levels, filter }, lookup, method);
+    let map = |filter, lookup| {
+        let settings = MapSettings { filter: Some(filter), ..MapSettings::new(resolution_m, levels) };
+        map_sequence(scans, settings, lookup, method)
+    };
     let exact = map(AMPLE, Lookup::Exact);
     let bloom = map(AMPLE, Lookup::Bloom);
     let small = map(SMALL, Lookup::Bloom);

@@ -103,20 +103,21 @@ fn delete_some(map: &MultiResolutionMap, model: &mut HashSet<[i32; 3]>, random: 
 fn assert_false_positives(set: &ScanSet, map: &MultiResolutionMap) {
     let levels = map.describe(SAMPLES, 7).levels;
     for level in levels {
-        let measured = level.measured_rate.expect("a level with voxels");
+        let filter = level.filter.expect("a map with filters");
+        let measured = filter.measured_rate.expect("a level with voxels");
         println!(
             "{} level {}: {} voxels, false positives {:.3} % measured, {:.3} % closed form, {:.3} % eq. (1)",
             set.name,
             level.level,
             level.voxels,
             measured * 100.0,
-            level.expected_rate * 100.0,
-            level.ideal_false_positive_rate * 100.0
+            filter.expected_rate * 100.0,
+            filter.ideal_false_positive_rate * 100.0
         );
         // A level of a few hundred voxels has too few neighbors for a rate: four standard errors on top.
         let samples = (level.voxels as f64).min(SAMPLES as f64) * 0.5;
-        let noise = 4.0 * (level.expected_rate / samples).sqrt();
-        assert!(measured <= 1.2 * level.expected_rate + noise, "level {}: {measured}", level.level);
+        let noise = 4.0 * (filter.expected_rate / samples).sqrt();
+        assert!(measured <= 1.2 * filter.expected_rate + noise, "level {}: {measured}", level.level);
     }
 }
 
@@ -124,7 +125,7 @@ fn assert_false_positives(set: &ScanSet, map: &MultiResolutionMap) {
 fn view_counters(map: &MultiResolutionMap, level: u32) -> Vec<usize> {
     let view = map.view();
     let used = |(in_use, saturated): (usize, usize)| in_use + saturated;
-    view.lists(level).map(|list| used(list.filter().counters_in_use())).collect()
+    view.lists(level).filter_map(|list| list.filter()).map(|filter| used(filter.counters_in_use())).collect()
 }
 
 fn check(name: &'static str) {
@@ -149,9 +150,10 @@ fn check(name: &'static str) {
     let view = map.view();
     for level in 0..LEVELS {
         for list in view.lists(level) {
-            assert!(list.filter().is_recount_of(list.iter().map(VoxelKey::to_bits)));
-            let (in_use, _) = list.filter().counters_in_use();
-            assert!(in_use <= list.len() * map.settings().filter.hashes as usize);
+            let filter = list.filter().expect("a map with filters");
+            assert!(filter.is_recount_of(list.iter().map(VoxelKey::to_bits)));
+            let (in_use, _) = filter.counters_in_use();
+            assert!(in_use <= list.len() * filter.settings().hashes as usize);
         }
     }
     drop(view);

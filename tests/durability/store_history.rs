@@ -160,9 +160,9 @@ fn data_dir(disk: &SimulatedDisk, settings: &StoreSettings) -> DataDir {
 }
 
 impl Kept {
-    fn new(levels: u32, settings: StoreSettings) -> Self {
+    fn new(map: MapSettings, settings: StoreSettings) -> Self {
         let (disk, uuid) = (SimulatedDisk::default(), Uuid::new_v4());
-        let map = MultiResolutionMap::new(MapSettings::new(1.0, levels)).unwrap();
+        let map = MultiResolutionMap::new(map).unwrap();
         let folder = data_dir(&disk, &settings).create(&office(), &Snapshot::of(&map, uuid)).unwrap();
         Self { disk, settings, uuid, folder, map }
     }
@@ -188,17 +188,20 @@ impl Kept {
     fn undo(&self, targets: UndoRecord) -> bool {
         let withdrawn = self.map.trajectory().withdrawn().to_vec();
         let (all, changes) = (|_| Ok::<_, Infallible>(()), targets.changes().collect::<Vec<_>>());
-        let mut observed = match self.folder.observations(&changes, &withdrawn, all, StopSignal::NEVER) {
-            Err(NotObserved::OutsideUndoWindow) => {
-                let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
-                assert!(changes[0] <= reach, "{} is out of reach at {}", changes[0], self.map.revision());
-                return false;
-            }
-            observed => observed.unwrap(),
-        };
+        let settings = self.map.settings();
+        let mut observed =
+            match self.folder.observations(settings, &changes, &withdrawn, all, StopSignal::NEVER) {
+                Err(NotObserved::OutsideUndoWindow) => {
+                    let reach = self.map.revision().saturating_sub(self.settings.undo_revisions);
+                    assert!(changes[0] <= reach, "{} is out of reach at {}", changes[0], self.map.revision());
+                    return false;
+                }
+                observed => observed.unwrap(),
+            };
         assert_eq!(observed.revision, self.map.revision());
         let Reversal { removed, restored, moments } =
             observed.observations.reversal(StopSignal::NEVER).unwrap();
+        assert!(self.map.settings().moments || moments.as_slice().is_empty());
         self.commit(&Change::Undo(UndoRecord { removed, restored, moments, ..targets }));
         true
     }
@@ -218,7 +221,10 @@ impl Kept {
                 let removed: PlainSet =
                     carved.iter().filter(|&i| there.contains(i) && !indices.contains(i)).copied().collect();
                 let carved = removed.iter().filter_map(|&i| VoxelKey::new(i)).collect();
-                let record = ScanRecord::of_points(pose, &points, self.map.lattice());
+                let record = match self.map.settings().moments {
+                    true => ScanRecord::of_points(pose, &points, self.map.lattice()),
+                    false => ScanRecord::without_moments(pose, &points, self.map.lattice()),
+                };
                 let revision = self.commit(&Change::Insertion(ScanRecord { carved, ..record }));
                 model.events.insert(revision, Event { removed, points: indices.clone() });
                 model.trajectory.push((revision, robot(*number)));
@@ -304,10 +310,14 @@ proptest! {
         // So few that undo runs into its reach, or so many that it does not.
         undo_revisions in prop::sample::select(vec![0u64, 3, 10, 1000]),
         segment_bytes_max in prop::sample::select(vec![1u64, 600, 1 << 20]),
+        has_filter: bool,
+        moments: bool,
         steps in prop::collection::vec(step(), 1..70),
     ) {
         let settings = StoreSettings { undo_revisions, segment_bytes_max, ..StoreSettings::default() };
-        let (mut kept, mut model) = (Kept::new(levels, settings), Model::default());
+        let map = MapSettings::new(1.0, levels);
+        let map = MapSettings { filter: map.filter.filter(|_| has_filter), moments, ..map };
+        let (mut kept, mut model) = (Kept::new(map, settings), Model::default());
         for step in &steps {
             kept.step(step, &mut model);
             let held = model.held();
@@ -315,9 +325,10 @@ proptest! {
             let found: Vec<_> =
                 kept.map.trajectory().poses().map(|pose| (pose.revision, pose.robot.clone())).collect();
             prop_assert_eq!(&found, &model.trajectory);
-            let moments: BTreeMap<_, _> =
-                kept.map.moments().to_set().as_slice().iter().map(|(key, moments)| (key.index(), *moments)).collect();
-            prop_assert_eq!(moments, held.moments);
+            let found = kept.map.moments().map(|moments| moments.to_set());
+            let of_voxel = |(key, moments): &(VoxelKey, Moments)| (key.index(), *moments);
+            let found = found.map(|set| set.as_slice().iter().map(of_voxel).collect::<BTreeMap<_, _>>());
+            prop_assert_eq!(found, moments.then_some(held.moments));
             let keep_outs = kept.map.keep_outs();
             prop_assert!(keep_outs.iter().eq(model.keep_outs.values()), "{:?}", keep_outs);
         }

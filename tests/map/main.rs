@@ -14,3 +14,5 @@ mod stationary_robots;
 #[path = "../support/mod.rs"]
 mod support;
 mod trajectory_growth;
+#[cfg(feature = "lab")]
+mod without_moments;

@@ -154,10 +154,13 @@ proptest! {
         hashes in 1u32..=4,
         // Few bits a key, so that counters saturate as well.
         bits_per_key in prop::sample::select(vec![1.0, 4.0, 14.0]),
+        has_filter: bool,
+        moments: bool,
         changes in prop::collection::vec(change(), 1..25),
     ) {
-        let filter = FilterSettings { hashes, bits_per_key };
-        let mut map = MultiResolutionMap::new(MapSettings { resolution_m: 1.0, levels, filter }).unwrap();
+        let filter = has_filter.then_some(FilterSettings { hashes, bits_per_key });
+        let settings = MapSettings { filter, moments, ..MapSettings::new(1.0, levels) };
+        let mut map = MultiResolutionMap::new(settings).unwrap();
         let (mut model, mut keep_outs) = (Model::new(), BTreeMap::new());
         for change in &changes {
             let before = map.content_version();
@@ -171,6 +174,7 @@ proptest! {
             apply_to_keep_outs(&mut keep_outs, change, map.revision());
             let expected = keep_outs.iter().map(|(name, (made, radius))| (name.clone(), *made, keep_out_shape(*radius)));
             prop_assert_eq!(keep_outs_of(&map), expected.collect::<Vec<_>>());
+            prop_assert_eq!(map.moments().is_some(), moments);
         }
     }
 }
@@ -185,9 +189,9 @@ fn a_map_that_lost_all_voxels_is_as_new() {
     assert!(map.is_empty());
     let levels = map.describe(100, 0).levels;
     for level in levels {
-        assert_eq!((level.voxels, level.measured_rate), (0, None));
+        assert_eq!((level.voxels, level.filter.unwrap().measured_rate), (0, None));
         let view = map.view();
-        assert!(view.lists(level.level).all(|list| list.filter().counters_in_use() == (0, 0)));
+        assert!(view.lists(level.level).all(|list| list.filter().unwrap().counters_in_use() == (0, 0)));
     }
 }
 

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6}
 
 use super::gaussian::Gaussian;
 use super::gaussians::VoxelGaussians;
+use super::known_moments::KnownMoments;
 use crate::geometry::{Point, Pose};
-use crate::map::MomentsView;
 use crate::util::StopSignal;
 
 /// Points that are matched between two checks of the stop signal: a millisecond, where none of their voxels was read
@@ -38,7 +38,7 @@ impl NormalEquations {
         points: &[Point],
         pose: &Pose,
         gaussians: &mut VoxelGaussians,
-        moments: &MomentsView<'_>,
+        moments: &KnownMoments<'_>,
         robust_scale: f64,
         stop: StopSignal<'_>,
     ) -> Self {
@@ -91,7 +91,7 @@ pub(super) fn information(
     points: &[Point],
     pose: &Pose,
     gaussians: &mut VoxelGaussians,
-    moments: &MomentsView<'_>,
+    moments: &KnownMoments<'_>,
     robust_scale: f64,
     stop: StopSignal<'_>,
 ) -> Matrix6<f64> {
@@ -122,7 +122,7 @@ fn for_each_match(
     points: &[Point],
     pose: &Pose,
     gaussians: &mut VoxelGaussians,
-    moments: &MomentsView<'_>,
+    moments: &KnownMoments<'_>,
     (robust_scale, stop): (f64, StopSignal<'_>),
     mut f: impl FnMut(usize, &Gaussian, Match),
 ) {

@@ -4,7 +4,8 @@ use hashbrown::HashMap;
 use nalgebra::Vector3;
 
 use super::gaussian::{Gaussian, Softness};
-use crate::map::{MomentsView, MultiResolutionMap};
+use super::known_moments::KnownMoments;
+use crate::map::MultiResolutionMap;
 use crate::voxel::{MOMENT_LEVEL, Moments, VoxelKey};
 
 /// Number of voxel sizes that have Gaussians: 4, 8 and 16 r_0. Where the smallest voxels hold too few points to show a
@@ -41,11 +42,11 @@ impl VoxelGaussians {
     /// Index of the Gaussian that a point of the map frame belongs to: that of its smallest voxel that has one or,
     /// failing that, of the neighbors across its nearest faces; then the same for larger voxels. (Otherwise a surface
     /// on the border of two voxels would attract only the points on its own side.)
-    pub(super) fn nearest(&mut self, moments: &MomentsView<'_>, point_m: &Vector3<f64>) -> Option<u32> {
+    pub(super) fn nearest(&mut self, moments: &KnownMoments<'_>, point_m: &Vector3<f64>) -> Option<u32> {
         (0..SIZES).find_map(|size| self.nearest_of(moments, point_m, size))
     }
 
-    fn nearest_of(&mut self, moments: &MomentsView<'_>, point_m: &Vector3<f64>, size: usize) -> Option<u32> {
+    fn nearest_of(&mut self, moments: &KnownMoments<'_>, point_m: &Vector3<f64>, size: usize) -> Option<u32> {
         let scaled = point_m / self.side_m(size);
         let index = scaled.map(|c| c.floor() as i32);
         if let Some(own) = self.of_voxel(moments, index.into(), size) {
@@ -66,7 +67,7 @@ impl VoxelGaussians {
         nearest.map(|(i, _)| i)
     }
 
-    fn of_voxel(&mut self, moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Option<u32> {
+    fn of_voxel(&mut self, moments: &KnownMoments<'_>, index: [i32; 3], size: usize) -> Option<u32> {
         let voxel = VoxelKey::new(index)?;
         if let Some(&known) = self.sizes[size].get(&voxel) {
             return known;
@@ -90,12 +91,12 @@ impl VoxelGaussians {
 }
 
 /// The moments of the points in a voxel `size` levels above those that keep them, about its center.
-fn moments_of(moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Moments {
+fn moments_of(moments: &KnownMoments<'_>, index: [i32; 3], size: usize) -> Moments {
     let side = 1 << size;
     let mut sum = Moments::default();
     for child in (0..side * side * side).map(|i| [i % side, i / side % side, i / (side * side)]) {
         let voxel = VoxelKey::new([0, 1, 2].map(|axis| index[axis] * side + child[axis]));
-        if let Some(moments) = voxel.and_then(|voxel| moments.of(voxel)) {
+        if let Some(moments) = voxel.and_then(|voxel| moments.in_voxel(voxel)) {
             sum += moments.about(child.map(|c| i64::from(2 * c + 1 - side) * (Moments::UNITS / 2)));
         }
     }
@@ -106,8 +107,22 @@ fn moments_of(moments: &MomentsView<'_>, index: [i32; 3], size: usize) -> Moment
 mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::map::{MapSettings, MappedScan, RobotName, ScanRecord};
-    use crate::voxel::{Lattice, MomentSet};
+    use crate::map::{MapContents, MapSettings, MappedScan, RobotName, ScanRecord};
+    use crate::voxel::{Lattice, MomentSet, VoxelSet};
+
+    #[test]
+    fn a_map_without_moments_knows_those_of_its_voxels_centers() {
+        let voxels: VoxelSet = (-40..40).filter_map(|i| VoxelKey::new([i, i * i % 17, i / 3])).collect();
+        let of =
+            |settings| MultiResolutionMap::restore(settings, MapContents::at(1, voxels.clone())).unwrap();
+        let (with, without) = (of(MapSettings::new(1.0, 1)), of(MapSettings::query_only(1.0, 1)));
+        let (with, without) = (KnownMoments::of(&with), KnownMoments::of(&without));
+        for voxel in voxels.moment_voxels() {
+            assert!(without.in_voxel(voxel).is_some());
+            assert_eq!(with.in_voxel(voxel), without.in_voxel(voxel));
+        }
+        assert_eq!(without.in_voxel(VoxelKey::new([50, 0, 0]).unwrap()), None);
+    }
 
     #[test]
     fn a_larger_voxel_has_the_moments_of_all_its_points() {
@@ -119,7 +134,7 @@ mod tests {
 
         // The same points in a lattice four times as coarse, whose units are four times as long.
         let coarse = MomentSet::of_points(&points, &Lattice::new(1.0, 1).unwrap().from_map());
-        let sum = moments_of(&map.moments(), [0, 0, 0], 2);
+        let sum = moments_of(&KnownMoments::of(&map), [0, 0, 0], 2);
         let (_, expected) = coarse.as_slice()[0];
         assert_eq!((sum.count(), coarse.as_slice().len()), (200, 1));
         let scaled = expected.to_numbers();

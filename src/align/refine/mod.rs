@@ -8,6 +8,7 @@
 mod equations;
 mod gaussian;
 mod gaussians;
+mod known_moments;
 
 use super::PoseInformation;
 use super::settings::RefinementSettings;
@@ -17,6 +18,7 @@ use crate::util::StopSignal;
 use equations::{NormalEquations, information};
 use gaussian::Softness;
 use gaussians::VoxelGaussians;
+use known_moments::KnownMoments;
 
 /// Steps shorter than this fraction of r_0, and than [`SETTLED_RAD`], end a stage.
 const SETTLED: f64 = 1e-4;
@@ -75,7 +77,7 @@ pub(super) fn refine(
                 points,
                 pose,
                 &mut gaussians,
-                &map.moments(),
+                &KnownMoments::of(map),
                 settings.robust_scale,
                 stop,
             );
@@ -104,8 +106,10 @@ pub(super) fn surface_fit(
     let std_m = settings.std_m(map.lattice().resolution_m(0));
     let mut gaussians = VoxelGaussians::new(map, Softness { std_m, spread: SPREAD_TO_JUDGE });
     let scale = settings.robust_scale;
-    let equations = NormalEquations::of(points, map_from_sensor, &mut gaussians, &map.moments(), scale, stop);
-    let information = information(points, map_from_sensor, &mut gaussians, &map.moments(), scale, stop);
+    let equations =
+        NormalEquations::of(points, map_from_sensor, &mut gaussians, &KnownMoments::of(map), scale, stop);
+    let information =
+        information(points, map_from_sensor, &mut gaussians, &KnownMoments::of(map), scale, stop);
     SurfaceFit {
         information: PoseInformation::new(information, points),
         inliers: equations.inliers as f64 / points.len().max(1) as f64,

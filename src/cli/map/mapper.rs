@@ -77,7 +77,7 @@ impl Mapper {
 
     /// True when the alignment asks the filters alone.
     pub(in crate::cli) fn asks_filters(&self) -> bool {
-        self.settings.alignment.lookup == Lookup::Bloom
+        self.settings.alignment.lookup == Lookup::Bloom && self.map.settings().filter.is_some()
     }
 
     /// Aligns scan `k` to the map, or takes `known` as its pose, and adds it where it fits.
@@ -118,8 +118,7 @@ impl Mapper {
         let view = self.map.view();
         let of_level = |level| {
             let (mut voxels, mut expected) = (0.0, 0.0);
-            for list in view.lists(level) {
-                let filter = list.filter();
+            for filter in view.lists(level).filter_map(|list| list.filter()) {
                 voxels += filter.len() as f64;
                 expected += filter.expected_rate() * filter.len() as f64;
             }

@@ -35,6 +35,8 @@ EXAMPLES:
   mrol map scans/ --resolution 0.1 --truth true.txt --at-truth --out hall.mrol
   mrol map scans/ --resolution 0.1 --lookup bloom --filter-hashes 10 --filter-bits-per-key 4096
                                                              are the filters ample? (last line)
+  mrol map scans/ --resolution 0.1 --no-filter --no-moments --out yard.mrol
+                                                             a map for queries, in a small part of the memory
   mkdir -p mrol-data/maps && mrol map scans/ --resolution 0.1 --out mrol-data/maps/hall.mrol && mrol serve
                                                              serve the map
 
@@ -95,6 +97,12 @@ pub(super) struct Map {
     /// Bits of the filters' planes a voxel, m / n of eq. (1): 1 to 4096
     #[arg(long, value_name = "BITS", default_value_t = FilterSettings::default().bits_per_key)]
     filter_bits_per_key: f64,
+    /// No filters: the exact set answers every look-up
+    #[arg(long, conflicts_with_all = ["filter_hashes", "filter_bits_per_key"])]
+    no_filter: bool,
+    /// No moments of points: scans are aligned by overlap alone
+    #[arg(long)]
+    no_moments: bool,
 }
 
 impl Map {
@@ -127,7 +135,11 @@ impl Map {
 
     fn map_settings(&self) -> MapSettings {
         let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
-        MapSettings { resolution_m: self.resolution, levels: self.levels, filter }
+        MapSettings {
+            filter: (!self.no_filter).then_some(filter),
+            moments: !self.no_moments,
+            ..MapSettings::new(self.resolution, self.levels)
+        }
     }
 
     fn alignment_settings(&self) -> Result<AlignmentSettings, CliError> {

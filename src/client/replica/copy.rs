@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::ReplicaError;
+use super::{ReplicaError, ReplicaOptions};
+use crate::bloom::FilterSettings;
 use crate::map::{
     Change, ContentHash, ContentVersion, KEEP_OUTS_MAX, KeepOutRecord, KeepOuts, MapContents, MapSettings,
     MultiResolutionMap,
@@ -36,6 +37,8 @@ pub(super) enum Applied {
 pub(super) struct Builder {
     /// Finest blocks that the copy, or one change, may have.
     blocks_max: usize,
+    /// Filters of the copy.
+    filter: Option<FilterSettings>,
     /// True of a copy of the whole map, whose hash can be compared.
     is_whole: bool,
     copied: Option<Copied>,
@@ -61,8 +64,9 @@ struct ChangeSoFar {
 
 impl Builder {
     /// Nothing is copied yet.
-    pub(super) fn new(is_whole: bool, blocks_max: usize) -> Self {
-        Self { blocks_max, is_whole, copied: None, state: None, change: None }
+    pub(super) fn new(options: &ReplicaOptions) -> Self {
+        let ReplicaOptions { region, blocks_max, filter, .. } = *options;
+        Self { blocks_max, filter, is_whole: region.is_none(), copied: None, state: None, change: None }
     }
 
     /// What was copied last.
@@ -96,7 +100,8 @@ impl Builder {
 
     fn take_state(&mut self, map_uuid: Uuid, part: StatePart) -> Result<Applied, ReplicaError> {
         if part.is_first {
-            let settings = MapSettings::new(part.resolution_m, part.levels).checked();
+            let settings = MapSettings::query_only(part.resolution_m, part.levels);
+            let settings = MapSettings { filter: self.filter, ..settings }.checked();
             let settings = settings.map_err(|e| damaged(format!("the map's settings: {e}")))?;
             let (version, blocks) = (part.version, Vec::new());
             let keep_outs = Arc::new(part.keep_outs.into_iter().collect());

@@ -30,7 +30,7 @@ pub(super) struct Follower {
 
 impl Follower {
     pub(super) fn new(client: Client, map: MapName, options: ReplicaOptions) -> Self {
-        let builder = Some(Builder::new(options.region.is_none(), options.blocks_max));
+        let builder = Some(Builder::new(&options));
         Self { client, map, options, builder, pause: PAUSE }
     }
 
@@ -126,10 +126,7 @@ impl Follower {
                     // Whatever went wrong with it, the copy is made anew.
                     match &mut self.builder {
                         Some(builder) => builder.forget(),
-                        lost => {
-                            let whole = self.options.region.is_none();
-                            *lost = Some(Builder::new(whole, self.options.blocks_max));
-                        }
+                        lost => *lost = Some(Builder::new(&self.options)),
                     }
                     return Some(error.to_string());
                 }

@@ -27,6 +27,7 @@ use tokio::task::JoinHandle;
 use uuid::Uuid;
 
 use super::{Client, ClientError};
+use crate::bloom::FilterSettings;
 use crate::geometry::Pose;
 use crate::map::{ContentVersion, MapName, MultiResolutionMap, Region};
 use crate::service::{PointAnswer, PointQuery, Reason, ServiceError};
@@ -45,13 +46,17 @@ pub struct ReplicaOptions {
     /// Most blocks of 8 x 8 x 8 finest voxels of the copy; 72 bytes each and what levels and filters take.
     /// [`BLOCKS_MAX_DEFAULT`].
     pub blocks_max: usize,
+    /// Filters in front of the copy's levels, for [`Lookup::Bloom`](crate::map::Lookup). None: the exact set answers, in a
+    /// small part of the memory.
+    pub filter: Option<FilterSettings>,
     /// How long the server may be silent until the connection counts as lost: more than its `watch_heartbeat_s`. 35 s.
     pub silence_max: Duration,
 }
 
 impl Default for ReplicaOptions {
     fn default() -> Self {
-        Self { region: None, blocks_max: BLOCKS_MAX_DEFAULT, silence_max: Duration::from_secs(35) }
+        let silence_max = Duration::from_secs(35);
+        Self { region: None, blocks_max: BLOCKS_MAX_DEFAULT, filter: None, silence_max }
     }
 }
 
@@ -160,7 +165,7 @@ impl Replica {
     /// The copy: all that a map answers can be asked of it. It changes as the server's does, and a view of it is of one
     /// revision. A map that was made again is another one: ask for it anew now and then.
     ///
-    /// It has no moments, which alignment refines poses on, and no trajectory.
+    /// It has no moments, so that alignment finds poses by overlap alone, and no trajectory.
     pub fn map(&self) -> Arc<MultiResolutionMap> {
         Arc::clone(&self.shared.copied.read().map)
     }

@@ -35,8 +35,8 @@ impl Target {
         let new_map = NewMap {
             resolution_m: settings.resolution_m,
             levels: Some(settings.levels),
-            filter_hashes: Some(settings.filter.hashes),
-            filter_bits_per_key: Some(settings.filter.bits_per_key),
+            filter: settings.filter.into(),
+            moments: Some(settings.moments),
         };
         client.create_map(&map, new_map).await?;
         let resolution_m = settings.resolution_m;

@@ -57,7 +57,7 @@ pub fn bytes(map: &MultiResolutionMap) -> usize {
 /// Bytes of a map's filters, of all levels.
 pub(super) fn filter_bytes(map: &MultiResolutionMap) -> usize {
     let MapDescription { levels, .. } = map.describe(0, 0);
-    levels.iter().map(|level| level.plane_bytes + level.counter_bytes).sum()
+    levels.iter().filter_map(|level| level.filter).map(|filter| filter.bytes()).sum()
 }
 
 /// Times insertion into a hash set of packed keys, which has one level and no filter.

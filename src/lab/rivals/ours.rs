@@ -82,7 +82,7 @@ pub fn query_scalar(
     lookup::occupied_scalar(points, lattice_from_points, &view.level_view(level), lookup, occupied)
 }
 
-/// Looks up packed keys in the filter of `level` alone: key i is bit i % 64 of `occupied[i / 64]`.
+/// Looks up packed keys in the filter of `level` alone, which must be there: key i is bit i % 64 of `occupied[i / 64]`.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.
@@ -90,15 +90,14 @@ pub fn filter_contains(view: &MapView<'_>, keys: &[u64], level: u32, occupied: &
     lookup::filter_contains(keys, &view.level_view(level), occupied);
 }
 
-/// Bytes of a structure. For a filter those of its plane and counters; for the exact set those of the tables of all
-/// levels, since three levels share one table.
+/// Bytes of the structure that answers. For a filter those of its plane and counters; for the exact set those of the
+/// tables of all levels, since three levels share one table.
 fn bytes(map: &MultiResolutionMap, level: u32, lookup: Lookup) -> usize {
     let described = map.describe(0, 0);
     match lookup {
         Lookup::Exact => described.set_bytes,
         Lookup::Bloom => {
-            let level = &described.levels[level as usize];
-            level.plane_bytes + level.counter_bytes
+            described.levels[level as usize].filter.map_or(described.set_bytes, |filter| filter.bytes())
         }
     }
 }

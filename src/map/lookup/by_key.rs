@@ -7,7 +7,7 @@ use super::{avx2, avx512};
 use crate::util::cpu::{Avx2, Avx512};
 use crate::voxel::VoxelKey;
 
-/// [`super::occupied`] by the filter, of voxels of the view's level whose keys are known.
+/// [`super::occupied`] by the filter, which must be there, of voxels of the view's level whose keys are known.
 ///
 /// # Panics
 /// When `occupied` is not one word for each 64 keys.
@@ -52,7 +52,7 @@ mod tests {
     }
 
     fn map_of(points: &[Point], levels: u32, hashes: u32) -> MultiResolutionMap {
-        let filter = FilterSettings { hashes, ..FilterSettings::default() };
+        let filter = Some(FilterSettings { hashes, ..FilterSettings::default() });
         let settings = MapSettings { filter, ..MapSettings::new(0.5, levels) };
         let map = MultiResolutionMap::new(settings).unwrap();
         let (voxels, _) = VoxelSet::of_points(points, &map.lattice().from_map());

@@ -18,6 +18,7 @@ pub(crate) use by_key::filter_contains;
 
 use super::OccupiedVoxelList;
 use super::sharding::SHARDS;
+use crate::bloom::CountingBloomFilter;
 use crate::geometry::Point;
 use crate::util::Keyword;
 #[cfg(target_arch = "x86_64")]
@@ -30,7 +31,8 @@ pub enum Lookup {
     /// The exact set.
     #[default]
     Exact,
-    /// The counting Bloom filter alone: now and then "occupied" of a free voxel, never "free" of an occupied one.
+    /// The counting Bloom filter alone: now and then "occupied" of a free voxel, never "free" of an occupied one. The exact
+    /// set in a map without filters.
     Bloom,
 }
 
@@ -52,6 +54,7 @@ pub(crate) struct LevelView<'a> {
     planes: [&'a [u64]; SHARDS],
     /// Slots of the tables that serve the level.
     blocks: [Slots<'a>; SHARDS],
+    /// Hash functions of the filters; 0 where there are none.
     hashes: u32,
     level: u32,
     /// How many levels up in its block a voxel of the level is.
@@ -61,19 +64,20 @@ pub(crate) struct LevelView<'a> {
 }
 
 impl<'a> LevelView<'a> {
-    /// A view of the lists that `list` gives; a shard without one is read as empty.
+    /// A view of the lists that `list` gives, whose filters have so many `hashes`; a shard without one is read as empty.
     pub(super) fn new(
         level: u32,
         up: u32,
         region_shift: u32,
-        hashes: u32,
+        hashes: Option<u32>,
         list: impl Fn(usize) -> Option<OccupiedVoxelList<'a>>,
     ) -> Self {
         const NO_PLANE: &[u64] = &[0];
+        let filter = |i| list(i).and_then(|list| list.filter());
         Self {
-            planes: std::array::from_fn(|i| list(i).map_or(NO_PLANE, |list| list.filter().plane())),
+            planes: std::array::from_fn(|i| filter(i).map_or(NO_PLANE, CountingBloomFilter::plane)),
             blocks: std::array::from_fn(|i| list(i).map_or(Slots::NONE, |list| list.blocks().slots())),
-            hashes,
+            hashes: hashes.unwrap_or(0),
             level,
             up,
             region_shift,
@@ -82,6 +86,11 @@ impl<'a> LevelView<'a> {
 }
 
 impl LevelView<'_> {
+    /// The structure that answers such a look-up.
+    fn answering(&self, lookup: Lookup) -> Lookup {
+        if self.hashes == 0 { Lookup::Exact } else { lookup }
+    }
+
     /// Bytes that look-ups of this kind may read.
     fn bytes(&self, lookup: Lookup) -> usize {
         match lookup {
@@ -107,7 +116,7 @@ pub(super) fn occupied(
     occupied: &mut [u64],
 ) -> bool {
     assert_eq!(occupied.len(), points.len().div_ceil(64), "one word of answers for each 64 points");
-    match lookup {
+    match view.answering(lookup) {
         Lookup::Bloom => look_up(points, lattice_from_points, view, lookup, occupied),
         Lookup::Exact => exactly(points, lattice_from_points, view, occupied),
     }
@@ -139,7 +148,7 @@ fn exactly(
             all_have_a_voxel &= look_up(points, lattice_from_points, view, Lookup::Exact, words);
         }
         let hits: u32 = words.iter().map(|word| word.count_ones()).sum();
-        sparse = hits as usize * SPARSE < points.len();
+        sparse = hits as usize * SPARSE < points.len() && view.hashes > 0;
     }
     all_have_a_voxel
 }
@@ -176,7 +185,7 @@ pub(crate) fn occupied_scalar(
     occupied: &mut [u64],
 ) -> bool {
     assert_eq!(occupied.len(), points.len().div_ceil(64), "one word of answers for each 64 points");
-    scalar::occupied(points, lattice_from_points, view, lookup, occupied)
+    scalar::occupied(points, lattice_from_points, view, view.answering(lookup), occupied)
 }
 
 /// Number of points whose voxel is occupied.

@@ -87,22 +87,42 @@ proptest! {
         bits_per_key in 2.0f64..20.0,
         turned in any::<bool>(),
     ) {
-        let filter = FilterSettings { hashes, bits_per_key };
-        let map = map_of(keys, MapSettings { resolution_m: 0.5, levels, filter });
+        let filter = Some(FilterSettings { hashes, bits_per_key });
+        let map = map_of(keys, MapSettings { filter, ..MapSettings::new(0.5, levels) });
         let pose = match turned {
             true => Pose::new([0.3, -7.0, 1.0].into(), [0.4, -0.2, 2.0].into()),
             false => Pose::identity(),
         };
         assert_variants_agree(&map, &points, &pose);
     }
+
+    #[test]
+    fn without_a_filter_the_exact_set_answers_both_look_ups(
+        keys in prop::collection::vec(index(), 0..600),
+        // So many that a filter would be asked for those behind the first 512.
+        points in prop::collection::vec(point(), 0..1200),
+        levels in 1u32..=12,
+    ) {
+        let map = map_of(keys, MapSettings::query_only(0.5, levels));
+        let (quantize, view) = (map.lattice().from_map(), map.view());
+        for level in 0..levels {
+            let level_view = view.level_view(level);
+            let [mut expected, mut found] = [(); 2].map(|()| vec![7; points.len().div_ceil(64)]);
+            let all = scalar::occupied(&points, &quantize, &level_view, Lookup::Exact, &mut expected);
+            for lookup in [Lookup::Exact, Lookup::Bloom] {
+                let found_all = super::occupied(&points, &quantize, &level_view, lookup, &mut found);
+                prop_assert_eq!((found_all, &found), (all, &expected));
+            }
+        }
+    }
 }
 
 #[test]
 fn exact_answers_are_exact_whichever_way_they_are_found() {
     // Chunks of few hits, of many, and of few again, with a filter that lets much through.
-    let filter = FilterSettings { hashes: 1, bits_per_key: 2.0 };
+    let filter = Some(FilterSettings { hashes: 1, bits_per_key: 2.0 });
     let floor = (0..1600).map(|i| [i % 40, i / 40, 0]);
-    let map = map_of(floor, MapSettings { resolution_m: 1.0, levels: 2, filter });
+    let map = map_of(floor, MapSettings { filter, ..MapSettings::new(1.0, 2) });
     let at = |i: usize, height: f32| Point::new((i % 40) as f32 + 0.5, (i / 40 % 40) as f32 + 0.5, height);
     let sparse = |i: usize| at(i, if i.is_multiple_of(50) { 0.5 } else { 3.5 });
     let points: Vec<_> = (0..20_000)

@@ -14,7 +14,7 @@ pub struct ScanRecord {
     pub voxels: VoxelSet,
     /// Finest voxels that were there and go, since the scan saw through them: none of `voxels`. They go before its own come.
     pub carved: VoxelSet,
-    /// What its points add to the moments of their voxels.
+    /// What its points add to the moments of their voxels; nothing in a map that keeps none.
     pub moments: MomentSet,
 }
 
@@ -26,6 +26,13 @@ impl ScanRecord {
         let (voxels, out_of_range) = VoxelSet::of_points(points, &quantize);
         pose.points_skipped += out_of_range;
         Self { pose, voxels, carved: VoxelSet::default(), moments: MomentSet::of_points(points, &quantize) }
+    }
+
+    /// [`ScanRecord::of_points`] for a map that keeps no moments.
+    pub fn without_moments(mut pose: MappedScan, points: &[Point], lattice: &Lattice) -> Self {
+        let (voxels, out_of_range) = VoxelSet::of_points(points, &lattice.from_points(&pose.map_from_sensor));
+        pose.points_skipped += out_of_range;
+        Self::of_voxels(pose, voxels)
     }
 
     /// A record of voxels whose points are not known: the refinement of alignments learns nothing from it.

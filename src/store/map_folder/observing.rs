@@ -2,7 +2,7 @@
 
 use super::MapFolder;
 use super::facts::Pin;
-use crate::map::{Change, VoxelOwnership, WithdrawnChange};
+use crate::map::{Change, MapSettings, VoxelOwnership, WithdrawnChange};
 use crate::store::snapshot_files::snapshot_name;
 use crate::store::{Changes, MapFileError, MapFileLimits, Snapshot, StoreError, folder};
 use crate::util::StopSignal;
@@ -36,7 +36,8 @@ pub enum NotObserved<E> {
 }
 
 impl MapFolder {
-    /// Reads what the map holds without `targets`, scans and deletions by revision, up to the present head of the journal.
+    /// Reads what the map of `settings` holds without `targets`, scans and deletions by revision, up to the present head of
+    /// the journal.
     /// `reserve` is called with the bytes of each part before it is built, when all parts before it exist.
     ///
     /// The journal is read twice: for the voxels that the targets touched, so that nothing else need be remembered, and
@@ -46,13 +47,14 @@ impl MapFolder {
     /// When the journal does not reach back far enough, something cannot be read, `reserve` refuses, or `stop` is set.
     pub fn observations<E: std::fmt::Display>(
         &self,
+        settings: &MapSettings,
         targets: &[u64],
         withdrawn: &[WithdrawnChange],
         mut reserve: impl FnMut(u64) -> Result<(), E>,
         stop: StopSignal<'_>,
     ) -> Result<Observed, NotObserved<E>> {
         let pin = self.facts.pin_base_of(targets, withdrawn).ok_or(NotObserved::OutsideUndoWindow)?;
-        let mut observations = VoxelOwnership::of(targets.to_vec(), withdrawn);
+        let mut observations = VoxelOwnership::of(targets.to_vec(), withdrawn, settings.moments);
         self.touch(&mut observations, &mut reserve, stop)?;
         let (revision, path) = (pin.snapshot, self.path.file(&snapshot_name(pin.snapshot)));
         let bytes = self.files.size(&path).map_err(StoreError::io(&path))?;
@@ -113,7 +115,7 @@ impl MapFolder {
                 return Err(NotObserved::Stopped);
             }
             let (_, change) = change?;
-            reserve(VoxelOwnership::bytes_of(&change) as u64).map_err(NotObserved::NoMemory)?;
+            reserve(observations.bytes_of(&change) as u64).map_err(NotObserved::NoMemory)?;
             observations.touch(&change);
         }
         Ok(())

@@ -38,6 +38,8 @@ pub(super) mod number {
     pub(in crate::store::snapshot) const MOMENTS: u64 = 13;
     pub(in crate::store::snapshot) const FORGOTTEN: u64 = 14;
     pub(in crate::store::snapshot) const KEEP_OUTS: u64 = 15;
+    pub(in crate::store::snapshot) const NO_FILTER: u64 = 16;
+    pub(in crate::store::snapshot) const NO_MOMENTS: u64 = 17;
 
     /// Field of `Voxels` and of `Moments`.
     pub(in crate::store::snapshot) const KEY_GAPS: u64 = 1;
@@ -84,6 +86,8 @@ pub(super) struct Body<'a> {
     settings: [f64; 2],
     levels: u32,
     hashes: u32,
+    no_filter: bool,
+    no_moments: bool,
     revision: u64,
     block_keys: &'a [u8],
     block_masks: &'a [u8],
@@ -109,6 +113,8 @@ impl<'a> Body<'a> {
             settings: [0.0; 2],
             levels: 0,
             hashes: 0,
+            no_filter: false,
+            no_moments: false,
             revision: 0,
             block_keys: &[],
             block_masks: &[],
@@ -137,6 +143,8 @@ impl<'a> Body<'a> {
             (number::LEVELS, Varint(levels)) => self.levels = small(levels, "levels")?,
             (number::FILTER_HASHES, Varint(hashes)) => self.hashes = small(hashes, "filter_hashes")?,
             (number::FILTER_BITS_PER_KEY, Fixed64(bits)) => self.settings[1] = f64::from_bits(bits),
+            (number::NO_FILTER, Varint(is_so)) => self.no_filter = is_so != 0,
+            (number::NO_MOMENTS, Varint(is_so)) => self.no_moments = is_so != 0,
             (number::REVISION, Varint(revision)) => self.revision = revision,
             (number::BLOCK_KEYS, Bytes(keys)) if self.block_keys.is_empty() => self.block_keys = keys,
             (number::BLOCK_MASKS, Bytes(masks)) if self.block_masks.is_empty() => self.block_masks = masks,
@@ -150,7 +158,7 @@ impl<'a> Body<'a> {
             }
             (number::FORGOTTEN, Bytes(robot)) => self.forgotten.push(robot),
             (number::KEEP_OUTS, Bytes(_)) => self.keep_outs += 1,
-            (known @ number::UUID..=number::KEEP_OUTS, _) => {
+            (known @ number::UUID..=number::NO_MOMENTS, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
             // A field of a newer version, which is reported where it matters.
@@ -189,7 +197,8 @@ impl<'a> Body<'a> {
     fn settings(&self) -> Result<MapSettings, Unreadable> {
         let [resolution_m, bits_per_key] = self.settings;
         let filter = FilterSettings { hashes: self.hashes, bits_per_key };
-        let settings = MapSettings { resolution_m, levels: self.levels, filter };
+        let filter = (!self.no_filter).then_some(filter);
+        let settings = MapSettings { resolution_m, levels: self.levels, filter, moments: !self.no_moments };
         settings.checked().map_err(|e| e.to_string())
     }
 
@@ -251,6 +260,9 @@ impl<'a> Body<'a> {
         voxels: &VoxelSet,
         memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
     ) -> Result<MomentSet, MapFileError<E>> {
+        if self.no_moments {
+            return Ok(MomentSet::default());
+        }
         let beside = || voxels.blocks().iter().map(|(_, mask)| mask.count(MOMENT_LEVEL)).sum::<usize>();
         let Some(message) = self.moments else {
             memory.reserve(beside() * MOMENT_BYTES)?;

@@ -24,8 +24,8 @@ pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
         uuid: uuid.as_bytes().to_vec().into(),
         resolution_m: settings.resolution_m,
         levels: settings.levels,
-        filter_hashes: settings.filter.hashes,
-        filter_bits_per_key: settings.filter.bits_per_key,
+        filter_hashes: settings.filter.map_or(0, |filter| filter.hashes),
+        filter_bits_per_key: settings.filter.map_or(0.0, |filter| filter.bits_per_key),
         revision: *revision,
         ..pb::Snapshot::default()
     }
@@ -40,12 +40,16 @@ pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
         ..Default::default()
     });
     append(&mut body, requests.iter(), stop, |requests| pb::Snapshot { requests, ..Default::default() });
-    append_moments(&mut body, &moments::beside(voxels, moments, stop), stop);
+    if settings.moments {
+        append_moments(&mut body, &moments::beside(voxels, moments, stop), stop);
+    }
     append(&mut body, trajectory.forgotten(), stop, |forgotten| pb::Snapshot {
         forgotten,
         ..Default::default()
     });
     append(&mut body, keep_outs.iter(), stop, |keep_outs| pb::Snapshot { keep_outs, ..Default::default() });
+    let (no_filter, no_moments) = (settings.filter.is_none(), !settings.moments);
+    body.append(&mut pb::Snapshot { no_filter, no_moments, ..Default::default() }.encode_to_vec());
     body
 }
 

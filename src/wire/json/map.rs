@@ -1,10 +1,11 @@
 //! The description of a map in JSON.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::pose::JsonPose;
 use super::version::JsonVersion;
-use crate::map::{LevelInfo, MapSettings};
+use crate::bloom::FilterSettings;
+use crate::map::{FilterInfo, LevelInfo, MapSettings};
 use crate::mapping::Sighting;
 use crate::service::{MapInfo, MapStorage};
 use crate::wire::maps::nanoseconds;
@@ -88,8 +89,21 @@ pub struct JsonSettings {
     pub resolution_m: f64,
     /// The number of levels.
     pub levels: u32,
-    /// The filters.
-    pub filter: JsonFilter,
+    /// The filters; `"none"` where there are none.
+    #[serde(serialize_with = "filter_or_word")]
+    pub filter: Option<JsonFilter>,
+    /// False of a map that keeps no moments of its points.
+    pub moments: bool,
+}
+
+/// What stands for the settings of filters where a map has none.
+pub const NO_FILTER: &str = "none";
+
+fn filter_or_word<S: Serializer>(filter: &Option<JsonFilter>, to: S) -> Result<S::Ok, S::Error> {
+    match filter {
+        Some(filter) => filter.serialize(to),
+        None => to.serialize_str(NO_FILTER),
+    }
 }
 
 /// The settings of filters.
@@ -110,6 +124,14 @@ pub struct JsonLevel {
     pub resolution_m: f64,
     /// Occupied voxels.
     pub voxels: usize,
+    /// The filters; without their fields where the map has none.
+    #[serde(flatten)]
+    pub filter: Option<JsonFilterInfo>,
+}
+
+/// The filters of one level of a map.
+#[derive(Debug, Serialize)]
+pub struct JsonFilterInfo {
     /// Bytes of the bit planes.
     pub plane_bytes: usize,
     /// Bytes of the counters.
@@ -152,9 +174,9 @@ impl From<MapStorage> for JsonStorage {
 }
 
 impl From<MapSettings> for JsonSettings {
-    fn from(MapSettings { resolution_m, levels, filter }: MapSettings) -> Self {
-        let filter = JsonFilter { hashes: filter.hashes, bits_per_key: filter.bits_per_key };
-        Self { resolution_m, levels, filter }
+    fn from(MapSettings { resolution_m, levels, filter, moments }: MapSettings) -> Self {
+        let json = |FilterSettings { hashes, bits_per_key }| JsonFilter { hashes, bits_per_key };
+        Self { resolution_m, levels, filter: filter.map(json), moments }
     }
 }
 
@@ -164,6 +186,14 @@ impl From<&LevelInfo> for JsonLevel {
             level: info.level,
             resolution_m: info.resolution_m,
             voxels: info.voxels,
+            filter: info.filter.map(Into::into),
+        }
+    }
+}
+
+impl From<FilterInfo> for JsonFilterInfo {
+    fn from(info: FilterInfo) -> Self {
+        Self {
             plane_bytes: info.plane_bytes,
             counter_bytes: info.counter_bytes,
             expected_false_positive_rate: info.expected_rate,

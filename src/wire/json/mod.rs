@@ -12,7 +12,9 @@ mod version;
 pub use keep_out::{JsonKeepOut, JsonShape};
 pub use keyword::ByKeyword;
 pub use localization::{JsonCandidate, JsonLocalization};
-pub use map::{JsonFilter, JsonLevel, JsonMap, JsonSettings, JsonSighting, JsonStorage};
+pub use map::{
+    JsonFilter, JsonFilterInfo, JsonLevel, JsonMap, JsonSettings, JsonSighting, JsonStorage, NO_FILTER,
+};
 pub use observers::{JsonObservers, JsonObservingScan};
 pub use pose::JsonPose;
 pub use scan::{JsonDirection, JsonScan};

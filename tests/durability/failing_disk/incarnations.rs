@@ -319,7 +319,8 @@ fn what_undo_alone_needs_is_bounded_in_bytes_and_stays_while_it_is_read() {
     };
     grow(0);
     let scan = folder.used().kept_from;
-    let reading = folder.observations(&[scan], &[], |_| Ok::<_, Infallible>(()), StopSignal::NEVER).unwrap();
+    let all = |_| Ok::<_, Infallible>(());
+    let reading = folder.observations(map.settings(), &[scan], &[], all, StopSignal::NEVER).unwrap();
     (1..20).for_each(|i| grow(i * 10));
     assert_eq!(folder.used().kept_from, scan, "what is read went");
     let mut reading = reading;

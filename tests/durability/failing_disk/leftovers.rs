@@ -197,8 +197,8 @@ fn undo_reaches_what_it_is_said_to_reach() {
     folder.give_up_undo().unwrap();
     let reach = |withdrawn: &[WithdrawnChange]| {
         let from = folder.undo_from(withdrawn);
-        let observe =
-            |scan| folder.observations(&[scan], withdrawn, |_| Ok::<_, Infallible>(()), StopSignal::NEVER);
+        let all = |_| Ok::<_, Infallible>(());
+        let observe = |scan| folder.observations(map.settings(), &[scan], withdrawn, all, StopSignal::NEVER);
         assert!(from > map.revision() || observe(from).is_ok());
         assert!(matches!(observe(from - 1), Err(NotObserved::OutsideUndoWindow)));
         from
@@ -218,6 +218,7 @@ fn reading_for_an_undo_looks_at_the_signal_at_each_record() {
     (0..RECORDS as i32).for_each(|i| commit(&folder, &map, i));
     let looks = Cell::new(0);
     let count_look = || looks.replace(looks.get() + 1) == usize::MAX;
-    folder.observations(&[1], &[], |_| Ok::<_, Infallible>(()), StopSignal::when(&count_look)).unwrap();
+    let all = |_| Ok::<_, Infallible>(());
+    folder.observations(map.settings(), &[1], &[], all, StopSignal::when(&count_look)).unwrap();
     assert!(looks.get() >= RECORDS, "{} looks", looks.get());
 }

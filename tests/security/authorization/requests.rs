@@ -58,7 +58,7 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             pb::StreamTrajectoryRequest { map, ..Default::default() }.encode_to_vec()
         }
         Operation::CreateMap => {
-            let settings = Some(pb::MapSettings { resolution_m: 0.1, levels: Some(2), filter: None });
+            let settings = Some(pb::MapSettings { resolution_m: 0.1, levels: Some(2), ..Default::default() });
             pb::CreateMapRequest { map, settings }.encode_to_vec()
         }
         Operation::GetMap => pb::GetMapRequest { map }.encode_to_vec(),

@@ -5,6 +5,7 @@ mod growth;
 mod insert;
 mod journal;
 mod lookup;
+mod memory;
 mod readers;
 mod serve;
 mod soak;
@@ -25,6 +26,7 @@ EXAMPLES:
   mrol bench insert --workload site
   mrol bench journal --workload site                  what it costs that nothing is lost
   mrol bench growth --workload site                   memory, and who waits, while ten million voxels go in
+  mrol bench memory --workload site                   bytes a voxel, with filters and moments and without
   mrol bench start --workload site                    a start with ten million voxels
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
@@ -47,6 +49,7 @@ enum What {
     Lookup(lookup::Lookup),
     Insert(insert::Insert),
     Growth(growth::Growth),
+    Memory(memory::Memory),
     Journal(journal::Journal),
     Align(align::Align),
     Readers(readers::Readers),
@@ -61,6 +64,7 @@ impl Bench {
             What::Lookup(lookup) => lookup.run(&output),
             What::Insert(insert) => insert.run(&output),
             What::Growth(growth) => growth.run(&output),
+            What::Memory(memory) => memory.run(&output),
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
             What::Readers(readers) => readers.run(&output),

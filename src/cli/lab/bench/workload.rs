@@ -109,7 +109,8 @@ pub(in crate::cli) struct MapOptions {
 impl MapOptions {
     pub(in crate::cli) fn settings(&self, resolution_m: f64) -> Result<MapSettings, CliError> {
         let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
-        MapSettings { resolution_m, levels: self.levels, filter }.checked().map_err(CliError::usage)
+        let settings = MapSettings { filter: Some(filter), ..MapSettings::new(resolution_m, self.levels) };
+        settings.checked().map_err(CliError::usage)
     }
 
     /// The map of a workload.

@@ -39,14 +39,15 @@ impl Display for Summary<'_> {
             percent(self.queries.share_occupied())
         )?;
         if let Some(finest) = self.info.levels.first() {
+            let filter = finest.filter.unwrap_or_default();
             writeln!(
                 f,
                 "map      {} voxels of {} m in {}, filter plane {}; it lets {} of absent neighbors through",
                 count(finest.voxels),
                 finest.resolution_m,
                 bytes(self.info.set_bytes),
-                bytes(finest.plane_bytes),
-                finest.measured_rate.map_or("none".into(), percent)
+                bytes(filter.plane_bytes),
+                filter.measured_rate.map_or("none".into(), percent)
             )?;
         }
         write!(f, "\n{}", self.checks)

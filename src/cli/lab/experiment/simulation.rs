@@ -171,7 +171,7 @@ impl Simulation {
     }
 
     fn mapper(&self, filter: FilterSettings, settings: AlignmentSettings) -> Result<Mapper, CliError> {
-        let map = MapSettings { resolution_m: self.resolution, levels: self.levels, filter };
+        let map = MapSettings { filter: Some(filter), ..MapSettings::new(self.resolution, self.levels) };
         Ok(Mapper::new(map, settings, Guess::Last)?.recovering(self.judged))
     }
 
