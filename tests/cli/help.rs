@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "serve",
     "demo",
     "map",
@@ -11,6 +11,7 @@ const COMMANDS: [&str; 17] = [
     "query",
     "delete",
     "undo",
+    "keepout",
     "maps",
     "bench",
     "experiment",

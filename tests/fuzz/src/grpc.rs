@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 18] = [
+const METHODS: [&str; 21] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -26,6 +26,9 @@ const METHODS: [&str; 18] = [
     "Maps/RestoreMap",
     // There is none of that name.
     "Maps/Explode",
+    "Mapping/PutKeepOut",
+    "Mapping/DeleteKeepOut",
+    "Occupancy/ListKeepOuts",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];
