@@ -147,12 +147,12 @@ mod tests {
     #[tokio::test(flavor = "multi_thread")]
     async fn a_map_whose_journal_failed_keeps_its_keep_outs_and_is_not_asked_again() {
         let data = tempfile::tempdir().unwrap();
-        let data_dir = Some(data.path().join("data"));
+        let folder = data.path().join("data");
         // Each record begins a segment, whose folder is not there any more then.
         let store = StoreSettings { segment_bytes_max: 1, ..StoreSettings::default() };
-        let settings = ServiceSettings { data_dir: data_dir.clone(), store, ..ServiceSettings::default() };
+        let settings = ServiceSettings { data_dir: Some(folder.clone()), store, ..ServiceSettings::default() };
         let (service, map) = service_with(settings, &[NEVER_YET, NEVER_YET]).await;
-        std::fs::rename(data_dir.unwrap().join("maps"), data.path().join("away")).unwrap();
+        std::fs::rename(folder.join("maps"), data.path().join("away")).unwrap();
         assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
         let hosted = service.map(&map).unwrap();
         assert!(hosted.commit_queue.stopped().is_some() && !hosted.has_expired(i64::MAX));
