@@ -37,7 +37,7 @@ pub(super) struct KeepOuts {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Put a keep-out: a new one, or in the place of the one of its name
-    Put(Put),
+    Put(Box<Put>),
     /// Remove a keep-out
     Delete(Delete),
     /// List the keep-outs, by name

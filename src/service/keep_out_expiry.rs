@@ -95,3 +95,80 @@ impl HostedMap {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::map::{KeepOutShape, MapName, MapSettings, Region};
+    use crate::service::{PutKeepOut, ServiceSettings};
+    use crate::store::{OpeningProgress, StoreSettings};
+
+    const NEVER_YET: i64 = i64::MAX - 10;
+
+    async fn service_with(settings: ServiceSettings, expiries: &[i64]) -> (MapService, MapName) {
+        let service = MapService::open(settings, &OpeningProgress::default()).unwrap();
+        let map = MapName::new("a").unwrap();
+        service.create_map(map.clone(), MapSettings::new(0.1, 4)).await.unwrap();
+        for (i, &expires_at_ns) in expiries.iter().enumerate() {
+            put(&service, &map, i, Some(expires_at_ns)).await;
+        }
+        (service, map)
+    }
+
+    async fn put(service: &MapService, map: &MapName, i: usize, expires_at_ns: Option<i64>) {
+        let shape = KeepOutShape::of_region(Region::ball([0.0; 3], 1.0).unwrap()).unwrap();
+        let name = KeepOutName::new(&format!("k{i}")).unwrap();
+        let put = PutKeepOut { name, shape, expires_at_ns, request_id: None };
+        service.put_keep_out(map, put).await.unwrap();
+    }
+
+    async fn names(service: &MapService, map: &MapName) -> Vec<String> {
+        let all = service.list_keep_outs(map).await.unwrap().keep_outs;
+        all.iter().map(|keep_out| keep_out.name.to_string()).collect()
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn keep_outs_end_at_their_time_each_by_a_revision_and_once() {
+        let expiries = [NEVER_YET, NEVER_YET + 1, NEVER_YET + 2];
+        let (service, map) = service_with(ServiceSettings::default(), &expiries).await;
+        put(&service, &map, 3, None).await;
+        assert_eq!(service.expire_keep_outs(NEVER_YET - 1).await, 0);
+        assert_eq!(service.expire_keep_outs(NEVER_YET + 1).await, 2);
+        assert_eq!(service.expire_keep_outs(NEVER_YET + 1).await, 0);
+        assert_eq!(names(&service, &map).await, ["k2", "k3"]);
+        // One that was put again has another time, or none.
+        put(&service, &map, 2, None).await;
+        assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
+        assert_eq!(service.list_keep_outs(&map).await.unwrap().version.revision, 7);
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_map_whose_journal_failed_keeps_its_keep_outs_and_is_not_asked_again() {
+        let data = tempfile::tempdir().unwrap();
+        let folder = data.path().join("data");
+        // Each record begins a segment, whose folder is not there any more then.
+        let store = StoreSettings { segment_bytes_max: 1, ..StoreSettings::default() };
+        let settings = ServiceSettings { data_dir: Some(folder.clone()), store, ..ServiceSettings::default() };
+        let (service, map) = service_with(settings, &[NEVER_YET, NEVER_YET]).await;
+        std::fs::rename(folder.join("maps"), data.path().join("away")).unwrap();
+        assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
+        let hosted = service.map(&map).unwrap();
+        assert!(hosted.commit_queue.stopped().is_some() && !hosted.has_expired(i64::MAX));
+        assert!(!hosted.is_expiry_put_off.load(Ordering::Relaxed), "that it failed was said where it did");
+        assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);
+        assert_eq!(names(&service, &map).await, ["k0", "k1"]);
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_map_that_is_being_asked_is_left_out_and_keeps_no_other_waiting() {
+        let (service, map) = service_with(ServiceSettings::default(), &[NEVER_YET]).await;
+        let hosted = service.map(&map).unwrap();
+        let turn = hosted.expiring.lock().await;
+        let left_out = tokio::time::timeout(Duration::from_secs(20), service.expire_keep_outs(i64::MAX));
+        assert_eq!(left_out.await.unwrap(), 0);
+        drop(turn);
+        assert_eq!(service.expire_keep_outs(i64::MAX).await, 1);
+    }
+}

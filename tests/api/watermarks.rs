@@ -99,6 +99,11 @@ async fn undo_first_scan(daemon: &Daemon) -> Response {
     daemon.post("/v1/maps/a/undo", json!({"revision": 1})).await
 }
 
+async fn put_keep_out(daemon: &Daemon) -> Response {
+    let sphere = json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}});
+    daemon.put("/v1/maps/a/keep-outs/dock", sphere).await
+}
+
 async fn make(daemon: &Daemon, map: &str) -> Response {
     daemon.put(&format!("/v1/maps/{map}"), json!({"resolution_m": 0.1, "levels": 4})).await
 }
@@ -167,6 +172,7 @@ async fn a_full_disk_refuses_every_change_and_no_question_until_there_is_room() 
     let message = refused(delete_first_voxel(&daemon).await, full, "disk_full").await;
     assert!(message.contains("the journal keeps"), "{message}");
     refused(undo_first_scan(&daemon).await, full, "disk_full").await;
+    refused(put_keep_out(&daemon).await, full, "disk_full").await;
     refused(make(&daemon, "b").await, full, "disk_full").await;
     refused(restore(&daemon, file.clone()).await, full, "disk_full").await;
 
@@ -217,6 +223,8 @@ async fn full_memory_refuses_what_grows_and_takes_what_shrinks() {
     assert_eq!(daemon.contents("a").await, before);
 
     assert_eq!(json_of(delete_first_voxel(&daemon).await).await["removed"], 1);
+    assert_eq!(put_keep_out(&daemon).await.status(), StatusCode::OK);
+    assert_eq!(daemon.delete("/v1/maps/a/keep-outs/dock").await.status(), StatusCode::OK);
     // To find out in who holds which voxels takes memory as well: there must be some left.
     dials.turn_memory(990);
     let message = refused(undo_first_scan(&daemon).await, full, "memory_full").await;

@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 20] = [
     "serve",
     "demo",
     "map",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 19] = [
     "observers",
     "delete",
     "undo",
+    "keepout",
     "maps",
     "bench",
     "experiment",

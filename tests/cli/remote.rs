@@ -217,3 +217,30 @@ fn the_settings_that_count_are_printed_and_read_back() {
     assert_eq!(read["http"]["listen"], "127.0.0.1:7333");
     assert!(complaint(&["config", "print", "--durability", "often"], 2).contains("durability"));
 }
+
+#[test]
+fn a_keep_out_is_put_asked_about_listed_and_removed() {
+    let daemon = Daemon::start("");
+    daemon.call(&["maps", "create", "a", "--resolution", "0.1"]);
+    let made = &daemon.call(&["keepout", "put", "dock", "--map", "a", "--box", "0 0 0 1 1 1"])[0];
+    assert_eq!((&made["keep_out"], &made["revision"]), (&json!("dock"), &json!(1)));
+    let prism = ["--prism", "0 0 4 0 4 3", "--height", "-1 2.5", "--expires-in", "2d"];
+    daemon.call(&[&["keepout", "put", "stage", "--map", "a"], &prism[..]].concat());
+    let all = daemon.call(&["keepout", "list", "--map", "a"]);
+    assert_eq!(
+        all[0],
+        json!({"name": "dock", "box": {"min_m": [0.0, 0.0, 0.0], "max_m": [1.0, 1.0, 1.0]}, "made_revision": 1})
+    );
+    assert_eq!((&all[1]["name"], &all[1]["prism"]["z_to_m"]), (&json!("stage"), &json!(2.5)));
+    assert!(all[1]["expires_at_ns"].is_i64(), "{all:?}");
+    let query = ["query", "--map", "a", "--point", "0.5,0.5,0.5"];
+    assert_eq!(daemon.call(&query)[0]["occupied"], false);
+    assert_eq!(daemon.call(&[&query[..], &["--keep-out"]].concat())[0]["occupied"], true);
+    assert_eq!(daemon.call(&["keepout", "delete", "dock", "--map", "a"])[0]["revision"], 3);
+    assert!(daemon.refuses(&["keepout", "delete", "dock", "--map", "a"]).contains("has no keep-out dock"));
+    mrol(&["keepout", "put", "x", "--map", "a"]).assert().code(2);
+    mrol(&["keepout", "put", "x", "--map", "a", "--prism", "0 0 1 0 1 1"]).assert().code(2);
+    mrol(&["keepout", "put", "x", "--map", "a", "--prism", "0 0 1 1 2 2", "--height", "0 1"])
+        .assert()
+        .code(2);
+}

@@ -154,11 +154,11 @@ impl Search<'_> {
         let voxel_m = self.lattice.resolution_m(self.level);
         let side = f64::from(1u32 << halvings);
         let center_m = first.map(|i| (f64::from(i) + side / 2.0) * voxel_m);
-        let reach_m = side * voxel_m * (3f64.sqrt() / 2.0 + 1e-9);
-        let is_near = |region: &Region| region.distance_m(center_m) <= reach_m + target.rounding_m;
-        target.shape.distance_m(center_m) <= reach_m + target.rounding_m
+        let half_diagonal_m = side * voxel_m * (3f64.sqrt() / 2.0 + 1e-9);
+        let is_near = |region: &Region| region.distance_m(center_m) <= half_diagonal_m + target.rounding_m;
+        target.shape.distance_m(center_m) <= half_diagonal_m + target.rounding_m
             && self.selection.region.as_ref().is_none_or(is_near)
-            && self.selection.may_meet(center_m, reach_m)
+            && self.selection.may_meet(center_m, half_diagonal_m)
     }
 
     /// The voxels of the level that a box meets, with one more on each side; none of them out of the level's range.

@@ -53,10 +53,10 @@ impl OrientedBox {
         let center_m = translation_m(&self.map_from_box);
         // A border that is rounded inwards would cut off what lies on it.
         let rounding_m = |axis: usize| 1e-12 * (center_m[axis].abs() + extent_m(axis));
-        let reach_m = |axis: usize| extent_m(axis) + rounding_m(axis);
+        let half_m = |axis: usize| extent_m(axis) + rounding_m(axis);
         (
-            std::array::from_fn(|axis| center_m[axis] - reach_m(axis)),
-            std::array::from_fn(|axis| center_m[axis] + reach_m(axis)),
+            std::array::from_fn(|axis| center_m[axis] - half_m(axis)),
+            std::array::from_fn(|axis| center_m[axis] + half_m(axis)),
         )
     }
 }

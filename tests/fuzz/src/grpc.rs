@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 20] = [
+const METHODS: [&str; 23] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -28,6 +28,9 @@ const METHODS: [&str; 20] = [
     "Maps/Explode",
     "Occupancy/GetBlock",
     "Occupancy/ListObservers",
+    "Mapping/PutKeepOut",
+    "Mapping/DeleteKeepOut",
+    "Occupancy/ListKeepOuts",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];
