@@ -3,26 +3,25 @@
 use crate::map::{MomentsView, MultiResolutionMap};
 use crate::voxel::{Moments, VoxelKey};
 
-/// Where moments come from.
+/// The moments of a map's points; of one that keeps none, those of the centers of its finest voxels, as they are when they
+/// are asked for.
 #[derive(Debug)]
-pub(super) enum KnownMoments<'a> {
-    /// From the points, of a map that keeps moments; they do not change meanwhile.
-    OfPoints(MomentsView<'a>),
-    /// From the centers of the finest voxels, as they are when they are asked for.
-    OfCenters(&'a MultiResolutionMap),
+pub(super) struct KnownMoments<'a> {
+    map: &'a MultiResolutionMap,
+    kept: Option<MomentsView<'a>>,
 }
 
 impl<'a> KnownMoments<'a> {
-    /// What there is of `map`.
+    /// What there is of `map`; moments that it keeps do not change meanwhile.
     pub(super) fn of(map: &'a MultiResolutionMap) -> Self {
-        map.moments().map_or(Self::OfCenters(map), Self::OfPoints)
+        Self { map, kept: map.moments() }
     }
 
     /// The moments in a voxel of [`MOMENT_LEVEL`](crate::voxel::MOMENT_LEVEL); none where there is no point.
     pub(super) fn in_voxel(&self, voxel: VoxelKey) -> Option<Moments> {
-        match self {
-            Self::OfPoints(moments) => moments.of(voxel).copied(),
-            Self::OfCenters(map) => map.center_moments(voxel),
+        match &self.kept {
+            Some(moments) => moments.of(voxel).copied(),
+            None => self.map.center_moments(voxel),
         }
     }
 }
