@@ -213,7 +213,9 @@ const char *mrol_code_name(mrol_code code);
 /* Copies a map and follows it from then on; returns when the copy is complete. `replica` is set to none on failure.
  *
  * Where the connection breaks the replica comes back by itself and goes on from its last revision; meanwhile it answers as
- * it is. Errors: MROL_INVALID_ARGUMENT, MROL_UNREACHABLE, MROL_REFUSED, MROL_TIMEOUT, MROL_TOO_LARGE, MROL_DAMAGED. */
+ * it is. The system's look-up of a host's name is waited for, also beyond the time-out.
+ *
+ * Errors: MROL_INVALID_ARGUMENT, MROL_UNREACHABLE, MROL_REFUSED, MROL_TIMEOUT, MROL_TOO_LARGE, MROL_DAMAGED. */
 mrol_code mrol_replica_open(const mrol_replica_options *options, mrol_replica *replica, mrol_error *error);
 
 /* Ends a replica and frees its memory, once questions under way are answered. Errors: MROL_CLOSED where it is closed already,

@@ -6,5 +6,6 @@ pub mod insert;
 pub mod journal;
 pub mod lookup;
 pub mod readers;
+pub mod replica;
 pub mod start;
 pub mod stopwatch;
