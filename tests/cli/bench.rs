@@ -121,3 +121,40 @@ fn a_soak_tells_what_a_fleet_got_and_how_memory_went() {
     }
     assert!(number(verdict, "mean_resident_bytes") > 1e6, "{verdict}");
 }
+
+#[test]
+fn replicas_have_the_maps_hash_at_every_revision_beside_a_stalled_watcher_and_after_restarts() {
+    let short =
+        ["bench", "watch", "--watchers", "4", "--seconds", "1", "--rate", "10", "--scan-points", "2000"];
+    let lines = objects(&short);
+    let (verdict, stages) = lines.split_last().unwrap();
+    let numbers = |field| stages.iter().map(|stage| number(stage, field)).collect::<Vec<_>>();
+    assert_eq!(texts(stages, "stage").len(), 5);
+    assert!(
+        number(verdict, "hashes_compared") > 40.0 && number(verdict, "hashes_differing") == 0.0,
+        "{verdict}"
+    );
+    assert_eq!(
+        (numbers("copies_min"), numbers("copies_max")),
+        (vec![0.0, 1.0, 1.0, 1.0, 2.0], vec![0.0, 1.0, 1.0, 1.0, 2.0])
+    );
+    // Where the server is killed, scans may fail, and nowhere else.
+    assert_eq!(numbers("failed")[..3], [0.0; 3], "{lines:?}");
+    assert!(numbers("resident_bytes").iter().all(|bytes| *bytes > 1e6), "{lines:?}");
+}
+
+#[test]
+fn a_replica_is_asked_beside_its_map() {
+    let replica = ["bench", "replica", "--points", "1000,30000", "--queries", "50000", "--repeats", "2"];
+    let lines = objects(&replica);
+    let (copied, lines) = lines.split_first().unwrap();
+    assert!(number(copied, "voxels") > 150e3 && number(copied, "seconds") > 0.0, "{copied}");
+    // A voxel of a surface is some bits on the way, and some bytes in memory.
+    let a_voxel = |field| number(copied, field) / number(copied, "voxels");
+    assert!(
+        (0.1..10.0).contains(&a_voxel("bytes_sent")) && (0.5..50.0).contains(&a_voxel("map_bytes")),
+        "{copied}"
+    );
+    assert_eq!(texts(lines, "through").len(), 8);
+    assert!(lines.iter().all(|line| number(line, "ns_per_point") > 0.0 && number(line, "of_map") > 0.0));
+}

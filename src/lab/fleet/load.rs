@@ -53,6 +53,18 @@ impl Question {
         }
     }
 
+    /// Messages of `points` points each, the last one of those that are left: all of `queries` once.
+    pub(crate) fn whole(queries: &Queries, points: usize, lookup: Lookup) -> Self {
+        let messages =
+            queries.points.chunks(points).map(|points| PointCloud::from(points.to_vec())).collect();
+        Self { messages, map_from_points: queries.map_from_points, lookup }
+    }
+
+    /// All queries in turn, once.
+    pub(crate) fn queries(&self) -> Vec<PointQuery> {
+        (0..self.messages.len()).map(|message| self.query(message)).collect()
+    }
+
     pub(crate) fn points(&self, message: usize) -> PointCloud {
         self.messages[message % self.messages.len()].clone()
     }

@@ -12,6 +12,7 @@ use tokio::time::timeout;
 
 use super::FleetError;
 use super::address::{GrpcAddress, HttpAddress};
+use super::cpu::cpu_seconds;
 use super::memory::resident_bytes;
 
 /// Longest time for the server to end, beyond the ten seconds of its drain.
@@ -19,6 +20,9 @@ const STOPPING_MAX: Duration = Duration::from_secs(30);
 
 /// Undo window of the server: missions are short, and more revisions would fill the disk.
 const UNDO_REVISIONS: &str = "1000";
+
+/// A free port of this machine alone.
+pub(crate) const ANY_PORT: &str = "127.0.0.1:0";
 
 /// This program as a daemon in another process, on free ports. It is killed when dropped without a stop.
 pub(crate) struct ServerProcess {
@@ -37,13 +41,23 @@ struct Serving {
 impl ServerProcess {
     /// Starts the server with its maps in `data_dir`.
     pub(crate) async fn start(data_dir: &Path) -> Result<Self, FleetError> {
+        Self::start_at(data_dir, ANY_PORT, &[]).await
+    }
+
+    /// Starts the server at an address of gRPC, with more settings: variables with their values.
+    pub(crate) async fn start_at(
+        data_dir: &Path,
+        grpc: &str,
+        settings: &[(&str, &str)],
+    ) -> Result<Self, FleetError> {
         let no_server = |error: &dyn std::fmt::Display| FleetError::failed(format!("no server: {error}"));
         let program = std::env::current_exe().map_err(|error| no_server(&error))?;
         let mut child = Command::new(program)
             .args(["serve", "--json", "--log-level", "warn"])
-            .args(["--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0", "--data-dir"])
+            .args(["--http-listen", ANY_PORT, "--grpc-listen", grpc, "--data-dir"])
             .arg(data_dir)
             .env("MROL_STORE__UNDO_REVISIONS", UNDO_REVISIONS)
+            .envs(settings.iter().copied())
             .stdout(Stdio::piped())
             .kill_on_drop(true)
             .spawn()
@@ -67,13 +81,28 @@ impl ServerProcess {
         HttpAddress::open(format!("http://{}", self.serving.http))
     }
 
+    /// Where the server listens for gRPC, as an address without a scheme.
+    pub(crate) fn grpc_listen(&self) -> &str {
+        &self.serving.grpc
+    }
+
+    /// Processor time that the server has used, seconds of one core.
+    pub(crate) fn cpu_seconds(&self) -> Result<f64, FleetError> {
+        cpu_seconds(self.pid)
+    }
+
+    /// Ends the server at once, as `kill -9` does.
+    pub(crate) async fn kill(&mut self) -> Result<(), FleetError> {
+        self.child.kill().await.map_err(FleetError::failed)
+    }
+
     /// Resident memory of the server, bytes.
     pub(crate) fn resident_bytes(&self) -> Result<u64, FleetError> {
         resident_bytes(self.pid)
     }
 
     /// Stops the server as a service manager does, and checks its exit code.
-    pub(crate) async fn stop(mut self) -> Result<(), FleetError> {
+    pub(crate) async fn stop(&mut self) -> Result<(), FleetError> {
         if let Some(pid) = i32::try_from(self.pid).ok().and_then(Pid::from_raw) {
             kill_process(pid, Signal::TERM).map_err(FleetError::failed)?;
         }

@@ -35,7 +35,24 @@ impl Seen {
         Self { turns, map_from_points: points.map_from_points }
     }
 
-    /// The scan of revolution `number`; the revolutions repeat.
+    /// The scan of revolution `number`, as a robot sends it where it was; the revolutions repeat.
+    pub(super) fn scan(&self, robot: &RobotName, session: &SessionName, number: u64) -> ScanRequest {
+        ScanRequest {
+            session: session.clone(),
+            scan_id: Some(number),
+            guess: Guess::Pose(self.map_from_points),
+            ..ScanRequest::new(robot.clone(), self.turn(number))
+        }
+    }
+
+    /// The ball around one point of a revolution.
+    pub(super) fn ball(&self, number: u64, radius_m: f64) -> Result<Region, FleetError> {
+        let turn = self.turn(number);
+        let seen = turn.as_slice()[number as usize * 7919 % turn.len()];
+        let center_m = (self.map_from_points * seen.to_f64()).into();
+        Region::ball(center_m, radius_m).map_err(FleetError::failed)
+    }
+
     fn turn(&self, number: u64) -> PointCloud {
         self.turns[number as usize % self.turns.len()].clone()
     }
@@ -106,13 +123,7 @@ impl Robot {
     /// Inserts a revolution, aligned or at its guess; returns the revision. All revolutions fit, so that a refused one
     /// is an error.
     async fn insert(&self, map: &MapName, number: u64, at_guess: bool) -> Result<u64, FleetError> {
-        let scan = ScanRequest {
-            session: self.session.clone(),
-            scan_id: Some(number),
-            guess: Guess::Pose(self.seen.map_from_points),
-            at_guess,
-            ..ScanRequest::new(self.name.clone(), self.seen.turn(number))
-        };
+        let scan = ScanRequest { at_guess, ..self.seen.scan(&self.name, &self.session, number) };
         let answer = self.client.insert_scan(map, scan).await?;
         match answer.accepted {
             true => Ok(answer.version.revision),
@@ -122,10 +133,7 @@ impl Robot {
 
     /// Deletes the voxels around one point of a revolution.
     async fn delete(&self, map: &MapName, number: u64) -> Result<(), FleetError> {
-        let turn = self.seen.turn(number);
-        let seen = turn.as_slice()[number as usize * 7919 % turn.len()];
-        let center_m = (self.seen.map_from_points * seen.to_f64()).into();
-        let ball = Region::ball(center_m, DELETED_RADIUS_M).map_err(FleetError::failed)?;
+        let ball = self.seen.ball(number, DELETED_RADIUS_M)?;
         let deletion = Deletion { target: DeletionTarget::Region(ball), level: 0, request_id: None };
         self.client.delete_voxels(map, deletion).await?;
         Ok(())

@@ -7,5 +7,6 @@ pub mod journal;
 pub mod lookup;
 pub mod memory;
 pub mod readers;
+pub mod replica;
 pub mod start;
 pub mod stopwatch;

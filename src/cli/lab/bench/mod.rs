@@ -7,9 +7,11 @@ mod journal;
 mod lookup;
 mod memory;
 mod readers;
+mod replica;
 mod serve;
 mod soak;
 mod start;
+mod watch;
 pub(super) mod workload;
 
 use clap::Subcommand;
@@ -31,6 +33,8 @@ EXAMPLES:
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench serve                                    a load of point queries on a server of its own
+  mrol bench replica                                  a copy of a map that follows, and its queries
+  mrol bench watch                                    fifty who follow a map that is mapped
   mrol bench soak                                     an hour under a fleet's load: memory, errors
 
 Figures are medians of several runs; give the machine nothing else to do meanwhile. `mrol bench WHAT --help`
@@ -53,9 +57,11 @@ enum What {
     Journal(journal::Journal),
     Align(align::Align),
     Readers(readers::Readers),
+    Replica(replica::ReplicaBench),
     Serve(serve::Serve),
     Soak(soak::Soak),
     Start(start::Start),
+    Watch(watch::WatchBench),
 }
 
 impl Bench {
@@ -71,6 +77,8 @@ impl Bench {
             What::Start(start) => start.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),
             What::Soak(soak) => runtime::block_on(soak.run(output)),
+            What::Replica(replica) => runtime::block_on(replica.run(output)),
+            What::Watch(watch) => runtime::block_on(watch.run(output)),
         }
     }
 }

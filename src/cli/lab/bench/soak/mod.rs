@@ -83,7 +83,7 @@ pub(super) struct Soak {
 impl Soak {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let folder = new_folder(self.folder.as_deref())?;
-        let server = ServerProcess::start(folder.path()).await?;
+        let mut server = ServerProcess::start(folder.path()).await?;
         let workload = self.workload.workload();
         let settings = self.map.settings(workload.resolution_m())?;
         let target = Target::make(server.grpc(), Some(server.http()), workload, settings).await?;

@@ -1,0 +1,102 @@
+//! What a program wants to open, parsed.
+
+use std::time::Duration;
+
+use mrol::client::{BLOCKS_MAX_DEFAULT, Credentials, ReplicaOptions};
+use mrol::map::{MapName, Region};
+use mrol::service::ServiceError;
+
+use crate::abi::Options;
+use crate::failure::Failure;
+use crate::memory;
+
+/// Longest time until a copy is complete, where nobody says.
+const OPEN_TIMEOUT_DEFAULT: Duration = Duration::from_secs(60);
+
+/// What to open.
+pub(crate) struct Opening {
+    pub(crate) address: String,
+    pub(crate) map: MapName,
+    pub(crate) credentials: Credentials,
+    pub(crate) replica: ReplicaOptions,
+    /// Longest time until the copy is complete.
+    pub(crate) timeout: Duration,
+    /// True where [`mrol::map::Lookup::Bloom`] is answered by a filter.
+    pub(crate) with_filter: bool,
+}
+
+impl Opening {
+    /// Parses what mrol.h says of `mrol_replica_options`.
+    pub(crate) fn of(options: Options) -> Result<Self, Failure> {
+        if options.reserved != [0; 6] {
+            return Err(Failure::argument("options.reserved must be zero"));
+        }
+        let map = required(options.map, "options.map")?;
+        let timeout = milliseconds(options.open_timeout_ms, OPEN_TIMEOUT_DEFAULT);
+        Ok(Self {
+            address: required(options.address, "options.address")?,
+            map: MapName::new(&map).map_err(ServiceError::from)?,
+            credentials: credentials(&options)?,
+            replica: replica_options(&options)?,
+            timeout,
+            with_filter: flag(options.with_filter, "options.with_filter")?,
+        })
+    }
+}
+
+fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
+    let usual = ReplicaOptions::default();
+    let has_region = flag(options.has_region, "options.has_region")?;
+    let region = has_region.then(|| Region::cuboid(options.region_min_m, options.region_max_m));
+    let blocks_max = match options.blocks_max {
+        0 => BLOCKS_MAX_DEFAULT,
+        blocks => usize::try_from(blocks).unwrap_or(usize::MAX),
+    };
+    Ok(ReplicaOptions {
+        region: region.transpose().map_err(ServiceError::from)?,
+        blocks_max,
+        silence_max: milliseconds(options.silence_timeout_ms, usual.silence_max),
+    })
+}
+
+fn credentials(options: &Options) -> Result<Credentials, Failure> {
+    let mut credentials = Credentials::default();
+    if let Some(key) = text(options.key, "options.key")? {
+        credentials = credentials.with_key(&key)?;
+    }
+    if let Some(ca) = file(options.ca_file, "options.ca_file")? {
+        credentials = credentials.with_server_ca(&ca)?;
+    }
+    let certificate = file(options.certificate_file, "options.certificate_file")?;
+    match (certificate, file(options.private_key_file, "options.private_key_file")?) {
+        (None, None) => Ok(credentials),
+        (Some(certificate), Some(key)) => Ok(credentials.with_identity(&certificate, &key)?),
+        _ => Err(Failure::argument("options has one of certificate_file and private_key_file, not both")),
+    }
+}
+
+fn text(text: *const std::ffi::c_char, name: &str) -> Result<Option<String>, Failure> {
+    // SAFETY: the program that passes options promises their texts.
+    unsafe { memory::text(text, name) }
+}
+
+fn required(pointer: *const std::ffi::c_char, name: &str) -> Result<String, Failure> {
+    text(pointer, name)?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
+}
+
+fn file(path: *const std::ffi::c_char, name: &str) -> Result<Option<Vec<u8>>, Failure> {
+    let Some(path) = text(path, name)? else { return Ok(None) };
+    let unreadable = |error| Failure::argument(format!("{name}: {path} cannot be read: {error}"));
+    std::fs::read(&path).map(Some).map_err(unreadable)
+}
+
+fn flag(flag: u8, name: &str) -> Result<bool, Failure> {
+    match flag {
+        0 | 1 => Ok(flag == 1),
+        other => Err(Failure::argument(format!("{name} must be 0 or 1, got {other}"))),
+    }
+}
+
+fn milliseconds(milliseconds: u64, usual: Duration) -> Duration {
+    if milliseconds == 0 { usual } else { Duration::from_millis(milliseconds) }
+}
