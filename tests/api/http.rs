@@ -253,7 +253,7 @@ async fn voxels_are_listed_by_level_and_box() {
     let coarse = json_of(daemon.get("/v1/maps/a/voxels?level=2").await).await;
     let whole = json!({
         "level": 2, "resolution_m": 0.4, "revision": 1, "map_uuid": put["map_uuid"],
-        "content_hash": put["content_hash"],
+        "content_hash": put["content_hash"], "voxels_total": 3,
         "voxels": [[0, 0, 0], [1, 0, 0], [2, 0, 0]],
     });
     assert_eq!(coarse, whole);

@@ -143,6 +143,7 @@ async fn copy(server: &ServerProcess, target: &Target) -> Result<(Replica, Copie
 /// Bytes of a map's sets and filters.
 fn map_bytes(map: &MultiResolutionMap) -> usize {
     let described = map.describe(0, 0);
-    let filters = described.levels.iter().map(|level| level.plane_bytes + level.counter_bytes);
+    let filters = described.levels.iter().filter_map(|level| level.filter.as_ref());
+    let filters = filters.map(|filter| filter.plane_bytes + filter.counter_bytes);
     described.set_bytes + described.moment_bytes + filters.sum::<usize>()
 }
