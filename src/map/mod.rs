@@ -8,6 +8,7 @@ mod block_change;
 mod bounds;
 mod bulk;
 mod capacity_schedule;
+mod cell_bounds;
 mod change;
 pub mod commit;
 mod committed;
@@ -29,11 +30,13 @@ mod region;
 mod settings;
 mod shard;
 mod sharding;
+mod tier_view;
 mod trajectory;
 mod update;
 pub mod view;
 mod voxel_ownership;
 
+pub(crate) use cell_bounds::CellBounds;
 pub use change::{Change, DeletionRecord, Request, UndoRecord};
 pub use commit::Committer;
 pub use committed::Committed;
@@ -52,6 +55,7 @@ pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{Region, RegionError, SPHERE_M_MAX};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
+pub(crate) use tier_view::TierView;
 pub use trajectory::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
     ScanRecord, Trajectory, TrajectorySpacing, WithdrawnChange,

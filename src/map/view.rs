@@ -4,13 +4,14 @@ use super::lookup::{self, LevelView, Lookup};
 use super::occupied_voxel_list::tier_of;
 use super::shard::Shard;
 use super::sharding::{SHARDS, ShardsTouched};
+use super::tier_view::TierView;
 use super::{ContentVersion, MomentsView, MultiResolutionMap, OccupiedVoxelList, Region};
 use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
 use crate::voxel::{
-    BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints,
-    VoxelKey, VoxelSet,
+    BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice,
+    LatticeFromPoints, VoxelKey, VoxelSet,
 };
 
 /// Read locks on some or all shards of a map. While it lives, what it covers does not change.
@@ -55,6 +56,11 @@ impl<'a> MapView<'a> {
             shards[i] = Some(map.shards[i].try_read()?);
         }
         Some(Self { map, shards, version: map.content_version() })
+    }
+
+    /// The lattices of the map's levels.
+    pub fn lattice(&self) -> &Lattice {
+        &self.map.lattice
     }
 
     /// The revision that everything read through this view belongs to.
@@ -103,6 +109,15 @@ impl<'a> MapView<'a> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
         let (_, up) = tier_of(level);
         LevelView::new(level, up, self.map.sharding.shift_at(level), self.map.settings.filter.hashes, list)
+    }
+
+    /// The clusters that serve `level`; where the view does not cover a shard they are absent.
+    pub(crate) fn tier_view(&self, level: u32) -> TierView<'_> {
+        let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
+        let (_, up) = tier_of(level);
+        let (region_shift, cell_m) =
+            (self.map.sharding.shift_at(level - up), self.map.lattice.resolution_m(level - up));
+        TierView::new(level, region_shift, cell_m, list)
     }
 
     /// The lists of `level`, one a shard that the view covers.
@@ -231,7 +246,7 @@ impl<'a> MapView<'a> {
     ///
     /// Walks the blocks that the region's bounds meet, or all that are stored where those are fewer; some of them once
     /// stopped.
-    pub(super) fn for_each_block(
+    pub(crate) fn for_each_block(
         &self,
         list: &OccupiedVoxelList<'_>,
         region: &Region,

@@ -1,11 +1,13 @@
 //! Clusters of 4 x 4 x 4 blocks: which of them are there in one word, their masks packed behind it.
 
 use super::key::AXIS_BITS;
-use super::{BlockMask, VoxelKey};
+use super::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, VoxelKey};
 use crate::util::bits::for_each_bit;
 
 /// Levels from a block up to its cluster.
 pub(crate) const CLUSTER_LEVELS: u32 = 2;
+/// Voxels along a cluster's side.
+pub(crate) const CLUSTER_SIDE: i32 = BLOCK_SIDE << CLUSTER_LEVELS;
 /// The bits of a block's index that say where in its cluster it is.
 const PLACE_MASK: u64 = (1 << CLUSTER_LEVELS) - 1;
 
@@ -31,6 +33,31 @@ impl BlockInCluster {
     pub(crate) fn of(block: VoxelKey) -> (VoxelKey, Self) {
         let axis = |axis: u32| (block.to_bits() >> (axis * AXIS_BITS) & PLACE_MASK) as u32;
         (block.ancestor(CLUSTER_LEVELS), Self(axis(0) | axis(1) << 2 | axis(2) << 4))
+    }
+
+    /// The place in its cluster of the block that holds the voxel at `index`.
+    #[inline(always)]
+    pub(crate) fn of_voxel(index: [i32; 3]) -> Self {
+        let axis = |axis: usize| (index[axis] >> BLOCK_LEVELS) as u32 & PLACE_MASK as u32;
+        Self(axis(0) | axis(1) << 2 | axis(2) << 4)
+    }
+
+    /// The place's number, 0..64.
+    #[inline(always)]
+    pub(crate) fn number(self) -> usize {
+        self.0 as usize
+    }
+
+    /// The place of the number in the low six bits of `n`.
+    #[inline(always)]
+    pub(crate) fn from_number(n: u32) -> Self {
+        Self(n & 63)
+    }
+
+    /// How many blocks of the cluster lie before this one along each axis.
+    #[inline(always)]
+    pub(crate) fn index(self) -> [usize; 3] {
+        [0, 2, 4].map(|shift| (self.0 >> shift & 3) as usize)
     }
 
     /// The block here in `cluster`: the inverse of [`BlockInCluster::of`].
@@ -96,6 +123,21 @@ impl Cluster {
             _ => &self.masks[self.rank(place)].0,
         }
     }
+
+    /// How large the empty aligned cube around the block at `place` is, where that is absent: the levels (0 or 1) from a
+    /// block up to it. None where it is there.
+    #[inline(always)]
+    pub(crate) fn empty_levels(&self, place: BlockInCluster) -> Option<u32> {
+        if self.present & place.bit() != 0 {
+            return None;
+        }
+        let octant = Self::OCTANT << (place.0 & Self::OCTANT_FIRST);
+        Some(u32::from(self.present & octant == 0))
+    }
+
+    /// The first octant of a cluster, 2 x 2 x 2 blocks of it; and the bits of a place that say in which octant it is.
+    const OCTANT: u64 = 0x0033_0033;
+    const OCTANT_FIRST: u32 = 0b10_1010;
 
     /// Gives the block at `place`, which is there, other voxels.
     ///

@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 16] = [
     &["voxel", "bloom"],
     &["scan"],
     &["map"],
-    &["align"],
+    &["align", "planning"],
     &["mapping"],
     &["store"],
     &["service"],
