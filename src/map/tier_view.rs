@@ -73,10 +73,16 @@ impl<'a> TierView<'a> {
         clusters.map(|c| c.clamp(-border, border - 1.0) as i32)
     }
 
+    /// True where a region is no smaller than a cluster, so that one shard holds all of it.
+    #[inline(always)]
+    pub(crate) fn has_whole_clusters(&self) -> bool {
+        self.region_shift >= CELL_TO_CLUSTER
+    }
+
     /// The clusters `key` of all shards that have it: one, where a region is no smaller than a cluster.
     #[inline(always)]
     pub(crate) fn clusters(&self, key: VoxelKey) -> impl Iterator<Item = &'a Cluster> {
-        let (first, last) = if self.region_shift >= CELL_TO_CLUSTER {
+        let (first, last) = if self.has_whole_clusters() {
             let shift = self.region_shift - CELL_TO_CLUSTER;
             let shard = shard_of_region(key.index().map(|i| i >> shift));
             (shard, shard)

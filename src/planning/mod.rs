@@ -8,6 +8,7 @@
 mod grid;
 mod nearest;
 mod rays;
+mod remembered;
 #[cfg(test)]
 mod test_maps;
 

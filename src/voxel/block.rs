@@ -139,12 +139,11 @@ impl BlockMask {
     /// How large the empty aligned cube around `cell` is: the levels (0, 1 or 2) from a cell up to it. None where the
     /// ancestor of `cell`, `level` (0, 1 or 2) levels up, is occupied.
     #[inline(always)]
-    pub(crate) fn empty_levels(&self, cell: Cell, level: u32) -> Option<u32> {
+    pub(super) fn empty_levels(&self, cell: Cell, level: u32) -> Option<u32> {
         let word = self.0[cell.word()];
-        if word & Self::within(cell, level) != 0 {
-            return None;
-        }
-        Some(if word == 0 { 2 } else { u32::from(word & Self::within(cell, 1) == 0) })
+        let is_empty = |level: u32| word & Self::within(cell, level) == 0;
+        // What is empty is so at each level below, so that a sum says up to which: no branch to guess.
+        is_empty(level).then(|| u32::from(is_empty(1)) + u32::from(is_empty(2)))
     }
 
     /// The bits of `cell`'s word that share its ancestor `level` levels up.

@@ -1,6 +1,6 @@
 //! The nearest voxel of one block.
 
-use super::search::{Best, Seeker};
+use super::seeker::Seeker;
 use crate::voxel::{BLOCK_SIDE, BlockMask, VoxelKey};
 
 /// Cells along a block's side.
@@ -62,10 +62,7 @@ fn nearest_in_word(seeker: &mut Seeker, mask: &BlockMask, word: usize, gaps: &Ga
         if seeker.may_be_nearest(squared) {
             let index = cell.index();
             let voxel = std::array::from_fn(|axis| (first[axis] + index[axis] as i32) >> seeker.up);
-            let found = Best { squared, key: VoxelKey::pack(voxel).to_bits() };
-            if found < seeker.best {
-                seeker.best = found;
-            }
+            seeker.offer(squared, VoxelKey::pack(voxel));
         }
     }
 }

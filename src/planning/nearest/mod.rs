@@ -2,13 +2,14 @@
 
 mod block;
 mod search;
+mod seeker;
 #[cfg(test)]
 mod tests;
 
 use crate::geometry::Point;
 use crate::map::MapView;
-use crate::util::StopSignal;
-use crate::voxel::VoxelKey;
+use crate::util::{Keyword, StopSignal};
+use crate::voxel::{Cluster, VoxelKey};
 use search::Search;
 
 /// Largest radius of a search, voxels of the level that is asked.
@@ -25,6 +26,17 @@ pub enum MeasuredTo {
     Cubes,
     /// Its center.
     Centers,
+}
+
+impl Keyword for MeasuredTo {
+    const ALL: &'static [Self] = &[Self::Cubes, Self::Centers];
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Cubes => "cubes",
+            Self::Centers => "centers",
+        }
+    }
 }
 
 /// Points of the map frame, and how far from them to look.
@@ -99,6 +111,11 @@ impl NearestVoxels {
         self.distances_m.is_empty()
     }
 
+    /// Number of points with a voxel within the radius.
+    pub fn count(&self) -> usize {
+        self.found.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     fn push(&mut self, nearest: Option<Nearest>) {
         let at = self.len();
         self.found[at / 64] |= u64::from(nearest.is_some()) << (at % 64);
@@ -129,7 +146,8 @@ pub fn find_nearest(
     if !(radius_m > 0.0 && radius_m <= max_m) {
         return Err(NearestError::Radius { radius_m, max_m, level });
     }
-    let search = Search::new(view.tier_view(level), radius_m, to);
+    let nothing = Cluster::default();
+    let mut search = Search::new(view.tier_view(level), &nothing, radius_m, to);
     let mut nearest = NearestVoxels::of_capacity(points.len());
     for &point in stop.paced(points, POINTS_PER_LOOK) {
         nearest.push(search.nearest(point));

@@ -4,19 +4,18 @@ mod ray;
 mod space;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 use crate::geometry::Point;
 use crate::map::MapView;
 use crate::util::StopSignal;
-use crate::voxel::{Lattice, VoxelKey};
+use crate::voxel::{Cluster, VoxelKey};
 use ray::Ray;
 use space::Space;
+use turns::Turns;
 
 /// How far the length of a direction may lie from one before it is refused instead of normalized.
 pub const DIRECTION_LENGTH_TOLERANCE: f64 = 1e-3;
-
-/// Rays that are cast between two looks at the stop signal: about a millisecond.
-const RAYS_PER_LOOK: usize = 4096;
 
 /// Rays in the map frame.
 #[derive(Debug, Clone, Copy)]
@@ -104,11 +103,12 @@ pub struct RayHits {
 }
 
 impl RayHits {
-    fn of_capacity(rays: usize) -> Self {
+    /// No hit of any of so many rays.
+    fn none_of(rays: usize) -> Self {
         Self {
             hit: vec![0; rays.div_ceil(64)],
-            distances_m: Vec::with_capacity(rays),
-            voxels: Vec::with_capacity(rays),
+            distances_m: vec![f32::INFINITY; rays],
+            voxels: vec![VoxelKey::default(); rays],
         }
     }
 
@@ -128,12 +128,10 @@ impl RayHits {
     }
 
     #[inline(always)]
-    fn push(&mut self, hit: Option<(f64, VoxelKey)>) {
-        let at = self.len();
-        self.hit[at / 64] |= u64::from(hit.is_some()) << (at % 64);
-        let (distance_m, voxel) = hit.unwrap_or((f64::INFINITY, VoxelKey::default()));
-        self.distances_m.push(distance_m as f32);
-        self.voxels.push(voxel);
+    fn set(&mut self, ray: usize, distance_m: f64, voxel: VoxelKey) {
+        self.hit[ray / 64] |= 1 << (ray % 64);
+        self.distances_m[ray] = distance_m as f32;
+        self.voxels[ray] = voxel;
     }
 }
 
@@ -161,20 +159,6 @@ impl<'a> Rays<'a> {
             Toward::Directions { range_m, .. } if !(range_m > 0.0) => Err(RayError::Range(range_m)),
             _ => Ok(()),
         }
-    }
-
-    /// Ray `at` in cells of `cell_m`, and its length in meters.
-    #[inline(always)]
-    fn ray(&self, at: usize, lattice: &Lattice, cell_m: f64) -> Result<(Ray, f64), RayError> {
-        let origin_at = if self.origins.len() == 1 { 0 } else { at };
-        let origin = self.origins[origin_at];
-        let origin_m = origin.xyz().map(f64::from);
-        let (min_m, end_m) = lattice.range_m();
-        if !origin_m.iter().all(|c| (min_m..end_m).contains(c)) {
-            return Err(RayError::Origin { at: origin_at, origin, min_m, end_m });
-        }
-        let (direction, range_m) = self.toward.from(at, origin)?;
-        Ok((Ray::new(origin_m.map(|c| c / cell_m), direction, cell_m), range_m))
     }
 }
 
@@ -204,6 +188,31 @@ impl Toward<'_> {
     }
 }
 
+/// Rays that were asked for, as those of a lattice of cells.
+#[derive(Debug, Clone, Copy)]
+struct Request<'a> {
+    rays: &'a Rays<'a>,
+    /// Smallest coordinate of an origin, and one past the largest, meters.
+    range_m: (f64, f64),
+    cell_m: f64,
+}
+
+impl Request<'_> {
+    /// Ray `number`, and its length in meters.
+    #[inline(always)]
+    fn ray(&self, number: usize) -> Result<(Ray, f64), RayError> {
+        let Rays { origins, toward } = self.rays;
+        let at = if origins.len() == 1 { 0 } else { number };
+        let (origin, (min_m, end_m)) = (origins[at], self.range_m);
+        let origin_m = origin.xyz().map(f64::from);
+        if !origin_m.iter().all(|c| (min_m..end_m).contains(c)) {
+            return Err(RayError::Origin { at, origin, min_m, end_m });
+        }
+        let (direction, length_m) = toward.from(number, origin)?;
+        Ok((Ray::new(origin_m.map(|c| c / self.cell_m), direction, self.cell_m), length_m))
+    }
+}
+
 fn length([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
@@ -217,7 +226,7 @@ fn length([x, y, z]: [f64; 3]) -> f64 {
 ///
 /// The view must cover the whole map. The walk leaps over empty space by the blocks and clusters of blocks that are not
 /// there, and comes out where single steps would (both computed in f64, and compared bit for bit in tests). Takes 12 bytes
-/// a ray. Once stopped, the answer has fewer rays.
+/// a ray. Once stopped, rays are left that met nothing yet.
 ///
 /// # Errors
 /// When a ray is none; the error names which, and why.
@@ -228,13 +237,12 @@ pub fn cast_rays(
     stop: StopSignal<'_>,
 ) -> Result<RayHits, RayError> {
     rays.checked()?;
-    let mut hits = RayHits::of_capacity(rays.len());
-    let tier = view.tier_view(level);
-    let (lattice, cell_m) = (view.lattice(), tier.cell_m());
-    let mut space = view.cell_bounds(level).map(|bounds| Space::new(tier, bounds));
-    for at in stop.paced(0..rays.len(), RAYS_PER_LOOK) {
-        let (ray, range_m) = rays.ray(at, lattice, cell_m)?;
-        hits.push(space.as_mut().and_then(|space| space.first_hit(&ray, range_m)));
+    let mut hits = RayHits::none_of(rays.len());
+    let (nothing, tier) = (Cluster::default(), view.tier_view(level));
+    let request = Request { rays, range_m: view.lattice().range_m(), cell_m: tier.cell_m() };
+    match view.cell_bounds(level) {
+        Some(bounds) => Turns::new(Space::new(tier, bounds, &nothing), request).walk(&mut hits, stop)?,
+        None => (0..rays.len()).try_for_each(|number| request.ray(number).map(|_| ()))?,
     }
     Ok(hits)
 }

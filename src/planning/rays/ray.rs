@@ -3,6 +3,9 @@
 
 use crate::map::CellBounds;
 
+/// The three axes, and one along which no ray moves: four of a kind go through one vector register, or two.
+const LANES: usize = 4;
+
 /// A ray in cells, each axis along which it descends turned over, so that it ascends along all of them.
 ///
 /// It passes the border below cell i of an axis at `(i - origin) * m_a_cell` meters, computed in just this way wherever it
@@ -12,22 +15,22 @@ use crate::map::CellBounds;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
     /// Where it begins, cells.
-    origin: [f64; 3],
+    origin: [f64; LANES],
     /// Meters along the ray from border to border of an axis; infinite along an axis on which it does not move.
-    m_a_cell: [f64; 3],
+    m_a_cell: [f64; LANES],
     /// Cells passed along each axis, a meter along the ray.
-    cells_a_m: [f64; 3],
+    cells_a_m: [f64; LANES],
     /// -1 for an axis that is turned over, 0 for others: exclusive or with it turns an index.
-    turned: [i32; 3],
+    turned: [i32; LANES],
 }
 
 /// A place on a ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     /// Distance from the ray's begin, meters.
     pub(super) at_m: f64,
     /// The cell, turned as the ray is.
-    pub(super) cell: [i32; 3],
+    cell: [i32; LANES],
 }
 
 /// How near to a border, in cells, the cell of a place is decided by where the ray passes the border: far more than rounding
@@ -38,24 +41,27 @@ const ROUNDS: f64 = 1.5 * (1u64 << 52) as f64;
 
 impl Ray {
     /// The ray from `origin` (cells) along the unit vector `direction`, through cells of side `cell_m`.
-    pub(super) fn new(origin: [f64; 3], direction: [f64; 3], cell_m: f64) -> Self {
-        let turned = direction.map(|d| -i32::from(d < 0.0));
+    #[inline(always)]
+    pub(super) fn new([x, y, z]: [f64; 3], [dx, dy, dz]: [f64; 3], cell_m: f64) -> Self {
+        // In the middle of a cell, no border is ever near along the fourth axis.
+        let (origin, direction) = ([x, y, z, 0.5], [dx, dy, dz, 0.0]);
         Self {
-            origin: std::array::from_fn(|axis| if turned[axis] == 0 { origin[axis] } else { -origin[axis] }),
-            m_a_cell: direction.map(|d| cell_m / d.abs()),
+            origin: std::array::from_fn(|i| if direction[i] < 0.0 { -origin[i] } else { origin[i] }),
+            m_a_cell: direction.map(|d: f64| cell_m / d.abs()),
             cells_a_m: direction.map(|d| d.abs() / cell_m),
-            turned,
+            turned: direction.map(|d| -i32::from(d < 0.0)),
         }
     }
 
-    /// An index turned, or turned back.
+    /// The cell of a place as the map counts cells.
     #[inline(always)]
-    pub(super) fn turn(&self, cell: [i32; 3]) -> [i32; 3] {
-        std::array::from_fn(|axis| cell[axis] ^ self.turned[axis])
+    pub(super) fn cell(&self, place: &Place) -> [i32; 3] {
+        std::array::from_fn(|axis| place.cell[axis] ^ self.turned[axis])
     }
 
     /// Where the ray meets a box, and the distance at which it leaves it or ends, meters: none where it does not meet it
     /// before `range_m`.
+    #[inline(always)]
     pub(super) fn clipped(&self, bounds: &CellBounds, range_m: f64) -> Option<(Place, f64)> {
         let (mut at_m, mut end_m) = (0.0, range_m);
         for axis in 0..3 {
@@ -68,25 +74,25 @@ impl Ray {
             end_m = f64::min(end_m, self.border_m(axis, end));
         }
         // Only where it meets the box is its place there within reach of an index.
-        (at_m < end_m).then(|| {
-            let cell = std::array::from_fn(|axis| self.cell_at(axis, at_m));
-            (Place { at_m, cell }, end_m)
-        })
+        (at_m < end_m).then(|| (Place { at_m, cell: self.cells_at(at_m) }, end_m))
     }
 
-    /// Where the ray leaves the cube of 2^`levels` cells' side, aligned as those of coarser levels are, that holds `cell`.
+    /// Where the ray leaves the cube of 2^`levels` cells' side, aligned as voxels of coarser levels are, that holds a place.
     #[inline(always)]
-    pub(super) fn beyond(&self, cell: [i32; 3], levels: u32) -> Place {
-        let border = cell.map(|i| (i | ((1 << levels) - 1)) + 1);
-        let passes_m: [f64; 3] = std::array::from_fn(|axis| self.border_m(axis, border[axis]));
-        let smaller = |a: f64, b: f64| if a < b { a } else { b };
-        let at_m = smaller(smaller(passes_m[0], passes_m[1]), passes_m[2]);
-        let cell =
-            std::array::from_fn(
-                |axis| {
-                    if passes_m[axis] <= at_m { border[axis] } else { self.cell_at(axis, at_m) }
-                },
-            );
+    pub(super) fn beyond(&self, place: &Place, levels: u32) -> Place {
+        let border = place.cell.map(|i| (i | ((1 << levels) - 1)) + 1);
+        let passes_m: [f64; LANES] = std::array::from_fn(|axis| self.border_m(axis, border[axis]));
+        let at_m = smaller(smaller(passes_m[0], passes_m[1]), smaller(passes_m[2], passes_m[3]));
+        let (mut cell, mut is_near) = ([0; LANES], false);
+        for axis in 0..LANES {
+            let passes = passes_m[axis] <= at_m;
+            let (index, is_near_border) = self.cell_away_from_border(axis, at_m);
+            is_near |= !passes & is_near_border;
+            cell[axis] = if passes { border[axis] } else { index };
+        }
+        if is_near {
+            cell = self.cells_at(at_m);
+        }
         Place { at_m, cell }
     }
 
@@ -96,29 +102,36 @@ impl Ray {
         (f64::from(index) - self.origin[axis]) * self.m_a_cell[axis]
     }
 
-    /// Index of the cell that the ray is in at `at_m`: the last whose lower border it has passed.
+    /// Index of the cell that the ray is in at `at_m`, and whether a border is so near that it may be the neighbor's.
     #[inline(always)]
-    fn cell_at(&self, axis: usize, at_m: f64) -> i32 {
+    fn cell_away_from_border(&self, axis: usize, at_m: f64) -> (i32, bool) {
         let at = self.origin[axis] + at_m * self.cells_a_m[axis];
-        let index = (at - 0.5 + ROUNDS).to_bits() as i32;
-        let within = at - f64::from(index);
-        if within < NEAR_BORDER || within > 1.0 - NEAR_BORDER {
-            return self.cell_near_border(axis, at_m, index);
-        }
-        index
+        let rounded = at - 0.5 + ROUNDS;
+        let from_middle = at - (rounded - ROUNDS) - 0.5;
+        (rounded.to_bits() as i32, from_middle.abs() > 0.5 - NEAR_BORDER)
     }
 
+    /// Indices of the cells that the ray is in at `at_m`: along each axis the last whose lower border it has passed.
     #[cold]
-    fn cell_near_border(&self, axis: usize, at_m: f64, mut index: i32) -> i32 {
-        if self.m_a_cell[axis].is_infinite() {
-            return self.origin[axis].floor() as i32;
-        }
-        while self.border_m(axis, index) > at_m {
-            index -= 1;
-        }
-        while self.border_m(axis, index + 1) <= at_m {
-            index += 1;
-        }
-        index
+    fn cells_at(&self, at_m: f64) -> [i32; LANES] {
+        std::array::from_fn(|axis| {
+            if self.m_a_cell[axis].is_infinite() {
+                return self.origin[axis].floor() as i32;
+            }
+            let (mut index, _) = self.cell_away_from_border(axis, at_m);
+            while self.border_m(axis, index) > at_m {
+                index -= 1;
+            }
+            while self.border_m(axis, index + 1) <= at_m {
+                index += 1;
+            }
+            index
+        })
     }
+}
+
+/// The smaller of two numbers: one instruction, as long as NaN does not matter.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }

@@ -1,77 +1,71 @@
 //! Space as a ray sees it: occupied, or empty up to some size.
 
-use super::ray::Ray;
+use super::ray::{Place, Ray};
 use crate::map::{CellBounds, TierView};
-use crate::voxel::{BLOCK_LEVELS, BlockInCluster, Cell, Cluster, VoxelKey};
+use crate::planning::remembered::Remembered;
+use crate::voxel::{BlockInCluster, Cell, Cluster, VoxelKey};
 
-/// Clusters that are remembered, each axis a power of two of them: neighboring rays meet the same ones.
-const REMEMBERED: [u32; 3] = [3, 3, 2];
-
-/// The voxels of one level, with the clusters that were met last.
+/// The voxels of one level.
 pub(super) struct Space<'a> {
-    view: TierView<'a>,
+    clusters: Remembered<'a>,
     bounds: CellBounds,
     up: u32,
     piece_levels: u32,
-    remembered: Vec<(VoxelKey, Option<&'a Cluster>)>,
+}
+
+/// A ray under way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Walk {
+    ray: Ray,
+    place: Place,
+    /// Where it ends, meters.
+    end_m: f64,
+    /// Which of the rays it is.
+    pub(super) number: usize,
+}
+
+/// What one step of a walk came to.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Step {
+    /// It goes on.
+    Further,
+    /// It met this voxel, so many meters from its begin.
+    Hit(f64, VoxelKey),
+    /// It ended.
+    Missed,
 }
 
 impl<'a> Space<'a> {
-    /// Space without a voxel beyond `bounds`.
-    pub(super) fn new(view: TierView<'a>, bounds: CellBounds) -> Self {
+    /// Space without a voxel beyond `bounds`; `nothing` is a cluster without a block.
+    pub(super) fn new(view: TierView<'a>, bounds: CellBounds, nothing: &'a Cluster) -> Self {
         let (up, piece_levels) = (view.up(), view.piece_levels());
-        // No piece has the key of one beyond where indices end.
-        let none = (VoxelKey::default(), None);
-        let mut space = Self {
-            view,
-            bounds,
-            up,
-            piece_levels,
-            remembered: vec![none; 1 << REMEMBERED.iter().sum::<u32>()],
-        };
-        space.remembered[0].1 = space.view.cluster_around([0; 3]);
-        space
+        Self { clusters: Remembered::new(view, nothing), bounds, up, piece_levels }
     }
 
-    /// The first occupied voxel that the ray meets before `range_m`: where it is met, and its key.
-    #[inline]
-    pub(super) fn first_hit(&mut self, ray: &Ray, range_m: f64) -> Option<(f64, VoxelKey)> {
-        let (mut place, end_m) = ray.clipped(&self.bounds, range_m)?;
-        loop {
-            let cell = ray.turn(place.cell);
-            let Some(levels) = self.empty_levels(cell) else {
-                return Some((place.at_m, VoxelKey::pack(cell.map(|i| i >> self.up))));
-            };
-            place = ray.beyond(place.cell, levels);
-            if !(place.at_m < end_m) {
-                return None;
-            }
-        }
+    /// The walk of a ray of length `range_m`; none where it misses all.
+    #[inline(always)]
+    pub(super) fn walk(&self, number: usize, ray: Ray, range_m: f64) -> Option<Walk> {
+        let (place, end_m) = ray.clipped(&self.bounds, range_m)?;
+        Some(Walk { ray, place, end_m, number })
+    }
+
+    /// Leaps over the empty space around the place of a walk, where it is empty.
+    #[inline(always)]
+    pub(super) fn step(&mut self, walk: &mut Walk) -> Step {
+        let cell = walk.ray.cell(&walk.place);
+        let Some(levels) = self.empty_levels(cell) else {
+            return Step::Hit(walk.place.at_m, VoxelKey::pack(cell.map(|i| i >> self.up)));
+        };
+        walk.place = walk.ray.beyond(&walk.place, levels);
+        if walk.place.at_m < walk.end_m { Step::Further } else { Step::Missed }
     }
 
     /// How large the empty aligned cube around `cell` is: the levels from a cell up to it. None where the voxel that holds
     /// the cell is occupied.
     #[inline(always)]
     fn empty_levels(&mut self, cell: [i32; 3]) -> Option<u32> {
-        let Some(cluster) = self.cluster(cell) else { return Some(self.piece_levels) };
-        let place = BlockInCluster::of_voxel(cell);
-        let levels = match cluster.empty_levels(place) {
-            Some(levels) => BLOCK_LEVELS + levels,
-            None => cluster.get(place).empty_levels(Cell::of(cell).1, self.up)?,
-        };
+        let (place, in_block) = (BlockInCluster::of_voxel(cell), Cell::of(cell).1);
+        let levels = self.clusters.around(cell).empty_levels(place, in_block, self.up)?;
         Some(levels.min(self.piece_levels))
-    }
-
-    #[inline(always)]
-    fn cluster(&mut self, cell: [i32; 3]) -> Option<&'a Cluster> {
-        let piece = cell.map(|i| i >> self.piece_levels);
-        let key = VoxelKey::pack(piece);
-        let [x, y, z]: [usize; 3] =
-            std::array::from_fn(|axis| (piece[axis] & ((1 << REMEMBERED[axis]) - 1)) as usize);
-        let slot = &mut self.remembered[x | y << REMEMBERED[0] | z << (REMEMBERED[0] + REMEMBERED[1])];
-        if slot.0 != key {
-            *slot = (key, self.view.cluster_around(cell));
-        }
-        slot.1
     }
 }
