@@ -5,6 +5,8 @@ mod growth;
 mod insert;
 mod journal;
 mod lookup;
+mod nearest;
+mod rays;
 mod readers;
 mod serve;
 mod soak;
@@ -27,6 +29,8 @@ EXAMPLES:
   mrol bench growth --workload site                   memory, and who waits, while ten million voxels go in
   mrol bench start --workload site                    a start with ten million voxels
   mrol bench align scans/ --resolution 0.05
+  mrol bench rays                                     a panorama of a million rays in the room
+  mrol bench nearest --queries 100000                 how far points are from the nearest voxel
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench serve                                    a load of point queries on a server of its own
   mrol bench soak                                     an hour under a fleet's load: memory, errors
@@ -49,6 +53,8 @@ enum What {
     Growth(growth::Growth),
     Journal(journal::Journal),
     Align(align::Align),
+    Rays(rays::Rays),
+    Nearest(nearest::Nearest),
     Readers(readers::Readers),
     Serve(serve::Serve),
     Soak(soak::Soak),
@@ -63,6 +69,8 @@ impl Bench {
             What::Growth(growth) => growth.run(&output),
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
+            What::Rays(rays) => rays.run(&output),
+            What::Nearest(nearest) => nearest.run(&output),
             What::Readers(readers) => readers.run(&output),
             What::Start(start) => start.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),
