@@ -7,6 +7,7 @@
 //!   points and poses.
 //! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
 //!   point-cloud files.
+//! * [`planning`]: what planners ask of a map: does a body fit, rays, the nearest voxels, the map from above.
 //! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Whoever wants to see the whole before its
 //!   parts begins here.
 //! * `store`: map files. `service`: the operations, once for every protocol.
@@ -78,6 +79,7 @@ pub mod map;
 pub mod mapping;
 #[cfg(feature = "server")]
 pub mod middleware;
+pub mod planning;
 pub mod scan;
 #[cfg(feature = "server")]
 pub mod server;

@@ -58,6 +58,17 @@ operations! {
     QueryPoints:       Some(Read),  grpc "/mrol.v1.Occupancy/QueryPoints",       http POST "/v1/maps/{map}/occupancy";
     QueryPointsStream: Some(Read),  grpc "/mrol.v1.Occupancy/QueryPointsStream";
     ListVoxels:        Some(Read),  grpc "/mrol.v1.Occupancy/ListVoxels",        http GET "/v1/maps/{map}/voxels";
+    CheckPoses:        Some(Read),  grpc "/mrol.v1.Occupancy/CheckPoses",        http POST "/v1/maps/{map}/poses";
+    CheckPosesStream:  Some(Read),  grpc "/mrol.v1.Occupancy/CheckPosesStream";
+    CheckSpheres:      Some(Read),  grpc "/mrol.v1.Occupancy/CheckSpheres",      http POST "/v1/maps/{map}/spheres";
+    CheckSpheresStream: Some(Read), grpc "/mrol.v1.Occupancy/CheckSpheresStream";
+    CheckMotions:      Some(Read),  grpc "/mrol.v1.Occupancy/CheckMotions",      http POST "/v1/maps/{map}/motions";
+    CheckMotionsStream: Some(Read), grpc "/mrol.v1.Occupancy/CheckMotionsStream";
+    CastRays:          Some(Read),  grpc "/mrol.v1.Occupancy/CastRays",          http POST "/v1/maps/{map}/rays";
+    CastRaysStream:    Some(Read),  grpc "/mrol.v1.Occupancy/CastRaysStream";
+    FindNearest:       Some(Read),  grpc "/mrol.v1.Occupancy/FindNearest",       http POST "/v1/maps/{map}/nearest";
+    FindNearestStream: Some(Read),  grpc "/mrol.v1.Occupancy/FindNearestStream";
+    ProjectGrid:       Some(Read),  grpc "/mrol.v1.Occupancy/ProjectGrid",       http POST "/v1/maps/{map}/grid";
     ListKeepOuts:      Some(Read),  grpc "/mrol.v1.Occupancy/ListKeepOuts",      http GET "/v1/maps/{map}/keep-outs";
     GetBlock:          Some(Read),  grpc "/mrol.v1.Occupancy/GetBlock",          http GET "/v1/maps/{map}/block";
     ListObservers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListObservers",     http GET "/v1/maps/{map}/observers";

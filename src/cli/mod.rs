@@ -6,10 +6,12 @@
 
 mod alignment_options;
 mod block;
+mod check;
 mod config;
 mod delete;
 mod doctor;
 mod error;
+mod grid;
 mod health;
 mod insert;
 mod keepout;
@@ -23,10 +25,12 @@ mod localize;
 mod map;
 mod map_report;
 mod maps;
+mod nearest;
 mod observers;
 mod output;
 mod parse;
 mod query;
+mod rays;
 mod remote;
 mod runtime;
 mod scan_report;
@@ -81,6 +85,10 @@ enum Command {
     Insert(insert::Insert),
     Localize(localize::Localize),
     Query(query::Query),
+    Check(check::Check),
+    Rays(rays::CastRays),
+    Nearest(nearest::Nearest),
+    Grid(grid::DrawGrid),
     Block(block::Block),
     Observers(observers::Observers),
     Delete(delete::Delete),
@@ -121,6 +129,10 @@ impl Command {
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
             Self::Localize(localize) => runtime::block_on(localize.run(output)),
             Self::Query(query) => runtime::block_on(query.run(output)),
+            Self::Check(check) => runtime::block_on(check.run(output)),
+            Self::Rays(rays) => runtime::block_on(rays.run(output)),
+            Self::Nearest(nearest) => runtime::block_on(nearest.run(output)),
+            Self::Grid(grid) => runtime::block_on(grid.run(output)),
             Self::Block(block) => runtime::block_on(block.run(output)),
             Self::Observers(observers) => runtime::block_on(observers.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use crate::align::localize::SearchBox;
 use crate::geometry::{self, Point, Pose};
 use crate::map::{KeepOutName, MapName, Region, RequestId, RobotName, SessionName};
+use crate::planning::{GridArea, Sphere};
 use crate::util::Keyword;
 
 /// A parser for keywords; `--help` lists them.
@@ -37,6 +38,23 @@ pub(super) fn cuboid(text: &str) -> Result<Region, String> {
 pub(super) fn corners(text: &str) -> Result<([f64; 3], [f64; 3]), String> {
     let [x0, y0, z0, x1, y1, z1] = numbers(text, "x y z x y z")?;
     Ok(([x0, y0, z0], [x1, y1, z1]))
+}
+
+/// Parses a sphere of a body "x y z r": center and radius, meters.
+pub(super) fn sphere(text: &str) -> Result<Sphere, String> {
+    let [x, y, z, radius_m] = numbers(text, "x y z r")?.map(|number: f64| number as f32);
+    Ok(Sphere { center_m: [x, y, z], radius_m })
+}
+
+/// Parses a band of height "z z": lowest and highest, meters.
+pub(super) fn band(text: &str) -> Result<[f64; 2], String> {
+    numbers(text, "z z")
+}
+
+/// Parses a rectangle "x y x y": smallest and largest corner, meters.
+pub(super) fn rectangle(text: &str) -> Result<GridArea, String> {
+    let [x0, y0, x1, y1] = numbers(text, "x y x y")?;
+    Ok(GridArea::Rectangle { min_m: [x0, y0], max_m: [x1, y1] })
 }
 
 /// Parses the box of a search "x y z x y z": smallest and largest corner, meters.

@@ -31,6 +31,7 @@ mod credentials;
 mod error;
 mod keep_outs;
 mod new_map;
+mod question;
 mod replica;
 mod streams;
 mod watch;

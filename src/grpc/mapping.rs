@@ -4,7 +4,7 @@ use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::stream::{Answers, Message};
+use super::stream::{Answers, Message, same_map};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use crate::service::MapService;
@@ -123,7 +123,9 @@ impl Mapping for Adapter {
 }
 
 impl Message for pb::InsertScanRequest {
-    fn map_mut(&mut self) -> &mut String {
-        &mut self.map
+    type Former = String;
+
+    fn complete(&mut self, former: &mut String) {
+        same_map(&mut self.map, former);
     }
 }

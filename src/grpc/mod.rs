@@ -8,6 +8,7 @@ mod message_framing;
 mod middleware;
 mod not_grpc;
 mod occupancy;
+mod question;
 mod status;
 mod stream;
 

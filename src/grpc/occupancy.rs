@@ -4,11 +4,13 @@ use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::stream::{Answers, Message};
+use super::stream::{Answers, Message, same_map};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use crate::map::MapName;
-use crate::service::ServiceError;
+use crate::service::{
+    GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion, ServiceError, SphereCheck,
+};
 use crate::wire::{listing_bytes, pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
 
@@ -16,6 +18,11 @@ use pb::occupancy_server::Occupancy;
 impl Occupancy for Adapter {
     type QueryPointsStreamStream = Answers<pb::QueryPointsResponse>;
     type ListVoxelsStream = BoxStream<pb::ListVoxelsResponse>;
+    type CheckPosesStreamStream = Answers<pb::CheckPosesResponse>;
+    type CheckSpheresStreamStream = Answers<pb::CheckSpheresResponse>;
+    type CheckMotionsStreamStream = Answers<pb::CheckMotionsResponse>;
+    type CastRaysStreamStream = Answers<pb::CastRaysResponse>;
+    type FindNearestStreamStream = Answers<pb::FindNearestResponse>;
     type WatchStream = BoxStream<pb::WatchResponse>;
 
     async fn query_points(
@@ -96,10 +103,89 @@ impl Occupancy for Adapter {
         let messages = service.watch(&map, request).await?.into_stream(self.admission.told_to_drain());
         Ok(Response::new(Box::pin(messages.map(|message| Ok(message?.into())))))
     }
+
+    async fn check_poses(
+        &self,
+        request: Request<pb::CheckPosesRequest>,
+    ) -> Result<Response<pb::CheckPosesResponse>, Status> {
+        self.ask::<PoseCheck, _, _>(request).await
+    }
+
+    async fn check_poses_stream(
+        &self,
+        requests: Request<Streaming<pb::CheckPosesRequest>>,
+    ) -> Result<Response<Self::CheckPosesStreamStream>, Status> {
+        self.ask_in_order::<PoseCheck, _, _>(Operation::CheckPosesStream, requests)
+    }
+
+    async fn check_spheres(
+        &self,
+        request: Request<pb::CheckSpheresRequest>,
+    ) -> Result<Response<pb::CheckSpheresResponse>, Status> {
+        self.ask::<SphereCheck, _, _>(request).await
+    }
+
+    async fn check_spheres_stream(
+        &self,
+        requests: Request<Streaming<pb::CheckSpheresRequest>>,
+    ) -> Result<Response<Self::CheckSpheresStreamStream>, Status> {
+        self.ask_in_order::<SphereCheck, _, _>(Operation::CheckSpheresStream, requests)
+    }
+
+    async fn check_motions(
+        &self,
+        request: Request<pb::CheckMotionsRequest>,
+    ) -> Result<Response<pb::CheckMotionsResponse>, Status> {
+        self.ask::<MotionCheck, _, _>(request).await
+    }
+
+    async fn check_motions_stream(
+        &self,
+        requests: Request<Streaming<pb::CheckMotionsRequest>>,
+    ) -> Result<Response<Self::CheckMotionsStreamStream>, Status> {
+        self.ask_in_order::<MotionCheck, _, _>(Operation::CheckMotionsStream, requests)
+    }
+
+    async fn cast_rays(
+        &self,
+        request: Request<pb::CastRaysRequest>,
+    ) -> Result<Response<pb::CastRaysResponse>, Status> {
+        self.ask::<RayQuestion, _, _>(request).await
+    }
+
+    async fn cast_rays_stream(
+        &self,
+        requests: Request<Streaming<pb::CastRaysRequest>>,
+    ) -> Result<Response<Self::CastRaysStreamStream>, Status> {
+        self.ask_in_order::<RayQuestion, _, _>(Operation::CastRaysStream, requests)
+    }
+
+    async fn find_nearest(
+        &self,
+        request: Request<pb::FindNearestRequest>,
+    ) -> Result<Response<pb::FindNearestResponse>, Status> {
+        self.ask::<NearestQuestion, _, _>(request).await
+    }
+
+    async fn find_nearest_stream(
+        &self,
+        requests: Request<Streaming<pb::FindNearestRequest>>,
+    ) -> Result<Response<Self::FindNearestStreamStream>, Status> {
+        self.ask_in_order::<NearestQuestion, _, _>(Operation::FindNearestStream, requests)
+    }
+
+    async fn project_grid(
+        &self,
+        request: Request<pb::ProjectGridRequest>,
+    ) -> Result<Response<pb::ProjectGridResponse>, Status> {
+        self.ask::<GridQuestion, _, _>(request).await
+    }
 }
 
 impl Message for pb::QueryPointsRequest {
-    fn map_mut(&mut self) -> &mut String {
-        &mut self.map
+    type Former = String;
+
+    fn complete(&mut self, former: &mut String) {
+        same_map(&mut self.map, former);
     }
 }

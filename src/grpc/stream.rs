@@ -57,8 +57,16 @@ impl<T> Stream for Answers<T> {
 
 /// A request of a stream.
 pub(super) trait Message: prost::Message + 'static {
-    /// The map's name: where it is empty, the former request's map is meant.
-    fn map_mut(&mut self) -> &mut String;
+    /// What later requests may leave out.
+    type Former: Default + Send + 'static;
+
+    /// Takes what it leaves out from the requests before it, and gives what it says to those that follow.
+    fn complete(&mut self, former: &mut Self::Former);
+}
+
+/// The map that a request names; where the name is empty, that of the request before.
+pub(super) fn same_map(map: &mut String, former: &mut String) {
+    if map.is_empty() { map.clone_from(former) } else { former.clone_from(map) }
 }
 
 impl Adapter {
@@ -85,8 +93,8 @@ impl Adapter {
         let (arrival, asking) = (InboundBody::of(extensions)?.clone(), RateLimitKey::of(extensions));
         let (admission, recorder) = (self.admission.clone(), self.recorder.clone());
         let authorized = Authorized::of(extensions)?.clone();
-        let map = String::new();
-        let worker = Worker { admission, recorder, asking, authorized, operation, failed, handle, map };
+        let former = M::Former::default();
+        let worker = Worker { admission, recorder, asking, authorized, operation, failed, handle, former };
         let compressed = extensions.get().copied().unwrap_or(Compressed(true));
         let reader = Reader {
             requests: requests.into_inner(),
@@ -150,7 +158,7 @@ impl<M: Message> Reader<M> {
     }
 }
 
-struct Worker<A, H> {
+struct Worker<A, H, P> {
     admission: Admission,
     recorder: RequestRecorder,
     asking: RateLimitKey,
@@ -158,14 +166,14 @@ struct Worker<A, H> {
     operation: Operation,
     failed: Option<fn(pb::Failure) -> A>,
     handle: H,
-    /// The last request's.
-    map: String,
+    /// What the requests before said.
+    former: P,
 }
 
-impl<A: prost::Message, H> Worker<A, H> {
+impl<A: prost::Message, H, P> Worker<A, H, P> {
     async fn run<M, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Made<A>>)
     where
-        M: Message,
+        M: Message<Former = P>,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
@@ -189,7 +197,7 @@ impl<A: prost::Message, H> Worker<A, H> {
     /// Answers one request, timed and counted as a request of its own.
     async fn answer<M, F>(&mut self, request: Read<M>) -> Made<A>
     where
-        M: Message,
+        M: Message<Former = P>,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
@@ -215,7 +223,7 @@ impl<A: prost::Message, H> Worker<A, H> {
     /// The answer, with room for it.
     async fn kept<M, F>(&mut self, request: M) -> Result<(A, Option<MemoryPermit>), ServiceError>
     where
-        M: Message,
+        M: Message<Former = P>,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
@@ -226,14 +234,11 @@ impl<A: prost::Message, H> Worker<A, H> {
 
     async fn handled<M, F>(&mut self, mut request: M) -> Result<A, ServiceError>
     where
-        M: Message,
+        M: Message<Former = P>,
         H: Fn(MapService, M) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
-        match request.map_mut() {
-            map if map.is_empty() => map.clone_from(&self.map),
-            map => self.map.clone_from(map),
-        }
+        request.complete(&mut self.former);
         self.admission.check_rate(&self.asking)?;
         let handled = (self.handle)(self.authorized.service.clone(), request);
         self.admission.lifecycle().admit(handled).await?

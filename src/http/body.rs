@@ -62,6 +62,27 @@ where
     }
 }
 
+/// A body that holds all of a request: JSON, or bytes.
+pub(super) enum Sent<T> {
+    Json(T),
+    Octets(Bytes),
+}
+
+/// Reads a body of either form; parameters beside it would go unheard.
+pub(super) async fn json_or_octets<T: DeserializeOwned + Send + 'static>(
+    request: Request,
+    adapter: &Adapter,
+) -> Result<Sent<T>, HttpError> {
+    match content_type(request.headers()).as_str() {
+        JSON => parse_all(request, adapter).await.map(Sent::Json),
+        OCTET_STREAM => {
+            no_query(&request, OCTET_STREAM)?;
+            read(request, adapter).await.map(Sent::Octets)
+        }
+        other => Err(unsupported(other, "application/json or application/octet-stream")),
+    }
+}
+
 /// The points that a body of bytes is.
 pub(super) fn points_of(body: Bytes) -> Result<PointCloud, ServiceError> {
     PointCloud::from_bytes(body).in_field("body")
@@ -94,11 +115,7 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
     request: Request,
     adapter: &Adapter,
 ) -> Result<T, HttpError> {
-    if let Some(query) = request.uri().query().filter(|query| !query.is_empty()) {
-        let message =
-            format!("with {JSON} the body holds everything, got the query {:?} too", excerpt(query));
-        return Err(ServiceError::new(Reason::UnexpectedQuery, message).into());
-    }
+    no_query(&request, JSON)?;
     let arrival = InboundBody::of(request.extensions())?.clone();
     let body = read(request, adapter).await?;
     arrival.at_least(body.len() * JSON_AND_PARSED)?;
@@ -115,7 +132,14 @@ async fn parse_all<T: DeserializeOwned + Send + 'static>(
     })
 }
 
-fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
+fn no_query(request: &Request, content_type: &str) -> Result<(), HttpError> {
+    let Some(query) = request.uri().query().filter(|query| !query.is_empty()) else { return Ok(()) };
+    let message =
+        format!("with {content_type} the body holds everything, got the query {:?} too", excerpt(query));
+    Err(ServiceError::new(Reason::UnexpectedQuery, message).into())
+}
+
+pub(super) fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
     let not_json = |error| ServiceError::new(Reason::BadJson, unreadable::body::<T>(body, &error));
     let Object(parsed) = serde_json::from_slice(body).map_err(not_json)?;
     Ok(parsed)

@@ -18,6 +18,7 @@ mod occupancy;
 mod params;
 mod pieces;
 mod probes;
+mod question;
 mod routes;
 mod scans;
 mod scrapes;

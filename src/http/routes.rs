@@ -5,8 +5,8 @@ use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
-    Adapter, block, deletions, keep_outs, localization, map_file, maps, observers, occupancy, probes, scans,
-    trajectory, undo, voxels, watch,
+    Adapter, block, deletions, keep_outs, localization, map_file, maps, observers, occupancy, probes,
+    question, scans, trajectory, undo, voxels, watch,
 };
 use crate::access::Operation;
 
@@ -35,6 +35,12 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::AlignScan => on(method, scans::align),
         Operation::Localize => on(method, localization::localize),
         Operation::QueryPoints => on(method, occupancy::query),
+        Operation::CheckPoses => on(method, question::check_poses),
+        Operation::CheckSpheres => on(method, question::check_spheres),
+        Operation::CheckMotions => on(method, question::check_motions),
+        Operation::CastRays => on(method, question::cast_rays),
+        Operation::FindNearest => on(method, question::find_nearest),
+        Operation::ProjectGrid => on(method, question::project_grid),
         Operation::DeleteVoxels => on(method, deletions::delete),
         Operation::Undo => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),
@@ -51,6 +57,11 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::Ready => on(method, probes::ready),
         Operation::Metrics => on(method, probes::metrics),
         Operation::QueryPointsStream
+        | Operation::CheckPosesStream
+        | Operation::CheckSpheresStream
+        | Operation::CheckMotionsStream
+        | Operation::CastRaysStream
+        | Operation::FindNearestStream
         | Operation::InsertScanStream
         | Operation::StreamTrajectory
         | Operation::Reflect

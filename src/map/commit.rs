@@ -8,6 +8,7 @@
 use std::sync::Arc;
 
 use super::block_change::{BlockChange, block_changes};
+use super::followers::TouchedBlocks;
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::shard::Shard;
 use super::sharding::SHARDS;
@@ -26,12 +27,15 @@ pub struct Committer<'a> {
     map: &'a MultiResolutionMap,
     /// The levels of which it is noted what the change does.
     noted: LevelSet,
+    /// True where a follower wants to know which blocks change.
+    followed: bool,
     _turn: MutexGuard<'a, ()>,
 }
 
 impl<'a> Committer<'a> {
     pub(super) fn begin(map: &'a MultiResolutionMap) -> Self {
-        Self { map, noted: LevelSet::default(), _turn: map.commit_queue.lock() }
+        let turn = map.commit_queue.lock();
+        Self { map, noted: LevelSet::default(), followed: map.followers.want_blocks(), _turn: turn }
     }
 
     /// The map, which nobody else changes meanwhile.
@@ -215,7 +219,8 @@ impl<'a> Committer<'a> {
         let by_shard = self.group(removed, added);
         let mut is_planned = by_shard.each_ref().map(|changes| !changes.is_empty());
         shards.into_iter().for_each(|i| is_planned[i] = true);
-        let wanted = Wanted { levels: self.noted, moments: self.map.moments.is_some() };
+        let wanted =
+            Wanted { levels: self.noted, moments: self.map.moments.is_some(), blocks: self.followed };
         let plan = |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], wanted, stop));
         let shards: Vec<_> = (0..SHARDS).filter(|&i| is_planned[i]).map(plan).collect();
         let total = |of: fn(&ShardUpdate) -> Moved| {
@@ -252,13 +257,15 @@ impl<'a> Committer<'a> {
         let lost = update.shards.iter().map(|(i, update)| (*i, &update.moments));
         let Gained { added, known } = &gained;
         let moments = self.map.moments.as_ref().map(|kept| kept.change(lost, added, known, stop));
-        let mut emptied = Vec::new();
+        let (mut emptied, mut touched) = (Vec::new(), TouchedBlocks::default());
         let lock = |(i, update): (usize, ShardUpdate)| {
             let mut shard = self.map.shards[i].write();
+            touched.extend(&update.touched);
             emptied.extend(update.apply(&mut shard, &self.map.settings));
             shard
         };
         let shards = update.shards.into_iter().map(lock).collect();
+        self.tell(touched);
         let locks = Locks {
             _shards: shards,
             _moments: moments.unwrap_or_default(),
@@ -266,6 +273,12 @@ impl<'a> Committer<'a> {
             _emptied: emptied,
         };
         (!stop.is_stopped()).then_some(locks)
+    }
+
+    /// Tells the followers which blocks changed, and those who came while it was planned that they do not know.
+    fn tell(&self, touched: TouchedBlocks) {
+        let touched = if self.followed { touched } else { TouchedBlocks::everything() };
+        self.map.followers.tell(&touched);
     }
 }
 

@@ -8,6 +8,7 @@ mod block_change;
 mod bounds;
 mod bulk;
 mod capacity_schedule;
+mod cell_bounds;
 mod cell_box;
 mod change;
 pub mod commit;
@@ -16,10 +17,12 @@ mod content_hash;
 mod contents;
 mod distance_block;
 mod filter_room;
+mod followers;
 mod frustum;
 mod idempotency_log;
 mod info;
 mod keep_out;
+mod level_block;
 mod level_blocks;
 mod level_changes;
 mod level_moves;
@@ -35,12 +38,14 @@ mod settings;
 mod shard;
 mod shard_level;
 mod sharding;
+mod tier_view;
 mod trajectory;
 mod update;
 pub mod view;
 mod voxel_ownership;
 mod voxel_selection;
 
+pub(crate) use cell_bounds::CellBounds;
 pub use cell_box::CellBox;
 pub use change::{Change, DeletionRecord, KeepOutRecord, Request, UndoRecord};
 pub use commit::Committer;
@@ -48,6 +53,7 @@ pub use committed::Committed;
 pub use content_hash::{ContentHash, ContentVersion};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
 pub use distance_block::{DISTANCE_CAP_MAX, DistanceBlock, margin_of};
+pub use followers::{BlockFollower, TouchedBlocks};
 pub use frustum::{Frustum, FrustumError};
 pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
@@ -68,6 +74,7 @@ pub use occupied_voxel_list::OccupiedVoxelList;
 pub use region::{OrientedBox, REGION_M_MAX, Region, RegionError};
 pub use settings::{LEVELS_DEFAULT, MapSettings, MapSettingsError};
 pub use sharding::SHARDS;
+pub(crate) use tier_view::TierView;
 pub use trajectory::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
     ScanRecord, Trajectory, TrajectorySpacing, WithdrawnChange,
@@ -81,6 +88,7 @@ use std::sync::Arc;
 use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
 use crate::voxel::{Cell, Lattice, MOMENT_LEVEL, Moments, VoxelKey};
+use followers::Followers;
 use moments::ShardedMoments;
 use published::Published;
 use shard::Shard;
@@ -105,6 +113,7 @@ pub struct MultiResolutionMap {
     requests: RwLock<IdempotencyLog>,
     keep_outs: RwLock<Arc<KeepOuts>>,
     published: Published,
+    followers: Followers,
     commit_queue: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
     long_reads: RwLock<()>,
@@ -127,6 +136,7 @@ impl MultiResolutionMap {
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
             keep_outs: RwLock::new(Rank::KeepOuts, Arc::default()),
             published: Published::default(),
+            followers: Followers::default(),
             commit_queue: Mutex::new(Rank::Commit, ()),
             long_reads: RwLock::new(Rank::LongRead, ()),
         })
@@ -238,6 +248,11 @@ impl MultiResolutionMap {
         let shard = self.shards[self.sharding.shard_of(voxel.index(), MOMENT_LEVEL)].read();
         let word = shard.level(0).blocks().get(block).0[cell.word()];
         (word != 0).then(|| Moments::of_descendants(word))
+    }
+
+    /// Follows which blocks change from now on, for what is derived of the voxels. Changes cost a little more meanwhile.
+    pub fn follow_blocks(&self) -> BlockFollower {
+        self.followers.add()
     }
 
     /// Waits for the turn to change the map.

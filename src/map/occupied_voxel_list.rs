@@ -34,6 +34,11 @@ impl<'a> OccupiedVoxelList<'a> {
         self.level
     }
 
+    /// How many levels the list's voxels lie above the cells of its blocks: 0, 1 or 2.
+    pub(crate) fn levels_up(&self) -> u32 {
+        tier_of(self.level).1
+    }
+
     /// True when `voxel` of this level is occupied: the filter, then the set for what it lets through.
     pub fn contains(&self, voxel: VoxelKey) -> bool {
         self.filter().is_none_or(|filter| filter.contains(voxel.to_bits())) && self.set_contains(voxel)

@@ -2,6 +2,7 @@
 
 use super::block_change::{BlockChange, block_changes};
 use super::bulk::find_each;
+use super::followers::TouchedBlocks;
 use super::level_changes::{KeysOfLevel, LevelSet};
 use super::level_moves::LevelMoves;
 use super::level_update::LevelUpdate;
@@ -25,6 +26,8 @@ pub(super) struct ShardUpdate {
     pub(super) moments: MomentsLost,
     /// The keys that go and come of the levels that somebody watches.
     pub(super) noted: Vec<KeysOfLevel>,
+    /// The blocks that change, where a follower wants to know them.
+    pub(super) touched: TouchedBlocks,
     outcome: Outcome,
 }
 
@@ -51,6 +54,8 @@ pub(super) struct Wanted {
     pub(super) levels: LevelSet,
     /// What becomes of the moments.
     pub(super) moments: bool,
+    /// The blocks that change, where somebody follows them.
+    pub(super) blocks: bool,
 }
 
 impl Moved {
@@ -78,7 +83,8 @@ impl ShardUpdate {
         if let Some(removed) = removes_everything(shard, changes) {
             let (moments, outcome) = (MomentsLost::Everything, Outcome::Nothing);
             let noted = wanted.levels.iter().map(|level| all_keys(shard, level)).collect();
-            return Self { removed, added: Moved::default(), moments, noted, outcome };
+            let touched = TouchedBlocks::everything();
+            return Self { removed, added: Moved::default(), moments, noted, touched, outcome };
         }
         let (mut tiers, mut levels) = (Vec::new(), Vec::new());
         let mut finest = Tier::of(shard, 0, changes, wanted, stop);
@@ -86,15 +92,18 @@ impl ShardUpdate {
         let (lost, gained) = finest.levels[0].keys();
         let (removed, added) = (Moved::of_keys(lost), Moved::of_keys(gained));
         let mut noted = finest.keys_of(wanted.levels);
+        let mut touched = TouchedBlocks::default();
+        touched.tiers.push(std::mem::take(&mut finest.touched));
         let (mut emptied, mut created) = finest.plan(&mut tiers, &mut levels, stop);
         for tier in 1..shard.tiers.len() {
             let (removed, added) = (VoxelSet::from_iter(emptied), VoxelSet::from_iter(created));
             let changes: Vec<_> = block_changes(&removed, &added).collect();
-            let tier = Tier::of(shard, tier, &changes, wanted, stop);
+            let mut tier = Tier::of(shard, tier, &changes, wanted, stop);
+            touched.tiers.push(std::mem::take(&mut tier.touched));
             noted.extend(tier.keys_of(wanted.levels));
             (emptied, created) = tier.plan(&mut tiers, &mut levels, stop);
         }
-        Self { removed, added, moments, noted, outcome: Outcome::Voxels { tiers, levels } }
+        Self { removed, added, moments, noted, touched, outcome: Outcome::Voxels { tiers, levels } }
     }
 
     /// Does it, but for the moments. What the shard held and holds no more is for the caller to drop, once nobody
@@ -148,6 +157,9 @@ struct Tier<'a> {
     keeps_moments: bool,
     /// The blocks that change, as they are afterwards.
     blocks: Vec<(VoxelKey, BlockMask)>,
+    /// The same blocks with the voxels that change, where somebody follows them.
+    touched: Vec<(VoxelKey, BlockMask)>,
+    followed: bool,
     /// The blocks that lose their last voxel, and those that get their first.
     emptied: Vec<VoxelKey>,
     created: Vec<VoxelKey>,
@@ -174,6 +186,8 @@ impl<'a> Tier<'a> {
             tier,
             keeps_moments: wanted.moments && tier == 0,
             blocks: Vec::with_capacity(changes.len()),
+            touched: Vec::new(),
+            followed: wanted.blocks,
             emptied: Vec::new(),
             created: Vec::new(),
             levels: levels.map(|level| LevelMoves::none(level, keeps_keys(level))).collect(),
@@ -203,6 +217,9 @@ impl<'a> Tier<'a> {
             self.emptied.push(block);
         }
         self.blocks.push((block, after));
+        if self.followed {
+            self.touched.push((block, before.symmetric_difference(&after)));
+        }
         self.levels.iter_mut().for_each(|level| level.note(block, before, &after, loses));
     }
 

@@ -6,6 +6,7 @@ use super::lookup::{self, LevelView, Lookup};
 use super::occupied_voxel_list::tier_of;
 use super::shard::Shard;
 use super::sharding::{SHARDS, ShardsTouched};
+use super::tier_view::TierView;
 use super::{
     ContentVersion, KeepOuts, MomentsView, MultiResolutionMap, OccupiedVoxelList, Region, VoxelSelection,
 };
@@ -13,8 +14,8 @@ use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
 use crate::voxel::{
-    BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, LatticeFromPoints,
-    VoxelKey, VoxelSet,
+    BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice,
+    LatticeFromPoints, VoxelKey, VoxelSet,
 };
 
 /// Read locks on some or all shards of a map. While it lives, what it covers does not change.
@@ -86,6 +87,11 @@ impl<'a> MapView<'a> {
         self.keep_outs.as_ref()
     }
 
+    /// The lattices of the map's levels.
+    pub fn lattice(&self) -> &Lattice {
+        &self.map.lattice
+    }
+
     /// The revision that everything read through this view belongs to.
     pub fn revision(&self) -> u64 {
         self.version.revision
@@ -127,12 +133,33 @@ impl<'a> MapView<'a> {
         self.shards.iter().flatten().map(|shard| &**shard)
     }
 
+    /// The shards, of those that the view covers, that the voxel at `index` of `level`, however coarse, lies in.
+    pub(super) fn shards_of(&self, index: [i32; 3], level: u32) -> impl Iterator<Item = &Shard> {
+        let one = self.map.sharding.shard_of_node(index, level);
+        let range = one.map_or(0..SHARDS, |one| one..one + 1);
+        self.shards[range].iter().flatten().map(|shard| &**shard)
+    }
+
+    /// The map that is read.
+    pub fn map(&self) -> &'a MultiResolutionMap {
+        self.map
+    }
+
     /// What the look-up kernels read of `level`.
     pub(crate) fn level_view(&self, level: u32) -> LevelView<'_> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
         let (_, up) = tier_of(level);
         let hashes = self.map.settings.filter.map(|filter| filter.hashes);
         LevelView::new(level, up, self.map.sharding.shift_at(level), hashes, list)
+    }
+
+    /// The clusters that serve `level`; where the view does not cover a shard they are absent.
+    pub(crate) fn tier_view(&self, level: u32) -> TierView<'_> {
+        let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
+        let (_, up) = tier_of(level);
+        let (region_shift, cell_m) =
+            (self.map.sharding.shift_at(level - up), self.map.lattice.resolution_m(level - up));
+        TierView::new(level, region_shift, cell_m, list)
     }
 
     /// The lists of `level`, one a shard that the view covers.
@@ -266,7 +293,7 @@ impl<'a> MapView<'a> {
     ///
     /// Walks the blocks that the selection's bounds meet, or all that are stored where those are fewer; some of them once
     /// stopped.
-    pub(super) fn for_each_block(
+    pub(crate) fn for_each_block(
         &self,
         list: &OccupiedVoxelList<'_>,
         selection: &VoxelSelection,

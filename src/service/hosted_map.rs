@@ -1,8 +1,8 @@
 //! A map under a name: what the service keeps about it besides the map itself.
 
 use std::collections::HashMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use tokio::sync::{OwnedMutexGuard, watch};
@@ -20,6 +20,7 @@ use super::{
 use crate::geometry::{Point, Pose};
 use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, RobotName};
 use crate::mapping::{LostRobots, Sightings};
+use crate::planning::Planner;
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
 use crate::sync::{Mutex, Rank};
 use crate::util::StopSignal;
@@ -51,6 +52,8 @@ pub(super) struct HostedMap {
     pub(super) full_states: FullStates,
     /// One robot's scans are taken in order.
     turns: Mutex<HashMap<RobotName, Arc<tokio::sync::Mutex<()>>>>,
+    /// What makes checks of bodies fast, once somebody asked for one.
+    pub(super) planner: OnceLock<Planner>,
     /// Where and when robots were last seen.
     pub(super) sightings: Sightings,
     /// Robots whose scans are refused, and that want to be looked for.
@@ -114,6 +117,7 @@ impl HostedMap {
             recent,
             full_states: FullStates::default(),
             turns: Mutex::new(Rank::Brief, HashMap::new()),
+            planner: OnceLock::new(),
             sightings: Sightings::default(),
             lost: LostRobots::default(),
             undo_turn: Arc::default(),

@@ -150,7 +150,8 @@ mod tests {
         let folder = data.path().join("data");
         // Each record begins a segment, whose folder is not there any more then.
         let store = StoreSettings { segment_bytes_max: 1, ..StoreSettings::default() };
-        let settings = ServiceSettings { data_dir: Some(folder.clone()), store, ..ServiceSettings::default() };
+        let settings =
+            ServiceSettings { data_dir: Some(folder.clone()), store, ..ServiceSettings::default() };
         let (service, map) = service_with(settings, &[NEVER_YET, NEVER_YET]).await;
         std::fs::rename(folder.join("maps"), data.path().join("away")).unwrap();
         assert_eq!(service.expire_keep_outs(i64::MAX).await, 0);

@@ -66,7 +66,7 @@ pub struct Limits {
     pub watch_heartbeat_s: f64,
     /// How long a watch's client may take no message, until the watch ends. 30 s.
     pub watch_unread_max_s: f64,
-    /// Points of one query, deletion or scan. 2,000,000.
+    /// Points of one query, deletion or scan, or rays of one question. 2,000,000.
     pub points_per_request_max: usize,
     /// How far the time of a scan's point may lie from the scan's timestamp. 2 s.
     pub point_times_max_s: f64,
@@ -78,6 +78,14 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
+    /// Spheres and points of a body that is checked. 16,384.
+    pub body_parts_max: usize,
+    /// Regions in which a check ignores voxels. 64.
+    pub ignored_regions_max: usize,
+    /// How long a question of a planner may take, while changes of the map wait for it. 1 s.
+    pub question_time_max_s: f64,
+    /// Cells of one 2-D grid. 4,000,000.
+    pub grid_cells_max: usize,
     /// Bytes of a block that is given out: one a cell of a dense one, 72 for 8 x 8 x 8 voxels of another. 16 MiB.
     pub block_bytes_max: usize,
     /// Cells of a dense block and as far around it as its distances go. 67,108,864.
@@ -163,6 +171,10 @@ impl Default for Limits {
             maps_max: 64,
             voxels_per_map_max: 200_000_000,
             listed_voxels_max: 20_000_000,
+            body_parts_max: 16_384,
+            ignored_regions_max: 64,
+            question_time_max_s: 1.0,
+            grid_cells_max: 4_000_000,
             block_bytes_max: 16 << 20,
             block_cells_max: 64 << 20,
             observers_max: 100,
@@ -225,6 +237,12 @@ impl Limits {
     /// When a request has no point, or more than `points_per_request_max`.
     pub(super) fn check_points(&self, points: usize) -> Result<(), ServiceError> {
         within("points", "points_per_request_max", points, self.points_per_request_max)
+    }
+
+    /// # Errors
+    /// When a request has no element of `field`, such as rays, or more than `points_per_request_max`.
+    pub(super) fn check_elements(&self, field: &str, elements: usize) -> Result<(), ServiceError> {
+        within(field, "points_per_request_max", elements, self.points_per_request_max)
     }
 
     /// # Errors

@@ -31,6 +31,7 @@ mod observer;
 mod observers;
 mod point_query;
 mod pool;
+mod question;
 mod reason;
 mod recent_changes;
 mod recovery;
@@ -56,6 +57,10 @@ pub use localization::{
 };
 pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
+pub use question::{
+    Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck,
+    Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck,
+};
 pub use reason::{Reason, ToldBy};
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,

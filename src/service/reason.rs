@@ -67,11 +67,14 @@ reasons! {
         AmbiguousGuess "ambiguous_guess" Http: "several of `guess`, `motion` and `constant_velocity` are given", "give one";
         AmbiguousPoints "ambiguous_points" Grpc: "both `xyz_f32le` and `xyz` are filled", "fill one";
         AmbiguousTarget "ambiguous_target" Http: "not exactly one target of a deletion or undo, shape of a keep-out, or voxel of a list of observers", "give one";
+        BadArray "bad_array" Both: "an array of bytes is not as long as what it is an array of", "send as many bytes as the message says";
         BadBlocks "bad_blocks" Client: "the server's answer has blocks of voxels that are none", "update the client";
         BadCap "bad_cap" Both: "`cap_m` of a dense block is not more than 0", "send meters";
+        BadCheck "bad_check" Both: "a body, configuration, sphere, motion, step or clearance is none, or out of range", "the message names which";
         BadCovariance "bad_covariance" Both: "the guess's covariance is not 36 finite numbers of a symmetric, positive semidefinite matrix", "send it row by row: x y z in meters, then turns about the map's axes in radians";
         BadDirection "bad_direction" Client: "the server's answer has a direction that is none", "update the client";
         BadFilter "bad_filter" Both: "range limits or body box are not numbers in order", "correct them";
+        BadGrid "bad_grid" Both: "a grid's rectangle or band is in the wrong order or not finite, or a cell is no whole number of voxels", "correct it";
         BadGuess "bad_guess" Grpc: "`constant_velocity` is false", "leave the guess out";
         BadGravity "bad_gravity" Both: "a scan's `gravity_in_sensor` is zero or not finite", "send the direction in which things fall, in the sensor frame; an accelerometer at rest reads the opposite";
         BadExpiry "bad_expiry" Both: "the `expires_at_ns` of a keep-out lies in the past", "send nanoseconds since 1970, in the future";
@@ -88,6 +91,8 @@ reasons! {
         BadNumbers "bad_numbers" Http: "a parameter is not so many numbers with commas", "correct it";
         BadPose "bad_pose" Both: "not finite, or the quaternion is no unit quaternion", "normalize it";
         BadQuery "bad_query" Both: "unknown or malformed parameter; in a localization, a gravity or box that is none", "correct it";
+        BadRadius "bad_radius" Both: "a search's radius is not above 0, or more than 64 voxels of the level", "take a coarser level for a larger radius";
+        BadRay "bad_ray" Both: "a ray's origin is not in the map's range, its direction no unit vector, its end where it begins, or its range not above 0", "the message names which ray";
         BadRegion "bad_region" Both: "corners in the wrong order, a negative radius, not finite, or too far", "correct it";
         BadSettings "bad_settings" Both: "resolution, levels or filter of a map out of range", "the message names the range";
         BadTimeLimit "bad_time_limit" Both: "`time_limit_s` is negative or no number", "correct it";
@@ -156,6 +161,7 @@ reasons! {
     ResourceExhausted {
         BlockTooLarge "block_too_large" Both: "a block exceeds `block_bytes_max`, or with what lies around it `block_cells_max`", "ask for a smaller part, a coarser level or a smaller `cap_m`";
         DiskFull "disk_full" Both 507: "little room on the disk of the data folder; changes are refused until there is more", "make room, or delete a map";
+        GridTooLarge "grid_too_large" Both: "a grid of more than `grid_cells_max` cells, or of more than a message holds", "ask for a smaller area or larger cells";
         ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`, with those that keep-outs take where they are asked for", "ask for a region or a coarser level";
         MapFileTooLarge "map_file_too_large" Both: "a map's file, or one that is to be restored, exceeds `map_file_bytes_max`", "raise the limit, here and where the file is to be restored";
         MapFull "map_full" Both: "the map would exceed `voxels_per_map_max`; a restored file also `map_file_scans_max` or `robots_per_map_max`", "make the map coarser, or raise the limit";

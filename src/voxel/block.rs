@@ -45,6 +45,13 @@ impl Cell {
         block.first_within(BLOCK_LEVELS).offset_by(OFFSETS[usize::from(self.0)])
     }
 
+    /// How many cells of the block lie before this one along each axis.
+    #[inline(always)]
+    pub(crate) fn index(self) -> [usize; 3] {
+        let [x, y, z] = VoxelKey::default().offset_by(OFFSETS[usize::from(self.0)]).index();
+        [x as usize, y as usize, z as usize]
+    }
+
     /// Which word of the mask holds this cell.
     #[inline(always)]
     pub(crate) fn word(self) -> usize {
@@ -129,6 +136,16 @@ impl BlockMask {
         self.0[cell.word()] & Self::within(cell, level) != 0
     }
 
+    /// How large the empty aligned cube around `cell` is: the levels (0, 1 or 2) from a cell up to it. None where the
+    /// ancestor of `cell`, `level` (0, 1 or 2) levels up, is occupied.
+    #[inline(always)]
+    pub(super) fn empty_levels(&self, cell: Cell, level: u32) -> Option<u32> {
+        let word = self.0[cell.word()];
+        let is_empty = |level: u32| word & Self::within(cell, level) == 0;
+        // What is empty is so at each level below, so that a sum says up to which: no branch to guess.
+        is_empty(level).then(|| u32::from(is_empty(1)) + u32::from(is_empty(2)))
+    }
+
     /// The bits of `cell`'s word that share its ancestor `level` levels up.
     #[inline(always)]
     fn within(cell: Cell, level: u32) -> u64 {
@@ -167,6 +184,33 @@ impl BlockMask {
                 rest &= rest - 1;
                 Some(Cell(((w as u16) << 6 | bit as u16) << (3 * level)))
             })
+        })
+    }
+
+    /// The occupied voxels at `level` (0, 1 or 2) that one word of the mask holds, each as the first cell it covers,
+    /// ascending.
+    #[inline(always)]
+    pub(crate) fn cells_of_word(&self, word: usize, level: u32) -> impl Iterator<Item = Cell> + use<> {
+        let mut rest = match level {
+            0 => self.0[word],
+            1 => occupied_bytes(self.0[word]),
+            _ => u64::from(self.0[word] != 0),
+        };
+        std::iter::from_fn(move || {
+            let bit = (rest != 0).then(|| rest.trailing_zeros() << (3 * level))?;
+            rest &= rest - 1;
+            Some(Cell((word as u16) << 6 | bit as u16))
+        })
+    }
+
+    /// The finest voxels within the ancestor of `cell` two levels up, ascending.
+    #[inline]
+    pub(crate) fn part(&self, cell: Cell) -> impl Iterator<Item = Cell> + use<> {
+        let (first, mut rest) = (cell.0 & !63, self.0[cell.word()]);
+        std::iter::from_fn(move || {
+            let bit = (rest != 0).then(|| rest.trailing_zeros())?;
+            rest &= rest - 1;
+            Some(Cell(first | bit as u16))
         })
     }
 
@@ -216,6 +260,12 @@ impl BlockMask {
     #[inline]
     pub fn intersection(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|w| self.0[w] & other.0[w]))
+    }
+
+    /// The voxels in one of the two and not in the other.
+    #[inline]
+    pub fn symmetric_difference(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|w| self.0[w] ^ other.0[w]))
     }
 
     /// The voxels of this that are not in `other`.

@@ -1,11 +1,13 @@
 //! Clusters of 4 x 4 x 4 blocks: which of them are there in one word, their masks packed behind it.
 
 use super::key::AXIS_BITS;
-use super::{BlockMask, VoxelKey};
+use super::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey};
 use crate::util::bits::for_each_bit;
 
 /// Levels from a block up to its cluster.
 pub(crate) const CLUSTER_LEVELS: u32 = 2;
+/// Voxels along a cluster's side.
+pub(crate) const CLUSTER_SIDE: i32 = BLOCK_SIDE << CLUSTER_LEVELS;
 /// The bits of a block's index that say where in its cluster it is.
 const PLACE_MASK: u64 = (1 << CLUSTER_LEVELS) - 1;
 
@@ -31,6 +33,25 @@ impl BlockInCluster {
     pub(crate) fn of(block: VoxelKey) -> (VoxelKey, Self) {
         let axis = |axis: u32| (block.to_bits() >> (axis * AXIS_BITS) & PLACE_MASK) as u32;
         (block.ancestor(CLUSTER_LEVELS), Self(axis(0) | axis(1) << 2 | axis(2) << 4))
+    }
+
+    /// The place in its cluster of the block that holds the voxel at `index`.
+    #[inline(always)]
+    pub(crate) fn of_voxel(index: [i32; 3]) -> Self {
+        let axis = |axis: usize| (index[axis] >> BLOCK_LEVELS) as u32 & PLACE_MASK as u32;
+        Self(axis(0) | axis(1) << 2 | axis(2) << 4)
+    }
+
+    /// The place of the number in the low six bits of `n`.
+    #[inline(always)]
+    pub(crate) fn from_number(n: u32) -> Self {
+        Self(n & 63)
+    }
+
+    /// How many blocks of the cluster lie before this one along each axis.
+    #[inline(always)]
+    pub(crate) fn index(self) -> [usize; 3] {
+        [0, 2, 4].map(|shift| (self.0 >> shift & 3) as usize)
     }
 
     /// The block here in `cluster`: the inverse of [`BlockInCluster::of`].
@@ -97,6 +118,21 @@ impl Cluster {
         }
     }
 
+    /// How large the empty aligned cube around `cell` of the block at `place` is: the levels, 0 to 5, from a cell up to it,
+    /// which then is a block at 3 and the cluster at 5. None where the ancestor of `cell`, `level` (0, 1 or 2) levels up, is
+    /// occupied.
+    #[inline(always)]
+    pub(crate) fn empty_levels(&self, place: BlockInCluster, cell: Cell, level: u32) -> Option<u32> {
+        let octant = Self::OCTANT << (place.0 & Self::OCTANT_FIRST);
+        let is_empty = |places: u64| u32::from(self.present & places == 0);
+        let of_blocks = is_empty(place.bit()) + is_empty(octant) + is_empty(u64::MAX);
+        Some(self.get(place).empty_levels(cell, level)? + of_blocks)
+    }
+
+    /// The first octant of a cluster, 2 x 2 x 2 blocks of it; and the bits of a place that say in which octant it is.
+    const OCTANT: u64 = 0x0033_0033;
+    const OCTANT_FIRST: u32 = 0b10_1010;
+
     /// Gives the block at `place`, which is there, other voxels.
     ///
     /// # Panics
@@ -135,7 +171,6 @@ impl Default for Cluster {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::Cell;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
@@ -146,6 +181,33 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_empty_cube_around_a_cell_is_the_largest_without_an_occupied_cell(
+            present in prop_oneof![any::<u64>(), any::<[u64; 4]>().prop_map(|[a, b, c, d]| a & b & c & d), Just(0)],
+            cells in prop::collection::vec(0u16..512, 1..4),
+            asked in prop::array::uniform3(0i32..32),
+            level in 0u32..3,
+        ) {
+            let mut cluster = Cluster::default().with_blocks(present);
+            let mut occupied = Vec::new();
+            for_each_bit(present, |place| {
+                let mut mask = BlockMask::EMPTY;
+                let block = BlockInCluster(place).block(VoxelKey::default());
+                for &cell in &cells {
+                    mask.insert(Cell::from_bits(cell));
+                    occupied.push(Cell::from_bits(cell).voxel(block).index());
+                }
+                cluster.set(BlockInCluster(place), mask);
+            });
+            let is_empty = |levels: u32| {
+                let cube = asked.map(|i| i >> levels);
+                occupied.iter().all(|cell| cell.map(|i| i >> levels) != cube)
+            };
+            let expected = (level..=5).take_while(|&levels| is_empty(levels)).last();
+            let found = cluster.empty_levels(BlockInCluster::of_voxel(asked), Cell::of(asked).1, level);
+            prop_assert_eq!(found, expected);
+        }
+
         #[test]
         fn a_block_is_its_cluster_and_place(index in prop::array::uniform3(-131_072i32..131_072)) {
             let block = VoxelKey::pack(index);

@@ -218,10 +218,7 @@ impl ClusterTable {
 
     /// All blocks, in no order.
     pub fn iter(&self) -> impl Iterator<Item = (VoxelKey, &BlockMask)> {
-        let keys = self.keys.iter().flat_map(|bucket| bucket.0);
-        keys.zip(&self.clusters)
-            .filter_map(|(key, cluster)| Some((VoxelKey::from_bits(key)?, cluster)))
-            .flat_map(|(key, cluster)| cluster.blocks(key))
+        self.slots().iter().flat_map(|(key, cluster)| cluster.blocks(key))
     }
 }
 

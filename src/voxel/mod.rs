@@ -17,7 +17,7 @@ mod set;
 mod slots;
 
 pub use block::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell};
-pub(crate) use cluster::{BlockInCluster, CLUSTER_LEVELS, CacheLine, Cluster};
+pub(crate) use cluster::{BlockInCluster, CLUSTER_LEVELS, CLUSTER_SIDE, CacheLine, Cluster};
 pub use cluster_table::ClusterTable;
 pub(crate) use cluster_update::ClusterUpdate;
 pub use key::{INDEX_MAX, INDEX_MIN, VoxelKey};

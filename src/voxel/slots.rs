@@ -63,6 +63,12 @@ impl<'a> Slots<'a> {
         bucket[BUCKET - 1] != VACANT
     }
 
+    /// The clusters with their keys, in no order.
+    pub(crate) fn iter(self) -> impl Iterator<Item = (VoxelKey, &'a Cluster)> {
+        let keys = self.keys.iter().flat_map(|bucket| bucket.0);
+        keys.zip(self.clusters).filter_map(|(key, cluster)| Some((VoxelKey::from_bits(key)?, cluster)))
+    }
+
     /// The slot of `key`.
     #[inline(always)]
     pub(crate) fn find(self, key: u64) -> Option<usize> {

@@ -4,6 +4,7 @@
 //! back, so that the daemon and the client share one definition. What cannot be converted is an error that
 //! names the field; everything else (limits, levels, numbers that are not finite) the service checks.
 
+mod array;
 mod block;
 mod deletion;
 mod failure;
@@ -17,6 +18,7 @@ mod maps;
 mod observers;
 mod occupancy;
 pub mod pb;
+mod question;
 mod scan;
 mod trajectory;
 pub mod transport;
@@ -24,6 +26,10 @@ mod types;
 mod undo;
 mod watch;
 
+#[cfg(all(test, feature = "server"))]
+pub(crate) use array::bitmap_of;
+#[cfg(feature = "server")]
+pub(crate) use array::bytes_of;
 pub use failure::status_code;
 pub(crate) use field::{InField, required};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};

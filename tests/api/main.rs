@@ -16,6 +16,7 @@ mod localize;
 mod memory_returns;
 mod observers;
 mod query_only;
+mod questions;
 #[cfg(feature = "lab")]
 mod recovery;
 mod regions;

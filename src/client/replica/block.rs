@@ -15,7 +15,7 @@ impl Replica {
     /// For a level that is none, a part that is not all in the region that is copied (of a dense block with what lies within
     /// its cap), a block beyond the limits, and a dense block that is no box of finite sides.
     pub fn get_block(&self, request: &BlockRequest) -> Result<BlockAnswer, ReplicaError> {
-        let Copied { map, map_uuid } = self.shared.copied.read().clone();
+        let Copied { map, map_uuid, .. } = self.shared.copied.read().clone();
         check_level(request.level, &map)?;
         self.check_cells(request.cells(map.lattice())?, map.lattice(), request.level)?;
         let limits = Limits::default();

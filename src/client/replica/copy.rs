@@ -1,6 +1,6 @@
 //! A copy of a map that is built of the messages of a watch.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use uuid::Uuid;
 
@@ -10,6 +10,7 @@ use crate::map::{
     Change, ContentHash, ContentVersion, KEEP_OUTS_MAX, KeepOutRecord, KeepOuts, MapContents, MapSettings,
     MultiResolutionMap,
 };
+use crate::planning::Planner;
 use crate::service::{Cause, ChangePart, StatePart, WatchEvent, WatchMessage};
 use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 
@@ -18,6 +19,8 @@ use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 pub(super) struct Copied {
     pub(super) map: Arc<MultiResolutionMap>,
     pub(super) map_uuid: Uuid,
+    /// What makes checks of bodies fast, once somebody asked for one.
+    pub(super) planner: Arc<OnceLock<Planner>>,
 }
 
 /// What a message did to the copy.
@@ -125,7 +128,7 @@ impl Builder {
         let contents = contents.checked().map_err(|e| damaged(e.to_string()))?;
         let map = MultiResolutionMap::restore(settings, contents);
         let map = Arc::new(map.map_err(|e| damaged(format!("the map's settings: {e}")))?);
-        let copied = Copied { map, map_uuid };
+        let copied = Copied { map, map_uuid, planner: Arc::default() };
         self.copied = Some(copied.clone());
         Ok(Applied::Replaced(copied))
     }

@@ -153,7 +153,7 @@ impl Shared {
         if let Applied::Replaced(copied) = applied {
             *self.copied.write() = copied;
         }
-        let Copied { map, map_uuid } = self.copied.read().clone();
+        let Copied { map, map_uuid, .. } = self.copied.read().clone();
         let version = map.content_version();
         self.tell(|status| {
             status.resets += u64::from(is_reset);

@@ -17,6 +17,7 @@
 mod block;
 mod copy;
 mod follow;
+mod question;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -177,7 +178,7 @@ impl Replica {
     /// For a point in no voxel or outside of the region that is copied, named by its place; a level that is none; another
     /// uuid than the map's; a `min_revision` that the copy has not.
     pub fn query_points(&self, query: &PointQuery) -> Result<PointAnswer, ReplicaError> {
-        let Copied { map, map_uuid } = self.shared.copied.read().clone();
+        let Copied { map, map_uuid, .. } = self.shared.copied.read().clone();
         check_level(query.level, &map)?;
         if query.map_uuid.is_some_and(|uuid| uuid != map_uuid) {
             let message = format!("map_uuid is {map_uuid}: the map was deleted and made again");

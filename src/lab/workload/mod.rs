@@ -5,6 +5,7 @@ mod ride;
 mod room;
 mod scatter;
 mod sequence;
+mod shots;
 mod site;
 
 use nalgebra::{Translation3, UnitQuaternion};
@@ -14,9 +15,12 @@ use rand_chacha::ChaCha8Rng;
 use crate::geometry::{Point, Pose};
 use crate::map::{MapSettings, MapSettingsError, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use crate::voxel::{LatticeFromPoints, VoxelKey, VoxelSet};
+use ride::Surface;
 pub use room::Room;
 pub use scatter::Scatter;
 pub use sequence::{Scan, simulate};
+use shots::EVERYWHERE_DEG;
+pub use shots::{ShotLayout, Shots};
 pub use site::Site;
 
 /// Order of queries.
@@ -111,6 +115,22 @@ impl Workload {
             }
             (_, Order::Sweep) => self.sweep(count, &mut random),
         }
+    }
+
+    /// Makes rays from places on the sensor's path: in a room in all directions, on a site those that its sensor looks in.
+    /// Scattered voxels have no path; all places are in their middle.
+    pub fn shots(&self, layout: ShotLayout) -> Shots {
+        match self {
+            Self::Room(room) => Shots::of(layout, EVERYWHERE_DEG, |place| room.sensor(place)),
+            Self::Site(site) => Shots::of(layout, Site::SIGHT.elevation_deg, |place| site.sensor(place)),
+            Self::Scatter(_) => Shots::of(layout, EVERYWHERE_DEG, |_| Scatter::middle()),
+        }
+    }
+
+    /// The queries' points in the map frame.
+    pub fn map_points(&self, order: Order, count: usize, seed: u64) -> Vec<Point> {
+        let Queries { points, map_from_points } = self.queries(order, count, seed);
+        points.into_iter().map(|point| Point::from(map_from_points * point.to_f64())).collect()
     }
 
     /// Makes a point in each voxel, away from its border.

@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Queries;
+use crate::geometry::Pose;
 use crate::voxel::{VoxelKey, VoxelSet};
 
 /// Random voxels of 5 cm in 14 x 9 x 3 m: "a map consisting of randomly generated voxels" (paper IV-A).
@@ -27,6 +28,12 @@ impl Scatter {
     /// Makes `voxels` voxels, at most [`Scatter::VOXELS_MAX`].
     pub fn of(voxels: usize, seed: u64) -> Self {
         Self { voxels: voxels.min(Self::VOXELS_MAX), seed }
+    }
+
+    /// A place in the middle of the voxels.
+    pub(super) fn middle() -> Pose {
+        let [x, y, z] = SIZE.map(|size| f64::from(size) * Self::RESOLUTION_M / 2.0);
+        Pose::translation(x, y, z)
     }
 
     pub(super) fn voxels(self) -> VoxelSet {

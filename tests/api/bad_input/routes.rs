@@ -19,6 +19,10 @@ enum Body {
     File,
 }
 
+fn ball() -> Value {
+    json!({"links": [{"spheres": [[0, 0, 0, 0.1]]}]})
+}
+
 /// A body that is taken, by operation. An operation that is new has none and does not compile.
 fn body(operation: Operation) -> Body {
     let scan = || json!({"robot": "r", "points": row(1), "guess": identity_json(), "align": false});
@@ -27,6 +31,17 @@ fn body(operation: Operation) -> Body {
         Operation::Localize => Body::Points(json!({"points": row(1)}), ""),
         Operation::DeleteVoxels => Body::Points(json!({"points": [[9.0, 9.0, 9.0]]}), ""),
         Operation::InsertScan | Operation::AlignScan => Body::Points(scan(), "robot=r&"),
+        Operation::CheckPoses => {
+            Body::Json(json!({"body": ball(), "configurations": [[0, 0, 0, 0, 0, 0, 1]]}))
+        }
+        Operation::CheckSpheres => Body::Json(json!({"spheres": [[0, 0, 0, 0.1]]})),
+        Operation::CheckMotions => {
+            let pose = [0, 0, 0, 0, 0, 0, 1];
+            Body::Json(json!({"body": ball(), "configurations": [pose, pose], "lengths": [2]}))
+        }
+        Operation::CastRays => Body::Json(json!({"origins": row(1), "directions": [[1, 0, 0]]})),
+        Operation::FindNearest => Body::Json(json!({"points": row(1), "radius_m": 1})),
+        Operation::ProjectGrid => Body::Json(json!({})),
         Operation::Undo => Body::Json(json!({"revision": 1})),
         Operation::PutKeepOut => Body::Json(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Body::Json(json!({"resolution_m": 0.1})),
@@ -44,6 +59,11 @@ fn body(operation: Operation) -> Body {
         | Operation::StreamTrajectory
         | Operation::SnapshotMap
         | Operation::QueryPointsStream
+        | Operation::CheckPosesStream
+        | Operation::CheckSpheresStream
+        | Operation::CheckMotionsStream
+        | Operation::CastRaysStream
+        | Operation::FindNearestStream
         | Operation::InsertScanStream
         | Operation::Reflect
         | Operation::HealthCheck

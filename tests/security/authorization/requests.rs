@@ -12,6 +12,11 @@ use tonic_reflection::pb::v1::server_reflection_request::MessageRequest;
 use crate::support::daemon::{guess_pb, identity_json, points_pb, query_pb, scan_pb};
 
 const POINTS: [[f32; 3]; 1] = [[1.0, 2.0, 3.0]];
+const POSE: [f32; 7] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+
+fn body_json() -> Value {
+    json!({"links": [{"spheres": [[0, 0, 0, 0.1]]}]})
+}
 
 /// The bytes of the gRPC message, about `map`.
 pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
@@ -19,6 +24,40 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
     match operation {
         Operation::QueryPoints | Operation::QueryPointsStream => query_pb(&map, &POINTS).encode_to_vec(),
         Operation::ListVoxels => pb::ListVoxelsRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::CheckPoses | Operation::CheckPosesStream => {
+            let (asked, body) = (asked(map), Some(body_pb()));
+            pb::CheckPosesRequest { asked, body, configurations_f32le: pose(), ..Default::default() }
+                .encode_to_vec()
+        }
+        Operation::CheckSpheres | Operation::CheckSpheresStream => pb::CheckSpheresRequest {
+            asked: asked(map),
+            spheres_f32le: sphere(),
+            sizes_u32le: 1u32.to_le_bytes().to_vec().into(),
+            ..Default::default()
+        }
+        .encode_to_vec(),
+        Operation::CheckMotions | Operation::CheckMotionsStream => pb::CheckMotionsRequest {
+            asked: asked(map),
+            body: Some(body_pb()),
+            configurations_f32le: [pose(), pose()].concat().into(),
+            lengths_u32le: 2u32.to_le_bytes().to_vec().into(),
+            ..Default::default()
+        }
+        .encode_to_vec(),
+        Operation::CastRays | Operation::CastRaysStream => pb::CastRaysRequest {
+            asked: asked(map),
+            origins: points_pb(&POINTS),
+            directions: points_pb(&[[1.0, 0.0, 0.0]]),
+            ..Default::default()
+        }
+        .encode_to_vec(),
+        Operation::FindNearest | Operation::FindNearestStream => {
+            let (asked, points) = (asked(map), points_pb(&POINTS));
+            pb::FindNearestRequest { asked, points, radius_m: 1.0, ..Default::default() }.encode_to_vec()
+        }
+        Operation::ProjectGrid => {
+            pb::ProjectGridRequest { asked: asked(map), ..Default::default() }.encode_to_vec()
+        }
         Operation::ListKeepOuts => pb::ListKeepOutsRequest { map }.encode_to_vec(),
         Operation::PutKeepOut => {
             let prism =
@@ -77,6 +116,25 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
     }
 }
 
+/// What questions have in common.
+fn asked(map: String) -> Option<pb::Asked> {
+    Some(pb::Asked { map, ..Default::default() })
+}
+
+/// A sphere of 0.1 m.
+fn sphere() -> prost::bytes::Bytes {
+    [0.0f32, 0.0, 0.0, 0.1].iter().flat_map(|number| number.to_le_bytes()).collect()
+}
+
+/// The identity as a configuration.
+fn pose() -> prost::bytes::Bytes {
+    [0.0f32, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].iter().flat_map(|number| number.to_le_bytes()).collect()
+}
+
+fn body_pb() -> pb::Body {
+    pb::Body { links: vec![pb::Link { spheres_f32le: sphere(), ..Default::default() }] }
+}
+
 /// The body of the HTTP request.
 pub(crate) fn body(operation: Operation) -> Option<Value> {
     match operation {
@@ -86,6 +144,14 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         Operation::InsertScan | Operation::AlignScan => {
             Some(json!({"robot": "r", "points": POINTS, "guess": identity_json(), "align": false}))
         }
+        Operation::CheckPoses => Some(json!({"body": body_json(), "configurations": [POSE]})),
+        Operation::CheckSpheres => Some(json!({"spheres": [[0, 0, 0, 0.1]]})),
+        Operation::CheckMotions => {
+            Some(json!({"body": body_json(), "configurations": [POSE, POSE], "lengths": [2]}))
+        }
+        Operation::CastRays => Some(json!({"origins": POINTS, "directions": [[1, 0, 0]]})),
+        Operation::FindNearest => Some(json!({"points": POINTS, "radius_m": 1})),
+        Operation::ProjectGrid => Some(json!({})),
         Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::PutKeepOut => Some(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
         Operation::CreateMap => Some(json!({"resolution_m": 0.1, "levels": 2})),
@@ -99,6 +165,17 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
+        | Operation::CheckPoses
+        | Operation::CheckPosesStream
+        | Operation::CheckSpheres
+        | Operation::CheckSpheresStream
+        | Operation::CheckMotions
+        | Operation::CheckMotionsStream
+        | Operation::CastRays
+        | Operation::CastRaysStream
+        | Operation::FindNearest
+        | Operation::FindNearestStream
+        | Operation::ProjectGrid
         | Operation::ListKeepOuts
         | Operation::PutKeepOut
         | Operation::DeleteKeepOut

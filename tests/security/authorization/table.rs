@@ -19,6 +19,17 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::QueryPointsStream
         | Operation::ListVoxels
         | Operation::ListKeepOuts
+        | Operation::CheckPoses
+        | Operation::CheckPosesStream
+        | Operation::CheckSpheres
+        | Operation::CheckSpheresStream
+        | Operation::CheckMotions
+        | Operation::CheckMotionsStream
+        | Operation::CastRays
+        | Operation::CastRaysStream
+        | Operation::FindNearest
+        | Operation::FindNearestStream
+        | Operation::ProjectGrid
         | Operation::GetBlock
         | Operation::ListObservers
         | Operation::Watch

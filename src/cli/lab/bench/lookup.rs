@@ -68,14 +68,7 @@ pub(super) struct Lookup {
 impl Lookup {
     pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
         let (map, queries) = self.map_and_queries(output)?;
-        let levels = map.settings().levels;
-        if self.level >= levels {
-            return Err(CliError::usage(format!(
-                "--level must lie in 0..={}, got {}",
-                levels - 1,
-                self.level
-            )));
-        }
+        self.map.check_level(self.level)?;
         let structures = self.build(&map, output);
         let (what, points) = (self.what(), count(queries.points.len()));
         output.say(format!(

@@ -6,6 +6,9 @@ mod insert;
 mod journal;
 mod lookup;
 mod memory;
+mod nearest;
+mod planning;
+mod rays;
 mod readers;
 mod replica;
 mod serve;
@@ -31,7 +34,10 @@ EXAMPLES:
   mrol bench memory --workload site                   bytes a voxel, with filters and moments and without
   mrol bench start --workload site                    a start with ten million voxels
   mrol bench align scans/ --resolution 0.05
+  mrol bench rays                                     a panorama of a million rays in the room
+  mrol bench nearest --queries 100000                 how far points are from the nearest voxel
   mrol bench readers --workload site                  readers beside each other, and beside a writer
+  mrol bench planning --workload site                 an arm among ten million voxels
   mrol bench serve                                    a load of point queries on a server of its own
   mrol bench replica                                  a copy of a map that follows, and its queries
   mrol bench watch                                    fifty who follow a map that is mapped
@@ -56,6 +62,9 @@ enum What {
     Memory(memory::Memory),
     Journal(journal::Journal),
     Align(align::Align),
+    Planning(planning::Planning),
+    Rays(rays::Rays),
+    Nearest(nearest::Nearest),
     Readers(readers::Readers),
     Replica(replica::ReplicaBench),
     Serve(serve::Serve),
@@ -73,6 +82,9 @@ impl Bench {
             What::Memory(memory) => memory.run(&output),
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
+            What::Planning(planning) => planning.run(&output),
+            What::Rays(rays) => rays.run(&output),
+            What::Nearest(nearest) => nearest.run(&output),
             What::Readers(readers) => readers.run(&output),
             What::Start(start) => start.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use crate::bloom::FilterSettings;
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
+use crate::geometry::Point;
 use crate::lab::workload::{Order, Queries, Room, Scatter, Site, Workload};
 use crate::map::{LEVELS_DEFAULT, MapSettings, MultiResolutionMap};
 
@@ -67,6 +68,11 @@ impl WorkloadOptions {
         self.workload().queries(self.order(), self.points() * times, seed)
     }
 
+    /// The points to ask about, in the map frame.
+    pub(in crate::cli) fn map_points(&self) -> Vec<Point> {
+        self.workload().map_points(self.order(), self.points(), self.seed.wrapping_add(0x5eed))
+    }
+
     pub(in crate::cli) fn seed(&self) -> u64 {
         self.seed
     }
@@ -111,6 +117,13 @@ impl MapOptions {
         let filter = FilterSettings { hashes: self.filter_hashes, bits_per_key: self.filter_bits_per_key };
         let settings = MapSettings { filter: Some(filter), ..MapSettings::new(resolution_m, self.levels) };
         settings.checked().map_err(CliError::usage)
+    }
+
+    /// Refuses a level that the map has not.
+    pub(in crate::cli) fn check_level(&self, level: u32) -> Result<(), CliError> {
+        let last = self.levels - 1;
+        let message = || CliError::usage(format!("--level must lie in 0..={last}, got {level}"));
+        (level <= last).then_some(()).ok_or_else(message)
     }
 
     /// The map of a workload.

@@ -1,0 +1,208 @@
+//! `mrol check`: asks whether a body fits, at poses or along a motion.
+
+use std::fmt::{self, Display};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::CliError;
+use super::output::Output;
+use super::parse;
+use super::remote::MapOptions;
+use crate::client::Client;
+use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
+use crate::map::MapName;
+use crate::planning::{Body, Link, Sphere, Surroundings};
+use crate::service::{Asked, CheckAs, Collisions, MotionCheck, PoseCheck};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol check --map office --sphere \"0 0 0.2 0.3\" --pose \"1 2 0 0 0 0 1\"
+  mrol check --map office --body arm.json --pose \"1 2 0 0 0 0 1\" --pose \"2 2 0 0 0 0 1\"
+  mrol check --map office --sphere \"0 0 0 0.3\" --motion --pose \"1 2 1 0 0 0 1\" --pose \"4 2 1 0 0 0 1\"
+
+A body file is what HTTP takes, with one link here: {\"links\": [{\"spheres\": [[x, y, z, r], ...], \"points\": [[x, y, z], ...],
+\"padding_m\": 0.05}]}. With --motion the body moves from pose to pose.";
+
+/// Ask a server whether a body fits at poses, or along a motion
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Check {
+    #[command(flatten)]
+    map: MapOptions,
+    /// A sphere of the body: center and radius in the body's frame, meters; may be repeated
+    #[arg(long, value_name = "X Y Z R", allow_hyphen_values = true, value_parser = parse::sphere, required_unless_present = "body", conflicts_with = "body")]
+    sphere: Vec<Sphere>,
+    /// A file with the body, of one link
+    #[arg(long, value_name = "FILE.json")]
+    body: Option<PathBuf>,
+    /// A pose of the body in the map; may be repeated
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse::pose, required = true)]
+    pose: Vec<Pose>,
+    /// Check the motion from pose to pose
+    #[arg(long)]
+    motion: bool,
+    /// Level to ask: 0 is the finest
+    #[arg(long, default_value_t = 0)]
+    level: u32,
+}
+
+impl Check {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let body = match &self.body {
+            Some(path) => read_body(path)?,
+            None => Body::new(vec![Link { spheres: self.sphere.clone(), ..Link::default() }])
+                .map_err(CliError::failed)?,
+        };
+        if body.links().len() != 1 {
+            let message = format!("a body of one link is checked here, this one has {}", body.links().len());
+            return Err(CliError::failed(message));
+        }
+        let client = self.map.server.connect().await?;
+        let configurations = self.pose.iter().flat_map(numbers_of).collect();
+        let body = Arc::new(body);
+        match self.motion {
+            true => self.check_motion(&client, body, configurations, &output).await,
+            false => self.check_poses(&client, body, configurations, &output).await,
+        }
+    }
+
+    fn map_name(&self) -> &MapName {
+        &self.map.name
+    }
+
+    fn asked(&self) -> Asked {
+        Asked { level: self.level, ..Asked::default() }
+    }
+
+    async fn check_poses(
+        &self,
+        client: &Client,
+        body: Arc<Body>,
+        configurations: Vec<f32>,
+        output: &Output,
+    ) -> Result<(), CliError> {
+        let (asked, surroundings) = (self.asked(), Surroundings::default());
+        let check = PoseCheck { asked, body, configurations, surroundings, answer: CheckAs::FirstHit };
+        let answered = client.check_poses(self.map_name(), check).await?;
+        let Collisions::FirstHits(hits) = answered.answer else {
+            return Err(CliError::failed("the server did not say what is met first"));
+        };
+        hits.iter().enumerate().try_for_each(|(pose, hit)| {
+            let voxel = hit.map(|hit| hit.voxel.index());
+            let part = hit.map(|hit| hit.part);
+            output.print(&PoseLine {
+                pose,
+                fits: hit.is_none(),
+                part,
+                voxel,
+                revision: answered.version.revision,
+            })
+        })
+    }
+
+    async fn check_motion(
+        &self,
+        client: &Client,
+        body: Arc<Body>,
+        configurations: Vec<f32>,
+        output: &Output,
+    ) -> Result<(), CliError> {
+        let check = MotionCheck {
+            asked: self.asked(),
+            body,
+            configurations,
+            lengths: vec![self.pose.len() as u32],
+            step_m: None,
+            clearance_max_m: None,
+            surroundings: Surroundings::default(),
+        };
+        let answered = client.check_motions(self.map_name(), check).await?;
+        let revision = answered.version.revision;
+        answered.answer.iter().try_for_each(|motion| {
+            let (is_free, first_hit) = (motion.is_free(), motion.first_hit);
+            output.print(&MotionLine { is_free, first_hit, revision })
+        })
+    }
+}
+
+/// The seven numbers of a pose in a configuration.
+fn numbers_of(pose: &Pose) -> impl Iterator<Item = f32> + use<> {
+    translation_m(pose).into_iter().chain(rotation_xyzw(pose)).map(|number| number as f32)
+}
+
+/// A body as HTTP takes it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BodyFile {
+    links: Vec<LinkFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LinkFile {
+    #[serde(default)]
+    spheres: Vec<[f32; 4]>,
+    #[serde(default)]
+    points: Vec<[f32; 3]>,
+    #[serde(default)]
+    padding_m: f32,
+}
+
+fn read_body(path: &Path) -> Result<Body, CliError> {
+    let failed = |error: &dyn Display| CliError::failed(format!("{}: {error}", path.display()));
+    let text = fs::read_to_string(path).map_err(|error| failed(&error))?;
+    let file: BodyFile = serde_json::from_str(&text).map_err(|error| failed(&error))?;
+    let link = |link: LinkFile| Link {
+        spheres: link
+            .spheres
+            .into_iter()
+            .map(|[x, y, z, radius_m]| Sphere { center_m: [x, y, z], radius_m })
+            .collect(),
+        points: link.points.into_iter().map(Point::from).collect(),
+        padding_m: link.padding_m,
+    };
+    Body::new(file.links.into_iter().map(link).collect()).map_err(|error| failed(&error))
+}
+
+#[derive(Serialize)]
+struct PoseLine {
+    pose: usize,
+    fits: bool,
+    part: Option<u32>,
+    voxel: Option<[i32; 3]>,
+    revision: u64,
+}
+
+impl Display for PoseLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.part, self.voxel) {
+            (Some(part), Some([x, y, z])) => {
+                write!(
+                    f,
+                    "pose {} does not fit: part {part} of the body meets voxel ({x}, {y}, {z})",
+                    self.pose
+                )
+            }
+            _ => write!(f, "pose {} fits", self.pose),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct MotionLine {
+    is_free: bool,
+    first_hit: Option<f32>,
+    revision: u64,
+}
+
+impl Display for MotionLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.first_hit {
+            Some(share) => write!(f, "the motion meets a voxel after {:.1} % of it", 100.0 * share),
+            None => f.write_str("the motion is free"),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `mrol grid`: draws a map from above, for the map server of ROS and Nav2.
+
+use std::fmt::{self, Display};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::map_report::count;
+use super::output::Output;
+use super::parse;
+use super::remote::MapOptions;
+use crate::planning::{Grid, GridArea, NotOccupied};
+use crate::service::{Asked, GridQuestion, GridScope};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol grid --map office --band \"0.1 1.8\" --out office.pgm        what a robot of 1.8 m can run into
+  mrol grid --map office --band \"0.1 1.8\" --cell 0.1 --area \"0 0 10 8\" --out office.pgm
+  mrol grid --map office --out office.pgm --unknown               nothing is said to be free
+
+Writes the image and, beside it, office.yaml, which names it: both are what map_server of ROS 1 and nav2_map_server read.";
+
+/// Draw a map from above, as a 2-D grid for Nav2
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct DrawGrid {
+    #[command(flatten)]
+    map: MapOptions,
+    /// Where to write the image; the description gets the same name with .yaml
+    #[arg(long, value_name = "FILE.pgm")]
+    out: PathBuf,
+    /// Lowest and highest height of voxels that count, meters: their centers lie between [default: all]
+    #[arg(long, value_name = "Z Z", allow_hyphen_values = true, value_parser = parse::band)]
+    band: Option<[f64; 2]>,
+    /// The rectangle to draw: smallest and largest x y, meters [default: all that there is]
+    #[arg(long, value_name = "X Y X Y", allow_hyphen_values = true, value_parser = parse::rectangle)]
+    area: Option<GridArea>,
+    /// Side of a cell, meters: a whole number of voxels [default: one voxel]
+    #[arg(long, value_name = "METERS")]
+    cell: Option<f64>,
+    /// Level to draw: 0 is the finest
+    #[arg(long, default_value_t = 0)]
+    level: u32,
+    /// Call cells without a voxel unknown, not free
+    #[arg(long)]
+    unknown: bool,
+}
+
+impl DrawGrid {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let Self { map, out, band, area, cell, level, unknown } = self;
+        let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let scope = GridScope { area: area.unwrap_or(GridArea::Occupied), band_m, cell_m: cell };
+        let question = GridQuestion { asked: Asked { level, ..Asked::default() }, scope };
+        let client = map.server.connect().await?;
+        let answered = client.project_grid(&map.name, question).await?;
+        let not_occupied = if unknown { NotOccupied::Unknown } else { NotOccupied::Free };
+        let grid = answered.answer;
+        if grid.cells() == 0 {
+            let message =
+                "the map has no voxel in this band: there is nothing to draw; give --area, or another --band";
+            return Err(CliError::failed(message));
+        }
+        let description = write_files(&grid, &out, not_occupied)?;
+        output.print(&Drawn::of(&grid, &out, &description, answered.version.revision))
+    }
+}
+
+/// Writes the image and its description, whose path is returned.
+fn write_files(grid: &Grid, image: &Path, not_occupied: NotOccupied) -> Result<PathBuf, CliError> {
+    let name = image.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let description = image.with_extension("yaml");
+    fs::write(image, grid.to_pgm(not_occupied)).map_err(CliError::writing(image))?;
+    fs::write(&description, grid.to_yaml(&name)).map_err(CliError::writing(&description))?;
+    Ok(description)
+}
+
+#[derive(Serialize)]
+struct Drawn {
+    image: String,
+    description: String,
+    size: [usize; 2],
+    cell_m: f64,
+    origin_m: [f64; 2],
+    cells_occupied: usize,
+    revision: u64,
+}
+
+impl Drawn {
+    fn of(grid: &Grid, image: &Path, description: &Path, revision: u64) -> Self {
+        Self {
+            image: image.display().to_string(),
+            description: description.display().to_string(),
+            size: grid.size,
+            cell_m: grid.cell_m,
+            origin_m: grid.origin_m,
+            cells_occupied: grid.occupied.iter().map(|word| word.count_ones() as usize).sum(),
+            revision,
+        }
+    }
+}
+
+impl Display for Drawn {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [width, height] = self.size;
+        write!(
+            f,
+            "{} and {}: {width} x {height} cells of {} m, {} of them occupied, at revision {}",
+            self.image,
+            self.description,
+            self.cell_m,
+            count(self.cells_occupied),
+            self.revision
+        )
+    }
+}

@@ -1,0 +1,95 @@
+//! `mrol nearest`: asks how far the nearest occupied voxel is.
+
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::output::Output;
+use super::parse;
+use super::query::points_of;
+use super::remote::MapOptions;
+use crate::geometry::Point;
+use crate::planning::MeasuredTo;
+use crate::service::{Asked, NearestQuestion};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol nearest --map office --point 1,2,0.5 --radius 1
+  mrol nearest --map office waypoints.xyz --radius 0.5
+  mrol nearest --map office --point 1,2,0.5 --radius 3 --level 2      further, and less finely
+
+The radius is 64 voxels of the level at most. A point inside of an occupied voxel is 0 m away from it.";
+
+/// Ask a server for the occupied voxel nearest to each point
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Nearest {
+    /// Points to ask about: .ply .pcd .xyz .f32
+    #[arg(required_unless_present = "point", conflicts_with = "point")]
+    points_file: Option<PathBuf>,
+    /// A point to ask about, meters; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
+    point: Vec<Point>,
+    #[command(flatten)]
+    map: MapOptions,
+    /// How far to look, meters
+    #[arg(long, value_name = "METERS")]
+    radius: f64,
+    /// What distances are measured to: the voxels' cubes, or their centers
+    #[arg(long, value_parser = parse::keyword::<MeasuredTo>(), default_value = "cubes")]
+    to: MeasuredTo,
+    /// Level to ask: 0 is the finest
+    #[arg(long, default_value_t = 0)]
+    level: u32,
+}
+
+impl Nearest {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let Self { points_file, point, map, radius, to, level } = self;
+        let points = match &points_file {
+            Some(path) => points_of(path)?,
+            None => point,
+        };
+        let asked = Asked { level, ..Asked::default() };
+        let question = NearestQuestion { asked, points: points.clone().into(), radius_m: radius, to };
+        let client = map.server.connect().await?;
+        let answered = client.find_nearest(&map.name, question).await?;
+        let (nearest, revision) = (answered.answer, answered.version.revision);
+        if nearest.len() != points.len() {
+            let message = format!("the server answered {} of {} points", nearest.len(), points.len());
+            return Err(CliError::failed(message));
+        }
+        points.iter().enumerate().try_for_each(|(i, point)| {
+            let found = nearest.found[i / 64] >> (i % 64) & 1 == 1;
+            output.print(&NearestLine {
+                point: point.xyz(),
+                distance_m: found.then(|| nearest.distances_m[i]),
+                voxel: found.then(|| nearest.voxels[i].index()),
+                away: found.then(|| nearest.away[i]),
+                revision,
+            })
+        })
+    }
+}
+
+#[derive(Serialize)]
+struct NearestLine {
+    point: [f32; 3],
+    distance_m: Option<f32>,
+    voxel: Option<[i32; 3]>,
+    away: Option<[f32; 3]>,
+    revision: u64,
+}
+
+impl Display for NearestLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.point;
+        write!(f, "{x:>10} {y:>10} {z:>10}   ")?;
+        match (self.distance_m, self.voxel) {
+            (Some(distance_m), Some([i, j, k])) => write!(f, "{distance_m:.4} m to voxel ({i}, {j}, {k})"),
+            _ => write!(f, "nothing near"),
+        }
+    }
+}

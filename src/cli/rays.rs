@@ -1,0 +1,86 @@
+//! `mrol rays`: asks what rays meet.
+
+use std::fmt::{self, Display};
+
+use serde::Serialize;
+
+use super::error::CliError;
+use super::output::Output;
+use super::parse;
+use super::remote::MapOptions;
+use crate::geometry::Point;
+use crate::service::{Asked, RayQuestion, RaysToward};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol rays --map office --from 1,2,0.5 --direction 1,0,0           how far it is to the next wall along x
+  mrol rays --map office --from 1,2,0.5 --direction 0.6,0.8,0 --direction 0,0,1 --range 10
+  mrol rays --map office --from 1,2,0.5 --to 4,2,0.5                is there a line of sight?
+
+A direction is a unit vector. A ray meets the first occupied voxel in which it runs for some way.";
+
+/// Ask a server what rays meet, and how far away
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct CastRays {
+    #[command(flatten)]
+    map: MapOptions,
+    /// Where the rays begin, meters
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
+    from: Point,
+    /// Direction of a ray, a unit vector; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point, required_unless_present = "to", conflicts_with = "to")]
+    direction: Vec<Point>,
+    /// Where a ray ends, meters; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
+    to: Vec<Point>,
+    /// Length of the rays with a direction, meters [default: as far as the map goes]
+    #[arg(long, value_name = "METERS", requires = "direction")]
+    range: Option<f64>,
+    /// Level to ask: 0 is the finest
+    #[arg(long, default_value_t = 0)]
+    level: u32,
+}
+
+impl CastRays {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let Self { map, from, direction, to, range, level } = self;
+        let toward = if to.is_empty() {
+            let range_m = range.unwrap_or(f64::INFINITY);
+            RaysToward::Directions { directions: direction.into(), range_m }
+        } else {
+            RaysToward::Ends(to.into())
+        };
+        let asked = Asked { level, ..Asked::default() };
+        let question = RayQuestion { asked, origins: vec![from].into(), toward };
+        let client = map.server.connect().await?;
+        let answered = client.cast_rays(&map.name, question).await?;
+        let (hits, revision) = (answered.answer, answered.version.revision);
+        (0..hits.len()).try_for_each(|ray| {
+            let hit = hits.hit[ray / 64] >> (ray % 64) & 1 == 1;
+            let distance_m = hit.then(|| hits.distances_m[ray]);
+            let voxel = hit.then(|| hits.voxels[ray].index());
+            output.print(&RayLine { ray, hit, distance_m, voxel, revision })
+        })
+    }
+}
+
+#[derive(Serialize)]
+struct RayLine {
+    ray: usize,
+    hit: bool,
+    distance_m: Option<f32>,
+    voxel: Option<[i32; 3]>,
+    revision: u64,
+}
+
+impl Display for RayLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.distance_m, self.voxel) {
+            (Some(distance_m), Some([x, y, z])) => {
+                write!(f, "ray {} meets voxel ({x}, {y}, {z}) after {distance_m:.4} m", self.ray)
+            }
+            _ => write!(f, "ray {} meets nothing", self.ray),
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Answers to questions: a head and arrays, in the form of the question.
+
+use axum::body::Bytes;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde::ser::{Error, SerializeMap};
+use serde::{Serialize, Serializer};
+
+use super::form::{Form, Slice};
+use crate::http::error::HttpError;
+use crate::service::{MapVersion, Reason, ServiceError};
+use crate::voxel::VoxelKey;
+use crate::wire::json::JsonVersion;
+
+/// An array of an answer, as bytes.
+pub(super) enum Array {
+    /// So many bits.
+    Bits(Bytes, usize),
+    /// Floats of four bytes, one a value. JSON has null in the place of what is not finite.
+    Floats(Bytes),
+    /// Unsigned integers of four bytes. JSON has null in the place of the largest, which stands for none.
+    Numbers(Bytes),
+    /// Three floats a value.
+    Vectors(Bytes),
+    /// Packed keys, of which only those are voxels whose bits are set. JSON has null in the place of others.
+    Voxels(Bytes, Bytes),
+}
+
+/// An answer that is put together.
+pub(super) struct Answer<H> {
+    /// What is no array.
+    pub(super) head: H,
+    pub(super) version: MapVersion,
+    pub(super) arrays: Vec<(&'static str, Array)>,
+}
+
+impl Array {
+    fn bytes(&self) -> &Bytes {
+        match self {
+            Self::Bits(bytes, _) | Self::Floats(bytes) | Self::Numbers(bytes) | Self::Vectors(bytes) => bytes,
+            Self::Voxels(bytes, _) => bytes,
+        }
+    }
+}
+
+impl<H: Serialize> Answer<H> {
+    /// The answer in a form.
+    pub(super) fn respond(self, form: Form) -> Result<Response, HttpError> {
+        let head = serde_json::to_vec(&Head { answer: &self, form })
+            .map_err(|error| ServiceError::new(Reason::NotWritten, error.to_string()))?;
+        let (content_type, body) = match form {
+            Form::Json => ("application/json", head),
+            Form::Arrays => ("application/octet-stream", self.behind(&head)),
+        };
+        Ok(([(header::CONTENT_TYPE, content_type)], body).into_response())
+    }
+
+    /// The length of the head, the head, and the arrays.
+    fn behind(&self, head: &[u8]) -> Vec<u8> {
+        let length = u32::try_from(head.len()).unwrap_or(u32::MAX).to_le_bytes();
+        let arrays: usize = self.arrays.iter().map(|(_, array)| array.bytes().len()).sum();
+        let mut body = Vec::with_capacity(length.len() + head.len() + arrays);
+        body.extend_from_slice(&length);
+        body.extend_from_slice(head);
+        self.arrays.iter().for_each(|(_, array)| body.extend_from_slice(array.bytes()));
+        body
+    }
+}
+
+/// What of an answer is JSON: all of it, or all but its arrays, of which it says where they are.
+struct Head<'a, H> {
+    answer: &'a Answer<H>,
+    form: Form,
+}
+
+impl<H: Serialize> Serialize for Head<'_, H> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Answer { head, version, arrays } = self.answer;
+        let mut map = serializer.serialize_map(None)?;
+        for value in [serde_json::to_value(head), serde_json::to_value(JsonVersion::from(*version))] {
+            let value = value.map_err(S::Error::custom)?;
+            for (name, value) in value.as_object().into_iter().flatten() {
+                map.serialize_entry(name, value)?;
+            }
+        }
+        let mut at = 0;
+        for (name, array) in arrays {
+            let bytes = array.bytes().len();
+            match self.form {
+                Form::Json => map.serialize_entry(name, array)?,
+                Form::Arrays => map.serialize_entry(name, &Slice { at, bytes })?,
+            }
+            at += bytes;
+        }
+        map.end()
+    }
+}
+
+impl Serialize for Array {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Bits(bytes, count) => serializer.collect_seq((0..*count).map(|i| bit(bytes, i))),
+            Self::Floats(bytes) => serializer.collect_seq(floats(bytes)),
+            Self::Numbers(bytes) => serializer.collect_seq(bytes.as_chunks().0.iter().map(|number| {
+                let number = u32::from_le_bytes(*number);
+                (number != u32::MAX).then_some(number)
+            })),
+            Self::Vectors(bytes) => serializer.collect_seq(bytes.chunks(VECTOR_BYTES).map(|vector| {
+                let mut numbers = floats(vector);
+                [(); 3].map(|()| numbers.next())
+            })),
+            Self::Voxels(bytes, set) => serializer.collect_seq(
+                bytes.chunks(size_of::<u64>()).enumerate().map(|(i, key)| bit(set, i).then(|| index(key))),
+            ),
+        }
+    }
+}
+
+/// Bytes of a vector of three floats.
+const VECTOR_BYTES: usize = 3 * size_of::<f32>();
+
+fn bit(bytes: &[u8], i: usize) -> bool {
+    bytes.get(i / 8).is_some_and(|byte| byte >> (i % 8) & 1 == 1)
+}
+
+fn floats(bytes: &[u8]) -> impl Iterator<Item = f32> + '_ {
+    bytes.as_chunks().0.iter().map(|number| f32::from_le_bytes(*number))
+}
+
+/// Index of the voxel of a packed key.
+fn index(key: &[u8]) -> Option<[i32; 3]> {
+    let bits = u64::from_le_bytes(key.try_into().ok()?);
+    Some(VoxelKey::from_bits(bits)?.index())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{bitmap_of, bytes_of};
+    use serde_json::{Value, json};
+
+    fn answer() -> Answer<Value> {
+        let version = MapVersion { revision: 3, map_uuid: uuid::Uuid::nil(), content_hash: None };
+        let key = VoxelKey::new([1, -2, 3]).unwrap().to_bits();
+        let hit = bitmap_of(vec![1], 2);
+        let arrays = vec![
+            ("hit", Array::Bits(hit.clone(), 2)),
+            ("distances_m", Array::Floats(bytes_of([0.5f32, f32::INFINITY]))),
+            ("away", Array::Vectors(bytes_of([1.0f32, 0.0, 0.0, 0.0, 0.0, 0.0]))),
+            ("voxels", Array::Voxels(bytes_of([key, 0]), hit)),
+        ];
+        Answer { head: json!({"rays": 2}), version, arrays }
+    }
+
+    #[test]
+    fn people_read_lists_with_null_where_there_is_nothing() {
+        let of = answer();
+        let said = serde_json::to_value(Head { answer: &of, form: Form::Json }).unwrap();
+        assert_eq!((&said["rays"], &said["revision"]), (&json!(2), &json!(3)));
+        assert_eq!(said["hit"], json!([true, false]));
+        assert_eq!(said["distances_m"], json!([0.5, null]));
+        assert_eq!(said["away"], json!([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]));
+        assert_eq!(said["voxels"], json!([[1, -2, 3], null]));
+    }
+
+    #[test]
+    fn programs_find_the_arrays_where_the_head_says() {
+        let of = answer();
+        let head = serde_json::to_vec(&Head { answer: &of, form: Form::Arrays }).unwrap();
+        let body = of.behind(&head);
+        let length = u32::from_le_bytes(body[..4].try_into().unwrap()) as usize;
+        let said: Value = serde_json::from_slice(&body[4..4 + length]).unwrap();
+        assert_eq!(
+            (&said["hit"], &said["voxels"]),
+            (&json!({"at": 0, "bytes": 1}), &json!({"at": 33, "bytes": 16}))
+        );
+        assert_eq!(body.len(), 4 + length + 49);
+        assert_eq!(body[4 + length + 1..][..4], 0.5f32.to_le_bytes());
+    }
+}

@@ -1,0 +1,128 @@
+//! Bodies and what checks of them have in common, in JSON.
+
+use axum::body::Bytes;
+use serde::{Deserialize, Serialize};
+
+use super::answer::Array;
+use super::form::{NumbersField, PointsField};
+use crate::http::object::Object;
+use crate::http::shapes::{BoxBody, OrientedBoxBody, SphereBody};
+use crate::map::Region;
+use crate::service::{CheckAs, ServiceError};
+use crate::util::Keyword;
+use crate::wire::{InField, pb};
+
+/// A body: its links.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BodyField {
+    links: Vec<Object<LinkField>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LinkField {
+    spheres: Option<NumbersField<4>>,
+    points: Option<PointsField>,
+    #[serde(default)]
+    padding_m: f32,
+}
+
+/// A region in which voxels do not count.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum IgnoredField {
+    Box(Object<BoxBody>),
+    Sphere(Object<SphereBody>),
+    OrientedBox(Object<OrientedBoxBody>),
+}
+
+/// How a check is answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum AnswerWord {
+    #[default]
+    Colliding,
+    FirstHit,
+    Clearance,
+}
+
+impl Keyword for AnswerWord {
+    const ALL: &'static [Self] = &[Self::Colliding, Self::FirstHit, Self::Clearance];
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Colliding => "colliding",
+            Self::FirstHit => "first_hit",
+            Self::Clearance => "clearance",
+        }
+    }
+}
+
+impl From<AnswerWord> for pb::CheckAnswer {
+    fn from(word: AnswerWord) -> Self {
+        match word {
+            AnswerWord::Colliding => Self::Colliding,
+            AnswerWord::FirstHit => Self::FirstHit,
+            AnswerWord::Clearance => Self::Clearance,
+        }
+    }
+}
+
+impl BodyField {
+    /// The body as a message has it.
+    pub(super) fn to_message(self, arrays: &Bytes) -> Result<pb::Body, ServiceError> {
+        let link = |(number, Object(link)): (usize, Object<LinkField>)| {
+            let name = |field: &str| format!("body.links[{number}].{field}");
+            let LinkField { spheres, points, padding_m } = link;
+            let spheres = spheres.map(|spheres| spheres.to_bytes(arrays, &name("spheres"))).transpose()?;
+            let points = points.map(|points| points.to_message(arrays, &name("points"))).transpose()?;
+            Ok(pb::Link { spheres_f32le: spheres.unwrap_or_default(), points, padding_m })
+        };
+        Ok(pb::Body {
+            links: self.links.into_iter().enumerate().map(link).collect::<Result<_, ServiceError>>()?,
+        })
+    }
+}
+
+/// The regions in which voxels do not count, as a message has them.
+pub(super) fn ignored_of(ignored: Vec<IgnoredField>) -> Result<Vec<pb::Region>, ServiceError> {
+    let region = |(number, field): (usize, IgnoredField)| {
+        let region: Result<Region, ServiceError> = match field {
+            IgnoredField::Box(Object(of)) => of.try_into().map_err(ServiceError::from),
+            IgnoredField::Sphere(Object(of)) => of.try_into().map_err(ServiceError::from),
+            IgnoredField::OrientedBox(Object(of)) => of.try_into(),
+        };
+        Ok(region.in_field(&format!("ignored[{number}]"))?.into())
+    };
+    ignored.into_iter().enumerate().map(region).collect()
+}
+
+/// What of an answer to a check is no array.
+#[derive(Serialize)]
+pub(super) struct CheckedHead {
+    checked: u64,
+    colliding_count: u64,
+}
+
+/// The head and the arrays of an answer to a check.
+pub(super) fn collisions_of(
+    collisions: pb::Collisions,
+    answer: CheckAs,
+) -> (CheckedHead, Vec<(&'static str, Array)>) {
+    let pb::Collisions { checked, colliding, colliding_count, .. } = collisions;
+    let head = CheckedHead { checked, colliding_count };
+    let mut arrays = vec![("colliding", Array::Bits(colliding.clone(), checked as usize))];
+    match answer {
+        CheckAs::Colliding => {}
+        CheckAs::FirstHit => arrays.extend([
+            ("hit_links", Array::Numbers(collisions.hit_links_u32le)),
+            ("hit_parts", Array::Numbers(collisions.hit_parts_u32le)),
+            ("hit_voxels", Array::Voxels(collisions.hit_voxels_u64le, colliding)),
+        ]),
+        CheckAs::Clearance { .. } => arrays.extend([
+            ("clearances_m", Array::Floats(collisions.clearances_m_f32le)),
+            ("nearest_links", Array::Numbers(collisions.nearest_links_u32le)),
+        ]),
+    }
+    (head, arrays)
+}

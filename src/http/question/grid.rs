@@ -1,0 +1,68 @@
+//! `POST /v1/maps/{map}/grid`: the map from above, as a 2-D grid.
+
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+
+use super::answer::{Answer, Array};
+use super::asked;
+use super::form::Asking;
+use crate::http::error::HttpError;
+use crate::http::middleware::Service;
+use crate::http::object::Object;
+use crate::http::params::Map;
+use crate::wire::pb;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::http) struct GridBody {
+    area: Option<Object<AreaBody>>,
+    min_z_m: Option<f64>,
+    max_z_m: Option<f64>,
+    cell_m: Option<f64>,
+    #[serde(default)]
+    level: u32,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AreaBody {
+    min_m: [f64; 2],
+    max_m: [f64; 2],
+}
+
+#[derive(Serialize)]
+struct GridHead {
+    cell_m: f64,
+    origin_m: [f64; 2],
+    size: [u64; 2],
+    cells_occupied: u64,
+}
+
+pub(in crate::http) async fn project_grid(
+    Service(service): Service,
+    Map(map): Map,
+    Asking { head, form, .. }: Asking<GridBody>,
+) -> Result<Response, HttpError> {
+    let GridBody { area, min_z_m, max_z_m, cell_m, level, min_revision, map_uuid } = head;
+    let area = area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
+        pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
+    });
+    let asked = asked(&map, level, min_revision, map_uuid);
+    let (map, question) = pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m }.try_into()?;
+    let answered = service.ask(&map, question).await?;
+    let version = answered.version;
+    let response = pb::ProjectGridResponse::from(answered);
+    let head = GridHead {
+        cell_m: response.cell_m,
+        origin_m: [response.origin_x_m, response.origin_y_m],
+        size: [response.cells_x, response.cells_y],
+        cells_occupied: response.cells_occupied,
+    };
+    let arrays = vec![
+        ("occupied", Array::Bits(response.occupied, (response.cells_x * response.cells_y) as usize)),
+        ("tops_m", Array::Floats(response.tops_m_f32le)),
+    ];
+    Answer { head, version, arrays }.respond(form)
+}

@@ -1,0 +1,68 @@
+//! `POST /v1/maps/{map}/motions`: can a body move along these configurations?
+
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+
+use super::answer::{Answer, Array};
+use super::asked;
+use super::body::{BodyField, IgnoredField, ignored_of};
+use super::form::{Asking, CountsField, NumbersField};
+use crate::http::error::HttpError;
+use crate::http::middleware::Service;
+use crate::http::object::Object;
+use crate::http::params::Map;
+use crate::wire::pb;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::http) struct MotionsBody {
+    body: Object<BodyField>,
+    /// Seven numbers a link, link by link, configuration by configuration, motion by motion.
+    configurations: NumbersField<7>,
+    /// How many configurations each motion has.
+    lengths: CountsField,
+    step_m: Option<f32>,
+    clearance_max_m: Option<f32>,
+    #[serde(default)]
+    ignored: Vec<IgnoredField>,
+    #[serde(default)]
+    level: u32,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+#[derive(Serialize)]
+struct MotionsHead {
+    motions: u64,
+    free_count: u64,
+}
+
+pub(in crate::http) async fn check_motions(
+    Service(service): Service,
+    Map(map): Map,
+    Asking { head, arrays, form }: Asking<MotionsBody>,
+) -> Result<Response, HttpError> {
+    let MotionsBody { body: Object(body), configurations, lengths, ignored, .. } = head;
+    let request = pb::CheckMotionsRequest {
+        asked: asked(&map, head.level, head.min_revision, head.map_uuid),
+        body: Some(body.to_message(&arrays)?),
+        configurations_f32le: configurations.to_bytes(&arrays, "configurations")?,
+        lengths_u32le: lengths.to_bytes(&arrays, "lengths")?,
+        step_m: head.step_m,
+        clearance_max_m: head.clearance_max_m,
+        ignored: ignored_of(ignored)?,
+    };
+    let (map, check) = request.try_into()?;
+    let answered = service.ask(&map, check).await?;
+    let version = answered.version;
+    let response = pb::CheckMotionsResponse::from(answered);
+    let pb::CheckMotionsResponse { motions, free_count, .. } = response;
+    let mut arrays = vec![
+        ("free", Array::Bits(response.free, motions as usize)),
+        ("first_hits", Array::Floats(response.first_hits_f32le)),
+    ];
+    if !response.clearances_m_f32le.is_empty() {
+        arrays.push(("clearances_m", Array::Floats(response.clearances_m_f32le)));
+    }
+    Answer { head: MotionsHead { motions, free_count }, version, arrays }.respond(form)
+}

@@ -1,0 +1,58 @@
+//! `POST /v1/maps/{map}/nearest`: the occupied voxel nearest to each point.
+
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+
+use super::answer::{Answer, Array};
+use super::asked;
+use super::form::{Asking, PointsField};
+use crate::http::error::HttpError;
+use crate::http::middleware::Service;
+use crate::http::params::Map;
+use crate::planning::MeasuredTo;
+use crate::wire::json::ByKeyword;
+use crate::wire::pb;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::http) struct NearestBody {
+    points: PointsField,
+    radius_m: f64,
+    #[serde(default)]
+    to: ByKeyword<MeasuredTo>,
+    #[serde(default)]
+    level: u32,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+#[derive(Serialize)]
+struct NearestHead {
+    points: u64,
+}
+
+pub(in crate::http) async fn find_nearest(
+    Service(service): Service,
+    Map(map): Map,
+    Asking { head, arrays, form }: Asking<NearestBody>,
+) -> Result<Response, HttpError> {
+    let NearestBody { points, radius_m, to: ByKeyword(to), level, min_revision, map_uuid } = head;
+    let request = pb::FindNearestRequest {
+        asked: asked(&map, level, min_revision, map_uuid),
+        points: Some(points.to_message(&arrays, "points")?),
+        radius_m,
+        to: pb::MeasuredTo::from(to).into(),
+    };
+    let (map, question) = request.try_into()?;
+    let answered = service.ask(&map, question).await?;
+    let version = answered.version;
+    let response = pb::FindNearestResponse::from(answered);
+    let points = response.points;
+    let arrays = vec![
+        ("found", Array::Bits(response.found.clone(), points as usize)),
+        ("distances_m", Array::Floats(response.distances_m_f32le)),
+        ("voxels", Array::Voxels(response.voxels_u64le, response.found)),
+        ("away", Array::Vectors(response.away_f32le)),
+    ];
+    Answer { head: NearestHead { points }, version, arrays }.respond(form)
+}

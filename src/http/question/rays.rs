@@ -1,0 +1,58 @@
+//! `POST /v1/maps/{map}/rays`: what each ray meets first.
+
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+
+use super::answer::{Answer, Array};
+use super::asked;
+use super::form::{Asking, PointsField};
+use crate::http::error::HttpError;
+use crate::http::middleware::Service;
+use crate::http::params::Map;
+use crate::wire::pb;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::http) struct RaysBody {
+    origins: PointsField,
+    directions: Option<PointsField>,
+    ends: Option<PointsField>,
+    range_m: Option<f64>,
+    #[serde(default)]
+    level: u32,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+#[derive(Serialize)]
+struct RaysHead {
+    rays: u64,
+    hits: u64,
+}
+
+pub(in crate::http) async fn cast_rays(
+    Service(service): Service,
+    Map(map): Map,
+    Asking { head, arrays, form }: Asking<RaysBody>,
+) -> Result<Response, HttpError> {
+    let RaysBody { origins, directions, ends, range_m, level, min_revision, map_uuid } = head;
+    let points = |field: Option<PointsField>, name| field.map(|of| of.to_message(&arrays, name)).transpose();
+    let request = pb::CastRaysRequest {
+        asked: asked(&map, level, min_revision, map_uuid),
+        origins: points(Some(origins), "origins")?,
+        directions: points(directions, "directions")?,
+        ends: points(ends, "ends")?,
+        range_m,
+    };
+    let (map, question) = request.try_into()?;
+    let answered = service.ask(&map, question).await?;
+    let version = answered.version;
+    let response = pb::CastRaysResponse::from(answered);
+    let (rays, hits) = (response.rays, response.hits);
+    let arrays = vec![
+        ("hit", Array::Bits(response.hit.clone(), rays as usize)),
+        ("distances_m", Array::Floats(response.distances_m_f32le)),
+        ("voxels", Array::Voxels(response.voxels_u64le, response.hit)),
+    ];
+    Answer { head: RaysHead { rays, hits }, version, arrays }.respond(form)
+}

@@ -1,0 +1,64 @@
+//! `POST /v1/maps/{map}/spheres`: do these spheres of the map frame meet voxels?
+
+use axum::response::Response;
+use serde::Deserialize;
+
+use super::answer::Answer;
+use super::asked;
+use super::body::{AnswerWord, IgnoredField, collisions_of, ignored_of};
+use super::form::{Asking, CountsField, NumbersField};
+use crate::http::error::HttpError;
+use crate::http::middleware::Service;
+use crate::http::params::Map;
+use crate::service::SphereCheck;
+use crate::wire::json::ByKeyword;
+use crate::wire::pb;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::http) struct SpheresBody {
+    spheres: NumbersField<4>,
+    /// How many spheres each group has; one each without.
+    sizes: Option<CountsField>,
+    #[serde(default)]
+    padding_m: f32,
+    #[serde(default)]
+    ignored: Vec<IgnoredField>,
+    #[serde(default)]
+    answer: ByKeyword<AnswerWord>,
+    clearance_max_m: Option<f32>,
+    #[serde(default)]
+    level: u32,
+    min_revision: Option<u64>,
+    map_uuid: Option<String>,
+}
+
+pub(in crate::http) async fn check_spheres(
+    Service(service): Service,
+    Map(map): Map,
+    Asking { head, arrays, form }: Asking<SpheresBody>,
+) -> Result<Response, HttpError> {
+    let SpheresBody { spheres, sizes, ignored, answer: ByKeyword(answer), .. } = head;
+    let spheres = spheres.to_bytes(&arrays, "spheres")?;
+    let sizes = match sizes {
+        Some(sizes) => sizes.to_bytes(&arrays, "sizes")?,
+        None => CountsField::ones(spheres.len() / SPHERE_BYTES),
+    };
+    let request = pb::CheckSpheresRequest {
+        asked: asked(&map, head.level, head.min_revision, head.map_uuid),
+        spheres_f32le: spheres,
+        sizes_u32le: sizes,
+        padding_m: head.padding_m,
+        ignored: ignored_of(ignored)?,
+        answer: pb::CheckAnswer::from(answer).into(),
+        clearance_max_m: head.clearance_max_m,
+    };
+    let (map, check): (_, SphereCheck) = request.try_into()?;
+    let answer = check.answer;
+    let answered = service.ask(&map, check).await?;
+    let (head, arrays) = collisions_of(answered.answer.into(), answer);
+    Answer { head, version: answered.version, arrays }.respond(form)
+}
+
+/// Bytes of a sphere.
+const SPHERE_BYTES: usize = 4 * size_of::<f32>();

@@ -1,0 +1,51 @@
+//! What planners ask of a map, each question at one revision: does a body fit, at poses and along motions; where rays end;
+//! what is nearest; what the map is seen from above.
+//!
+//! Of bodies, [`Body`] is what is asked about, [`Planner`] who is asked, and [`PlanningView`] has the questions. `cubes` defines
+//! when a ball meets a voxel; `clearance` is what makes the answers fast. Each other question is a function of a
+//! [`MapView`](crate::map::MapView) and a request of plain slices, and answers with plain arrays.
+
+mod body;
+mod clearance;
+mod configurations;
+mod cover;
+mod cubes;
+mod eight;
+mod error;
+mod grid;
+mod in_cells;
+mod kind;
+mod link;
+mod look;
+mod motions;
+mod nearest;
+mod one;
+mod path;
+mod placement;
+mod planner;
+mod points;
+mod poses;
+mod rays;
+mod remembered;
+mod simd;
+mod spheres;
+mod surroundings;
+#[cfg(test)]
+mod test_maps;
+#[cfg(test)]
+mod tests;
+
+pub use body::{Body, Link, Sphere};
+pub use clearance::FIELD_BYTES_MAX_DEFAULT;
+pub use configurations::{Configurations, NUMBERS_PER_POSE};
+pub use cover::{COVER_SPHERES_MAX, CoverError, cover_box, cover_capsule};
+pub use error::PlanningError;
+pub use grid::{Grid, GridArea, GridError, GridRequest, NotOccupied, project_grid};
+pub use kind::{CLEARANCE_CELLS_MAX, Clearance, Hit};
+pub use motions::{MotionAnswer, MotionQuestion};
+pub use nearest::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, RADIUS_VOXELS_MAX, find_nearest};
+pub use planner::{Planner, PlanningView};
+pub use poses::PoseQuestion;
+pub use rays::{DIRECTION_LENGTH_TOLERANCE, RayError, RayHits, Rays, Toward, cast_rays};
+pub use spheres::{SphereGroups, SphereQuestion};
+pub use surroundings::Surroundings;

@@ -1,0 +1,71 @@
+//! Space as a ray sees it: occupied, or empty up to some size.
+
+use super::ray::{Place, Ray};
+use crate::map::{CellBounds, TierView};
+use crate::planning::remembered::Remembered;
+use crate::voxel::{BlockInCluster, Cell, Cluster, VoxelKey};
+
+/// The voxels of one level.
+pub(super) struct Space<'a> {
+    clusters: Remembered<'a>,
+    bounds: CellBounds,
+    up: u32,
+    piece_levels: u32,
+}
+
+/// A ray under way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Walk {
+    ray: Ray,
+    place: Place,
+    /// Where it ends, meters.
+    end_m: f64,
+    /// Which of the rays it is.
+    pub(super) number: usize,
+}
+
+/// What one step of a walk came to.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Step {
+    /// It goes on.
+    Further,
+    /// It met this voxel, so many meters from its begin.
+    Hit(f64, VoxelKey),
+    /// It ended.
+    Missed,
+}
+
+impl<'a> Space<'a> {
+    /// Space without a voxel beyond `bounds`; `nothing` is a cluster without a block.
+    pub(super) fn new(view: TierView<'a>, bounds: CellBounds, nothing: &'a Cluster) -> Self {
+        let (up, piece_levels) = (view.up(), view.piece_levels());
+        Self { clusters: Remembered::new(view, nothing), bounds, up, piece_levels }
+    }
+
+    /// The walk of a ray of length `range_m`; none where it misses all.
+    #[inline(always)]
+    pub(super) fn walk(&self, number: usize, ray: Ray, range_m: f64) -> Option<Walk> {
+        let (place, end_m) = ray.clipped(&self.bounds, range_m)?;
+        Some(Walk { ray, place, end_m, number })
+    }
+
+    /// Leaps over the empty space around the place of a walk, where it is empty.
+    #[inline(always)]
+    pub(super) fn step(&mut self, walk: &mut Walk) -> Step {
+        let cell = walk.ray.cell(&walk.place);
+        let Some(levels) = self.empty_levels(cell) else {
+            return Step::Hit(walk.place.at_m, VoxelKey::pack(cell.map(|i| i >> self.up)));
+        };
+        walk.place = walk.ray.beyond(&walk.place, levels);
+        if walk.place.at_m < walk.end_m { Step::Further } else { Step::Missed }
+    }
+
+    /// How large the empty aligned cube around `cell` is: the levels from a cell up to it. None where the voxel that holds
+    /// the cell is occupied.
+    #[inline(always)]
+    fn empty_levels(&mut self, cell: [i32; 3]) -> Option<u32> {
+        let (place, in_block) = (BlockInCluster::of_voxel(cell), Cell::of(cell).1);
+        let levels = self.clusters.around(cell).empty_levels(place, in_block, self.up)?;
+        Some(levels.min(self.piece_levels))
+    }
+}

@@ -1,0 +1,78 @@
+//! Rays that take turns: while one waits for memory or for a sum, others go on.
+
+use super::space::{Space, Step, Walk};
+use super::{RayError, RayHits, Request};
+use crate::util::StopSignal;
+
+/// Rays under way at once.
+const AT_ONCE: usize = 4;
+
+/// Rounds of turns between two looks at the stop signal: about a millisecond.
+const ROUNDS_PER_LOOK: usize = 16_384;
+
+/// All rays of a request, some of them under way.
+pub(super) struct Turns<'a> {
+    space: Space<'a>,
+    request: Request<'a>,
+    /// The first ray that has not begun.
+    next: usize,
+}
+
+impl<'a> Turns<'a> {
+    /// The rays of `request` in `space`, none of which has begun.
+    pub(super) fn new(space: Space<'a>, request: Request<'a>) -> Self {
+        Self { space, request, next: 0 }
+    }
+
+    /// Walks all rays to their ends and sets what they hit.
+    pub(super) fn walk(mut self, hits: &mut RayHits, stop: StopSignal<'_>) -> Result<(), RayError> {
+        let mut walks = Vec::with_capacity(AT_ONCE);
+        while walks.len() < AT_ONCE
+            && let Some(walk) = self.begin()?
+        {
+            walks.push(walk);
+        }
+        while !walks.is_empty() && !stop.is_stopped() {
+            self.some_rounds(&mut walks, hits)?;
+        }
+        Ok(())
+    }
+
+    fn some_rounds(&mut self, walks: &mut Vec<Walk>, hits: &mut RayHits) -> Result<(), RayError> {
+        for _ in 0..ROUNDS_PER_LOOK {
+            if walks.is_empty() {
+                break;
+            }
+            let mut turn = 0;
+            while let Some(walk) = walks.get_mut(turn) {
+                match self.space.step(walk) {
+                    Step::Further => {
+                        turn += 1;
+                        continue;
+                    }
+                    Step::Hit(distance_m, voxel) => hits.set(walk.number, distance_m, voxel),
+                    Step::Missed => {}
+                }
+                match self.begin()? {
+                    Some(begun) => *walk = begun,
+                    None => drop(walks.swap_remove(turn)),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The walk of the next ray that can meet anything.
+    #[inline(always)]
+    fn begin(&mut self) -> Result<Option<Walk>, RayError> {
+        while self.next < self.request.rays.len() {
+            let number = self.next;
+            self.next += 1;
+            let (ray, range_m) = self.request.ray(number)?;
+            if let Some(walk) = self.space.walk(number, ray, range_m) {
+                return Ok(Some(walk));
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,83 @@
+//! The map from above, as a 2-D grid.
+
+use super::{Asked, Question, QuestionedMap};
+use crate::map::ContentVersion;
+use crate::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
+use crate::service::{Limits, Reason, ServiceError};
+use crate::util::StopSignal;
+
+/// What is the map from above?
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridQuestion {
+    /// What it has in common with other questions.
+    pub asked: Asked,
+    /// What the grid covers, and how finely.
+    pub scope: GridScope,
+}
+
+/// What a grid covers, and how finely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridScope {
+    /// Which part of the map, seen from above.
+    pub area: GridArea,
+    /// Lowest and highest height of voxels' centers, meters; infinite ones are fine.
+    pub band_m: [f64; 2],
+    /// Side of a cell, meters: a whole number of the level's voxels. One voxel without.
+    pub cell_m: Option<f64>,
+}
+
+/// Bytes of a cell in an answer: a height and a bit.
+const BYTES_EACH: usize = 5;
+
+impl GridQuestion {
+    /// Most cells of an answer.
+    fn cells_max(limits: &Limits) -> usize {
+        limits.grid_cells_max.min(limits.message_bytes_max / BYTES_EACH)
+    }
+}
+
+impl Question for GridQuestion {
+    type Answer = Grid;
+
+    const OPERATION: &'static str = "ProjectGrid";
+
+    fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    fn answer_bytes(&self, limits: &Limits) -> usize {
+        Self::cells_max(limits) * BYTES_EACH
+    }
+
+    fn check(&self, _: &Limits) -> Result<(), ServiceError> {
+        Ok(())
+    }
+
+    fn answer_from(
+        &self,
+        map: &QuestionedMap<'_>,
+        limits: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<(Grid, ContentVersion), ServiceError> {
+        let GridScope { area, band_m, cell_m } = self.scope;
+        let level = self.asked.level;
+        // It walks all voxels of the area: never a short question.
+        map.in_view(usize::MAX, stop, |view| {
+            let cell_m = cell_m.unwrap_or_else(|| view.lattice().resolution_m(level));
+            let cells_max = Self::cells_max(limits);
+            Ok(project_grid(view, &GridRequest { level, area, band_m, cell_m, cells_max }, stop)?)
+        })
+    }
+}
+
+impl From<GridError> for ServiceError {
+    fn from(error: GridError) -> Self {
+        match error {
+            GridError::Cells { .. } => {
+                let message = format!("grid_cells_max: {error}: ask for a smaller area or larger cells");
+                Self::new(Reason::GridTooLarge, message)
+            }
+            _ => Self::new(Reason::BadGrid, error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Questions of planners: each is answered from a view of a whole map, the server's or a replica's.
+
+mod check;
+mod grid;
+mod motions;
+mod nearest;
+mod poses;
+mod rays;
+mod spheres;
+
+pub use check::{CheckAs, Collisions};
+pub use grid::{GridQuestion, GridScope};
+pub use motions::MotionCheck;
+pub use nearest::NearestQuestion;
+pub use poses::PoseCheck;
+pub use rays::{RayQuestion, RaysToward};
+pub use spheres::SphereCheck;
+
+use std::fmt::Debug;
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use uuid::Uuid;
+
+use super::hosted_map::HostedMap;
+use super::time_limit::TimeLimit;
+use super::{Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early};
+use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap};
+use crate::planning::Planner;
+use crate::util::StopSignal;
+
+/// What all questions have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Asked {
+    /// The level of the voxels, 0 the finest.
+    pub level: u32,
+    /// Wait for this revision.
+    pub min_revision: Option<u64>,
+    /// The incarnation of the map that `min_revision` belongs to.
+    pub map_uuid: Option<Uuid>,
+}
+
+/// A question of a planner.
+pub trait Question: Debug + Send + Sync + 'static {
+    /// What it is answered with.
+    type Answer: Debug + Send + 'static;
+
+    /// Its name in the table of operations.
+    const OPERATION: &'static str;
+
+    /// What it has in common with others.
+    fn asked(&self) -> &Asked;
+
+    /// Bytes of memory that its answer takes, at most.
+    fn answer_bytes(&self, limits: &Limits) -> usize;
+
+    /// Checks it against the server's limits.
+    ///
+    /// # Errors
+    /// `InvalidArgument`, naming the field, the value and the limit.
+    fn check(&self, limits: &Limits) -> Result<(), ServiceError>;
+
+    /// The answer from one view of `map`, with the version that it is of.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was.
+    fn answer_from(
+        &self,
+        map: &QuestionedMap<'_>,
+        limits: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<(Self::Answer, ContentVersion), ServiceError>;
+}
+
+/// A map that questions are asked of, and the planner of it, which is made when it is first needed.
+#[derive(Debug, Clone, Copy)]
+pub struct QuestionedMap<'a> {
+    map: &'a Arc<MultiResolutionMap>,
+    planner: &'a OnceLock<Planner>,
+}
+
+impl<'a> QuestionedMap<'a> {
+    /// The map, with a place for its planner.
+    pub fn new(map: &'a Arc<MultiResolutionMap>, planner: &'a OnceLock<Planner>) -> Self {
+        Self { map, planner }
+    }
+
+    /// The planner, which keeps what makes checks of bodies fast.
+    pub(super) fn planner(&self) -> &'a Planner {
+        self.planner.get_or_init(|| Planner::new(Arc::clone(self.map)))
+    }
+
+    /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
+    /// are kept from beginning meanwhile, so that no shorter question queues behind a change that waits for this one.
+    pub(super) fn in_view<A>(
+        &self,
+        elements: usize,
+        stop: StopSignal<'_>,
+        f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
+    ) -> Result<(A, ContentVersion), ServiceError> {
+        let _long_read = (elements > SHORT_ELEMENTS).then(|| self.map.long_read());
+        let view = self.map.view();
+        let answer = f(&view)?;
+        check_not_stopped(stop)?;
+        Ok((answer, view.version()))
+    }
+}
+
+/// The answer to a question, with the state of the map that it is of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answered<A> {
+    /// The answer.
+    pub answer: A,
+    /// All of it is at this state.
+    pub version: MapVersion,
+}
+
+/// Elements up to which a question is answered without keeping changes from beginning meanwhile: some milliseconds.
+const SHORT_ELEMENTS: usize = 4096;
+
+/// Whom memory is lent to, in refusals.
+const ANSWER: &str = "the answer to a question";
+
+impl MapService {
+    /// Answers a question of a planner at one revision, on a thread for queries.
+    ///
+    /// # Errors
+    /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when `min_revision`
+    /// does not come; `FailedPrecondition` when the map has another uuid; `ResourceExhausted` where there is no memory for
+    /// the answer, or too many jobs wait.
+    pub async fn ask<Q: Question>(
+        &self,
+        map: &MapName,
+        question: Q,
+    ) -> Result<Answered<Q::Answer>, ServiceError> {
+        let work = async {
+            let map = self.map(map)?;
+            let Asked { level, min_revision, map_uuid } = *question.asked();
+            question.check(self.limits())?;
+            map.check_level(level)?;
+            map.check_uuid(map_uuid)?;
+            if let Some(revision) = min_revision {
+                let wait_max = Duration::from_secs_f64(self.limits().min_revision_wait_max_s);
+                map.wait_for_revision(revision, wait_max).await?;
+            }
+            let inner = Arc::clone(&self.inner);
+            let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
+            let answer = move |stop: StopSignal<'_>| {
+                let limits = &inner.settings.limits;
+                let _lent = inner.budget.reserve_transient(question.answer_bytes(limits) as u64, ANSWER)?;
+                let (answer, version) =
+                    limit.run(stop, |stop| question.answer_from(&map.questioned(), limits, stop))?;
+                Ok(Answered { answer, version: map.version(version) })
+            };
+            self.inner.queries.run(answer).await?
+        };
+        self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
+    }
+}
+
+impl HostedMap {
+    fn questioned(&self) -> QuestionedMap<'_> {
+        QuestionedMap::new(&self.map, &self.planner)
+    }
+}
+
+/// Refuses a question of more elements than one request may have, or of so many that the answer fits into no message.
+fn check_elements(
+    field: &str,
+    elements: usize,
+    bytes_each: usize,
+    limits: &Limits,
+) -> Result<(), ServiceError> {
+    limits.check_elements(field, elements)?;
+    let most = limits.message_bytes_max / bytes_each;
+    if elements <= most {
+        return Ok(());
+    }
+    let message = format!(
+        "{field}: {elements} of them take {} bytes in the answer, message_bytes_max is {}: ask for at most {most}",
+        elements * bytes_each,
+        limits.message_bytes_max
+    );
+    Err(ServiceError::new(Reason::BatchTooLarge, message))
+}

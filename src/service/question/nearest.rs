@@ -1,0 +1,64 @@
+//! The nearest voxel of points.
+
+use super::{Asked, Question, QuestionedMap, check_elements};
+use crate::geometry::Point;
+use crate::map::ContentVersion;
+use crate::planning::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, find_nearest};
+use crate::service::{Limits, PointCloud, Reason, ServiceError};
+use crate::util::StopSignal;
+
+/// How far is the nearest occupied voxel of these points?
+#[derive(Debug, Clone, PartialEq)]
+pub struct NearestQuestion {
+    /// What it has in common with other questions.
+    pub asked: Asked,
+    /// The points, meters in the map frame.
+    pub points: PointCloud,
+    /// How far to look, meters: above 0, at most [`RADIUS_VOXELS_MAX`](crate::planning::RADIUS_VOXELS_MAX) voxels.
+    pub radius_m: f64,
+    /// What of a voxel distances are measured to.
+    pub to: MeasuredTo,
+}
+
+/// Bytes of a point in an answer: a distance, a voxel, a direction, and a bit.
+const BYTES_EACH: usize = 25;
+
+impl Question for NearestQuestion {
+    type Answer = NearestVoxels;
+
+    const OPERATION: &'static str = "FindNearest";
+
+    fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    fn answer_bytes(&self, _: &Limits) -> usize {
+        self.points.len() * BYTES_EACH
+    }
+
+    fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
+        check_elements("points", self.points.len(), BYTES_EACH, limits)?;
+        let points = self.points.as_slice();
+        let Some(place) = points.iter().position(|point: &Point| !point.is_finite()) else { return Ok(()) };
+        let message = format!("points[{place}] is not finite: {:?}", points[place]);
+        Err(ServiceError::new(Reason::PointNotFinite, message))
+    }
+
+    fn answer_from(
+        &self,
+        map: &QuestionedMap<'_>,
+        _: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<(NearestVoxels, ContentVersion), ServiceError> {
+        let Self { asked, points, radius_m, to } = self;
+        let request =
+            NearestRequest { points: points.as_slice(), level: asked.level, radius_m: *radius_m, to: *to };
+        map.in_view(points.len(), stop, |view| Ok(find_nearest(view, &request, stop)?))
+    }
+}
+
+impl From<NearestError> for ServiceError {
+    fn from(error: NearestError) -> Self {
+        Self::new(Reason::BadRadius, error.to_string())
+    }
+}

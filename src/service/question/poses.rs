@@ -1,0 +1,71 @@
+//! Does a body fit at these configurations?
+
+use std::sync::Arc;
+
+use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, check_parts, clearance_most_m};
+use super::{Asked, Question, QuestionedMap, check_elements};
+use crate::map::ContentVersion;
+use crate::planning::{Body, Configurations, PoseQuestion, Surroundings};
+use crate::service::{Limits, ServiceError, check_not_stopped};
+use crate::util::StopSignal;
+
+/// Does a body fit at these configurations?
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseCheck {
+    /// What it has in common with other questions.
+    pub asked: Asked,
+    /// The body.
+    pub body: Arc<Body>,
+    /// Poses of its links in the map frame, configuration by configuration, link by link, each x y z qx qy qz qw.
+    pub configurations: Vec<f32>,
+    /// What counts.
+    pub surroundings: Surroundings,
+    /// How it is answered.
+    pub answer: CheckAs,
+}
+
+impl Question for PoseCheck {
+    type Answer = Collisions;
+
+    const OPERATION: &'static str = "CheckPoses";
+
+    fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    fn answer_bytes(&self, _: &Limits) -> usize {
+        self.configurations.len() * BYTES_EACH
+    }
+
+    fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
+        check_parts("body", self.body.parts(), limits)?;
+        check_ignored(self.surroundings.ignored.len(), limits)?;
+        let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
+        check_elements("configurations", configurations.len(), BYTES_EACH, limits)
+    }
+
+    fn answer_from(
+        &self,
+        map: &QuestionedMap<'_>,
+        _: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<(Collisions, ContentVersion), ServiceError> {
+        let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
+        let level = self.asked.level;
+        let question =
+            PoseQuestion { body: &self.body, configurations, level, surroundings: &self.surroundings };
+        let view = map.planner().view();
+        let collisions = match self.answer {
+            CheckAs::Colliding => view
+                .bodies_meet(&question, stop)?
+                .map(|words| Collisions::Colliding { words, checked: configurations.len() }),
+            CheckAs::FirstHit => view.first_hits(&question, stop)?.map(Collisions::FirstHits),
+            CheckAs::Clearance { most_m } => {
+                let most_m = clearance_most_m(&view, level, most_m);
+                view.clearances(&question, most_m, stop)?.map(Collisions::Clearances)
+            }
+        };
+        check_not_stopped(stop)?;
+        collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| super::ended_early(stop))
+    }
+}

@@ -1,0 +1,86 @@
+//! Rays: what each meets first.
+
+use super::{Asked, Question, QuestionedMap, check_elements};
+use crate::map::ContentVersion;
+use crate::planning::{RayError, RayHits, Rays, Toward, cast_rays};
+use crate::service::{Limits, PointCloud, Reason, ServiceError};
+use crate::util::StopSignal;
+
+/// What do these rays meet?
+#[derive(Debug, Clone, PartialEq)]
+pub struct RayQuestion {
+    /// What it has in common with other questions.
+    pub asked: Asked,
+    /// Where each ray begins, meters in the map frame: one point for each ray, or one for all of them.
+    pub origins: PointCloud,
+    /// Where each ray leads.
+    pub toward: RaysToward,
+}
+
+/// Where rays lead.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RaysToward {
+    /// Along unit vectors.
+    Directions {
+        /// A direction for each ray, of length 1 within [`DIRECTION_LENGTH_TOLERANCE`].
+        ///
+        /// [`DIRECTION_LENGTH_TOLERANCE`]: crate::planning::DIRECTION_LENGTH_TOLERANCE
+        directions: PointCloud,
+        /// Length of each ray, meters, above 0; infinite for rays that end with the map.
+        range_m: f64,
+    },
+    /// To the point where each ray ends.
+    Ends(PointCloud),
+}
+
+/// Bytes of a ray in an answer: a distance, a voxel, and a bit.
+const BYTES_EACH: usize = 13;
+
+impl RayQuestion {
+    fn rays(&self) -> Rays<'_> {
+        let toward = match &self.toward {
+            RaysToward::Directions { directions, range_m } => {
+                Toward::Directions { directions: directions.as_slice(), range_m: *range_m }
+            }
+            RaysToward::Ends(ends) => Toward::Ends(ends.as_slice()),
+        };
+        Rays { origins: self.origins.as_slice(), toward }
+    }
+
+    fn elements(&self) -> usize {
+        self.rays().len()
+    }
+}
+
+impl Question for RayQuestion {
+    type Answer = RayHits;
+
+    const OPERATION: &'static str = "CastRays";
+
+    fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    fn answer_bytes(&self, _: &Limits) -> usize {
+        self.elements() * BYTES_EACH
+    }
+
+    fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
+        check_elements("rays", self.elements(), BYTES_EACH, limits)
+    }
+
+    fn answer_from(
+        &self,
+        map: &QuestionedMap<'_>,
+        _: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<(RayHits, ContentVersion), ServiceError> {
+        map.in_view(self.elements(), stop, |view| Ok(cast_rays(view, &self.rays(), self.asked.level, stop)?))
+    }
+}
+
+impl From<RayError> for ServiceError {
+    fn from(error: RayError) -> Self {
+        Self::new(Reason::BadRay, error.to_string())
+    }
+}

@@ -1,0 +1,177 @@
+//! Bodies, and what checks of them have in common.
+
+use bytes::Bytes;
+
+use crate::map::Region;
+use crate::planning::{Body, Clearance, Hit, Link, NUMBERS_PER_POSE, Sphere, Surroundings};
+use crate::service::{CheckAs, Collisions, PointCloud, Reason, ServiceError};
+use crate::voxel::VoxelKey;
+use crate::wire::array::{bitmap_of, bytes_of, numbers_of, voxels_of, words_of};
+use crate::wire::types::count_from;
+use crate::wire::{InField, pb};
+
+/// Numbers of a sphere: its center and its radius.
+const NUMBERS_PER_SPHERE: usize = 4;
+/// The link of nothing.
+const NO_LINK: u32 = u32::MAX;
+
+impl TryFrom<pb::Body> for Body {
+    type Error = ServiceError;
+
+    fn try_from(body: pb::Body) -> Result<Self, ServiceError> {
+        let link =
+            |(number, link): (usize, pb::Link)| link.try_into().in_field(&format!("body.links[{number}]"));
+        let links = body.links.into_iter().enumerate().map(link).collect::<Result<_, _>>()?;
+        Ok(Self::new(links).in_field("body")?)
+    }
+}
+
+impl From<&Body> for pb::Body {
+    fn from(body: &Body) -> Self {
+        Self { links: body.links().iter().map(Into::into).collect() }
+    }
+}
+
+impl TryFrom<pb::Link> for Link {
+    type Error = ServiceError;
+
+    fn try_from(link: pb::Link) -> Result<Self, ServiceError> {
+        let points = match link.points {
+            Some(points) => PointCloud::try_from(points).in_field("points")?.as_slice().to_vec(),
+            None => Vec::new(),
+        };
+        let spheres = spheres_from(&link.spheres_f32le)?;
+        Ok(Self { spheres, points, padding_m: link.padding_m })
+    }
+}
+
+impl From<&Link> for pb::Link {
+    fn from(link: &Link) -> Self {
+        let points = (!link.points.is_empty()).then(|| PointCloud::from(link.points.clone()).into());
+        Self { spheres_f32le: spheres_bytes(&link.spheres), points, padding_m: link.padding_m }
+    }
+}
+
+/// Spheres, four numbers each.
+pub(super) fn spheres_from(bytes: &Bytes) -> Result<Vec<Sphere>, ServiceError> {
+    let numbers = whole_from(bytes, NUMBERS_PER_SPHERE, "spheres_f32le")?;
+    let spheres = numbers.as_chunks::<NUMBERS_PER_SPHERE>().0.iter();
+    Ok(spheres.map(|&[x, y, z, radius_m]| Sphere { center_m: [x, y, z], radius_m }).collect())
+}
+
+/// The inverse of [`spheres_from`].
+pub(super) fn spheres_bytes(spheres: &[Sphere]) -> Bytes {
+    bytes_of(spheres.iter().flat_map(|Sphere { center_m: [x, y, z], radius_m }| [*x, *y, *z, *radius_m]))
+}
+
+/// Poses of links, seven numbers each.
+pub(super) fn configurations_from(bytes: &Bytes) -> Result<Vec<f32>, ServiceError> {
+    whole_from(bytes, NUMBERS_PER_POSE, "configurations_f32le")
+}
+
+/// Counts, as many as there are.
+pub(super) fn counts_from(bytes: &Bytes, field: &str) -> Result<Vec<u32>, ServiceError> {
+    numbers_of(bytes, bytes.len() / size_of::<u32>(), field)
+}
+
+/// Floats, `each` at a time.
+fn whole_from(bytes: &Bytes, each: usize, field: &str) -> Result<Vec<f32>, ServiceError> {
+    if !bytes.len().is_multiple_of(each * size_of::<f32>()) {
+        let message =
+            format!("{field} must have {each} numbers of 4 bytes each time, got {} bytes", bytes.len());
+        return Err(ServiceError::new(Reason::BadArray, message));
+    }
+    numbers_of(bytes, bytes.len() / size_of::<f32>(), field)
+}
+
+/// What counts for a check.
+pub(super) fn surroundings_from(ignored: Vec<pb::Region>) -> Result<Surroundings, ServiceError> {
+    let region = |(number, region): (usize, pb::Region)| {
+        Region::try_from(region).in_field(&format!("ignored[{number}]"))
+    };
+    Ok(Surroundings { ignored: ignored.into_iter().enumerate().map(region).collect::<Result<_, _>>()? })
+}
+
+/// The inverse of [`surroundings_from`].
+pub(super) fn ignored_of(surroundings: Surroundings) -> Vec<pb::Region> {
+    surroundings.ignored.into_iter().map(Into::into).collect()
+}
+
+/// How a check is answered.
+pub(super) fn answer_from(answer: i32, clearance_max_m: Option<f32>) -> Result<CheckAs, ServiceError> {
+    let answer_as = match pb::CheckAnswer::try_from(answer) {
+        Ok(pb::CheckAnswer::Unspecified | pb::CheckAnswer::Colliding) => CheckAs::Colliding,
+        Ok(pb::CheckAnswer::FirstHit) => CheckAs::FirstHit,
+        Ok(pb::CheckAnswer::Clearance) => return Ok(CheckAs::Clearance { most_m: clearance_max_m }),
+        Err(_) => {
+            let message =
+                format!("answer must be 0, 1 (colliding), 2 (first hit) or 3 (clearance), got {answer}");
+            return Err(ServiceError::new(Reason::BadCheck, message));
+        }
+    };
+    if clearance_max_m.is_some() {
+        let message = "clearance_max_m goes with the answer clearance";
+        return Err(ServiceError::new(Reason::BadCheck, message));
+    }
+    Ok(answer_as)
+}
+
+/// The inverse of [`answer_from`].
+pub(super) fn answer_of(answer: CheckAs) -> (pb::CheckAnswer, Option<f32>) {
+    match answer {
+        CheckAs::Colliding => (pb::CheckAnswer::Colliding, None),
+        CheckAs::FirstHit => (pb::CheckAnswer::FirstHit, None),
+        CheckAs::Clearance { most_m } => (pb::CheckAnswer::Clearance, most_m),
+    }
+}
+
+impl From<Collisions> for pb::Collisions {
+    fn from(collisions: Collisions) -> Self {
+        let (checked, words) = (collisions.checked(), collisions.words());
+        let colliding_count = words.iter().map(|word| u64::from(word.count_ones())).sum();
+        let all = Self {
+            checked: checked as u64,
+            colliding: bitmap_of(words, checked),
+            colliding_count,
+            ..Self::default()
+        };
+        match collisions {
+            Collisions::Colliding { .. } => all,
+            Collisions::FirstHits(hits) => Self {
+                hit_links_u32le: bytes_of(hits.iter().map(|hit| hit.map_or(NO_LINK, |hit| hit.link))),
+                hit_parts_u32le: bytes_of(hits.iter().map(|hit| hit.map_or(0, |hit| hit.part))),
+                hit_voxels_u64le: bytes_of(hits.iter().map(|hit| hit.map_or(0, |hit| hit.voxel.to_bits()))),
+                ..all
+            },
+            Collisions::Clearances(clearances) => Self {
+                clearances_m_f32le: bytes_of(clearances.iter().map(|of| of.distance_m)),
+                nearest_links_u32le: bytes_of(clearances.iter().map(|of| of.link.unwrap_or(NO_LINK))),
+                ..all
+            },
+        }
+    }
+}
+
+impl TryFrom<pb::Collisions> for Collisions {
+    type Error = ServiceError;
+
+    fn try_from(of: pb::Collisions) -> Result<Self, ServiceError> {
+        let checked = count_from(of.checked);
+        let link = |link: u32| (link != NO_LINK).then_some(link);
+        if !of.hit_links_u32le.is_empty() {
+            let links = numbers_of(&of.hit_links_u32le, checked, "hit_links_u32le")?;
+            let parts = numbers_of(&of.hit_parts_u32le, checked, "hit_parts_u32le")?;
+            let voxels = voxels_of(&of.hit_voxels_u64le, checked, "hit_voxels_u64le")?;
+            let hit =
+                |((of, part), voxel): ((u32, u32), VoxelKey)| Some(Hit { link: link(of)?, part, voxel });
+            return Ok(Self::FirstHits(links.into_iter().zip(parts).zip(voxels).map(hit).collect()));
+        }
+        if !of.clearances_m_f32le.is_empty() {
+            let distances = numbers_of(&of.clearances_m_f32le, checked, "clearances_m_f32le")?;
+            let links = numbers_of(&of.nearest_links_u32le, checked, "nearest_links_u32le")?;
+            let clearance = |(distance_m, of): (f32, u32)| Clearance { distance_m, link: link(of) };
+            return Ok(Self::Clearances(distances.into_iter().zip(links).map(clearance).collect()));
+        }
+        Ok(Self::Colliding { words: words_of(&of.colliding, checked, "colliding")?, checked })
+    }
+}

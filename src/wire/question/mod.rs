@@ -1,0 +1,43 @@
+//! Questions of planners and their answers (`planning.proto`).
+
+mod body;
+mod grid;
+mod motions;
+mod nearest;
+mod poses;
+mod rays;
+
+use super::{InField, pb, required, uuid_from};
+use crate::map::MapName;
+use crate::service::{Answered, Asked, MapVersion, ServiceError};
+
+/// A question with the map that it is about.
+pub(super) type Of<Q> = (MapName, Q);
+
+impl TryFrom<pb::Asked> for Of<Asked> {
+    type Error = ServiceError;
+
+    fn try_from(asked: pb::Asked) -> Result<Self, ServiceError> {
+        let pb::Asked { map, level, min_revision, map_uuid } = asked;
+        let map_uuid = (!map_uuid.is_empty()).then(|| uuid_from(&map_uuid)).transpose()?;
+        Ok((MapName::new(&map)?, Asked { level, min_revision, map_uuid }))
+    }
+}
+
+impl From<(&MapName, Asked)> for pb::Asked {
+    fn from((map, Asked { level, min_revision, map_uuid }): (&MapName, Asked)) -> Self {
+        let map_uuid = map_uuid.map(|uuid| uuid.to_string()).unwrap_or_default();
+        Self { map: map.to_string(), level, min_revision, map_uuid }
+    }
+}
+
+/// What a question has in common with others.
+fn asked_of(asked: Option<pb::Asked>) -> Result<Of<Asked>, ServiceError> {
+    required(asked, "asked")?.try_into()
+}
+
+/// An answer with its version, which the message must name.
+fn answered<A>(answer: A, version: Option<pb::MapVersion>) -> Result<Answered<A>, ServiceError> {
+    let version: MapVersion = required(version, "version")?.try_into().in_field("version")?;
+    Ok(Answered { answer, version })
+}

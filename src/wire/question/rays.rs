@@ -1,0 +1,70 @@
+//! Rays.
+
+use super::{Of, answered, asked_of};
+use crate::map::MapName;
+use crate::planning::RayHits;
+use crate::service::{Answered, PointCloud, RayQuestion, RaysToward, Reason, ServiceError};
+use crate::wire::array::{bitmap_of, bytes_of, numbers_of, voxels_of, words_of};
+use crate::wire::types::count_from;
+use crate::wire::{InField, pb, required};
+
+impl TryFrom<pb::CastRaysRequest> for Of<RayQuestion> {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::CastRaysRequest) -> Result<Self, ServiceError> {
+        let (map, asked) = asked_of(request.asked)?;
+        let origins = required(request.origins, "origins")?.try_into().in_field("origins")?;
+        let toward = match (request.directions, request.ends, request.range_m) {
+            (Some(directions), None, range_m) => RaysToward::Directions {
+                directions: directions.try_into().in_field("directions")?,
+                range_m: range_m.unwrap_or(f64::INFINITY),
+            },
+            (None, Some(ends), None) => RaysToward::Ends(ends.try_into().in_field("ends")?),
+            _ => {
+                let message = "rays take directions, with range_m or without, or ends alone";
+                return Err(ServiceError::new(Reason::BadRay, message));
+            }
+        };
+        Ok((map, RayQuestion { asked, origins, toward }))
+    }
+}
+
+impl From<(&MapName, RayQuestion)> for pb::CastRaysRequest {
+    fn from((map, RayQuestion { asked, origins, toward }): (&MapName, RayQuestion)) -> Self {
+        let points = |points: PointCloud| Some(points.into());
+        let (directions, ends, range_m) = match toward {
+            RaysToward::Directions { directions, range_m } => (points(directions), None, Some(range_m)),
+            RaysToward::Ends(ends) => (None, points(ends), None),
+        };
+        Self { asked: Some((map, asked).into()), origins: points(origins), directions, ends, range_m }
+    }
+}
+
+impl From<Answered<RayHits>> for pb::CastRaysResponse {
+    fn from(Answered { answer, version }: Answered<RayHits>) -> Self {
+        let (rays, hits) = (answer.len(), answer.hits());
+        let RayHits { hit, distances_m, voxels } = answer;
+        Self {
+            hit: bitmap_of(hit, rays),
+            rays: rays as u64,
+            hits: hits as u64,
+            distances_m_f32le: bytes_of(distances_m),
+            voxels_u64le: bytes_of(voxels.into_iter().map(|voxel| voxel.to_bits())),
+            version: Some(version.into()),
+        }
+    }
+}
+
+impl TryFrom<pb::CastRaysResponse> for Answered<RayHits> {
+    type Error = ServiceError;
+
+    fn try_from(response: pb::CastRaysResponse) -> Result<Self, ServiceError> {
+        let rays = count_from(response.rays);
+        let hits = RayHits {
+            hit: words_of(&response.hit, rays, "hit")?,
+            distances_m: numbers_of(&response.distances_m_f32le, rays, "distances_m_f32le")?,
+            voxels: voxels_of(&response.voxels_u64le, rays, "voxels_u64le")?,
+        };
+        answered(hits, response.version)
+    }
+}
