@@ -6,6 +6,7 @@
 //! queue behind a change that itself waits for a long one.
 
 use super::block_change::{BlockChange, block_changes};
+use super::followers::TouchedBlocks;
 use super::moments::{MomentLocks, MomentsOfShard};
 use super::shard::Shard;
 use super::sharding::SHARDS;
@@ -24,12 +25,15 @@ pub struct Committer<'a> {
     map: &'a MultiResolutionMap,
     /// The levels of which it is noted what the change does.
     noted: LevelSet,
+    /// True where a follower wants to know which blocks change.
+    followed: bool,
     _turn: MutexGuard<'a, ()>,
 }
 
 impl<'a> Committer<'a> {
     pub(super) fn begin(map: &'a MultiResolutionMap) -> Self {
-        Self { map, noted: LevelSet::default(), _turn: map.commit_queue.lock() }
+        let turn = map.commit_queue.lock();
+        Self { map, noted: LevelSet::default(), followed: map.followers.want_blocks(), _turn: turn }
     }
 
     /// The map, which nobody else changes meanwhile.
@@ -204,8 +208,10 @@ impl<'a> Committer<'a> {
         let by_shard = self.group(removed, added);
         let mut is_planned = by_shard.each_ref().map(|changes| !changes.is_empty());
         shards.into_iter().for_each(|i| is_planned[i] = true);
-        let plan =
-            |i: usize| (i, ShardUpdate::plan(&self.map.shards[i].read(), &by_shard[i], self.noted, stop));
+        let plan = |i: usize| {
+            let shard = self.map.shards[i].read();
+            (i, ShardUpdate::plan(&shard, &by_shard[i], self.noted, self.followed, stop))
+        };
         let shards: Vec<_> = (0..SHARDS).filter(|&i| is_planned[i]).map(plan).collect();
         let total = |of: fn(&ShardUpdate) -> Moved| {
             shards.iter().fold(Moved::default(), |all, (_, update)| all.and(of(update)))
@@ -237,16 +243,24 @@ impl<'a> Committer<'a> {
         let no_long_read = self.map.long_reads.write();
         let lost = update.shards.iter().map(|(i, update)| (*i, &update.moments));
         let moments = self.map.moments.change(lost, added, known, stop);
-        let mut emptied = Vec::new();
+        let (mut emptied, mut touched) = (Vec::new(), TouchedBlocks::default());
         let lock = |(i, update): (usize, ShardUpdate)| {
             let mut shard = self.map.shards[i].write();
+            touched.extend(&update.touched);
             emptied.extend(update.apply(&mut shard, &self.map.settings));
             shard
         };
         let shards = update.shards.into_iter().map(lock).collect();
+        self.tell(touched);
         let locks =
             Locks { _shards: shards, _moments: moments, _no_long_read: no_long_read, _emptied: emptied };
         (!stop.is_stopped()).then_some(locks)
+    }
+
+    /// Tells the followers which blocks changed, and those who came while it was planned that they do not know.
+    fn tell(&self, touched: TouchedBlocks) {
+        let touched = if self.followed { touched } else { TouchedBlocks::everything() };
+        self.map.followers.tell(touched);
     }
 }
 

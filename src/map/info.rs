@@ -40,6 +40,8 @@ pub struct MapDescription {
     pub set_bytes: usize,
     /// Bytes of memory of the points' moments.
     pub moment_bytes: usize,
+    /// Bytes of memory of what is derived of the voxels beside the map, as planners do.
+    pub follower_bytes: usize,
     /// Bytes of memory of the trajectory, with what is known of scans whose poses are not kept.
     pub trajectory_bytes: usize,
 }
@@ -69,17 +71,20 @@ impl MultiResolutionMap {
             levels: levels.collect(),
             set_bytes: view.shards().map(Shard::set_bytes).sum(),
             moment_bytes: moments.bytes(),
+            follower_bytes: self.followers.bytes(),
             trajectory_bytes: self.trajectory().memory_bytes(),
         }
     }
 
-    /// Bytes of memory of the exact sets of all levels, the points' moments and the trajectory.
+    /// Bytes of memory of the exact sets of all levels, the points' moments and the trajectory, and of what is derived of
+    /// the voxels beside the map.
     pub fn memory_bytes(&self) -> usize {
         let long = self.long_read();
         let (moments, view) = (long.moments(), long.view());
         view.shards().map(Shard::set_bytes).sum::<usize>()
             + moments.bytes()
             + self.trajectory().memory_bytes()
+            + self.followers.bytes()
     }
 
     /// Bytes of memory of the exact sets of all levels.

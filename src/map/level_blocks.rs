@@ -19,7 +19,7 @@ impl MapView<'_> {
 }
 
 /// The part of a block `up` levels coarser that the voxels of `block` are.
-fn coarsened(block: VoxelKey, mask: &BlockMask, up: u32) -> (VoxelKey, BlockMask) {
+pub(super) fn coarsened(block: VoxelKey, mask: &BlockMask, up: u32) -> (VoxelKey, BlockMask) {
     if up == 0 {
         return (block, *mask);
     }

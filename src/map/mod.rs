@@ -14,8 +14,10 @@ mod committed;
 mod content_hash;
 mod contents;
 mod filter_room;
+mod followers;
 mod idempotency_log;
 mod info;
+mod level_block;
 mod level_blocks;
 mod level_changes;
 mod level_update;
@@ -39,6 +41,7 @@ pub use commit::Committer;
 pub use committed::Committed;
 pub use content_hash::{ContentHash, ContentVersion};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};
+pub use followers::{BlockFollower, TouchedBlocks};
 pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
@@ -62,6 +65,7 @@ pub use voxel_ownership::{Reversal, VoxelOwnership};
 use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
 use crate::voxel::Lattice;
+use followers::Followers;
 use moments::ShardedMoments;
 use published::Published;
 use shard::Shard;
@@ -84,6 +88,7 @@ pub struct MultiResolutionMap {
     trajectory: RwLock<Trajectory>,
     requests: RwLock<IdempotencyLog>,
     published: Published,
+    followers: Followers,
     commit_queue: Mutex<()>,
     /// Held by who reads for long; see [`MultiResolutionMap::long_view`].
     long_reads: RwLock<()>,
@@ -105,6 +110,7 @@ impl MultiResolutionMap {
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
             published: Published::default(),
+            followers: Followers::default(),
             commit_queue: Mutex::new(Rank::Commit, ()),
             long_reads: RwLock::new(Rank::LongRead, ()),
         })
@@ -190,6 +196,11 @@ impl MultiResolutionMap {
     /// are needed.
     pub fn moments(&self) -> MomentsView<'_> {
         self.moments.view()
+    }
+
+    /// Follows which blocks change from now on, for what is derived of the voxels. Changes cost a little more meanwhile.
+    pub fn follow_blocks(&self) -> BlockFollower {
+        self.followers.add()
     }
 
     /// Waits for the turn to change the map.

@@ -67,6 +67,11 @@ impl Sharding {
         shard_of_region(index.map(|i| i >> self.shift_at(level)))
     }
 
+    /// The shard of the voxel at `index` of `level`; none where the level is so coarse that the voxel spans several regions.
+    pub(super) fn shard_of_node(self, index: [i32; 3], level: u32) -> Option<usize> {
+        (level <= self.region_shift).then(|| self.shard_of(index, level))
+    }
+
     /// Shards enough for `points` placed at `map_from_points`: those of the regions that their bounding box meets, with
     /// room for rounding; all of them where that is many.
     pub(super) fn touched_by(

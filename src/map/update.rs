@@ -2,6 +2,7 @@
 
 use super::block_change::{BlockChange, block_changes};
 use super::bulk::find_each;
+use super::followers::TouchedBlocks;
 use super::level_changes::{KeysOfLevel, LevelSet};
 use super::level_update::LevelUpdate;
 use super::moments::MomentsLost;
@@ -23,6 +24,8 @@ pub(super) struct ShardUpdate {
     pub(super) moments: MomentsLost,
     /// The keys that go and come of the levels that somebody watches.
     pub(super) noted: Vec<KeysOfLevel>,
+    /// The blocks that change, where a follower wants to know them.
+    pub(super) touched: TouchedBlocks,
     outcome: Outcome,
 }
 
@@ -57,31 +60,36 @@ impl Moved {
 impl ShardUpdate {
     /// Finds out what `changes` of blocks of finest voxels come to in `shard`, and counts them: voxels to remove that are not
     /// there are passed over, and so the set says which keys the filters are told to forget (paper II-A). Once stopped, what
-    /// comes of it is not to be applied, and the shard of no use. What becomes of the levels `noted` is kept.
+    /// comes of it is not to be applied, and the shard of no use. What becomes of the levels `noted` is kept, and the blocks that change where they are `followed`.
     pub(super) fn plan(
         shard: &Shard,
         changes: &[BlockChange<'_>],
         noted: LevelSet,
+        followed: bool,
         stop: StopSignal<'_>,
     ) -> Self {
         if let Some(removed) = removes_everything(shard, changes) {
             let (moments, outcome) = (MomentsLost::Everything, Outcome::Nothing);
             let noted = noted.iter().map(|level| all_keys(shard, level)).collect();
-            return Self { removed, added: Moved::default(), moments, noted, outcome };
+            let touched = TouchedBlocks::everything();
+            return Self { removed, added: Moved::default(), moments, noted, touched, outcome };
         }
         let (mut tiers, mut levels, mut moments) = (Vec::new(), Vec::new(), MomentsLost::default());
-        let finest = Tier::of(shard, 0, changes, &mut moments, stop);
+        let mut touched = TouchedBlocks::default();
+        let mut finest = Tier::of(shard, 0, changes, followed, &mut moments, stop);
         let (removed, added) = (Moved::of_keys(&finest.lost[0]), Moved::of_keys(&finest.gained[0]));
         let mut kept = finest.keys_of(noted);
+        touched.tiers.push(std::mem::take(&mut finest.touched));
         let (mut emptied, mut created) = finest.plan(&mut tiers, &mut levels, stop);
         for tier in 1..shard.tiers.len() {
             let (removed, added) = (VoxelSet::from_iter(emptied), VoxelSet::from_iter(created));
             let changes: Vec<_> = block_changes(&removed, &added).collect();
-            let tier = Tier::of(shard, tier, &changes, &mut moments, stop);
+            let mut tier = Tier::of(shard, tier, &changes, followed, &mut moments, stop);
+            touched.tiers.push(std::mem::take(&mut tier.touched));
             kept.extend(tier.keys_of(noted));
             (emptied, created) = tier.plan(&mut tiers, &mut levels, stop);
         }
-        Self { removed, added, moments, noted: kept, outcome: Outcome::Voxels { tiers, levels } }
+        Self { removed, added, moments, noted: kept, touched, outcome: Outcome::Voxels { tiers, levels } }
     }
 
     /// Does it, but for the moments. What the shard held and holds no more is for the caller to drop, once nobody
@@ -133,6 +141,9 @@ struct Tier<'a> {
     tier: usize,
     /// The blocks that change, as they are afterwards.
     blocks: Vec<(VoxelKey, BlockMask)>,
+    /// The same blocks with the voxels that change, where somebody follows them.
+    touched: Vec<(VoxelKey, BlockMask)>,
+    followed: bool,
     /// The blocks that lose their last voxel, and those that get their first.
     emptied: Vec<VoxelKey>,
     created: Vec<VoxelKey>,
@@ -146,14 +157,15 @@ impl<'a> Tier<'a> {
         shard: &'a Shard,
         tier: usize,
         changes: &[BlockChange<'_>],
+        followed: bool,
         moments: &mut MomentsLost,
         stop: StopSignal<'_>,
     ) -> Self {
         let levels = levels_of(tier, shard.filters.len()).len();
         let keys = || vec![Vec::new(); levels];
-        let blocks = Vec::with_capacity(changes.len());
+        let (blocks, touched) = (Vec::with_capacity(changes.len()), Vec::new());
         let (emptied, created, lost, gained) = (Vec::new(), Vec::new(), keys(), keys());
-        let mut of = Self { shard, tier, blocks, emptied, created, lost, gained };
+        let mut of = Self { shard, tier, blocks, touched, followed, emptied, created, lost, gained };
         for changes in stop.pieces(changes, BLOCKS_PER_LOOK) {
             find_each(&shard.tiers[tier], changes, |change, before| of.block(change, before, moments));
         }
@@ -178,6 +190,9 @@ impl<'a> Tier<'a> {
             self.emptied.push(block);
         }
         self.blocks.push((block, after));
+        if self.followed {
+            self.touched.push((block, before.symmetric_difference(&after)));
+        }
         (0..).zip(&mut self.gained).for_each(|(up, keys)| before.keys_gained(&after, block, up, keys));
         if loses {
             // What is gone is what would be gained if all came back.
@@ -204,7 +219,7 @@ impl<'a> Tier<'a> {
         levels: &mut Vec<LevelUpdate>,
         stop: StopSignal<'_>,
     ) -> (Vec<VoxelKey>, Vec<VoxelKey>) {
-        let Self { shard, tier, blocks, emptied, created, lost, gained } = self;
+        let Self { shard, tier, blocks, emptied, created, lost, gained, .. } = self;
         tiers.push(ClusterUpdate::plan(&shard.tiers[tier], &blocks, stop));
         drop(blocks);
         let keys = lost.into_iter().zip(gained);

@@ -98,6 +98,18 @@ impl<'a> MapView<'a> {
         self.shards.iter().flatten().map(|shard| &**shard)
     }
 
+    /// The shards, of those that the view covers, that the voxel at `index` of `level`, however coarse, lies in.
+    pub(super) fn shards_of(&self, index: [i32; 3], level: u32) -> impl Iterator<Item = &Shard> {
+        let one = self.map.sharding.shard_of_node(index, level);
+        let range = one.map_or(0..SHARDS, |one| one..one + 1);
+        self.shards[range].iter().flatten().map(|shard| &**shard)
+    }
+
+    /// The map that is read.
+    pub fn map(&self) -> &'a MultiResolutionMap {
+        self.map
+    }
+
     /// What the look-up kernels read of `level`.
     pub(crate) fn level_view(&self, level: u32) -> LevelView<'_> {
         let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));

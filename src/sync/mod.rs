@@ -54,6 +54,8 @@ pub(crate) enum Rank {
     Trajectory,
     /// The answers to requests that a map remembers.
     Requests,
+    /// The distance fields that a planner keeps beside a map.
+    Fields,
     /// Anything that is held for a few instructions.
     Brief,
 }

@@ -170,6 +170,17 @@ impl BlockMask {
         })
     }
 
+    /// The finest voxels within the ancestor of `cell` two levels up, ascending.
+    #[inline]
+    pub(crate) fn part(&self, cell: Cell) -> impl Iterator<Item = Cell> + use<> {
+        let (first, mut rest) = (cell.0 & !63, self.0[cell.word()]);
+        std::iter::from_fn(move || {
+            let bit = (rest != 0).then(|| rest.trailing_zeros())?;
+            rest &= rest - 1;
+            Some(Cell(first | bit as u16))
+        })
+    }
+
     /// The occupied voxels at `level` (0, 1 or 2) as the cells of a block of as many fewer levels: the first 512, 64 or 8.
     #[inline]
     pub(super) fn coarsened(&self, level: u32) -> Self {
@@ -216,6 +227,12 @@ impl BlockMask {
     #[inline]
     pub fn intersection(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|w| self.0[w] & other.0[w]))
+    }
+
+    /// The voxels in one of the two and not in the other.
+    #[inline]
+    pub fn symmetric_difference(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|w| self.0[w] ^ other.0[w]))
     }
 
     /// The voxels of this that are not in `other`.
