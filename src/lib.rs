@@ -5,8 +5,8 @@
 //!
 //! * [`voxel`], [`bloom`], [`geometry`]: keys, lattice and blocks (paper II-B, III); counting Bloom filters (II-A);
 //!   points and poses.
-//! * [`map`], [`align`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A, III-B);
-//!   point-cloud files.
+//! * [`map`], [`align`], [`planning`], [`scan`]: the map itself (II, III) and its look-ups; sequential alignment (III-A,
+//!   III-B); what planners ask; point-cloud files.
 //! * [`mapping`]: a scan enters a map, from its guess to the inserted voxels (III-B). Whoever wants to see the whole before its
 //!   parts begins here.
 //! * `store`: map files. `service`: the operations, once for every protocol.
@@ -78,6 +78,7 @@ pub mod map;
 pub mod mapping;
 #[cfg(feature = "server")]
 pub mod middleware;
+pub mod planning;
 pub mod scan;
 #[cfg(feature = "server")]
 pub mod server;

@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 16] = [
     &["voxel", "bloom"],
     &["scan"],
     &["map"],
-    &["align"],
+    &["align", "planning"],
     &["mapping"],
     &["store"],
     &["service"],
@@ -34,13 +34,15 @@ const CORE: usize = 5;
 /// Crates that the core must not know.
 const NOT_IN_THE_CORE: [&str; 7] = ["tokio", "tonic", "axum", "prost", "serde", "hyper", "tower"];
 
-/// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart; and the prefetch.
-const KERNELS: [&str; 7] = [
+/// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart, planners' questions; and the
+/// prefetch.
+const KERNELS: [&str; 8] = [
     "voxel/quantize",
     "voxel/new_keys",
     "bloom/fill",
     "map/bounds.rs",
     "map/lookup",
+    "planning/simd.rs",
     "lab/rivals/dense/offsets",
     "util/prefetch.rs",
 ];

@@ -1,0 +1,131 @@
+//! Why a planner's question cannot be answered.
+
+use crate::geometry::QUATERNION_NORM_TOLERANCE;
+
+/// Why numbers are not a question.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlanningError {
+    /// A sphere that is none.
+    #[error(
+        "links[{link}].spheres[{sphere}] must have a finite center and a radius in 0..={radius_max_m} m, got {center_m:?} and {radius_m}"
+    )]
+    Sphere {
+        /// The link, or the group.
+        link: usize,
+        /// The sphere in it.
+        sphere: usize,
+        /// Its center, meters.
+        center_m: [f32; 3],
+        /// Its radius, meters.
+        radius_m: f32,
+        /// The largest radius, meters.
+        radius_max_m: f32,
+    },
+    /// A sphere that is too large for the level.
+    #[error(
+        "links[{link}].spheres[{sphere}] has a radius of {radius} voxels with its padding, at most {radius_max} are possible: ask a coarser level"
+    )]
+    RadiusInVoxels {
+        /// The link, or the group.
+        link: usize,
+        /// The sphere in it; points with padding come after the spheres.
+        sphere: usize,
+        /// Its radius, voxels of the level.
+        radius: f64,
+        /// The largest radius, voxels of the level.
+        radius_max: f64,
+    },
+    /// A point with NaN or infinity.
+    #[error("links[{link}].points[{point}] must be finite, got {xyz_m:?}")]
+    Point {
+        /// The link.
+        link: usize,
+        /// The point in it.
+        point: usize,
+        /// Its coordinates, meters.
+        xyz_m: [f32; 3],
+    },
+    /// A padding that is none.
+    #[error("links[{link}].padding_m must lie in 0..={padding_max_m} m, got {padding_m}")]
+    Padding {
+        /// The link.
+        link: usize,
+        /// Its padding, meters.
+        padding_m: f32,
+        /// The largest padding, meters.
+        padding_max_m: f32,
+    },
+    /// A body without a link.
+    #[error("a body has at least one link")]
+    NoLinks,
+    /// Numbers that are not whole configurations.
+    #[error(
+        "a configuration of {links} links has {expected} numbers (x y z qx qy qz qw each), got {got} in all"
+    )]
+    Configurations {
+        /// The body's links.
+        links: usize,
+        /// Numbers of a configuration.
+        expected: usize,
+        /// Numbers that came.
+        got: usize,
+    },
+    /// A pose that is none.
+    #[error(
+        "configurations[{configuration}].links[{link}] must be finite, with a unit quaternion within {QUATERNION_NORM_TOLERANCE}, got {numbers:?}"
+    )]
+    Pose {
+        /// The configuration.
+        configuration: usize,
+        /// The link.
+        link: usize,
+        /// x y z qx qy qz qw.
+        numbers: [f32; 7],
+    },
+    /// Groups whose sizes do not sum up to the spheres.
+    #[error("the groups have {expected} spheres in all, got {got}")]
+    Groups {
+        /// The sum of the groups' sizes.
+        expected: usize,
+        /// Spheres that came.
+        got: usize,
+    },
+    /// A motion of fewer than two configurations, or motions whose lengths do not sum up.
+    #[error("motions have at least 2 configurations each, {configurations} in all, got {lengths:?}")]
+    Motions {
+        /// Configurations that came.
+        configurations: usize,
+        /// The motions' lengths; the first of them where they are many.
+        lengths: Vec<usize>,
+    },
+    /// A level that the map has not.
+    #[error("level must lie in 0..={level_max}, got {level}")]
+    Level {
+        /// The level.
+        level: u32,
+        /// The map's coarsest.
+        level_max: u32,
+    },
+    /// A distance that is none.
+    #[error("{field} must lie in {min}..={max}, got {value}")]
+    Number {
+        /// Which number it is.
+        field: &'static str,
+        /// The number.
+        value: f64,
+        /// The least.
+        min: f64,
+        /// The largest.
+        max: f64,
+    },
+    /// A motion that takes too many steps.
+    #[error("motions[{motion}] takes {steps} steps, at most {steps_max} are made: take a larger step_m")]
+    Steps {
+        /// The motion.
+        motion: usize,
+        /// Its steps.
+        steps: u64,
+        /// The largest number of steps.
+        steps_max: u64,
+    },
+}

@@ -1,0 +1,108 @@
+//! The kinds of answers for one configuration: a bit, the first hit, the clearance.
+
+use super::PlanningError;
+use super::look::Look;
+use super::one::{Configuration, NearestLink};
+use crate::voxel::VoxelKey;
+
+/// Largest distance up to which clearances are told, in voxels of the level that is asked.
+pub const CLEARANCE_CELLS_MAX: f64 = 64.0;
+
+/// What a body meets first: in the order of links, in a link spheres before points, each in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hit {
+    /// The link.
+    pub link: u32,
+    /// The sphere, or the number of spheres plus that of the point.
+    pub part: u32,
+    /// The voxel: for a sphere the nearest to its center, of several the one with the smallest key; for a point without
+    /// padding the one that it falls in.
+    pub voxel: VoxelKey,
+}
+
+/// How much room a body has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance {
+    /// Distance from the body to the nearest voxel, meters: 0 where they meet, and at most what was asked for.
+    pub distance_m: f32,
+    /// The link that is nearest, the first of several; none where nothing is nearer than what was asked for.
+    pub link: Option<u32>,
+}
+
+/// A kind of answer.
+pub(super) trait Kind {
+    /// The answer.
+    type Answer;
+
+    /// The answer for a configuration that is placed; none where it waits for a part of the field.
+    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Self::Answer>;
+}
+
+/// Does the body meet a voxel?
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Meets;
+
+/// What does it meet first?
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FirstHits;
+
+/// How far is it from a voxel?
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clearances {
+    most_m: f32,
+    most: f64,
+    cells_per_m: f64,
+}
+
+impl Clearances {
+    /// Clearances up to `most_m` meters.
+    ///
+    /// # Errors
+    /// When that is negative, or more than [`CLEARANCE_CELLS_MAX`] cells.
+    pub(super) fn up_to(most_m: f32, cells_per_m: f64) -> Result<Self, PlanningError> {
+        let (value, max) = (f64::from(most_m), CLEARANCE_CELLS_MAX / cells_per_m);
+        let most = value * cells_per_m;
+        let is_in_range = (0.0..=CLEARANCE_CELLS_MAX).contains(&most);
+        let refused = PlanningError::Number { field: "clearance_max_m", value, min: 0.0, max };
+        is_in_range.then_some(Self { most_m, most, cells_per_m }).ok_or(refused)
+    }
+
+    /// The largest distance that is told, cells.
+    pub(super) fn most(&self) -> f64 {
+        self.most
+    }
+
+    /// A distance in cells, as meters.
+    pub(super) fn told_m(&self, distance: f64) -> f32 {
+        ((distance / self.cells_per_m) as f32).min(self.most_m)
+    }
+}
+
+impl Kind for Meets {
+    type Answer = bool;
+
+    #[inline(always)]
+    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<bool> {
+        configuration.meets(look)
+    }
+}
+
+impl Kind for FirstHits {
+    type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Option<Hit>> {
+        let hit = configuration.first_hit(look)?;
+        Some(hit.map(|hit| Hit { link: hit.link as u32, part: hit.part as u32, voxel: hit.voxel }))
+    }
+}
+
+impl Kind for Clearances {
+    type Answer = Clearance;
+
+    #[inline(always)]
+    fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Clearance> {
+        let NearestLink { distance, link } = configuration.nearest(look, self.most)?;
+        Some(Clearance { distance_m: self.told_m(distance), link: link.map(|link| link as u32) })
+    }
+}

@@ -1,0 +1,263 @@
+//! Can a body move along these configurations?
+//!
+//! Between two configurations a link's translation goes along a line and its rotation along the shorter arc. A motion is
+//! checked in even steps, so that no point of the body moves further than a step. Steps are skipped by clearance: a link
+//! that is clear by d cannot meet a voxel before one of its spheres' centers has moved by d. So the answer is that of all
+//! steps.
+
+use super::PlanningError;
+use super::body::Body;
+use super::configurations::Configurations;
+use super::in_cells::{BodyInCells, LinkInCells};
+use super::kind::Clearances;
+use super::link::{self, LinkState};
+use super::look::Look;
+use super::path::LinkMotion;
+use super::placement::{CellsFromLink, LinkPose};
+use super::planner::{Answerer, PlanningView};
+use super::surroundings::Surroundings;
+use crate::util::StopSignal;
+
+/// Motions between two looks at the stop signal.
+const PER_LOOK: usize = 16;
+/// Most steps of a motion between two configurations.
+const STEPS_MAX: u64 = 100_000;
+/// The least step, meters.
+const STEP_MIN_M: f64 = 1e-5;
+/// What is taken off a clearance before steps are skipped by it, cells.
+const ROUNDING_CELLS: f64 = 1e-6;
+
+/// A body along motions.
+#[derive(Debug, Clone, Copy)]
+pub struct MotionQuestion<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// The configurations of all motions, one after the other.
+    pub configurations: Configurations<'a>,
+    /// How many configurations each motion has: two or more.
+    pub lengths: &'a [u32],
+    /// How far a point of the body moves in a step at most, meters; half a voxel of the level without.
+    pub step_m: Option<f32>,
+    /// Up to where the least clearance of each motion is told, meters; it is not told without.
+    pub clearance_max_m: Option<f32>,
+    /// Level of the voxels that count.
+    pub level: u32,
+    /// What counts.
+    pub surroundings: &'a Surroundings,
+}
+
+/// How far a body can move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionAnswer {
+    /// The first step at which the body meets a voxel, as a share of the motion: configuration i of n is i / (n - 1). None
+    /// where the motion is free.
+    pub first_hit: Option<f32>,
+    /// The least distance from the body to a voxel at any step, meters, where it was asked for: 0 where they meet.
+    pub clearance_m: Option<f32>,
+}
+
+impl MotionAnswer {
+    /// True where the body meets nothing on its way.
+    pub fn is_free(&self) -> bool {
+        self.first_hit.is_none()
+    }
+}
+
+impl PlanningView<'_> {
+    /// Says of each motion whether the body can make it. None once stopped.
+    ///
+    /// # Errors
+    /// For a level that the map has not, spheres that are too large for it, lengths that do not sum up to the
+    /// configurations or are below two, and a step or clearance out of range.
+    pub fn check_motions(
+        &self,
+        question: &MotionQuestion<'_>,
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Vec<MotionAnswer>>, PlanningError> {
+        let cells_per_m = self.cells_per_m(question.level)?;
+        let body = BodyInCells::of(question.body, cells_per_m)?;
+        let motions = question.motions(&body, cells_per_m)?;
+        let chunks = (motions.len(), PER_LOOK);
+        let MotionQuestion { level, surroundings, .. } = *question;
+        Ok(self.each(level, surroundings, chunks, stop, Motions(&motions)))
+    }
+}
+
+/// Answers motion by motion.
+struct Motions<'a>(&'a [BodyMotion<'a>]);
+
+impl Answerer for Motions<'_> {
+    type Answer = MotionAnswer;
+
+    #[inline(always)]
+    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<MotionAnswer> {
+        self.0[item].answer(look)
+    }
+}
+
+/// The motion of a body along a polyline.
+struct BodyMotion<'a> {
+    body: &'a BodyInCells,
+    segments: Vec<Segment>,
+    cells_per_m: f64,
+    clearances: Option<Clearances>,
+}
+
+/// A motion between two configurations.
+struct Segment {
+    links: Vec<LinkMotion>,
+    steps: u64,
+}
+
+impl MotionQuestion<'_> {
+    fn motions<'b>(
+        &self,
+        body: &'b BodyInCells,
+        cells_per_m: f64,
+    ) -> Result<Vec<BodyMotion<'b>>, PlanningError> {
+        self.configurations.check_links(body.links.len())?;
+        self.check_lengths()?;
+        let step_m = self.step_m(cells_per_m)?;
+        let clearances = self.clearance_max_m.map(|most_m| Clearances::up_to(most_m, cells_per_m));
+        let clearances = clearances.transpose()?;
+        let mut first = 0;
+        let motion = |(number, &length): (usize, &u32)| {
+            let (start, end) = (first, first + length as usize - 1);
+            first = end + 1;
+            let segments = (start..end).map(|from| self.segment(body, number, from, step_m));
+            let segments = segments.collect::<Result<Vec<_>, _>>()?;
+            Ok(BodyMotion { body, segments, cells_per_m, clearances })
+        };
+        self.lengths.iter().enumerate().map(motion).collect()
+    }
+
+    fn check_lengths(&self) -> Result<(), PlanningError> {
+        const SHOWN: usize = 8;
+        let sum: u64 = self.lengths.iter().map(|length| u64::from(*length)).sum();
+        let configurations = self.configurations.len();
+        if sum == configurations as u64 && self.lengths.iter().all(|length| *length >= 2) {
+            return Ok(());
+        }
+        let lengths = self.lengths.iter().take(SHOWN).map(|length| *length as usize).collect();
+        Err(PlanningError::Motions { configurations, lengths })
+    }
+
+    fn step_m(&self, cells_per_m: f64) -> Result<f64, PlanningError> {
+        let value = self.step_m.map_or(0.5 / cells_per_m, f64::from);
+        let max = f64::from(super::body::RADIUS_MAX_M);
+        let is_valid = (STEP_MIN_M..=max).contains(&value);
+        is_valid.then_some(value).ok_or(PlanningError::Number {
+            field: "step_m",
+            value,
+            min: STEP_MIN_M,
+            max,
+        })
+    }
+
+    /// The motion of the body from configuration `from` to the next.
+    fn segment(
+        &self,
+        body: &BodyInCells,
+        motion: usize,
+        from: usize,
+        step_m: f64,
+    ) -> Result<Segment, PlanningError> {
+        let ends = self.configurations.poses_of(from).iter().zip(self.configurations.poses_of(from + 1));
+        let links: Vec<_> =
+            ends.map(|(from, to)| LinkMotion::new(&LinkPose::of(from), &LinkPose::of(to))).collect();
+        let lengths_m = links.iter().zip(&body.links).map(|(motion, link)| motion.length_m(link.extent_m));
+        let steps = (lengths_m.fold(0.0, f64::max) / step_m).ceil().max(1.0) as u64;
+        if steps > STEPS_MAX {
+            return Err(PlanningError::Steps { motion, steps, steps_max: STEPS_MAX });
+        }
+        Ok(Segment { links, steps })
+    }
+}
+
+impl BodyMotion<'_> {
+    /// None where a part of the field is waited for.
+    #[inline(always)]
+    fn answer(&self, look: &mut Look<'_>) -> Option<MotionAnswer> {
+        let mut first_hit = None;
+        for (number, segment) in self.segments.iter().enumerate() {
+            // The first step of a segment is the last one of that before.
+            let step = self.first_hit(look, segment, u64::from(number > 0))?;
+            if let Some(step) = step {
+                let share = step as f64 / segment.steps as f64;
+                first_hit = Some(((number as f64 + share) / self.segments.len() as f64) as f32);
+                break;
+            }
+        }
+        let clearance_m = self.clearances.map(|clearances| match first_hit {
+            Some(_) => 0.0,
+            None => clearances.told_m(self.clearance(look, clearances.most())),
+        });
+        Some(MotionAnswer { first_hit, clearance_m })
+    }
+
+    /// The first step of a segment, from `first` on, at which a link meets a voxel.
+    #[inline(always)]
+    fn first_hit(&self, look: &mut Look<'_>, segment: &Segment, first: u64) -> Option<Option<u64>> {
+        let (mut end, mut waits) = (segment.steps + 1, false);
+        for (link, motion) in self.body.links.iter().zip(&segment.links) {
+            let per_step = motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
+            let mut step = first;
+            while step < end {
+                match self.state(look, link, motion, step, segment.steps) {
+                    LinkState::Meets => end = step,
+                    LinkState::IsClear(by) => step += steps_without(by, per_step),
+                    LinkState::Waits => {
+                        // What else is on the way will be asked for too.
+                        waits = true;
+                        step += 1;
+                    }
+                }
+            }
+        }
+        (!waits).then_some(Some(end).filter(|end| *end <= segment.steps))
+    }
+
+    #[inline(always)]
+    fn state(
+        &self,
+        look: &mut Look<'_>,
+        link: &LinkInCells,
+        motion: &LinkMotion,
+        step: u64,
+        steps: u64,
+    ) -> LinkState {
+        let pose = motion.at(step as f64 / steps as f64);
+        link::state(look, link, &pose, &CellsFromLink::of(&pose, self.cells_per_m))
+    }
+
+    /// The least distance at any step, cells, up to `most`.
+    fn clearance(&self, look: &mut Look<'_>, most: f64) -> f64 {
+        let mut least = most;
+        for segment in &self.segments {
+            for (link, motion) in self.body.links.iter().zip(&segment.links) {
+                let per_step =
+                    motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
+                let mut step = 0;
+                while step <= segment.steps {
+                    let pose = motion.at(step as f64 / segment.steps as f64);
+                    let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
+                    let lower = link::lower_bound(look, link, &cells_from_link);
+                    if lower > least {
+                        step += steps_without(lower - least, per_step);
+                        continue;
+                    }
+                    least = link::nearest(look, link, &cells_from_link, least).unwrap_or(least);
+                    step += 1;
+                }
+            }
+        }
+        least
+    }
+}
+
+/// Steps to the next one at which what is `clear` cells away can be reached, where each step goes `per_step` cells at most.
+#[inline(always)]
+fn steps_without(clear: f64, per_step: f64) -> u64 {
+    let steps = (clear - ROUNDING_CELLS) / per_step;
+    if steps >= 1.0 { steps.min(STEPS_MAX as f64 + 1.0) as u64 } else { 1 }
+}

@@ -1,0 +1,172 @@
+//! Who is asked: a map with the fields that make its answers fast.
+
+use std::sync::Arc;
+
+use super::PlanningError;
+use super::clearance::{FIELD_BYTES_MAX_DEFAULT, FieldBlockKey, Fields};
+use super::look::Look;
+use super::simd::{self, Work};
+use super::surroundings::Surroundings;
+use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
+use crate::sync::{Rank, RwLock};
+use crate::util::StopSignal;
+
+/// Times that a question is asked again for what was not made; then the voxels answer.
+const ROUNDS_MAX: usize = 3;
+
+/// Answers planners' questions about a map.
+///
+/// It keeps distance fields beside the map: made where they are asked for, renewed where the map changed, bounded in memory.
+/// A map without a planner costs nothing for it. Dropping the planner gives the memory back.
+#[derive(Debug)]
+pub struct Planner {
+    map: Arc<MultiResolutionMap>,
+    fields: RwLock<Fields>,
+    follower: BlockFollower,
+}
+
+/// Answers items of a question one by one.
+pub(super) trait Answerer {
+    /// The answer of an item.
+    type Answer;
+
+    /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when that
+    /// is. On the last look ([`Look::is_last`]) it always answers.
+    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<Self::Answer>;
+}
+
+/// Items that are answered between two looks at the stop signal, those of them that have no answer yet.
+struct Chunk<'a, 'l, A: Answerer> {
+    answerer: &'a mut A,
+    look: &'a mut Look<'l>,
+    first: usize,
+    answers: &'a mut [Option<A::Answer>],
+}
+
+impl<A: Answerer> Work for Chunk<'_, '_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (item, answer) in self.answers.iter_mut().enumerate().filter(|(_, answer)| answer.is_none()) {
+            *answer = self.answerer.answer(self.look, self.first + item);
+        }
+    }
+}
+
+/// A planner's map at one revision.
+#[derive(Debug)]
+pub struct PlanningView<'a> {
+    planner: &'a Planner,
+    view: MapView<'a>,
+    _changes_wait: LongRead<'a>,
+}
+
+impl Planner {
+    /// A planner of `map` with fields of at most [`FIELD_BYTES_MAX_DEFAULT`] bytes.
+    pub fn new(map: Arc<MultiResolutionMap>) -> Self {
+        Self::with_field_bytes(map, FIELD_BYTES_MAX_DEFAULT)
+    }
+
+    /// A planner of `map` whose fields hold at most `field_bytes_max` bytes, but for what a question needs at once. Less
+    /// is slower, and as exact.
+    pub fn with_field_bytes(map: Arc<MultiResolutionMap>, field_bytes_max: usize) -> Self {
+        let follower = map.follow_blocks();
+        let fields = Fields::new(map.block_levels_end() + 1, field_bytes_max);
+        Self { map, fields: RwLock::new(Rank::Fields, fields), follower }
+    }
+
+    /// The map.
+    pub fn map(&self) -> &Arc<MultiResolutionMap> {
+        &self.map
+    }
+
+    /// Bytes of memory that the fields hold; the map counts them among its own.
+    pub fn field_bytes(&self) -> usize {
+        self.fields.read().bytes()
+    }
+
+    /// Locks the whole map for questions. Changes wait for it, as for [`MultiResolutionMap::long_read`].
+    pub fn view(&self) -> PlanningView<'_> {
+        let changes_wait = self.map.long_read();
+        let view = self.map.view();
+        self.catch_up(&view);
+        PlanningView { planner: self, view, _changes_wait: changes_wait }
+    }
+
+    /// Forgets what is not true any more.
+    ///
+    /// Nothing changes while the view of the whole map is held. What changed is taken under the fields' lock, so that
+    /// whoever finds nothing to take finds the fields mended too.
+    fn catch_up(&self, view: &MapView<'_>) {
+        if self.follower.is_up_to_date() {
+            return;
+        }
+        let mut fields = self.fields.write();
+        let touched = self.follower.take();
+        fields.forget(&touched, view);
+        self.follower.set_bytes(fields.bytes());
+    }
+}
+
+impl PlanningView<'_> {
+    /// The revision of all answers, with the hash of what the map holds then.
+    pub fn version(&self) -> ContentVersion {
+        self.view.version()
+    }
+
+    /// Cells of `level` a meter.
+    ///
+    /// # Errors
+    /// For a level that the map has not.
+    pub(super) fn cells_per_m(&self, level: u32) -> Result<f64, PlanningError> {
+        let lattice = self.planner.map.lattice();
+        let level_max = lattice.levels() - 1;
+        if level > level_max {
+            return Err(PlanningError::Level { level, level_max });
+        }
+        Ok(1.0 / lattice.resolution_m(level))
+    }
+
+    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped.
+    pub(super) fn each<A: Answerer>(
+        &self,
+        level: u32,
+        surroundings: &Surroundings,
+        (count, per_look): (usize, usize),
+        stop: StopSignal<'_>,
+        mut answerer: A,
+    ) -> Option<Vec<A::Answer>> {
+        let mut answers: Vec<Option<A::Answer>> = Vec::with_capacity(count);
+        answers.resize_with(count, || None);
+        for (chunk, answers) in answers.chunks_mut(per_look).enumerate() {
+            if stop.is_stopped() {
+                return None;
+            }
+            for round in 1..=ROUNDS_MAX {
+                let fields = self.planner.fields.read();
+                let mut look = Look::new(&self.view, surroundings, level, &fields, round == ROUNDS_MAX);
+                let (answerer, look_at) = (&mut answerer, &mut look);
+                simd::run(Chunk { answerer, look: look_at, first: chunk * per_look, answers });
+                let unmade = look.into_unmade();
+                drop(fields);
+                self.make(unmade);
+                if answers.iter().all(Option::is_some) {
+                    break;
+                }
+            }
+        }
+        answers.into_iter().collect()
+    }
+
+    /// Makes blocks of the field.
+    fn make(&self, unmade: Vec<FieldBlockKey>) {
+        if unmade.is_empty() {
+            return;
+        }
+        let blocks = unmade.into_iter().map(|key| (key, key.make(&self.view))).collect();
+        let mut fields = self.planner.fields.write();
+        fields.keep(blocks);
+        self.planner.follower.set_bytes(fields.bytes());
+    }
+}

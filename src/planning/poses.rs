@@ -1,0 +1,107 @@
+//! Does a body fit at these configurations?
+
+use super::PlanningError;
+use super::body::Body;
+use super::configurations::Configurations;
+use super::in_cells::BodyInCells;
+use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
+use super::look::Look;
+use super::one::Configuration;
+use super::planner::{Answerer, PlanningView};
+use super::surroundings::Surroundings;
+use crate::util::StopSignal;
+
+/// Configurations between two looks at the stop signal.
+const PER_LOOK: usize = 256;
+
+/// A body at configurations.
+#[derive(Debug, Clone, Copy)]
+pub struct PoseQuestion<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// Where it is asked about, in the map frame.
+    pub configurations: Configurations<'a>,
+    /// Level of the voxels that count.
+    pub level: u32,
+    /// What counts.
+    pub surroundings: &'a Surroundings,
+}
+
+impl PlanningView<'_> {
+    /// Says of each configuration whether the body meets a voxel: configuration i is bit i % 64 of word i / 64. None once
+    /// stopped.
+    ///
+    /// # Errors
+    /// For a level that the map has not, and spheres that are too large for the level.
+    pub fn bodies_meet(
+        &self,
+        question: &PoseQuestion<'_>,
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Vec<u64>>, PlanningError> {
+        Ok(self.each_configuration(question, stop, Meets)?.map(|meets| words(&meets)))
+    }
+
+    /// What the body meets first in each configuration, where it meets something. None once stopped.
+    ///
+    /// # Errors
+    /// As for [`PlanningView::bodies_meet`].
+    pub fn first_hits(
+        &self,
+        question: &PoseQuestion<'_>,
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Vec<Option<Hit>>>, PlanningError> {
+        self.each_configuration(question, stop, FirstHits)
+    }
+
+    /// How much room the body has in each configuration, up to `most_m` meters. None once stopped.
+    ///
+    /// # Errors
+    /// As for [`PlanningView::bodies_meet`], and when `most_m` is more than [`CLEARANCE_CELLS_MAX`](super::CLEARANCE_CELLS_MAX) voxels.
+    pub fn clearances(
+        &self,
+        question: &PoseQuestion<'_>,
+        most_m: f32,
+        stop: StopSignal<'_>,
+    ) -> Result<Option<Vec<Clearance>>, PlanningError> {
+        let clearances = Clearances::up_to(most_m, self.cells_per_m(question.level)?)?;
+        self.each_configuration(question, stop, clearances)
+    }
+
+    fn each_configuration<K: Kind>(
+        &self,
+        question: &PoseQuestion<'_>,
+        stop: StopSignal<'_>,
+        kind: K,
+    ) -> Result<Option<Vec<K::Answer>>, PlanningError> {
+        let PoseQuestion { body, configurations, level, surroundings } = *question;
+        let cells_per_m = self.cells_per_m(level)?;
+        configurations.check_links(body.links().len())?;
+        let body = BodyInCells::of(body, cells_per_m)?;
+        let chunks = (configurations.len(), PER_LOOK);
+        let poses = Poses { configurations, kind, configuration: Configuration::new(&body, cells_per_m) };
+        Ok(self.each(level, surroundings, chunks, stop, poses))
+    }
+}
+
+/// Answers configuration by configuration.
+struct Poses<'a, K> {
+    configurations: Configurations<'a>,
+    kind: K,
+    configuration: Configuration<'a>,
+}
+
+impl<K: Kind> Answerer for Poses<'_, K> {
+    type Answer = K::Answer;
+
+    #[inline(always)]
+    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<K::Answer> {
+        self.configuration.place(self.configurations.poses_of(item));
+        self.kind.answer(&mut self.configuration, look)
+    }
+}
+
+/// Bits in words, the first in the lowest of the first word.
+pub(super) fn words(bits: &[bool]) -> Vec<u64> {
+    let word = |bits: &[bool]| (0..).zip(bits).fold(0, |word, (n, bit)| word | u64::from(*bit) << n);
+    bits.chunks(64).map(word).collect()
+}

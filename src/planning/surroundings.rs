@@ -1,0 +1,31 @@
+//! What of the map counts for a question, and what does not.
+
+use crate::map::Region;
+use crate::voxel::{Lattice, VoxelKey};
+
+/// What a body can run into: the voxels of the map but for those that are ignored.
+///
+/// Shapes that a body must keep out of will be here too, and be asked for their distance beside the voxels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Surroundings {
+    /// Voxels whose centers lie in one of these do not count: an object that is grasped, the robot's own place. Map frame.
+    pub ignored: Vec<Region>,
+}
+
+impl Surroundings {
+    /// The voxels of the map, all of them.
+    pub const ALL_VOXELS: Self = Self { ignored: Vec::new() };
+
+    /// True where voxels are ignored, so that what is known of the nearest voxel does not tell of the nearest that counts.
+    pub(super) fn ignores_some(&self) -> bool {
+        !self.ignored.is_empty()
+    }
+
+    /// True where `voxel` of `level` does not count.
+    pub(super) fn ignores(&self, lattice: &Lattice, voxel: VoxelKey, level: u32) -> bool {
+        self.ignores_some() && {
+            let center_m = lattice.center_m(voxel, level);
+            self.ignored.iter().any(|region| region.contains(center_m))
+        }
+    }
+}
