@@ -22,6 +22,16 @@ fn structures_answer_alike_and_each_has_a_line() {
 }
 
 #[test]
+fn each_of_a_planners_questions_has_a_line() {
+    let few = ["--poses", "200", "--point-poses", "50", "--scans", "2", "--repeats", "1"];
+    let lines = objects(&[&["bench", "planning"], &few[..]].concat());
+    assert_eq!(texts(&lines, "what"), ["arm", "points", "motions", "changing"]);
+    assert!(number(&lines[0], "ns_per_pose") > 0.0 && number(&lines[0], "field_bytes") > 10_000.0);
+    assert_eq!((number(&lines[1], "poses"), number(&lines[2], "colliding")), (50.0, 128.0));
+    assert!(number(&lines[3], "new_voxels_per_scan") > 0.0);
+}
+
+#[test]
 fn files_of_points_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

@@ -5,6 +5,7 @@ pub mod growth;
 pub mod insert;
 pub mod journal;
 pub mod lookup;
+pub mod planning;
 pub mod readers;
 pub mod start;
 pub mod stopwatch;

@@ -5,6 +5,7 @@ mod growth;
 mod insert;
 mod journal;
 mod lookup;
+mod planning;
 mod readers;
 mod serve;
 mod soak;
@@ -28,6 +29,7 @@ EXAMPLES:
   mrol bench start --workload site                    a start with ten million voxels
   mrol bench align scans/ --resolution 0.05
   mrol bench readers --workload site                  readers beside each other, and beside a writer
+  mrol bench planning --workload site                 an arm among ten million voxels
   mrol bench serve                                    a load of point queries on a server of its own
   mrol bench soak                                     an hour under a fleet's load: memory, errors
 
@@ -49,6 +51,7 @@ enum What {
     Growth(growth::Growth),
     Journal(journal::Journal),
     Align(align::Align),
+    Planning(planning::Planning),
     Readers(readers::Readers),
     Serve(serve::Serve),
     Soak(soak::Soak),
@@ -63,6 +66,7 @@ impl Bench {
             What::Growth(growth) => growth.run(&output),
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
+            What::Planning(planning) => planning.run(&output),
             What::Readers(readers) => readers.run(&output),
             What::Start(start) => start.run(&output),
             What::Serve(serve) => runtime::block_on(serve.run(output)),

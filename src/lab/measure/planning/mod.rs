@@ -1,0 +1,167 @@
+//! Measurement of planners' questions: an arm at poses, a body of points, motions, and what all that costs a map that
+//! changes.
+
+mod arm;
+mod changing;
+mod place;
+mod points;
+
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::stopwatch::Runs;
+use crate::map::MultiResolutionMap;
+use crate::planning::{
+    Body, Configurations, MotionQuestion, Planner, PlanningError, PoseQuestion, Surroundings,
+};
+use crate::util::StopSignal;
+pub use changing::{Changing, between_insertions};
+use place::Surface;
+pub use points::{PointBody, point_body};
+
+/// What an arm's poses cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmPoses {
+    /// Poses that were asked about.
+    pub poses: usize,
+    /// Those at which the arm meets a voxel.
+    pub colliding: usize,
+    /// The first pass, for which the fields are made; nanoseconds a pose.
+    pub first_ns: f64,
+    /// Passes after it.
+    pub runs: Runs,
+    /// Bytes of the fields after it.
+    pub field_bytes: usize,
+}
+
+/// What motions cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motions {
+    /// Motions that were asked about.
+    pub motions: usize,
+    /// Those on which the body meets a voxel.
+    pub colliding: usize,
+    /// Nanoseconds a motion.
+    pub runs: Runs,
+}
+
+/// Motions of which half collide.
+const MOTIONS: usize = 256;
+/// How far each goes, meters.
+const MOTION_M: f64 = 0.5;
+
+/// Asks about an arm of 59 spheres at `poses` random configurations within a meter of the map's surfaces, a bit each;
+/// `passes` times after the first.
+///
+/// # Errors
+/// When the map's voxels are too small for the arm.
+pub fn arm_poses(
+    map: &Arc<MultiResolutionMap>,
+    poses: usize,
+    passes: usize,
+    seed: u64,
+) -> Result<ArmPoses, PlanningError> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let arm = arm::body()?;
+    let numbers = arm::configurations(&Surface::of(map, &mut random), poses, &mut random);
+    let planner = Planner::new(Arc::clone(map));
+    let (mut first, mut runs) = (Runs::default(), Runs::default());
+    let bits = first.time(poses, || meets(&planner, &arm, &numbers))?;
+    for _ in 0..passes {
+        runs.time(poses, || meets(&planner, &arm, &numbers))?;
+    }
+    let colliding = bits.iter().map(|word| word.count_ones() as usize).sum();
+    let field_bytes = planner.field_bytes();
+    Ok(ArmPoses { poses, colliding, first_ns: first.median(), runs, field_bytes })
+}
+
+/// A bit for each configuration, by a view of its own.
+fn meets(planner: &Planner, body: &Body, numbers: &[f32]) -> Result<Vec<u64>, PlanningError> {
+    let configurations = Configurations::new(numbers, body.links().len())?;
+    let surroundings = &Surroundings::ALL_VOXELS;
+    let question = PoseQuestion { body, configurations, level: 0, surroundings };
+    Ok(planner.view().bodies_meet(&question, StopSignal::NEVER)?.unwrap_or_default())
+}
+
+/// Asks about 256 motions of half a meter of a body of 20 spheres near the map's surfaces, of which half collide, in one
+/// question; `passes` times after one that is not timed.
+///
+/// # Errors
+/// When the map's voxels are too small for the body.
+pub fn motions(map: &Arc<MultiResolutionMap>, passes: usize, seed: u64) -> Result<Motions, PlanningError> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let (body, planner) = (place::cart()?, Planner::new(Arc::clone(map)));
+    let surface = Surface::of(map, &mut random);
+    let (mut free, mut hit) = (Vec::new(), Vec::new());
+    // On some maps one kind is rare: then there are fewer.
+    for _ in 0..100 * MOTIONS {
+        if free.len() == MOTIONS / 2 && hit.len() == MOTIONS / 2 {
+            break;
+        }
+        let ends = surface.motion(MOTION_M, &mut random);
+        let kind = if ask(&planner, &body, &ends)?.contains(&true) { &mut hit } else { &mut free };
+        if kind.len() < MOTIONS / 2 {
+            kind.push(ends);
+        }
+    }
+    let colliding = hit.len();
+    let numbers: Vec<f32> = free.into_iter().chain(hit).flatten().collect();
+    let motions = numbers.len() / 14;
+    let mut runs = Runs::default();
+    ask(&planner, &body, &numbers)?;
+    for _ in 0..passes {
+        runs.time(motions, || ask(&planner, &body, &numbers))?;
+    }
+    Ok(Motions { motions, colliding, runs })
+}
+
+/// True for each motion on which the body meets a voxel.
+fn ask(planner: &Planner, body: &Body, numbers: &[f32]) -> Result<Vec<bool>, PlanningError> {
+    let configurations = Configurations::new(numbers, 1)?;
+    let question = MotionQuestion {
+        body,
+        configurations,
+        lengths: &vec![2; configurations.len() / 2],
+        step_m: None,
+        clearance_max_m: None,
+        level: 0,
+        surroundings: &Surroundings::ALL_VOXELS,
+    };
+    let answers = planner.view().check_motions(&question, StopSignal::NEVER)?.unwrap_or_default();
+    Ok(answers.iter().map(|answer| !answer.is_free()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::workload::{Room, Site, Workload};
+    use crate::map::MapSettings;
+
+    fn map_of(workload: Workload) -> Arc<MultiResolutionMap> {
+        Arc::new(workload.map(MapSettings::new(workload.resolution_m(), 6)).unwrap())
+    }
+
+    #[test]
+    fn arms_and_motions_collide_now_and_then() {
+        for workload in [Workload::Room(Room), Workload::Site(Site::of(100_000, 1))] {
+            let map = map_of(workload);
+            let arms = arm_poses(&map, 300, 1, 1).unwrap();
+            assert!((30..270).contains(&arms.colliding), "{arms:?}");
+            assert!(arms.field_bytes > 10_000 && arms.runs.ns_per_item().len() == 1);
+            let motions = motions(&map, 1, 1).unwrap();
+            assert_eq!((motions.motions, motions.colliding), (MOTIONS, MOTIONS / 2));
+        }
+    }
+
+    #[test]
+    fn a_body_of_points_and_a_map_that_changes_are_measured() {
+        let map = map_of(Workload::Room(Room));
+        let points = point_body(&map, 50, 1, 1).unwrap();
+        assert_eq!((points.poses, points.points), (50, 500));
+        let changing = between_insertions(Workload::Room(Room), MapSettings::new(0.05, 6), 3, 1).unwrap();
+        assert_eq!((changing.first_checks_ms.len(), changing.with_planner_ms.len()), (3, 3));
+        assert!(changing.changed_voxels > 0.0 && changing.between_ns > 0.0);
+    }
+}
