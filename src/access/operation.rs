@@ -133,6 +133,11 @@ impl Operation {
         matches!(
             self,
             Self::QueryPointsStream
+                | Self::CheckPosesStream
+                | Self::CheckSpheresStream
+                | Self::CheckMotionsStream
+                | Self::CastRaysStream
+                | Self::FindNearestStream
                 | Self::InsertScanStream
                 | Self::Watch
                 | Self::Reflect
@@ -142,7 +147,7 @@ impl Operation {
 
     /// True for streams whose messages are requests of their own, each counted when it is answered.
     pub fn is_stream_of_requests(self) -> bool {
-        matches!(self, Self::QueryPointsStream | Self::InsertScanStream)
+        self.is_stream() && !matches!(self, Self::Watch | Self::Reflect | Self::HealthWatch)
     }
 
     /// The operation of a gRPC call.

@@ -173,8 +173,13 @@ impl Fit {
             (Verdict::Undetermined, reason)
         } else {
             let held_m = self.surfaces.information.directions()[0].std_m;
-            let by = if map.settings().moments { "" } else { "; by overlap alone, the map keeps no moments" };
-            let reason = format!("overlap {overlap:.3}, held to {held_m:.4} m in every direction{by}");
+            let reason = if map.settings().moments {
+                format!("overlap {overlap:.3}, held to {held_m:.4} m in every direction")
+            } else {
+                format!(
+                    "overlap {overlap:.3}, by overlap alone: the map keeps no moments, and does not know what is open"
+                )
+            };
             (Verdict::Accepted, reason)
         };
         Alignment {

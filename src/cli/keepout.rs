@@ -54,8 +54,11 @@ struct Put {
     #[command(flatten)]
     shape: Shape,
     /// How long it stays: 90s, 15m, 8h or 2d [default: until it is removed]
-    #[arg(long, value_name = "TIME", value_parser = parse::duration)]
+    #[arg(long, value_name = "TIME", value_parser = parse::duration, conflicts_with = "request_id")]
     expires_in: Option<Duration>,
+    /// When it ends, nanoseconds since 1970: what goes with an id, since it is the same when it is sent again
+    #[arg(long, value_name = "NANOSECONDS", conflicts_with = "expires_in")]
+    expires_at_ns: Option<i64>,
     /// An id of this change, which makes it safe to send again
     #[arg(long, value_name = "ID", value_parser = parse::request_id)]
     request_id: Option<RequestId>,
@@ -117,8 +120,9 @@ impl KeepOuts {
 
 impl Put {
     async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { name, map, shape, expires_in, request_id } = self;
-        let expires_at_ns = expires_in.map(|rest| unix_time_ns(SystemTime::now() + rest)).transpose()?;
+        let Self { name, map, shape, expires_in, expires_at_ns, request_id } = self;
+        let from_now = expires_in.map(|rest| unix_time_ns(SystemTime::now() + rest)).transpose()?;
+        let expires_at_ns = from_now.or(expires_at_ns);
         let put = PutKeepOut { name: name.clone(), shape: shape.resolve()?, expires_at_ns, request_id };
         let client = map.server.connect().await?;
         let answer = client.put_keep_out(&map.name, put).await?;

@@ -278,7 +278,7 @@ impl<'a> Committer<'a> {
     /// Tells the followers which blocks changed, and those who came while it was planned that they do not know.
     fn tell(&self, touched: TouchedBlocks) {
         let touched = if self.followed { touched } else { TouchedBlocks::everything() };
-        self.map.followers.tell(&touched);
+        self.map.followers.tell(touched);
     }
 }
 

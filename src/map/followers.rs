@@ -35,6 +35,7 @@ impl TouchedBlocks {
         self.tiers.iter().map(Vec::len).sum()
     }
 
+    /// Adds what another part of the map, or a later change, touched.
     pub(super) fn extend(&mut self, other: &Self) {
         self.everything |= other.everything;
         if self.tiers.len() < other.tiers.len() {
@@ -66,8 +67,30 @@ impl TouchedBlocks {
 #[derive(Debug, Default)]
 struct Queue {
     follower: u64,
-    touched: TouchedBlocks,
+    /// The changes that wait, and how many blocks they touched.
+    touched: Vec<Arc<TouchedBlocks>>,
+    blocks: usize,
+    /// True where something is not known, or was too much: then nothing waits.
+    everything: bool,
     bytes: usize,
+}
+
+impl Queue {
+    fn push(&mut self, touched: &Arc<TouchedBlocks>) {
+        self.blocks += touched.len();
+        self.everything |= touched.everything || self.blocks > QUEUE_BLOCKS_MAX;
+        if self.everything {
+            self.touched.clear();
+        } else if !touched.is_empty() {
+            self.touched.push(Arc::clone(touched));
+        }
+    }
+
+    /// What waited.
+    fn take(&mut self) -> (Vec<Arc<TouchedBlocks>>, bool) {
+        self.blocks = 0;
+        (std::mem::take(&mut self.touched), std::mem::take(&mut self.everything))
+    }
 }
 
 #[derive(Debug, Default)]
@@ -98,19 +121,13 @@ impl Followers {
 
     /// True where a follower wants to know which blocks change.
     pub(super) fn want_blocks(&self) -> bool {
-        self.0.lock().queues.iter().any(|queue| !queue.touched.everything)
+        self.0.lock().queues.iter().any(|queue| !queue.everything)
     }
 
     /// Tells all of a change. To be called while the locks of what changed are held.
-    pub(super) fn tell(&self, touched: &TouchedBlocks) {
-        for queue in &mut self.0.lock().queues {
-            if !queue.touched.everything {
-                queue.touched.extend(touched);
-            }
-            if queue.touched.everything || queue.touched.len() > QUEUE_BLOCKS_MAX {
-                queue.touched = TouchedBlocks::everything();
-            }
-        }
+    pub(super) fn tell(&self, touched: TouchedBlocks) {
+        let touched = Arc::new(touched);
+        self.0.lock().queues.iter_mut().for_each(|queue| queue.push(&touched));
     }
 
     /// Bytes of memory that the followers hold.
@@ -132,12 +149,15 @@ pub struct BlockFollower {
 impl BlockFollower {
     /// True where nothing changed since the last time it was asked.
     pub fn is_up_to_date(&self) -> bool {
-        self.with(|queue| queue.touched.is_empty()).unwrap_or(true)
+        self.with(|queue| queue.touched.is_empty() && !queue.everything).unwrap_or(true)
     }
 
     /// What changed since it was asked last: each block once.
     pub fn take(&self) -> TouchedBlocks {
-        self.with(|queue| std::mem::take(&mut queue.touched)).unwrap_or_default().merged()
+        let (changes, everything) = self.with(Queue::take).unwrap_or_default();
+        let mut touched = TouchedBlocks { tiers: Vec::new(), everything };
+        changes.iter().for_each(|change| touched.extend(change));
+        touched.merged()
     }
 
     /// Says how many bytes of memory the follower holds, which the map counts among its own.
@@ -200,7 +220,7 @@ mod tests {
         for x in 0..2 {
             let blocks = (0..QUEUE_BLOCKS_MAX as i32 / 2 + 100).map(|i| [i % 512 * 8 + x, i / 512 * 8, 0]);
             exchange(&map, &[], &blocks.collect::<Vec<_>>());
-            assert_eq!(follower.followers.lock().queues[0].touched.everything, x == 1);
+            assert_eq!(follower.followers.lock().queues[0].everything, x == 1);
         }
         assert!(!map.followers.want_blocks());
         exchange(&map, &[], &[[0, 0, 7]]);

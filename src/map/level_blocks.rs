@@ -65,29 +65,38 @@ pub(super) fn coarsened(block: VoxelKey, mask: &BlockMask, up: u32) -> (VoxelKey
     (block.ancestor(up), part)
 }
 
+/// The voxels of `blocks`, which are those of `level`, whose centers lie in `region`; blocks without one are left out.
+pub fn blocks_in(
+    blocks: &[(VoxelKey, BlockMask)],
+    region: &Region,
+    lattice: &Lattice,
+    level: u32,
+) -> Vec<(VoxelKey, BlockMask)> {
+    let (min_m, max_m) = region.bounds_m();
+    let block_m = lattice.resolution_m(level) * f64::from(BLOCK_SIDE);
+    // Whatever the rounding, a block less than a voxel away is looked at.
+    let may_meet = |block: VoxelKey| {
+        let index = block.index();
+        (0..3).all(|axis| {
+            let low = f64::from(index[axis]) * block_m;
+            low - block_m <= max_m[axis] && low + 2.0 * block_m >= min_m[axis]
+        })
+    };
+    let part = |&(block, mask): &(VoxelKey, BlockMask)| {
+        let mut part = BlockMask::EMPTY;
+        for cell in mask.cells(0).filter(|cell| region.contains(lattice.center_m(cell.voxel(block), level))) {
+            part.insert(cell);
+        }
+        (block, part)
+    };
+    let parts = blocks.iter().filter(|(block, _)| may_meet(*block)).map(part);
+    parts.filter(|(_, part)| !part.is_empty()).collect()
+}
+
 impl VoxelSet {
     /// The voxels of this set, which are those of `level`, whose centers lie in `region`.
     pub fn part_in(&self, region: &Region, lattice: &Lattice, level: u32) -> Self {
-        let (min_m, max_m) = region.bounds_m();
-        let block_m = lattice.resolution_m(level) * f64::from(BLOCK_SIDE);
-        // Whatever the rounding, a block less than a voxel away is looked at.
-        let may_meet = |block: VoxelKey| {
-            let index = block.index();
-            (0..3).all(|axis| {
-                let low = f64::from(index[axis]) * block_m;
-                low - block_m <= max_m[axis] && low + 2.0 * block_m >= min_m[axis]
-            })
-        };
-        let part = |&(block, mask): &(VoxelKey, BlockMask)| {
-            let mut part = BlockMask::EMPTY;
-            for cell in
-                mask.cells(0).filter(|cell| region.contains(lattice.center_m(cell.voxel(block), level)))
-            {
-                part.insert(cell);
-            }
-            (block, part)
-        };
-        self.blocks().iter().filter(|(block, _)| may_meet(*block)).map(part).collect()
+        blocks_in(self.blocks(), region, lattice, level).into_iter().collect()
     }
 }
 

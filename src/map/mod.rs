@@ -63,6 +63,7 @@ pub use keep_out::{
     KEEP_OUTS_MAX, KeepOut, KeepOutAct, KeepOutChange, KeepOutShape, KeepOutShapeError, KeepOuts,
     KeepOutsFull, PRISM_CORNERS_MAX, Prism, PrismError, TooManyVoxels,
 };
+pub use level_blocks::blocks_in;
 pub use level_changes::{LevelChange, LevelSet};
 pub use level_voxels::LevelVoxels;
 pub use lookup::Lookup;

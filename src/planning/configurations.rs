@@ -81,6 +81,7 @@ impl<'a> Configurations<'a> {
 }
 
 #[inline(always)]
+#[expect(clippy::manual_range_contains, reason = "without a branch")]
 fn is_pose(&[px, py, pz, x, y, z, w]: &[f32; NUMBERS_PER_POSE]) -> bool {
     const LOW: f32 = ((1.0 - QUATERNION_NORM_TOLERANCE) * (1.0 - QUATERNION_NORM_TOLERANCE)) as f32;
     const HIGH: f32 = ((1.0 + QUATERNION_NORM_TOLERANCE) * (1.0 + QUATERNION_NORM_TOLERANCE)) as f32;

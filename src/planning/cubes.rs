@@ -41,7 +41,7 @@ pub(super) struct CubeSearch<'a> {
 }
 
 /// Cells beyond a ball that are looked at, whatever the rounding.
-const SLACK: f64 = 1e-6;
+pub(super) const SLACK: f64 = 1e-6;
 /// Blocks along an axis that are searched one by one; where there are more, their presence is asked first.
 const BLOCKS_MAX: i32 = 3;
 

@@ -9,7 +9,7 @@ pub(super) const LANES: usize = 8;
 /// What f32 rounding may do to a bound, in cells of the field.
 const ROUNDING: f32 = 1e-5;
 /// Coordinates up to here, either way, have blocks with neighbors on all sides.
-const COORDINATE_MAX: f64 = ((1 << 20) - 64) as f64;
+pub(super) const COORDINATE_MAX: f64 = ((1 << 20) - 64) as f64;
 
 /// Eight points in cells of a level, axis by axis.
 pub(super) type Centers = [[f64; LANES]; 3];
@@ -48,7 +48,11 @@ impl Cells {
                 squared[lane] += off * off;
             }
         }
-        Self { index, off_middle: squared.map(|squared| squared.sqrt() + ROUNDING), is_in_range }
+        let mut off_middle = [0f32; LANES];
+        for lane in 0..LANES {
+            off_middle[lane] = squared[lane].sqrt() + ROUNDING;
+        }
+        Self { index, off_middle, is_in_range }
     }
 }
 
@@ -56,14 +60,7 @@ impl Cells {
 #[inline(always)]
 pub(super) fn bounds(field: &FieldLevel, centers: &Centers, scale: f64) -> Bounds {
     let cells = Cells::of(centers, scale);
-    let (mut bytes, mut unmade) = ([0u8; LANES], 0u8);
-    for lane in 0..LANES {
-        let index = [0, 1, 2].map(|axis| cells.index[axis][lane]);
-        match field.byte(index) {
-            Some(byte) if cells.is_in_range[lane] => bytes[lane] = byte,
-            _ => unmade |= 1 << lane,
-        }
-    }
+    let (bytes, unmade) = bytes(field, &cells);
     let (mut lower, mut upper) = ([0f32; LANES], [0f32; LANES]);
     for lane in 0..LANES {
         let distance = f32::from(bytes[lane]).sqrt() * 0.5;
@@ -76,6 +73,32 @@ pub(super) fn bounds(field: &FieldLevel, centers: &Centers, scale: f64) -> Bound
         }
     }
     Bounds { lower, upper, unmade }
+}
+
+/// The bytes of eight cells, and the lanes in which the field is not made.
+#[inline(always)]
+fn bytes(field: &FieldLevel, cells: &Cells) -> ([u8; LANES], u8) {
+    let (mut keys, mut blocks, mut places) = ([0; LANES], [0; LANES], [0; LANES]);
+    for lane in 0..LANES {
+        let index = [0, 1, 2].map(|axis: usize| cells.index[axis][lane]);
+        keys[lane] = FieldLevel::cluster_key(index);
+        blocks[lane] = FieldLevel::block_place(index);
+        places[lane] = FieldLevel::cell_place(index);
+    }
+    let (mut bytes, mut unmade) = ([0; LANES], 0);
+    // Neighboring points lie in one cluster more often than not.
+    let (mut last, mut cluster) = (keys[0], field.cluster(keys[0]));
+    for lane in 0..LANES {
+        if keys[lane] != last {
+            (last, cluster) = (keys[lane], field.cluster(keys[lane]));
+        }
+        let byte = cluster.and_then(|cluster| cluster.byte(blocks[lane], places[lane]));
+        match byte.filter(|_| cells.is_in_range[lane]) {
+            Some(byte) => bytes[lane] = byte,
+            None => unmade |= 1 << lane,
+        }
+    }
+    (bytes, unmade)
 }
 
 /// The index of the field's cell that lane `lane` falls in; none where it is out of range.

@@ -37,7 +37,7 @@ pub(super) struct Ball {
 /// A link, in cells of a level.
 #[derive(Debug, Clone)]
 pub(super) struct LinkInCells {
-    /// Around all spheres, and points.
+    /// The ball around all spheres, and points.
     pub(super) ball: Ball,
     pub(super) ball_group: Group,
     /// The spheres in order; points with padding after them.
@@ -81,6 +81,7 @@ impl Group {
 
     /// The centers in cells.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "a lane goes through several arrays")]
     pub(super) fn centers(&self, cells_from_link: &CellsFromLink) -> Centers {
         let mut centers = [[0.0; LANES]; 3];
         for lane in 0..LANES {

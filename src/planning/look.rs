@@ -1,14 +1,12 @@
 //! A look at a level: the field where it decides, the voxels themselves where it does not.
 
-use std::cell::OnceCell;
-
 use super::clearance::{FieldBlockKey, Fields};
 use super::cubes::{CubeSearch, NearestCube};
 use super::eight::{self, Bounds, Centers, LANES};
 use super::in_cells::Group;
+use super::nearby;
 use super::surroundings::Surroundings;
 use crate::map::MapView;
-use crate::map::lookup::LevelView;
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
 
 /// What lies between the nearest voxels of a level and of a coarser one, in cells of the coarser: a diagonal.
@@ -21,7 +19,6 @@ pub(super) struct Look<'a> {
     pub(super) surroundings: &'a Surroundings,
     pub(super) level: u32,
     fields: &'a Fields,
-    level_view: OnceCell<LevelView<'a>>,
     /// Blocks of the field that were asked for and are not made.
     unmade: Vec<FieldBlockKey>,
     /// True where what is not made is not waited for: the voxels answer.
@@ -50,13 +47,7 @@ impl<'a> Look<'a> {
         fields: &'a Fields,
         is_last: bool,
     ) -> Self {
-        let level_view = OnceCell::new();
-        Self { view, surroundings, level, fields, level_view, unmade: Vec::new(), is_last }
-    }
-
-    /// What point look-ups read.
-    pub(super) fn level_view(&self) -> &LevelView<'a> {
-        self.level_view.get_or_init(|| self.view.level_view(self.level))
+        Self { view, surroundings, level, fields, unmade: Vec::new(), is_last }
     }
 
     /// The blocks that were asked for and are not made, each once.
@@ -138,9 +129,15 @@ impl<'a> Look<'a> {
         unmade != 0 && !self.is_last
     }
 
-    /// True where a ball meets a voxel, as the voxels say.
+    /// True where a ball meets a voxel, exactly.
+    #[inline(always)]
     pub(super) fn meets(&self, center: [f64; 3], radius: f64) -> bool {
-        self.search(center).meets(radius)
+        let by_field = if self.surroundings.ignores_some() {
+            None
+        } else {
+            nearby::meets(self.fields.level(self.level), center, radius)
+        };
+        by_field.unwrap_or_else(|| self.search(center).meets(radius))
     }
 
     /// The nearest voxel that is at most `radius` cells away.

@@ -18,6 +18,7 @@ mod kind;
 mod link;
 mod look;
 mod motions;
+mod nearby;
 mod nearest;
 mod one;
 mod path;

@@ -83,6 +83,7 @@ pub(super) struct EightTransforms {
 impl EightTransforms {
     /// The transforms of up to eight poses; lanes beyond them repeat the first.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "a lane goes through several arrays")]
     pub(super) fn of(poses: &[[f32; NUMBERS_PER_POSE]], cells_per_m: f64) -> Self {
         let mut numbers = [[0.0; LANES]; NUMBERS_PER_POSE];
         for lane in 0..LANES {
@@ -110,8 +111,11 @@ impl EightTransforms {
     #[inline(always)]
     pub(super) fn lane(&self, lane: usize) -> CellsFromLink {
         CellsFromLink {
-            rotation: self.rotation.map(|row| row.map(|column| column[lane])),
-            translation: self.translation.map(|lanes| lanes[lane]),
+            // By index: to map the arrays would copy them.
+            rotation: std::array::from_fn(|axis| {
+                std::array::from_fn(|column| self.rotation[axis][column][lane])
+            }),
+            translation: std::array::from_fn(|axis| self.translation[axis][lane]),
         }
     }
 

@@ -1,13 +1,16 @@
-//! The points of a link: the field clears most of them, the look-up says of the rest which voxels they fall in.
+//! The points of a link: the field clears most of them, the rest are looked up voxel by voxel.
 
 use super::eight::LANES;
 use super::in_cells::{LinkInCells, POINTS_PER_CLUMP};
 use super::look::Look;
 use super::placement::{CellsFromLink, LinkPose};
-use crate::voxel::VoxelKey;
+use crate::util::bits::for_each_bit;
+use crate::voxel::{LatticeFromPoints, VoxelKey};
 
 /// What the look-up's f32 arithmetic may move a point, as a share of the coordinates that enter it and in voxels.
 const ROUNDING: (f64, f64) = (2e-6, 2e-3);
+/// Eights of points in a clump.
+const EIGHTS: usize = POINTS_PER_CLUMP / LANES;
 
 /// What a link's points meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,37 +27,14 @@ pub(super) fn first_hit(
     pose: &LinkPose,
     cells_from_link: &CellsFromLink,
 ) -> Option<PointHit> {
-    let lattice = *look.view.map().lattice();
-    let lattice_from_points = pose.lattice_from_points(&lattice);
-    let slack = rounding_cells(link, pose, look.level, lattice.resolution_m(0));
-    let mut first = None;
-    for (eight, balls) in link.clumps.iter().enumerate() {
-        let judged = look.judge(balls, &balls.centers(cells_from_link));
-        for lane in (0..LANES).filter(|&lane| judged.lower[lane] <= slack) {
-            let clump = (eight * LANES + lane) * POINTS_PER_CLUMP;
-            let points = &link.points[clump..link.points.len().min(clump + POINTS_PER_CLUMP)];
-            let mut occupied = [0];
-            look.level_view().occupied_exactly(points, &lattice_from_points, &mut occupied);
-            for place in (0..points.len()).filter(|place| occupied[0] >> place & 1 == 1) {
-                let point = link.numbers[clump + place];
-                let voxel = lattice_from_points.key(points[place]).map(|voxel| voxel.ancestor(look.level));
-                let counts = |voxel: &VoxelKey| !look.surroundings.ignores(&lattice, *voxel, look.level);
-                if let Some(voxel) = voxel.filter(counts)
-                    && first.is_none_or(|first: PointHit| point < first.point)
-                {
-                    first = Some(PointHit { point, voxel });
-                }
-            }
+    let mut first: Option<PointHit> = None;
+    find(look, link, pose, cells_from_link, |hit| {
+        if first.is_none_or(|first| hit.point < first.point) {
+            first = Some(hit);
         }
-    }
+        false
+    });
     first
-}
-
-/// How far from where it is a point may be looked up, in voxels of `level`, rounded up.
-fn rounding_cells(link: &LinkInCells, pose: &LinkPose, level: u32, resolution_m: f64) -> f32 {
-    let coordinates_m = pose.translation_m.iter().map(|c| c.abs()).sum::<f64>() + 2.0 * link.center_extent_m;
-    let finest = coordinates_m / resolution_m * ROUNDING.0 + ROUNDING.1;
-    (finest / f64::from(1u32 << level)) as f32
 }
 
 /// True where a point of the link falls in a voxel that counts.
@@ -64,5 +44,71 @@ pub(super) fn meet(
     pose: &LinkPose,
     cells_from_link: &CellsFromLink,
 ) -> bool {
-    !link.points.is_empty() && first_hit(look, link, pose, cells_from_link).is_some()
+    !link.points.is_empty() && find(look, link, pose, cells_from_link, |_| true)
+}
+
+/// Gives `is_enough` the points that fall in voxels that count until that is true; true where it was.
+#[inline(always)]
+fn find(
+    look: &mut Look<'_>,
+    link: &LinkInCells,
+    pose: &LinkPose,
+    cells_from_link: &CellsFromLink,
+    mut is_enough: impl FnMut(PointHit) -> bool,
+) -> bool {
+    let slack = rounding_cells(link, pose, look.level, look.view.map().lattice().resolution_m(0));
+    // Most links have no point near a voxel.
+    let mut lattice_from_points = None;
+    for (number, balls) in link.clumps.iter().enumerate() {
+        let near = lanes_within(&look.judge(balls, &balls.centers(cells_from_link)).lower, slack);
+        for lane in (0..LANES).filter(|lane| near >> lane & 1 == 1) {
+            let first = (number * LANES + lane) * EIGHTS;
+            let eights = first..link.point_groups.len().min(first + EIGHTS);
+            for eight in eights {
+                let points = &link.point_groups[eight];
+                let near = lanes_within(&look.judge(points, &points.centers(cells_from_link)).lower, slack);
+                let mut is_done = false;
+                for_each_bit(near.into(), |lane| {
+                    let lattice_from_points = *lattice_from_points
+                        .get_or_insert_with(|| pose.lattice_from_points(look.view.map().lattice()));
+                    let hit = hit(look, link, eight * LANES + lane as usize, &lattice_from_points);
+                    is_done = is_done || hit.is_some_and(&mut is_enough);
+                });
+                if is_done {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// The lanes in which something may be at most `distance` cells away.
+#[inline(always)]
+fn lanes_within(lower: &[f32; LANES], distance: f32) -> u8 {
+    let mut lanes = 0;
+    for (lane, lower) in lower.iter().enumerate() {
+        lanes |= u8::from(*lower <= distance) << lane;
+    }
+    lanes
+}
+
+/// What a point meets, by its place among the clumps' points.
+fn hit(
+    look: &Look<'_>,
+    link: &LinkInCells,
+    place: usize,
+    lattice_from_points: &LatticeFromPoints,
+) -> Option<PointHit> {
+    let voxel = lattice_from_points.key(link.points[place])?.ancestor(look.level);
+    let counts = look.view.contains(voxel, look.level)
+        && !look.surroundings.ignores(look.view.map().lattice(), voxel, look.level);
+    counts.then(|| PointHit { point: link.numbers[place], voxel })
+}
+
+/// How far from where it is a point may be looked up, in voxels of `level`, rounded up.
+fn rounding_cells(link: &LinkInCells, pose: &LinkPose, level: u32, resolution_m: f64) -> f32 {
+    let coordinates_m = pose.translation_m.iter().map(|c| c.abs()).sum::<f64>() + 2.0 * link.center_extent_m;
+    let finest = coordinates_m / resolution_m * ROUNDING.0 + ROUNDING.1;
+    (finest / f64::from(1u32 << level)) as f32
 }

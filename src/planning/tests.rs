@@ -449,3 +449,49 @@ fn the_fields_are_counted_and_bounded() {
         assert_eq!(map.memory_bytes(), before);
     }
 }
+
+#[test]
+fn answers_are_those_of_the_views_own_revision_while_the_map_changes() {
+    let settings = MapSettings::new(RESOLUTION_M, 4);
+    let wall = |x: i32| (0..400).map(|n| [x, n % 20 - 10, n / 20 - 10]).collect::<Vec<_>>();
+    let states = [wall(3), wall(-4)];
+    let body = Body::new(vec![Link {
+        spheres: vec![Sphere { center_m: [0.0; 3], radius_m: 0.6 }],
+        ..Link::default()
+    }]);
+    let body = body.unwrap();
+    let numbers: Vec<f32> =
+        (0..200).flat_map(|n| [n as f32 / 20.0 - 5.0, 0.3, 0.1, 0.0, 0.0, 0.0, 1.0]).collect();
+    let configurations = Configurations::new(&numbers, 1).unwrap();
+    let question =
+        PoseQuestion { body: &body, configurations, level: 0, surroundings: &Surroundings::ALL_VOXELS };
+    let ask = |planner: &Planner| {
+        let view = planner.view();
+        (view.version().revision, view.bodies_meet(&question, StopSignal::NEVER).unwrap().unwrap())
+    };
+    let expected = states.each_ref().map(|state| {
+        let map = Arc::new(MultiResolutionMap::new(settings).unwrap());
+        exchange(&map, &(Vec::new(), state.clone()));
+        ask(&Planner::new(map)).1
+    });
+    assert_ne!(expected[0], expected[1]);
+    let map = Arc::new(MultiResolutionMap::new(settings).unwrap());
+    exchange(&map, &(Vec::new(), states[1].clone()));
+    let planner = Planner::new(Arc::clone(&map));
+    std::thread::scope(|threads| {
+        for _ in 0..2 {
+            threads.spawn(|| {
+                let mut last = 0;
+                while last < 200 {
+                    let (revision, answer) = ask(&planner);
+                    assert_eq!(answer, expected[(revision % 2) as usize], "at revision {revision}");
+                    last = revision;
+                }
+            });
+        }
+        for revision in 2..=200 {
+            let [now, before] = [revision % 2, 1 - revision % 2].map(|n| states[n].clone());
+            exchange(&map, &(before, now));
+        }
+    });
+}

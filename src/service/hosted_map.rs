@@ -14,11 +14,11 @@ use super::point_query::{POINTS_PER_STEP, point_without_voxel};
 use super::recent_changes::RecentChanges;
 use super::resource_budget::ResourceBudget;
 use super::{
-    ListingRequest, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError,
+    Limits, ListingRequest, MapInfo, MapStorage, MapVersion, PointAnswer, PointQuery, Reason, ServiceError,
     VoxelListing, check_not_stopped, ended_early,
 };
 use crate::geometry::{Point, Pose};
-use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap, RobotName};
+use crate::map::{ContentVersion, LongRead, MapName, MapView, MultiResolutionMap, RobotName};
 use crate::mapping::{LostRobots, Sightings};
 use crate::planning::Planner;
 use crate::store::{FolderUse, MapFolder, Snapshot, StoreError, StoreSettings};
@@ -270,13 +270,16 @@ impl HostedMap {
     pub(super) fn query(
         &self,
         query: &PointQuery,
+        limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<PointAnswer, ServiceError> {
         let points = query.points.as_slice();
-        let _long_read = (points.len() > POINTS_PER_STEP).then(|| self.map.long_read());
+        let long_read = (points.len() > POINTS_PER_STEP).then(|| self.map.long_read());
         let view = self.map.view_of(points, &query.map_from_points.unwrap_or_else(Pose::identity));
         let view = if query.keep_out { view.with_keep_outs() } else { view };
-        self.query_in(view, query, stop)
+        limits
+            .check_keep_out_tests(points.len(), view.keep_outs().map_or(0, |keep_outs| keep_outs.sides()))?;
+        self.query_in(view, long_read, query, stop)
     }
 
     /// Answers a query where it need not wait for a lock, and its points are not compared with many keep-outs.
@@ -291,16 +294,17 @@ impl HostedMap {
                 return None;
             }
         }
-        Some(self.query_in(view, query, StopSignal::NEVER))
+        Some(self.query_in(view, None, query, StopSignal::NEVER))
     }
 
     fn query_in(
         &self,
         view: MapView<'_>,
+        long_read: Option<LongRead<'_>>,
         query: &PointQuery,
         stop: StopSignal<'_>,
     ) -> Result<PointAnswer, ServiceError> {
-        query.answer_in(view, self.uuid, self.map.lattice(), stop)
+        query.answer_in(view, long_read, self.uuid, self.map.lattice(), stop)
     }
 
     /// Names the first point that falls in no voxel.
@@ -347,7 +351,8 @@ impl HostedMap {
         Ok(VoxelListing { resolution_m, voxels_total, keys, version: self.version(version) })
     }
 
-    /// The number of voxels that are asked for; of those of keep-outs, at most `most` are looked for.
+    /// The number of voxels that are asked for. Those of keep-outs are found out as for a listing, which gives its locks back
+    /// before it looks at shapes: at most `most` are counted then.
     pub(super) fn count(
         &self,
         request: &ListingRequest,
@@ -355,16 +360,14 @@ impl HostedMap {
         stop: StopSignal<'_>,
     ) -> Result<VoxelListing, ServiceError> {
         let ListingRequest { level, selection, keep_out, .. } = *request;
+        if keep_out {
+            let listing = self.list(request, most, stop)?;
+            return Ok(VoxelListing { keys: Vec::new(), ..listing });
+        }
         let long_read = self.map.long_read();
         let view = long_read.view();
-        let view = if keep_out { view.with_keep_outs() } else { view };
-        let (occupied, version) = (view.count_voxels(level, &selection, stop), view.version());
-        let keep_outs = view.keep_outs().cloned().unwrap_or_default();
-        let kept_out = keep_outs.voxels_of(level, &selection, self.map.lattice(), most, stop);
+        let (voxels_total, version) = (view.count_voxels(level, &selection, stop), view.version());
         check_not_stopped(stop)?;
-        let kept_out = kept_out.map_err(|_| keep_outs_too_large(level, most))?;
-        let is_other = |key: &VoxelKey| !view.contains(*key, level);
-        let voxels_total = occupied + kept_out.iter().filter(is_other).count();
         let resolution_m = self.map.lattice().resolution_m(level);
         Ok(VoxelListing { resolution_m, voxels_total, keys: Vec::new(), version: self.version(version) })
     }
@@ -428,7 +431,8 @@ fn listing_too_large(level: u32, found: usize, most: usize) -> ServiceError {
 
 fn keep_outs_too_large(level: u32, most: usize) -> ServiceError {
     let message = format!(
-        "the keep-outs take more of level {level} there than listed_voxels_max, which is {most}, allows to look through: ask          for a region, a coarser level, or without keep_out"
+        "the keep-outs take more of level {level} there than listed_voxels_max, which is {most}, allows to look through: ask \
+         for a region, a coarser level, or without keep_out"
     );
     ServiceError::new(Reason::ListingTooLarge, message)
 }

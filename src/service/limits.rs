@@ -98,6 +98,9 @@ pub struct Limits {
     pub trajectory_page_max: usize,
     /// Keep-outs of one map. 256, which is also the most.
     pub keep_outs_max: usize,
+    /// Comparisons of points with the sides of keep-outs in one query: points times corners, a shape without corners counting as
+    /// one. 400,000,000, some seconds.
+    pub keep_out_tests_max: usize,
     /// Corners of a keep-out that is a prism. 64, which is also the most.
     pub keep_out_corners_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
@@ -181,6 +184,7 @@ impl Default for Limits {
             observers_time_max_s: 10.0,
             trajectory_page_max: 5_000,
             keep_outs_max: KEEP_OUTS_MAX,
+            keep_out_tests_max: 400_000_000,
             keep_out_corners_max: PRISM_CORNERS_MAX,
             robots_per_map_max: 4_096,
             jobs_waiting_max: 256,
@@ -249,6 +253,21 @@ impl Limits {
     /// When a request has no key, or more than `keys_per_request_max`.
     pub(super) fn check_keys(&self, keys: usize) -> Result<(), ServiceError> {
         within("keys", "keys_per_request_max", keys, self.keys_per_request_max)
+    }
+
+    /// # Errors
+    /// When a query of so many points would be compared with more sides of keep-outs than `keep_out_tests_max` in all.
+    pub(super) fn check_keep_out_tests(&self, points: usize, sides: usize) -> Result<(), ServiceError> {
+        let most = self.keep_out_tests_max;
+        if points.saturating_mul(sides) <= most {
+            return Ok(());
+        }
+        let message = format!(
+            "points: {points} of them compared with {sides} sides of keep-outs are more than keep_out_tests_max, {most}: ask for \
+             at most {}",
+            most / sides.max(1)
+        );
+        Err(ServiceError::new(Reason::BatchTooLarge, message))
     }
 
     /// # Errors
@@ -358,6 +377,16 @@ mod tests {
         assert!(limits.check_points(0).unwrap_err().message.contains("points must not be empty"));
         let error = limits.check_points(11).unwrap_err();
         assert!(error.message.contains("11") && error.message.contains("points_per_request_max is 10"));
+    }
+
+    #[test]
+    fn points_are_compared_with_as_many_sides_as_the_limit_says_and_no_more() {
+        let limits = Limits { keep_out_tests_max: 1000, ..Limits::default() };
+        assert!(limits.check_keep_out_tests(10, 100).is_ok() && limits.check_keep_out_tests(5000, 0).is_ok());
+        for (points, sides) in [(11, 100), (usize::MAX, 2)] {
+            let error = limits.check_keep_out_tests(points, sides).unwrap_err();
+            assert!(error.message.contains("keep_out_tests_max, 1000"), "{error}");
+        }
     }
 
     #[test]

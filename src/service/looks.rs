@@ -68,7 +68,7 @@ fn a_query_looks_at_the_signal_in_proportion_to_its_points() {
             map_uuid: None,
             keep_out: false,
         };
-        map.query(&query, StopSignal::when(&count_look)).unwrap();
+        map.query(&query, &Limits::default(), StopSignal::when(&count_look)).unwrap();
         assert!(count / looks.get() <= 64 << 10, "{count} points, {} looks", looks.get());
     }
 }

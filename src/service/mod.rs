@@ -141,6 +141,10 @@ struct Inner {
     /// For finding the scans that touched a voxel, which may read much of the journal: one at a time, since each takes memory
     /// as a segment of it does.
     observers: Pool,
+    /// For blocks, which take up to seconds: no query of points waits for them.
+    blocks: Pool,
+    /// For what planners ask besides points: no query of points waits for a long one.
+    planning: Pool,
     budget: Arc<ResourceBudget>,
 }
 
@@ -156,9 +160,9 @@ impl MapService {
         let waiting = settings.limits.jobs_waiting_max;
         let mapping = Pool::new("mapping", settings.mapping_threads, waiting)?;
         let localization = Pool::new("localization", settings.localization_threads, waiting)?;
+        let queries = Pool::new("query", settings.query_threads, waiting)?;
         let inner = Inner {
             catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
-            queries: Pool::new("query", settings.query_threads, waiting)?,
             long_mapping: Pool::beside("long_mapping", &mapping, waiting.div_ceil(LONG_SHARE))?,
             mapping,
             alignment: Pool::new("alignment", settings.alignment_threads, waiting)?,
@@ -167,6 +171,9 @@ impl MapService {
             recovery: Pool::beside("recovery", &localization, 0)?,
             watch: Pool::new("watch", WATCH_THREADS, waiting.max(settings.limits.watches_max))?,
             observers: Pool::new("observers", OBSERVERS_THREADS, waiting)?,
+            blocks: Pool::beside("blocks", &queries, waiting)?,
+            queries,
+            planning: Pool::new("planning", settings.query_threads, waiting)?,
             localization,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
@@ -212,7 +219,7 @@ impl MapService {
     }
 
     /// What the threads for work that uses the CPU are doing.
-    pub fn pools(&self) -> [PoolUse; 10] {
+    pub fn pools(&self) -> [PoolUse; 12] {
         let Inner {
             queries,
             mapping,
@@ -224,6 +231,8 @@ impl MapService {
             map_files,
             watch,
             observers,
+            blocks,
+            planning,
             ..
         } = &*self.inner;
         let all = [
@@ -237,6 +246,8 @@ impl MapService {
             map_files,
             watch,
             observers,
+            blocks,
+            planning,
         ];
         all.map(Pool::in_use)
     }
@@ -266,7 +277,9 @@ impl MapService {
             {
                 return answer;
             }
-            self.inner.queries.run(move |stop| map.query(&query, stop)).await?
+            let inner = Arc::clone(&self.inner);
+            let answer = move |stop: StopSignal<'_>| map.query(&query, &inner.settings.limits, stop);
+            self.inner.queries.run(answer).await?
         };
         self.observed("QueryPoints", Some(map), work, |answer| Outcome::Points {
             lookup,

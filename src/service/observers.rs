@@ -3,7 +3,7 @@
 //! The journal knows. It is read backwards, segment by segment, so that the newest scans are found first and no more is read
 //! than is needed, nor held than one segment.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use super::deletion::in_range;
@@ -86,13 +86,14 @@ struct Observers {
 impl Search<'_> {
     fn observers(&self, limits: &Limits, budget: &ResourceBudget) -> Result<ObserversAnswer, ServiceError> {
         let (trajectory, version) = self.map.map.trajectory_and_version();
-        let undone: BTreeSet<u64> = trajectory.withdrawn().iter().map(|withdrawn| withdrawn.change).collect();
+        let mut undone: BTreeSet<u64> =
+            trajectory.withdrawn().iter().map(|withdrawn| withdrawn.change).collect();
         let parts = self.folder.journal_parts(version.revision);
         let reaches_back_to = parts.last().map_or(version.revision + 1, |oldest| oldest.first);
         let (mut scans, mut older_scans) = (Vec::new(), reaches_back_to > 1);
         for part in parts {
             let most = limits.observers_max - scans.len();
-            let found = if most == 0 { None } else { self.in_part(&part, &undone, most, budget)? };
+            let found = if most == 0 { None } else { self.in_part(&part, &mut undone, most, budget)? };
             older_scans |= found.as_ref().is_none_or(|found| found.has_more);
             let Some(found) = found else { break };
             scans.extend(found.scans);
@@ -108,7 +109,7 @@ impl Search<'_> {
     fn in_part(
         &self,
         part: &JournalPart,
-        undone: &BTreeSet<u64>,
+        undone: &mut BTreeSet<u64>,
         most: usize,
         budget: &ResourceBudget,
     ) -> Result<Option<Observers>, ServiceError> {
@@ -122,7 +123,7 @@ impl Search<'_> {
         };
         // The segment, and what one record of it becomes.
         let _memory = budget.reserve_transient(2 * bytes, OBSERVERS)?;
-        let mut newest = VecDeque::new();
+        let mut touching = Vec::new();
         for change in self.folder.changes_of_part(part) {
             if self.stop.is_stopped() {
                 return Ok(None);
@@ -131,17 +132,18 @@ impl Search<'_> {
                 Ok(change) => change,
                 Err(error) => return unreadable(error),
             };
-            let Change::Insertion(scan) = change else { continue };
-            if !undone.contains(&revision) && scan.voxels.touches(self.voxel, self.level) {
-                newest.push_back(ObservingScan { revision, scan: scan.pose.into() });
-                // One more than may be told, so that it is known of.
-                if newest.len() > most + 1 {
-                    newest.pop_front();
+            match change {
+                Change::Insertion(scan) if scan.voxels.touches(self.voxel, self.level) => {
+                    touching.push(ObservingScan { revision, scan: scan.pose.into() });
                 }
+                // What was undone long ago the trajectory knows no more. An undo lies behind what it takes back.
+                Change::Undo(undo) => undone.extend(undo.changes()),
+                Change::Insertion(_) | Change::Deletion(_) | Change::KeepOut(_) => {}
             }
         }
-        let has_more = newest.len() > most;
-        Ok(Some(Observers { scans: newest.into_iter().rev().take(most).collect(), has_more }))
+        touching.retain(|scan| !undone.contains(&scan.revision));
+        let has_more = touching.len() > most;
+        Ok(Some(Observers { scans: touching.into_iter().rev().take(most).collect(), has_more }))
     }
 }
 

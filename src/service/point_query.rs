@@ -5,7 +5,7 @@ use uuid::Uuid;
 
 use super::{MapVersion, PointAnswer, PointQuery, Reason, ServiceError, check_not_stopped};
 use crate::geometry::{Point, Pose};
-use crate::map::{ContentVersion, MapView};
+use crate::map::{ContentVersion, LongRead, MapView};
 use crate::util::StopSignal;
 use crate::voxel::{Lattice, LatticeFromPoints};
 
@@ -22,6 +22,7 @@ impl PointQuery {
     pub(crate) fn answer_in(
         &self,
         view: MapView<'_>,
+        long_read: Option<LongRead<'_>>,
         map_uuid: Uuid,
         lattice: &Lattice,
         stop: StopSignal<'_>,
@@ -37,7 +38,8 @@ impl PointQuery {
         }
         let ContentVersion { revision, hash } = view.version();
         let keep_outs = view.keep_outs().filter(|_| self.keep_out).cloned();
-        drop(view);
+        // Changes do not wait until the points are compared with shapes.
+        drop((view, long_read));
         if !all_have_a_voxel {
             return Err(point_without_voxel(points, &quantize, lattice));
         }

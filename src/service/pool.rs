@@ -53,7 +53,7 @@ struct Counts {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PoolUse {
     /// The pool's: `query`, `mapping`, `long_mapping`, `alignment`, `localization`, `recovery`, `undo`, `map_file`,
-    /// `watch` or `observers`.
+    /// `watch`, `observers`, `blocks` or `planning`.
     pub name: &'static str,
     /// Jobs that wait for a thread.
     pub waiting: usize,

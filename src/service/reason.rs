@@ -99,7 +99,7 @@ reasons! {
         BadUuid "bad_uuid" Both: "`map_uuid` is no uuid", "send what an answer named";
         BadVerdict "bad_verdict" Client: "the server's answer has a verdict that this client does not know", "update the client";
         BadView "bad_view" Both: "angles not between 0 and pi, `far_m` not beyond `near_m`, or a camera that is too far", "correct it";
-        BatchTooLarge "batch_too_large" Both: "more than `points_per_request_max` or `keys_per_request_max`", "split it, or use a stream";
+        BatchTooLarge "batch_too_large" Both: "more than `points_per_request_max`, `keys_per_request_max` or another limit on a request, which the message names", "split it, or use a stream";
         BodyTooLarge "body_too_large" Http 413: "the body exceeds `message_bytes_max`, of a map file `map_file_bytes_max`", "split it, or raise the limit";
         BodyUnreadable "body_unreadable" Http: "the body broke off", "send it again";
         EmptyBatch "empty_batch" Both: "there is no point, or no key", "leave the request out";

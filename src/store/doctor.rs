@@ -230,6 +230,7 @@ fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
     let (revision, voxels, requests) = (&made.revision, &made.voxels, &made.requests);
     let same = (&written.revision, &written.voxels, &written.requests) == (revision, voxels, requests);
     let is_known = |pose: &MappedScan| made.trajectory.at(pose.revision) == Some(pose);
+    let same = same && written.keep_outs == made.keep_outs;
     same && written.moments == made.moments && written.trajectory.poses().all(is_known)
 }
 

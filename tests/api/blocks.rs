@@ -325,7 +325,6 @@ async fn a_view_that_no_camera_has_is_refused_by_name() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_large_block_whose_caller_has_gone_is_given_up() {
     let daemon = Daemon::start_with(|config| {
-        // One besides for what `/metrics` asks.
         config.threads.query = 2;
         config.limits.block_cells_max = 1 << 30;
         config.limits.block_bytes_max = 30 << 20;
@@ -337,7 +336,7 @@ async fn a_large_block_whose_caller_has_gone_is_given_up() {
         [(i % 299) as f32 * 0.1 + 0.05, (i / 300) as f32 * 0.1 + 0.05, (i % 300) as f32 * 0.1 + 0.05]
     };
     daemon.put_in("a", &(0..90_000).map(scattered).collect::<Vec<_>>()).await;
-    let query = async |what: &str| daemon.metric(&format!("mrol_jobs_{what}{{pool=\"query\"}}")).await;
+    let query = async |what: &str| daemon.metric(&format!("mrol_jobs_{what}{{pool=\"blocks\"}}")).await;
     let cancelled = query("cancelled_total").await.unwrap();
     let url = daemon.url("/v1/maps/a/block?form=dense&min=0,0,0&max=30,30,30");
     let gone = tokio::spawn(client().get(url).send());

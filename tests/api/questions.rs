@@ -106,10 +106,7 @@ async fn poses_are_checked_alike_everywhere() {
 async fn what_is_ignored_does_not_collide() {
     let (daemon, client, _) = row_of_voxels().await;
     let ignored = vec![Region::cuboid([0.0; 3], [1.0; 3]).unwrap()];
-    let check = PoseCheck {
-        surroundings: Surroundings { ignored, ..Surroundings::default() },
-        ..poses(CheckAs::Colliding)
-    };
+    let check = PoseCheck { surroundings: Surroundings { ignored }, ..poses(CheckAs::Colliding) };
     assert_eq!(client.check_poses(&map(), check).await.unwrap().answer.words(), [0]);
     let body = json!({"links": [{"spheres": [[0, 0, 0, 0.15]]}]});
     let asked = json!({"body": body, "configurations": [at(0.55, 0.2, 0.05)],
@@ -294,7 +291,7 @@ async fn what_is_no_question_is_refused_by_name() {
         ("nearest", json!({"points": [[0, null, 0]], "radius_m": 1}), "points[0]"),
         ("grid", json!({"cell_m": 0.15}), "cell_m"),
         ("grid", json!({"area": {"min_m": [0, 0], "max_m": [1e6, 1e6]}, "cell_m": 0.1}), "grid_cells_max"),
-        ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "sizes"),
+        ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "groups"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "level": 9}), "level"),
     ] {
         let answer = daemon.post(&format!("/v1/maps/a/{route}"), asked.clone()).await;

@@ -412,6 +412,29 @@ async fn a_replica_answers_as_the_server_does_at_the_same_revision() {
 }
 
 #[tokio::test]
+async fn a_replica_of_a_region_refuses_coarse_voxels_that_reach_out_of_it() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &[[0.65, 0.05, 0.05]]).await;
+    let region = Some(Region::cuboid([0.0; 3], [0.5; 3]).unwrap());
+    let options = ReplicaOptions { region, ..ReplicaOptions::default() };
+    let part = Replica::open(client_of(&daemon).await, map("a"), options).await.unwrap();
+    // Its voxel of level 1 lies in the region, that of level 2 goes from 0.4 to 0.8 m, and is occupied.
+    let query = |level| PointQuery {
+        points: vec![[0.45, 0.05, 0.05].into()].into(),
+        map_from_points: None,
+        level,
+        lookup: Lookup::Exact,
+        min_revision: None,
+        map_uuid: None,
+        keep_out: false,
+    };
+    assert_eq!(part.query_points(&query(0)).unwrap().points_occupied, 0);
+    let refused = part.query_points(&query(2)).unwrap_err().to_string();
+    assert!(refused.contains("points[0] is outside of the region"), "{refused}");
+}
+
+#[tokio::test]
 async fn a_replica_notices_a_map_that_was_deleted_and_made_again() {
     let daemon = Daemon::start().await;
     daemon.make_map("a").await;

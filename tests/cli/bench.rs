@@ -32,6 +32,16 @@ fn each_of_a_planners_questions_has_a_line() {
 }
 
 #[test]
+fn a_query_only_map_takes_the_memory_of_its_set_alone() {
+    let lines = objects(&["bench", "memory", "--workload", "room"]);
+    assert_eq!(texts(&lines, "keeps"), ["all", "no moments", "no filter", "query only"]);
+    let of = |line: usize, part: &str| number(&lines[line], &format!("{part}_per_voxel"));
+    assert_eq!((of(3, "filters"), of(3, "moments")), (0.0, 0.0));
+    assert_eq!((of(3, "masks"), of(3, "tables")), (of(0, "masks"), of(0, "tables")));
+    assert!(of(3, "bytes") < 1.5 && of(0, "bytes") > 20.0, "{lines:?}");
+}
+
+#[test]
 fn files_of_points_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

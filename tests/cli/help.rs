@@ -2,13 +2,17 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 24] = [
     "serve",
     "demo",
     "map",
     "insert",
     "localize",
     "query",
+    "check",
+    "rays",
+    "nearest",
+    "grid",
     "block",
     "observers",
     "delete",

@@ -159,7 +159,7 @@ enum {
     MROL_LOOKUP_BLOOM = 1
 };
 
-/* A question about points: are their voxels occupied? Take it from mrol_point_query_default(). */
+/* A question about points: are their voxels occupied? Keep-outs of the map are not regarded. Take it from mrol_point_query_default(). */
 typedef struct mrol_point_query {
     /* sizeof(mrol_point_query) where the program was compiled. */
     size_t struct_size;

@@ -148,6 +148,7 @@ impl PointQuery {
             lookup,
             min_revision: None,
             map_uuid: None,
+            keep_out: false,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use mrol::bloom::FilterSettings;
 use mrol::client::{BLOCKS_MAX_DEFAULT, Credentials, ReplicaOptions};
 use mrol::map::{MapName, Region};
 use mrol::service::ServiceError;
@@ -56,6 +57,7 @@ fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
         region: region.transpose().map_err(ServiceError::from)?,
         blocks_max,
         silence_max: milliseconds(options.silence_timeout_ms, usual.silence_max),
+        filter: flag(options.with_filter, "options.with_filter")?.then(FilterSettings::default),
     })
 }
 

@@ -238,8 +238,15 @@ async fn compare(driver: &mut Driver, client: &Client) {
         for lookup in [Lookup::Exact, Lookup::Bloom] {
             for map_from_points in [None, Some(turned)] {
                 let points = points.clone().into();
-                let query =
-                    PointQuery { points, map_from_points, level, lookup, min_revision: None, map_uuid: None };
+                let query = PointQuery {
+                    points,
+                    map_from_points,
+                    level,
+                    lookup,
+                    min_revision: None,
+                    map_uuid: None,
+                    keep_out: false,
+                };
                 let (command, line) = question(client, query).await;
                 assert_eq!(driver.told(&command), line, "level {level}, {lookup:?}");
             }

@@ -33,6 +33,7 @@ use crate::geometry::Pose;
 use crate::map::{ContentVersion, MapName, MultiResolutionMap, Region};
 use crate::service::{PointAnswer, PointQuery, Reason, ServiceError};
 use crate::util::StopSignal;
+use crate::voxel::VoxelKey;
 use copy::Copied;
 use follow::Follower;
 
@@ -192,7 +193,7 @@ impl Replica {
             let message = format!("min_revision was not reached: the copy is at {}", view.revision());
             return Err(ServiceError::new(Reason::RevisionNotReached, message).into());
         }
-        let mut answer = query.answer_in(view, map_uuid, map.lattice(), StopSignal::NEVER)?;
+        let mut answer = query.answer_in(view, None, map_uuid, map.lattice(), StopSignal::NEVER)?;
         // The hash of a part is not the map's.
         answer.version.content_hash = answer.version.content_hash.filter(|_| self.region.is_none());
         Ok(answer)
@@ -203,9 +204,15 @@ impl Replica {
         let Some(region) = &self.region else { return Ok(()) };
         let lattice = map.lattice();
         let quantize = lattice.from_points(&query.map_from_points.unwrap_or_else(Pose::identity));
+        // A region that holds the outermost finest voxels of a coarser one holds all of it.
         let is_outside = |point| {
-            let center = |voxel| lattice.center_m(voxel, 0);
-            quantize.key(point).is_some_and(|voxel| !region.contains(center(voxel)))
+            quantize.index(point).is_some_and(|index| {
+                let first = index.map(|i| i >> query.level << query.level);
+                let last = first.map(|i| i + ((1 << query.level) - 1));
+                let corner = |n: usize| std::array::from_fn(|axis| [first, last][n >> axis & 1][axis]);
+                let center = |voxel| lattice.center_m(voxel, 0);
+                !(0..8).all(|n| VoxelKey::new(corner(n)).is_some_and(|voxel| region.contains(center(voxel))))
+            })
         };
         let Some(place) = query.points.as_slice().iter().position(|&point| is_outside(point)) else {
             return Ok(());

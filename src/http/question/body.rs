@@ -70,12 +70,12 @@ impl From<AnswerWord> for pb::CheckAnswer {
 
 impl BodyField {
     /// The body as a message has it.
-    pub(super) fn to_message(self, arrays: &Bytes) -> Result<pb::Body, ServiceError> {
+    pub(super) fn into_message(self, arrays: &Bytes) -> Result<pb::Body, ServiceError> {
         let link = |(number, Object(link)): (usize, Object<LinkField>)| {
             let name = |field: &str| format!("body.links[{number}].{field}");
             let LinkField { spheres, points, padding_m } = link;
-            let spheres = spheres.map(|spheres| spheres.to_bytes(arrays, &name("spheres"))).transpose()?;
-            let points = points.map(|points| points.to_message(arrays, &name("points"))).transpose()?;
+            let spheres = spheres.map(|spheres| spheres.into_bytes(arrays, &name("spheres"))).transpose()?;
+            let points = points.map(|points| points.into_message(arrays, &name("points"))).transpose()?;
             Ok(pb::Link { spheres_f32le: spheres.unwrap_or_default(), points, padding_m })
         };
         Ok(pb::Body {

@@ -34,7 +34,7 @@ pub(in crate::http) enum Form {
 }
 
 /// A question: its head, and the arrays that the head speaks of.
-pub(in crate::http) struct Asking<T> {
+pub(in crate::http) struct QuestionBody<T> {
     pub(super) head: T,
     pub(super) arrays: Bytes,
     pub(super) form: Form,
@@ -43,7 +43,7 @@ pub(in crate::http) struct Asking<T> {
 /// Bytes that say how long the head is.
 const LENGTH_BYTES: usize = size_of::<u32>();
 
-impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for Asking<T> {
+impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody<T> {
     type Rejection = HttpError;
 
     async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
@@ -106,7 +106,7 @@ pub(super) enum PointsField {
 
 impl PointsField {
     /// The points as a message has them.
-    pub(super) fn to_message(self, arrays: &Bytes, field: &str) -> Result<pb::Points, ServiceError> {
+    pub(super) fn into_message(self, arrays: &Bytes, field: &str) -> Result<pb::Points, ServiceError> {
         match self {
             Self::Listed(points) => Ok(PointCloud::from(points).into()),
             Self::Sliced(slice) => {
@@ -173,7 +173,7 @@ impl<'de, const N: usize> Deserialize<'de> for Tuple<N> {
 
 impl<const N: usize> NumbersField<N> {
     /// The bytes of all numbers.
-    pub(super) fn to_bytes(self, arrays: &Bytes, field: &str) -> Result<Bytes, ServiceError> {
+    pub(super) fn into_bytes(self, arrays: &Bytes, field: &str) -> Result<Bytes, ServiceError> {
         match self.0 {
             ListOrSlice::Listed(tuples) => {
                 Ok(bytes_of(tuples.into_iter().flat_map(|Tuple(numbers)| numbers)))
@@ -190,7 +190,7 @@ pub(super) struct CountsField(ListOrSlice<u32>);
 
 impl CountsField {
     /// The bytes of all counts.
-    pub(super) fn to_bytes(self, arrays: &Bytes, field: &str) -> Result<Bytes, ServiceError> {
+    pub(super) fn into_bytes(self, arrays: &Bytes, field: &str) -> Result<Bytes, ServiceError> {
         match self.0 {
             ListOrSlice::Listed(counts) => Ok(bytes_of(counts)),
             ListOrSlice::Sliced(slice) => slice.of(arrays, field),
@@ -229,9 +229,9 @@ mod tests {
     fn points_are_listed_or_lie_where_the_head_says() {
         let arrays = Bytes::from(vec![7u8; 30]);
         let field = |text: &str| serde_json::from_str::<PointsField>(text).unwrap();
-        let listed = field("[[1, 2, 3]]").to_message(&arrays, "points").unwrap();
+        let listed = field("[[1, 2, 3]]").into_message(&arrays, "points").unwrap();
         assert_eq!(listed.xyz_f32le.len(), 12);
-        let sliced = field(r#"{"at": 6, "bytes": 24}"#).to_message(&arrays, "points").unwrap();
+        let sliced = field(r#"{"at": 6, "bytes": 24}"#).into_message(&arrays, "points").unwrap();
         assert_eq!(sliced.xyz_f32le, vec![7u8; 24]);
         for (at, bytes) in [(7, 24), (usize::MAX, 1), (31, 0)] {
             let error = Slice { at, bytes }.of(&arrays, "points").unwrap_err();

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::answer::{Answer, Array};
 use super::asked;
-use super::form::Asking;
+use super::form::QuestionBody;
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
@@ -43,7 +43,7 @@ struct GridHead {
 pub(in crate::http) async fn project_grid(
     Service(service): Service,
     Map(map): Map,
-    Asking { head, form, .. }: Asking<GridBody>,
+    QuestionBody { head, form, .. }: QuestionBody<GridBody>,
 ) -> Result<Response, HttpError> {
     let GridBody { area, min_z_m, max_z_m, cell_m, level, min_revision, map_uuid } = head;
     let area = area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::answer::{Answer, Array};
 use super::asked;
 use super::body::{BodyField, IgnoredField, ignored_of};
-use super::form::{Asking, CountsField, NumbersField};
+use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
@@ -40,14 +40,14 @@ struct MotionsHead {
 pub(in crate::http) async fn check_motions(
     Service(service): Service,
     Map(map): Map,
-    Asking { head, arrays, form }: Asking<MotionsBody>,
+    QuestionBody { head, arrays, form }: QuestionBody<MotionsBody>,
 ) -> Result<Response, HttpError> {
     let MotionsBody { body: Object(body), configurations, lengths, ignored, .. } = head;
     let request = pb::CheckMotionsRequest {
         asked: asked(&map, head.level, head.min_revision, head.map_uuid),
-        body: Some(body.to_message(&arrays)?),
-        configurations_f32le: configurations.to_bytes(&arrays, "configurations")?,
-        lengths_u32le: lengths.to_bytes(&arrays, "lengths")?,
+        body: Some(body.into_message(&arrays)?),
+        configurations_f32le: configurations.into_bytes(&arrays, "configurations")?,
+        lengths_u32le: lengths.into_bytes(&arrays, "lengths")?,
         step_m: head.step_m,
         clearance_max_m: head.clearance_max_m,
         ignored: ignored_of(ignored)?,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::answer::{Answer, Array};
 use super::asked;
-use super::form::{Asking, PointsField};
+use super::form::{PointsField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
@@ -34,12 +34,12 @@ struct NearestHead {
 pub(in crate::http) async fn find_nearest(
     Service(service): Service,
     Map(map): Map,
-    Asking { head, arrays, form }: Asking<NearestBody>,
+    QuestionBody { head, arrays, form }: QuestionBody<NearestBody>,
 ) -> Result<Response, HttpError> {
     let NearestBody { points, radius_m, to: ByKeyword(to), level, min_revision, map_uuid } = head;
     let request = pb::FindNearestRequest {
         asked: asked(&map, level, min_revision, map_uuid),
-        points: Some(points.to_message(&arrays, "points")?),
+        points: Some(points.into_message(&arrays, "points")?),
         radius_m,
         to: pb::MeasuredTo::from(to).into(),
     };

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::answer::Answer;
 use super::asked;
 use super::body::{AnswerWord, BodyField, IgnoredField, collisions_of, ignored_of};
-use super::form::{Asking, NumbersField};
+use super::form::{NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
@@ -35,13 +35,13 @@ pub(in crate::http) struct PosesBody {
 pub(in crate::http) async fn check_poses(
     Service(service): Service,
     Map(map): Map,
-    Asking { head, arrays, form }: Asking<PosesBody>,
+    QuestionBody { head, arrays, form }: QuestionBody<PosesBody>,
 ) -> Result<Response, HttpError> {
     let PosesBody { body: Object(body), configurations, ignored, answer: ByKeyword(answer), .. } = head;
     let request = pb::CheckPosesRequest {
         asked: asked(&map, head.level, head.min_revision, head.map_uuid),
-        body: Some(body.to_message(&arrays)?),
-        configurations_f32le: configurations.to_bytes(&arrays, "configurations")?,
+        body: Some(body.into_message(&arrays)?),
+        configurations_f32le: configurations.into_bytes(&arrays, "configurations")?,
         ignored: ignored_of(ignored)?,
         answer: pb::CheckAnswer::from(answer).into(),
         clearance_max_m: head.clearance_max_m,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::answer::{Answer, Array};
 use super::asked;
-use super::form::{Asking, PointsField};
+use super::form::{PointsField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
@@ -33,10 +33,11 @@ struct RaysHead {
 pub(in crate::http) async fn cast_rays(
     Service(service): Service,
     Map(map): Map,
-    Asking { head, arrays, form }: Asking<RaysBody>,
+    QuestionBody { head, arrays, form }: QuestionBody<RaysBody>,
 ) -> Result<Response, HttpError> {
     let RaysBody { origins, directions, ends, range_m, level, min_revision, map_uuid } = head;
-    let points = |field: Option<PointsField>, name| field.map(|of| of.to_message(&arrays, name)).transpose();
+    let points =
+        |field: Option<PointsField>, name| field.map(|of| of.into_message(&arrays, name)).transpose();
     let request = pb::CastRaysRequest {
         asked: asked(&map, level, min_revision, map_uuid),
         origins: points(Some(origins), "origins")?,

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::answer::Answer;
 use super::asked;
 use super::body::{AnswerWord, IgnoredField, collisions_of, ignored_of};
-use super::form::{Asking, CountsField, NumbersField};
+use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
@@ -36,12 +36,12 @@ pub(in crate::http) struct SpheresBody {
 pub(in crate::http) async fn check_spheres(
     Service(service): Service,
     Map(map): Map,
-    Asking { head, arrays, form }: Asking<SpheresBody>,
+    QuestionBody { head, arrays, form }: QuestionBody<SpheresBody>,
 ) -> Result<Response, HttpError> {
     let SpheresBody { spheres, sizes, ignored, answer: ByKeyword(answer), .. } = head;
-    let spheres = spheres.to_bytes(&arrays, "spheres")?;
+    let spheres = spheres.into_bytes(&arrays, "spheres")?;
     let sizes = match sizes {
-        Some(sizes) => sizes.to_bytes(&arrays, "sizes")?,
+        Some(sizes) => sizes.into_bytes(&arrays, "sizes")?,
         None => CountsField::ones(spheres.len() / SPHERE_BYTES),
     };
     let request = pb::CheckSpheresRequest {

@@ -57,6 +57,8 @@ impl ServerProcess {
             .args(["--http-listen", ANY_PORT, "--grpc-listen", grpc, "--data-dir"])
             .arg(data_dir)
             .env("MROL_STORE__UNDO_REVISIONS", UNDO_REVISIONS)
+            // Who changes the maps is known, and how often they do.
+            .env("MROL_LOG__AUDIT", "false")
             .envs(settings.iter().copied())
             .stdout(Stdio::piped())
             .kill_on_drop(true)

@@ -24,18 +24,27 @@ impl Runs {
 
     /// The median run, which occasional load of the same core does not move; 0 without a run.
     pub fn median(&self) -> f64 {
-        let mut sorted = self.0.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        match (sorted.len(), sorted.len() / 2) {
-            (0, _) => 0.0,
-            (n, middle) if n % 2 == 1 => sorted[middle],
-            (_, middle) => (sorted[middle - 1] + sorted[middle]) / 2.0,
-        }
+        median_of(self.0.clone())
+    }
+
+    /// The median of how many times as long each run took as that of `others` beside it, which load that comes and goes
+    /// does not move; 0 without a run.
+    pub fn median_ratio(&self, others: &Self) -> f64 {
+        median_of(self.0.iter().zip(&others.0).map(|(run, other)| run / other).collect())
     }
 
     /// All runs, in order.
     pub fn ns_per_item(&self) -> &[f64] {
         &self.0
+    }
+}
+
+fn median_of(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    match (values.len(), values.len() / 2) {
+        (0, _) => 0.0,
+        (n, middle) if n % 2 == 1 => values[middle],
+        (_, middle) => (values[middle - 1] + values[middle]) / 2.0,
     }
 }
 
@@ -48,6 +57,13 @@ mod tests {
         assert_eq!(Runs(vec![9.0, 1.0, 2.0]).median(), 2.0);
         assert_eq!(Runs(vec![4.0, 1.0, 2.0, 100.0]).median(), 3.0);
         assert_eq!(Runs::default().median(), 0.0);
+    }
+
+    #[test]
+    fn runs_are_compared_with_those_beside_them() {
+        let (calm, load) = ([1.0, 1.0, 4.0, 4.0, 4.0], [2.0, 2.0, 8.0, 8.0, 1.0]);
+        assert_eq!(Runs(load.into()).median_ratio(&Runs(calm.into())), 2.0);
+        assert_eq!(Runs::default().median_ratio(&Runs::default()), 0.0);
     }
 
     #[test]

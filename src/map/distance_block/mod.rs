@@ -62,6 +62,9 @@ impl DistanceBlock {
 
     /// Bytes of memory that the distances of `cells` take while they are made, themselves among them.
     pub fn bytes_max(cells: &CellBox, cap: NonZeroU8) -> u64 {
+        if cells.cells() == 0 {
+            return 0;
+        }
         let sizes = [cells.size(), cells.grown(margin_of(cap)).size()];
         let [[xs, ys, _], [wide_xs, wide_ys, wide_zs]] = sizes.map(|size| size.map(|cells| cells as u64));
         let square = size_of::<i16>() as u64;
@@ -96,6 +99,13 @@ mod tests {
     use crate::voxel::{INDEX_MIN, Lattice, VoxelKey};
     use proptest::prelude::*;
     use std::cell::Cell;
+
+    #[test]
+    fn a_block_without_a_cell_takes_no_memory() {
+        let lattice = Lattice::new(0.05, 4).unwrap();
+        let none = CellBox::of_centers([-1e300, -1e300, 0.06], [1e300, 1e300, 0.07], &lattice, 0);
+        assert_eq!((none.cells(), DistanceBlock::bytes_max(&none, DISTANCE_CAP_MAX)), (0, 0));
+    }
 
     /// The definition: quarter cells from the center of `cell` to the nearest of `voxels`, rounded down.
     fn by_brute_force(cell: [i32; 3], voxels: &[[i32; 3]], cap: NonZeroU8) -> u8 {

@@ -91,19 +91,6 @@ impl LevelView<'_> {
         if self.hashes == 0 { Lookup::Exact } else { lookup }
     }
 
-    /// Says of each point whether its voxel is occupied, exactly: point i is bit i % 64 of `occupied[i / 64]`.
-    ///
-    /// # Panics
-    /// When `occupied` is not one word for each 64 points.
-    pub(crate) fn occupied_exactly(
-        &self,
-        points: &[Point],
-        lattice_from_points: &LatticeFromPoints,
-        occupied: &mut [u64],
-    ) {
-        self::occupied(points, lattice_from_points, self, Lookup::Exact, occupied);
-    }
-
     /// Bytes that look-ups of this kind may read.
     fn bytes(&self, lookup: Lookup) -> usize {
         match lookup {

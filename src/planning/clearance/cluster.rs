@@ -35,9 +35,9 @@ impl FieldCluster {
 
     /// The byte of a cell of a block, both by their places; none where the block is not made.
     #[inline(always)]
-    pub(in crate::planning) fn byte(&self, block: usize, cell: usize) -> Option<u8> {
-        let number = self.numbers[block % BLOCKS];
-        self.blocks.get(usize::from(number)).map(|block| block.0[cell % BLOCK_BYTES])
+    pub(in crate::planning) fn byte(&self, block: u32, cell: u32) -> Option<u8> {
+        let number = self.numbers[block as usize % BLOCKS];
+        self.blocks.get(usize::from(number)).map(|block| block.0[cell as usize % BLOCK_BYTES])
     }
 
     /// Keeps the block at `place`; none is one with nothing near.
@@ -53,6 +53,10 @@ impl FieldCluster {
                 number
             }
             (Some(block), None) => {
+                if self.blocks.len() == self.blocks.capacity() {
+                    // By a quarter, not to hold much that is not used.
+                    self.blocks.reserve_exact(self.blocks.len() / 4 + 4);
+                }
                 self.blocks.push(block);
                 (self.blocks.len() - 1) as u16
             }

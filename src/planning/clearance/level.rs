@@ -1,13 +1,20 @@
 //! The field of one level: its clusters by key.
 
 use super::cluster::{CLUSTER_LEVELS, FieldCluster};
-use crate::voxel::VoxelKey;
+use crate::voxel::{BLOCK_LEVELS, VoxelKey};
 
 /// Marks a vacant slot; no key sets bit 63.
 const VACANT: u64 = u64::MAX;
 /// Slots for each cluster, at least: searches end where they begin.
 const SLOTS_A_CLUSTER: usize = 4;
 const SLOTS_MIN: usize = 16;
+
+/// A place of 8 x 8 x 8, x fastest, by the lowest three bits of an index.
+#[inline(always)]
+fn place(index: [i32; 3]) -> u32 {
+    let [x, y, z] = index.map(|i| (i & 7) as u32);
+    x | y << 3 | z << 6
+}
 
 #[derive(Debug)]
 struct Slot {
@@ -38,19 +45,27 @@ impl FieldLevel {
         Self { slots: std::iter::repeat_with(|| Slot::NONE).take(slots).collect(), clusters: 0 }
     }
 
-    /// The byte of the cell at `index` of the level; none where its block is not made.
+    /// The key of the cluster of the cell at `index`.
     #[inline(always)]
-    pub(in crate::planning) fn byte(&self, index: [i32; 3]) -> Option<u8> {
-        let key = VoxelKey::pack(index.map(|i| i >> (3 + CLUSTER_LEVELS))).to_bits();
-        let place = |shift: u32| {
-            let [x, y, z] = index.map(|i| (i >> shift & 7) as usize);
-            x | y << 3 | z << 6
-        };
-        self.find(key)?.byte(place(3), place(0))
+    pub(in crate::planning) fn cluster_key(index: [i32; 3]) -> u64 {
+        VoxelKey::pack(index.map(|i| i >> (BLOCK_LEVELS + CLUSTER_LEVELS))).to_bits()
     }
 
+    /// The place of its block in the cluster.
     #[inline(always)]
-    fn find(&self, key: u64) -> Option<&FieldCluster> {
+    pub(in crate::planning) fn block_place(index: [i32; 3]) -> u32 {
+        place(index.map(|i| i >> BLOCK_LEVELS))
+    }
+
+    /// Its place in the block.
+    #[inline(always)]
+    pub(in crate::planning) fn cell_place(index: [i32; 3]) -> u32 {
+        place(index)
+    }
+
+    /// The cluster with a key, where there is one.
+    #[inline(always)]
+    pub(in crate::planning) fn cluster(&self, key: u64) -> Option<&FieldCluster> {
         let mask = self.slots.len() - 1;
         let mut at = Self::hash(key) & mask;
         loop {

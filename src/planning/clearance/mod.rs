@@ -20,6 +20,7 @@ mod fields;
 mod level;
 
 pub(super) use block::FAR;
+pub(super) use cluster::FieldCluster;
 pub use fields::FIELD_BYTES_MAX_DEFAULT;
 pub(super) use fields::{FieldBlockKey, Fields};
 pub(super) use level::FieldLevel;

@@ -190,7 +190,8 @@ impl<'a> Projection<'a> {
                 return Err(GridError::Rectangle(min_m, max_m));
             }
         }
-        if !(band_m[0] <= band_m[1]) {
+        let is_in_order = band_m[0] <= band_m[1];
+        if !is_in_order {
             return Err(GridError::Band(band_m));
         }
         let voxel_m = view.lattice().resolution_m(level);

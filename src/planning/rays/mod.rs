@@ -156,7 +156,9 @@ impl<'a> Rays<'a> {
             return Err(RayError::Origins { origins, rays });
         }
         match self.toward {
-            Toward::Directions { range_m, .. } if !(range_m > 0.0) => Err(RayError::Range(range_m)),
+            Toward::Directions { range_m, .. } if range_m.is_nan() || range_m <= 0.0 => {
+                Err(RayError::Range(range_m))
+            }
             _ => Ok(()),
         }
     }
@@ -170,7 +172,8 @@ impl Toward<'_> {
             Self::Directions { directions, range_m } => {
                 let direction = directions[at].xyz().map(f64::from);
                 let length = length(direction);
-                if !((length - 1.0).abs() <= DIRECTION_LENGTH_TOLERANCE) {
+                let is_unit = (length - 1.0).abs() <= DIRECTION_LENGTH_TOLERANCE;
+                if !is_unit {
                     return Err(RayError::Direction { at, direction: directions[at], length });
                 }
                 Ok((direction.map(|c| c / length), range_m))

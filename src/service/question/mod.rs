@@ -122,7 +122,7 @@ const SHORT_ELEMENTS: usize = 4096;
 const ANSWER: &str = "the answer to a question";
 
 impl MapService {
-    /// Answers a question of a planner at one revision, on a thread for queries.
+    /// Answers a question of a planner at one revision, on a thread for planners.
     ///
     /// # Errors
     /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when `min_revision`
@@ -152,7 +152,7 @@ impl MapService {
                     limit.run(stop, |stop| question.answer_from(&map.questioned(), limits, stop))?;
                 Ok(Answered { answer, version: map.version(version) })
             };
-            self.inner.queries.run(answer).await?
+            self.inner.planning.run(answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }

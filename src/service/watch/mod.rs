@@ -29,7 +29,7 @@ use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
 
 /// Changes that are read from the journal at once, and bytes of memory after which no other is added to them.
-const BATCH_MAX: usize = 64;
+const BATCH_MAX: usize = 4096;
 const BATCH_BYTES: usize = 4 << 20;
 
 impl MapService {
@@ -137,8 +137,8 @@ impl Watch {
     /// Begins to tell of the whole state, once it is durable.
     async fn begin_state(&mut self) -> Result<(), ServiceError> {
         let (map, inner) = (Arc::clone(&self.map), Arc::clone(&self.service.inner));
-        let (form, region) = (self.form, self.region);
-        let make = move |stop: StopSignal<'_>| map.full_state(form, region.as_ref(), &inner.budget, stop);
+        let form = self.form;
+        let make = move |stop: StopSignal<'_>| map.whole_state(form, &inner.budget, stop);
         let state = self.service.inner.watch.run(make).await??;
         let revision = state.version.revision;
         let is_durable = tokio::select! {
@@ -150,7 +150,7 @@ impl Watch {
             return Err(self.ended());
         }
         (self.told, self.parts) =
-            (Some(revision), Parts::State(StateParts::of(state, self.map.map.settings())));
+            (Some(revision), Parts::State(StateParts::of(state, self.region, self.map.map.lattice())));
         Ok(())
     }
 

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::map::Region;
 use crate::service::full_state::FullState;
 use crate::service::hosted_map::HostedMap;
 use crate::service::resource_budget::ResourceBudget;
@@ -15,24 +14,9 @@ const WATCH: &str = "a watch";
 const BLOCK_BYTES: usize = BlockBytes::OF_BLOCK;
 
 impl HostedMap {
-    /// What the map holds, of `region` where there is one: as it is, or as it was shortly before where that is at hand and can
-    /// be followed from.
-    pub(super) fn full_state(
-        &self,
-        form: WatchForm,
-        region: Option<&Region>,
-        budget: &ResourceBudget,
-        stop: StopSignal<'_>,
-    ) -> Result<Arc<FullState>, ServiceError> {
-        let whole = self.whole_state(form, budget, stop)?;
-        let Some(region) = region else { return Ok(whole) };
-        let memory = budget.reserve_transient((whole.voxels.blocks().len() * BLOCK_BYTES) as u64, WATCH)?;
-        let voxels = whole.voxels.part_in(region, self.map.lattice(), whole.level);
-        let (version, level, keep_outs) = (whole.version, whole.level, Arc::clone(&whole.keep_outs));
-        Ok(Arc::new(FullState { version, level, voxels, keep_outs, _memory: memory }))
-    }
-
-    fn whole_state(
+    /// What the map holds: as it is, or as it was shortly before where that is at hand and can be followed from. Those who
+    /// watch a region share it with those who watch everything.
+    pub(super) fn whole_state(
         &self,
         form: WatchForm,
         budget: &ResourceBudget,
@@ -50,13 +34,14 @@ impl HostedMap {
         let long_read = self.map.long_read();
         let view = long_read.view().with_keep_outs();
         let stored: usize = view.lists(level).map(|list| list.blocks().len()).sum();
-        let memory = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
+        // Lent while it is made; then it lies in memory, and is measured there.
+        let _lent = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
         let (voxels, version) = (view.level_blocks(level, stop), view.version());
         let keep_outs = view.keep_outs().cloned().unwrap_or_default();
         drop(view);
         drop(long_read);
         check_not_stopped(stop)?;
-        let state = Arc::new(FullState { version, level, voxels, keep_outs, _memory: memory });
+        let state = Arc::new(FullState { version, level, voxels, keep_outs });
         self.full_states.put(key, &state);
         Ok(state)
     }

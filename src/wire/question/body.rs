@@ -22,7 +22,7 @@ impl TryFrom<pb::Body> for Body {
         let link =
             |(number, link): (usize, pb::Link)| link.try_into().in_field(&format!("body.links[{number}]"));
         let links = body.links.into_iter().enumerate().map(link).collect::<Result<_, _>>()?;
-        Ok(Self::new(links).in_field("body")?)
+        Self::new(links).in_field("body")
     }
 }
 

@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 23] = [
+const METHODS: [&str; 29] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -31,6 +31,12 @@ const METHODS: [&str; 23] = [
     "Mapping/PutKeepOut",
     "Mapping/DeleteKeepOut",
     "Occupancy/ListKeepOuts",
+    "Occupancy/CheckPoses",
+    "Occupancy/CheckSpheres",
+    "Occupancy/CheckMotions",
+    "Occupancy/CastRays",
+    "Occupancy/FindNearest",
+    "Occupancy/ProjectGrid",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];

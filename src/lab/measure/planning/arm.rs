@@ -10,8 +10,10 @@ use super::place::{Surface, append};
 use crate::geometry::Pose;
 use crate::planning::{Body, Link, PlanningError, Sphere};
 
+type Row = (usize, [f64; 3], [f64; 3], f64, usize);
+
 /// Spheres in rows: link, ends of the row, radius (meters), how many.
-const ROWS: [(usize, [f64; 3], [f64; 3], f64, usize); 11] = [
+const ROWS: [Row; 11] = [
     (0, [-0.06, 0.0, 0.06], [0.0, 0.0, 0.06], 0.08, 2),
     (1, [0.0, 0.0, -0.2], [0.0, -0.03, 0.0], 0.06, 5),
     (2, [0.0, -0.03, 0.02], [0.0, -0.18, 0.0], 0.06, 5),

@@ -26,7 +26,8 @@ EXAMPLES:
 A server is started as a process of its own, with the workload's map. A replica copies it, and another one does so through a
 relay that counts bytes. Then the same points are asked, --points at a time: through the replica's map and its locks, as
 `mrol bench lookup` does; through the replica; and through a C program with a replica of its own. They take turns, each pass
-after one that is not timed; ns_per_point is the median of --repeats passes, of_map compares with the first.";
+after one that is not timed; ns_per_point is the median of --repeats passes, and of_map that of each pass against the map's
+pass beside it.";
 
 /// Measure a copy of a map that follows: until it is complete, its memory, and its queries against look-ups
 #[derive(Debug, clap::Args)]
@@ -114,8 +115,9 @@ impl ReplicaBench {
                 return Err(CliError::failed(format!("the answers differ: {answers:?} points are occupied")));
             }
         }
-        let map = compared.map.median();
-        let line = |through, runs: &Runs| Line::of(through, lookup, points, runs.median(), map);
+        let line = |through, runs: &Runs| {
+            Line::of(through, lookup, points, runs.median(), runs.median_ratio(&compared.map))
+        };
         let mut lines = vec![line("map", &compared.map), line("replica", &compared.replica)];
         lines.extend(c_client.map(|_| line("C", &of_c)));
         Ok(lines)

@@ -58,9 +58,9 @@ impl Line {
         lookup: Lookup,
         points: usize,
         ns_per_point: f64,
-        map_ns: f64,
+        of_map: f64,
     ) -> Self {
-        Self { through, lookup: lookup.as_str(), points, ns_per_point, of_map: ns_per_point / map_ns }
+        Self { through, lookup: lookup.as_str(), points, ns_per_point, of_map }
     }
 }
 
