@@ -22,9 +22,10 @@ No server may use the folder meanwhile. Every snapshot and every record of the j
 replayed from the oldest snapshot, and the map is compared with each snapshot on the way. The exit code is 1 where
 something is wrong.
 
---set-aside keeps what can be read before the damage and moves the rest to files named .damaged. Nothing is deleted,
-and the command prints what the map loses. Those files stay, and are reported, until you remove them. Damaged snapshots,
-which a server sets aside by itself, are removed together with the snapshots of their age.";
+--set-aside makes a map of what can be read before the damage, and renames the damaged folder to NAME.UUID.damaged, as it
+is. Nothing is deleted. The new map has a uuid of its own, so that robots and planners notice, and undo does not reach
+behind its beginning. The folder stays, and is reported, until you remove it. Damaged snapshots, which a server sets
+aside by itself, are removed together with the snapshots of their age.";
 
 /// Check a data folder, file by file, while no server uses it
 #[derive(Debug, clap::Args)]
@@ -33,7 +34,7 @@ pub(super) struct Doctor {
     /// The data folder of a server
     #[arg(value_name = "DATA_DIR")]
     data_dir: PathBuf,
-    /// Set aside the damaged end of this map's journal, so that the map can be opened
+    /// Set this map's damaged folder aside, and make a map of what can be read of it
     #[arg(long, value_name = "MAP", value_parser = parse::map_name)]
     set_aside: Option<MapName>,
 }
@@ -57,6 +58,9 @@ fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
     for path in data_dir.not_understood()? {
         output.note(format!("not understood, and left alone: {}", path.display()));
     }
+    for path in data_dir.set_aside()? {
+        output.note(format!("set aside, and read by nobody: {}", path.display()));
+    }
     let output = output.with_bar_of(names.len(), "maps");
     let mut problems = 0;
     for name in names {
@@ -75,10 +79,8 @@ fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
 fn aside(data_dir: &DataDir, name: &MapName, output: &Output) -> Result<(), CliError> {
     match set_aside(data_dir, name)? {
         None => output.say(format!("map {name} can be opened as it is")),
-        Some(SetAside { files, revision }) => {
-            for file in files {
-                output.note(format!("set aside: {}", file.display()));
-            }
+        Some(SetAside { folder, revision }) => {
+            output.note(format!("set aside: {}", folder.display()));
             output.print(&Opens { map: name.to_string(), revision })
         }
     }

@@ -4,6 +4,7 @@
 //! DATA_DIR/lock                   held by the one process that uses the folder
 //! DATA_DIR/maps/NAME.UUID/        a map, see `map_folder.rs`
 //! DATA_DIR/maps/NAME/             a map of a former release: gets its uuid when it is opened
+//! DATA_DIR/maps/NAME.UUID.damaged/   a map whose files are damaged, set aside by `mrol doctor`: read by nobody
 //! DATA_DIR/maps/NAME.mrol         a map file (of version 1, a backup, of `mrol map --out`): taken in at a start where
 //!                                 there is no map of the name; where there is one, it stays and is reported
 //! DATA_DIR/maps/.unfinished-...   what a crash left: swept away
@@ -105,17 +106,6 @@ impl DataDir {
         Ok(opened)
     }
 
-    /// Opens a map that lacks revisions which are known only to have been acknowledged, and writes a snapshot that no
-    /// longer expects them. Returns the map's revision.
-    pub(super) fn go_on_without(&self, name: &MapName) -> Result<u64, StoreError> {
-        let (files, progress) = (Arc::clone(&self.files), OpeningProgress::default());
-        let (path, uuid) = self.adopted(name, &progress)?;
-        let opened = MapFolder::open_at(files, path, uuid, self.settings.clone(), &progress, false)?;
-        let snapshot = Snapshot::of(&opened.map, uuid);
-        opened.folder.save(&snapshot, u64::MAX)?;
-        Ok(snapshot.contents.revision)
-    }
-
     /// Creates a map, as a whole or not at all.
     ///
     /// # Errors
@@ -144,8 +134,8 @@ impl DataDir {
     ) -> Result<MapFolder, StoreError> {
         self.clear_leftovers()?;
         let new = Entry::folder_name(name, first.uuid);
-        let old_entry = old.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let replacement = Replacement { old: old_entry, kept: Entry::folder_name(kept, old.uuid()) };
+        let replacement =
+            Replacement { old: name_of(&old.path()), kept: Entry::folder_name(kept, old.uuid()) };
         self.make(&new, first, Some(&replacement), StopSignal::NEVER)?;
         // It is not used before it is known to stay.
         let exchange = || {
@@ -159,6 +149,25 @@ impl DataDir {
         Ok(folder)
     }
 
+    /// Creates a map in the place of one whose files are damaged, and sets the folder of that aside as it is; returns where
+    /// it lies then. Nobody uses the folder.
+    ///
+    /// # Errors
+    /// When the system refuses. Where the new map is there already, the next start completes the exchange.
+    pub(super) fn replace_damaged(
+        &self,
+        name: &MapName,
+        old: &Path,
+        first: &Snapshot,
+    ) -> Result<PathBuf, StoreError> {
+        let (new, old) = (Entry::folder_name(name, first.uuid), name_of(old));
+        let replacement = Replacement { kept: Entry::set_aside_name(&old), old };
+        self.make(&new, first, Some(&replacement), StopSignal::NEVER)?;
+        replacement.keep_old(&*self.files, &self.maps)?;
+        replacement::finish(&*self.files, &self.maps.join(&new))?;
+        Ok(self.maps.join(&replacement.kept))
+    }
+
     /// Deletes a map. When this returns, the map is deleted for good, though its bytes may not all be freed.
     ///
     /// # Errors
@@ -168,7 +177,7 @@ impl DataDir {
         let path = folder.path();
         let gone = folder::unfinished(&path);
         folder.take_away(&gone)?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = name_of(&path);
         if let Err(error) = self.files.sync(&self.maps) {
             self.leftovers.lock().insert(name);
             return Err(StoreError::io(&path)(error));
@@ -282,6 +291,11 @@ impl DataDir {
     pub(super) fn files(&self) -> &Arc<dyn FileSystem> {
         &self.files
     }
+}
+
+/// The name of a folder in the folder of maps.
+fn name_of(folder: &Path) -> String {
+    folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Creates a folder where it does not exist, and makes its entry durable.

@@ -8,7 +8,9 @@ use uuid::Uuid;
 use super::entry::Entry;
 use super::folder::FolderPath;
 use super::journal::{self, Inspected};
-use super::{DataDir, FileSystem, OpeningProgress, Snapshot, StoreError, folder, snapshot, snapshot_files};
+use super::{
+    DataDir, DataDirContents, FileSystem, OpeningProgress, Snapshot, StoreError, snapshot, snapshot_files,
+};
 use crate::map::{MapContents, MapName, MappedScan, MultiResolutionMap};
 
 /// Findings about a map.
@@ -55,9 +57,9 @@ pub struct AsideFile {
 /// Result of [`set_aside`].
 #[derive(Debug)]
 pub struct SetAside {
-    /// Files that hold what was set aside.
-    pub files: Vec<PathBuf>,
-    /// Revision of the map without what was set aside.
+    /// Where the damaged folder lies now.
+    pub folder: PathBuf,
+    /// Revision of the map that was made of what can be read.
     pub revision: u64,
 }
 
@@ -210,10 +212,11 @@ impl Replay {
         if revision <= self.map.revision() {
             return Ok(());
         }
-        let made = self.map.committer().apply(change).revision;
-        if made != revision {
-            return Err(format!("replayed, it makes revision {made}"));
+        let next = self.map.revision() + 1;
+        if revision != next {
+            return Err(format!("it holds revision {revision}, {next} should come next"));
         }
+        self.map.committer().apply(change);
         if let Some(snapshot) = self.snapshots.pop_if(|snapshot| snapshot.contents.revision == revision)
             && !is_made_by(&snapshot.contents, &self.map.contents())
         {
@@ -234,61 +237,37 @@ fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
     same && written.moments == made.moments && written.trajectory.poses().all(is_known)
 }
 
-/// Sets aside the part of a damaged journal that cannot be read, and what follows it. None where the map can be opened
-/// as it is.
+/// Makes a map of what can be read of one that cannot be opened, and sets the folder of that aside as it is. None where the
+/// map can be opened.
+///
+/// The map begins anew, with a uuid of its own: its history goes on otherwise than that which clients may have seen.
 ///
 /// # Errors
-/// When the system refuses, or the damage is not in the journal.
+/// When the system refuses, or there is no snapshot that can be read.
 pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>, StoreError> {
-    let mut aside = Vec::new();
-    loop {
-        match data_dir.map(name, &OpeningProgress::default()) {
-            Ok(_) if aside.is_empty() => return Ok(None),
-            Ok(opened) => return Ok(Some(SetAside { files: aside, revision: opened.map.revision() })),
-            Err(StoreError::JournalDamaged { path, offset, .. }) => {
-                aside.extend(set_aside_from(&**data_dir.files(), &path, offset)?);
-            }
-            Err(StoreError::Foreign { path, .. }) => {
-                aside.push(move_aside(&**data_dir.files(), &path)?);
-            }
-            Err(StoreError::RevisionsMissing { .. }) => {
-                let revision = data_dir.go_on_without(name)?;
-                return Ok(Some(SetAside { files: aside, revision }));
-            }
-            Err(error) => return Err(error),
-        }
+    use StoreError::{Foreign, JournalDamaged, RevisionsMissing};
+    // An exchange that a crash interrupted may be that of an earlier call.
+    data_dir.end_replacements(&mut DataDirContents::default())?;
+    match data_dir.map(name, &OpeningProgress::default()) {
+        Ok(_) => return Ok(None),
+        Err(JournalDamaged { .. } | Foreign { .. } | RevisionsMissing { .. }) => {}
+        Err(error) => return Err(error),
     }
+    let path = data_dir.path(name)?;
+    let map = readable(data_dir.files(), &path)?;
+    let first = Snapshot::of(&map, Uuid::new_v4());
+    let folder = data_dir.replace_damaged(name, &path, &first)?;
+    Ok(Some(SetAside { folder, revision: first.contents.revision }))
 }
 
-/// Renames a file so that it is no longer read.
-fn move_aside(files: &dyn FileSystem, path: &Path) -> Result<PathBuf, StoreError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let to = path.with_file_name(format!("{name}.damaged"));
-    let renamed = files.rename(path, &to).and_then(|()| files.sync(folder::folder_of(path)));
-    renamed.map_err(StoreError::io(path))?;
-    Ok(to)
-}
-
-/// Moves a segment from `offset` on, and all later ones, to files that are not read.
-fn set_aside_from(files: &dyn FileSystem, path: &Path, offset: u64) -> Result<Vec<PathBuf>, StoreError> {
-    let above = folder::folder_of(path);
-    let bytes = files.read(path).map_err(StoreError::io(path))?;
-    let damaged = path.with_extension("log.damaged");
-    folder::replace(files, &damaged, &bytes)?;
-    // A segment without a frame is not needed.
-    let shortened = match offset < journal::SEGMENT_HEADER_BYTES as u64 {
-        true => files.remove(path),
-        false => files.truncate(path, offset).and_then(|()| files.sync(path)),
-    };
-    shortened.map_err(StoreError::io(path))?;
-    let mut aside = vec![damaged];
-    let names = files.list(above).map_err(StoreError::io(above))?;
-    let damaged_first = path.file_name().and_then(|name| journal::first_revision(&name.to_string_lossy()));
-    for name in names.iter().filter(|name| journal::first_revision(name) > damaged_first) {
-        let (from, to) = (above.join(name), above.join(format!("{name}.damaged")));
-        files.rename(&from, &to).map_err(StoreError::io(&from))?;
-        aside.push(to);
-    }
-    files.sync(above).map_err(StoreError::io(above))?;
-    Ok(aside)
+/// The map that a folder still gives: that of the newest snapshot, and the changes after it up to what cannot be read.
+fn readable(files: &Arc<dyn FileSystem>, path: &Path) -> Result<MultiResolutionMap, StoreError> {
+    let mut found = Diagnosis::default();
+    let newest = read_snapshots(&**files, path, &mut found)?.into_iter().next();
+    let newest = newest.ok_or_else(|| StoreError::damaged(path, "no snapshot can be read"))?;
+    let uuid = newest.uuid;
+    let map = newest.restore().map_err(|e| StoreError::damaged(path, e.to_string()))?;
+    let mut replay = Replay { map, snapshots: Vec::new(), problems: Vec::new() };
+    replay.read_journal(files, path, uuid, &mut found)?;
+    Ok(replay.map)
 }

@@ -8,6 +8,7 @@ use super::folder::UNFINISHED;
 use crate::map::MapName;
 
 const MAP_FILE_SUFFIX: &str = ".mrol";
+const SET_ASIDE_SUFFIX: &str = ".damaged";
 
 /// Meaning of a name in the folder of maps. A map's name has no dot, so that each name means one thing.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,6 +19,8 @@ pub(super) enum Entry {
     OldMap(MapName),
     /// A map file to be imported.
     MapFile(MapName),
+    /// The folder of a map whose files are damaged: an operator set it aside, and nobody reads it.
+    SetAside,
     /// Something unfinished that a crash left.
     Unfinished,
     /// Not part of a data folder.
@@ -31,6 +34,9 @@ impl Entry {
         }
         if let Some(name) = entry.strip_suffix(MAP_FILE_SUFFIX).and_then(|name| MapName::new(name).ok()) {
             return Self::MapFile(name);
+        }
+        if let Some(folder) = entry.strip_suffix(SET_ASIDE_SUFFIX) {
+            return if matches!(Self::of(folder), Self::Map { .. }) { Self::SetAside } else { Self::Unknown };
         }
         match entry.split_once('.') {
             None => MapName::new(entry).map_or(Self::Unknown, Self::OldMap),
@@ -49,13 +55,18 @@ impl Entry {
     pub(super) fn into_map(self) -> Option<MapName> {
         match self {
             Self::Map { name, .. } | Self::OldMap(name) => Some(name),
-            Self::MapFile(_) | Self::Unfinished | Self::Unknown => None,
+            Self::MapFile(_) | Self::SetAside | Self::Unfinished | Self::Unknown => None,
         }
     }
 
     /// The name of a map's folder.
     pub(super) fn folder_name(name: &MapName, uuid: Uuid) -> String {
         format!("{name}.{uuid}")
+    }
+
+    /// The name of the folder of a map that is set aside.
+    pub(super) fn set_aside_name(folder_name: &str) -> String {
+        format!("{folder_name}{SET_ASIDE_SUFFIX}")
     }
 
     /// The name of a map file.
@@ -76,8 +87,11 @@ mod tests {
         assert_eq!(Entry::of("office"), Entry::OldMap(office.clone()));
         assert_eq!(Entry::of("office.mrol"), Entry::MapFile(office));
         assert_eq!(Entry::of(&format!(".unfinished-{folder}")), Entry::Unfinished);
+        assert_eq!(Entry::of(&Entry::set_aside_name(&folder)), Entry::SetAside);
         let simple = format!("office.{}", uuid.simple());
-        for other in ["Office", "office.txt", "office.mrol.bak", ".mrol", "lost+found", &simple, ""] {
+        for other in
+            ["Office", "office.txt", "office.damaged", "office.mrol.bak", ".mrol", "lost+found", &simple, ""]
+        {
             assert_eq!(Entry::of(other), Entry::Unknown, "{other}");
         }
     }

@@ -31,8 +31,8 @@ pub enum StoreError {
     /// The journal is damaged before its end. Something that was acknowledged may be lost, and nothing is skipped
     /// silently.
     #[error(
-        "{}: damaged at offset {offset}: {reason}. Revision {revision} and what follows cannot be read; {} keeps \
-         what comes before and sets the rest aside",
+        "{}: damaged at offset {offset}: {reason}. Revision {revision} and what follows cannot be read; {} makes \
+         a map of what comes before, and sets this one aside",
         .path.display(), set_aside_command(.path)
     )]
     JournalDamaged {
@@ -61,7 +61,8 @@ pub enum StoreError {
     },
     /// A file in a map's folder belongs to another map.
     #[error(
-        "{}: it is another map's: its uuid is {found}, that of the map is {expected}; move it away, or {} does",
+        "{}: it is another map's: its uuid is {found}, that of the map is {expected}; move it away, or {} \
+         makes a map without it",
         .path.display(), set_aside_command(.path)
     )]
     Foreign {

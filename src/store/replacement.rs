@@ -8,7 +8,8 @@
 //! done                   maps/office-replaced-41.OLD/          maps/office.NEW/
 //! ```
 //!
-//! The file `replaces` names the folder of the old map, and the new name of that folder. While it exists, the next
+//! The file `replaces` names the folder of the old map, and the new name of that folder, which may be that of one that is set
+//! aside. While it exists, the next
 //! start completes what a crash interrupted, so that there is one map of the name at every moment.
 
 use std::path::Path;
@@ -44,10 +45,11 @@ impl Replacement {
         let bytes = files.read(&path).map_err(StoreError::io(&path))?;
         let text = String::from_utf8_lossy(&bytes);
         let mut lines = text.lines();
-        let mut folder_name =
-            || lines.next().filter(|line| matches!(Entry::of(line), Entry::Map { .. })).map(str::to_owned);
-        match (folder_name(), folder_name()) {
-            (Some(old), Some(kept)) => Ok(Some(Self { old, kept })),
+        let mut folder = || lines.next().map(|line| (line.to_owned(), Entry::of(line)));
+        match (folder(), folder()) {
+            (Some((old, Entry::Map { .. })), Some((kept, Entry::Map { .. } | Entry::SetAside))) => {
+                Ok(Some(Self { old, kept }))
+            }
             _ => Err(StoreError::damaged(&path, "it names no two folders of maps")),
         }
     }

@@ -62,10 +62,11 @@ fn a_torn_end_is_no_problem() {
 fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
     let sequence = Sequence::of(3);
     let data = killed(&sequence);
-    let mut bytes = std::fs::read(journal(&sequence)).unwrap();
+    let damaged = journal(&sequence);
+    let mut bytes = std::fs::read(&damaged).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
-    std::fs::write(journal(&sequence), &bytes).unwrap();
+    std::fs::write(&damaged, &bytes).unwrap();
 
     let told = mrol(&["doctor", &data]).assert().code(1).get_output().clone();
     let told = String::from_utf8(told.stdout).unwrap();
@@ -90,13 +91,21 @@ fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
 
     let opens = &objects(&["doctor", &data, "--set-aside", "office"])[0];
     assert_eq!(opens, &json!({"map": "office", "revision": 1}));
-    assert_eq!(std::fs::read(journal(&sequence).with_extension("log.damaged")).unwrap(), bytes);
-    let found = &objects(&["doctor", &data])[0];
-    let aside = json!([{"file": "journal-00000000000000000001.log.damaged", "bytes": bytes.len()}]);
-    assert_eq!((&found["problems"], &found["set_aside"]), (&json!([]), &aside));
+    // The damaged folder is there as it was, under another name.
+    let folder = damaged.parent().unwrap();
+    let aside = format!("{}.damaged", folder.display());
+    let kept = Path::new(&aside).join(damaged.file_name().unwrap());
+    assert!(!folder.exists() && std::fs::read(kept).unwrap() == bytes);
+    let told = mrol(&["doctor", &data]).assert().code(0).get_output().clone();
+    assert!(String::from_utf8(told.stderr).unwrap().contains(&aside));
+    assert_eq!(objects(&["doctor", &data])[0]["problems"], json!([]));
+
+    // Whoever saw more of it than there is now has to notice: the map is another one.
     let server = Process::start(&data, &[]);
     let shown = &objects(&["maps", "show", "office", "--server", &server.grpc])[0];
     assert_eq!((&shown["revision"], &shown["scans"]), (&json!(1), &json!(1)));
+    assert!(!folder.to_str().unwrap().contains(shown["map_uuid"].as_str().unwrap()), "{shown}");
+    assert!(objects(&["maps", "list", "--server", &server.grpc]).len() == 1);
 }
 
 #[test]

@@ -50,7 +50,7 @@ impl DataDir {
                     Err(error) => contents.refused.push((name, error)),
                 },
                 Entry::Unknown => contents.not_understood.push(self.maps.join(entry)),
-                Entry::Map { .. } | Entry::OldMap(_) | Entry::Unfinished => {}
+                Entry::Map { .. } | Entry::OldMap(_) | Entry::SetAside | Entry::Unfinished => {}
             }
         }
         contents.maps = self.names()?;
@@ -62,8 +62,20 @@ impl DataDir {
     /// # Errors
     /// When the folder cannot be read.
     pub fn not_understood(&self) -> Result<Vec<PathBuf>, StoreError> {
-        let unknown = |entry: &String| Entry::of(entry) == Entry::Unknown;
-        Ok(self.entries()?.into_iter().filter(unknown).map(|entry| self.maps.join(entry)).collect())
+        self.paths_of(&Entry::Unknown)
+    }
+
+    /// Folders of maps that were set aside because their files are damaged.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn set_aside(&self) -> Result<Vec<PathBuf>, StoreError> {
+        self.paths_of(&Entry::SetAside)
+    }
+
+    fn paths_of(&self, meaning: &Entry) -> Result<Vec<PathBuf>, StoreError> {
+        let has_it = |entry: &String| Entry::of(entry) == *meaning;
+        Ok(self.entries()?.into_iter().filter(has_it).map(|entry| self.maps.join(entry)).collect())
     }
 
     /// Adds the bytes that opening the maps `names` will read to `progress`. Problems with a map are reported when it
@@ -77,7 +89,10 @@ impl DataDir {
 
     /// Completes the replacements of maps that a crash interrupted. Where that fails, neither map of the name can be
     /// told from the other: the name is refused, and the next start tries again.
-    fn end_replacements(&self, contents: &mut DataDirContents) -> Result<(), StoreError> {
+    pub(in crate::store) fn end_replacements(
+        &self,
+        contents: &mut DataDirContents,
+    ) -> Result<(), StoreError> {
         for entry in self.entries()? {
             let Entry::Map { name, .. } = Entry::of(&entry) else { continue };
             let new = self.maps.join(&entry);

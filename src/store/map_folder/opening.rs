@@ -68,18 +68,6 @@ impl MapFolder {
         settings: StoreSettings,
         progress: &OpeningProgress,
     ) -> Result<OpenedMap, StoreError> {
-        Self::open_at(files, path, uuid, settings, progress, true)
-    }
-
-    /// Opens a map's folder; the caller may accept the loss of revisions that are known only to have been acknowledged.
-    pub(in crate::store) fn open_at(
-        files: Arc<dyn FileSystem>,
-        path: PathBuf,
-        uuid: Uuid,
-        settings: StoreSettings,
-        progress: &OpeningProgress,
-        must_reach_head: bool,
-    ) -> Result<OpenedMap, StoreError> {
         progress.check_wanted()?;
         folder::sweep(&*files, &path)?;
         let mut revisions = snapshot_revisions(&*files, &path)?;
@@ -110,8 +98,8 @@ impl MapFolder {
             let made = format!("replayed, it makes revision {}", committed.revision);
             (committed.revision == revision).then_some(()).ok_or(made)
         };
-        let durable = if must_reach_head { last_written.max(head) } else { revision };
-        let (known, at) = (Known { snapshot: revision, durable }, FolderPath::new(path.clone()));
+        let known = Known { snapshot: revision, durable: last_written.max(head) };
+        let at = FolderPath::new(path.clone());
         let segment_bytes_max = settings.segment_bytes_max;
         let (journal, recovered) = SegmentedJournal::recover(
             Arc::clone(&files),
