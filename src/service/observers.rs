@@ -273,6 +273,25 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
+    async fn what_was_undone_so_long_ago_that_the_trajectory_forgot_it_does_not_come_back() {
+        let data = tempfile::tempdir().unwrap();
+        // In one segment, and in a segment each.
+        for (name, segment_bytes_max) in [("one", 64 << 20), ("each", 1)] {
+            let data = TempDir::with_prefix_in(name, &data).unwrap();
+            let service = service(&data, segment_bytes_max, Limits::default()).await;
+            service.create_map(map(), MapSettings::new(RESOLUTION_M.into(), 4)).await.unwrap();
+            let (undone, kept) = (insert(&service, 1, &[[0; 3]]).await, insert(&service, 2, &[[0; 3]]).await);
+            let undo = Undo { target: UndoTarget::Revision(undone), request_id: None };
+            let head = service.undo(&map(), undo).await.unwrap().version.revision;
+            let hosted = service.map(&map()).unwrap();
+            let spacing = &hosted.folder.as_ref().unwrap().settings().trajectory_spacing;
+            hosted.map.committer().thin(head + 1, spacing);
+            assert!(hosted.map.trajectory_and_version().0.withdrawn().is_empty());
+            assert_eq!(observers(&service, [0; 3], 0).await, (vec![kept], false));
+        }
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
     async fn a_voxel_that_is_none_and_a_map_without_a_journal_are_refused() {
         let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
         service.create_map(map(), MapSettings::new(RESOLUTION_M.into(), 4)).await.unwrap();

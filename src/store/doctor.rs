@@ -271,3 +271,37 @@ fn readable(files: &Arc<dyn FileSystem>, path: &Path) -> Result<MultiResolutionM
     replay.read_journal(files, path, uuid, &mut found)?;
     Ok(replay.map)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::{
+        Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapSettings, Region,
+    };
+    use crate::store::{Record, StoreSettings};
+
+    #[test]
+    fn a_snapshot_whose_keep_outs_the_journal_does_not_make_is_told() {
+        let data = tempfile::tempdir().unwrap();
+        let data_dir = DataDir::open(data.path(), StoreSettings::default()).unwrap();
+        let (name, uuid) = (MapName::new("office").unwrap(), Uuid::from_u128(7));
+        let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
+        let folder = data_dir.create(&name, &Snapshot::of(&map, uuid)).unwrap();
+        let shape = KeepOutShape::of_region(Region::ball([0.0; 3], 1.0).unwrap()).unwrap();
+        let act = KeepOutAct::Put { shape, made_by: None, expires_at_ns: None };
+        let change = KeepOutChange { name: KeepOutName::new("dock").unwrap(), act };
+        let change = Change::KeepOut(KeepOutRecord { change, request: None });
+        folder.append(&[&Record::of(&change).unwrap()]).unwrap();
+        folder.sync().unwrap();
+        map.committer().apply(&change);
+        let mut snapshot = Snapshot::of(&map, uuid);
+        folder.save(&snapshot, u64::MAX).unwrap();
+        assert_eq!(diagnose(&data_dir, &name).unwrap().problems, Vec::<String>::new());
+
+        snapshot.contents.keep_outs = Arc::default();
+        let file = folder.path().join(snapshot_files::snapshot_name(1));
+        snapshot.write(&**data_dir.files(), &file).unwrap();
+        let problems = diagnose(&data_dir, &name).unwrap().problems;
+        assert_eq!(problems, ["the snapshot of revision 1 is not what the journal makes"]);
+    }
+}

@@ -11,6 +11,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod calls;
+mod keep_outs;
 mod load;
 mod made_again;
 mod pace;

@@ -46,3 +46,45 @@ impl HostedMap {
         Ok(state)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::{Point, Pose};
+    use crate::map::{MapName, MapSettings, Region, RobotName};
+    use crate::mapping::Guess;
+    use crate::service::{MapService, ScanRequest, ServiceSettings, WatchEvent, WatchForm, WatchRequest};
+    use crate::store::OpeningProgress;
+
+    const WATCHERS: u32 = 20;
+
+    /// Each had a copy of its region's voxels once: some dozens that read nothing held gigabytes.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn all_who_are_told_of_a_state_hold_one_between_them_whatever_regions_they_watch() {
+        let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let map = MapName::new("a").unwrap();
+        service.create_map(map.clone(), MapSettings::new(0.1, 4)).await.unwrap();
+        let points: Vec<_> = (0..1000).map(|x| Point::new(x as f32 + 0.05, 0.05, 0.05)).collect();
+        let scan = ScanRequest {
+            guess: Guess::Pose(Pose::identity()),
+            at_guess: true,
+            ..ScanRequest::new(RobotName::new("r").unwrap(), points.into())
+        };
+        service.insert_scan(&map, scan).await.unwrap();
+
+        let mut watches = Vec::new();
+        for n in 0..WATCHERS {
+            let region = Region::cuboid([0.0; 3], [f64::from(1 + n), 1.0, 1.0]).unwrap();
+            let region = (n > 0).then_some(region);
+            let request = WatchRequest { since: None, region, form: WatchForm::Changes };
+            let mut watch = service.watch(&map, request).await.unwrap();
+            let told = watch.next().await.unwrap().event;
+            assert!(matches!(&told, WatchEvent::State(part) if !part.voxels.is_empty()), "{told:?}");
+            watches.push(watch);
+        }
+        let hosted = service.map(&map).unwrap();
+        let state = hosted.full_states.get(None).expect("it is being told");
+        assert_eq!(std::sync::Arc::strong_count(&state), WATCHERS as usize + 1);
+        drop(watches);
+        assert_eq!(std::sync::Arc::strong_count(&state), 1);
+    }
+}
