@@ -1,6 +1,6 @@
 //! How certain an alignment is of a pose, direction by direction.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, Unit, Vector3, Vector6};
 
 use crate::geometry::{Point, symmetric_eigen};
 
@@ -34,6 +34,13 @@ impl PoseInformation {
     /// The information of a pose that nothing is known of: zero.
     pub(super) fn none(points: &[Point]) -> Self {
         Self::new(Matrix6::zeros(), points)
+    }
+
+    /// The same, but for the shift along `direction` (along the map's axes), of which nothing is known.
+    pub(super) fn without(self, direction: &Unit<Vector3<f64>>) -> Self {
+        let along = Vector6::from_fn(|i, _| if i < 3 { direction[i] } else { 0.0 });
+        let across = Matrix6::identity() - along * along.transpose();
+        Self { matrix: across * self.matrix * across, ..self }
     }
 
     /// Rows of the information matrix; entries are in 1 / m^2, 1 / (m rad) and 1 / rad^2.
@@ -97,6 +104,17 @@ mod tests {
         assert!(open.iter().all(|open| open.std_m.is_infinite() && open.direction[0].abs() < 1e-12));
         let held = information.directions()[5];
         assert!((held.std_m - 0.01).abs() < 1e-12, "{held:?}");
+    }
+
+    #[test]
+    fn a_shift_of_which_nothing_is_known_is_open_and_what_lies_across_it_is_as_it_was() {
+        let points = [Point::new(2.0, 0.0, 0.0), Point::new(-2.0, 0.0, 0.0)];
+        let held = PoseInformation::new(Matrix6::identity() * 1e4, &points);
+        let along = Unit::new_normalize(Vector3::new(0.6, 0.8, 0.0));
+        let open = held.without(&along).undetermined(0.1);
+        assert_eq!(open.len(), 1);
+        let [x, y, ..] = open[0].direction;
+        assert!((x * 0.6 + y * 0.8).abs() > 0.999 && open[0].std_m > 1e3, "{open:?}");
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod overlap;
 mod prior;
 mod refine;
 mod settings;
+mod slide;
 mod verdict;
 
 pub use free_space::{Contradiction, FreeSpaceSettings};
@@ -40,6 +41,7 @@ use extent::within_extent;
 use information::root_mean_square_range_m;
 use overlap::{Overlap, level_overlaps_until};
 use refine::{refine, surface_fit};
+use slide::Slide;
 use verdict::Fit;
 
 /// A scan and the samples that its alignment reads.
@@ -230,9 +232,11 @@ fn fit(
     refined_by_m: f64,
     settings: &AlignmentSettings,
 ) -> Fit {
+    let keeps_moments = map.settings().moments;
     Fit {
         map_from_sensor: ascent.pose,
         refined_by_m,
+        slide: if keeps_moments { None } else { Slide::of(map, scan, &ascent.pose, settings) },
         level_overlaps: level_overlaps_until(map, scan.points, &ascent.pose, scan.stop),
         surfaces: surface_fit(map, &scan.surface_sample, &ascent.pose, &settings.refinement, scan.stop),
         iterations: ascent.iterations,

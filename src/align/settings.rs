@@ -60,6 +60,12 @@ pub struct AlignmentSettings {
     /// A pose is undetermined where its standard deviation in some direction exceeds this fraction of r_0. 0.2: ten
     /// times that of a furnished room, a seventh of that along a blank wall.
     pub undetermined_std: f64,
+    /// Where a map keeps no moments, a scan is shifted by this many r_0 in all directions to see what holds it. 5: more than
+    /// walls are thick.
+    pub slide: f64,
+    /// A pose is undetermined where more than this fraction of the overlap is left after such a shift. 0.85: along a blank
+    /// wall or a corridor 0.92 and more are left, in a furnished room at most 0.7.
+    pub slide_overlap_max: f64,
     /// A pose is undetermined where the refinement moved it by more than this many r_0: the ascent ends within a few
     /// where anything holds it. 8.
     pub refinement_max_correction: f64,
@@ -139,6 +145,8 @@ impl Default for AlignmentSettings {
             multi_start: MultiStartSettings::default(),
             overlap_min: 0.2,
             undetermined_std: 0.2,
+            slide: 5.0,
+            slide_overlap_max: 0.85,
             refinement_max_correction: 8.0,
             max_correction: 48.0,
             max_correction_deg: 45.0,
@@ -205,6 +213,8 @@ impl AlignmentSettings {
             ("refinement.std", self.refinement.std),
             ("refinement.robust_scale", self.refinement.robust_scale),
             ("undetermined_std", self.undetermined_std),
+            ("slide", self.slide),
+            ("slide_overlap_max", self.slide_overlap_max),
             ("refinement_max_correction", self.refinement_max_correction),
             ("max_correction", self.max_correction),
             ("max_correction_deg", self.max_correction_deg),

@@ -1,6 +1,7 @@
 //! Verdicts: whether to believe an alignment, and why not.
 
 use super::refine::SurfaceFit;
+use super::slide::Slide;
 use super::{AlignmentSettings, Contradiction, Direction, PoseInformation, PosePrior};
 use crate::geometry::{Point, Pose, pose_difference};
 use crate::map::MultiResolutionMap;
@@ -146,6 +147,8 @@ pub(super) struct Fit {
     pub(super) map_from_sensor: Pose,
     /// Distance that the refinement moved the pose, meters; rotations count by the points' range.
     pub(super) refined_by_m: f64,
+    /// What a shift leaves of the overlap, where the map does not know its surfaces.
+    pub(super) slide: Option<Slide>,
     pub(super) level_overlaps: Vec<f64>,
     pub(super) surfaces: SurfaceFit,
     pub(super) iterations: u32,
@@ -160,7 +163,13 @@ impl Fit {
         let (overlap, overlap_min) = (self.level_overlaps[0], settings.overlap_min);
         let open_m = settings.undetermined_std * resolution_m;
         let max_correction_m = settings.refinement_max_correction * resolution_m;
-        let undetermined = self.surfaces.information.undetermined(open_m);
+        let information = match &self.slide {
+            Some(slide) if slide.share > settings.slide_overlap_max => {
+                self.surfaces.information.without(&slide.direction)
+            }
+            _ => self.surfaces.information,
+        };
+        let undetermined = information.undetermined(open_m);
         let (verdict, reason) = if overlap < overlap_min {
             (Verdict::LowOverlap, format!("overlap {overlap:.3} is below overlap_min {overlap_min}"))
         } else if let Some(worst) = undetermined.first() {
@@ -172,13 +181,16 @@ impl Fit {
             );
             (Verdict::Undetermined, reason)
         } else {
-            let held_m = self.surfaces.information.directions()[0].std_m;
-            let reason = if map.settings().moments {
-                format!("overlap {overlap:.3}, held to {held_m:.4} m in every direction")
-            } else {
-                format!(
-                    "overlap {overlap:.3}, by overlap alone: the map keeps no moments, and does not know what is open"
-                )
+            let reason = match &self.slide {
+                None => format!(
+                    "overlap {overlap:.3}, held to {:.4} m in every direction",
+                    information.directions()[0].std_m
+                ),
+                Some(slide) => format!(
+                    "overlap {overlap:.3}, of which {:.3} is left {:.2} m aside; the map keeps no moments",
+                    slide.share,
+                    settings.slide * resolution_m
+                ),
             };
             (Verdict::Accepted, reason)
         };
@@ -189,7 +201,7 @@ impl Fit {
             level_overlaps: self.level_overlaps,
             inliers: self.surfaces.inliers,
             fitness: self.surfaces.fitness,
-            information: self.surfaces.information,
+            information,
             undetermined,
             refined_by_m: self.refined_by_m,
             contradiction: Contradiction::default(),

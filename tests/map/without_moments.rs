@@ -84,22 +84,48 @@ fn one_blank_wall_leaves_the_pose_along_it_open() {
     }
 }
 
+/// A corridor from `from` to `to` along its own axis, 2 m wide.
+fn corridor(from: f64, to: f64, yaw: f64, seed: u64) -> Vec<Point> {
+    let random = &mut ChaCha8Rng::seed_from_u64(seed);
+    let length = [to - from, 0.0, 0.0];
+    [
+        wall([from, -1.02, -1.01], length, [0.0, 0.0, 2.53], yaw, random),
+        wall([from, 1.03, -1.01], length, [0.0, 0.0, 2.53], yaw, random),
+        wall([from, -1.02, -1.01], length, [0.0, 2.05, 0.0], yaw, random),
+        wall([from, -1.02, 1.52], length, [0.0, 2.05, 0.0], yaw, random),
+    ]
+    .concat()
+}
+
+/// The stairs that a wall makes in a lattice which it lies askew in hold nothing.
 #[test]
-fn a_straight_corridor_along_the_lattice_leaves_the_pose_along_it_open() {
-    let corridor = |from: f64, to: f64, seed: u64| {
-        let random = &mut ChaCha8Rng::seed_from_u64(seed);
-        let length = [to - from, 0.0, 0.0];
-        [
-            wall([from, -1.0, -1.0], length, [0.0, 0.0, 2.5], 0.0, random),
-            wall([from, 1.0, -1.0], length, [0.0, 0.0, 2.5], 0.0, random),
-            wall([from, -1.0, -1.0], length, [0.0, 2.0, 0.0], 0.0, random),
-            wall([from, -1.0, 1.5], length, [0.0, 2.0, 0.0], 0.0, random),
-        ]
-        .concat()
-    };
-    let map = map_of(&corridor(-12.0, 12.0, 1));
-    let alignment = aligned(&map, &corridor(-4.0, 4.0, 2), Pose::translation(0.06, 0.03, 0.0));
-    assert_eq!(alignment.verdict, Verdict::Undetermined, "{}", alignment.reason);
+fn a_straight_corridor_leaves_the_pose_along_it_open_however_it_lies_in_the_lattice() {
+    for yaw_deg in [0.0, 5.0, 20.0, 45.0_f64] {
+        let yaw = yaw_deg.to_radians();
+        let along = |m: f64| Pose::translation(m * yaw.cos(), m * yaw.sin(), 0.0);
+        let map = map_of(&corridor(-6.0, 6.0, yaw, 1));
+        for (seed, offset_m) in [(2, 0.4), (3, -0.25)] {
+            let alignment = aligned(&map, &corridor(-2.5, 2.5, yaw, seed), along(offset_m));
+            let (verdict, reason) = (alignment.verdict, &alignment.reason);
+            assert_eq!(verdict, Verdict::Undetermined, "{yaw_deg} deg, {offset_m} m: {reason}");
+            let [x, y, ..] = alignment.undetermined[0].direction;
+            assert!((x * yaw.cos() + y * yaw.sin()).abs() > 0.9, "{yaw_deg} deg: {reason}");
+        }
+    }
+}
+
+#[test]
+fn a_robot_does_not_shorten_a_corridor_that_lies_askew() {
+    let yaw = 20.0_f64.to_radians();
+    let along = |m: f64| Pose::translation(m * yaw.cos(), m * yaw.sin(), 0.0);
+    let map = map_of(&corridor(-2.5, 2.5, yaw, 1));
+    for step in 1..6 {
+        // It sees a corridor without an end, and its wheels say less than it went.
+        let seen = corridor(-2.5, 2.5, yaw, 1 + step);
+        let alignment = align(&map, &seen, &along(0.2 * step as f64), &AlignmentSettings::default());
+        assert_eq!(alignment.verdict, Verdict::Undetermined, "{step}: {}", alignment.reason);
+        insert(&map, &seen, along(0.25 * step as f64));
+    }
 }
 
 #[test]
