@@ -1,4 +1,4 @@
-//! Reading a map file takes no more memory than it asks for, whatever the file holds.
+//! Reading a map file, or a record of a journal for one voxel, takes no more memory than is asked for, whatever they hold.
 
 #![cfg(all(feature = "server", target_os = "linux"))]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
@@ -6,14 +6,20 @@
 mod support;
 
 use mrol::geometry::Pose;
-use mrol::map::{MapContents, MapSettings, MappedScan, RobotName, Trajectory};
-use mrol::store::{MapFileLimits, Snapshot};
-use mrol::voxel::{VoxelKey, VoxelSet};
+use std::sync::Mutex;
+
+use mrol::map::{
+    Change, DeletionRecord, MapContents, MapName, MapSettings, MappedScan, RobotName, ScanRecord, Trajectory,
+};
+use mrol::store::{DataDir, MapFileLimits, Record, Snapshot, StoreSettings, VoxelMention};
+use mrol::voxel::{MomentSet, VoxelKey, VoxelSet};
 use uuid::Uuid;
 
 use crate::support::hostile_files::hostile_files;
 use crate::support::memory::Memory;
 
+/// Held by a test that measures the memory of the process.
+static MEASURING: Mutex<()> = Mutex::new(());
 const MIB: u64 = 1 << 20;
 /// More than that is refused.
 const MEMORY_MAX: u64 = 128 * MIB;
@@ -41,6 +47,7 @@ fn honest_file() -> Vec<u8> {
 
 #[test]
 fn what_is_read_takes_no_more_memory_than_was_asked_for() {
+    let _measuring = MEASURING.lock().unwrap();
     let memory = Memory::of(std::process::id());
     let files = [vec![("an honest map", honest_file())], hostile_files()].concat();
     for (what, file) in files {
@@ -61,4 +68,45 @@ fn what_is_read_takes_no_more_memory_than_was_asked_for() {
         assert!(taken <= granted + BESIDES, "{what} took {taken} bytes, {granted} were granted: {said}");
         assert!(what != "an honest map" || read.is_ok(), "{said}");
     }
+}
+
+/// Each in a block of its own: as a set of voxels it takes forty times its record.
+fn scattered(count: i32) -> VoxelSet {
+    (0..count).filter_map(|i| VoxelKey::new([8 * (i % 1500), 8 * (i / 1500), 0])).collect()
+}
+
+#[test]
+fn what_a_record_says_of_a_voxel_takes_no_more_memory_than_it_says() {
+    let _measuring = MEASURING.lock().unwrap();
+    let memory = Memory::of(std::process::id());
+    let data = tempfile::tempdir().unwrap();
+    let data_dir = DataDir::open(data.path(), StoreSettings::default()).unwrap();
+    let contents = MapContents::at(0, VoxelSet::default());
+    let first = Snapshot { uuid: Uuid::from_bytes([7; 16]), settings: MapSettings::new(0.05, 6), contents };
+    let folder = data_dir.create(&MapName::new("office").unwrap(), &first).unwrap();
+    let pose = MappedScan::new(RobotName::new("r1").unwrap(), Pose::identity());
+    let insertion = |voxels| {
+        let (carved, moments) = (VoxelSet::default(), MomentSet::default());
+        Change::Insertion(ScanRecord { pose: pose.clone(), voxels, carved, moments })
+    };
+    let deletion = Change::Deletion(DeletionRecord { voxels: scattered(2_000_000), request: None });
+    for change in [insertion(scattered(2_000_000)), deletion, insertion(scattered(10))] {
+        folder.append(&[&Record::of(&change).unwrap()]).unwrap();
+    }
+    folder.sync().unwrap();
+
+    let (voxel, part) = (VoxelKey::new([0; 3]).unwrap(), folder.journal_parts(3)[0]);
+    let mut touched = Vec::new();
+    for record in folder.records_of_part(&part) {
+        let (revision, record) = record.unwrap();
+        memory.forget_peak();
+        let before = memory.resident() as u64;
+        let mention = record.mention(voxel, 0).unwrap();
+        // Small pieces may be memory that was given back above, and is taken again unseen; a set of voxels is 144 MB.
+        let taken = (memory.peak() as u64).saturating_sub(before);
+        println!("revision {revision}: {} KiB of {} KiB", taken >> 10, record.memory_bytes() >> 10);
+        assert!(taken <= record.memory_bytes() + 4 * MIB, "{taken} of {} bytes", record.memory_bytes());
+        touched.extend(matches!(mention, VoxelMention::Touched(_)).then_some(revision));
+    }
+    assert_eq!(touched, [1, 3]);
 }

@@ -11,11 +11,11 @@ use super::hosted_map::HostedMap;
 use super::point_query::without_voxel;
 use super::resource_budget::ResourceBudget;
 use super::{
-    Limits, MapService, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan, Outcome,
+    Limits, MapService, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan, Outcome, Reason,
     ServiceError, ended_early,
 };
-use crate::map::{Change, MapName};
-use crate::store::{JournalPart, MapFolder, StoreError};
+use crate::map::MapName;
+use crate::store::{JournalPart, MapFolder, StoreError, VoxelMention};
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
@@ -121,24 +121,28 @@ impl Search<'_> {
             Ok(bytes) => bytes,
             Err(error) => return unreadable(error),
         };
-        // The segment, and what one record of it becomes.
-        let _memory = budget.reserve_transient(2 * bytes, OBSERVERS)?;
+        let _segment = budget.reserve_transient(bytes, OBSERVERS)?;
         let mut touching = Vec::new();
-        for change in self.folder.changes_of_part(part) {
+        for record in self.folder.records_of_part(part) {
             if self.stop.is_stopped() {
                 return Ok(None);
             }
-            let (revision, change) = match change {
-                Ok(change) => change,
+            let (revision, record) = match record {
+                Ok(record) => record,
                 Err(error) => return unreadable(error),
             };
-            match change {
-                Change::Insertion(scan) if scan.voxels.touches(self.voxel, self.level) => {
-                    touching.push(ObservingScan { revision, scan: scan.pose.into() });
+            let _read = budget.reserve_transient(record.memory_bytes(), OBSERVERS)?;
+            let damaged = |reason| {
+                let message = format!("the record of revision {revision} cannot be read: {reason}");
+                ServiceError::new(Reason::JournalUnreadable, message)
+            };
+            match record.mention(self.voxel, self.level).map_err(damaged)? {
+                VoxelMention::Touched(scan) => {
+                    touching.push(ObservingScan { revision, scan: (*scan).into() });
                 }
                 // What was undone long ago the trajectory knows no more. An undo lies behind what it takes back.
-                Change::Undo(undo) => undone.extend(undo.changes()),
-                Change::Insertion(_) | Change::Deletion(_) | Change::KeepOut(_) => {}
+                VoxelMention::Undone(changes) => undone.extend(changes),
+                VoxelMention::Nothing => {}
             }
         }
         touching.retain(|scan| !undone.contains(&scan.revision));
@@ -153,7 +157,7 @@ mod tests {
     use crate::geometry::{Point, Pose};
     use crate::map::{MapSettings, RobotName};
     use crate::mapping::Guess;
-    use crate::service::{Deletion, DeletionTarget, Reason, ScanRequest, ServiceSettings, Undo, UndoTarget};
+    use crate::service::{Deletion, DeletionTarget, ScanRequest, ServiceSettings, Undo, UndoTarget};
     use crate::store::{OpeningProgress, StoreSettings};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

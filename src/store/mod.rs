@@ -41,7 +41,7 @@ pub use error::StoreError;
 pub use file_system::{Appending, Disk, FileSystem};
 pub use journal::{
     Changes, Cut, JOURNAL_VERSION, Journal, JournalUse, RECORD_BYTES_MAX, Record, Recovered, Revised,
-    SegmentedJournal,
+    SegmentedJournal, StoredRecord, StoredRecords, VoxelMention,
 };
 pub use map_folder::{FolderUse, JournalPart, MapFolder, NotObserved, Observed, OpenedMap, Pin};
 pub use mode::{StoreMode, StoreModeError};

@@ -74,14 +74,13 @@ impl VoxelSet {
         })
     }
 
-    /// True where one of these lies in `voxel` of `level`.
-    pub fn touches(&self, voxel: VoxelKey, level: u32) -> bool {
+    /// True where a voxel of the block lies in `voxel` of `level`.
+    pub fn block_touches((block, mask): &(VoxelKey, BlockMask), voxel: VoxelKey, level: u32) -> bool {
         match level.checked_sub(BLOCK_LEVELS) {
-            Some(above) => self.blocks.iter().any(|(block, _)| block.ancestor(above) == voxel),
+            Some(above) => block.ancestor(above) == voxel,
             None => {
-                let (block, cell) = Cell::of(voxel.index().map(|i| i << level));
-                let found = self.blocks.binary_search_by_key(&block, |(block, _)| *block);
-                found.is_ok_and(|place| self.blocks[place].1.contains(cell, level))
+                let (of_voxel, cell) = Cell::of(voxel.index().map(|i| i << level));
+                of_voxel == *block && mask.contains(cell, level)
             }
         }
     }

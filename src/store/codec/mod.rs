@@ -14,7 +14,7 @@ pub(super) use scan::with_forgotten;
 pub(super) type Unreadable = String;
 
 /// Returns the value of a required field.
-fn required<T>(value: Option<T>, field: &str) -> Result<T, Unreadable> {
+pub(super) fn required<T>(value: Option<T>, field: &str) -> Result<T, Unreadable> {
     value.ok_or_else(|| format!("{field} is missing"))
 }
 

@@ -3,7 +3,7 @@
 use super::Unreadable;
 use crate::store::pb;
 use crate::util::StopSignal;
-use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelSet};
+use crate::voxel::{BLOCKS_PER_LOOK, BlockMask, VoxelKey, VoxelSet};
 
 impl From<&VoxelSet> for pb::Voxels {
     fn from(voxels: &VoxelSet) -> Self {
@@ -33,9 +33,22 @@ pub(in crate::store) fn write(voxels: &VoxelSet, stop: StopSignal<'_>) -> pb::Vo
 
 /// Reads a set: the inverse of [`write`].
 pub(in crate::store) fn read(voxels: &pb::Voxels, stop: StopSignal<'_>) -> Result<VoxelSet, Unreadable> {
-    let (mut key, mut octrees) = (0u64, &voxels.octrees[..]);
+    if voxels.key_gaps.is_empty() && !voxels.octrees.is_empty() {
+        return Err(format!("voxels.octrees has {} bytes, and there is no block", voxels.octrees.len()));
+    }
     let mut blocks = Vec::with_capacity(voxels.key_gaps.len());
-    for (i, &gap) in stop.paced(voxels.key_gaps.iter().enumerate(), BLOCKS_PER_LOOK) {
+    for block in stop.paced(blocks_of(voxels), BLOCKS_PER_LOOK) {
+        blocks.push(block?);
+    }
+    Ok(VoxelSet::of_blocks_until(blocks, stop))
+}
+
+/// The blocks of a set, ascending, read one after the other: an error is the last.
+pub(in crate::store) fn blocks_of(
+    voxels: &pb::Voxels,
+) -> impl Iterator<Item = Result<(VoxelKey, BlockMask), Unreadable>> {
+    let (mut key, mut octrees, count) = (0u64, &voxels.octrees[..], voxels.key_gaps.len());
+    voxels.key_gaps.iter().enumerate().map(move |(i, &gap)| {
         if gap == 0 && i > 0 {
             return Err(format!("voxels.key_gaps[{i}] is 0: a block comes twice"));
         }
@@ -43,12 +56,11 @@ pub(in crate::store) fn read(voxels: &pb::Voxels, stop: StopSignal<'_>) -> Resul
         let block = VoxelSet::block_key(key).ok_or_else(|| format!("block key {key:#x} is out of range"))?;
         let mask = read_octree(&mut octrees)
             .ok_or_else(|| format!("voxels.octrees: that of block {i} is cut short or has an empty child"))?;
-        blocks.push((block, mask));
-    }
-    if !octrees.is_empty() {
-        return Err(format!("voxels.octrees has {} bytes too many", octrees.len()));
-    }
-    Ok(VoxelSet::of_blocks_until(blocks, stop))
+        if i + 1 == count && !octrees.is_empty() {
+            return Err(format!("voxels.octrees has {} bytes too many", octrees.len()));
+        }
+        Ok((block, mask))
+    })
 }
 
 /// Appends the tree of a block that is not empty.

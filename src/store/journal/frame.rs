@@ -20,6 +20,7 @@
 
 use uuid::Uuid;
 
+use super::mention::StoredRecord;
 use super::record::{self, Record};
 use crate::map::Change;
 use crate::store::codec::Unreadable;
@@ -119,6 +120,10 @@ impl Frame<'_> {
 
     pub(super) fn change(&self) -> Result<Change, Unreadable> {
         record::change_of(self.payload, self.bytes)
+    }
+
+    pub(super) fn stored(&self) -> StoredRecord {
+        StoredRecord { payload: self.payload.to_vec(), bytes: self.bytes }
     }
 }
 

@@ -6,12 +6,14 @@
 
 mod frame;
 mod inspection;
+mod mention;
 mod record;
 mod recovery;
 mod segment;
 mod segmented;
 
 pub(super) use inspection::{Inspected, inspect};
+pub use mention::{StoredRecord, VoxelMention};
 pub use record::{RECORD_BYTES_MAX, Record};
 pub(super) use recovery::Known;
 pub use recovery::{Cut, Recovered};
@@ -27,6 +29,9 @@ use crate::map::Change;
 pub type Revised = (u64, Change);
 /// Iterator of changes in the order of their revisions, read on demand.
 pub type Changes = Box<dyn Iterator<Item = Result<Revised, StoreError>> + Send>;
+
+/// Iterator of records in the order of their revisions, read on demand.
+pub type StoredRecords = Box<dyn Iterator<Item = Result<(u64, StoredRecord), StoreError>> + Send>;
 
 /// A log of changes. The sequence numbers are the map's revisions: 1, 2, 3, ...
 pub trait Journal: std::fmt::Debug + Send {

@@ -49,12 +49,17 @@ impl Record {
     }
 }
 
-/// Decodes the change of a record whose checksum was right.
-pub(super) fn change_of(payload: &[u8], bytes: u32) -> Result<Change, Unreadable> {
+/// The bytes of a record whose checksum was right.
+pub(super) fn decompressed(payload: &[u8], bytes: u32) -> Result<Vec<u8>, Unreadable> {
     if bytes as usize > RECORD_BYTES_MAX {
         return Err(format!("a record of {bytes} bytes, at most {RECORD_BYTES_MAX} are read"));
     }
-    let message = zstd::bulk::decompress(payload, bytes as usize).map_err(|e| e.to_string())?;
+    zstd::bulk::decompress(payload, bytes as usize).map_err(|e| e.to_string())
+}
+
+/// Decodes the change of a record whose checksum was right.
+pub(super) fn change_of(payload: &[u8], bytes: u32) -> Result<Change, Unreadable> {
+    let message = decompressed(payload, bytes)?;
     pb::Change::decode(&message[..]).map_err(|e| e.to_string())?.try_into()
 }
 

@@ -7,9 +7,11 @@ use std::time::Instant;
 
 use uuid::Uuid;
 
+use super::frame::Frame;
 use super::segment::{self, Frames};
-use super::{Changes, Journal, Record, Revised, frame};
+use super::{Changes, Journal, Record, StoredRecords, frame};
 use crate::map::REVISION_MAX;
+use crate::store::codec::Unreadable;
 use crate::store::folder::{self, FolderPath};
 use crate::store::{Appending, FileSystem, OpeningProgress, StoreError};
 use crate::util::{Durations, StopSignal};
@@ -202,16 +204,30 @@ impl SegmentFolder {
     /// Reads the changes from `revision` to `head` from the segments that begin with the revisions `segments`.
     pub(in crate::store) fn read_from(&self, revision: u64, segments: &[u64], head: u64) -> Changes {
         let first = segments.partition_point(|&first| first <= revision).saturating_sub(1);
-        let segments = segments[first..].iter().copied().collect();
-        Box::new(Reader { place: self.clone(), segments, revision, head, open: None })
+        Box::new(self.reader(revision, &segments[first..], head, |frame| frame.change()))
+    }
+
+    /// Reads the records from `revision` to `head` of the segment that begins with revision `first`, as they are.
+    pub(in crate::store) fn records_of(&self, revision: u64, first: u64, head: u64) -> StoredRecords {
+        Box::new(self.reader(revision, &[first], head, |frame| Ok(frame.stored())))
+    }
+
+    fn reader<T>(&self, revision: u64, segments: &[u64], head: u64, read: ReadFrame<T>) -> Reader<T> {
+        Reader {
+            place: self.clone(),
+            segments: segments.iter().copied().collect(),
+            revision,
+            head,
+            open: None,
+            read,
+        }
     }
 
     /// Reads only the changes that made `revisions` (ascending); others are skipped without decoding.
     pub(in crate::store) fn read_at(&self, revisions: Vec<u64>, segments: &[u64], head: u64) -> Changes {
         let first = revisions.first().copied().unwrap_or_default();
         let begin = segments.partition_point(|&begins| begins <= first).saturating_sub(1);
-        let segments = segments[begin..].iter().copied().collect();
-        let mut reader = Reader { place: self.clone(), segments, revision: first, head, open: None };
+        let mut reader = self.reader(first, &segments[begin..], head, |frame| frame.change());
         let known = revisions.into_iter().take_while(move |&revision| revision <= head);
         Box::new(known.map(move |revision| {
             reader.revision = revision;
@@ -244,8 +260,11 @@ impl SegmentFolder {
     }
 }
 
-/// Iterator of changes, read segment by segment.
-struct Reader {
+/// What is made of a frame.
+type ReadFrame<T> = fn(&Frame<'_>) -> Result<T, Unreadable>;
+
+/// Iterator of changes, or of records, read segment by segment.
+struct Reader<T> {
     place: SegmentFolder,
     segments: VecDeque<u64>,
     /// The next revision to return.
@@ -253,6 +272,7 @@ struct Reader {
     /// The last revision to return.
     head: u64,
     open: Option<OpenSegment>,
+    read: ReadFrame<T>,
 }
 
 struct OpenSegment {
@@ -261,8 +281,8 @@ struct OpenSegment {
     frames: Frames,
 }
 
-impl Iterator for Reader {
-    type Item = Result<Revised, StoreError>;
+impl<T> Iterator for Reader<T> {
+    type Item = Result<(u64, T), StoreError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.revision > self.head {
@@ -278,8 +298,8 @@ impl Iterator for Reader {
     }
 }
 
-impl Reader {
-    fn read(&mut self) -> Result<Revised, StoreError> {
+impl<T> Reader<T> {
+    fn read(&mut self) -> Result<(u64, T), StoreError> {
         loop {
             let Some(OpenSegment { path, bytes, frames }) = &mut self.open else {
                 self.open = Some(self.next_segment()?);
@@ -288,9 +308,9 @@ impl Reader {
             let at = frames.offset();
             match frames.next(bytes).map_err(|broken| broken.of(path, self.place.map))? {
                 Some(frame) if frame.revision == self.revision => {
-                    let change = frame.change();
-                    let change = change.map_err(|reason| StoreError::at(path, at, self.revision, reason))?;
-                    return Ok((self.revision, change));
+                    let read = (self.read)(&frame);
+                    let read = read.map_err(|reason| StoreError::at(path, at, self.revision, reason))?;
+                    return Ok((self.revision, read));
                 }
                 Some(_) => {}
                 None => self.open = None,

@@ -1,7 +1,7 @@
 //! Reads the journal backwards, a segment at a time.
 
 use super::MapFolder;
-use crate::store::{Changes, StoreError};
+use crate::store::{StoreError, StoredRecords};
 
 /// Consecutive changes of the journal that lie in one segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,9 +30,9 @@ impl MapFolder {
         self.place.bytes(part.first)
     }
 
-    /// Reads the changes of a part, ascending.
-    pub fn changes_of_part(&self, part: &JournalPart) -> Changes {
-        self.place.read_from(part.first, &[part.first], part.last)
+    /// Reads the records of a part, ascending.
+    pub fn records_of_part(&self, part: &JournalPart) -> StoredRecords {
+        self.place.records_of(part.first, part.first, part.last)
     }
 
     /// False once the segment of a part is not kept any more.
