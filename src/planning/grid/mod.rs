@@ -190,7 +190,9 @@ impl<'a> Projection<'a> {
                 return Err(GridError::Rectangle(min_m, max_m));
             }
         }
-        if !(band_m[0] <= band_m[1]) {
+        // Also of NaN.
+        let is_band = band_m[0] <= band_m[1];
+        if !is_band {
             return Err(GridError::Band(band_m));
         }
         let voxel_m = view.lattice().resolution_m(level);

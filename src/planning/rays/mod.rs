@@ -6,6 +6,8 @@ mod space;
 mod tests;
 mod turns;
 
+use std::cmp::Ordering;
+
 use crate::geometry::Point;
 use crate::map::MapView;
 use crate::util::StopSignal;
@@ -156,7 +158,10 @@ impl<'a> Rays<'a> {
             return Err(RayError::Origins { origins, rays });
         }
         match self.toward {
-            Toward::Directions { range_m, .. } if !(range_m > 0.0) => Err(RayError::Range(range_m)),
+            // NaN is not above 0 either.
+            Toward::Directions { range_m, .. } if range_m.partial_cmp(&0.0) != Some(Ordering::Greater) => {
+                Err(RayError::Range(range_m))
+            }
             _ => Ok(()),
         }
     }
@@ -170,10 +175,11 @@ impl Toward<'_> {
             Self::Directions { directions, range_m } => {
                 let direction = directions[at].xyz().map(f64::from);
                 let length = length(direction);
-                if !((length - 1.0).abs() <= DIRECTION_LENGTH_TOLERANCE) {
+                let is_unit_vector = (length - 1.0).abs() <= DIRECTION_LENGTH_TOLERANCE;
+                if !is_unit_vector {
                     return Err(RayError::Direction { at, direction: directions[at], length });
                 }
-                Ok((direction.map(|c| c / length), range_m))
+                Ok((unit_vector(direction, length), range_m))
             }
             Self::Ends(ends) => {
                 let (from, to) = (origin.xyz(), ends[at].xyz());
@@ -182,7 +188,7 @@ impl Toward<'_> {
                 if !(length > 0.0 && length.is_finite()) {
                     return Err(RayError::End { at, end: ends[at], origin });
                 }
-                Ok((way.map(|c| c / length), length))
+                Ok((unit_vector(way, length), length))
             }
         }
     }
@@ -213,6 +219,14 @@ impl Request<'_> {
     }
 }
 
+/// A direction of this length as one of length 1.
+#[inline(always)]
+fn unit_vector(direction: [f64; 3], length: f64) -> [f64; 3] {
+    let share = 1.0 / length;
+    direction.map(|c| c * share)
+}
+
+#[inline(always)]
 fn length([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
