@@ -9,7 +9,7 @@ use crate::geometry::Point;
 /// Largest radius with padding, in voxels of the level that is asked.
 pub(super) const RADIUS_CELLS_MAX: f64 = 512.0;
 /// Points whose surroundings are asked for at once.
-pub(super) const POINTS_PER_CLUMP: usize = 32;
+pub(super) const POINTS_PER_CLUMP: usize = 16;
 
 /// Eight spheres at most.
 #[derive(Debug, Clone)]

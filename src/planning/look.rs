@@ -2,14 +2,14 @@
 
 use super::clearance::{FieldBlockKey, Fields};
 use super::cubes::{CubeSearch, NearestCube};
-use super::eight::{self, Bounds, Centers, LANES};
+use super::eight::{self, Bounds, Centers, Found, LANES};
 use super::in_cells::Group;
 use super::nearby;
 use super::surroundings::Surroundings;
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
 
-/// What lies between the nearest voxels of a level and of a coarser one, in cells of the coarser: a diagonal.
+/// A coarse voxel holds a fine one, which is no further away than the coarse one and its diagonal, in coarse cells.
 const DIAGONAL: f32 = 1.7321;
 
 /// Level, field and voxels, as a question reads them.
@@ -23,6 +23,34 @@ pub(super) struct Look<'a> {
     unmade: Vec<FieldBlockKey>,
     /// True where what is not made is not waited for: the voxels answer.
     pub(super) is_last: bool,
+}
+
+/// Where the field of a level, or of a coarser one, says of eight points how far the nearest voxel is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FoundGroup<'f> {
+    found: Found<'f>,
+    /// Cells of the level that is asked along a cell of the field.
+    side: f32,
+    /// How much further than the nearest voxel of the field that of the level may be, cells of the field.
+    beyond: f32,
+    /// The lanes of which the field would say more if it were made.
+    unmade: u8,
+}
+
+impl FoundGroup<'_> {
+    /// Nothing was looked for yet.
+    pub(super) const NOTHING: Self = Self { found: Found::NOTHING, side: 1.0, beyond: 0.0, unmade: 0 };
+
+    /// Bounds of the distances, in cells of the level that is asked.
+    #[inline(always)]
+    fn bounds(&self) -> Bounds {
+        let Bounds { mut lower, mut upper } = self.found.bounds();
+        for lane in 0..LANES {
+            lower[lane] *= self.side;
+            upper[lane] = (upper[lane] + self.beyond) * self.side;
+        }
+        Bounds { lower, upper }
+    }
 }
 
 /// What the field says of eight spheres.
@@ -61,35 +89,43 @@ impl<'a> Look<'a> {
     /// What the field says of the spheres of `group` with these centers, cells.
     #[inline(always)]
     pub(super) fn judge(&mut self, group: &Group, centers: &Centers) -> Judgment {
-        let Bounds { lower, upper, unmade } = self.bounds(group.coarser_by, centers);
-        let (mut meets, mut is_clear) = (0u8, 0u8);
+        let mut found = FoundGroup::NOTHING;
+        self.find(group, centers, &mut found);
+        self.judge_found(group, &found)
+    }
+
+    /// Where the field says it.
+    #[inline(always)]
+    pub(super) fn find(&mut self, group: &Group, centers: &Centers, found: &mut FoundGroup<'a>) {
+        if group.coarser_by != 0 {
+            self.find_coarse(group.coarser_by, centers, found);
+            return;
+        }
+        (found.side, found.beyond) = (1.0, 0.0);
+        eight::find(self.fields.level(self.level), centers, 1.0, &mut found.found);
+        found.unmade = 0;
+        if found.found.unknown != 0 {
+            found.unmade = self.note_unmade(0, centers, found.found.unknown);
+        }
+    }
+
+    /// What it says there.
+    #[inline(always)]
+    pub(super) fn judge_found(&self, group: &Group, found: &FoundGroup<'_>) -> Judgment {
+        let Bounds { lower, upper } = found.bounds();
         let (mut low, mut high) = ([0f32; LANES], [0f32; LANES]);
         for lane in 0..LANES {
             low[lane] = lower[lane] - group.radius_high[lane];
             high[lane] = upper[lane] - group.radius_low[lane];
         }
-        for lane in 0..LANES {
-            is_clear |= u8::from(low[lane] > 0.0) << lane;
-            meets |= u8::from(high[lane] < 0.0) << lane;
-        }
+        // Rounding is allowed for on the way: what is clear by nothing is clear.
+        let (mut meets, is_near) = (eight::lanes_below_zero(&high), eight::lanes_below_zero(&low));
         if self.surroundings.ignores_some() {
             // The nearest voxel may be one that does not count.
             (meets, high) = (0, [f32::INFINITY; LANES]);
         }
-        Judgment { meets, is_open: !(meets | is_clear), unmade: unmade & !is_clear, lower: low, upper: high }
-    }
-
-    /// Bounds of the distances to the nearest voxel, cells, by the field of a level so many levels coarser.
-    #[inline(always)]
-    fn bounds(&mut self, coarser_by: u32, centers: &Centers) -> Bounds {
-        if coarser_by == 0 {
-            let mut bounds = eight::bounds(self.fields.level(self.level), centers, 1.0);
-            if bounds.unmade != 0 {
-                bounds.unmade = self.note_unmade(0, centers, bounds.unmade);
-            }
-            return bounds;
-        }
-        self.coarse_bounds(coarser_by, centers)
+        let unmade = found.unmade & is_near;
+        Judgment { meets, is_open: is_near & !meets, unmade, lower: low, upper: high }
     }
 
     /// Notes what is to be made; the lanes of which there is something to make.
@@ -106,20 +142,16 @@ impl<'a> Look<'a> {
         noted
     }
 
+    /// [`Look::find`] in the field of a level so many levels coarser.
     #[inline(never)]
-    fn coarse_bounds(&mut self, coarser_by: u32, centers: &Centers) -> Bounds {
+    fn find_coarse(&mut self, coarser_by: u32, centers: &Centers, found: &mut FoundGroup<'a>) {
         let coarser_by = coarser_by.min(self.view.map().block_levels_end() - self.level);
-        let side = (1u32 << coarser_by) as f32;
+        (found.side, found.beyond) = ((1u32 << coarser_by) as f32, DIAGONAL);
         let field = self.fields.level(self.level + coarser_by);
-        let Bounds { lower, upper, mut unmade } = eight::bounds(field, centers, 1.0 / f64::from(side));
-        if unmade != 0 {
-            unmade = self.note_unmade(coarser_by, centers, unmade);
-        }
-        // A coarse voxel holds a fine one, and goes no further than that by more than its diagonal.
-        Bounds {
-            lower: lower.map(|lower| lower * side),
-            upper: upper.map(|upper| (upper + DIAGONAL) * side),
-            unmade,
+        eight::find(field, centers, 1.0 / f64::from(found.side), &mut found.found);
+        found.unmade = 0;
+        if found.found.unknown != 0 {
+            found.unmade = self.note_unmade(coarser_by, centers, found.found.unknown);
         }
     }
 
@@ -156,9 +188,11 @@ impl<'a> Look<'a> {
         let end = self.view.map().block_levels_end() - self.level;
         let mut best = 0.0f64;
         for coarser_by in (BLOCK_LEVELS..=end).step_by(BLOCK_LEVELS as usize) {
-            let bounds = self.coarse_bounds(coarser_by, &centers);
+            let mut found = FoundGroup::NOTHING;
+            self.find_coarse(coarser_by, &centers, &mut found);
+            let bounds = found.bounds();
             best = best.max(f64::from(bounds.lower[0]));
-            if best >= enough || bounds.upper[0].is_finite() || bounds.unmade != 0 {
+            if best >= enough || bounds.upper[0].is_finite() || found.unmade != 0 {
                 break;
             }
         }

@@ -30,7 +30,7 @@ impl<'a> CellReader<'a> {
         if key != self.key {
             (self.key, self.cluster) = (key, self.field.cluster(key));
         }
-        self.cluster?.byte(FieldLevel::block_place(index), FieldLevel::cell_place(index))
+        self.cluster?.byte(FieldLevel::block_place(index), FieldLevel::cell_place(index)).copied()
     }
 }
 

@@ -1,10 +1,10 @@
 //! One configuration: does the body meet a voxel, which first, and how far is it from one.
 
 use super::configurations::NUMBERS_PER_POSE;
-use super::eight::LANES;
-use super::in_cells::BodyInCells;
+use super::eight::{Centers, LANES};
+use super::in_cells::{BodyInCells, Group};
 use super::link;
-use super::look::Look;
+use super::look::{FoundGroup, Look};
 use super::placement::{CellsFromLink, EightTransforms, LinkPose};
 use super::points;
 use crate::util::bits::for_each_bit;
@@ -28,6 +28,38 @@ pub(super) struct Configuration<'a> {
     /// The links that the balls around them do not clear.
     near: Vec<usize>,
     open: Vec<OpenSphere>,
+}
+
+/// Where the field says what a configuration needs to know.
+#[derive(Debug, Default)]
+pub(super) struct Aim<'a, 'f> {
+    /// The balls around the links, eight at a time.
+    balls: Vec<FoundGroup<'f>>,
+    /// The spheres of links that are not clear: the first so many. The others are from before.
+    groups: Vec<AimedGroup<'a, 'f>>,
+    count: usize,
+}
+
+#[derive(Debug)]
+struct AimedGroup<'a, 'f> {
+    group: &'a Group,
+    centers: Centers,
+    found: FoundGroup<'f>,
+}
+
+impl<'a, 'f> Aim<'a, 'f> {
+    /// The place for one more group.
+    #[inline(always)]
+    fn next(&mut self, group: &'a Group) -> &mut AimedGroup<'a, 'f> {
+        if self.count == self.groups.len() {
+            let (centers, found) = ([[0.0; LANES]; 3], FoundGroup::NOTHING);
+            self.groups.push(AimedGroup { group, centers, found });
+        }
+        self.count += 1;
+        let aimed = &mut self.groups[self.count - 1];
+        aimed.group = group;
+        aimed
+    }
 }
 
 /// The first part of a link, or of a body, that meets a voxel.
@@ -54,9 +86,9 @@ impl<'a> Configuration<'a> {
     #[inline(always)]
     pub(super) fn place(&mut self, poses: &'a [[f32; NUMBERS_PER_POSE]]) {
         self.poses = poses;
-        self.transforms.clear();
-        for poses in poses.chunks(LANES) {
-            self.transforms.push(EightTransforms::of(poses, self.cells_per_m));
+        self.transforms.resize(poses.len().div_ceil(LANES), EightTransforms::NOTHING);
+        for (poses, transforms) in poses.chunks(LANES).zip(&mut self.transforms) {
+            transforms.set(poses, self.cells_per_m);
         }
     }
 
@@ -81,24 +113,58 @@ impl<'a> Configuration<'a> {
     /// True where the body meets a voxel.
     #[inline(always)]
     pub(super) fn meets(&mut self, look: &mut Look<'_>) -> Option<bool> {
-        self.note_near(look);
-        self.open.clear();
-        let mut unmade = 0;
+        let mut aim = Aim::default();
+        self.find_balls(look, &mut aim);
+        self.find_spheres(look, &mut aim);
+        self.meets_found(look, &aim)
+    }
+
+    /// The first step of [`Configuration::meets`]: finds the balls around the links in the field.
+    #[inline(always)]
+    pub(super) fn find_balls<'f>(&mut self, look: &mut Look<'f>, aim: &mut Aim<'a, 'f>) {
+        aim.balls.resize(self.body.balls.len(), FoundGroup::NOTHING);
+        let balls = self.body.balls.iter().zip(&self.transforms);
+        for ((balls, transforms), found) in balls.zip(&mut aim.balls) {
+            look.find(balls, &balls.centers_of_each(transforms), found);
+        }
+    }
+
+    /// The second step: finds the spheres of links that are not clear.
+    #[inline(always)]
+    pub(super) fn find_spheres<'f>(&mut self, look: &mut Look<'f>, aim: &mut Aim<'a, 'f>) {
+        self.near.clear();
+        aim.count = 0;
+        for (eight, (balls, found)) in self.body.balls.iter().zip(&aim.balls).enumerate() {
+            let judged = look.judge_found(balls, found);
+            for_each_bit(u64::from(judged.meets | judged.is_open), |lane| {
+                self.near.push(eight * LANES + lane as usize);
+            });
+        }
         for &number in &self.near {
             let cells_from_link = self.cells_from_link(number);
             for group in &self.body.links[number].groups {
-                let centers = group.centers(&cells_from_link);
-                let judged = look.judge(group, &centers);
-                if judged.meets != 0 {
-                    return Some(true);
-                }
-                unmade |= judged.unmade;
-                for_each_bit(u64::from(judged.is_open), |lane| {
-                    let (center, radius) =
-                        (link::lane_of(&centers, lane as usize), group.radius[lane as usize]);
-                    self.open.push(OpenSphere { center, radius });
-                });
+                let aimed = aim.next(group);
+                aimed.centers = group.centers(&cells_from_link);
+                look.find(group, &aimed.centers, &mut aimed.found);
             }
+        }
+    }
+
+    /// The last step: reads what was found.
+    #[inline(always)]
+    pub(super) fn meets_found(&mut self, look: &mut Look<'_>, aim: &Aim<'_, '_>) -> Option<bool> {
+        self.open.clear();
+        let mut unmade = 0;
+        for AimedGroup { group, centers, found } in &aim.groups[..aim.count] {
+            let judged = look.judge_found(group, found);
+            if judged.meets != 0 {
+                return Some(true);
+            }
+            unmade |= judged.unmade;
+            for_each_bit(u64::from(judged.is_open), |lane| {
+                let (center, radius) = (link::lane_of(centers, lane as usize), group.radius[lane as usize]);
+                self.open.push(OpenSphere { center, radius });
+            });
         }
         if look.waits_for(unmade) {
             return None;
@@ -106,8 +172,14 @@ impl<'a> Configuration<'a> {
         Some(self.open_meets(look) || self.points_meet(look))
     }
 
+    #[inline(always)]
     fn open_meets(&self, look: &Look<'_>) -> bool {
-        self.open.iter().any(|sphere| look.meets(sphere.center, sphere.radius))
+        for sphere in &self.open {
+            if look.meets(sphere.center, sphere.radius) {
+                return true;
+            }
+        }
+        false
     }
 
     fn points_meet(&self, look: &mut Look<'_>) -> bool {

@@ -35,9 +35,9 @@ impl FieldCluster {
 
     /// The byte of a cell of a block, both by their places; none where the block is not made.
     #[inline(always)]
-    pub(in crate::planning) fn byte(&self, block: u32, cell: u32) -> Option<u8> {
+    pub(in crate::planning) fn byte(&self, block: u32, cell: u32) -> Option<&u8> {
         let number = self.numbers[block as usize % BLOCKS];
-        self.blocks.get(usize::from(number)).map(|block| block.0[cell as usize % BLOCK_BYTES])
+        self.blocks.get(usize::from(number)).map(|block| &block.0[cell as usize % BLOCK_BYTES])
     }
 
     /// Keeps the block at `place`; none is one with nothing near.

@@ -6,7 +6,6 @@ mod space;
 mod tests;
 mod turns;
 
-
 use crate::geometry::Point;
 use crate::map::MapView;
 use crate::util::StopSignal;
