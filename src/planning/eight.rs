@@ -153,3 +153,9 @@ pub(super) fn cell(centers: &Centers, scale: f64, lane: usize) -> Option<[i32; 3
     let cells = Cells::of(centers, scale);
     (cells.out_of_range >> lane & 1 == 0).then(|| [0, 1, 2].map(|axis| cells.index[axis][lane]))
 }
+
+/// The center in one lane.
+#[inline(always)]
+pub(super) fn lane_of(centers: &Centers, lane: usize) -> [f64; 3] {
+    [0, 1, 2].map(|axis: usize| centers[axis][lane])
+}

@@ -69,6 +69,11 @@ impl Group {
         Self { centers_m, radius, radius_low, radius_high, coarser_by }
     }
 
+    /// A ball eight times.
+    pub(super) fn of_one(ball: &Ball) -> Self {
+        Self::of(&[(ball.center_m, ball.radius); LANES])
+    }
+
     fn all(spheres: &[([f64; 3], f64)]) -> Vec<Self> {
         spheres.chunks(LANES).map(Self::of).collect()
     }

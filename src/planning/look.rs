@@ -4,7 +4,7 @@ use super::clearance::{FieldBlockKey, Fields};
 use super::cubes::{CubeSearch, NearestCube};
 use super::eight::{self, Bounds, Centers, Found, LANES};
 use super::in_cells::Group;
-use super::nearby;
+use super::nearby::{self, Nearby};
 use super::surroundings::Surroundings;
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
@@ -18,6 +18,8 @@ pub(super) struct Look<'a> {
     pub(super) view: &'a MapView<'a>,
     pub(super) surroundings: &'a Surroundings,
     pub(super) level: u32,
+    /// Coarser levels that have a field.
+    levels_above: u32,
     fields: &'a Fields,
     /// Blocks of the field that were asked for and are not made.
     unmade: Vec<FieldBlockKey>,
@@ -75,7 +77,8 @@ impl<'a> Look<'a> {
         fields: &'a Fields,
         is_last: bool,
     ) -> Self {
-        Self { view, surroundings, level, fields, unmade: Vec::new(), is_last }
+        let levels_above = view.map().block_levels_end() - level;
+        Self { view, surroundings, level, levels_above, fields, unmade: Vec::new(), is_last }
     }
 
     /// The blocks that were asked for and are not made, each once.
@@ -97,15 +100,20 @@ impl<'a> Look<'a> {
     /// Where the field says it.
     #[inline(always)]
     pub(super) fn find(&mut self, group: &Group, centers: &Centers, found: &mut FoundGroup<'a>) {
-        if group.coarser_by != 0 {
-            self.find_coarse(group.coarser_by, centers, found);
-            return;
-        }
-        (found.side, found.beyond) = (1.0, 0.0);
-        eight::find(self.fields.level(self.level), centers, 1.0, &mut found.found);
+        self.find_in(group.coarser_by, centers, found);
+    }
+
+    /// [`Look::find`] in the field of a level so many levels coarser, or of the coarsest.
+    #[inline(always)]
+    fn find_in(&mut self, coarser_by: u32, centers: &Centers, found: &mut FoundGroup<'a>) {
+        let coarser_by = coarser_by.min(self.levels_above);
+        let side = (1u32 << coarser_by) as f32;
+        (found.side, found.beyond) = (side, if coarser_by == 0 { 0.0 } else { DIAGONAL });
+        let field = self.fields.level(self.level + coarser_by);
+        eight::find(field, centers, 1.0 / f64::from(side), &mut found.found);
         found.unmade = 0;
         if found.found.unknown != 0 {
-            found.unmade = self.note_unmade(0, centers, found.found.unknown);
+            found.unmade = self.note_unmade(coarser_by, centers, found.found.unknown);
         }
     }
 
@@ -142,34 +150,27 @@ impl<'a> Look<'a> {
         noted
     }
 
-    /// [`Look::find`] in the field of a level so many levels coarser.
-    #[inline(never)]
-    fn find_coarse(&mut self, coarser_by: u32, centers: &Centers, found: &mut FoundGroup<'a>) {
-        let coarser_by = coarser_by.min(self.view.map().block_levels_end() - self.level);
-        (found.side, found.beyond) = ((1u32 << coarser_by) as f32, DIAGONAL);
-        let field = self.fields.level(self.level + coarser_by);
-        eight::find(field, centers, 1.0 / f64::from(found.side), &mut found.found);
-        found.unmade = 0;
-        if found.found.unknown != 0 {
-            found.unmade = self.note_unmade(coarser_by, centers, found.found.unknown);
-        }
-    }
-
     /// True where the field is not made and is waited for.
     #[inline(always)]
     pub(super) fn waits_for(&self, unmade: u8) -> bool {
         unmade != 0 && !self.is_last
     }
 
-    /// True where a ball meets a voxel, exactly.
+    /// True where a ball meets a voxel, exactly. Where the field is not made, the voxels answer, and it will be.
     #[inline(always)]
-    pub(super) fn meets(&self, center: [f64; 3], radius: f64) -> bool {
-        let by_field = if self.surroundings.ignores_some() {
-            None
-        } else {
-            nearby::meets(self.fields.level(self.level), center, radius)
-        };
-        by_field.unwrap_or_else(|| self.search(center).meets(radius))
+    pub(super) fn meets(&mut self, center: [f64; 3], radius: f64) -> bool {
+        if !self.surroundings.ignores_some() {
+            match nearby::ask(self.fields.level(self.level), center, radius) {
+                Nearby::Meets => return true,
+                Nearby::IsFree => return false,
+                Nearby::Unknown => {}
+                Nearby::Unmade(cell) => {
+                    let block = VoxelKey::pack(cell.map(|i| i >> BLOCK_LEVELS));
+                    self.unmade.push(FieldBlockKey { level: self.level, block });
+                }
+            }
+        }
+        self.search(center).meets(radius)
     }
 
     /// The nearest voxel that is at most `radius` cells away.
@@ -185,11 +186,10 @@ impl<'a> Look<'a> {
     /// knows or the bound is at least `enough`.
     pub(super) fn far_lower_bound(&mut self, center: [f64; 3], enough: f64) -> f64 {
         let centers = center.map(|c| [c; LANES]);
-        let end = self.view.map().block_levels_end() - self.level;
         let mut best = 0.0f64;
-        for coarser_by in (BLOCK_LEVELS..=end).step_by(BLOCK_LEVELS as usize) {
+        for coarser_by in (BLOCK_LEVELS..=self.levels_above).step_by(BLOCK_LEVELS as usize) {
             let mut found = FoundGroup::NOTHING;
-            self.find_coarse(coarser_by, &centers, &mut found);
+            self.find_in(coarser_by, &centers, &mut found);
             let bounds = found.bounds();
             best = best.max(f64::from(bounds.lower[0]));
             if best >= enough || bounds.upper[0].is_finite() || found.unmade != 0 {

@@ -1,21 +1,16 @@
 //! One configuration: does the body meet a voxel, which first, and how far is it from one.
 
+use super::aim::Aim;
 use super::configurations::NUMBERS_PER_POSE;
-use super::eight::{Centers, LANES};
-use super::in_cells::{BodyInCells, Group};
+use super::eight::LANES;
+use super::in_cells::BodyInCells;
 use super::link;
 use super::look::{FoundGroup, Look};
 use super::placement::{CellsFromLink, EightTransforms, LinkPose};
 use super::points;
+use super::steps::{InSteps, Unanswered};
 use crate::util::bits::for_each_bit;
 use crate::voxel::VoxelKey;
-
-/// A sphere of which the field does not say whether it meets a voxel.
-#[derive(Debug, Clone, Copy)]
-struct OpenSphere {
-    center: [f64; 3],
-    radius: f64,
-}
 
 /// Answers for one configuration after the other. None means that a part of the field is waited for.
 #[derive(Debug)]
@@ -27,38 +22,43 @@ pub(super) struct Configuration<'a> {
     transforms: Vec<EightTransforms>,
     /// The links that the balls around them do not clear.
     near: Vec<usize>,
-    open: Vec<OpenSphere>,
 }
 
-/// Where the field says what a configuration needs to know.
-#[derive(Debug, Default)]
-pub(super) struct Aim<'a, 'f> {
+/// One configuration after the other, in steps: see [`steps`](super::steps).
+#[derive(Debug)]
+pub(super) struct InTurn<'a, 'o, 'f> {
+    configuration: Configuration<'a>,
+    unanswered: Unanswered<'a, 'o>,
+    place: usize,
     /// The balls around the links, eight at a time.
     balls: Vec<FoundGroup<'f>>,
-    /// The spheres of links that are not clear: the first so many. The others are from before.
-    groups: Vec<AimedGroup<'a, 'f>>,
-    count: usize,
+    /// The spheres of links that are not clear.
+    aim: Aim<'a, 'f>,
 }
 
-#[derive(Debug)]
-struct AimedGroup<'a, 'f> {
-    group: &'a Group,
-    centers: Centers,
-    found: FoundGroup<'f>,
+impl<'a, 'o> InTurn<'a, 'o, '_> {
+    pub(super) fn new(body: &'a BodyInCells, cells_per_m: f64, unanswered: Unanswered<'a, 'o>) -> Self {
+        let configuration = Configuration::new(body, cells_per_m);
+        Self { configuration, unanswered, place: 0, balls: Vec::new(), aim: Aim::default() }
+    }
 }
 
-impl<'a, 'f> Aim<'a, 'f> {
-    /// The place for one more group.
+impl<'f> InSteps<'f> for InTurn<'_, '_, 'f> {
     #[inline(always)]
-    fn next(&mut self, group: &'a Group) -> &mut AimedGroup<'a, 'f> {
-        if self.count == self.groups.len() {
-            let (centers, found) = ([[0.0; LANES]; 3], FoundGroup::NOTHING);
-            self.groups.push(AimedGroup { group, centers, found });
-        }
-        self.count += 1;
-        let aimed = &mut self.groups[self.count - 1];
-        aimed.group = group;
-        aimed
+    fn begin(&mut self, look: &mut Look<'f>, part: usize) {
+        self.place = part;
+        self.configuration.place(self.unanswered.poses_of(part));
+        self.configuration.find_balls(look, &mut self.balls);
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self, look: &mut Look<'f>) {
+        self.configuration.find_spheres(look, &self.balls, &mut self.aim);
+    }
+
+    #[inline(always)]
+    fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]) {
+        answers[self.unanswered.items[self.place]] = self.configuration.meets_found(look, &mut self.aim);
     }
 }
 
@@ -79,7 +79,7 @@ pub(super) struct NearestLink {
 
 impl<'a> Configuration<'a> {
     pub(super) fn new(body: &'a BodyInCells, cells_per_m: f64) -> Self {
-        Self { body, cells_per_m, poses: &[], transforms: Vec::new(), near: Vec::new(), open: Vec::new() }
+        Self { body, cells_per_m, poses: &[], transforms: Vec::new(), near: Vec::new() }
     }
 
     /// Puts the links at these poses.
@@ -110,76 +110,49 @@ impl<'a> Configuration<'a> {
         }
     }
 
-    /// True where the body meets a voxel.
+    /// True where the body meets a voxel; none where a part of the field is waited for.
     #[inline(always)]
     pub(super) fn meets(&mut self, look: &mut Look<'_>) -> Option<bool> {
-        let mut aim = Aim::default();
-        self.find_balls(look, &mut aim);
-        self.find_spheres(look, &mut aim);
-        self.meets_found(look, &aim)
+        let (mut balls, mut aim) = (Vec::new(), Aim::default());
+        self.find_balls(look, &mut balls);
+        self.find_spheres(look, &balls, &mut aim);
+        self.meets_found(look, &mut aim)
     }
 
-    /// The first step of [`Configuration::meets`]: finds the balls around the links in the field.
+    /// Finds the balls around the links in the field.
     #[inline(always)]
-    pub(super) fn find_balls<'f>(&mut self, look: &mut Look<'f>, aim: &mut Aim<'a, 'f>) {
-        aim.balls.resize(self.body.balls.len(), FoundGroup::NOTHING);
+    fn find_balls<'f>(&self, look: &mut Look<'f>, found: &mut Vec<FoundGroup<'f>>) {
+        found.resize(self.body.balls.len(), FoundGroup::NOTHING);
         let balls = self.body.balls.iter().zip(&self.transforms);
-        for ((balls, transforms), found) in balls.zip(&mut aim.balls) {
+        for ((balls, transforms), found) in balls.zip(found) {
             look.find(balls, &balls.centers_of_each(transforms), found);
         }
     }
 
-    /// The second step: finds the spheres of links that are not clear.
+    /// Finds the spheres of the links that are not clear.
     #[inline(always)]
-    pub(super) fn find_spheres<'f>(&mut self, look: &mut Look<'f>, aim: &mut Aim<'a, 'f>) {
+    fn find_spheres<'f>(&mut self, look: &mut Look<'f>, balls: &[FoundGroup<'f>], aim: &mut Aim<'a, 'f>) {
         self.near.clear();
-        aim.count = 0;
-        for (eight, (balls, found)) in self.body.balls.iter().zip(&aim.balls).enumerate() {
+        for (eight, (balls, found)) in self.body.balls.iter().zip(balls).enumerate() {
             let judged = look.judge_found(balls, found);
             for_each_bit(u64::from(judged.meets | judged.is_open), |lane| {
                 self.near.push(eight * LANES + lane as usize);
             });
         }
+        aim.clear();
         for &number in &self.near {
             let cells_from_link = self.cells_from_link(number);
             for group in &self.body.links[number].groups {
-                let aimed = aim.next(group);
-                aimed.centers = group.centers(&cells_from_link);
-                look.find(group, &aimed.centers, &mut aimed.found);
+                aim.add(look, group, &cells_from_link);
             }
         }
     }
 
-    /// The last step: reads what was found.
+    /// Reads what was found.
     #[inline(always)]
-    pub(super) fn meets_found(&mut self, look: &mut Look<'_>, aim: &Aim<'_, '_>) -> Option<bool> {
-        self.open.clear();
-        let mut unmade = 0;
-        for AimedGroup { group, centers, found } in &aim.groups[..aim.count] {
-            let judged = look.judge_found(group, found);
-            if judged.meets != 0 {
-                return Some(true);
-            }
-            unmade |= judged.unmade;
-            for_each_bit(u64::from(judged.is_open), |lane| {
-                let (center, radius) = (link::lane_of(centers, lane as usize), group.radius[lane as usize]);
-                self.open.push(OpenSphere { center, radius });
-            });
-        }
-        if look.waits_for(unmade) {
-            return None;
-        }
-        Some(self.open_meets(look) || self.points_meet(look))
-    }
-
-    #[inline(always)]
-    fn open_meets(&self, look: &Look<'_>) -> bool {
-        for sphere in &self.open {
-            if look.meets(sphere.center, sphere.radius) {
-                return true;
-            }
-        }
-        false
+    fn meets_found(&self, look: &mut Look<'_>, aim: &mut Aim<'_, '_>) -> Option<bool> {
+        let do_spheres = aim.meets(look, 0..aim.len())?;
+        Some(do_spheres || self.points_meet(look))
     }
 
     fn points_meet(&self, look: &mut Look<'_>) -> bool {

@@ -3,11 +3,14 @@
 use super::PlanningError;
 use super::body::Body;
 use super::configurations::Configurations;
+use super::eight::LANES;
 use super::in_cells::BodyInCells;
 use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind};
 use super::look::Look;
-use super::one::{Aim, Configuration};
+use super::one::{Configuration, InTurn};
 use super::planner::{Answerer, PlanningView};
+use super::rigid::EightPlaces;
+use super::steps::{Unanswered, answer_in_steps};
 use super::surroundings::Surroundings;
 use crate::util::StopSignal;
 
@@ -109,16 +112,12 @@ impl<K: Kind> Answerer for Poses<'_, K> {
     }
 }
 
-/// Says of each configuration whether the body meets a voxel, in three steps: while one configuration is answered, what the
-/// next two need of the field is on its way from memory.
+/// Says of each configuration whether the body meets a voxel.
 struct Meeting<'a> {
     configurations: Configurations<'a>,
     body: &'a BodyInCells,
     cells_per_m: f64,
 }
-
-/// Steps of an answer, and so configurations under way.
-const STEPS: usize = 3;
 
 impl Answerer for Meeting<'_> {
     type Answer = bool;
@@ -132,22 +131,16 @@ impl Answerer for Meeting<'_> {
 
     #[inline(always)]
     fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<bool>]) {
-        let open: Vec<usize> = (0..answers.len()).filter(|&item| answers[item].is_none()).collect();
-        let mut under_way: [_; STEPS] =
-            std::array::from_fn(|_| (Configuration::new(self.body, self.cells_per_m), Aim::default()));
-        for step in 0..open.len() + STEPS - 1 {
-            if let Some(&item) = open.get(step) {
-                let (configuration, aim) = &mut under_way[step % STEPS];
-                configuration.place(self.configurations.poses_of(first + item));
-                configuration.find_balls(look, aim);
+        let items: Vec<usize> = (0..answers.len()).filter(|&item| answers[item].is_none()).collect();
+        let unanswered = Unanswered { configurations: self.configurations, first, items: &items };
+        match &self.body.links[..] {
+            [link] => {
+                let new = || EightPlaces::new(link, self.cells_per_m, unanswered);
+                answer_in_steps(look, items.len().div_ceil(LANES), new, answers);
             }
-            if let Some(step) = step.checked_sub(1).filter(|step| *step < open.len()) {
-                let (configuration, aim) = &mut under_way[step % STEPS];
-                configuration.find_spheres(look, aim);
-            }
-            if let Some(step) = step.checked_sub(2) {
-                let (configuration, aim) = &mut under_way[step % STEPS];
-                answers[open[step]] = configuration.meets_found(look, aim);
+            _ => {
+                let new = || InTurn::new(self.body, self.cells_per_m, unanswered);
+                answer_in_steps(look, items.len(), new, answers);
             }
         }
     }
