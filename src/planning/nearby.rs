@@ -52,10 +52,10 @@ impl Along {
         let [first, last] = [center - radius - SLACK, center + radius + SLACK].map(|c| c.floor() as i32 >> 2);
         let (mut squared, mut least) = ([[0.0; LINE]; LINES], [0.0; LINES]);
         for line in 0..LINES {
-            for cell in 0..LINE {
+            for (cell, squared) in squared[line].iter_mut().enumerate() {
                 let low = f64::from(first * LINE as i32 + (line * LINE + cell) as i32);
                 let gap = (low - center).max(center - (low + 1.0)).max(0.0);
-                squared[line][cell] = gap * gap;
+                *squared = gap * gap;
             }
             let [a, b, c, d] = squared[line];
             least[line] = a.min(b).min(c.min(d));
