@@ -9,7 +9,7 @@ use crate::geometry::Point;
 /// Largest radius with padding, in voxels of the level that is asked.
 pub(super) const RADIUS_CELLS_MAX: f64 = 512.0;
 /// Points whose surroundings are asked for at once.
-pub(super) const POINTS_PER_CLUMP: usize = 32;
+pub(super) const POINTS_PER_CLUMP: usize = 16;
 
 /// Eight spheres at most.
 #[derive(Debug, Clone)]
@@ -67,6 +67,11 @@ impl Group {
         let radius_high = radius.map(|radius| rounded(radius, 1.0));
         let coarser_by = coarser_by(radius.into_iter().fold(0.0, f64::max));
         Self { centers_m, radius, radius_low, radius_high, coarser_by }
+    }
+
+    /// A ball eight times.
+    pub(super) fn of_one(ball: &Ball) -> Self {
+        Self::of(&[(ball.center_m, ball.radius); LANES])
     }
 
     fn all(spheres: &[([f64; 3], f64)]) -> Vec<Self> {

@@ -1,6 +1,7 @@
 //! One link at one pose.
 
-use super::eight::{Centers, LANES};
+use super::aim::OpenSpheres;
+use super::eight::{LANES, lane_of};
 use super::in_cells::LinkInCells;
 use super::look::Look;
 use super::placement::{CellsFromLink, LinkPose};
@@ -104,26 +105,29 @@ pub(super) enum LinkState {
     Waits,
 }
 
-/// What is known of the link at a pose.
+/// What is known of the link at a pose. `open` is a place for spheres.
 #[inline(always)]
 pub(super) fn state(
     look: &mut Look<'_>,
     link: &LinkInCells,
     pose: &LinkPose,
     cells_from_link: &CellsFromLink,
+    open: &mut OpenSpheres,
 ) -> LinkState {
     let ball = look.judge(&link.ball_group, &link.ball_group.centers(cells_from_link));
     if ball.lower[0] > 0.0 {
         return LinkState::IsClear(ball.lower[0].into());
     }
-    let (mut unmade, mut lower, mut is_open) = (0, f32::INFINITY, false);
+    let (mut unmade, mut lower) = (0, f32::INFINITY);
+    open.clear();
     for group in &link.groups {
-        let judged = look.judge(group, &group.centers(cells_from_link));
+        let centers = group.centers(cells_from_link);
+        let judged = look.judge(group, &centers);
         if judged.meets != 0 {
             return LinkState::Meets;
         }
         unmade |= judged.unmade;
-        is_open |= judged.is_open != 0;
+        open.note(&judged, group, &centers);
         lower = lowest(lower, &judged.lower);
     }
     for group in &link.point_groups {
@@ -134,7 +138,7 @@ pub(super) fn state(
     if look.waits_for(unmade) {
         return LinkState::Waits;
     }
-    if is_open && open_meets(look, link, cells_from_link) || points::meet(look, link, pose, cells_from_link) {
+    if open.meet(look) || points::meet(look, link, pose, cells_from_link) {
         return LinkState::Meets;
     }
     LinkState::IsClear(lower.max(0.0).into())
@@ -143,20 +147,4 @@ pub(super) fn state(
 #[inline(always)]
 fn lowest(lower: f32, lanes: &[f32; LANES]) -> f32 {
     lanes.iter().fold(lower, |lowest, lane| lowest.min(*lane))
-}
-
-/// True where a sphere of which the field does not say meets a voxel.
-fn open_meets(look: &mut Look<'_>, link: &LinkInCells, cells_from_link: &CellsFromLink) -> bool {
-    link.groups.iter().any(|group| {
-        let centers = group.centers(cells_from_link);
-        let is_open = look.judge(group, &centers).is_open;
-        let lanes = (0..LANES).filter(|lane| is_open >> lane & 1 == 1);
-        lanes.into_iter().any(|lane| look.meets(lane_of(&centers, lane), group.radius[lane]))
-    })
-}
-
-/// The center in one lane.
-#[inline(always)]
-pub(super) fn lane_of(centers: &Centers, lane: usize) -> [f64; 3] {
-    [0, 1, 2].map(|axis: usize| centers[axis][lane])
 }

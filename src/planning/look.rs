@@ -2,14 +2,14 @@
 
 use super::clearance::{FieldBlockKey, Fields};
 use super::cubes::{CubeSearch, NearestCube};
-use super::eight::{self, Bounds, Centers, LANES};
+use super::eight::{self, Bounds, Centers, Found, LANES};
 use super::in_cells::Group;
-use super::nearby;
+use super::nearby::{self, Nearby};
 use super::surroundings::Surroundings;
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
 
-/// What lies between the nearest voxels of a level and of a coarser one, in cells of the coarser: a diagonal.
+/// A coarse voxel holds a fine one, which is no further away than the coarse one and its diagonal, in coarse cells.
 const DIAGONAL: f32 = 1.7321;
 
 /// Level, field and voxels, as a question reads them.
@@ -18,11 +18,41 @@ pub(super) struct Look<'a> {
     pub(super) view: &'a MapView<'a>,
     pub(super) surroundings: &'a Surroundings,
     pub(super) level: u32,
+    /// Coarser levels that have a field.
+    levels_above: u32,
     fields: &'a Fields,
     /// Blocks of the field that were asked for and are not made.
     unmade: Vec<FieldBlockKey>,
     /// True where what is not made is not waited for: the voxels answer.
     pub(super) is_last: bool,
+}
+
+/// Where the field of a level, or of a coarser one, says of eight points how far the nearest voxel is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FoundGroup<'f> {
+    found: Found<'f>,
+    /// Cells of the level that is asked along a cell of the field.
+    side: f32,
+    /// How much further than the nearest voxel of the field that of the level may be, cells of the field.
+    beyond: f32,
+    /// The lanes of which the field would say more if it were made.
+    unmade: u8,
+}
+
+impl FoundGroup<'_> {
+    /// Nothing was looked for yet.
+    pub(super) const NOTHING: Self = Self { found: Found::NOTHING, side: 1.0, beyond: 0.0, unmade: 0 };
+
+    /// Bounds of the distances, in cells of the level that is asked.
+    #[inline(always)]
+    fn bounds(&self) -> Bounds {
+        let Bounds { mut lower, mut upper } = self.found.bounds();
+        for lane in 0..LANES {
+            lower[lane] *= self.side;
+            upper[lane] = (upper[lane] + self.beyond) * self.side;
+        }
+        Bounds { lower, upper }
+    }
 }
 
 /// What the field says of eight spheres.
@@ -47,7 +77,8 @@ impl<'a> Look<'a> {
         fields: &'a Fields,
         is_last: bool,
     ) -> Self {
-        Self { view, surroundings, level, fields, unmade: Vec::new(), is_last }
+        let levels_above = view.map().block_levels_end() - level;
+        Self { view, surroundings, level, levels_above, fields, unmade: Vec::new(), is_last }
     }
 
     /// The blocks that were asked for and are not made, each once.
@@ -61,35 +92,48 @@ impl<'a> Look<'a> {
     /// What the field says of the spheres of `group` with these centers, cells.
     #[inline(always)]
     pub(super) fn judge(&mut self, group: &Group, centers: &Centers) -> Judgment {
-        let Bounds { lower, upper, unmade } = self.bounds(group.coarser_by, centers);
-        let (mut meets, mut is_clear) = (0u8, 0u8);
+        let mut found = FoundGroup::NOTHING;
+        self.find(group, centers, &mut found);
+        self.judge_found(group, &found)
+    }
+
+    /// Where the field says it.
+    #[inline(always)]
+    pub(super) fn find(&mut self, group: &Group, centers: &Centers, found: &mut FoundGroup<'a>) {
+        self.find_in(group.coarser_by, centers, found);
+    }
+
+    /// [`Look::find`] in the field of a level so many levels coarser, or of the coarsest.
+    #[inline(always)]
+    fn find_in(&mut self, coarser_by: u32, centers: &Centers, found: &mut FoundGroup<'a>) {
+        let coarser_by = coarser_by.min(self.levels_above);
+        let side = (1u32 << coarser_by) as f32;
+        (found.side, found.beyond) = (side, if coarser_by == 0 { 0.0 } else { DIAGONAL });
+        let field = self.fields.level(self.level + coarser_by);
+        eight::find(field, centers, 1.0 / f64::from(side), &mut found.found);
+        found.unmade = 0;
+        if found.found.unknown != 0 {
+            found.unmade = self.note_unmade(coarser_by, centers, found.found.unknown);
+        }
+    }
+
+    /// What it says there.
+    #[inline(always)]
+    pub(super) fn judge_found(&self, group: &Group, found: &FoundGroup<'_>) -> Judgment {
+        let Bounds { lower, upper } = found.bounds();
         let (mut low, mut high) = ([0f32; LANES], [0f32; LANES]);
         for lane in 0..LANES {
             low[lane] = lower[lane] - group.radius_high[lane];
             high[lane] = upper[lane] - group.radius_low[lane];
         }
-        for lane in 0..LANES {
-            is_clear |= u8::from(low[lane] > 0.0) << lane;
-            meets |= u8::from(high[lane] < 0.0) << lane;
-        }
+        // Rounding is allowed for on the way: what is clear by nothing is clear.
+        let (mut meets, is_near) = (eight::lanes_below_zero(&high), eight::lanes_below_zero(&low));
         if self.surroundings.ignores_some() {
             // The nearest voxel may be one that does not count.
             (meets, high) = (0, [f32::INFINITY; LANES]);
         }
-        Judgment { meets, is_open: !(meets | is_clear), unmade: unmade & !is_clear, lower: low, upper: high }
-    }
-
-    /// Bounds of the distances to the nearest voxel, cells, by the field of a level so many levels coarser.
-    #[inline(always)]
-    fn bounds(&mut self, coarser_by: u32, centers: &Centers) -> Bounds {
-        if coarser_by == 0 {
-            let mut bounds = eight::bounds(self.fields.level(self.level), centers, 1.0);
-            if bounds.unmade != 0 {
-                bounds.unmade = self.note_unmade(0, centers, bounds.unmade);
-            }
-            return bounds;
-        }
-        self.coarse_bounds(coarser_by, centers)
+        let unmade = found.unmade & is_near;
+        Judgment { meets, is_open: is_near & !meets, unmade, lower: low, upper: high }
     }
 
     /// Notes what is to be made; the lanes of which there is something to make.
@@ -106,38 +150,27 @@ impl<'a> Look<'a> {
         noted
     }
 
-    #[inline(never)]
-    fn coarse_bounds(&mut self, coarser_by: u32, centers: &Centers) -> Bounds {
-        let coarser_by = coarser_by.min(self.view.map().block_levels_end() - self.level);
-        let side = (1u32 << coarser_by) as f32;
-        let field = self.fields.level(self.level + coarser_by);
-        let Bounds { lower, upper, mut unmade } = eight::bounds(field, centers, 1.0 / f64::from(side));
-        if unmade != 0 {
-            unmade = self.note_unmade(coarser_by, centers, unmade);
-        }
-        // A coarse voxel holds a fine one, and goes no further than that by more than its diagonal.
-        Bounds {
-            lower: lower.map(|lower| lower * side),
-            upper: upper.map(|upper| (upper + DIAGONAL) * side),
-            unmade,
-        }
-    }
-
     /// True where the field is not made and is waited for.
     #[inline(always)]
     pub(super) fn waits_for(&self, unmade: u8) -> bool {
         unmade != 0 && !self.is_last
     }
 
-    /// True where a ball meets a voxel, exactly.
+    /// True where a ball meets a voxel, exactly. Where the field is not made, the voxels answer, and it will be.
     #[inline(always)]
-    pub(super) fn meets(&self, center: [f64; 3], radius: f64) -> bool {
-        let by_field = if self.surroundings.ignores_some() {
-            None
-        } else {
-            nearby::meets(self.fields.level(self.level), center, radius)
-        };
-        by_field.unwrap_or_else(|| self.search(center).meets(radius))
+    pub(super) fn meets(&mut self, center: [f64; 3], radius: f64) -> bool {
+        if !self.surroundings.ignores_some() {
+            match nearby::ask(self.fields.level(self.level), center, radius) {
+                Nearby::Meets => return true,
+                Nearby::IsFree => return false,
+                Nearby::Unknown => {}
+                Nearby::Unmade(cell) => {
+                    let block = VoxelKey::pack(cell.map(|i| i >> BLOCK_LEVELS));
+                    self.unmade.push(FieldBlockKey { level: self.level, block });
+                }
+            }
+        }
+        self.search(center).meets(radius)
     }
 
     /// The nearest voxel that is at most `radius` cells away.
@@ -153,12 +186,13 @@ impl<'a> Look<'a> {
     /// knows or the bound is at least `enough`.
     pub(super) fn far_lower_bound(&mut self, center: [f64; 3], enough: f64) -> f64 {
         let centers = center.map(|c| [c; LANES]);
-        let end = self.view.map().block_levels_end() - self.level;
         let mut best = 0.0f64;
-        for coarser_by in (BLOCK_LEVELS..=end).step_by(BLOCK_LEVELS as usize) {
-            let bounds = self.coarse_bounds(coarser_by, &centers);
+        for coarser_by in (BLOCK_LEVELS..=self.levels_above).step_by(BLOCK_LEVELS as usize) {
+            let mut found = FoundGroup::NOTHING;
+            self.find_in(coarser_by, &centers, &mut found);
+            let bounds = found.bounds();
             best = best.max(f64::from(bounds.lower[0]));
-            if best >= enough || bounds.upper[0].is_finite() || bounds.unmade != 0 {
+            if best >= enough || bounds.upper[0].is_finite() || found.unmade != 0 {
                 break;
             }
         }

@@ -5,6 +5,7 @@
 //! when a ball meets a voxel; `clearance` is what makes the answers fast. Each other question is a function of a
 //! [`MapView`](crate::map::MapView) and a request of plain slices, and answers with plain arrays.
 
+mod aim;
 mod body;
 mod clearance;
 mod configurations;
@@ -28,8 +29,10 @@ mod points;
 mod poses;
 mod rays;
 mod remembered;
+mod rigid;
 mod simd;
 mod spheres;
+mod steps;
 mod surroundings;
 #[cfg(test)]
 mod test_maps;

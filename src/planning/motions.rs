@@ -6,9 +6,10 @@
 //! steps.
 
 use super::PlanningError;
+use super::aim::OpenSpheres;
 use super::body::Body;
 use super::configurations::Configurations;
-use super::in_cells::{BodyInCells, LinkInCells};
+use super::in_cells::BodyInCells;
 use super::kind::Clearances;
 use super::link::{self, LinkState};
 use super::look::Look;
@@ -178,10 +179,10 @@ impl BodyMotion<'_> {
     /// None where a part of the field is waited for.
     #[inline(always)]
     fn answer(&self, look: &mut Look<'_>) -> Option<MotionAnswer> {
-        let mut first_hit = None;
+        let (mut first_hit, mut open) = (None, OpenSpheres::default());
         for (number, segment) in self.segments.iter().enumerate() {
             // The first step of a segment is the last one of that before.
-            let step = self.first_hit(look, segment, u64::from(number > 0))?;
+            let step = self.first_hit(look, segment, u64::from(number > 0), &mut open)?;
             if let Some(step) = step {
                 let share = step as f64 / segment.steps as f64;
                 first_hit = Some(((number as f64 + share) / self.segments.len() as f64) as f32);
@@ -197,13 +198,21 @@ impl BodyMotion<'_> {
 
     /// The first step of a segment, from `first` on, at which a link meets a voxel.
     #[inline(always)]
-    fn first_hit(&self, look: &mut Look<'_>, segment: &Segment, first: u64) -> Option<Option<u64>> {
+    fn first_hit(
+        &self,
+        look: &mut Look<'_>,
+        segment: &Segment,
+        first: u64,
+        open: &mut OpenSpheres,
+    ) -> Option<Option<u64>> {
         let (mut end, mut waits) = (segment.steps + 1, false);
         for (link, motion) in self.body.links.iter().zip(&segment.links) {
             let per_step = motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
             let mut step = first;
             while step < end {
-                match self.state(look, link, motion, step, segment.steps) {
+                let pose = motion.at(step as f64 / segment.steps as f64);
+                let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
+                match link::state(look, link, &pose, &cells_from_link, open) {
                     LinkState::Meets => end = step,
                     LinkState::IsClear(by) => step += steps_without(by, per_step),
                     LinkState::Waits => {
@@ -215,19 +224,6 @@ impl BodyMotion<'_> {
             }
         }
         (!waits).then_some(Some(end).filter(|end| *end <= segment.steps))
-    }
-
-    #[inline(always)]
-    fn state(
-        &self,
-        look: &mut Look<'_>,
-        link: &LinkInCells,
-        motion: &LinkMotion,
-        step: u64,
-        steps: u64,
-    ) -> LinkState {
-        let pose = motion.at(step as f64 / steps as f64);
-        link::state(look, link, &pose, &CellsFromLink::of(&pose, self.cells_per_m))
     }
 
     /// The least distance at any step, cells, up to `most`.

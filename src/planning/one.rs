@@ -1,21 +1,16 @@
 //! One configuration: does the body meet a voxel, which first, and how far is it from one.
 
+use super::aim::Aim;
 use super::configurations::NUMBERS_PER_POSE;
 use super::eight::LANES;
 use super::in_cells::BodyInCells;
 use super::link;
-use super::look::Look;
+use super::look::{FoundGroup, Look};
 use super::placement::{CellsFromLink, EightTransforms, LinkPose};
 use super::points;
+use super::steps::{InSteps, Unanswered};
 use crate::util::bits::for_each_bit;
 use crate::voxel::VoxelKey;
-
-/// A sphere of which the field does not say whether it meets a voxel.
-#[derive(Debug, Clone, Copy)]
-struct OpenSphere {
-    center: [f64; 3],
-    radius: f64,
-}
 
 /// Answers for one configuration after the other. None means that a part of the field is waited for.
 #[derive(Debug)]
@@ -27,7 +22,44 @@ pub(super) struct Configuration<'a> {
     transforms: Vec<EightTransforms>,
     /// The links that the balls around them do not clear.
     near: Vec<usize>,
-    open: Vec<OpenSphere>,
+}
+
+/// One configuration after the other, in steps: see [`steps`](super::steps).
+#[derive(Debug)]
+pub(super) struct InTurn<'a, 'o, 'f> {
+    configuration: Configuration<'a>,
+    unanswered: Unanswered<'a, 'o>,
+    place: usize,
+    /// The balls around the links, eight at a time.
+    balls: Vec<FoundGroup<'f>>,
+    /// The spheres of links that are not clear.
+    aim: Aim<'a, 'f>,
+}
+
+impl<'a, 'o> InTurn<'a, 'o, '_> {
+    pub(super) fn new(body: &'a BodyInCells, cells_per_m: f64, unanswered: Unanswered<'a, 'o>) -> Self {
+        let configuration = Configuration::new(body, cells_per_m);
+        Self { configuration, unanswered, place: 0, balls: Vec::new(), aim: Aim::default() }
+    }
+}
+
+impl<'f> InSteps<'f> for InTurn<'_, '_, 'f> {
+    #[inline(always)]
+    fn begin(&mut self, look: &mut Look<'f>, part: usize) {
+        self.place = part;
+        self.configuration.place(self.unanswered.poses_of(part));
+        self.configuration.find_balls(look, &mut self.balls);
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self, look: &mut Look<'f>) {
+        self.configuration.find_spheres(look, &self.balls, &mut self.aim);
+    }
+
+    #[inline(always)]
+    fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]) {
+        answers[self.unanswered.items[self.place]] = self.configuration.meets_found(look, &mut self.aim);
+    }
 }
 
 /// The first part of a link, or of a body, that meets a voxel.
@@ -47,16 +79,16 @@ pub(super) struct NearestLink {
 
 impl<'a> Configuration<'a> {
     pub(super) fn new(body: &'a BodyInCells, cells_per_m: f64) -> Self {
-        Self { body, cells_per_m, poses: &[], transforms: Vec::new(), near: Vec::new(), open: Vec::new() }
+        Self { body, cells_per_m, poses: &[], transforms: Vec::new(), near: Vec::new() }
     }
 
     /// Puts the links at these poses.
     #[inline(always)]
     pub(super) fn place(&mut self, poses: &'a [[f32; NUMBERS_PER_POSE]]) {
         self.poses = poses;
-        self.transforms.clear();
-        for poses in poses.chunks(LANES) {
-            self.transforms.push(EightTransforms::of(poses, self.cells_per_m));
+        self.transforms.resize(poses.len().div_ceil(LANES), EightTransforms::NOTHING);
+        for (poses, transforms) in poses.chunks(LANES).zip(&mut self.transforms) {
+            transforms.set(poses, self.cells_per_m);
         }
     }
 
@@ -78,36 +110,49 @@ impl<'a> Configuration<'a> {
         }
     }
 
-    /// True where the body meets a voxel.
+    /// True where the body meets a voxel; none where a part of the field is waited for.
     #[inline(always)]
     pub(super) fn meets(&mut self, look: &mut Look<'_>) -> Option<bool> {
-        self.note_near(look);
-        self.open.clear();
-        let mut unmade = 0;
+        let (mut balls, mut aim) = (Vec::new(), Aim::default());
+        self.find_balls(look, &mut balls);
+        self.find_spheres(look, &balls, &mut aim);
+        self.meets_found(look, &mut aim)
+    }
+
+    /// Finds the balls around the links in the field.
+    #[inline(always)]
+    fn find_balls<'f>(&self, look: &mut Look<'f>, found: &mut Vec<FoundGroup<'f>>) {
+        found.resize(self.body.balls.len(), FoundGroup::NOTHING);
+        let balls = self.body.balls.iter().zip(&self.transforms);
+        for ((balls, transforms), found) in balls.zip(found) {
+            look.find(balls, &balls.centers_of_each(transforms), found);
+        }
+    }
+
+    /// Finds the spheres of the links that are not clear.
+    #[inline(always)]
+    fn find_spheres<'f>(&mut self, look: &mut Look<'f>, balls: &[FoundGroup<'f>], aim: &mut Aim<'a, 'f>) {
+        self.near.clear();
+        for (eight, (balls, found)) in self.body.balls.iter().zip(balls).enumerate() {
+            let judged = look.judge_found(balls, found);
+            for_each_bit(u64::from(judged.meets | judged.is_open), |lane| {
+                self.near.push(eight * LANES + lane as usize);
+            });
+        }
+        aim.clear();
         for &number in &self.near {
             let cells_from_link = self.cells_from_link(number);
             for group in &self.body.links[number].groups {
-                let centers = group.centers(&cells_from_link);
-                let judged = look.judge(group, &centers);
-                if judged.meets != 0 {
-                    return Some(true);
-                }
-                unmade |= judged.unmade;
-                for_each_bit(u64::from(judged.is_open), |lane| {
-                    let (center, radius) =
-                        (link::lane_of(&centers, lane as usize), group.radius[lane as usize]);
-                    self.open.push(OpenSphere { center, radius });
-                });
+                aim.add(look, group, &cells_from_link);
             }
         }
-        if look.waits_for(unmade) {
-            return None;
-        }
-        Some(self.open_meets(look) || self.points_meet(look))
     }
 
-    fn open_meets(&self, look: &Look<'_>) -> bool {
-        self.open.iter().any(|sphere| look.meets(sphere.center, sphere.radius))
+    /// Reads what was found.
+    #[inline(always)]
+    fn meets_found(&self, look: &mut Look<'_>, aim: &mut Aim<'_, '_>) -> Option<bool> {
+        let do_spheres = aim.meets(look, 0..aim.len())?;
+        Some(do_spheres || self.points_meet(look))
     }
 
     fn points_meet(&self, look: &mut Look<'_>) -> bool {

@@ -10,8 +10,9 @@ pub(super) struct LinkMotion {
     /// Unit quaternions x y z w with an angle of at most 90 degrees between them.
     from: [f64; 4],
     to: [f64; 4],
-    /// That angle, which is half of the rotation's; radians.
+    /// That angle, which is half of the rotation's, radians; and its sine.
     half_angle: f64,
+    sine: f64,
 }
 
 /// The sine of an angle that is none.
@@ -28,13 +29,14 @@ impl LinkMotion {
             dot(sum, sum).sqrt()
         };
         let half_angle = 2.0 * norm(-1.0).atan2(norm(1.0));
-        Self { from_m: from.translation_m, to_m: to.translation_m, from: start, to: end, half_angle }
+        let sine = half_angle.sin();
+        Self { from_m: from.translation_m, to_m: to.translation_m, from: start, to: end, half_angle, sine }
     }
 
     /// The pose after `share` of the motion, 0 to 1.
     #[inline]
     pub(super) fn at(&self, share: f64) -> LinkPose {
-        let (rest, sine) = (1.0 - share, self.half_angle.sin());
+        let (rest, sine) = (1.0 - share, self.sine);
         let (a, b) = if sine < SINE_MIN {
             (rest, share)
         } else {

@@ -81,30 +81,35 @@ pub(super) struct EightTransforms {
 }
 
 impl EightTransforms {
-    /// The transforms of up to eight poses; lanes beyond them repeat the first.
+    /// No pose yet.
+    pub(super) const NOTHING: Self =
+        Self { rotation: [[[0.0; LANES]; 3]; 3], translation: [[0.0; LANES]; 3] };
+
+    /// Sets the transforms of up to eight poses; lanes beyond them repeat the first.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "a lane goes through several arrays")]
-    pub(super) fn of(poses: &[[f32; NUMBERS_PER_POSE]], cells_per_m: f64) -> Self {
-        let mut numbers = [[0.0; LANES]; NUMBERS_PER_POSE];
+    pub(super) fn set(&mut self, poses: &[[f32; NUMBERS_PER_POSE]], cells_per_m: f64) {
+        let mut numbers = [[0f32; LANES]; NUMBERS_PER_POSE];
         for lane in 0..LANES {
             let pose = &poses[if lane < poses.len() { lane } else { 0 }];
             for (numbers, number) in numbers.iter_mut().zip(pose) {
-                numbers[lane] = f64::from(*number);
+                numbers[lane] = *number;
             }
         }
-        let (mut rotation, mut translation) = ([[[0.0; LANES]; 3]; 3], [[0.0; LANES]; 3]);
         for lane in 0..LANES {
-            let [px, py, pz, x, y, z, w] = [0, 1, 2, 3, 4, 5, 6].map(|n: usize| numbers[n][lane]);
-            let pose = LinkPose { translation_m: [px, py, pz], rotation_xyzw: [x, y, z, w] };
+            let number = |n: usize| f64::from(numbers[n][lane]);
+            let pose = LinkPose {
+                translation_m: [number(0), number(1), number(2)],
+                rotation_xyzw: [number(3), number(4), number(5), number(6)],
+            };
             let transform = CellsFromLink::of(&pose, cells_per_m);
             for axis in 0..3 {
-                translation[axis][lane] = transform.translation[axis];
+                self.translation[axis][lane] = transform.translation[axis];
                 for column in 0..3 {
-                    rotation[axis][column][lane] = transform.rotation[axis][column];
+                    self.rotation[axis][column][lane] = transform.rotation[axis][column];
                 }
             }
         }
-        Self { rotation, translation }
     }
 
     /// The transform in one lane.

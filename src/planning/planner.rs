@@ -34,6 +34,14 @@ pub(super) trait Answerer {
     /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when that
     /// is. On the last look ([`Look::is_last`]) it always answers.
     fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<Self::Answer>;
+
+    /// Answers the items from `first` on that have no answer yet.
+    #[inline(always)]
+    fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<Self::Answer>]) {
+        for (item, answer) in answers.iter_mut().enumerate().filter(|(_, answer)| answer.is_none()) {
+            *answer = self.answer(look, first + item);
+        }
+    }
 }
 
 /// Items that are answered between two looks at the stop signal, those of them that have no answer yet.
@@ -49,9 +57,7 @@ impl<A: Answerer> Work for Chunk<'_, '_, A> {
 
     #[inline(always)]
     fn run(self) {
-        for (item, answer) in self.answers.iter_mut().enumerate().filter(|(_, answer)| answer.is_none()) {
-            *answer = self.answerer.answer(self.look, self.first + item);
-        }
+        self.answerer.answer_all(self.look, self.first, self.answers);
     }
 }
 

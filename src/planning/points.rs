@@ -1,6 +1,6 @@
 //! The points of a link: the field clears most of them, the rest are looked up voxel by voxel.
 
-use super::eight::LANES;
+use super::eight::{LANES, lanes_below_zero};
 use super::in_cells::{LinkInCells, POINTS_PER_CLUMP};
 use super::look::Look;
 use super::placement::{CellsFromLink, LinkPose};
@@ -83,14 +83,14 @@ fn find(
     false
 }
 
-/// The lanes in which something may be at most `distance` cells away.
+/// The lanes in which something may be less than `distance` cells away.
 #[inline(always)]
 fn lanes_within(lower: &[f32; LANES], distance: f32) -> u8 {
-    let mut lanes = 0;
-    for (lane, lower) in lower.iter().enumerate() {
-        lanes |= u8::from(*lower <= distance) << lane;
+    let mut left = [0f32; LANES];
+    for lane in 0..LANES {
+        left[lane] = lower[lane] - distance;
     }
-    lanes
+    lanes_below_zero(&left)
 }
 
 /// What a point meets, by its place among the clumps' points.

@@ -3,11 +3,14 @@
 use super::PlanningError;
 use super::body::Body;
 use super::configurations::Configurations;
+use super::eight::LANES;
 use super::in_cells::BodyInCells;
-use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
+use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind};
 use super::look::Look;
-use super::one::Configuration;
+use super::one::{Configuration, InTurn};
 use super::planner::{Answerer, PlanningView};
+use super::rigid::EightPlaces;
+use super::steps::{Unanswered, answer_in_steps};
 use super::surroundings::Surroundings;
 use crate::util::StopSignal;
 
@@ -38,7 +41,11 @@ impl PlanningView<'_> {
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<u64>>, PlanningError> {
-        Ok(self.each_configuration(question, stop, Meets)?.map(|meets| words(&meets)))
+        let (body, cells_per_m) = self.in_cells(question)?;
+        let PoseQuestion { configurations, level, surroundings, .. } = *question;
+        let meeting = Meeting { configurations, body: &body, cells_per_m };
+        let meets = self.each(level, surroundings, (configurations.len(), PER_LOOK), stop, meeting);
+        Ok(meets.map(|meets| words(&meets)))
     }
 
     /// What the body meets first in each configuration, where it meets something. None once stopped.
@@ -67,16 +74,21 @@ impl PlanningView<'_> {
         self.each_configuration(question, stop, clearances)
     }
 
+    /// The body in cells of the level, and how many of them are a meter.
+    fn in_cells(&self, question: &PoseQuestion<'_>) -> Result<(BodyInCells, f64), PlanningError> {
+        let cells_per_m = self.cells_per_m(question.level)?;
+        question.configurations.check_links(question.body.links().len())?;
+        Ok((BodyInCells::of(question.body, cells_per_m)?, cells_per_m))
+    }
+
     fn each_configuration<K: Kind>(
         &self,
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
         kind: K,
     ) -> Result<Option<Vec<K::Answer>>, PlanningError> {
-        let PoseQuestion { body, configurations, level, surroundings } = *question;
-        let cells_per_m = self.cells_per_m(level)?;
-        configurations.check_links(body.links().len())?;
-        let body = BodyInCells::of(body, cells_per_m)?;
+        let (body, cells_per_m) = self.in_cells(question)?;
+        let PoseQuestion { configurations, level, surroundings, .. } = *question;
         let chunks = (configurations.len(), PER_LOOK);
         let poses = Poses { configurations, kind, configuration: Configuration::new(&body, cells_per_m) };
         Ok(self.each(level, surroundings, chunks, stop, poses))
@@ -97,6 +109,40 @@ impl<K: Kind> Answerer for Poses<'_, K> {
     fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<K::Answer> {
         self.configuration.place(self.configurations.poses_of(item));
         self.kind.answer(&mut self.configuration, look)
+    }
+}
+
+/// Says of each configuration whether the body meets a voxel.
+struct Meeting<'a> {
+    configurations: Configurations<'a>,
+    body: &'a BodyInCells,
+    cells_per_m: f64,
+}
+
+impl Answerer for Meeting<'_> {
+    type Answer = bool;
+
+    #[inline(always)]
+    fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<bool> {
+        let mut configuration = Configuration::new(self.body, self.cells_per_m);
+        configuration.place(self.configurations.poses_of(item));
+        configuration.meets(look)
+    }
+
+    #[inline(always)]
+    fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<bool>]) {
+        let items: Vec<usize> = (0..answers.len()).filter(|&item| answers[item].is_none()).collect();
+        let unanswered = Unanswered { configurations: self.configurations, first, items: &items };
+        match &self.body.links[..] {
+            [link] => {
+                let new = || EightPlaces::new(link, self.cells_per_m, unanswered);
+                answer_in_steps(look, items.len().div_ceil(LANES), new, answers);
+            }
+            _ => {
+                let new = || InTurn::new(self.body, self.cells_per_m, unanswered);
+                answer_in_steps(look, items.len(), new, answers);
+            }
+        }
     }
 }
 

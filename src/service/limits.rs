@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Reason, ServiceError};
 use crate::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
+use crate::planning::FIELD_BYTES_MAX_DEFAULT;
 
 /// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is named
 /// in the error of a request beyond it, and is a setting of the section `limits`.
@@ -82,6 +83,9 @@ pub struct Limits {
     pub body_parts_max: usize,
     /// Regions in which a check ignores voxels. 64.
     pub ignored_regions_max: usize,
+    /// Bytes of the distance fields that a map keeps for checks of bodies. Less is slower and as exact: the oldest part goes.
+    /// 128 MiB.
+    pub planning_field_bytes_max: usize,
     /// How long a question of a planner may take, while changes of the map wait for it. 1 s.
     pub question_time_max_s: f64,
     /// Cells of one 2-D grid. 4,000,000.
@@ -176,6 +180,7 @@ impl Default for Limits {
             listed_voxels_max: 20_000_000,
             body_parts_max: 16_384,
             ignored_regions_max: 64,
+            planning_field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
             question_time_max_s: 1.0,
             grid_cells_max: 4_000_000,
             block_bytes_max: 16 << 20,

@@ -8,13 +8,13 @@ use crate::voxel::VoxelKey;
 /// A number of an array.
 pub(crate) trait Number: Copy {
     /// Its bytes, little-endian.
-    type Bytes: AsRef<[u8]> + for<'a> TryFrom<&'a [u8]>;
+    type Bytes: AsRef<[u8]>;
 
     /// The bytes of this number.
     fn to_bytes(self) -> Self::Bytes;
 
-    /// The number of these bytes.
-    fn of_bytes(bytes: Self::Bytes) -> Self;
+    /// The numbers of bytes; what is left over at the end makes none.
+    fn all_of(bytes: &[u8]) -> Vec<Self>;
 }
 
 /// Makes a [`Number`] of each type.
@@ -28,9 +28,9 @@ macro_rules! numbers {
                 self.to_le_bytes()
             }
 
-            #[inline]
-            fn of_bytes(bytes: Self::Bytes) -> Self {
-                Self::from_le_bytes(bytes)
+            fn all_of(bytes: &[u8]) -> Vec<Self> {
+                let numbers = bytes.as_chunks::<{ size_of::<$of>() }>().0;
+                numbers.iter().map(|bytes| Self::from_le_bytes(*bytes)).collect()
             }
         })+
     };
@@ -55,8 +55,7 @@ pub(crate) fn numbers_of<T: Number>(
     if Some(bytes.len()) != count.checked_mul(size_of::<T>()) {
         return Err(wrong_length(field, bytes.len(), count, size_of::<T>()));
     }
-    let number = |bytes: &[u8]| Some(T::of_bytes(bytes.try_into().ok()?));
-    Ok(bytes.chunks_exact(size_of::<T>()).filter_map(number).collect())
+    Ok(T::all_of(bytes))
 }
 
 /// The bytes of the first `count` bits of `words`: bit i is bit i % 8, lowest first, of byte i / 8.

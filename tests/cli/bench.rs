@@ -23,12 +23,33 @@ fn structures_answer_alike_and_each_has_a_line() {
 
 #[test]
 fn each_of_a_planners_questions_has_a_line() {
-    let few = ["--poses", "200", "--point-poses", "50", "--scans", "2", "--repeats", "1"];
-    let lines = objects(&[&["bench", "planning"], &few[..]].concat());
-    assert_eq!(texts(&lines, "what"), ["arm", "points", "motions", "changing"]);
-    assert!(number(&lines[0], "ns_per_pose") > 0.0 && number(&lines[0], "field_bytes") > 10_000.0);
-    assert_eq!((number(&lines[1], "poses"), number(&lines[2], "colliding")), (50.0, 128.0));
-    assert!(number(&lines[3], "new_voxels_per_scan") > 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let peer_file = folder.path().join("arms.bin");
+    let few = ["--poses", "200", "--point-poses", "50", "--scans", "2", "--repeats", "1", "--peer-file"];
+    let lines = objects(&[&["bench", "planning"], &few[..], &[peer_file.to_str().unwrap()]].concat());
+    // What comes before the arms are the voxels.
+    assert!(std::fs::metadata(&peer_file).unwrap().len() > 200 * (59 * 4 + 1) * 4 + 150_000 * 12);
+    assert_eq!(texts(&lines, "what"), ["arm", "arm", "points", "motions", "changing"]);
+    let (arms, lines) = lines.split_at(2);
+    assert!(arms.iter().map(|arm| number(arm, "links")).eq([11.0, 8.0]));
+    assert!(arms.iter().all(|arm| number(arm, "ns_per_pose") > 0.0 && number(arm, "field_bytes") > 10_000.0));
+    assert_eq!((number(&lines[0], "poses"), number(&lines[1], "colliding")), (50.0, 128.0));
+    assert!(number(&lines[2], "new_voxels_per_scan") > 0.0);
+}
+
+#[test]
+fn planners_questions_to_a_server_have_a_line_each_and_so_have_scans_beside_them() {
+    let lines = objects(&["bench", "questions", "--seconds", "0.3", "--azimuths", "60", "--rings", "20"]);
+    let scans = ["scans, nobody asks", "scans, 100 asked after", "the 100"];
+    let questions = ["arms, 90 % free", "arms, half free", "cycles", "rays", "rays, in process"];
+    let motions = ["motions beside scans", "motions of a replica"];
+    assert_eq!(texts(&lines, "what"), [&scans[..], &questions[..], &motions[..]].concat());
+    for line in &lines {
+        assert!(number(line, "messages") > 0.0 && number(line, "p50_ms") > 0.0, "{line}");
+        assert!(number(line, "p99_ms") >= number(line, "p50_ms"), "{line}");
+    }
+    let items = lines.iter().map(|line| number(line, "items_per_message"));
+    assert!(items.eq([1.0, 1.0, 1.0, 1000.0, 1000.0, 56_000.0, 1200.0, 1200.0, 256.0, 256.0]), "{lines:?}");
 }
 
 #[test]

@@ -34,15 +34,16 @@ const CORE: usize = 5;
 /// Crates that the core must not know.
 const NOT_IN_THE_CORE: [&str; 7] = ["tokio", "tonic", "axum", "prost", "serde", "hyper", "tower"];
 
-/// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart, planners' questions; and the
-/// prefetch.
-const KERNELS: [&str; 8] = [
+/// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart, planners' questions, rays;
+/// and the prefetch.
+const KERNELS: [&str; 9] = [
     "voxel/quantize",
     "voxel/new_keys",
     "bloom/fill",
     "map/bounds.rs",
     "map/lookup",
     "planning/simd.rs",
+    "planning/rays/turns.rs",
     "lab/rivals/dense/offsets",
     "util/prefetch.rs",
 ];

@@ -56,6 +56,7 @@ fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
     Ok(ReplicaOptions {
         region: region.transpose().map_err(ServiceError::from)?,
         blocks_max,
+        field_bytes_max: usual.field_bytes_max,
         silence_max: milliseconds(options.silence_timeout_ms, usual.silence_max),
         filter: flag(options.with_filter, "options.with_filter")?.then(FilterSettings::default),
     })

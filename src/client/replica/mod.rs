@@ -31,6 +31,7 @@ use super::{Client, ClientError};
 use crate::bloom::FilterSettings;
 use crate::geometry::Pose;
 use crate::map::{ContentVersion, MapName, MultiResolutionMap, Region};
+use crate::planning::FIELD_BYTES_MAX_DEFAULT;
 use crate::service::{PointAnswer, PointQuery, Reason, ServiceError};
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
@@ -51,6 +52,9 @@ pub struct ReplicaOptions {
     /// Filters in front of the copy's levels, for [`Lookup::Bloom`](crate::map::Lookup). None: the exact set answers, in a
     /// small part of the memory.
     pub filter: Option<FilterSettings>,
+    /// Most bytes of the distance fields that the copy keeps for checks of bodies; less is slower, and as exact.
+    /// [`FIELD_BYTES_MAX_DEFAULT`].
+    pub field_bytes_max: usize,
     /// How long the server may be silent until the connection counts as lost: more than its `watch_heartbeat_s`. 35 s.
     pub silence_max: Duration,
 }
@@ -58,7 +62,13 @@ pub struct ReplicaOptions {
 impl Default for ReplicaOptions {
     fn default() -> Self {
         let silence_max = Duration::from_secs(35);
-        Self { region: None, blocks_max: BLOCKS_MAX_DEFAULT, filter: None, silence_max }
+        Self {
+            region: None,
+            blocks_max: BLOCKS_MAX_DEFAULT,
+            filter: None,
+            field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
+            silence_max,
+        }
     }
 }
 
@@ -71,6 +81,7 @@ impl Default for ReplicaOptions {
 pub struct Replica {
     shared: Arc<Shared>,
     region: Option<Region>,
+    field_bytes_max: usize,
     following: JoinHandle<()>,
 }
 
@@ -133,7 +144,7 @@ impl Replica {
         let mut follower = Follower::new(client, map, options);
         let (shared, watched) = follower.copy_first().await?;
         let following = tokio::spawn(follower.run(Arc::clone(&shared), watched));
-        Ok(Self { shared, region: options.region, following })
+        Ok(Self { shared, region: options.region, field_bytes_max: options.field_bytes_max, following })
     }
 
     /// How far the replica is.

@@ -24,7 +24,7 @@ impl Replica {
             return Err(ServiceError::new(Reason::PointOutOfRange, message).into());
         }
         check_revision(asked.min_revision, map.revision())?;
-        let questioned = QuestionedMap::new(&map, &planner);
+        let questioned = QuestionedMap::new(&map, &planner, self.field_bytes_max);
         let (answer, version) = question.answer_from(&questioned, &limits, StopSignal::NEVER)?;
         let version = MapVersion { revision: version.revision, map_uuid, content_hash: Some(version.hash) };
         Ok(Answered { answer, version })

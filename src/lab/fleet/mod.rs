@@ -13,6 +13,7 @@ mod memory;
 mod pace;
 mod planner;
 mod process;
+pub(crate) mod questions;
 mod relay;
 mod robot;
 mod spectator;

@@ -1,6 +1,6 @@
 //! A server in a process of its own, so that its memory is its own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -44,15 +44,29 @@ impl ServerProcess {
         Self::start_at(data_dir, ANY_PORT, &[]).await
     }
 
+    /// Starts the server on some processors only, as `taskset -c` names them.
+    pub(crate) async fn start_on(processors: &str, data_dir: &Path) -> Result<Self, FleetError> {
+        let mut command = Command::new("taskset");
+        command.args(["-c", processors]).arg(own_program()?);
+        Self::launch(command, data_dir, ANY_PORT, &[]).await
+    }
+
     /// Starts the server at an address of gRPC, with more settings: variables with their values.
     pub(crate) async fn start_at(
         data_dir: &Path,
         grpc: &str,
         settings: &[(&str, &str)],
     ) -> Result<Self, FleetError> {
-        let no_server = |error: &dyn std::fmt::Display| FleetError::failed(format!("no server: {error}"));
-        let program = std::env::current_exe().map_err(|error| no_server(&error))?;
-        let mut child = Command::new(program)
+        Self::launch(Command::new(own_program()?), data_dir, grpc, settings).await
+    }
+
+    async fn launch(
+        mut command: Command,
+        data_dir: &Path,
+        grpc: &str,
+        settings: &[(&str, &str)],
+    ) -> Result<Self, FleetError> {
+        let mut child = command
             .args(["serve", "--json", "--log-level", "warn"])
             .args(["--http-listen", ANY_PORT, "--grpc-listen", grpc, "--data-dir"])
             .arg(data_dir)
@@ -115,6 +129,15 @@ impl ServerProcess {
             status => Err(ended_badly(status)),
         }
     }
+}
+
+/// This program.
+fn own_program() -> Result<PathBuf, FleetError> {
+    std::env::current_exe().map_err(|error| no_server(&error))
+}
+
+fn no_server(error: &dyn std::fmt::Display) -> FleetError {
+    FleetError::failed(format!("no server: {error}"))
 }
 
 fn ended_badly(status: ExitStatus) -> FleetError {

@@ -1,6 +1,7 @@
 //! Workloads: content for maps, and queries about it. Both are seeded and made in pieces, so that 50 million voxels
 //! need no list of their keys.
 
+pub(crate) mod bodies;
 mod ride;
 mod room;
 mod scatter;

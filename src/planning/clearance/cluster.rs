@@ -1,6 +1,6 @@
 //! Clusters of 8 x 8 x 8 blocks of the field: which are made, and where they are.
 
-use super::block::{BLOCK_BYTES, FieldBlock};
+use super::block::{BLOCK_BYTES, FieldBlock, LINE_BYTES};
 use crate::voxel::VoxelKey;
 
 /// Levels from a block up to its cluster.
@@ -35,9 +35,17 @@ impl FieldCluster {
 
     /// The byte of a cell of a block, both by their places; none where the block is not made.
     #[inline(always)]
-    pub(in crate::planning) fn byte(&self, block: u32, cell: u32) -> Option<u8> {
+    pub(in crate::planning) fn byte(&self, block: u32, cell: u32) -> Option<&u8> {
         let number = self.numbers[block as usize % BLOCKS];
-        self.blocks.get(usize::from(number)).map(|block| block.0[cell as usize % BLOCK_BYTES])
+        self.blocks.get(usize::from(number)).map(|block| &block.0[cell as usize % BLOCK_BYTES])
+    }
+
+    /// The bytes of a line, by the places of its block and of a cell in it; none where the block is not made.
+    #[inline(always)]
+    pub(in crate::planning) fn line(&self, block: u32, cell: u32) -> Option<&[u8; LINE_BYTES]> {
+        let number = self.numbers[block as usize % BLOCKS];
+        let lines = self.blocks.get(usize::from(number))?.0.as_chunks().0;
+        lines.get(cell as usize / LINE_BYTES)
     }
 
     /// Keeps the block at `place`; none is one with nothing near.

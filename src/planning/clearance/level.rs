@@ -1,5 +1,6 @@
 //! The field of one level: its clusters by key.
 
+use super::block::cell_place;
 use super::cluster::{CLUSTER_LEVELS, FieldCluster};
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
 
@@ -60,7 +61,7 @@ impl FieldLevel {
     /// Its place in the block.
     #[inline(always)]
     pub(in crate::planning) fn cell_place(index: [i32; 3]) -> u32 {
-        place(index)
+        cell_place(index)
     }
 
     /// The cluster with a key, where there is one.

@@ -19,7 +19,7 @@ mod cluster;
 mod fields;
 mod level;
 
-pub(super) use block::FAR;
+pub(super) use block::{FAR, LINE_BYTES};
 pub(super) use cluster::FieldCluster;
 pub use fields::FIELD_BYTES_MAX_DEFAULT;
 pub(super) use fields::{FieldBlockKey, Fields};

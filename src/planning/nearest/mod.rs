@@ -15,8 +15,8 @@ use search::Search;
 /// Largest radius of a search, voxels of the level that is asked.
 pub const RADIUS_VOXELS_MAX: f64 = 64.0;
 
-/// Points that are searched between two looks at the stop signal: some milliseconds.
-const POINTS_PER_LOOK: usize = 1024;
+/// Points that are searched between two looks at the stop signal: at worst some milliseconds.
+const POINTS_PER_LOOK: usize = 64;
 
 /// What of a voxel a distance is measured to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

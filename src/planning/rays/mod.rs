@@ -176,7 +176,7 @@ impl Toward<'_> {
                 if !is_unit {
                     return Err(RayError::Direction { at, direction: directions[at], length });
                 }
-                Ok((direction.map(|c| c / length), range_m))
+                Ok((unit_vector(direction, length), range_m))
             }
             Self::Ends(ends) => {
                 let (from, to) = (origin.xyz(), ends[at].xyz());
@@ -185,7 +185,7 @@ impl Toward<'_> {
                 if !(length > 0.0 && length.is_finite()) {
                     return Err(RayError::End { at, end: ends[at], origin });
                 }
-                Ok((way.map(|c| c / length), length))
+                Ok((unit_vector(way, length), length))
             }
         }
     }
@@ -216,6 +216,14 @@ impl Request<'_> {
     }
 }
 
+/// A direction of this length as one of length 1.
+#[inline(always)]
+fn unit_vector(direction: [f64; 3], length: f64) -> [f64; 3] {
+    let share = 1.0 / length;
+    direction.map(|c| c * share)
+}
+
+#[inline(always)]
 fn length([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }

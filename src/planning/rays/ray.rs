@@ -45,10 +45,11 @@ impl Ray {
     pub(super) fn new([x, y, z]: [f64; 3], [dx, dy, dz]: [f64; 3], cell_m: f64) -> Self {
         // In the middle of a cell, no border is ever near along the fourth axis.
         let (origin, direction) = ([x, y, z, 0.5], [dx, dy, dz, 0.0]);
+        let cells_a_m = 1.0 / cell_m;
         Self {
             origin: std::array::from_fn(|i| if direction[i] < 0.0 { -origin[i] } else { origin[i] }),
             m_a_cell: direction.map(|d: f64| cell_m / d.abs()),
-            cells_a_m: direction.map(|d| d.abs() / cell_m),
+            cells_a_m: direction.map(|d| d.abs() * cells_a_m),
             turned: direction.map(|d| -i32::from(d < 0.0)),
         }
     }

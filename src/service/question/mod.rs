@@ -77,17 +77,22 @@ pub trait Question: Debug + Send + Sync + 'static {
 pub struct QuestionedMap<'a> {
     map: &'a Arc<MultiResolutionMap>,
     planner: &'a OnceLock<Planner>,
+    field_bytes_max: usize,
 }
 
 impl<'a> QuestionedMap<'a> {
-    /// The map, with a place for its planner.
-    pub fn new(map: &'a Arc<MultiResolutionMap>, planner: &'a OnceLock<Planner>) -> Self {
-        Self { map, planner }
+    /// The map, with a place for its planner, whose fields hold at most so many bytes.
+    pub fn new(
+        map: &'a Arc<MultiResolutionMap>,
+        planner: &'a OnceLock<Planner>,
+        field_bytes_max: usize,
+    ) -> Self {
+        Self { map, planner, field_bytes_max }
     }
 
     /// The planner, which keeps what makes checks of bodies fast.
     pub(super) fn planner(&self) -> &'a Planner {
-        self.planner.get_or_init(|| Planner::new(Arc::clone(self.map)))
+        self.planner.get_or_init(|| Planner::with_field_bytes(Arc::clone(self.map), self.field_bytes_max))
     }
 
     /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
@@ -149,7 +154,7 @@ impl MapService {
                 let limits = &inner.settings.limits;
                 let _lent = inner.budget.reserve_transient(question.answer_bytes(limits) as u64, ANSWER)?;
                 let (answer, version) =
-                    limit.run(stop, |stop| question.answer_from(&map.questioned(), limits, stop))?;
+                    limit.run(stop, |stop| question.answer_from(&map.questioned(limits), limits, stop))?;
                 Ok(Answered { answer, version: map.version(version) })
             };
             self.inner.planning.run(answer).await?
@@ -159,8 +164,8 @@ impl MapService {
 }
 
 impl HostedMap {
-    fn questioned(&self) -> QuestionedMap<'_> {
-        QuestionedMap::new(&self.map, &self.planner)
+    fn questioned(&self, limits: &Limits) -> QuestionedMap<'_> {
+        QuestionedMap::new(&self.map, &self.planner, limits.planning_field_bytes_max)
     }
 }
 
@@ -182,4 +187,40 @@ fn check_elements(
         limits.message_bytes_max
     );
     Err(ServiceError::new(Reason::BatchTooLarge, message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::{MapContents, MapSettings};
+    use crate::planning::{Body, Link, Sphere, Surroundings};
+    use crate::voxel::VoxelKey;
+
+    /// Bytes that the fields of a map hold after a check where a voxel is near, when they may hold so many.
+    fn field_bytes(field_bytes_max: usize) -> usize {
+        let voxels = VoxelKey::new([3, 0, 0]).into_iter().collect();
+        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), MapContents::at(1, voxels)).unwrap();
+        let spheres = vec![Sphere { center_m: [0.0; 3], radius_m: 0.1 }];
+        let check = PoseCheck {
+            asked: Asked::default(),
+            body: Arc::new(Body::new(vec![Link { spheres, ..Link::default() }]).unwrap()),
+            configurations: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            surroundings: Surroundings::ALL_VOXELS,
+            answer: CheckAs::Colliding,
+        };
+        let (map, planner) = (Arc::new(map), OnceLock::new());
+        let map = QuestionedMap::new(&map, &planner, field_bytes_max);
+        let (answer, _) = check.answer_from(&map, &Limits::default(), StopSignal::NEVER).unwrap();
+        assert_eq!(answer.words(), [0]);
+        map.planner().field_bytes()
+    }
+
+    #[test]
+    fn fields_hold_what_they_may_and_not_a_byte_more() {
+        let needed = field_bytes(Limits::default().planning_field_bytes_max);
+        assert!(needed > 512, "{needed}");
+        assert_eq!(field_bytes(needed), needed);
+        assert!(field_bytes(needed - 1) < needed);
+        assert_eq!(field_bytes(0), 0);
+    }
 }

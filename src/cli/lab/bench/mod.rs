@@ -8,6 +8,7 @@ mod lookup;
 mod memory;
 mod nearest;
 mod planning;
+mod questions;
 mod rays;
 mod readers;
 mod replica;
@@ -38,6 +39,7 @@ EXAMPLES:
   mrol bench nearest --queries 100000                 how far points are from the nearest voxel
   mrol bench readers --workload site                  readers beside each other, and beside a writer
   mrol bench planning --workload site                 an arm among ten million voxels
+  mrol bench questions                                planners' questions to a server, beside scans
   mrol bench serve                                    a load of point queries on a server of its own
   mrol bench replica                                  a copy of a map that follows, and its queries
   mrol bench watch                                    fifty who follow a map that is mapped
@@ -63,6 +65,7 @@ enum What {
     Journal(journal::Journal),
     Align(align::Align),
     Planning(planning::Planning),
+    Questions(questions::QuestionBench),
     Rays(rays::Rays),
     Nearest(nearest::Nearest),
     Readers(readers::Readers),
@@ -83,6 +86,7 @@ impl Bench {
             What::Journal(journal) => runtime::block_on(journal.run(output)),
             What::Align(align) => align.run(&output),
             What::Planning(planning) => planning.run(&output),
+            What::Questions(questions) => runtime::block_on(questions.run(output)),
             What::Rays(rays) => rays.run(&output),
             What::Nearest(nearest) => nearest.run(&output),
             What::Readers(readers) => readers.run(&output),

@@ -1,6 +1,7 @@
 //! `mrol bench planning`: times planners' questions.
 
 use std::fmt::{self, Display};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -10,7 +11,7 @@ use crate::cli::error::CliError;
 use crate::cli::map_report::{bytes, count, percent};
 use crate::cli::output::Output;
 use crate::lab::measure::planning::{
-    ArmPoses, Changing, Motions, PointBody, arm_poses, between_insertions, motions, point_body,
+    ArmPoses, Changing, Motions, PointBody, arm_poses, between_insertions, motions, point_body, write_arms,
 };
 
 const EXAMPLES: &str = "\
@@ -18,10 +19,12 @@ EXAMPLES:
   mrol bench planning                                 an arm, a body of points and motions in a room
   mrol bench planning --workload site                 the same on ten million voxels
   mrol bench planning --scans 0 --json                without the part in which the map changes
+  mrol bench planning --peer-file arms.bin && benches/peers/coal_octree.py arms.bin
 
 On one core, in this process. An arm of 59 spheres stands at random places within 1 m of a surface, with random joint
-angles. The body of points is asked where it meets nothing. Half of the motions of 0.5 m, of a body of 20 spheres, collide.
-Then scans of 20,000 points go in ten times a second while the arm is asked about. Figures are medians of --repeats passes.";
+angles: its hand and fingers are links, and then parts of the last link. The body of points is asked where it meets nothing.
+Half of the motions of 0.5 m, of a body of 20 spheres, collide. Then scans of 20,000 points go in ten times a second while the
+arm is asked about. Figures are medians of --repeats passes. --peer-file is for other libraries.";
 
 /// Time planners' questions: an arm at poses, a body of points, motions; between insertions as well
 #[derive(Debug, clap::Args)]
@@ -43,6 +46,9 @@ pub(super) struct Planning {
     /// Passes over all poses
     #[arg(long, value_name = "N", default_value = "11", value_parser = times)]
     repeats: usize,
+    /// Write voxels, the arm's spheres and the answers to this file
+    #[arg(long, value_name = "FILE")]
+    peer_file: Option<PathBuf>,
 }
 
 impl Planning {
@@ -51,13 +57,18 @@ impl Planning {
         let map = Arc::new(self.map.map_of(workload)?);
         output.say(format!("{}: {}, median of {} passes", self.workload, size_of(&map, 0), self.repeats))?;
         let voxels = map.voxels(0);
-        let arm = arm_poses(&map, self.poses as usize, self.repeats, seed).map_err(CliError::usage)?;
-        output.print(&ArmLine::of(&arm, voxels))?;
+        for has_stiff_hand in [false, true] {
+            let arm = arm_poses(&map, has_stiff_hand, self.poses as usize, self.repeats, seed);
+            output.print(&ArmLine::of(&arm.map_err(CliError::usage)?, voxels))?;
+        }
         let points =
             point_body(&map, self.point_poses as usize, self.repeats, seed).map_err(CliError::usage)?;
         output.print(&PointsLine::of(&points))?;
         let motions = motions(&map, self.repeats, seed).map_err(CliError::usage)?;
         output.print(&MotionsLine::of(&motions))?;
+        if let Some(path) = &self.peer_file {
+            write_arms(path, &map, self.poses as usize, seed).map_err(CliError::failed)?;
+        }
         drop(map);
         if self.scans > 0 {
             let settings = self.map.settings(workload.resolution_m())?;
@@ -71,6 +82,7 @@ impl Planning {
 #[derive(Serialize)]
 struct ArmLine {
     what: &'static str,
+    links: usize,
     ns_per_pose: f64,
     first_pass_ns_per_pose: f64,
     poses: usize,
@@ -83,6 +95,7 @@ impl ArmLine {
     fn of(arm: &ArmPoses, voxels: usize) -> Self {
         Self {
             what: "arm",
+            links: arm.links,
             ns_per_pose: arm.runs.median(),
             first_pass_ns_per_pose: arm.first_ns,
             poses: arm.poses,
@@ -98,7 +111,8 @@ impl Display for ArmLine {
         let share = percent(self.colliding as f64 / self.poses.max(1) as f64);
         write!(
             f,
-            "arm of 59 spheres: {:.0} ns a pose ({} poses, {share} collide), {:.0} ns in the first pass; fields of {}, {:.1} bytes a voxel",
+            "arm of 59 spheres, {} links: {:.0} ns a pose ({} poses, {share} collide), {:.0} ns in the first pass; fields of {}, {:.1} bytes a voxel",
+            self.links,
             self.ns_per_pose,
             count(self.poses),
             self.first_pass_ns_per_pose,

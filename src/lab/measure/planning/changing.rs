@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::place::Surface;
-use super::{arm, meets};
+use super::meets;
+use crate::lab::workload::bodies::arm::{self, Hand};
+use crate::lab::workload::bodies::place::Surface;
 use crate::lab::workload::{Order, Queries, Workload, add};
 use crate::map::{MapSettings, MultiResolutionMap};
 use crate::planning::Planner;
@@ -56,8 +57,8 @@ pub fn between_insertions(
 ) -> Result<Changing, Refused> {
     let [map, other] = [Arc::new(workload.map(settings)?), Arc::new(workload.map(settings)?)];
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let (arm, surface) = (arm::body()?, Surface::of(&map, &mut random));
-    let numbers = arm::configurations(&surface, POSES, &mut random);
+    let (arm, surface) = (arm::body(Hand::Moves)?, Surface::of(&map, &mut random));
+    let numbers = arm::configurations(Hand::Moves, &surface, POSES, &mut random);
     let planner = Planner::new(Arc::clone(&map));
     meets(&planner, &arm, &numbers)?;
     let mut measured = Changing { steady_ns: steady_ns(&planner, &arm, &numbers)?, ..Changing::default() };
@@ -67,7 +68,7 @@ pub fn between_insertions(
         measured.without_planner_ms.push(inserting_ms(&other, scan.clone()));
         measured.with_planner_ms.push(inserting_ms(&map, scan));
         let start = Instant::now();
-        let few = arm::configurations(&surface, FIRST_POSES, &mut random);
+        let few = arm::configurations(Hand::Moves, &surface, FIRST_POSES, &mut random);
         let first = Instant::now();
         meets(&planner, &arm, &few)?;
         measured.first_checks_ms.push(first.elapsed().as_secs_f64() * 1e3);

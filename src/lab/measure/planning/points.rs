@@ -7,9 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::meets;
-use super::place::{Surface, append, in_ball};
 use crate::geometry::{Point, Pose};
 use crate::lab::measure::stopwatch::Runs;
+use crate::lab::workload::bodies::place::{Surface, append, in_ball};
 use crate::map::{Lookup, MultiResolutionMap};
 use crate::planning::{Body, Link, Planner, PlanningError};
 

@@ -1,0 +1,101 @@
+//! Bodies of one link: eight configurations at once.
+
+use super::aim::Aim;
+use super::configurations::NUMBERS_PER_POSE;
+use super::eight::LANES;
+use super::in_cells::{Group, LinkInCells};
+use super::look::{FoundGroup, Look};
+use super::placement::{EightTransforms, LinkPose};
+use super::points;
+use super::steps::{InSteps, Unanswered};
+use crate::util::bits::for_each_bit;
+
+/// A link at eight places.
+#[derive(Debug)]
+pub(super) struct EightPlaces<'a, 'o, 'f> {
+    link: &'a LinkInCells,
+    cells_per_m: f64,
+    unanswered: Unanswered<'a, 'o>,
+    /// The ball around the link, eight times.
+    balls: Group,
+    /// Those that are asked about: so many, from the first on.
+    first: usize,
+    count: usize,
+    transforms: EightTransforms,
+    around: FoundGroup<'f>,
+    /// The places where the ball is not clear, with the spheres there, one place after the other.
+    near: u8,
+    aim: Aim<'a, 'f>,
+}
+
+impl<'a, 'o> EightPlaces<'a, 'o, '_> {
+    pub(super) fn new(link: &'a LinkInCells, cells_per_m: f64, unanswered: Unanswered<'a, 'o>) -> Self {
+        Self {
+            link,
+            cells_per_m,
+            unanswered,
+            balls: Group::of_one(&link.ball),
+            first: 0,
+            count: 0,
+            transforms: EightTransforms::NOTHING,
+            around: FoundGroup::NOTHING,
+            near: 0,
+            aim: Aim::default(),
+        }
+    }
+
+    fn pose(&self, lane: usize) -> &'a [f32; NUMBERS_PER_POSE] {
+        &self.unanswered.poses_of(self.first + lane)[0]
+    }
+
+    /// True where the link meets a voxel at one of the places; none where a part of the field is waited for.
+    #[inline(always)]
+    fn meets(&mut self, look: &mut Look<'_>, lane: usize, groups: std::ops::Range<usize>) -> Option<bool> {
+        let do_spheres = self.aim.meets(look, groups)?;
+        Some(
+            do_spheres
+                || !self.link.points.is_empty() && {
+                    let pose = LinkPose::of(self.pose(lane));
+                    points::meet(look, self.link, &pose, &self.transforms.lane(lane))
+                },
+        )
+    }
+}
+
+impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
+    #[inline(always)]
+    fn begin(&mut self, look: &mut Look<'f>, part: usize) {
+        self.first = part * LANES;
+        self.count = LANES.min(self.unanswered.items.len() - self.first);
+        let poses: [_; LANES] =
+            std::array::from_fn(|lane| *self.pose(if lane < self.count { lane } else { 0 }));
+        self.transforms.set(&poses, self.cells_per_m);
+        look.find(&self.balls, &self.balls.centers_of_each(&self.transforms), &mut self.around);
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self, look: &mut Look<'f>) {
+        let judged = look.judge_found(&self.balls, &self.around);
+        self.near = (judged.meets | judged.is_open) & (u8::MAX >> (LANES - self.count));
+        self.aim.clear();
+        for_each_bit(self.near.into(), |lane| {
+            let cells_from_link = self.transforms.lane(lane as usize);
+            for group in &self.link.groups {
+                self.aim.add(look, group, &cells_from_link);
+            }
+        });
+    }
+
+    #[inline(always)]
+    fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]) {
+        let (groups, mut begin) = (self.link.groups.len(), 0);
+        for lane in 0..self.count {
+            let item = self.unanswered.items[self.first + lane];
+            answers[item] = Some(false);
+            if self.near >> lane & 1 == 1 {
+                answers[item] = self.meets(look, lane, begin..begin + groups);
+                begin += groups;
+            }
+        }
+    }
+}
