@@ -3,10 +3,18 @@
 use super::PlanningError;
 use super::look::Look;
 use super::one::{Configuration, NearestLink};
-use crate::voxel::VoxelKey;
+use crate::voxel::{Lattice, VoxelKey};
 
 /// Largest distance up to which clearances are told, in voxels of the level that is asked.
 pub const CLEARANCE_CELLS_MAX: f64 = 64.0;
+
+/// The largest distance up to which clearances are told at `level`, meters.
+pub fn clearance_max_m(lattice: &Lattice, level: u32) -> f32 {
+    let voxels_m = CLEARANCE_CELLS_MAX * lattice.resolution_m(level);
+    // The largest float that is not more.
+    let rounded = voxels_m as f32;
+    if f64::from(rounded) > voxels_m { rounded.next_down() } else { rounded }
+}
 
 /// What a body meets first: in the order of links, in a link spheres before points, each in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

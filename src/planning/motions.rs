@@ -75,7 +75,7 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<MotionAnswer>>, PlanningError> {
         let cells_per_m = self.cells_per_m(question.level)?;
-        let body = BodyInCells::of(question.body, cells_per_m)?;
+        let body = question.body.in_cells(cells_per_m)?;
         let motions = question.motions(&body, cells_per_m)?;
         let chunks = (motions.len(), PER_LOOK);
         let MotionQuestion { level, surroundings, .. } = *question;
@@ -144,7 +144,7 @@ impl MotionQuestion<'_> {
 
     fn step_m(&self, cells_per_m: f64) -> Result<f64, PlanningError> {
         let value = self.step_m.map_or(0.5 / cells_per_m, f64::from);
-        let max = f64::from(super::body::RADIUS_MAX_M);
+        let max = f64::from(super::parts::RADIUS_MAX_M);
         let is_valid = (STEP_MIN_M..=max).contains(&value);
         is_valid.then_some(value).ok_or(PlanningError::Number {
             field: "step_m",

@@ -3,7 +3,6 @@
 use super::PlanningError;
 use super::body::Body;
 use super::configurations::Configurations;
-use super::in_cells::BodyInCells;
 use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
 use super::look::Look;
 use super::one::Configuration;
@@ -76,7 +75,7 @@ impl PlanningView<'_> {
         let PoseQuestion { body, configurations, level, surroundings } = *question;
         let cells_per_m = self.cells_per_m(level)?;
         configurations.check_links(body.links().len())?;
-        let body = BodyInCells::of(body, cells_per_m)?;
+        let body = body.in_cells(cells_per_m)?;
         let chunks = (configurations.len(), PER_LOOK);
         let poses = Poses { configurations, kind, configuration: Configuration::new(&body, cells_per_m) };
         Ok(self.each(level, surroundings, chunks, stop, poses))

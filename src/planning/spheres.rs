@@ -1,12 +1,12 @@
 //! Do these spheres of the map frame meet voxels?
 
 use super::PlanningError;
-use super::body::{RADIUS_MAX_M, Sphere};
 use super::configurations::NUMBERS_PER_POSE;
 use super::in_cells::{BodyInCells, LinkInCells};
 use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
 use super::look::Look;
 use super::one::Configuration;
+use super::parts::{RADIUS_MAX_M, Sphere};
 use super::planner::{Answerer, PlanningView};
 use super::poses::words;
 use super::surroundings::Surroundings;

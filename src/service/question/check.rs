@@ -1,6 +1,6 @@
 //! What checks of bodies have in common: how they are answered, and what is in the answer.
 
-use crate::planning::{CLEARANCE_CELLS_MAX, Clearance, Hit, PlanningError, PlanningView};
+use crate::planning::{Clearance, Hit, PlanningError, PlanningView, clearance_max_m};
 use crate::service::{Limits, Reason, ServiceError};
 
 /// How a check is answered.
@@ -64,12 +64,7 @@ pub(super) const BYTES_EACH: usize = 17;
 
 /// Up to where clearances are told, meters.
 pub(super) fn clearance_most_m(view: &PlanningView<'_>, level: u32, most_m: Option<f32>) -> f32 {
-    let voxels_m = CLEARANCE_CELLS_MAX * view.lattice().resolution_m(level);
-    most_m.unwrap_or_else(|| {
-        // The largest float that is not more.
-        let rounded = voxels_m as f32;
-        if f64::from(rounded) > voxels_m { rounded.next_down() } else { rounded }
-    })
+    most_m.unwrap_or_else(|| clearance_max_m(view.lattice(), level))
 }
 
 /// Refuses more spheres and points of a body, or of all groups, than may be.
