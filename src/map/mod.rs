@@ -61,7 +61,7 @@ pub use idempotency_log::{
 pub use info::{FilterInfo, LevelInfo, MapDescription};
 pub use keep_out::{
     KEEP_OUTS_MAX, KeepOut, KeepOutAct, KeepOutChange, KeepOutShape, KeepOutShapeError, KeepOuts,
-    KeepOutsFull, PRISM_CORNERS_MAX, Prism, PrismError, TooManyVoxels,
+    KeepOutsFull, Outline, PRISM_CORNERS_MAX, Prism, PrismError, ShapeRay, TooManyVoxels,
 };
 pub use level_blocks::blocks_in;
 pub use level_changes::{LevelChange, LevelSet};

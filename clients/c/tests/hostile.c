@@ -212,7 +212,7 @@ static void bad_bodies(void) {
 static void bad_checks(mrol_replica replica, mrol_body body) {
     float configurations[14] = {0.05f, 0.05f, 0.05f, 0, 0, 0, 1, 0.05f, 5.0f, 0.05f, 0, 0, 0, 1};
     uint8_t colliding[2] = {0xaa, 0xaa};
-    uint32_t parts[2];
+    uint32_t parts[3];
     float clearances[2];
     mrol_region region;
     mrol_answer answer;
@@ -267,7 +267,7 @@ static void bad_checks(mrol_replica replica, mrol_body body) {
     PLACES_FAIL("answers.struct_size");
     other = places, other.colliding = (uint8_t *)configurations + 3;
     PLACES_FAIL("answers.colliding overlaps");
-    other = places, other.hit_parts = parts, other.hit_links = parts + 1;
+    other = places, other.hit_links = parts, other.hit_parts = parts + 1;
     PLACES_FAIL("answers.hit_parts overlaps");
     other = places, other.hit_parts = misaligned(parts);
     PLACES_FAIL("answers.hit_parts is at address");
