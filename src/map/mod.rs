@@ -59,6 +59,8 @@ pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
 pub use info::{FilterInfo, LevelInfo, MapDescription};
+#[cfg(test)]
+pub(crate) use keep_out::test_shapes;
 pub use keep_out::{
     KEEP_OUTS_MAX, KeepOut, KeepOutAct, KeepOutChange, KeepOutShape, KeepOutShapeError, KeepOuts,
     KeepOutsFull, Outline, PRISM_CORNERS_MAX, Prism, PrismError, ShapeRay, TooManyVoxels,

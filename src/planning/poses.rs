@@ -3,6 +3,7 @@
 use super::PlanningError;
 use super::body::Body;
 use super::configurations::Configurations;
+use super::keep_outs::{Figure, Posed, Shapes};
 use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
 use super::look::Look;
 use super::one::Configuration;
@@ -37,7 +38,8 @@ impl PlanningView<'_> {
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<u64>>, PlanningError> {
-        Ok(self.each_configuration(question, stop, Meets)?.map(|meets| words(&meets)))
+        let words = self.each_configuration(question, stop, Meets)?.map(|meets| words(&meets));
+        Ok(self.among_keep_outs_at(question, words, |posed, shapes, words| posed.mark(shapes, words, stop)))
     }
 
     /// What the body meets first in each configuration, where it meets something. None once stopped.
@@ -49,7 +51,8 @@ impl PlanningView<'_> {
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Option<Hit>>>, PlanningError> {
-        self.each_configuration(question, stop, FirstHits)
+        let hits = self.each_configuration(question, stop, FirstHits)?;
+        Ok(self.among_keep_outs_at(question, hits, |posed, shapes, hits| posed.hits(shapes, hits, stop)))
     }
 
     /// How much room the body has in each configuration, up to `most_m` meters. None once stopped.
@@ -63,7 +66,22 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Clearance>>, PlanningError> {
         let clearances = Clearances::up_to(most_m, self.cells_per_m(question.level)?)?;
-        self.each_configuration(question, stop, clearances)
+        let clearances = self.each_configuration(question, stop, clearances)?;
+        Ok(self.among_keep_outs_at(question, clearances, |posed, shapes, clearances| {
+            posed.clearances(shapes, clearances, stop)
+        }))
+    }
+
+    /// The answers that `mend` makes of those about voxels, where there are keep-outs that count.
+    fn among_keep_outs_at<A>(
+        &self,
+        question: &PoseQuestion<'_>,
+        answers: Option<A>,
+        mend: impl FnOnce(Posed<'_>, &Shapes<'_>, A) -> Option<A>,
+    ) -> Option<A> {
+        let Some(shapes) = self.shapes() else { return answers };
+        let figure = Figure::of(question.body.links());
+        mend(Posed::Body(&figure, question.configurations), &shapes, answers?)
     }
 
     fn each_configuration<K: Kind>(

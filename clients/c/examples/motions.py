@@ -42,7 +42,8 @@ class MotionCheck(Structure):
         ("level", c_uint32),
         ("step_m", c_float),
         ("clearance_max_m", c_float),
-        ("reserved", c_uint8 * 4),
+        ("ignore_keep_outs", c_uint8),
+        ("reserved", c_uint8 * 3),
     ]
 
 

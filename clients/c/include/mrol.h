@@ -204,13 +204,21 @@ typedef struct mrol_answer {
     uint64_t reserved[4];
 } mrol_answer;
 
+/* Bytes of the name of a keep-out with its terminating zero. */
+#define MROL_NAME_BYTES 72
+
+/* The name of a keep-out, with zeros behind it; all zeros where there is none. */
+typedef struct mrol_name {
+    char text[MROL_NAME_BYTES];
+} mrol_name;
+
 /* A body. {0} is none. */
 typedef struct mrol_body {
     uint64_t number;
 } mrol_body;
 
 /* A rigid part of a body, in a frame of its own. A sphere meets a voxel where the closed ball and the closed cube share a
- * point. {0} is a link of nothing. */
+ * point, and a keep-out where it is no further from the center than the radius. {0} is a link of nothing. */
 typedef struct mrol_link {
     /* `spheres_count` spheres: center x y z and radius each; at most 1000 m, and 512 voxels of the level that is asked. */
     const float *spheres;
@@ -258,8 +266,10 @@ typedef struct mrol_pose_check {
     uint32_t level;
     /* Up to where clearances are told, at most 64 voxels of the level, which 0 stands for. */
     float clearance_max_m;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[8];
+    uint8_t reserved[7];
 } mrol_pose_check;
 
 /* A question: do these spheres meet anything? Take it from mrol_sphere_check_default(). */
@@ -278,8 +288,10 @@ typedef struct mrol_sphere_check {
     float padding_m;
     /* As in mrol_pose_check. */
     float clearance_max_m;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[4];
+    uint8_t reserved[3];
 } mrol_sphere_check;
 
 /* Where the answers to checks of poses and spheres go. What is NULL is not wanted; places for hits and for clearances are not
@@ -300,6 +312,8 @@ typedef struct mrol_collisions {
     float *clearances_m;
     /* The link that is nearest; MROL_NO_LINK where nothing is nearer than clearance_max_m. */
     uint32_t *nearest_links;
+    /* The keep-out that is met first, where it is met instead of a voxel. */
+    mrol_name *hit_keep_outs;
 } mrol_collisions;
 
 /* A question: can a body move along these configurations? Between two of them a link's translation goes along a line, its
@@ -320,8 +334,10 @@ typedef struct mrol_motion_check {
     float step_m;
     /* As in mrol_pose_check. */
     float clearance_max_m;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[4];
+    uint8_t reserved[3];
 } mrol_motion_check;
 
 /* Where the answers to checks of motions go; NULL: not wanted. Take it from mrol_motion_answers_default(). */
@@ -352,8 +368,10 @@ typedef struct mrol_ray_question {
     /* Length of rays with directions; 0: as far as the map goes. */
     double range_m;
     uint32_t level;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[4];
+    uint8_t reserved[3];
 } mrol_ray_question;
 
 /* Where the answers about rays go; NULL: not wanted. Take it from mrol_ray_answers_default(). */
@@ -363,13 +381,15 @@ typedef struct mrol_ray_answers {
     size_t capacity;
     /* A bit each: it meets something. */
     uint8_t *hit;
-    /* From the origin to where it enters the voxel: 0 where it begins in it, infinite where it meets nothing. */
+    /* From the origin to where it enters the voxel: 0 where it begins in it, infinite where it meets nothing; or a keep-out. */
     float *distances_m;
     /* The voxel, see mrol_voxel_index; 0 where it meets none. */
     uint64_t *voxels;
+    /* The keep-out that it meets instead of a voxel. */
+    mrol_name *keep_outs;
 } mrol_ray_answers;
 
-/* What of a voxel a distance is measured to. */
+/* What of a voxel a distance is measured to; to keep-outs it is measured to their borders. */
 typedef int32_t mrol_measured_to;
 enum {
     /* The nearest place of its cube: 0 for a point in it. */
@@ -387,8 +407,10 @@ typedef struct mrol_nearest_question {
     double radius_m;
     uint32_t level;
     mrol_measured_to to;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[8];
+    uint8_t reserved[7];
 } mrol_nearest_question;
 
 /* Where the answers about points go; NULL: not wanted. Take it from mrol_nearest_answers_default(). */
@@ -404,6 +426,8 @@ typedef struct mrol_nearest_answers {
     uint64_t *voxels;
     /* Three numbers each: the unit vector away from it; zero where the distance is, and where nothing is. */
     float *away;
+    /* The keep-out, where one is nearer than all voxels. */
+    mrol_name *keep_outs;
 } mrol_nearest_answers;
 
 /* A question: what is the map, seen from above? Take it from mrol_grid_question_default(). */
@@ -422,8 +446,10 @@ typedef struct mrol_grid_question {
     uint8_t has_area;
     uint8_t has_min_z;
     uint8_t has_max_z;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
     /* Not used: zero. */
-    uint8_t reserved[9];
+    uint8_t reserved[8];
 } mrol_grid_question;
 
 /* How large a grid is: cell (x, y) has the number y * cells[0] + x. */
@@ -444,9 +470,10 @@ typedef struct mrol_grid_answers {
     size_t capacity;
     /* How large the grid is: written too where the capacity is too small for it. */
     mrol_grid_shape *shape;
-    /* A bit a cell: it has something in the band; NULL: not wanted. */
+    /* A bit a cell: it has a voxel in the band, or a point of a keep-out; NULL: not wanted. */
     uint8_t *occupied;
-    /* Height of the top of each cell's highest voxel in the band, NaN of a cell without one; NULL: not wanted. */
+    /* Height of the top of each cell's highest voxel in the band, NaN of a cell without one, for keep-outs have none;
+     * NULL: not wanted. */
     float *tops_m;
 } mrol_grid_answers;
 
@@ -525,6 +552,7 @@ mrol_code mrol_body_free(mrol_body body, mrol_error *error);
  *     find_nearest     points, and those that have something within the radius
  *     project_grid     cells, and those that are occupied
  *
+ * Keep-outs of the map count as voxels do unless ignore_keep_outs is 1; where one is met instead of a voxel its name is told.
  * What the questions mean is said once, for all interfaces, in docs/guide/planners.md. A body that is asked about for the first
  * time at a level takes longer, as does a place that nobody asked about: what a question learns is kept beside the copy.
  *

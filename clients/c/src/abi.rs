@@ -263,16 +263,16 @@ mod tests {
             "mrol_body" BodyHandle { number }
             "mrol_link" LinkParts { spheres spheres_count points points_count padding_m reserved }
             "mrol_region" RegionNumbers { kind reserved numbers }
-            "mrol_pose_check" PoseCheck { struct_size body configurations count ignored ignored_count level clearance_max_m reserved }
-            "mrol_sphere_check" SphereCheck { struct_size spheres count sizes groups ignored ignored_count level padding_m clearance_max_m reserved }
-            "mrol_collisions" CollisionPlaces { struct_size capacity colliding hit_links hit_parts hit_voxels clearances_m nearest_links }
-            "mrol_motion_check" MotionCheck { struct_size body configurations count lengths motions ignored ignored_count level step_m clearance_max_m reserved }
+            "mrol_pose_check" PoseCheck { struct_size body configurations count ignored ignored_count level clearance_max_m ignore_keep_outs reserved }
+            "mrol_sphere_check" SphereCheck { struct_size spheres count sizes groups ignored ignored_count level padding_m clearance_max_m ignore_keep_outs reserved }
+            "mrol_collisions" CollisionPlaces { struct_size capacity colliding hit_links hit_parts hit_voxels clearances_m nearest_links hit_keep_outs }
+            "mrol_motion_check" MotionCheck { struct_size body configurations count lengths motions ignored ignored_count level step_m clearance_max_m ignore_keep_outs reserved }
             "mrol_motion_answers" MotionPlaces { struct_size capacity is_free first_hits clearances_m }
-            "mrol_ray_question" RayQuestion { struct_size origins origins_count directions ends count range_m level reserved }
-            "mrol_ray_answers" RayPlaces { struct_size capacity hit distances_m voxels }
-            "mrol_nearest_question" NearestQuestion { struct_size points count radius_m level to reserved }
-            "mrol_nearest_answers" NearestPlaces { struct_size capacity found distances_m voxels away }
-            "mrol_grid_question" GridQuestion { struct_size area_min_m area_max_m min_z_m max_z_m cell_m level has_area has_min_z has_max_z reserved }
+            "mrol_ray_question" RayQuestion { struct_size origins origins_count directions ends count range_m level ignore_keep_outs reserved }
+            "mrol_ray_answers" RayPlaces { struct_size capacity hit distances_m voxels keep_outs }
+            "mrol_nearest_question" NearestQuestion { struct_size points count radius_m level to ignore_keep_outs reserved }
+            "mrol_nearest_answers" NearestPlaces { struct_size capacity found distances_m voxels away keep_outs }
+            "mrol_grid_question" GridQuestion { struct_size area_min_m area_max_m min_z_m max_z_m cell_m level has_area has_min_z has_max_z ignore_keep_outs reserved }
             "mrol_grid_shape" GridShape { cell_m origin_m cells reserved }
             "mrol_grid_answers" GridPlaces { struct_size capacity shape occupied tops_m }
         };

@@ -88,6 +88,7 @@ int main(void) {
     FIELD(mrol_pose_check, ignored_count);
     FIELD(mrol_pose_check, level);
     FIELD(mrol_pose_check, clearance_max_m);
+    FIELD(mrol_pose_check, ignore_keep_outs);
     FIELD(mrol_pose_check, reserved);
     SIZE(mrol_pose_check);
 
@@ -101,6 +102,7 @@ int main(void) {
     FIELD(mrol_sphere_check, level);
     FIELD(mrol_sphere_check, padding_m);
     FIELD(mrol_sphere_check, clearance_max_m);
+    FIELD(mrol_sphere_check, ignore_keep_outs);
     FIELD(mrol_sphere_check, reserved);
     SIZE(mrol_sphere_check);
 
@@ -112,6 +114,7 @@ int main(void) {
     FIELD(mrol_collisions, hit_voxels);
     FIELD(mrol_collisions, clearances_m);
     FIELD(mrol_collisions, nearest_links);
+    FIELD(mrol_collisions, hit_keep_outs);
     SIZE(mrol_collisions);
 
     FIELD(mrol_motion_check, struct_size);
@@ -125,6 +128,7 @@ int main(void) {
     FIELD(mrol_motion_check, level);
     FIELD(mrol_motion_check, step_m);
     FIELD(mrol_motion_check, clearance_max_m);
+    FIELD(mrol_motion_check, ignore_keep_outs);
     FIELD(mrol_motion_check, reserved);
     SIZE(mrol_motion_check);
 
@@ -143,6 +147,7 @@ int main(void) {
     FIELD(mrol_ray_question, count);
     FIELD(mrol_ray_question, range_m);
     FIELD(mrol_ray_question, level);
+    FIELD(mrol_ray_question, ignore_keep_outs);
     FIELD(mrol_ray_question, reserved);
     SIZE(mrol_ray_question);
 
@@ -151,6 +156,7 @@ int main(void) {
     FIELD(mrol_ray_answers, hit);
     FIELD(mrol_ray_answers, distances_m);
     FIELD(mrol_ray_answers, voxels);
+    FIELD(mrol_ray_answers, keep_outs);
     SIZE(mrol_ray_answers);
 
     FIELD(mrol_nearest_question, struct_size);
@@ -159,6 +165,7 @@ int main(void) {
     FIELD(mrol_nearest_question, radius_m);
     FIELD(mrol_nearest_question, level);
     FIELD(mrol_nearest_question, to);
+    FIELD(mrol_nearest_question, ignore_keep_outs);
     FIELD(mrol_nearest_question, reserved);
     SIZE(mrol_nearest_question);
 
@@ -168,6 +175,7 @@ int main(void) {
     FIELD(mrol_nearest_answers, distances_m);
     FIELD(mrol_nearest_answers, voxels);
     FIELD(mrol_nearest_answers, away);
+    FIELD(mrol_nearest_answers, keep_outs);
     SIZE(mrol_nearest_answers);
 
     FIELD(mrol_grid_question, struct_size);
@@ -180,6 +188,7 @@ int main(void) {
     FIELD(mrol_grid_question, has_area);
     FIELD(mrol_grid_question, has_min_z);
     FIELD(mrol_grid_question, has_max_z);
+    FIELD(mrol_grid_question, ignore_keep_outs);
     FIELD(mrol_grid_question, reserved);
     SIZE(mrol_grid_question);
 

@@ -99,7 +99,6 @@ impl Outline {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::map::keep_out::test_shapes::shape;
     use proptest::prelude::*;
 

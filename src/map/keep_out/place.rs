@@ -39,7 +39,6 @@ fn nearest_of_prism(prism: &Prism, [x, y, z]: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::map::keep_out::test_shapes::shape;
     use proptest::prelude::*;
 

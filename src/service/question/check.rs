@@ -44,7 +44,15 @@ impl Collisions {
         }
     }
 
-    /// Whether each meets a voxel: number i is bit i % 64 of word i / 64.
+    /// How much room number `i` has, meters; 0 where that was not asked for.
+    pub(super) fn clearance_m(&self, i: usize) -> f64 {
+        match self {
+            Self::Colliding { .. } | Self::FirstHits(_) => 0.0,
+            Self::Clearances(clearances) => clearances.get(i).map_or(0.0, |of| f64::from(of.distance_m)),
+        }
+    }
+
+    /// Whether each meets a voxel or a keep-out: number i is bit i % 64 of word i / 64.
     pub fn words(&self) -> Vec<u64> {
         let pack = |bits: &mut dyn Iterator<Item = bool>| {
             let mut words = vec![0; self.checked().div_ceil(64)];

@@ -1,10 +1,11 @@
 //! Does a body fit at these configurations? Do these spheres meet anything?
 
 use mrol::planning::{Clearance, Hit, NUMBERS_PER_POSE};
+use mrol::voxel::VoxelKey;
 use mrol::service::{Answered, CheckAs, Collisions};
 
 use super::regions::{RegionNumbers, surroundings_but};
-use super::{Form, asked, check_reserved, ones, unless_zero};
+use super::{Form, Name, asked, check_reserved, ones, unless_zero};
 use crate::abi::Answer;
 use crate::bodies::{BODIES, BodyHandle, spheres_of};
 use crate::failure::Failure;
@@ -23,7 +24,8 @@ pub struct PoseCheck {
     pub(crate) ignored_count: usize,
     pub(crate) level: u32,
     pub(crate) clearance_max_m: f32,
-    pub(crate) reserved: [u8; 8],
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -46,7 +48,8 @@ pub struct SphereCheck {
     pub(crate) level: u32,
     pub(crate) padding_m: f32,
     pub(crate) clearance_max_m: f32,
-    pub(crate) reserved: [u8; 4],
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -67,6 +70,7 @@ pub struct CollisionPlaces {
     pub(crate) hit_voxels: *mut u64,
     pub(crate) clearances_m: *mut f32,
     pub(crate) nearest_links: *mut u32,
+    pub(crate) hit_keep_outs: *mut Name,
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -86,6 +90,7 @@ struct Arrays {
     hit_voxels: Option<Array<u64>>,
     clearances_m: Option<Array<f32>>,
     nearest_links: Option<Array<u32>>,
+    hit_keep_outs: Option<Array<Name>>,
 }
 
 impl CollisionPlaces {
@@ -101,6 +106,7 @@ impl CollisionPlaces {
                 hit_voxels: places.array(self.hit_voxels, "answers.hit_voxels")?,
                 clearances_m: places.array(self.clearances_m, "answers.clearances_m")?,
                 nearest_links: places.array(self.nearest_links, "answers.nearest_links")?,
+                hit_keep_outs: places.array(self.hit_keep_outs, "answers.hit_keep_outs")?,
             })
         }
     }
@@ -109,7 +115,10 @@ impl CollisionPlaces {
 impl Arrays {
     /// What has a place is asked for.
     fn check_as(&self, clearance_max_m: f32) -> Result<CheckAs, Failure> {
-        let hits = self.hit_links.is_some() || self.hit_parts.is_some() || self.hit_voxels.is_some();
+        let hits = self.hit_links.is_some()
+            || self.hit_parts.is_some()
+            || self.hit_voxels.is_some()
+            || self.hit_keep_outs.is_some();
         let clearances = self.clearances_m.is_some() || self.nearest_links.is_some();
         match (hits, clearances) {
             (false, false) => Ok(CheckAs::Colliding),
@@ -138,13 +147,17 @@ impl Arrays {
 
     fn write_hits(&self, hits: &[Option<Hit>]) {
         if let Some(links) = &self.hit_links {
-            links.write(hits.iter().map(|hit| hit.map_or(NO_LINK, |hit| hit.link)));
+            links.write(hits.iter().map(|hit| hit.as_ref().map_or(NO_LINK, |hit| hit.link)));
         }
         if let Some(parts) = &self.hit_parts {
-            parts.write(hits.iter().map(|hit| hit.map_or(0, |hit| hit.part)));
+            parts.write(hits.iter().map(|hit| hit.as_ref().map_or(0, |hit| hit.part)));
         }
         if let Some(voxels) = &self.hit_voxels {
-            voxels.write(hits.iter().map(|hit| hit.map_or(0, |hit| hit.voxel.to_bits())));
+            let voxel = |hit: &Option<Hit>| hit.as_ref().and_then(|hit| hit.met.voxel());
+            voxels.write(hits.iter().map(|hit| voxel(hit).map_or(0, VoxelKey::to_bits)));
+        }
+        if let Some(keep_outs) = &self.hit_keep_outs {
+            keep_outs.write(hits.iter().map(|hit| Name::of(hit.as_ref().and_then(|hit| hit.met.keep_out()))));
         }
     }
 
@@ -173,7 +186,7 @@ impl Form for PoseCheck {
             (numbers, surroundings_but(self.ignored, self.ignored_count)?, places.arrays(room)?)
         };
         let question = mrol::service::PoseCheck {
-            asked: asked(self.level),
+            asked: asked(self.level, self.ignore_keep_outs)?,
             body,
             configurations: numbers.to_vec(),
             surroundings,
@@ -208,7 +221,7 @@ impl Form for SphereCheck {
             (spheres, sizes, surroundings_but(self.ignored, self.ignored_count)?, places.arrays(room)?)
         };
         let question = mrol::service::SphereCheck {
-            asked: asked(self.level),
+            asked: asked(self.level, self.ignore_keep_outs)?,
             spheres: spheres_of(spheres),
             sizes,
             padding_m: self.padding_m,

@@ -23,7 +23,8 @@ pub struct GridQuestion {
     pub(crate) has_area: u8,
     pub(crate) has_min_z: u8,
     pub(crate) has_max_z: u8,
-    pub(crate) reserved: [u8; 9],
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 8],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -110,7 +111,7 @@ impl Form for GridQuestion {
     unsafe fn ask(&self, places: &GridPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
         // SAFETY: as the caller promises.
         let shape = unsafe { Out::of(places.shape, "answers.shape") }.required()?;
-        let question = mrol::service::GridQuestion { asked: asked(self.level), scope: self.scope()? };
+        let question = mrol::service::GridQuestion { asked: asked(self.level, self.ignore_keep_outs)?, scope: self.scope()? };
         let answered = replica.ask(&question)?;
         let grid = &answered.answer;
         shape.write(shape_of(grid));

@@ -13,11 +13,12 @@ pub(crate) use motions::{MotionCheck, MotionPlaces};
 pub(crate) use nearest::{NearestPlaces, NearestQuestion};
 pub(crate) use rays::{RayPlaces, RayQuestion};
 
+use mrol::map::{KeepOutName, NAME_LENGTH_MAX};
 use mrol::service::Asked;
 
 use crate::abi::{Answer, Error, ReplicaHandle};
 use crate::failure::Failure;
-use crate::memory::{self, Out};
+use crate::memory::{self, Array, Out, Plain};
 use crate::replicas::{OpenReplica, REPLICAS};
 
 /// A question, as a struct of mrol.h.
@@ -60,8 +61,40 @@ pub(crate) unsafe fn ask<F: Form>(
 }
 
 /// What all questions have in common. A copy is asked as it is: programs wait for revisions beforehand.
-fn asked(level: u32) -> Asked {
-    Asked { level, ..Asked::default() }
+fn asked(level: u32, ignore_keep_outs: u8) -> Result<Asked, Failure> {
+    let ignore_keep_outs = memory::flag(ignore_keep_outs, "ignore_keep_outs")?;
+    Ok(Asked { level, ignore_keep_outs, ..Asked::default() })
+}
+
+/// `mrol_name`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(crate) struct Name {
+    text: [u8; NAME_BYTES],
+}
+
+/// Bytes of a name with its zero: `MROL_NAME_BYTES`.
+const NAME_BYTES: usize = 72;
+const _: () = assert!(NAME_BYTES > NAME_LENGTH_MAX);
+
+// SAFETY: any bytes are one.
+unsafe impl Plain for Name {}
+
+impl Name {
+    /// The name, or none.
+    fn of(name: Option<&KeepOutName>) -> Self {
+        let mut text = [0; NAME_BYTES];
+        let name = name.map_or("", KeepOutName::as_str);
+        text.iter_mut().zip(name.bytes()).for_each(|(to, byte)| *to = byte);
+        Self { text }
+    }
+}
+
+/// Writes the keep-outs of `count` elements, of which there are none where the list is empty.
+fn write_names(to: Option<Array<Name>>, keep_outs: &[Option<KeepOutName>], count: usize) {
+    if let Some(to) = to {
+        to.write((0..count).map(|i| Name::of(keep_outs.get(i).and_then(Option::as_ref))));
+    }
 }
 
 /// Refuses bytes that must be zero.

@@ -25,7 +25,8 @@ pub struct MotionCheck {
     pub(crate) level: u32,
     pub(crate) step_m: f32,
     pub(crate) clearance_max_m: f32,
-    pub(crate) reserved: [u8; 4],
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -130,7 +131,7 @@ impl Form for MotionCheck {
             None => replica.clearance_max_m(self.level),
         });
         let question = mrol::service::MotionCheck {
-            asked: asked(self.level),
+            asked: asked(self.level, self.ignore_keep_outs)?,
             body,
             configurations: numbers.to_vec(),
             lengths,

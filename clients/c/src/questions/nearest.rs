@@ -2,7 +2,7 @@
 
 use mrol::planning::MeasuredTo;
 
-use super::{Form, asked, check_reserved};
+use super::{Form, Name, asked, check_reserved, write_names};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{self, Places, Question};
@@ -18,7 +18,8 @@ pub struct NearestQuestion {
     pub(crate) radius_m: f64,
     pub(crate) level: u32,
     pub(crate) to: i32,
-    pub(crate) reserved: [u8; 8],
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -37,6 +38,7 @@ pub struct NearestPlaces {
     pub(crate) distances_m: *mut f32,
     pub(crate) voxels: *mut u64,
     pub(crate) away: *mut f32,
+    pub(crate) keep_outs: *mut Name,
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -59,16 +61,17 @@ impl Form for NearestQuestion {
         let points = unsafe { memory::points_of(self.points, self.count, "question.points") }?;
         let mut room = Places::new(self.count, places.capacity)?.beside(points.as_slice());
         // SAFETY: as the caller promises.
-        let (found, distances_m, voxels, away) = unsafe {
+        let (found, distances_m, voxels, away, keep_outs) = unsafe {
             (
                 room.bitmap(places.found, "answers.found")?,
                 room.array(places.distances_m, "answers.distances_m")?,
                 room.array(places.voxels, "answers.voxels")?,
                 room.array(places.away.cast::<[f32; 3]>(), "answers.away")?,
+                room.array(places.keep_outs, "answers.keep_outs")?,
             )
         };
         let question =
-            mrol::service::NearestQuestion { asked: asked(self.level), points, radius_m: self.radius_m, to };
+            mrol::service::NearestQuestion { asked: asked(self.level, self.ignore_keep_outs)?, points, radius_m: self.radius_m, to };
         let answered = replica.ask(&question)?;
         let nearest = &answered.answer;
         if let Some(to) = found {
@@ -83,6 +86,7 @@ impl Form for NearestQuestion {
         if let Some(to) = away {
             to.write(nearest.away.iter().copied());
         }
+        write_names(keep_outs, &nearest.keep_outs, nearest.len());
         Ok(Answer::of(answered.version, nearest.len(), nearest.count() as u64))
     }
 }

@@ -2,7 +2,7 @@
 
 use mrol::service::{PointCloud, RaysToward};
 
-use super::{Form, asked, check_reserved, unless_zero};
+use super::{Form, Name, asked, check_reserved, unless_zero, write_names};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{self, Places, Question};
@@ -20,7 +20,8 @@ pub struct RayQuestion {
     pub(crate) count: usize,
     pub(crate) range_m: f64,
     pub(crate) level: u32,
-    pub(crate) reserved: [u8; 4],
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 3],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -38,6 +39,7 @@ pub struct RayPlaces {
     pub(crate) hit: *mut u8,
     pub(crate) distances_m: *mut f32,
     pub(crate) voxels: *mut u64,
+    pub(crate) keep_outs: *mut Name,
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -90,15 +92,16 @@ impl Form for RayQuestion {
         let room = Places::new(self.count, places.capacity)?;
         let mut room = room.beside(origins.as_slice()).beside(of_toward(&toward).as_slice());
         // SAFETY: as the caller promises.
-        let (hit, distances_m, voxels) = unsafe {
+        let (hit, distances_m, voxels, keep_outs) = unsafe {
             (
                 room.bitmap(places.hit, "answers.hit")?,
                 room.array(places.distances_m, "answers.distances_m")?,
                 room.array(places.voxels, "answers.voxels")?,
+                room.array(places.keep_outs, "answers.keep_outs")?,
             )
         };
         let answered =
-            replica.ask(&mrol::service::RayQuestion { asked: asked(self.level), origins, toward })?;
+            replica.ask(&mrol::service::RayQuestion { asked: asked(self.level, self.ignore_keep_outs)?, origins, toward })?;
         let hits = &answered.answer;
         if let Some(to) = hit {
             to.write_bits(&hits.hit);
@@ -109,6 +112,7 @@ impl Form for RayQuestion {
         if let Some(to) = voxels {
             to.write(hits.voxels.iter().map(|voxel| voxel.to_bits()));
         }
+        write_names(keep_outs, &hits.keep_outs, hits.len());
         Ok(Answer::of(answered.version, hits.len(), hits.hits() as u64))
     }
 }
