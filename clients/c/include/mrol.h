@@ -557,7 +557,8 @@ mrol_code mrol_body_free(mrol_body body, mrol_error *error);
  * time at a level takes longer, as does a place that nobody asked about: what a question learns is kept beside the copy.
  *
  * Errors: MROL_CLOSED; MROL_INVALID_ARGUMENT, which names the field or the element, its value and its limit: a question about
- * nothing, a level that is none, a pose or direction that is none, a body that was freed, a replica of a region. */
+ * nothing, a level that is none, a pose or direction that is none, a body that was freed; of a replica of a region what reaches out
+ * of it, so that voxels that are not copied could change the answer. */
 mrol_code mrol_replica_check_poses(mrol_replica replica, const mrol_pose_check *check, const mrol_collisions *answers,
                                    mrol_answer *answer, mrol_error *error);
 mrol_code mrol_replica_check_spheres(mrol_replica replica, const mrol_sphere_check *check, const mrol_collisions *answers,

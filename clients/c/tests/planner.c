@@ -9,6 +9,7 @@
  *     nearest LEVEL TO RADIUS COUNT X Y Z ...
  *     grid LEVEL LOW HIGH
  *     wait REVISION
+ *     ignore 0|1                                         keep-outs, in all questions from then on
  */
 #include <mrol.h>
 #include <stdio.h>
@@ -19,6 +20,7 @@ static mrol_body body;
 static size_t links;
 static mrol_error error;
 static mrol_answer answer;
+static uint8_t ignores;
 
 static void fail_to_read(void) {
     fprintf(stderr, "a command cannot be read\n");
@@ -63,6 +65,16 @@ static void print_words(const void *words, size_t count) {
 static void print_voxels(const uint64_t *voxels, size_t count) {
     size_t i;
     for (i = 0; i < count; i++) printf(" %016llx", (unsigned long long)voxels[i]);
+}
+
+static void print_names(const mrol_name *names, size_t count) {
+    size_t i;
+    for (i = 0; i < count; i++) printf(" %s", names[i].text[0] == 0 ? "-" : names[i].text);
+}
+
+static void ignore_keep_outs_or_not(void) {
+    ignores = (uint8_t)number();
+    printf("ok");
 }
 
 /* Prints what all answers have. */
@@ -114,6 +126,7 @@ static mrol_collisions places_of(int kind, size_t count) {
         places.hit_links = (uint32_t *)memory(4 * count);
         places.hit_parts = (uint32_t *)memory(4 * count);
         places.hit_voxels = (uint64_t *)memory(8 * count);
+        places.hit_keep_outs = (mrol_name *)memory(count * sizeof(mrol_name));
     } else if (kind == 2) {
         places.clearances_m = (float *)memory(4 * count);
         places.nearest_links = (uint32_t *)memory(4 * count);
@@ -128,13 +141,14 @@ static void print_collisions(mrol_code code, int kind, size_t count, mrol_collis
             print_words(places->hit_links, count);
             print_words(places->hit_parts, count);
             print_voxels(places->hit_voxels, count);
+            print_names(places->hit_keep_outs, count);
         } else if (kind == 2) {
             print_words(places->clearances_m, count);
             print_words(places->nearest_links, count);
         }
     }
     free(places->colliding), free(places->hit_links), free(places->hit_parts), free(places->hit_voxels);
-    free(places->clearances_m), free(places->nearest_links);
+    free(places->clearances_m), free(places->nearest_links), free(places->hit_keep_outs);
 }
 
 static void check_poses(void) {
@@ -144,6 +158,7 @@ static void check_poses(void) {
     float *read;
     check.body = body;
     check.level = (uint32_t)number();
+    check.ignore_keep_outs = ignores;
     check.clearance_max_m = (float)number();
     check.count = (size_t)number();
     check.configurations = read = numbers(7 * links * check.count);
@@ -158,6 +173,7 @@ static void check_spheres(void) {
     int kind = (int)number();
     float *read;
     check.level = (uint32_t)number();
+    check.ignore_keep_outs = ignores;
     check.clearance_max_m = (float)number();
     check.count = (size_t)number();
     check.spheres = read = numbers(4 * check.count);
@@ -174,6 +190,7 @@ static void check_motions(void) {
     float *read;
     check.body = body;
     check.level = (uint32_t)number();
+    check.ignore_keep_outs = ignores;
     check.clearance_max_m = (float)number();
     check.count = (size_t)number();
     check.configurations = read = numbers(7 * links * check.count);
@@ -195,6 +212,7 @@ static void cast_rays(void) {
     float *read, *directions, *origins;
     size_t i, count;
     question.level = (uint32_t)number();
+    question.ignore_keep_outs = ignores;
     question.range_m = number();
     count = question.count = question.origins_count = places.capacity = (size_t)number();
     read = numbers(6 * count);
@@ -207,12 +225,14 @@ static void cast_rays(void) {
     places.hit = (uint8_t *)memory(MROL_BITMAP_BYTES(count));
     places.distances_m = (float *)memory(4 * count);
     places.voxels = (uint64_t *)memory(8 * count);
+    places.keep_outs = (mrol_name *)memory(count * sizeof(mrol_name));
     if (answered(mrol_replica_cast_rays(replica, &question, &places, &answer, &error))) {
         print_bits(places.hit, count);
         print_words(places.distances_m, count);
         print_voxels(places.voxels, count);
+        print_names(places.keep_outs, count);
     }
-    free(read), free(origins), free(directions), free(places.hit), free(places.distances_m), free(places.voxels);
+    free(places.keep_outs), free(read), free(origins), free(directions), free(places.hit), free(places.distances_m), free(places.voxels);
 }
 
 static void find_nearest(void) {
@@ -221,6 +241,7 @@ static void find_nearest(void) {
     float *read;
     size_t count;
     question.level = (uint32_t)number();
+    question.ignore_keep_outs = ignores;
     question.to = (mrol_measured_to)number();
     question.radius_m = number();
     count = question.count = places.capacity = (size_t)number();
@@ -229,13 +250,15 @@ static void find_nearest(void) {
     places.distances_m = (float *)memory(4 * count);
     places.voxels = (uint64_t *)memory(8 * count);
     places.away = (float *)memory(12 * count);
+    places.keep_outs = (mrol_name *)memory(count * sizeof(mrol_name));
     if (answered(mrol_replica_find_nearest(replica, &question, &places, &answer, &error))) {
         print_bits(places.found, count);
         print_words(places.distances_m, count);
         print_voxels(places.voxels, count);
         print_words(places.away, 3 * count);
+        print_names(places.keep_outs, count);
     }
-    free(read), free(places.found), free(places.distances_m), free(places.voxels), free(places.away);
+    free(places.keep_outs), free(read), free(places.found), free(places.distances_m), free(places.voxels), free(places.away);
 }
 
 /* Asks for the shape first, and then for as many cells. */
@@ -245,6 +268,7 @@ static void project_grid(void) {
     mrol_grid_shape shape;
     size_t cells;
     question.level = (uint32_t)number();
+    question.ignore_keep_outs = ignores;
     question.has_min_z = question.has_max_z = 1;
     question.min_z_m = number(), question.max_z_m = number();
     places.shape = &shape;
@@ -272,7 +296,8 @@ int main(void) {
         void (*does)(void);
     } commands[] = {{"open", open_replica},     {"body", make_body},       {"poses", check_poses},
                     {"spheres", check_spheres}, {"motions", check_motions}, {"rays", cast_rays},
-                    {"nearest", find_nearest},  {"grid", project_grid},    {"wait", wait_for_revision}};
+                    {"nearest", find_nearest},  {"grid", project_grid},    {"wait", wait_for_revision},
+                    {"ignore", ignore_keep_outs_or_not}};
     while (fgets(line, sizeof line, stdin) != NULL) {
         char *command;
         size_t i;

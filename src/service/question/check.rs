@@ -67,8 +67,8 @@ impl Collisions {
     }
 }
 
-/// Bytes of one check in an answer, at most: a link, a part, a voxel, and a bit.
-pub(super) const BYTES_EACH: usize = 17;
+/// Bytes of one check in an answer, at most: a link, a part, a voxel, the number of a keep-out, and a bit.
+pub(super) const BYTES_EACH: usize = 21;
 
 /// Up to where clearances are told, meters.
 pub(super) fn clearance_most_m(view: &PlanningView<'_>, level: u32, most_m: Option<f32>) -> f32 {

@@ -20,8 +20,8 @@ pub struct NearestQuestion {
     pub to: MeasuredTo,
 }
 
-/// Bytes of a point in an answer: a distance, a voxel, a direction, and a bit.
-const BYTES_EACH: usize = 25;
+/// Bytes of a point in an answer: a distance, a voxel, a direction, the number of a keep-out, and a bit.
+const BYTES_EACH: usize = 29;
 
 impl Question for NearestQuestion {
     type Answer = NearestVoxels;

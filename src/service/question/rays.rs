@@ -33,8 +33,8 @@ pub enum RaysToward {
     Ends(PointCloud),
 }
 
-/// Bytes of a ray in an answer: a distance, a voxel, and a bit.
-const BYTES_EACH: usize = 13;
+/// Bytes of a ray in an answer: a distance, a voxel, the number of a keep-out, and a bit.
+const BYTES_EACH: usize = 17;
 
 impl RayQuestion {
     fn rays(&self) -> Rays<'_> {

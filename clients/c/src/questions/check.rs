@@ -1,8 +1,8 @@
 //! Does a body fit at these configurations? Do these spheres meet anything?
 
 use mrol::planning::{Clearance, Hit, NUMBERS_PER_POSE};
-use mrol::voxel::VoxelKey;
 use mrol::service::{Answered, CheckAs, Collisions};
+use mrol::voxel::VoxelKey;
 
 use super::regions::{RegionNumbers, surroundings_but};
 use super::{Form, Name, asked, check_reserved, ones, unless_zero};

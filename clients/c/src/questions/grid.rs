@@ -111,7 +111,10 @@ impl Form for GridQuestion {
     unsafe fn ask(&self, places: &GridPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
         // SAFETY: as the caller promises.
         let shape = unsafe { Out::of(places.shape, "answers.shape") }.required()?;
-        let question = mrol::service::GridQuestion { asked: asked(self.level, self.ignore_keep_outs)?, scope: self.scope()? };
+        let question = mrol::service::GridQuestion {
+            asked: asked(self.level, self.ignore_keep_outs)?,
+            scope: self.scope()?,
+        };
         let answered = replica.ask(&question)?;
         let grid = &answered.answer;
         shape.write(shape_of(grid));

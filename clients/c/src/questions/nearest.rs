@@ -70,8 +70,12 @@ impl Form for NearestQuestion {
                 room.array(places.keep_outs, "answers.keep_outs")?,
             )
         };
-        let question =
-            mrol::service::NearestQuestion { asked: asked(self.level, self.ignore_keep_outs)?, points, radius_m: self.radius_m, to };
+        let question = mrol::service::NearestQuestion {
+            asked: asked(self.level, self.ignore_keep_outs)?,
+            points,
+            radius_m: self.radius_m,
+            to,
+        };
         let answered = replica.ask(&question)?;
         let nearest = &answered.answer;
         if let Some(to) = found {

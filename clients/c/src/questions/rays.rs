@@ -100,8 +100,11 @@ impl Form for RayQuestion {
                 room.array(places.keep_outs, "answers.keep_outs")?,
             )
         };
-        let answered =
-            replica.ask(&mrol::service::RayQuestion { asked: asked(self.level, self.ignore_keep_outs)?, origins, toward })?;
+        let answered = replica.ask(&mrol::service::RayQuestion {
+            asked: asked(self.level, self.ignore_keep_outs)?,
+            origins,
+            toward,
+        })?;
         let hits = &answered.answer;
         if let Some(to) = hit {
             to.write_bits(&hits.hit);

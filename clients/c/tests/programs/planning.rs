@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use mrol::client::Client;
+use mrol::map::{KeepOutName, KeepOutShape, Region};
 use mrol::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings};
 use mrol::service::{
     Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, MapVersion, MotionCheck, NearestQuestion,
-    PoseCheck, RayQuestion, RaysToward, SphereCheck,
+    PoseCheck, PutKeepOut, RayQuestion, RaysToward, SphereCheck,
 };
 
 use super::{Driver, Linked, Server, insert, make_map, map, row};
@@ -65,6 +66,13 @@ impl Line {
         self
     }
 
+    fn names<'a>(mut self, names: impl IntoIterator<Item = Option<&'a KeepOutName>>) -> Self {
+        names
+            .into_iter()
+            .for_each(|name| write!(self.0, " {}", name.map_or("-", |name| name.as_str())).unwrap());
+        self
+    }
+
     fn voxels(mut self, voxels: impl IntoIterator<Item = u64>) -> Self {
         voxels.into_iter().for_each(|voxel| write!(self.0, " {voxel:016x}").unwrap());
         self
@@ -76,10 +84,14 @@ fn collisions(told: Answered<Collisions>) -> String {
     let line = Line::of(told.version, checked, ones(&words)).bits(&words, checked);
     match told.answer {
         Collisions::Colliding { .. } => line,
-        Collisions::FirstHits(hits) => line
-            .words(hits.iter().map(|hit| hit.map_or(u32::MAX, |hit| hit.link)))
-            .words(hits.iter().map(|hit| hit.map_or(0, |hit| hit.part)))
-            .voxels(hits.iter().map(|hit| hit.map_or(0, |hit| hit.voxel.to_bits()))),
+        Collisions::FirstHits(hits) => {
+            line.words(hits.iter().map(|hit| hit.as_ref().map_or(u32::MAX, |hit| hit.link)))
+                .words(hits.iter().map(|hit| hit.as_ref().map_or(0, |hit| hit.part)))
+                .voxels(hits.iter().map(|hit| {
+                    hit.as_ref().and_then(|hit| hit.met.voxel()).map_or(0, |voxel| voxel.to_bits())
+                }))
+                .names(hits.iter().map(|hit| hit.as_ref().and_then(|hit| hit.met.keep_out())))
+        }
         Collisions::Clearances(clearances) => line
             .floats(clearances.iter().map(|clearance| clearance.distance_m))
             .words(clearances.iter().map(|clearance| clearance.link.unwrap_or(u32::MAX))),
@@ -172,7 +184,8 @@ async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
     let line = Line::of(told.version, 20, told.answer.hits())
         .bits(&told.answer.hit, 20)
         .floats(told.answer.distances_m.iter().copied())
-        .voxels(told.answer.voxels.iter().map(|voxel| voxel.to_bits()));
+        .voxels(told.answer.voxels.iter().map(|voxel| voxel.to_bits()))
+        .names((0..20).map(|i| told.answer.keep_outs.get(i).and_then(Option::as_ref)));
     assert_eq!(driver.told(&format!("rays {} 5 20{}", asked.level, listed(&both))), line.0);
     for (to, word) in [(MeasuredTo::Cubes, 0), (MeasuredTo::Centers, 1)] {
         let question = NearestQuestion { asked, points: points(&origins), radius_m: 1.2, to };
@@ -182,7 +195,8 @@ async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
             .bits(&told.answer.found, 20)
             .floats(told.answer.distances_m.iter().copied())
             .voxels(told.answer.voxels.iter().map(|voxel| voxel.to_bits()))
-            .floats(told.answer.away.iter().flatten().copied());
+            .floats(told.answer.away.iter().flatten().copied())
+            .names((0..20).map(|i| told.answer.keep_outs.get(i).and_then(Option::as_ref)));
         let command = format!("nearest {} {word} 1.2 20{}", asked.level, listed(origins.as_flattened()));
         assert_eq!(driver.told(&command), line.0);
     }
@@ -199,6 +213,13 @@ async fn grids(driver: &mut Driver, client: &Client, asked: Asked) {
     assert_eq!(driver.told(&format!("grid {} -1 2", asked.level)), line.0);
 }
 
+async fn questions(driver: &mut Driver, client: &Client, asked: Asked) {
+    bodies(driver, client, asked).await;
+    motions(driver, client, asked).await;
+    rays_and_points(driver, client, asked).await;
+    grids(driver, client, asked).await;
+}
+
 async fn a_c_planner_is_answered_as_grpc_answers(linked: Linked) {
     let server = Server::start(&format!("planning-{linked:?}"));
     let client = server.client().await;
@@ -208,11 +229,17 @@ async fn a_c_planner_is_answered_as_grpc_answers(linked: Linked) {
     assert_eq!(driver.told(&format!("open {} a", server.grpc)), "MROL_OK");
     assert_eq!(driver.told(BODY), "MROL_OK");
     for level in 0..3 {
-        let asked = Asked { level, ..Asked::default() };
-        bodies(&mut driver, &client, asked).await;
-        motions(&mut driver, &client, asked).await;
-        rays_and_points(&mut driver, &client, asked).await;
-        grids(&mut driver, &client, asked).await;
+        questions(&mut driver, &client, Asked { level, ..Asked::default() }).await;
+    }
+    let ball = KeepOutShape::of_region(Region::ball([0.9, 0.45, 0.05], 0.16).unwrap()).unwrap();
+    let name = KeepOutName::new("crate").unwrap();
+    let put = PutKeepOut { name, shape: ball, expires_at_ns: None, request_id: None };
+    let revision = client.put_keep_out(&map(), put).await.unwrap().version.revision;
+    assert_eq!(driver.told(&format!("wait {revision}")), "MROL_OK");
+    assert!(driver.told("nearest 0 0 1 1 0.9 0.7 0.05").ends_with(" crate"));
+    for ignore_keep_outs in [false, true] {
+        driver.does(&format!("ignore {}", u8::from(ignore_keep_outs)));
+        questions(&mut driver, &client, Asked { ignore_keep_outs, ..Asked::default() }).await;
     }
     let refused = driver.told("nearest 0 0 100 1 0 0 0");
     assert!(refused.starts_with("MROL_INVALID_ARGUMENT bad_radius: radius_m must lie above 0"), "{refused}");
