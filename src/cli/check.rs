@@ -8,6 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::error::CliError;
+use super::met::met;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
@@ -16,6 +17,7 @@ use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
 use crate::map::MapName;
 use crate::planning::{Body, Link, Sphere, Surroundings};
 use crate::service::{Asked, CheckAs, Collisions, MotionCheck, PoseCheck};
+use crate::voxel::VoxelKey;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -47,6 +49,9 @@ pub(super) struct Check {
     /// Level to ask: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// Regard no keep-outs, which count as voxels do otherwise
+    #[arg(long)]
+    ignore_keep_outs: bool,
 }
 
 impl Check {
@@ -74,7 +79,7 @@ impl Check {
     }
 
     fn asked(&self) -> Asked {
-        Asked { level: self.level, ..Asked::default() }
+        Asked { level: self.level, ignore_keep_outs: self.ignore_keep_outs, ..Asked::default() }
     }
 
     async fn check_poses(
@@ -91,13 +96,14 @@ impl Check {
             return Err(CliError::failed("the server did not say what is met first"));
         };
         hits.iter().enumerate().try_for_each(|(pose, hit)| {
-            let voxel = hit.map(|hit| hit.voxel.index());
-            let part = hit.map(|hit| hit.part);
+            let met = hit.as_ref().map(|hit| &hit.met);
+            let part = hit.as_ref().map(|hit| hit.part);
             output.print(&PoseLine {
                 pose,
                 fits: hit.is_none(),
                 part,
-                voxel,
+                voxel: met.and_then(|met| met.voxel()).map(VoxelKey::index),
+                keep_out: met.and_then(|met| met.keep_out()).map(ToString::to_string),
                 revision: answered.version.revision,
             })
         })
@@ -173,21 +179,15 @@ struct PoseLine {
     fits: bool,
     part: Option<u32>,
     voxel: Option<[i32; 3]>,
+    keep_out: Option<String>,
     revision: u64,
 }
 
 impl Display for PoseLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.part, self.voxel) {
-            (Some(part), Some([x, y, z])) => {
-                write!(
-                    f,
-                    "pose {} does not fit: part {part} of the body meets voxel ({x}, {y}, {z})",
-                    self.pose
-                )
-            }
-            _ => write!(f, "pose {} fits", self.pose),
-        }
+        let Some(part) = self.part else { return write!(f, "pose {} fits", self.pose) };
+        write!(f, "pose {} does not fit: part {part} of the body meets ", self.pose)?;
+        f.write_str(&met(self.voxel, self.keep_out.as_deref()))
     }
 }
 
@@ -201,7 +201,7 @@ struct MotionLine {
 impl Display for MotionLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.first_hit {
-            Some(share) => write!(f, "the motion meets a voxel after {:.1} % of it", 100.0 * share),
+            Some(share) => write!(f, "the motion meets something after {:.1} % of it", 100.0 * share),
             None => f.write_str("the motion is free"),
         }
     }

@@ -46,14 +46,17 @@ pub(super) struct DrawGrid {
     /// Call cells without a voxel unknown, not free
     #[arg(long)]
     unknown: bool,
+    /// Regard no keep-outs, which are occupied otherwise
+    #[arg(long)]
+    ignore_keep_outs: bool,
 }
 
 impl DrawGrid {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, out, band, area, cell, level, unknown } = self;
+        let Self { map, out, band, area, cell, level, unknown, ignore_keep_outs } = self;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let scope = GridScope { area: area.unwrap_or(GridArea::Occupied), band_m, cell_m: cell };
-        let question = GridQuestion { asked: Asked { level, ..Asked::default() }, scope };
+        let question = GridQuestion { asked: Asked { level, ignore_keep_outs, ..Asked::default() }, scope };
         let client = map.server.connect().await?;
         let answered = client.project_grid(&map.name, question).await?;
         let not_occupied = if unknown { NotOccupied::Unknown } else { NotOccupied::Free };

@@ -25,6 +25,7 @@ mod localize;
 mod map;
 mod map_report;
 mod maps;
+mod met;
 mod nearest;
 mod observers;
 mod output;

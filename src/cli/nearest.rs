@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::error::CliError;
+use super::met::met;
 use super::output::Output;
 use super::parse;
 use super::query::points_of;
@@ -43,16 +44,19 @@ pub(super) struct Nearest {
     /// Level to ask: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// Regard no keep-outs, which count as voxels do otherwise
+    #[arg(long)]
+    ignore_keep_outs: bool,
 }
 
 impl Nearest {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { points_file, point, map, radius, to, level } = self;
+        let Self { points_file, point, map, radius, to, level, ignore_keep_outs } = self;
         let points = match &points_file {
             Some(path) => points_of(path)?,
             None => point,
         };
-        let asked = Asked { level, ..Asked::default() };
+        let asked = Asked { level, ignore_keep_outs, ..Asked::default() };
         let question = NearestQuestion { asked, points: points.clone().into(), radius_m: radius, to };
         let client = map.server.connect().await?;
         let answered = client.find_nearest(&map.name, question).await?;
@@ -63,10 +67,12 @@ impl Nearest {
         }
         points.iter().enumerate().try_for_each(|(i, point)| {
             let found = nearest.found[i / 64] >> (i % 64) & 1 == 1;
+            let keep_out = nearest.keep_outs.get(i).cloned().flatten().map(|name| name.to_string());
             output.print(&NearestLine {
                 point: point.xyz(),
                 distance_m: found.then(|| nearest.distances_m[i]),
-                voxel: found.then(|| nearest.voxels[i].index()),
+                voxel: (found && keep_out.is_none()).then(|| nearest.voxels[i].index()),
+                keep_out,
                 away: found.then(|| nearest.away[i]),
                 revision,
             })
@@ -79,6 +85,7 @@ struct NearestLine {
     point: [f32; 3],
     distance_m: Option<f32>,
     voxel: Option<[i32; 3]>,
+    keep_out: Option<String>,
     away: Option<[f32; 3]>,
     revision: u64,
 }
@@ -87,9 +94,11 @@ impl Display for NearestLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.point;
         write!(f, "{x:>10} {y:>10} {z:>10}   ")?;
-        match (self.distance_m, self.voxel) {
-            (Some(distance_m), Some([i, j, k])) => write!(f, "{distance_m:.4} m to voxel ({i}, {j}, {k})"),
-            _ => write!(f, "nothing near"),
+        match self.distance_m {
+            Some(distance_m) => {
+                write!(f, "{distance_m:.4} m to {}", met(self.voxel, self.keep_out.as_deref()))
+            }
+            None => write!(f, "nothing near"),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::fmt::{self, Display};
 use serde::Serialize;
 
 use super::error::CliError;
+use super::met::met;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
@@ -40,18 +41,21 @@ pub(super) struct CastRays {
     /// Level to ask: 0 is the finest
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// Regard no keep-outs, which count as voxels do otherwise
+    #[arg(long)]
+    ignore_keep_outs: bool,
 }
 
 impl CastRays {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, from, direction, to, range, level } = self;
+        let Self { map, from, direction, to, range, level, ignore_keep_outs } = self;
         let toward = if to.is_empty() {
             let range_m = range.unwrap_or(f64::INFINITY);
             RaysToward::Directions { directions: direction.into(), range_m }
         } else {
             RaysToward::Ends(to.into())
         };
-        let asked = Asked { level, ..Asked::default() };
+        let asked = Asked { level, ignore_keep_outs, ..Asked::default() };
         let question = RayQuestion { asked, origins: vec![from].into(), toward };
         let client = map.server.connect().await?;
         let answered = client.cast_rays(&map.name, question).await?;
@@ -59,8 +63,9 @@ impl CastRays {
         (0..hits.len()).try_for_each(|ray| {
             let hit = hits.hit[ray / 64] >> (ray % 64) & 1 == 1;
             let distance_m = hit.then(|| hits.distances_m[ray]);
-            let voxel = hit.then(|| hits.voxels[ray].index());
-            output.print(&RayLine { ray, hit, distance_m, voxel, revision })
+            let keep_out = hits.keep_outs.get(ray).cloned().flatten().map(|name| name.to_string());
+            let voxel = (hit && keep_out.is_none()).then(|| hits.voxels[ray].index());
+            output.print(&RayLine { ray, hit, distance_m, voxel, keep_out, revision })
         })
     }
 }
@@ -71,16 +76,18 @@ struct RayLine {
     hit: bool,
     distance_m: Option<f32>,
     voxel: Option<[i32; 3]>,
+    keep_out: Option<String>,
     revision: u64,
 }
 
 impl Display for RayLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.distance_m, self.voxel) {
-            (Some(distance_m), Some([x, y, z])) => {
-                write!(f, "ray {} meets voxel ({x}, {y}, {z}) after {distance_m:.4} m", self.ray)
+        match self.distance_m {
+            Some(distance_m) => {
+                let met = met(self.voxel, self.keep_out.as_deref());
+                write!(f, "ray {} meets {met} after {distance_m:.4} m", self.ray)
             }
-            _ => write!(f, "ray {} meets nothing", self.ray),
+            None => write!(f, "ray {} meets nothing", self.ray),
         }
     }
 }

@@ -59,9 +59,11 @@ pub use idempotency_log::{
     CompletedRequest, IdempotencyLog, REQUESTS_KEPT, REQUESTS_PER_CALLER_KEPT, RequestKind,
 };
 pub use info::{FilterInfo, LevelInfo, MapDescription};
+#[cfg(test)]
+pub(crate) use keep_out::test_shapes;
 pub use keep_out::{
     KEEP_OUTS_MAX, KeepOut, KeepOutAct, KeepOutChange, KeepOutShape, KeepOutShapeError, KeepOuts,
-    KeepOutsFull, PRISM_CORNERS_MAX, Prism, PrismError, TooManyVoxels,
+    KeepOutsFull, Outline, PRISM_CORNERS_MAX, Prism, PrismError, ShapeRay, TooManyVoxels,
 };
 pub use level_blocks::blocks_in;
 pub use level_changes::{LevelChange, LevelSet};

@@ -6,6 +6,9 @@ use crate::geometry::QUATERNION_NORM_TOLERANCE;
 /// Numbers of a pose: x y z in meters and the unit quaternion qx qy qz qw.
 pub const NUMBERS_PER_POSE: usize = 7;
 
+/// The pose of what is in the map frame.
+pub(super) const MAP_FRAME: [f32; NUMBERS_PER_POSE] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+
 /// Poses of a body's links in the map frame, configuration by configuration, link by link, each x y z qx qy qz qw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Configurations<'a> {

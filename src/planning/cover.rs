@@ -1,7 +1,7 @@
 //! Spheres that cover boxes and capsules, for bodies that are not drawn in spheres.
 
 use super::Sphere;
-use super::body::RADIUS_MAX_M;
+use super::parts::RADIUS_MAX_M;
 
 /// Spheres of one cover, at most.
 pub const COVER_SPHERES_MAX: usize = 16_384;

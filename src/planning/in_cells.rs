@@ -1,8 +1,8 @@
 //! Bodies as a level's field is asked for them: in groups of eight, with a ball around each link.
 
 use super::PlanningError;
-use super::body::{Body, Link, Sphere};
 use super::eight::{Centers, LANES};
+use super::parts::{Link, Sphere};
 use super::placement::{CellsFromLink, EightTransforms};
 use crate::geometry::Point;
 
@@ -226,8 +226,8 @@ pub(super) struct BodyInCells {
 }
 
 impl BodyInCells {
-    pub(super) fn of(body: &Body, cells_per_m: f64) -> Result<Self, PlanningError> {
-        let links = body.links().iter().enumerate();
+    pub(super) fn of(links: &[Link], cells_per_m: f64) -> Result<Self, PlanningError> {
+        let links = links.iter().enumerate();
         let links = links.map(|(number, link)| LinkInCells::of(link, number, cells_per_m));
         let links = links.collect::<Result<Vec<_>, _>>()?;
         Ok(Self::of_links(links))

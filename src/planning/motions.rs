@@ -10,6 +10,7 @@ use super::aim::OpenSpheres;
 use super::body::Body;
 use super::configurations::Configurations;
 use super::in_cells::BodyInCells;
+use super::keep_outs::{Figure, Shapes, Way};
 use super::kind::Clearances;
 use super::link::{self, LinkState};
 use super::look::Look;
@@ -50,10 +51,10 @@ pub struct MotionQuestion<'a> {
 /// How far a body can move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionAnswer {
-    /// The first step at which the body meets a voxel, as a share of the motion: configuration i of n is i / (n - 1). None
+    /// The first step at which the body meets a voxel or a keep-out, as a share of the motion: configuration i of n is i / (n - 1). None
     /// where the motion is free.
     pub first_hit: Option<f32>,
-    /// The least distance from the body to a voxel at any step, meters, where it was asked for: 0 where they meet.
+    /// The least distance from the body to a voxel or a keep-out at any step, meters, where it was asked for: 0 where they meet.
     pub clearance_m: Option<f32>,
 }
 
@@ -76,11 +77,18 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<MotionAnswer>>, PlanningError> {
         let cells_per_m = self.cells_per_m(question.level)?;
-        let body = BodyInCells::of(question.body, cells_per_m)?;
+        let body = question.body.in_cells(cells_per_m)?;
         let motions = question.motions(&body, cells_per_m)?;
         let chunks = (motions.len(), PER_LOOK);
         let MotionQuestion { level, surroundings, .. } = *question;
-        Ok(self.each(level, surroundings, chunks, stop, Motions(&motions)))
+        let answers = self.each(level, surroundings, chunks, stop, Motions(&motions));
+        let Some(shapes) = self.shapes() else { return Ok(answers) };
+        let Some(mut answers) = answers else { return Ok(None) };
+        let figure = Figure::of(question.body.links());
+        for (motion, answer) in stop.paced(motions.iter().zip(&mut answers), 1) {
+            motion.mend(answer, &figure, &shapes);
+        }
+        Ok((!stop.is_stopped()).then_some(answers))
     }
 }
 
@@ -145,7 +153,7 @@ impl MotionQuestion<'_> {
 
     fn step_m(&self, cells_per_m: f64) -> Result<f64, PlanningError> {
         let value = self.step_m.map_or(0.5 / cells_per_m, f64::from);
-        let max = f64::from(super::body::RADIUS_MAX_M);
+        let max = f64::from(super::parts::RADIUS_MAX_M);
         let is_valid = (STEP_MIN_M..=max).contains(&value);
         is_valid.then_some(value).ok_or(PlanningError::Number {
             field: "step_m",
@@ -194,6 +202,42 @@ impl BodyMotion<'_> {
             None => clearances.told_m(self.clearance(look, clearances.most())),
         });
         Some(MotionAnswer { first_hit, clearance_m })
+    }
+
+    /// Makes the answer about voxels one about keep-outs too.
+    fn mend(&self, answer: &mut MotionAnswer, figure: &Figure, shapes: &Shapes<'_>) {
+        let told = |(number, step): (usize, u64), segment: &Segment| {
+            let share = step as f64 / segment.steps as f64;
+            ((number as f64 + share) / self.segments.len() as f64) as f32
+        };
+        let met = self.segments.iter().enumerate().find_map(|(number, segment)| {
+            let first = u64::from(number > 0);
+            let end = segment.steps + 1;
+            let ways = self.ways(segment, figure);
+            let step = ways.fold(end, |end, way| way.first_met(shapes, first, end));
+            (step < end).then(|| told((number, step), segment))
+        });
+        answer.first_hit = match (answer.first_hit, met) {
+            (Some(voxel), Some(keep_out)) => Some(voxel.min(keep_out)),
+            (voxel, keep_out) => voxel.or(keep_out),
+        };
+        let Some(clearance_m) = &mut answer.clearance_m else { return };
+        if answer.first_hit.is_some() {
+            *clearance_m = 0.0;
+            return;
+        }
+        for way in self.segments.iter().flat_map(|segment| self.ways(segment, figure)) {
+            *clearance_m = clearance_m.min(way.least_m(shapes, f64::from(*clearance_m)) as f32);
+        }
+    }
+
+    /// The links on their ways through a segment, in meters.
+    fn ways<'w>(&'w self, segment: &'w Segment, figure: &'w Figure) -> impl Iterator<Item = Way<'w>> {
+        let links = figure.links().iter().zip(&segment.links).zip(&self.body.links);
+        links.map(|((link, motion), in_cells)| {
+            let per_step_m = motion.length_m(in_cells.center_extent_m) / segment.steps as f64;
+            Way { link, motion, steps: segment.steps, per_step_m }
+        })
     }
 
     /// The first step of a segment, from `first` on, at which a link meets a voxel.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::PlanningError;
 use super::clearance::{FIELD_BYTES_MAX_DEFAULT, FieldBlockKey, Fields};
+use super::keep_outs::Shapes;
 use super::look::Look;
 use super::simd::{self, Work};
 use super::surroundings::Surroundings;
@@ -125,6 +126,17 @@ impl PlanningView<'_> {
     /// The lattices of the map's levels.
     pub fn lattice(&self) -> &Lattice {
         self.planner.map.lattice()
+    }
+
+    /// This view with the keep-outs of the map, which count beside the voxels.
+    #[must_use]
+    pub fn with_keep_outs(self) -> Self {
+        Self { view: self.view.with_keep_outs(), ..self }
+    }
+
+    /// The keep-outs that count; none where none do.
+    pub(super) fn shapes(&self) -> Option<Shapes<'_>> {
+        Shapes::of(&self.view)
     }
 
     /// Cells of `level` a meter.

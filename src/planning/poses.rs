@@ -1,10 +1,13 @@
 //! Does a body fit at these configurations?
 
+use std::borrow::Cow;
+
 use super::PlanningError;
 use super::body::Body;
 use super::configurations::Configurations;
 use super::eight::LANES;
 use super::in_cells::BodyInCells;
+use super::keep_outs::{Figure, Posed, Shapes};
 use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind};
 use super::look::Look;
 use super::one::{Configuration, InTurn};
@@ -45,7 +48,8 @@ impl PlanningView<'_> {
         let PoseQuestion { configurations, level, surroundings, .. } = *question;
         let meeting = Meeting { configurations, body: &body, cells_per_m };
         let meets = self.each(level, surroundings, (configurations.len(), PER_LOOK), stop, meeting);
-        Ok(meets.map(|meets| words(&meets)))
+        let words = meets.map(|meets| words(&meets));
+        Ok(self.among_keep_outs_at(question, words, |posed, shapes, words| posed.mark(shapes, words, stop)))
     }
 
     /// What the body meets first in each configuration, where it meets something. None once stopped.
@@ -57,7 +61,8 @@ impl PlanningView<'_> {
         question: &PoseQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Option<Hit>>>, PlanningError> {
-        self.each_configuration(question, stop, FirstHits)
+        let hits = self.each_configuration(question, stop, FirstHits)?;
+        Ok(self.among_keep_outs_at(question, hits, |posed, shapes, hits| posed.hits(shapes, hits, stop)))
     }
 
     /// How much room the body has in each configuration, up to `most_m` meters. None once stopped.
@@ -71,14 +76,32 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Clearance>>, PlanningError> {
         let clearances = Clearances::up_to(most_m, self.cells_per_m(question.level)?)?;
-        self.each_configuration(question, stop, clearances)
+        let clearances = self.each_configuration(question, stop, clearances)?;
+        Ok(self.among_keep_outs_at(question, clearances, |posed, shapes, clearances| {
+            posed.clearances(shapes, clearances, stop)
+        }))
+    }
+
+    /// The answers that `mend` makes of those about voxels, where there are keep-outs that count.
+    fn among_keep_outs_at<A>(
+        &self,
+        question: &PoseQuestion<'_>,
+        answers: Option<A>,
+        mend: impl FnOnce(Posed<'_>, &Shapes<'_>, A) -> Option<A>,
+    ) -> Option<A> {
+        let Some(shapes) = self.shapes() else { return answers };
+        let figure = Figure::of(question.body.links());
+        mend(Posed::Body(&figure, question.configurations), &shapes, answers?)
     }
 
     /// The body in cells of the level, and how many of them are a meter.
-    fn in_cells(&self, question: &PoseQuestion<'_>) -> Result<(BodyInCells, f64), PlanningError> {
+    fn in_cells<'q>(
+        &self,
+        question: &PoseQuestion<'q>,
+    ) -> Result<(Cow<'q, BodyInCells>, f64), PlanningError> {
         let cells_per_m = self.cells_per_m(question.level)?;
         question.configurations.check_links(question.body.links().len())?;
-        Ok((BodyInCells::of(question.body, cells_per_m)?, cells_per_m))
+        Ok((question.body.in_cells(cells_per_m)?, cells_per_m))
     }
 
     fn each_configuration<K: Kind>(

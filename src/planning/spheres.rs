@@ -1,19 +1,18 @@
 //! Do these spheres of the map frame meet voxels?
 
 use super::PlanningError;
-use super::body::{RADIUS_MAX_M, Sphere};
-use super::configurations::NUMBERS_PER_POSE;
+use super::configurations::MAP_FRAME;
 use super::in_cells::{BodyInCells, LinkInCells};
+use super::keep_outs::{Posed, Shapes, Solid};
 use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
 use super::look::Look;
 use super::one::Configuration;
+use super::parts::{RADIUS_MAX_M, Sphere};
 use super::planner::{Answerer, PlanningView};
 use super::poses::words;
 use super::surroundings::Surroundings;
 use crate::util::StopSignal;
 
-/// Spheres of the map frame are those of a link that is there.
-const MAP_FRAME: [f32; NUMBERS_PER_POSE] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 /// Groups between two looks at the stop signal.
 const PER_LOOK: usize = 256;
 
@@ -72,7 +71,8 @@ impl PlanningView<'_> {
         question: &SphereQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<u64>>, PlanningError> {
-        Ok(self.each_group(question, stop, Meets)?.map(|meets| words(&meets)))
+        let words = self.each_group(question, stop, Meets)?.map(|meets| words(&meets));
+        Ok(self.among_keep_outs(question, words, |posed, shapes, words| posed.mark(shapes, words, stop)))
     }
 
     /// The first sphere of each group that meets a voxel, where one does; the link is 0. None once stopped.
@@ -84,7 +84,8 @@ impl PlanningView<'_> {
         question: &SphereQuestion<'_>,
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Option<Hit>>>, PlanningError> {
-        self.each_group(question, stop, FirstHits)
+        let hits = self.each_group(question, stop, FirstHits)?;
+        Ok(self.among_keep_outs(question, hits, |posed, shapes, hits| posed.hits(shapes, hits, stop)))
     }
 
     /// How much room each group has, up to `most_m` meters; the link is 0. None once stopped.
@@ -98,7 +99,22 @@ impl PlanningView<'_> {
         stop: StopSignal<'_>,
     ) -> Result<Option<Vec<Clearance>>, PlanningError> {
         let clearances = Clearances::up_to(most_m, self.cells_per_m(question.level)?)?;
-        self.each_group(question, stop, clearances)
+        let clearances = self.each_group(question, stop, clearances)?;
+        Ok(self.among_keep_outs(question, clearances, |posed, shapes, clearances| {
+            posed.clearances(shapes, clearances, stop)
+        }))
+    }
+
+    /// The answers that `mend` makes of those about voxels, where there are keep-outs that count.
+    fn among_keep_outs<A>(
+        &self,
+        question: &SphereQuestion<'_>,
+        answers: Option<A>,
+        mend: impl FnOnce(Posed<'_>, &Shapes<'_>, A) -> Option<A>,
+    ) -> Option<A> {
+        let Some(shapes) = self.shapes() else { return answers };
+        let groups = question.groups.iter().map(|spheres| Solid::of_spheres(spheres, question.padding_m));
+        mend(Posed::Groups(&groups.collect::<Vec<_>>()), &shapes, answers?)
     }
 
     fn each_group<K: Kind>(

@@ -3,9 +3,8 @@
 use crate::map::Region;
 use crate::voxel::{Lattice, VoxelKey};
 
-/// What a body can run into: the voxels of the map but for those that are ignored.
-///
-/// Shapes that a body must keep out of will be here too, and be asked for their distance beside the voxels.
+/// What a body can run into: the voxels of the map but for those that are ignored, and the keep-outs of
+/// a view that has them, wherever they are.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surroundings {
     /// Voxels whose centers lie in one of these do not count: an object that is grasped, the robot's own place. Map frame.

@@ -60,14 +60,15 @@ impl BruteForce {
                 let radius = (f64::from(sphere.radius_m) + f64::from(link.padding_m)) * self.cells_per_m();
                 let nearest = self.nearest(cells_from_link.cells(sphere.center_m.map(f64::from)));
                 if let Some((_, voxel)) = nearest.filter(|(squared, _)| *squared <= radius * radius) {
-                    return Some(Hit { link: number as u32, part: part as u32, voxel });
+                    return Some(Hit { link: number as u32, part: part as u32, met: Met::Voxel(voxel) });
                 }
             }
             let lattice_from_points = pose.lattice_from_points(&self.lattice);
             for (part, point) in link.points.iter().enumerate().filter(|_| link.padding_m == 0.0) {
                 let voxel = lattice_from_points.key(*point).map(|voxel| voxel.ancestor(self.level));
                 if let Some(voxel) = voxel.filter(|voxel| self.voxels.contains(voxel)) {
-                    return Some(Hit { link: number as u32, part: (spheres.len() + part) as u32, voxel });
+                    let part = (spheres.len() + part) as u32;
+                    return Some(Hit { link: number as u32, part, met: Met::Voxel(voxel) });
                 }
             }
         }
@@ -212,7 +213,7 @@ fn check_poses(
         let poses: Vec<_> = configurations.poses_of(number).iter().map(LinkPose::of).collect();
         let hit = oracle.first_hit(body, &poses);
         prop_assert_eq!(meets, hit.is_some(), "configuration {}", number);
-        prop_assert_eq!(hits[number], hit);
+        prop_assert_eq!(&hits[number], &hit);
         prop_assert_eq!(clearances[number], oracle.clearance(body, &poses, most_m));
     }
     Ok(())
@@ -270,7 +271,7 @@ proptest! {
             let body = Body::new(vec![link]).unwrap();
             let expected = oracle.first_hit(&body, &[LinkPose::of(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])]);
             prop_assert_eq!(bits(&meets, groups.len())[number], expected.is_some());
-            prop_assert_eq!(hits[number], expected);
+            prop_assert_eq!(&hits[number], &expected);
             prop_assert_eq!(clearances[number], oracle.clearance(&body, &[LinkPose::of(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])], 3.0));
         }
     }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use mrol::client::{Client, Replica, ReplicaOptions};
 use mrol::geometry::Point;
-use mrol::map::{MapName, Region};
-use mrol::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings};
+use mrol::map::{KeepOutName, KeepOutShape, MapName, Region};
+use mrol::planning::{Body, GridArea, Link, MeasuredTo, Met, Sphere, Surroundings};
 use mrol::service::{
-    Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, Question,
-    RayQuestion, RaysToward, SphereCheck,
+    Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, PutKeepOut,
+    Question, RayQuestion, RaysToward, SphereCheck,
 };
+use mrol::voxel::VoxelKey;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
@@ -290,6 +291,7 @@ async fn what_is_no_question_is_refused_by_name() {
         ("nearest", json!({"points": [[0, 0, 0]], "radius_m": 100}), "radius_m"),
         ("nearest", json!({"points": [[0, null, 0]], "radius_m": 1}), "points[0]"),
         ("grid", json!({"cell_m": 0.15}), "cell_m"),
+        ("grid", json!({"ignore_keep_outs": 1}), "boolean"),
         ("grid", json!({"area": {"min_m": [0, 0], "max_m": [1e6, 1e6]}, "cell_m": 0.1}), "grid_cells_max"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "groups"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "level": 9}), "level"),
@@ -302,5 +304,291 @@ async fn what_is_no_question_is_refused_by_name() {
     for short in [&[][..], &[9, 0, 0, 0, b'{'], &[255; 8]] {
         let answer = daemon.post_bytes("/v1/maps/a/rays", short.to_vec()).await;
         assert_eq!(json_of(answer).await["reason"], "bad_array");
+    }
+}
+
+/// A server with the row, and a crate: a box from y = 1 to 2 along all of the row.
+async fn row_and_crate() -> (Daemon, Client, Replica) {
+    let (daemon, client, replica) = row_of_voxels().await;
+    let shape = KeepOutShape::of_region(Region::cuboid([0.0, 1.0, 0.0], [2.0, 2.0, 0.5]).unwrap()).unwrap();
+    let name = KeepOutName::new("crate").unwrap();
+    let put = PutKeepOut { name, shape, expires_at_ns: None, request_id: None };
+    let revision = client.put_keep_out(&map(), put).await.unwrap().version.revision;
+    replica.wait_for_revision(revision, std::time::Duration::from_secs(20)).await.unwrap();
+    (daemon, client, replica)
+}
+
+/// The same question without keep-outs.
+fn but_keep_outs() -> Asked {
+    Asked { ignore_keep_outs: true, ..Asked::default() }
+}
+
+#[tokio::test]
+async fn keep_outs_count_for_bodies_unless_they_are_ignored() {
+    let (daemon, client, replica) = row_and_crate().await;
+    let configurations = [at(0.55, 0.2, 0.05), at(0.55, 0.9, 0.05), at(0.55, 0.5, 0.05)].concat();
+    let check = |answer| PoseCheck { configurations: configurations.clone(), ..poses(answer) };
+    let hits = client.check_poses(&map(), check(CheckAs::FirstHit)).await.unwrap();
+    same(&replica, &check(CheckAs::FirstHit), &hits);
+    let Collisions::FirstHits(of) = &hits.answer else { panic!("{hits:?}") };
+    let met: Vec<_> = of.iter().map(|hit| hit.as_ref().map(|hit| hit.met.clone())).collect();
+    let voxel = VoxelKey::new([5, 0, 0]).unwrap();
+    let name = KeepOutName::new("crate").unwrap();
+    assert_eq!(met, [Some(Met::Voxel(voxel)), Some(Met::KeepOut(name)), None]);
+    let room = client.check_poses(&map(), check(CheckAs::Clearance { most_m: Some(1.0) })).await.unwrap();
+    same(&replica, &check(CheckAs::Clearance { most_m: Some(1.0) }), &room);
+    let Collisions::Clearances(clearances) = &room.answer else { panic!("{room:?}") };
+    assert!((clearances[2].distance_m - 0.25).abs() < 1e-6 && clearances[1].distance_m == 0.0, "{room:?}");
+    let ignoring = PoseCheck { asked: but_keep_outs(), ..check(CheckAs::Colliding) };
+    assert_eq!(client.check_poses(&map(), ignoring.clone()).await.unwrap().answer.words(), [0b001]);
+    assert_eq!(replica.ask(&ignoring).unwrap().answer.words(), [0b001]);
+    // A region of voxels that do not count has no say in keep-outs.
+    let ignored = vec![Region::cuboid([-9.0; 3], [9.0; 3]).unwrap()];
+    let regions = PoseCheck { surroundings: Surroundings { ignored }, ..check(CheckAs::Colliding) };
+    assert_eq!(client.check_poses(&map(), regions).await.unwrap().answer.words(), [0b010]);
+
+    let body = json!({"links": [{"spheres": [[0, 0, 0, 0.15]]}]});
+    let listed = [at(0.55, 0.2, 0.05), at(0.55, 0.9, 0.05), at(0.55, 0.5, 0.05)];
+    let asked = json!({"body": body, "configurations": listed, "answer": "first_hit"});
+    let told = json_of(daemon.post("/v1/maps/a/poses", asked).await).await;
+    assert_eq!(told["hit_keep_outs"], json!([null, "crate", null]), "{told}");
+    assert_eq!(told["hit_voxels"], json!([[5, 0, 0], null, null]));
+    let asked = json!({"body": body, "configurations": listed, "ignore_keep_outs": true});
+    let told = json_of(daemon.post("/v1/maps/a/poses", asked).await).await;
+    assert_eq!(told["colliding"], json!([true, false, false]));
+    let asked = json!({"spheres": [[0.55, 0.9, 0.05, 0.15], [0.55, 0.5, 0.05, 0.15]], "answer": "first_hit"});
+    let told = json_of(daemon.post("/v1/maps/a/spheres", asked).await).await;
+    assert_eq!(
+        (&told["colliding"], &told["hit_keep_outs"]),
+        (&json!([true, false]), &json!(["crate", null])),
+        "{told}"
+    );
+    let bytes: Vec<u8> = configurations.iter().flat_map(|number| number.to_le_bytes()).collect();
+    let head =
+        json!({"body": body, "configurations": {"at": 0, "bytes": bytes.len()}, "answer": "first_hit"});
+    let answer = daemon.post_bytes("/v1/maps/a/poses", framed(&head, &bytes)).await.bytes().await.unwrap();
+    let (head, arrays) = parts(&answer);
+    assert_eq!(head["hit_keep_outs"]["names"], json!(["crate"]));
+    assert_eq!(array(&head, arrays, "hit_keep_outs"), [[255; 4], [0; 4], [255; 4]].concat());
+}
+
+#[tokio::test]
+async fn keep_outs_count_for_motions_unless_they_are_ignored() {
+    let (daemon, client, replica) = row_and_crate().await;
+    let configurations = [at(-1.0, 1.5, 0.05), at(1.0, 1.5, 0.05), at(-1.0, 0.5, 0.05), at(3.0, 0.5, 0.05)];
+    let check = MotionCheck {
+        asked: Asked::default(),
+        body: ball(0.1),
+        configurations: configurations.concat(),
+        lengths: vec![2, 2],
+        step_m: Some(0.01),
+        clearance_max_m: Some(2.0),
+        surroundings: Surroundings::default(),
+    };
+    let told = client.check_motions(&map(), check.clone()).await.unwrap();
+    same(&replica, &check, &told);
+    let [into, beside] = told.answer[..] else { panic!("{told:?}") };
+    assert!((into.first_hit.unwrap() - 0.45).abs() < 0.01 && beside.is_free(), "{told:?}");
+    assert!((beside.clearance_m.unwrap() - 0.3).abs() < 1e-6, "the row is as near on the other side");
+    let ignoring = MotionCheck { asked: but_keep_outs(), ..check };
+    assert!(client.check_motions(&map(), ignoring).await.unwrap().answer[0].is_free());
+    let body = json!({"links": [{"spheres": [[0, 0, 0, 0.1]]}]});
+    for (ignore, free) in [(false, json!([false, true])), (true, json!([true, true]))] {
+        let asked = json!({"body": body, "configurations": configurations, "lengths": [2, 2], "ignore_keep_outs": ignore});
+        let told = json_of(daemon.post("/v1/maps/a/motions", asked).await).await;
+        assert_eq!(told["free"], free, "{told}");
+    }
+}
+
+#[tokio::test]
+async fn keep_outs_count_for_rays_and_points_unless_they_are_ignored() {
+    let (daemon, client, replica) = row_and_crate().await;
+    let points = |of: &[[f32; 3]]| of.iter().copied().map(Point::from).collect::<Vec<_>>().into();
+    let rays = RayQuestion {
+        asked: Asked::default(),
+        origins: points(&[[0.55, 0.4, 0.05]]),
+        toward: RaysToward::Directions {
+            directions: points(&[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
+            range_m: f64::INFINITY,
+        },
+    };
+    let told = client.cast_rays(&map(), rays.clone()).await.unwrap();
+    same(&replica, &rays, &told);
+    let name = KeepOutName::new("crate").unwrap();
+    assert_eq!(told.answer.keep_outs, [Some(name.clone()), None, None]);
+    assert!((told.answer.distances_m[0] - 0.6).abs() < 1e-6 && told.answer.hits() == 2, "{told:?}");
+    let ignoring = RayQuestion { asked: but_keep_outs(), ..rays };
+    let told = client.cast_rays(&map(), ignoring).await.unwrap().answer;
+    assert_eq!((told.hits(), told.keep_outs), (1, Vec::new()));
+    let asked = json!({"origins": [[0.55, 0.4, 0.05]], "directions": [[0, 1, 0], [0, -1, 0], [0, 0, 1]]});
+    let told = json_of(daemon.post("/v1/maps/a/rays", asked).await).await;
+    assert_eq!(told["keep_outs"], json!(["crate", null, null]), "{told}");
+    assert_eq!((&told["voxels"][0], &told["hit"]), (&Value::Null, &json!([true, true, false])));
+
+    let nearest = NearestQuestion {
+        asked: Asked::default(),
+        points: points(&[[0.55, 0.9, 0.05], [0.55, 0.2, 0.05], [0.55, 1.5, 0.05]]),
+        radius_m: 1.0,
+        to: MeasuredTo::Cubes,
+    };
+    let told = client.find_nearest(&map(), nearest.clone()).await.unwrap();
+    same(&replica, &nearest, &told);
+    assert_eq!(told.answer.keep_outs, [Some(name.clone()), None, Some(name)]);
+    assert_eq!((told.answer.away[0], told.answer.distances_m[2]), ([0.0, -1.0, 0.0], 0.0));
+    let ignoring = NearestQuestion { asked: but_keep_outs(), ..nearest };
+    assert_eq!(client.find_nearest(&map(), ignoring).await.unwrap().answer.keep_outs, Vec::new());
+    let asked = json!({"points": [[0.55, 0.9, 0.05], [0.55, 0.2, 0.05]], "radius_m": 1});
+    let told = json_of(daemon.post("/v1/maps/a/nearest", asked).await).await;
+    assert_eq!(
+        (&told["keep_outs"], &told["voxels"]),
+        (&json!(["crate", null]), &json!([null, [5, 0, 0]])),
+        "{told}"
+    );
+}
+
+#[tokio::test]
+async fn keep_outs_are_occupied_in_the_map_from_above_unless_they_are_ignored() {
+    let (daemon, client, replica) = row_and_crate().await;
+    let area = GridArea::Rectangle { min_m: [0.0, 0.0], max_m: [0.4, 1.2] };
+    let scope = |band_m| GridScope { area, band_m, cell_m: Some(0.2) };
+    let question = GridQuestion { asked: Asked::default(), scope: scope([0.0, 1.0]) };
+    let told = client.project_grid(&map(), question).await.unwrap().answer;
+    assert_eq!((told.size, told.occupied.clone()), ([2, 6], vec![0b1100_0000_0011]));
+    assert!(told.tops_m[0] > 0.09 && told.tops_m[10].is_nan(), "a keep-out has no top");
+    assert_eq!(replica.ask(&question).unwrap().answer.occupied, told.occupied);
+    let above = GridQuestion { asked: Asked::default(), scope: scope([0.6, 1.0]) };
+    assert_eq!(client.project_grid(&map(), above).await.unwrap().answer.occupied, [0]);
+    let ignoring = GridQuestion { asked: but_keep_outs(), ..question };
+    assert_eq!(client.project_grid(&map(), ignoring).await.unwrap().answer.occupied, [0b11]);
+    let asked = json!({"area": {"min_m": [0, 0.8], "max_m": [0.4, 1.2]}, "cell_m": 0.2});
+    let told = json_of(daemon.post("/v1/maps/a/grid", asked).await).await;
+    assert_eq!(told["occupied"], json!([false, false, true, true]), "{told}");
+    // The area that is there is that of voxels.
+    let told = json_of(daemon.post("/v1/maps/a/grid", json!({})).await).await;
+    assert_eq!(told["size"], json!([20, 1]), "{told}");
+}
+
+/// A replica of a part of the row, x from 0.3 to 1.5.
+async fn part_of(client: &Client) -> Replica {
+    let region = Some(Region::cuboid([0.3, -1.0, -1.0], [1.5, 2.5, 1.0]).unwrap());
+    Replica::open(client.clone(), map(), ReplicaOptions { region, ..ReplicaOptions::default() })
+        .await
+        .unwrap()
+}
+
+/// The answer of a replica of a part is the server's, or it names what reaches out of it; true of an answer.
+fn agrees<Q: Question>(part: &Replica, question: &Q, told: &Q::Answer, named: &str) -> bool
+where
+    Q::Answer: PartialEq,
+{
+    match part.ask(question) {
+        Ok(own) => {
+            assert_eq!((&own.answer, own.version.content_hash), (told, None));
+            true
+        }
+        Err(error) => {
+            let said = error.to_string();
+            assert!(said.contains(named) && said.contains("the region that the replica copies"), "{said}");
+            false
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_replica_of_a_region_answers_what_lies_in_it() {
+    let (_daemon, client, _) = row_and_crate().await;
+    let part = part_of(&client).await;
+    let mut answered = Vec::new();
+    for x in 0..20 {
+        let x = x as f32 * 0.1 + 0.05;
+        let mut told = Vec::new();
+        for answer in [CheckAs::Colliding, CheckAs::FirstHit, CheckAs::Clearance { most_m: Some(0.3) }] {
+            let check = PoseCheck { configurations: at(x, 0.3, 0.05).to_vec(), ..poses(answer) };
+            let of_server = client.check_poses(&map(), check.clone()).await.unwrap().answer;
+            told.push(agrees(&part, &check, &of_server, "configurations[0].links[0]"));
+        }
+        let spheres = SphereCheck {
+            asked: Asked::default(),
+            spheres: vec![Sphere { center_m: [x, 0.3, 0.05], radius_m: 0.15 }],
+            sizes: vec![1],
+            padding_m: 0.0,
+            surroundings: Surroundings::default(),
+            answer: CheckAs::FirstHit,
+        };
+        let of_server = client.check_spheres(&map(), spheres.clone()).await.unwrap().answer;
+        assert_eq!(agrees(&part, &spheres, &of_server, "spheres[0]"), told[0]);
+        let points = NearestQuestion {
+            asked: Asked::default(),
+            points: vec![Point::new(x, 0.3, 0.05)].into(),
+            radius_m: 1.0,
+            to: MeasuredTo::Cubes,
+        };
+        let of_server = client.find_nearest(&map(), points.clone()).await.unwrap().answer;
+        told.push(agrees(&part, &points, &of_server, "points[0]"));
+        answered.push((told[0], told[2], told[3]));
+    }
+    // Within 0.15 m and a voxel's diagonal of the border nothing is said; a voxel that is 0.2 m away is the nearest there is.
+    let inside: Vec<_> = (0..20).filter(|i| answered[*i].0).collect();
+    assert_eq!(inside, (6..=11).collect::<Vec<_>>(), "{answered:?}");
+    assert!(answered[7] == (true, true, true) && !answered[6].1, "{answered:?}");
+}
+
+#[tokio::test]
+async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
+    let (_daemon, client, _) = row_and_crate().await;
+    let part = part_of(&client).await;
+    let motion = |configurations: [[f32; 7]; 2], clearance_max_m| MotionCheck {
+        asked: Asked::default(),
+        body: ball(0.1),
+        configurations: configurations.concat(),
+        lengths: vec![2],
+        step_m: None,
+        clearance_max_m,
+        surroundings: Surroundings::default(),
+    };
+    let inside = [at(0.6, 0.3, 0.0), at(1.2, 0.5, 0.0)];
+    for (configurations, clearance_max_m, is_known) in [
+        (inside, None, true),
+        (inside, Some(0.5), false),
+        ([at(0.6, 0.8, 0.0), at(1.2, 0.0, 0.0)], Some(0.5), true),
+        ([at(0.6, 0.3, 0.0), at(1.45, 0.5, 0.0)], None, false),
+        ([at(0.6, 0.3, 0.0), at(9.0, 0.5, 0.0)], None, false),
+    ] {
+        let check = motion(configurations, clearance_max_m);
+        let of_server = client.check_motions(&map(), check.clone()).await.unwrap().answer;
+        assert_eq!(agrees(&part, &check, &of_server, "configurations["), is_known, "{configurations:?}");
+    }
+    let points = |of: [f32; 3]| vec![Point::from(of)].into();
+    for (from, direction, range_m, is_known) in [
+        ([0.9, 0.5, 0.05], [0.0, -1.0, 0.0], f64::INFINITY, true),
+        ([0.9, 0.5, 0.05], [0.0, 1.0, 0.0], f64::INFINITY, true),
+        ([0.9, 0.5, 0.05], [1.0, 0.0, 0.0], 0.3, true),
+        ([0.9, 0.5, 0.05], [1.0, 0.0, 0.0], 0.5, false),
+        ([0.9, 0.5, 0.05], [0.0, 0.0, 1.0], f64::INFINITY, false),
+        ([0.1, 0.5, 0.05], [1.0, 0.0, 0.0], 0.5, false),
+    ] {
+        let toward = RaysToward::Directions { directions: points(direction), range_m };
+        let rays = RayQuestion { asked: Asked::default(), origins: points(from), toward };
+        let of_server = client.cast_rays(&map(), rays.clone()).await.unwrap().answer;
+        assert_eq!(agrees(&part, &rays, &of_server, "rays[0]"), is_known, "{from:?} {direction:?}");
+    }
+    for (area, band_m, is_known) in [
+        (Some([[0.5, 0.0], [1.2, 1.5]]), [-0.5, 0.5], true),
+        (Some([[0.5, 0.0], [1.4, 1.5]]), [-0.5, 0.5], false),
+        (Some([[0.5, 0.0], [1.2, 1.5]]), [-0.5, f64::INFINITY], false),
+        (None, [-0.5, 0.5], false),
+    ] {
+        let area = area.map_or(GridArea::Occupied, |[min_m, max_m]| GridArea::Rectangle { min_m, max_m });
+        let question =
+            GridQuestion { asked: Asked::default(), scope: GridScope { area, band_m, cell_m: None } };
+        let own = part.ask(&question);
+        assert_eq!(own.is_ok(), is_known, "{area:?} {band_m:?}");
+        match own {
+            Ok(own) => {
+                let told = client.project_grid(&map(), question).await.unwrap().answer;
+                assert_eq!((own.answer.size, own.answer.occupied), (told.size, told.occupied));
+            }
+            Err(error) => assert!(error.to_string().contains("area"), "{error}"),
+        }
     }
 }

@@ -57,6 +57,8 @@ class PointQuery(Structure):
         ("map_from_points", POINTER(c_double)),
         ("level", c_uint32),
         ("lookup", c_int32),
+        ("keep_out", c_uint8),
+        ("reserved", c_uint8 * 7),
     ]
 
 

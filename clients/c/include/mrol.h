@@ -15,8 +15,11 @@
  *
  *     mrol_code mrol_replica_...(mrol_replica replica, const <question> *question, <outputs>, mrol_error *error);
  *
- * returns MROL_OK, or a code with its reason in `error`. After an error no output but `error` has been written, unless the
+ * returns MROL_OK, or a code with its reason in `error`. Questions of planners (mrol_replica_check_motions and its like) answer
+ * into arrays of the caller, which a struct of places names. After an error no output but `error` has been written, unless the
  * function says otherwise. No function calls back, prints, exits, or lets an exception or a panic out.
+ *
+ * UNITS. Meters, in the map's frame. A pose is seven numbers: x y z, and a unit quaternion qx qy qz qw (within 0.001).
  *
  * OWNERSHIP. All memory is the caller's. The library reads what a pointer points to during the call alone and keeps no
  * pointer; it returns none that must be freed. Strings that it returns are constants.
@@ -25,14 +28,18 @@
  * beside each other. A question waits for a change that is being applied to the copy, about a millisecond. Memory that is
  * passed in must not be written by another thread meanwhile.
  *
+ * BODIES. A body, mrol_body, is made once and asked about as often as a planner likes, of every replica, from every thread: a
+ * question about it copies nothing of it. It is a number as a replica is: freed (mrol_body_free) it is an error for ever, and
+ * questions under way are answered. No replica needs to be open for it.
+ *
  * LIFETIME. A replica is a number, not a pointer: it lives from mrol_replica_open to mrol_replica_close. Using one after that
  * is MROL_CLOSED, closing one twice as well, and no other replica gets its number. Closing one that other threads use is fine:
  * questions under way are answered, waits end with MROL_CLOSED. All replicas of a process share one thread for the network and
  * at most two that apply changes; they end with the last replica. The library may be unloaded (dlclose) when all replicas are closed
  * and every call has returned.
  *
- * FORK. Replicas stay with the process that opened them. A child of fork() gets MROL_FORKED from each function that takes or
- * opens one; it may exec. Fork before the first mrol_replica_open if a child is to open replicas of its own.
+ * FORK. Replicas and bodies stay with the process that made them. A child of fork() gets MROL_FORKED from each function that
+ * takes or makes one; it may exec. Fork before the first mrol_replica_open and mrol_body_new if a child is to make some of its own.
  *
  * SIGNALS. No function is safe in a signal handler.
  */
@@ -54,8 +61,14 @@ extern "C" {
 #define MROL_REASON_BYTES 48
 #define MROL_MESSAGE_BYTES 464
 
-/* Most points of one query. */
+/* Most points of one query, and elements of any other array. */
 #define MROL_POINTS_MAX ((size_t)1 << 27)
+
+/* Most links of a body. */
+#define MROL_LINKS_MAX 4096
+
+/* Stands for no link in answers. */
+#define MROL_NO_LINK UINT32_MAX
 
 /* Bytes of a bitmap of `count` answers: answer i is bit i % 8 (lowest first) of byte i / 8. */
 #define MROL_BITMAP_BYTES(count) ((count) / 8 + ((count) % 8 != 0))
@@ -159,7 +172,7 @@ enum {
     MROL_LOOKUP_BLOOM = 1
 };
 
-/* A question about points: are their voxels occupied? Keep-outs of the map are not regarded. Take it from mrol_point_query_default(). */
+/* A question about points: are their voxels occupied? Take it from mrol_point_query_default(). */
 typedef struct mrol_point_query {
     /* sizeof(mrol_point_query) where the program was compiled. */
     size_t struct_size;
@@ -173,6 +186,10 @@ typedef struct mrol_point_query {
     /* Level of the voxels: 0 is the finest, level n is 2^n as wide. */
     uint32_t level;
     mrol_lookup lookup;
+    /* 1: points in keep-outs of the map count as occupied. */
+    uint8_t keep_out;
+    /* Not used: zero. */
+    uint8_t reserved[7];
 } mrol_point_query;
 
 /* What all answers have, whatever was asked: all of one answer is of one revision. */
@@ -186,6 +203,279 @@ typedef struct mrol_answer {
     /* Not used: zero. */
     uint64_t reserved[4];
 } mrol_answer;
+
+/* Bytes of the name of a keep-out with its terminating zero. */
+#define MROL_NAME_BYTES 72
+
+/* The name of a keep-out, with zeros behind it; all zeros where there is none. */
+typedef struct mrol_name {
+    char text[MROL_NAME_BYTES];
+} mrol_name;
+
+/* A body. {0} is none. */
+typedef struct mrol_body {
+    uint64_t number;
+} mrol_body;
+
+/* A rigid part of a body, in a frame of its own. A sphere meets a voxel where the closed ball and the closed cube share a
+ * point, and a keep-out where it is no further from the center than the radius. {0} is a link of nothing. */
+typedef struct mrol_link {
+    /* `spheres_count` spheres: center x y z and radius each; at most 1000 m, and 512 voxels of the level that is asked. */
+    const float *spheres;
+    size_t spheres_count;
+    /* `points_count` points: x y z each. A point meets the voxel that it falls in; with padding it is a sphere. */
+    const float *points;
+    size_t points_count;
+    /* What is added to the radii of spheres and points. */
+    float padding_m;
+    /* Not used: zero. */
+    uint32_t reserved[3];
+} mrol_link;
+
+/* What a region is. */
+typedef int32_t mrol_region_kind;
+enum {
+    /* numbers: smallest x y z, largest x y z. */
+    MROL_REGION_BOX = 1,
+    /* numbers: center x y z, radius. */
+    MROL_REGION_BALL = 2,
+    /* numbers: pose of its center (7), sides along its own axes (3). */
+    MROL_REGION_ORIENTED_BOX = 3
+};
+
+/* A part of space; borders belong to it. Numbers that its kind does not use are zero. */
+typedef struct mrol_region {
+    mrol_region_kind kind;
+    /* Not used: zero. */
+    uint32_t reserved;
+    double numbers[10];
+} mrol_region;
+
+/* A question: does a body fit at these configurations? Take it from mrol_pose_check_default(). */
+typedef struct mrol_pose_check {
+    /* sizeof(mrol_pose_check) where the program was compiled; so in all structs that begin with it. */
+    size_t struct_size;
+    mrol_body body;
+    /* `count` configurations: a pose for each link of the body, in the order of links. */
+    const float *configurations;
+    size_t count;
+    /* Voxels whose centers lie in one of these do not count: an object that is grasped, the robot's own place. */
+    const mrol_region *ignored;
+    size_t ignored_count;
+    /* Level of the voxels: 0 is the finest. */
+    uint32_t level;
+    /* Up to where clearances are told, at most 64 voxels of the level, which 0 stands for. */
+    float clearance_max_m;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[7];
+} mrol_pose_check;
+
+/* A question: do these spheres meet anything? Take it from mrol_sphere_check_default(). */
+typedef struct mrol_sphere_check {
+    size_t struct_size;
+    /* `count` spheres in the map's frame: center x y z and radius each. */
+    const float *spheres;
+    size_t count;
+    /* How many spheres each of `groups` groups has; a group is answered as one. NULL and 0: each sphere by itself. */
+    const uint32_t *sizes;
+    size_t groups;
+    const mrol_region *ignored;
+    size_t ignored_count;
+    uint32_t level;
+    /* What is added to all radii. */
+    float padding_m;
+    /* As in mrol_pose_check. */
+    float clearance_max_m;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[3];
+} mrol_sphere_check;
+
+/* Where the answers to checks of poses and spheres go. What is NULL is not wanted; places for hits and for clearances are not
+ * given both. Bits alone take the least time. Take it from mrol_collisions_default(). */
+typedef struct mrol_collisions {
+    size_t struct_size;
+    /* Elements that each array has room for: at least one for each configuration or group. */
+    size_t capacity;
+    /* A bit each, MROL_BITMAP_BYTES(count) bytes: it meets something. */
+    uint8_t *colliding;
+    /* What each meets first: the link (0 of spheres), in the order of links; MROL_NO_LINK where nothing is met. */
+    uint32_t *hit_links;
+    /* The sphere in the link or the group, or after all spheres of the link the point; 0 where nothing is met. */
+    uint32_t *hit_parts;
+    /* The voxel, see mrol_voxel_index: for a sphere the nearest to its center; 0 where nothing is met. */
+    uint64_t *hit_voxels;
+    /* The distance to the nearest voxel, 0 where one is met, at most clearance_max_m. */
+    float *clearances_m;
+    /* The link that is nearest; MROL_NO_LINK where nothing is nearer than clearance_max_m. */
+    uint32_t *nearest_links;
+    /* The keep-out that is met first, where it is met instead of a voxel. */
+    mrol_name *hit_keep_outs;
+} mrol_collisions;
+
+/* A question: can a body move along these configurations? Between two of them a link's translation goes along a line, its
+ * rotation along the shorter arc. Take it from mrol_motion_check_default(). */
+typedef struct mrol_motion_check {
+    size_t struct_size;
+    mrol_body body;
+    /* `count` configurations of all motions, one motion after the other. */
+    const float *configurations;
+    size_t count;
+    /* How many configurations each of `motions` motions has, two or more. NULL and 0: two each. */
+    const uint32_t *lengths;
+    size_t motions;
+    const mrol_region *ignored;
+    size_t ignored_count;
+    uint32_t level;
+    /* How far a point of the body moves from one check to the next, at most. 0: half a voxel of the level. */
+    float step_m;
+    /* As in mrol_pose_check. */
+    float clearance_max_m;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[3];
+} mrol_motion_check;
+
+/* Where the answers to checks of motions go; NULL: not wanted. Take it from mrol_motion_answers_default(). */
+typedef struct mrol_motion_answers {
+    size_t struct_size;
+    /* Elements that each array has room for: at least one for each motion. */
+    size_t capacity;
+    /* A bit each: the body meets nothing on its way. */
+    uint8_t *is_free;
+    /* The first check at which the body meets something, as a share of the motion: configuration i of n is i / (n - 1). NaN of
+     * a motion that is free. */
+    float *first_hits;
+    /* The least distance to a voxel at any check, 0 where one is met. Costs more than the bit. */
+    float *clearances_m;
+} mrol_motion_answers;
+
+/* A question: what do these rays meet? Take it from mrol_ray_question_default(). */
+typedef struct mrol_ray_question {
+    size_t struct_size;
+    /* Where rays begin: one point for all of them, or one each. */
+    const float *origins;
+    size_t origins_count;
+    /* `count` rays. One of the two: unit vectors (within 0.001) ... */
+    const float *directions;
+    /* ... or points where the rays end. The other is NULL. */
+    const float *ends;
+    size_t count;
+    /* Length of rays with directions; 0: as far as the map goes. */
+    double range_m;
+    uint32_t level;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[3];
+} mrol_ray_question;
+
+/* Where the answers about rays go; NULL: not wanted. Take it from mrol_ray_answers_default(). */
+typedef struct mrol_ray_answers {
+    size_t struct_size;
+    /* Elements that each array has room for: at least one for each ray. */
+    size_t capacity;
+    /* A bit each: it meets something. */
+    uint8_t *hit;
+    /* From the origin to where it enters the voxel: 0 where it begins in it, infinite where it meets nothing; or a keep-out. */
+    float *distances_m;
+    /* The voxel, see mrol_voxel_index; 0 where it meets none. */
+    uint64_t *voxels;
+    /* The keep-out that it meets instead of a voxel. */
+    mrol_name *keep_outs;
+} mrol_ray_answers;
+
+/* What of a voxel a distance is measured to; to keep-outs it is measured to their borders. */
+typedef int32_t mrol_measured_to;
+enum {
+    /* The nearest place of its cube: 0 for a point in it. */
+    MROL_MEASURED_TO_CUBES = 0,
+    /* Its center. */
+    MROL_MEASURED_TO_CENTERS = 1
+};
+
+/* A question: what is nearest to these points? Take it from mrol_nearest_question_default(), and set radius_m. */
+typedef struct mrol_nearest_question {
+    size_t struct_size;
+    const float *points;
+    size_t count;
+    /* How far to look: above 0, at most 64 voxels of the level. */
+    double radius_m;
+    uint32_t level;
+    mrol_measured_to to;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[7];
+} mrol_nearest_question;
+
+/* Where the answers about points go; NULL: not wanted. Take it from mrol_nearest_answers_default(). */
+typedef struct mrol_nearest_answers {
+    size_t struct_size;
+    /* Elements that each array has room for: at least one for each point. */
+    size_t capacity;
+    /* A bit each: something is within the radius. */
+    uint8_t *found;
+    /* The distance to it; infinite where nothing is. */
+    float *distances_m;
+    /* The voxel, see mrol_voxel_index; 0 where there is none. Of those equally far the one with the smallest number. */
+    uint64_t *voxels;
+    /* Three numbers each: the unit vector away from it; zero where the distance is, and where nothing is. */
+    float *away;
+    /* The keep-out, where one is nearer than all voxels. */
+    mrol_name *keep_outs;
+} mrol_nearest_answers;
+
+/* A question: what is the map, seen from above? Take it from mrol_grid_question_default(). */
+typedef struct mrol_grid_question {
+    size_t struct_size;
+    /* Smallest and largest x and y, where has_area is 1; otherwise all that is there. Cells lie at whole multiples of their
+     * side, and every cell that the area meets belongs to the grid. */
+    double area_min_m[2];
+    double area_max_m[2];
+    /* Voxels count whose centers lie between these heights or on them, where has_min_z and has_max_z are 1. */
+    double min_z_m;
+    double max_z_m;
+    /* Side of a cell: a whole number of the level's voxels. 0: one voxel. */
+    double cell_m;
+    uint32_t level;
+    uint8_t has_area;
+    uint8_t has_min_z;
+    uint8_t has_max_z;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[8];
+} mrol_grid_question;
+
+/* How large a grid is: cell (x, y) has the number y * cells[0] + x. */
+typedef struct mrol_grid_shape {
+    double cell_m;
+    /* Corner of the grid: smallest x and y. */
+    double origin_m[2];
+    /* Cells along x and y. */
+    uint64_t cells[2];
+    /* Not used: zero. */
+    uint64_t reserved[2];
+} mrol_grid_shape;
+
+/* Where a grid goes. Take it from mrol_grid_answers_default(), and set shape. */
+typedef struct mrol_grid_answers {
+    size_t struct_size;
+    /* Cells that each array has room for. */
+    size_t capacity;
+    /* How large the grid is: written too where the capacity is too small for it. */
+    mrol_grid_shape *shape;
+    /* A bit a cell: it has a voxel in the band, or a point of a keep-out; NULL: not wanted. */
+    uint8_t *occupied;
+    /* Height of the top of each cell's highest voxel in the band, NaN of a cell without one, for keep-outs have none;
+     * NULL: not wanted. */
+    float *tops_m;
+} mrol_grid_answers;
 
 /* How far a replica is. */
 typedef struct mrol_replica_status {
@@ -243,6 +533,55 @@ mrol_code mrol_replica_wait_for_revision(mrol_replica replica, uint64_t revision
 mrol_code mrol_replica_query_points(mrol_replica replica, const mrol_point_query *query, uint8_t *occupied,
                                     size_t occupied_bytes, mrol_answer *answer, mrol_error *error);
 
+/* Makes a body of `links_count` links, at most MROL_LINKS_MAX; nothing of them is kept where it is. `body` is set to none on
+ * failure. Errors: MROL_INVALID_ARGUMENT, which names the link and the number. */
+mrol_code mrol_body_new(const mrol_link *links, size_t links_count, mrol_body *body, mrol_error *error);
+
+/* Frees a body, once questions under way are answered. Errors: MROL_INVALID_ARGUMENT where it is freed already, which does no
+ * harm. */
+mrol_code mrol_body_free(mrol_body body, mrol_error *error);
+
+/* Questions of planners, each answered at one revision. `answers` names the arrays that are written: at least as long as what
+ * is asked about, apart from each other and from what is asked; bits behind the last are 0, and what is behind those is left
+ * alone. In `answer`, which may be NULL, `asked` and `positive` count
+ *
+ *     check_poses      configurations, and those that collide
+ *     check_spheres    groups, and those that collide
+ *     check_motions    motions, and those that are free
+ *     cast_rays        rays, and those that hit
+ *     find_nearest     points, and those that have something within the radius
+ *     project_grid     cells, and those that are occupied
+ *
+ * Keep-outs of the map count as voxels do unless ignore_keep_outs is 1; where one is met instead of a voxel its name is told.
+ * What the questions mean is said once, for all interfaces, in docs/guide/planners.md. A body that is asked about for the first
+ * time at a level takes longer, as does a place that nobody asked about: what a question learns is kept beside the copy.
+ *
+ * Errors: MROL_CLOSED; MROL_INVALID_ARGUMENT, which names the field or the element, its value and its limit: a question about
+ * nothing, a level that is none, a pose or direction that is none, a body that was freed; of a replica of a region what reaches out
+ * of it, so that voxels that are not copied could change the answer. */
+mrol_code mrol_replica_check_poses(mrol_replica replica, const mrol_pose_check *check, const mrol_collisions *answers,
+                                   mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_check_spheres(mrol_replica replica, const mrol_sphere_check *check, const mrol_collisions *answers,
+                                     mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_check_motions(mrol_replica replica, const mrol_motion_check *check,
+                                     const mrol_motion_answers *answers, mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_cast_rays(mrol_replica replica, const mrol_ray_question *question, const mrol_ray_answers *answers,
+                                 mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_find_nearest(mrol_replica replica, const mrol_nearest_question *question,
+                                    const mrol_nearest_answers *answers, mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_project_grid(mrol_replica replica, const mrol_grid_question *question,
+                                    const mrol_grid_answers *answers, mrol_answer *answer, mrol_error *error);
+
+/* The indices x y z of a voxel in an answer: it spans [x, x + 1) * resolution * 2^level along x, and so on. */
+static inline void mrol_voxel_index(uint64_t voxel, int32_t index[3]) {
+    int axis;
+    for (axis = 0; axis < 3; axis++) {
+        /* 21 bits an axis, two's complement. */
+        int32_t bits = (int32_t)(voxel >> 21 * axis & 0x1fffff);
+        index[axis] = bits >= 0x100000 ? bits - 0x200000 : bits;
+    }
+}
+
 /* Options with every default. */
 static inline mrol_replica_options mrol_replica_options_default(void) {
     mrol_replica_options options;
@@ -257,6 +596,94 @@ static inline mrol_point_query mrol_point_query_default(void) {
     memset(&query, 0, sizeof query);
     query.struct_size = sizeof query;
     return query;
+}
+
+/* A question about no configurations at level 0. */
+static inline mrol_pose_check mrol_pose_check_default(void) {
+    mrol_pose_check check;
+    memset(&check, 0, sizeof check);
+    check.struct_size = sizeof check;
+    return check;
+}
+
+/* A question about no spheres at level 0. */
+static inline mrol_sphere_check mrol_sphere_check_default(void) {
+    mrol_sphere_check check;
+    memset(&check, 0, sizeof check);
+    check.struct_size = sizeof check;
+    return check;
+}
+
+/* Places for nothing. */
+static inline mrol_collisions mrol_collisions_default(void) {
+    mrol_collisions answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
+}
+
+/* A question about no motions at level 0. */
+static inline mrol_motion_check mrol_motion_check_default(void) {
+    mrol_motion_check check;
+    memset(&check, 0, sizeof check);
+    check.struct_size = sizeof check;
+    return check;
+}
+
+/* Places for nothing. */
+static inline mrol_motion_answers mrol_motion_answers_default(void) {
+    mrol_motion_answers answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
+}
+
+/* A question about no rays at level 0. */
+static inline mrol_ray_question mrol_ray_question_default(void) {
+    mrol_ray_question question;
+    memset(&question, 0, sizeof question);
+    question.struct_size = sizeof question;
+    return question;
+}
+
+/* Places for nothing. */
+static inline mrol_ray_answers mrol_ray_answers_default(void) {
+    mrol_ray_answers answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
+}
+
+/* A question about no points at level 0, without a radius. */
+static inline mrol_nearest_question mrol_nearest_question_default(void) {
+    mrol_nearest_question question;
+    memset(&question, 0, sizeof question);
+    question.struct_size = sizeof question;
+    return question;
+}
+
+/* Places for nothing. */
+static inline mrol_nearest_answers mrol_nearest_answers_default(void) {
+    mrol_nearest_answers answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
+}
+
+/* A question about all of the map at level 0. */
+static inline mrol_grid_question mrol_grid_question_default(void) {
+    mrol_grid_question question;
+    memset(&question, 0, sizeof question);
+    question.struct_size = sizeof question;
+    return question;
+}
+
+/* Places for nothing. */
+static inline mrol_grid_answers mrol_grid_answers_default(void) {
+    mrol_grid_answers answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
 }
 
 #ifdef __cplusplus

@@ -115,6 +115,8 @@ pub struct PointQuery {
     pub(crate) map_from_points: *const f64,
     pub(crate) level: u32,
     pub(crate) lookup: i32,
+    pub(crate) keep_out: u8,
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -140,15 +142,17 @@ impl PointQuery {
         let map_from_points = map_from_points.transpose().map_err(ServiceError::from)?;
         // SAFETY: as the caller promises.
         let points = unsafe { memory::points(self.xyz, self.count, "query") }?;
-        let level = self.level;
+        if self.reserved != [0; 7] {
+            return Err(Failure::argument("query.reserved must be zero"));
+        }
         Ok(mrol::service::PointQuery {
             points,
             map_from_points,
-            level,
+            level: self.level,
             lookup,
             min_revision: None,
             map_uuid: None,
-            keep_out: false,
+            keep_out: memory::flag(self.keep_out, "query.keep_out")?,
         })
     }
 }
@@ -164,14 +168,14 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// The answer about so many, without its arrays.
+    pub(crate) fn of(version: mrol::service::MapVersion, asked: usize, positive: u64) -> Self {
+        Self { version: version.into(), asked: asked as u64, positive, reserved: [0; 4] }
+    }
+
     /// The answer to a question about points, without its bitmap.
     pub(crate) fn to_points(answer: &PointAnswer) -> Self {
-        Self {
-            version: answer.version.into(),
-            asked: answer.points as u64,
-            positive: answer.points_occupied as u64,
-            reserved: [0; 4],
-        }
+        Self::of(answer.version, answer.points, answer.points_occupied as u64)
     }
 }
 
@@ -219,6 +223,13 @@ fn terminated<const BYTES: usize>(text: &str) -> [u8; BYTES] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bodies::{BodyHandle, LinkParts};
+    use crate::questions::grid::GridShape;
+    use crate::questions::regions::RegionNumbers;
+    use crate::questions::{
+        CollisionPlaces, GridPlaces, GridQuestion, MotionCheck, MotionPlaces, NearestPlaces, NearestQuestion,
+        PoseCheck, RayPlaces, RayQuestion, SphereCheck,
+    };
 
     #[test]
     fn long_texts_are_cut_off_between_characters() {
@@ -246,9 +257,24 @@ mod tests {
                 struct_size address map key ca_file certificate_file private_key_file open_timeout_ms silence_timeout_ms
                 blocks_max region_min_m region_max_m has_region with_filter reserved
             }
-            "mrol_point_query" PointQuery { struct_size xyz count map_from_points level lookup }
+            "mrol_point_query" PointQuery { struct_size xyz count map_from_points level lookup keep_out reserved }
             "mrol_answer" Answer { version asked positive reserved }
             "mrol_replica_status" Status { version head_revision resets is_connected reserved last_error }
+            "mrol_body" BodyHandle { number }
+            "mrol_link" LinkParts { spheres spheres_count points points_count padding_m reserved }
+            "mrol_region" RegionNumbers { kind reserved numbers }
+            "mrol_pose_check" PoseCheck { struct_size body configurations count ignored ignored_count level clearance_max_m ignore_keep_outs reserved }
+            "mrol_sphere_check" SphereCheck { struct_size spheres count sizes groups ignored ignored_count level padding_m clearance_max_m ignore_keep_outs reserved }
+            "mrol_collisions" CollisionPlaces { struct_size capacity colliding hit_links hit_parts hit_voxels clearances_m nearest_links hit_keep_outs }
+            "mrol_motion_check" MotionCheck { struct_size body configurations count lengths motions ignored ignored_count level step_m clearance_max_m ignore_keep_outs reserved }
+            "mrol_motion_answers" MotionPlaces { struct_size capacity is_free first_hits clearances_m }
+            "mrol_ray_question" RayQuestion { struct_size origins origins_count directions ends count range_m level ignore_keep_outs reserved }
+            "mrol_ray_answers" RayPlaces { struct_size capacity hit distances_m voxels keep_outs }
+            "mrol_nearest_question" NearestQuestion { struct_size points count radius_m level to ignore_keep_outs reserved }
+            "mrol_nearest_answers" NearestPlaces { struct_size capacity found distances_m voxels away keep_outs }
+            "mrol_grid_question" GridQuestion { struct_size area_min_m area_max_m min_z_m max_z_m cell_m level has_area has_min_z has_max_z ignore_keep_outs reserved }
+            "mrol_grid_shape" GridShape { cell_m origin_m cells reserved }
+            "mrol_grid_answers" GridPlaces { struct_size capacity shape occupied tops_m }
         };
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
         let program = std::env::temp_dir().join(format!("mrol-layout-{}", std::process::id()));

@@ -89,9 +89,19 @@ impl Failure {
         Self::new(Code::InvalidArgument, "", message)
     }
 
+    /// The failure of something that is part of what is named.
+    pub(crate) fn of(self, name: &str) -> Self {
+        Self { message: format!("{name}: {}", self.message), ..self }
+    }
+
     /// The replica is not open.
     pub(crate) fn closed() -> Self {
         Self::new(Code::Closed, "", "the replica is not open: it never was, or it is closed")
+    }
+
+    /// The body is none.
+    pub(crate) fn no_body() -> Self {
+        Self::argument("body is none: it was never made, or it was freed")
     }
 
     /// The replica belongs to the process that forked this one.

@@ -2,20 +2,28 @@
 //!
 //! ```text
 //! lib.rs       the functions: read the arguments, ask, write the answer
+//! planning.rs  those of planners' questions
 //! abi.rs       the structs of mrol.h, field by field
+//! questions/   those of planners' questions, and what each asks and writes
+//! bodies.rs    the bodies by their numbers
 //! replicas.rs  the open replicas by their numbers, and their threads
 //! options.rs   what to open
 //! failure.rs   codes, reasons and messages of failures
-//! memory.rs    the caller's memory: the only file that trusts a pointer
+//! process.rs   the process that all of it belongs to
+//! memory.rs    the caller's memory, with memory/arrays.rs: the only files that trust a pointer
 //! ```
 //!
 //! Nothing that a program passes is believed where it can be checked: NULL, misaligned and overlapping memory, counts,
 //! flags, levels, numbers of replicas. No panic leaves a function.
 
 mod abi;
+mod bodies;
 mod failure;
 mod memory;
 mod options;
+pub mod planning;
+mod process;
+mod questions;
 mod replicas;
 
 use std::ffi::{CStr, c_char};
@@ -171,7 +179,7 @@ pub unsafe extern "C" fn mrol_replica_query_points(
         // SAFETY: as the caller promises.
         let bitmap =
             unsafe { Bitmap::of(occupied, occupied_bytes, "occupied") }.for_answers_about(&query.points)?;
-        let asked = replica.query_points(query)?;
+        let asked = replica.query_points(&query)?;
         bitmap.write(&asked.occupied);
         if let Some(out) = out {
             out.write(Answer::to_points(&asked));
@@ -181,7 +189,7 @@ pub unsafe extern "C" fn mrol_replica_query_points(
 }
 
 /// Does the work; its code, and the rest of a failure in `error`. A panic is a failure.
-fn guarded(error: Out<Error>, work: impl FnOnce() -> Result<(), Failure>) -> i32 {
+pub(crate) fn guarded(error: Out<Error>, work: impl FnOnce() -> Result<(), Failure>) -> i32 {
     let Ok(error) = error.optional() else { return Code::InvalidArgument as i32 };
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         // What it carries may panic in turn when it is dropped.
@@ -216,7 +224,9 @@ mod tests {
             let line = format!("{} = {}", code.name().to_str().unwrap(), *code as i32);
             assert!(header.contains(&format!("    {line}")), "{line}");
         }
-        assert_eq!(header.matches("    MROL_").count(), Code::ALL.len() + 2, "and two look-ups");
+        let others = ["MROL_LOOKUP_", "MROL_REGION_", "MROL_MEASURED_TO_"];
+        let others: usize = others.iter().map(|other| header.matches(&format!("    {other}")).count()).sum();
+        assert_eq!(header.matches("    MROL_").count(), Code::ALL.len() + others);
         assert!(header.contains(&format!("#define MROL_ABI_VERSION {}\n", abi::VERSION)));
     }
 }

@@ -1,5 +1,9 @@
 //! The memory of the program that calls. What can be checked of a pointer is checked here; the rest it promises.
 
+mod arrays;
+
+pub(crate) use arrays::{Array, Places, Plain, numbers_each, rows, span};
+
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -97,11 +101,23 @@ pub(crate) unsafe fn text(text: *const c_char, name: &str) -> Result<Option<Stri
     String::from_utf8(bytes).map(Some).map_err(|_| Failure::argument(format!("{name} is not UTF-8")))
 }
 
+/// The points of a query, where they are.
+///
+/// # Safety
+/// As [`points_of`].
+pub(crate) unsafe fn points(xyz: *const f32, count: usize, name: &str) -> Result<PointCloud, Failure> {
+    if count > POINTS_MAX {
+        return Err(Failure::argument(format!("{name}.count must be at most {POINTS_MAX}, got {count}")));
+    }
+    // SAFETY: as the caller promises.
+    unsafe { points_of(xyz, count, &format!("{name}.xyz")) }
+}
+
 /// The points of a program, where they are.
 ///
 /// # Safety
 /// `xyz` is NULL, or misaligned, or points to `count` points that nobody writes while the points are in use.
-pub(crate) unsafe fn points(xyz: *const f32, count: usize, name: &str) -> Result<PointCloud, Failure> {
+pub(crate) unsafe fn points_of(xyz: *const f32, count: usize, name: &str) -> Result<PointCloud, Failure> {
     struct Lent {
         xyz: *const u8,
         bytes: usize,
@@ -115,12 +131,12 @@ pub(crate) unsafe fn points(xyz: *const f32, count: usize, name: &str) -> Result
         }
     }
     if count > POINTS_MAX {
-        return Err(Failure::argument(format!("{name}.count must be at most {POINTS_MAX}, got {count}")));
+        return Err(Failure::argument(format!("{name}: at most {POINTS_MAX} of them, got {count}")));
     }
     if count == 0 {
         return Ok(Vec::new().into());
     }
-    check(xyz, &format!("{name}.xyz"))?;
+    check(xyz, name)?;
     let lent = Lent { xyz: xyz.cast(), bytes: count * Point::BYTES };
     Ok(PointCloud::from_bytes(Bytes::from_owner(lent))?)
 }
@@ -202,6 +218,14 @@ impl Bitmap {
         let bytes = answers.len().min(self.bytes);
         // SAFETY: the program promises the memory, which nobody else has: it is no answer's.
         unsafe { ptr::copy_nonoverlapping(answers.as_ptr(), self.to, bytes) };
+    }
+}
+
+/// Reads a flag.
+pub(crate) fn flag(flag: u8, name: &str) -> Result<bool, Failure> {
+    match flag {
+        0 | 1 => Ok(flag == 1),
+        other => Err(Failure::argument(format!("{name} must be 0 or 1, got {other}"))),
     }
 }
 

@@ -22,8 +22,6 @@ pub(crate) struct Opening {
     pub(crate) replica: ReplicaOptions,
     /// Longest time until the copy is complete.
     pub(crate) timeout: Duration,
-    /// True where [`mrol::map::Lookup::Bloom`] is answered by a filter.
-    pub(crate) with_filter: bool,
 }
 
 impl Opening {
@@ -40,14 +38,13 @@ impl Opening {
             credentials: credentials(&options)?,
             replica: replica_options(&options)?,
             timeout,
-            with_filter: flag(options.with_filter, "options.with_filter")?,
         })
     }
 }
 
 fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
     let usual = ReplicaOptions::default();
-    let has_region = flag(options.has_region, "options.has_region")?;
+    let has_region = memory::flag(options.has_region, "options.has_region")?;
     let region = has_region.then(|| Region::cuboid(options.region_min_m, options.region_max_m));
     let blocks_max = match options.blocks_max {
         0 => BLOCKS_MAX_DEFAULT,
@@ -58,7 +55,7 @@ fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
         blocks_max,
         field_bytes_max: usual.field_bytes_max,
         silence_max: milliseconds(options.silence_timeout_ms, usual.silence_max),
-        filter: flag(options.with_filter, "options.with_filter")?.then(FilterSettings::default),
+        filter: memory::flag(options.with_filter, "options.with_filter")?.then(FilterSettings::default),
     })
 }
 
@@ -91,13 +88,6 @@ fn file(path: *const std::ffi::c_char, name: &str) -> Result<Option<Vec<u8>>, Fa
     let Some(path) = text(path, name)? else { return Ok(None) };
     let unreadable = |error| Failure::argument(format!("{name}: {path} cannot be read: {error}"));
     std::fs::read(&path).map(Some).map_err(unreadable)
-}
-
-fn flag(flag: u8, name: &str) -> Result<bool, Failure> {
-    match flag {
-        0 | 1 => Ok(flag == 1),
-        other => Err(Failure::argument(format!("{name} must be 0 or 1, got {other}"))),
-    }
 }
 
 fn milliseconds(milliseconds: u64, usual: Duration) -> Duration {

@@ -1,14 +1,13 @@
 //! The open replicas of this process, by their numbers, and the threads that they share.
 
 use std::collections::BTreeMap;
-use std::process;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use mrol::client::{Client, Replica};
-use mrol::map::Lookup;
-use mrol::service::{PointAnswer, PointQuery};
+use mrol::planning::clearance_max_m;
+use mrol::service::{Answered, PointAnswer, PointQuery, Question};
 use parking_lot::{Mutex, RwLock};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
@@ -16,13 +15,13 @@ use tokio::sync::watch;
 use crate::abi::{ReplicaHandle, Status};
 use crate::failure::Failure;
 use crate::options::Opening;
+use crate::process;
 
 /// Threads that apply changes, at most.
 const APPLYING_THREADS: usize = 2;
 
 /// The open replicas of this process.
 pub(crate) static REPLICAS: Replicas = Replicas {
-    process: AtomicU32::new(0),
     last_number: AtomicU64::new(0),
     open: RwLock::new(BTreeMap::new()),
     runtime: Mutex::new(Weak::new()),
@@ -31,8 +30,6 @@ pub(crate) static REPLICAS: Replicas = Replicas {
 /// Open replicas by their numbers. A program that uses a number after its end finds nothing, where a pointer would be to
 /// memory that is somebody else's.
 pub(crate) struct Replicas {
-    /// The process that opened the first replica; 0 before.
-    process: AtomicU32,
     last_number: AtomicU64,
     open: RwLock<BTreeMap<ReplicaHandle, Arc<OpenReplica>>>,
     /// The threads of all replicas, for as long as there is one.
@@ -43,7 +40,6 @@ pub(crate) struct Replicas {
 pub(crate) struct OpenReplica {
     replica: Replica,
     is_whole: bool,
-    with_filter: bool,
     /// Tells who waits that the replica is closed.
     closed: watch::Sender<bool>,
     /// The last field, so that its threads are there while the replica is dropped.
@@ -53,8 +49,7 @@ pub(crate) struct OpenReplica {
 impl Replicas {
     /// Opens a replica.
     pub(crate) fn open(&self, opening: Opening) -> Result<ReplicaHandle, Failure> {
-        let _ = self.process.compare_exchange(0, process::id(), Ordering::Relaxed, Ordering::Relaxed);
-        self.check_process()?;
+        process::claim()?;
         let opened = Arc::new(OpenReplica::open(opening, self.runtime()?)?);
         let replica = ReplicaHandle { number: self.last_number.fetch_add(1, Ordering::Relaxed) + 1 };
         self.open.write().insert(replica, opened);
@@ -63,22 +58,16 @@ impl Replicas {
 
     /// The replica of a number.
     pub(crate) fn get(&self, replica: ReplicaHandle) -> Result<Arc<OpenReplica>, Failure> {
-        self.check_process()?;
+        process::check()?;
         self.open.read().get(&replica).cloned().ok_or_else(Failure::closed)
     }
 
     /// Closes a replica. It ends when the last call that uses it returns.
     pub(crate) fn close(&self, replica: ReplicaHandle) -> Result<(), Failure> {
-        self.check_process()?;
+        process::check()?;
         let open = self.open.write().remove(&replica).ok_or_else(Failure::closed)?;
         open.closed.send_replace(true);
         Ok(())
-    }
-
-    /// In a child that was forked, locks may be held by threads that are not there: nothing may be touched.
-    fn check_process(&self) -> Result<(), Failure> {
-        let process = self.process.load(Ordering::Relaxed);
-        if process == 0 || process == process::id() { Ok(()) } else { Err(Failure::forked()) }
     }
 
     /// The threads: those that there are, or new ones.
@@ -101,7 +90,7 @@ impl Replicas {
 
 impl OpenReplica {
     fn open(opening: Opening, runtime: Arc<Runtime>) -> Result<Self, Failure> {
-        let Opening { address, map, credentials, replica: options, timeout, with_filter } = opening;
+        let Opening { address, map, credentials, replica: options, timeout } = opening;
         let opened = runtime.block_on(async {
             let copying = async {
                 let client = Client::connect_with(&address, &credentials).await?;
@@ -111,7 +100,7 @@ impl OpenReplica {
         });
         let replica = opened.map_err(|_| Failure::too_slow(timeout))??;
         let (is_whole, closed) = (options.region.is_none(), watch::Sender::new(false));
-        Ok(Self { replica, is_whole, with_filter, closed, runtime })
+        Ok(Self { replica, is_whole, closed, runtime })
     }
 
     /// How far the replica is.
@@ -132,8 +121,19 @@ impl OpenReplica {
     }
 
     /// Answers a question about points.
-    pub(crate) fn query_points(&self, query: PointQuery) -> Result<PointAnswer, Failure> {
-        let lookup = if self.with_filter { query.lookup } else { Lookup::Exact };
-        Ok(self.replica.query_points(&PointQuery { lookup, ..query })?)
+    pub(crate) fn query_points(&self, query: &PointQuery) -> Result<PointAnswer, Failure> {
+        Ok(self.replica.query_points(query)?)
+    }
+
+    /// Up to where clearances can be told at `level`, meters; nothing of a level that is none, which questions refuse.
+    pub(crate) fn clearance_max_m(&self, level: u32) -> f32 {
+        let map = self.replica.map();
+        let lattice = map.lattice();
+        if level < lattice.levels() { clearance_max_m(lattice, level) } else { 0.0 }
+    }
+
+    /// Answers a question of a planner.
+    pub(crate) fn ask<Q: Question>(&self, question: &Q) -> Result<Answered<Q::Answer>, Failure> {
+        Ok(self.replica.ask(question)?)
     }
 }

@@ -1,7 +1,7 @@
-/* Does what it reads, a command a line, and prints a line each: for tests/programs.rs to drive and compare.
+/* Does what it reads, a command a line, and prints a line each: for tests/programs to drive and compare.
  *
  *     open ADDRESS MAP WITH_FILTER [X0 Y0 Z0 X1 Y1 Z1]
- *     query LEVEL LOOKUP POSE(7, or -) COUNT X Y Z ...
+ *     query LEVEL LOOKUP KEEP_OUT POSE(7, or -) COUNT X Y Z ...
  *     status | version | wait REVISION TIMEOUT_MS | close
  */
 #include <mrol.h>
@@ -71,6 +71,7 @@ static void query_points(void) {
     size_t bytes, i;
     query.level = (uint32_t)number();
     query.lookup = (mrol_lookup)number();
+    query.keep_out = (uint8_t)number();
     word = strtok(NULL, " ");
     if (word == NULL) fail_to_read();
     if (strcmp(word, "-") != 0) {

@@ -146,6 +146,10 @@ static void bad_queries(mrol_replica replica) {
     QUERY_FAILS("query.lookup must be 0 or 1, got 2");
     query = good, query.lookup = -1;
     QUERY_FAILS("query.lookup must be 0 or 1, got -1");
+    query = good, query.keep_out = 2;
+    QUERY_FAILS("query.keep_out must be 0 or 1, got 2");
+    query = good, query.reserved[6] = 1;
+    QUERY_FAILS("query.reserved must be zero");
     pose[6] = 2.0;
     query = good;
     QUERY_FAILS("unit quaternion");
@@ -164,6 +168,240 @@ static void bad_queries(mrol_replica replica) {
     good.map_from_points = NULL, good.count = 0, good.xyz = NULL;
     MUST(mrol_replica_query_points(replica, &good, NULL, 0, &answer, NULL) == MROL_OK);
     MUST(answer.asked == 0 && answer.positive == 0 && answer.version.revision == 1 && answer.reserved[3] == 0);
+}
+
+static mrol_link ball(const float *sphere) {
+    mrol_link link;
+    memset(&link, 0, sizeof link);
+    link.spheres = sphere, link.spheres_count = 1;
+    return link;
+}
+
+static void bad_bodies(void) {
+    float sphere[4] = {0, 0, 0, 0.1f};
+    mrol_link good = ball(sphere), link;
+    mrol_body body = {99};
+#define BODY_FAILS(words) FAILS(mrol_body_new(&link, 1, &body, &error), MROL_INVALID_ARGUMENT, words)
+    FAILS(mrol_body_new(NULL, 1, &body, &error), MROL_INVALID_ARGUMENT, "links is NULL");
+    MUST(body.number == 0);
+    FAILS(mrol_body_new(NULL, 0, &body, &error), MROL_INVALID_ARGUMENT, "at least one link");
+    FAILS(mrol_body_new(&good, 1, NULL, &error), MROL_INVALID_ARGUMENT, "body is NULL");
+    FAILS(mrol_body_new(misaligned(&good), 1, &body, &error), MROL_INVALID_ARGUMENT, "links is at address");
+    FAILS(mrol_body_new(&good, MROL_LINKS_MAX + 1, &body, &error), MROL_INVALID_ARGUMENT, "links_count must be at most 4096");
+    FAILS(mrol_body_new(&good, SIZE_MAX, &body, &error), MROL_INVALID_ARGUMENT, "links_count must be at most");
+    link = good, link.spheres = NULL;
+    BODY_FAILS("links.spheres is NULL");
+    link = good, link.spheres = misaligned(sphere);
+    BODY_FAILS("links.spheres is at address");
+    link = good, link.spheres_count = SIZE_MAX;
+    BODY_FAILS("links.spheres: at most 134217728");
+    link = good, link.points_count = 1;
+    BODY_FAILS("links.points is NULL");
+    link = good, link.padding_m = NAN;
+    BODY_FAILS("links[0].padding_m must lie in");
+    link = good, link.reserved[2] = 1;
+    BODY_FAILS("links[0].reserved must be zero");
+    sphere[3] = -1.0f, link = good;
+    BODY_FAILS("links[0].spheres[0]");
+    sphere[3] = 1001.0f;
+    BODY_FAILS("links[0].spheres[0]");
+    FAILS(mrol_body_free(body, &error), MROL_INVALID_ARGUMENT, "body is none");
+    MUST(body.number == 0);
+}
+
+static void bad_checks(mrol_replica replica, mrol_body body) {
+    float configurations[14] = {0.05f, 0.05f, 0.05f, 0, 0, 0, 1, 0.05f, 5.0f, 0.05f, 0, 0, 0, 1};
+    uint8_t colliding[2] = {0xaa, 0xaa};
+    uint32_t parts[3];
+    float clearances[2];
+    mrol_region region;
+    mrol_answer answer;
+    mrol_pose_check good = mrol_pose_check_default(), check;
+    mrol_collisions places = mrol_collisions_default(), other;
+    memset(&region, 0, sizeof region);
+    good.body = body, good.configurations = configurations, good.count = 2;
+    places.capacity = 2, places.colliding = colliding;
+#define CHECK(check, places) mrol_replica_check_poses(replica, check, places, &answer, &error)
+#define CHECK_FAILS(words) FAILS(CHECK(&check, &places), MROL_INVALID_ARGUMENT, words)
+#define PLACES_FAIL(words) FAILS(CHECK(&good, &other), MROL_INVALID_ARGUMENT, words)
+    FAILS(CHECK(NULL, &places), MROL_INVALID_ARGUMENT, "check is NULL");
+    FAILS(CHECK(&good, NULL), MROL_INVALID_ARGUMENT, "answers is NULL");
+    FAILS(CHECK(misaligned(&good), &places), MROL_INVALID_ARGUMENT, "check is at address");
+    FAILS(CHECK(&good, misaligned(&places)), MROL_INVALID_ARGUMENT, "answers is at address");
+    check = good, check.struct_size = 8;
+    CHECK_FAILS("check.struct_size");
+    check = good, check.body.number = 0;
+    CHECK_FAILS("body is none");
+    check = good, check.body.number = UINT64_MAX;
+    CHECK_FAILS("body is none");
+    check = good, check.configurations = NULL;
+    CHECK_FAILS("check.configurations is NULL");
+    check = good, check.configurations = misaligned(configurations);
+    CHECK_FAILS("check.configurations is at address");
+    check = good, check.count = SIZE_MAX / 2, other = places, other.capacity = SIZE_MAX;
+    FAILS(CHECK(&check, &other), MROL_INVALID_ARGUMENT, "check.configurations: at most");
+    check = good, check.level = 4;
+    CHECK_FAILS("level must lie in 0..=3, got 4");
+    check = good, check.reserved[6] = 1;
+    CHECK_FAILS("check.reserved must be zero");
+    check = good, check.ignore_keep_outs = 2;
+    CHECK_FAILS("ignore_keep_outs must be 0 or 1, got 2");
+    check = good, check.ignored_count = 1;
+    CHECK_FAILS("ignored is NULL");
+    check.ignored = &region;
+    CHECK_FAILS("ignored[0]: kind must be 1");
+    region.kind = MROL_REGION_BALL, region.numbers[3] = -1;
+    CHECK_FAILS("ignored[0]: sphere.");
+    region.numbers[3] = 1, region.numbers[4] = 1;
+    CHECK_FAILS("the others must be zero");
+    region.kind = MROL_REGION_ORIENTED_BOX;
+    CHECK_FAILS("ignored[0]: rotation_xyzw");
+    region.kind = MROL_REGION_BOX, region.numbers[0] = NAN;
+    CHECK_FAILS("ignored[0]: box.min_m");
+    check = good, configurations[6] = 2.0f;
+    CHECK_FAILS("configurations[0].links[0]");
+    configurations[6] = 1.0f, configurations[7] = NAN;
+    CHECK_FAILS("configurations[1].links[0]");
+    configurations[7] = 0.05f;
+    other = places, other.capacity = 1;
+    PLACES_FAIL("answers.capacity must be at least 2, got 1");
+    other = places, other.struct_size = 0;
+    PLACES_FAIL("answers.struct_size");
+    other = places, other.colliding = (uint8_t *)configurations + 3;
+    PLACES_FAIL("answers.colliding overlaps");
+    other = places, other.hit_links = parts, other.hit_parts = parts + 1;
+    PLACES_FAIL("answers.hit_parts overlaps");
+    other = places, other.hit_parts = misaligned(parts);
+    PLACES_FAIL("answers.hit_parts is at address");
+    other = places, other.hit_parts = parts, other.clearances_m = clearances;
+    PLACES_FAIL("ask for one of them");
+    other = places, other.clearances_m = clearances;
+    check = good, check.clearance_max_m = -1.0f;
+    FAILS(CHECK(&check, &other), MROL_INVALID_ARGUMENT, "clearance_max_m");
+    check.clearance_max_m = 1e9f;
+    FAILS(CHECK(&check, &other), MROL_INVALID_ARGUMENT, "clearance_max_m");
+    MUST(colliding[0] == 0xaa && colliding[1] == 0xaa);
+    /* And what is right; a replica that is none is said before anything is read. */
+    FAILS(mrol_replica_check_poses(NONE, NULL, NULL, NULL, &error), MROL_CLOSED, "not open");
+    MUST(mrol_replica_check_poses(replica, &good, &places, NULL, NULL) == MROL_OK);
+    MUST(colliding[0] == 0x01 && colliding[1] == 0xaa);
+    good.count = 0, good.configurations = NULL, places.capacity = 0, places.colliding = NULL;
+    FAILS(CHECK(&good, &places), MROL_INVALID_ARGUMENT, "configurations must not be empty");
+}
+
+static void bad_motions_and_spheres(mrol_replica replica, mrol_body body) {
+    float configurations[21] = {0.05f, 2.0f, 0.05f, 0, 0, 0, 1, 0.05f, 0.05f, 0.05f, 0, 0, 0, 1, 9, 9, 9, 0, 0, 0, 1};
+    float spheres[8] = {0.05f, 0.05f, 0.05f, 0.1f, 5, 5, 5, 0.1f};
+    uint32_t lengths[2] = {2, 1}, sizes[2] = {1, 2};
+    uint8_t bits[1];
+    mrol_motion_check motions = mrol_motion_check_default();
+    mrol_motion_answers answers = mrol_motion_answers_default();
+    mrol_sphere_check check = mrol_sphere_check_default();
+    mrol_collisions places = mrol_collisions_default();
+    motions.body = body, motions.configurations = configurations, motions.count = 3;
+    answers.capacity = 2, answers.is_free = bits;
+#define MOTIONS_FAIL(words) \
+    FAILS(mrol_replica_check_motions(replica, &motions, &answers, NULL, &error), MROL_INVALID_ARGUMENT, words)
+    MOTIONS_FAIL("check.count must be even");
+    motions.motions = 2;
+    MOTIONS_FAIL("check.lengths is NULL");
+    motions.lengths = lengths;
+    MOTIONS_FAIL("motions have at least 2 configurations");
+    motions.motions = 1;
+    MOTIONS_FAIL("motions have at least 2 configurations");
+    motions.count = 2, motions.step_m = -1.0f;
+    MOTIONS_FAIL("step_m must lie in");
+    motions.step_m = 1.1e-5f;
+    MOTIONS_FAIL("steps");
+    motions.step_m = 0;
+    MUST(mrol_replica_check_motions(replica, &motions, &answers, NULL, NULL) == MROL_OK && bits[0] == 0);
+    check.spheres = spheres, check.count = 2;
+    places.capacity = 2, places.colliding = bits;
+#define SPHERES_FAIL(words) \
+    FAILS(mrol_replica_check_spheres(replica, &check, &places, NULL, &error), MROL_INVALID_ARGUMENT, words)
+    check.groups = 2;
+    SPHERES_FAIL("check.sizes is NULL");
+    check.sizes = sizes;
+    SPHERES_FAIL("the groups have 3 spheres in all, got 2");
+    check.sizes = NULL, check.groups = 0, check.padding_m = NAN;
+    SPHERES_FAIL("padding_m");
+    check.padding_m = 0, spheres[3] = INFINITY;
+    SPHERES_FAIL("spheres[0]");
+    spheres[3] = 0.1f;
+    MUST(mrol_replica_check_spheres(replica, &check, &places, NULL, NULL) == MROL_OK && bits[0] == 1);
+}
+
+static void bad_rays_points_and_grids(mrol_replica replica) {
+    float points[6] = {0.05f, 2.0f, 0.05f, 0.05f, -2.0f, 0.05f}, directions[6] = {0, -1, 0, 0, 1, 0}, tops[3];
+    uint8_t bits[1];
+    mrol_ray_question rays = mrol_ray_question_default();
+    mrol_ray_answers hits = mrol_ray_answers_default();
+    mrol_nearest_question nearest = mrol_nearest_question_default();
+    mrol_nearest_answers found = mrol_nearest_answers_default();
+    mrol_grid_question grid = mrol_grid_question_default();
+    mrol_grid_answers cells = mrol_grid_answers_default();
+    mrol_grid_shape shape;
+    rays.origins = points, rays.origins_count = 2, rays.directions = rays.ends = directions, rays.count = 2;
+    hits.capacity = 2, hits.hit = bits;
+#define RAYS_FAIL(words) FAILS(mrol_replica_cast_rays(replica, &rays, &hits, NULL, &error), MROL_INVALID_ARGUMENT, words)
+    RAYS_FAIL("one of them must be NULL");
+    rays.directions = NULL, rays.range_m = 1;
+    RAYS_FAIL("question.range_m is of rays with directions");
+    rays.ends = NULL;
+    RAYS_FAIL("question.directions is NULL");
+    rays.directions = directions, rays.range_m = -1;
+    RAYS_FAIL("range_m must be above 0");
+    rays.range_m = 0, rays.origins_count = 0;
+    RAYS_FAIL("origins must be one, or one for each");
+    rays.origins_count = 2, directions[1] = -2;
+    RAYS_FAIL("directions[0]");
+    directions[1] = -1;
+    MUST(mrol_replica_cast_rays(replica, &rays, &hits, NULL, NULL) == MROL_OK && bits[0] == 3);
+    nearest.points = points, nearest.count = 2, nearest.radius_m = 1;
+    found.capacity = 2, found.found = bits, found.away = points + 1;
+#define NEAREST_FAILS(words) \
+    FAILS(mrol_replica_find_nearest(replica, &nearest, &found, NULL, &error), MROL_INVALID_ARGUMENT, words)
+    NEAREST_FAILS("answers.away overlaps");
+    found.away = NULL, nearest.to = 2;
+    NEAREST_FAILS("question.to must be 0 or 1, got 2");
+    nearest.to = 0, nearest.radius_m = NAN;
+    NEAREST_FAILS("radius_m must lie above 0");
+    nearest.radius_m = 1, points[0] = NAN;
+    NEAREST_FAILS("points[0] is not finite");
+    points[0] = 0.05f;
+    MUST(mrol_replica_find_nearest(replica, &nearest, &found, NULL, NULL) == MROL_OK && bits[0] == 0);
+    cells.capacity = 2, cells.tops_m = tops;
+#define GRID_FAILS(words) \
+    FAILS(mrol_replica_project_grid(replica, &grid, &cells, NULL, &error), MROL_INVALID_ARGUMENT, words)
+    GRID_FAILS("answers.shape is NULL");
+    cells.shape = &shape, grid.has_area = 2;
+    GRID_FAILS("question.has_area must be 0 or 1");
+    grid.has_area = 0, grid.cell_m = 0.15;
+    GRID_FAILS("cell_m must be a whole number of voxels");
+    grid.cell_m = 0;
+    GRID_FAILS("answers.capacity must be at least 3, got 2");
+    MUST(shape.cells[0] == 3 && shape.cells[1] == 1);
+    cells.capacity = 3;
+    MUST(mrol_replica_project_grid(replica, &grid, &cells, NULL, NULL) == MROL_OK);
+    MUST(tops[0] > 0.099f && tops[2] < 0.101f && shape.origin_m[0] == 0);
+}
+
+/* A body is one until it is freed, and none from then on. */
+static void bad_questions(mrol_replica replica) {
+    float sphere[4] = {0, 0, 0, 0.1f};
+    mrol_link link = ball(sphere);
+    mrol_body body;
+    mrol_pose_check check = mrol_pose_check_default();
+    mrol_collisions places = mrol_collisions_default();
+    bad_bodies();
+    MUST(mrol_body_new(&link, 1, &body, NULL) == MROL_OK && body.number != 0);
+    bad_checks(replica, body);
+    bad_motions_and_spheres(replica, body);
+    bad_rays_points_and_grids(replica);
+    MUST(mrol_body_free(body, NULL) == MROL_OK);
+    FAILS(mrol_body_free(body, &error), MROL_INVALID_ARGUMENT, "body is none");
+    check.body = body;
+    FAILS(mrol_replica_check_poses(replica, &check, &places, NULL, &error), MROL_INVALID_ARGUMENT, "body is none");
 }
 
 static void bad_replicas(mrol_replica replica) {
@@ -195,10 +433,13 @@ static void a_child_is_refused(const mrol_replica_options *options, mrol_replica
     MUST(child >= 0);
     if (child == 0) {
         mrol_replica own;
+        mrol_body body = {1};
         mrol_point_query query = mrol_point_query_default();
         FAILS(mrol_replica_query_points(replica, &query, NULL, 0, NULL, &error), MROL_FORKED, "forked");
         FAILS(mrol_replica_wait_for_revision(replica, 9, 9, &error), MROL_FORKED, "forked");
         FAILS(mrol_replica_open(options, &own, &error), MROL_FORKED, "forked");
+        FAILS(mrol_body_new(NULL, 0, &body, &error), MROL_FORKED, "forked");
+        FAILS(mrol_body_free(body, &error), MROL_FORKED, "forked");
         FAILS(mrol_replica_close(replica, &error), MROL_FORKED, "forked");
         _exit(0);
     }
@@ -216,6 +457,7 @@ int main(int count, char **words) {
     options = options_for(words[1], words[2]);
     MUST(mrol_replica_open(&options, &replica, NULL) == MROL_OK);
     bad_queries(replica);
+    bad_questions(replica);
     bad_replicas(replica);
     a_child_is_refused(&options, replica);
     MUST(mrol_replica_revision(replica) == 1);

@@ -46,6 +46,8 @@ int main(void) {
     FIELD(mrol_point_query, map_from_points);
     FIELD(mrol_point_query, level);
     FIELD(mrol_point_query, lookup);
+    FIELD(mrol_point_query, keep_out);
+    FIELD(mrol_point_query, reserved);
     SIZE(mrol_point_query);
 
     FIELD(mrol_answer, version);
@@ -61,5 +63,146 @@ int main(void) {
     FIELD(mrol_replica_status, reserved);
     FIELD(mrol_replica_status, last_error);
     SIZE(mrol_replica_status);
+
+    FIELD(mrol_body, number);
+    SIZE(mrol_body);
+
+    FIELD(mrol_link, spheres);
+    FIELD(mrol_link, spheres_count);
+    FIELD(mrol_link, points);
+    FIELD(mrol_link, points_count);
+    FIELD(mrol_link, padding_m);
+    FIELD(mrol_link, reserved);
+    SIZE(mrol_link);
+
+    FIELD(mrol_region, kind);
+    FIELD(mrol_region, reserved);
+    FIELD(mrol_region, numbers);
+    SIZE(mrol_region);
+
+    FIELD(mrol_pose_check, struct_size);
+    FIELD(mrol_pose_check, body);
+    FIELD(mrol_pose_check, configurations);
+    FIELD(mrol_pose_check, count);
+    FIELD(mrol_pose_check, ignored);
+    FIELD(mrol_pose_check, ignored_count);
+    FIELD(mrol_pose_check, level);
+    FIELD(mrol_pose_check, clearance_max_m);
+    FIELD(mrol_pose_check, ignore_keep_outs);
+    FIELD(mrol_pose_check, reserved);
+    SIZE(mrol_pose_check);
+
+    FIELD(mrol_sphere_check, struct_size);
+    FIELD(mrol_sphere_check, spheres);
+    FIELD(mrol_sphere_check, count);
+    FIELD(mrol_sphere_check, sizes);
+    FIELD(mrol_sphere_check, groups);
+    FIELD(mrol_sphere_check, ignored);
+    FIELD(mrol_sphere_check, ignored_count);
+    FIELD(mrol_sphere_check, level);
+    FIELD(mrol_sphere_check, padding_m);
+    FIELD(mrol_sphere_check, clearance_max_m);
+    FIELD(mrol_sphere_check, ignore_keep_outs);
+    FIELD(mrol_sphere_check, reserved);
+    SIZE(mrol_sphere_check);
+
+    FIELD(mrol_collisions, struct_size);
+    FIELD(mrol_collisions, capacity);
+    FIELD(mrol_collisions, colliding);
+    FIELD(mrol_collisions, hit_links);
+    FIELD(mrol_collisions, hit_parts);
+    FIELD(mrol_collisions, hit_voxels);
+    FIELD(mrol_collisions, clearances_m);
+    FIELD(mrol_collisions, nearest_links);
+    FIELD(mrol_collisions, hit_keep_outs);
+    SIZE(mrol_collisions);
+
+    FIELD(mrol_motion_check, struct_size);
+    FIELD(mrol_motion_check, body);
+    FIELD(mrol_motion_check, configurations);
+    FIELD(mrol_motion_check, count);
+    FIELD(mrol_motion_check, lengths);
+    FIELD(mrol_motion_check, motions);
+    FIELD(mrol_motion_check, ignored);
+    FIELD(mrol_motion_check, ignored_count);
+    FIELD(mrol_motion_check, level);
+    FIELD(mrol_motion_check, step_m);
+    FIELD(mrol_motion_check, clearance_max_m);
+    FIELD(mrol_motion_check, ignore_keep_outs);
+    FIELD(mrol_motion_check, reserved);
+    SIZE(mrol_motion_check);
+
+    FIELD(mrol_motion_answers, struct_size);
+    FIELD(mrol_motion_answers, capacity);
+    FIELD(mrol_motion_answers, is_free);
+    FIELD(mrol_motion_answers, first_hits);
+    FIELD(mrol_motion_answers, clearances_m);
+    SIZE(mrol_motion_answers);
+
+    FIELD(mrol_ray_question, struct_size);
+    FIELD(mrol_ray_question, origins);
+    FIELD(mrol_ray_question, origins_count);
+    FIELD(mrol_ray_question, directions);
+    FIELD(mrol_ray_question, ends);
+    FIELD(mrol_ray_question, count);
+    FIELD(mrol_ray_question, range_m);
+    FIELD(mrol_ray_question, level);
+    FIELD(mrol_ray_question, ignore_keep_outs);
+    FIELD(mrol_ray_question, reserved);
+    SIZE(mrol_ray_question);
+
+    FIELD(mrol_ray_answers, struct_size);
+    FIELD(mrol_ray_answers, capacity);
+    FIELD(mrol_ray_answers, hit);
+    FIELD(mrol_ray_answers, distances_m);
+    FIELD(mrol_ray_answers, voxels);
+    FIELD(mrol_ray_answers, keep_outs);
+    SIZE(mrol_ray_answers);
+
+    FIELD(mrol_nearest_question, struct_size);
+    FIELD(mrol_nearest_question, points);
+    FIELD(mrol_nearest_question, count);
+    FIELD(mrol_nearest_question, radius_m);
+    FIELD(mrol_nearest_question, level);
+    FIELD(mrol_nearest_question, to);
+    FIELD(mrol_nearest_question, ignore_keep_outs);
+    FIELD(mrol_nearest_question, reserved);
+    SIZE(mrol_nearest_question);
+
+    FIELD(mrol_nearest_answers, struct_size);
+    FIELD(mrol_nearest_answers, capacity);
+    FIELD(mrol_nearest_answers, found);
+    FIELD(mrol_nearest_answers, distances_m);
+    FIELD(mrol_nearest_answers, voxels);
+    FIELD(mrol_nearest_answers, away);
+    FIELD(mrol_nearest_answers, keep_outs);
+    SIZE(mrol_nearest_answers);
+
+    FIELD(mrol_grid_question, struct_size);
+    FIELD(mrol_grid_question, area_min_m);
+    FIELD(mrol_grid_question, area_max_m);
+    FIELD(mrol_grid_question, min_z_m);
+    FIELD(mrol_grid_question, max_z_m);
+    FIELD(mrol_grid_question, cell_m);
+    FIELD(mrol_grid_question, level);
+    FIELD(mrol_grid_question, has_area);
+    FIELD(mrol_grid_question, has_min_z);
+    FIELD(mrol_grid_question, has_max_z);
+    FIELD(mrol_grid_question, ignore_keep_outs);
+    FIELD(mrol_grid_question, reserved);
+    SIZE(mrol_grid_question);
+
+    FIELD(mrol_grid_shape, cell_m);
+    FIELD(mrol_grid_shape, origin_m);
+    FIELD(mrol_grid_shape, cells);
+    FIELD(mrol_grid_shape, reserved);
+    SIZE(mrol_grid_shape);
+
+    FIELD(mrol_grid_answers, struct_size);
+    FIELD(mrol_grid_answers, capacity);
+    FIELD(mrol_grid_answers, shape);
+    FIELD(mrol_grid_answers, occupied);
+    FIELD(mrol_grid_answers, tops_m);
+    SIZE(mrol_grid_answers);
     return 0;
 }

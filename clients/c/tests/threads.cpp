@@ -21,6 +21,15 @@ struct Failed : std::runtime_error {
     mrol_code code;
 };
 
+void must(bool condition, const char *what) {
+    if (!condition) {
+        std::fprintf(stderr, "it is not so: %s\n", what);
+        std::exit(1);
+    }
+}
+
+enum class Moves { freely, no_body };
+
 // How a C++ program may wrap it.
 class Replica {
 public:
@@ -51,6 +60,26 @@ public:
         return answer;
     }
 
+    // From 0.5 m beside the row of voxels along it, and into it.
+    Moves moves_freely(mrol_body body) const {
+        static constexpr std::array<float, 28> motions{0, 0.5f, 0.05f, 0, 0, 0, 1, 0.3f, 0.5f,  0.05f, 0, 0, 0, 1,
+                                                       0, 0.5f, 0.05f, 0, 0, 0, 1, 0,    0.05f, 0.05f, 0, 0, 0, 1};
+        auto check = mrol_motion_check_default();
+        check.body = body;
+        check.configurations = motions.data();
+        check.count = 4;
+        std::uint8_t is_free = 0;
+        auto places = mrol_motion_answers_default();
+        places.capacity = 2;
+        places.is_free = &is_free;
+        mrol_error error;
+        const auto code = mrol_replica_check_motions(replica_, &check, &places, nullptr, &error);
+        if (code == MROL_INVALID_ARGUMENT) return Moves::no_body;
+        if (code != MROL_OK) throw Failed(code, error);
+        must(is_free == 1, "the first motion is free, and the second is not");
+        return Moves::freely;
+    }
+
     void wait_for(std::uint64_t revision, std::chrono::milliseconds timeout) const {
         const auto milliseconds = static_cast<std::uint64_t>(timeout.count());
         call([&](mrol_error *error) {
@@ -67,11 +96,27 @@ private:
     mrol_replica replica_{};
 };
 
-void must(bool condition, const char *what) {
-    if (!condition) {
-        std::fprintf(stderr, "it is not so: %s\n", what);
-        std::exit(1);
+// A body that threads ask about, one of them frees, and nobody else gets the number of.
+void share_a_body(const char *address, const char *map) {
+    const Replica replica(address, map);
+    const std::array<float, 4> sphere{0.0f, 0.0f, 0.0f, 0.1f};
+    mrol_link link{};
+    link.spheres = sphere.data();
+    link.spheres_count = 1;
+    mrol_body body;
+    must(mrol_body_new(&link, 1, &body, nullptr) == MROL_OK, "there is a body");
+    std::atomic<int> answered{0};
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 4; i++) {
+        threads.emplace_back([&] {
+            for (bool is_first = true; replica.moves_freely(body) != Moves::no_body; is_first = false) {
+                if (is_first) answered++;
+            }
+        });
     }
+    while (answered < 4) std::this_thread::yield();
+    must(mrol_body_free(body, nullptr) == MROL_OK, "the body is freed once");
+    for (auto &thread : threads) thread.join();
 }
 
 // Asks until the replica is closed; how often it was answered.
@@ -132,5 +177,6 @@ int main(int count, char **words) {
     must(count == 3, "there is an address and a map");
     close_while_threads_ask(words[1], words[2]);
     open_beside_each_other(words[1], words[2]);
+    share_a_body(words[1], words[2]);
     std::puts("ok");
 }

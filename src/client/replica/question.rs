@@ -1,7 +1,9 @@
 //! Questions of planners, answered by the copy.
 
 use super::{Copied, Replica, ReplicaError, check_level};
-use crate::service::{Answered, Asked, Limits, MapVersion, Question, QuestionedMap, Reason, ServiceError};
+use crate::service::{
+    Answered, Asked, KnownPart, Limits, MapVersion, Question, QuestionedMap, Reason, ServiceError,
+};
 use crate::util::StopSignal;
 
 impl Replica {
@@ -10,7 +12,7 @@ impl Replica {
     ///
     /// # Errors
     /// For what makes no question; a level that is none; another uuid than the map's; a `min_revision` that the copy has
-    /// not; a copy of a region, which does not know what is around it.
+    /// not; of a copy of a region, `PointOutOfRange` where what lies beyond the region could change the answer.
     pub fn ask<Q: Question>(&self, question: &Q) -> Result<Answered<Q::Answer>, ReplicaError> {
         let limits = Limits::default();
         question.check(&limits)?;
@@ -18,15 +20,15 @@ impl Replica {
         let asked @ Asked { level, .. } = *question.asked();
         check_level(level, &map)?;
         check_uuid(&asked, map_uuid)?;
-        if self.region.is_some() {
-            let message =
-                format!("{} is answered by a copy of a whole map, and this is one of a region", Q::OPERATION);
-            return Err(ServiceError::new(Reason::PointOutOfRange, message).into());
-        }
         check_revision(asked.min_revision, map.revision())?;
         let questioned = QuestionedMap::new(&map, &planner, self.field_bytes_max);
         let (answer, version) = question.answer_from(&questioned, &limits, StopSignal::NEVER)?;
-        let version = MapVersion { revision: version.revision, map_uuid, content_hash: Some(version.hash) };
+        if let Some(region) = self.region {
+            question.check_known(&answer, &KnownPart::of(region, map.lattice(), level))?;
+        }
+        // The hash of a part is not the map's.
+        let content_hash = self.region.is_none().then_some(version.hash);
+        let version = MapVersion { revision: version.revision, map_uuid, content_hash };
         Ok(Answered { answer, version })
     }
 }

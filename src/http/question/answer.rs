@@ -6,11 +6,12 @@ use axum::response::{IntoResponse, Response};
 use serde::ser::{Error, SerializeMap};
 use serde::{Serialize, Serializer};
 
-use super::form::{Form, Slice};
+use super::form::Form;
 use crate::http::error::HttpError;
 use crate::service::{MapVersion, Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::json::JsonVersion;
+use crate::wire::pb;
 
 /// An array of an answer, as bytes.
 pub(super) enum Array {
@@ -24,6 +25,8 @@ pub(super) enum Array {
     Vectors(Bytes),
     /// Packed keys, of which only those are voxels whose bits are set. JSON has null in the place of others.
     Voxels(Bytes, Bytes),
+    /// Numbers of names, of four bytes each. JSON has the names, and null in the place of the largest number.
+    Names(Vec<String>, Bytes),
 }
 
 /// An answer that is put together.
@@ -38,8 +41,35 @@ impl Array {
     fn bytes(&self) -> &Bytes {
         match self {
             Self::Bits(bytes, _) | Self::Floats(bytes) | Self::Numbers(bytes) | Self::Vectors(bytes) => bytes,
-            Self::Voxels(bytes, _) => bytes,
+            Self::Voxels(bytes, _) | Self::Names(_, bytes) => bytes,
         }
+    }
+
+    fn names(&self) -> Option<&[String]> {
+        match self {
+            Self::Names(names, _) => Some(names),
+            _ => None,
+        }
+    }
+
+    /// The keep-outs that elements met, where one did.
+    pub(super) fn keep_outs(
+        name: &'static str,
+        hits: Option<pb::KeepOutHits>,
+    ) -> Option<(&'static str, Self)> {
+        hits.map(|hits| (name, Self::Names(hits.names, hits.numbers_u32le)))
+    }
+
+    /// Voxels of those elements whose bit is set and that met no keep-out.
+    pub(super) fn voxels(bytes: Bytes, bits: &Bytes, keep_outs: Option<&pb::KeepOutHits>) -> Self {
+        let Some(keep_outs) = keep_outs else { return Self::Voxels(bytes, bits.clone()) };
+        let mut of_voxels = bits.to_vec();
+        for (i, number) in keep_outs.numbers_u32le.as_chunks().0.iter().enumerate() {
+            if let Some(byte) = of_voxels.get_mut(i / 8).filter(|_| u32::from_le_bytes(*number) != u32::MAX) {
+                *byte &= !(1 << (i % 8));
+            }
+        }
+        Self::Voxels(bytes, of_voxels.into())
     }
 }
 
@@ -67,6 +97,15 @@ impl<H: Serialize> Answer<H> {
     }
 }
 
+/// Where an array is, and of numbers of names, the names.
+#[derive(Serialize)]
+struct NamedSlice<'a> {
+    at: usize,
+    bytes: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    names: Option<&'a [String]>,
+}
+
 /// What of an answer is JSON: all of it, or all but its arrays, of which it says where they are.
 struct Head<'a, H> {
     answer: &'a Answer<H>,
@@ -88,7 +127,7 @@ impl<H: Serialize> Serialize for Head<'_, H> {
             let bytes = array.bytes().len();
             match self.form {
                 Form::Json => map.serialize_entry(name, array)?,
-                Form::Arrays => map.serialize_entry(name, &Slice { at, bytes })?,
+                Form::Arrays => map.serialize_entry(name, &NamedSlice { at, bytes, names: array.names() })?,
             }
             at += bytes;
         }
@@ -105,6 +144,9 @@ impl Serialize for Array {
                 let number = u32::from_le_bytes(*number);
                 (number != u32::MAX).then_some(number)
             })),
+            Self::Names(names, bytes) => serializer.collect_seq(
+                bytes.as_chunks().0.iter().map(|number| names.get(u32::from_le_bytes(*number) as usize)),
+            ),
             Self::Vectors(bytes) => serializer.collect_seq(bytes.chunks(VECTOR_BYTES).map(|vector| {
                 let mut numbers = floats(vector);
                 [(); 3].map(|()| numbers.next())

@@ -109,16 +109,20 @@ pub(super) fn collisions_of(
     collisions: pb::Collisions,
     answer: CheckAs,
 ) -> (CheckedHead, Vec<(&'static str, Array)>) {
-    let pb::Collisions { checked, colliding, colliding_count, .. } = collisions;
+    let pb::Collisions { checked, colliding, colliding_count, hit_keep_outs, .. } = collisions;
     let head = CheckedHead { checked, colliding_count };
     let mut arrays = vec![("colliding", Array::Bits(colliding.clone(), checked as usize))];
     match answer {
         CheckAs::Colliding => {}
-        CheckAs::FirstHit => arrays.extend([
-            ("hit_links", Array::Numbers(collisions.hit_links_u32le)),
-            ("hit_parts", Array::Numbers(collisions.hit_parts_u32le)),
-            ("hit_voxels", Array::Voxels(collisions.hit_voxels_u64le, colliding)),
-        ]),
+        CheckAs::FirstHit => {
+            let voxels = Array::voxels(collisions.hit_voxels_u64le, &colliding, hit_keep_outs.as_ref());
+            arrays.extend([
+                ("hit_links", Array::Numbers(collisions.hit_links_u32le)),
+                ("hit_parts", Array::Numbers(collisions.hit_parts_u32le)),
+                ("hit_voxels", voxels),
+            ]);
+            arrays.extend(Array::keep_outs("hit_keep_outs", hit_keep_outs));
+        }
         CheckAs::Clearance { .. } => arrays.extend([
             ("clearances_m", Array::Floats(collisions.clearances_m_f32le)),
             ("nearest_links", Array::Numbers(collisions.nearest_links_u32le)),

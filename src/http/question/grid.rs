@@ -23,6 +23,8 @@ pub(in crate::http) struct GridBody {
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    ignore_keep_outs: bool,
 }
 
 #[derive(Deserialize)]
@@ -45,11 +47,11 @@ pub(in crate::http) async fn project_grid(
     Map(map): Map,
     QuestionBody { head, form, .. }: QuestionBody<GridBody>,
 ) -> Result<Response, HttpError> {
-    let GridBody { area, min_z_m, max_z_m, cell_m, level, min_revision, map_uuid } = head;
+    let GridBody { area, min_z_m, max_z_m, cell_m, level, min_revision, map_uuid, ignore_keep_outs } = head;
     let area = area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
         pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
     });
-    let asked = asked(&map, level, min_revision, map_uuid);
+    let asked = asked(&map, (level, ignore_keep_outs), min_revision, map_uuid);
     let (map, question) = pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m }.try_into()?;
     let answered = service.ask(&map, question).await?;
     let version = answered.version;

@@ -23,9 +23,10 @@ use crate::wire::pb;
 /// What questions have in common, as a message has it.
 fn asked(
     map: &MapName,
-    level: u32,
+    (level, ignore_keep_outs): (u32, bool),
     min_revision: Option<u64>,
     map_uuid: Option<String>,
 ) -> Option<pb::Asked> {
-    Some(pb::Asked { map: map.to_string(), level, min_revision, map_uuid: map_uuid.unwrap_or_default() })
+    let (map, map_uuid) = (map.to_string(), map_uuid.unwrap_or_default());
+    Some(pb::Asked { map, level, min_revision, map_uuid, ignore_keep_outs })
 }

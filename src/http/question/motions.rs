@@ -29,6 +29,8 @@ pub(in crate::http) struct MotionsBody {
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    ignore_keep_outs: bool,
 }
 
 #[derive(Serialize)]
@@ -44,7 +46,7 @@ pub(in crate::http) async fn check_motions(
 ) -> Result<Response, HttpError> {
     let MotionsBody { body: Object(body), configurations, lengths, ignored, .. } = head;
     let request = pb::CheckMotionsRequest {
-        asked: asked(&map, head.level, head.min_revision, head.map_uuid),
+        asked: asked(&map, (head.level, head.ignore_keep_outs), head.min_revision, head.map_uuid),
         body: Some(body.into_message(&arrays)?),
         configurations_f32le: configurations.into_bytes(&arrays, "configurations")?,
         lengths_u32le: lengths.into_bytes(&arrays, "lengths")?,

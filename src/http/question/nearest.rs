@@ -24,6 +24,8 @@ pub(in crate::http) struct NearestBody {
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    ignore_keep_outs: bool,
 }
 
 #[derive(Serialize)]
@@ -36,9 +38,10 @@ pub(in crate::http) async fn find_nearest(
     Map(map): Map,
     QuestionBody { head, arrays, form }: QuestionBody<NearestBody>,
 ) -> Result<Response, HttpError> {
-    let NearestBody { points, radius_m, to: ByKeyword(to), level, min_revision, map_uuid } = head;
+    let NearestBody { points, radius_m, to: ByKeyword(to), level, min_revision, map_uuid, ignore_keep_outs } =
+        head;
     let request = pb::FindNearestRequest {
-        asked: asked(&map, level, min_revision, map_uuid),
+        asked: asked(&map, (level, ignore_keep_outs), min_revision, map_uuid),
         points: Some(points.into_message(&arrays, "points")?),
         radius_m,
         to: pb::MeasuredTo::from(to).into(),
@@ -48,11 +51,13 @@ pub(in crate::http) async fn find_nearest(
     let version = answered.version;
     let response = pb::FindNearestResponse::from(answered);
     let points = response.points;
-    let arrays = vec![
-        ("found", Array::Bits(response.found.clone(), points as usize)),
+    let voxels = Array::voxels(response.voxels_u64le, &response.found, response.keep_outs.as_ref());
+    let mut arrays = vec![
+        ("found", Array::Bits(response.found, points as usize)),
         ("distances_m", Array::Floats(response.distances_m_f32le)),
-        ("voxels", Array::Voxels(response.voxels_u64le, response.found)),
+        ("voxels", voxels),
         ("away", Array::Vectors(response.away_f32le)),
     ];
+    arrays.extend(Array::keep_outs("keep_outs", response.keep_outs));
     Answer { head: NearestHead { points }, version, arrays }.respond(form)
 }

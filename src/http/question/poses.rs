@@ -30,6 +30,8 @@ pub(in crate::http) struct PosesBody {
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    ignore_keep_outs: bool,
 }
 
 pub(in crate::http) async fn check_poses(
@@ -39,7 +41,7 @@ pub(in crate::http) async fn check_poses(
 ) -> Result<Response, HttpError> {
     let PosesBody { body: Object(body), configurations, ignored, answer: ByKeyword(answer), .. } = head;
     let request = pb::CheckPosesRequest {
-        asked: asked(&map, head.level, head.min_revision, head.map_uuid),
+        asked: asked(&map, (head.level, head.ignore_keep_outs), head.min_revision, head.map_uuid),
         body: Some(body.into_message(&arrays)?),
         configurations_f32le: configurations.into_bytes(&arrays, "configurations")?,
         ignored: ignored_of(ignored)?,

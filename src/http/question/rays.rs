@@ -22,6 +22,8 @@ pub(in crate::http) struct RaysBody {
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    ignore_keep_outs: bool,
 }
 
 #[derive(Serialize)]
@@ -35,11 +37,12 @@ pub(in crate::http) async fn cast_rays(
     Map(map): Map,
     QuestionBody { head, arrays, form }: QuestionBody<RaysBody>,
 ) -> Result<Response, HttpError> {
-    let RaysBody { origins, directions, ends, range_m, level, min_revision, map_uuid } = head;
+    let RaysBody { origins, directions, ends, range_m, level, min_revision, map_uuid, ignore_keep_outs } =
+        head;
     let points =
         |field: Option<PointsField>, name| field.map(|of| of.into_message(&arrays, name)).transpose();
     let request = pb::CastRaysRequest {
-        asked: asked(&map, level, min_revision, map_uuid),
+        asked: asked(&map, (level, ignore_keep_outs), min_revision, map_uuid),
         origins: points(Some(origins), "origins")?,
         directions: points(directions, "directions")?,
         ends: points(ends, "ends")?,
@@ -50,10 +53,12 @@ pub(in crate::http) async fn cast_rays(
     let version = answered.version;
     let response = pb::CastRaysResponse::from(answered);
     let (rays, hits) = (response.rays, response.hits);
-    let arrays = vec![
-        ("hit", Array::Bits(response.hit.clone(), rays as usize)),
+    let voxels = Array::voxels(response.voxels_u64le, &response.hit, response.keep_outs.as_ref());
+    let mut arrays = vec![
+        ("hit", Array::Bits(response.hit, rays as usize)),
         ("distances_m", Array::Floats(response.distances_m_f32le)),
-        ("voxels", Array::Voxels(response.voxels_u64le, response.hit)),
+        ("voxels", voxels),
     ];
+    arrays.extend(Array::keep_outs("keep_outs", response.keep_outs));
     Answer { head: RaysHead { rays, hits }, version, arrays }.respond(form)
 }

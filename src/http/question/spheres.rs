@@ -31,6 +31,8 @@ pub(in crate::http) struct SpheresBody {
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
+    #[serde(default)]
+    ignore_keep_outs: bool,
 }
 
 pub(in crate::http) async fn check_spheres(
@@ -45,7 +47,7 @@ pub(in crate::http) async fn check_spheres(
         None => CountsField::ones(spheres.len() / SPHERE_BYTES),
     };
     let request = pb::CheckSpheresRequest {
-        asked: asked(&map, head.level, head.min_revision, head.map_uuid),
+        asked: asked(&map, (head.level, head.ignore_keep_outs), head.min_revision, head.map_uuid),
         spheres_f32le: spheres,
         sizes_u32le: sizes,
         padding_m: head.padding_m,

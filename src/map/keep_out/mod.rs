@@ -4,14 +4,21 @@
 //! and the content hash know nothing of them.
 
 mod change;
+mod outline;
+mod place;
 mod points;
 mod polygon;
 mod prism;
+mod ray;
 mod shape;
+#[cfg(test)]
+pub(crate) mod test_shapes;
 mod voxels;
 
 pub use change::{KeepOutAct, KeepOutChange};
+pub use outline::Outline;
 pub use prism::{PRISM_CORNERS_MAX, Prism, PrismError};
+pub use ray::ShapeRay;
 pub use shape::{KeepOutShape, KeepOutShapeError};
 pub use voxels::TooManyVoxels;
 

@@ -52,10 +52,89 @@ pub(super) fn distance(corners: &[Point2], point: Point2) -> f64 {
 }
 
 fn distance_of_side(a: Point2, b: Point2, point: Point2) -> f64 {
+    let away = away_from_side(a, b, point);
+    away[0].hypot(away[1])
+}
+
+/// The way from the nearest place of a side to the point.
+fn away_from_side(a: Point2, b: Point2, point: Point2) -> Point2 {
     let (along, from_a) = (minus(b, a), minus(point, a));
     let share = (dot(from_a, along) / dot(along, along)).clamp(0.0, 1.0);
-    let away = minus(from_a, along.map(|c| c * share));
-    away[0].hypot(away[1])
+    minus(from_a, along.map(|c| c * share))
+}
+
+/// The place of the polygon that is nearest to the point.
+pub(super) fn nearest_place(corners: &[Point2], point: Point2) -> Point2 {
+    if contains(corners, point) {
+        return point;
+    }
+    let away = sides(corners).map(|(a, b)| away_from_side(a, b, point));
+    let nearest = away.min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
+    nearest.map_or(point, |away| minus(point, away))
+}
+
+/// How far along a line, in lengths of `direction` from `origin`, it crosses or touches sides that do not lie along it.
+pub(super) fn crossings(corners: &[Point2], origin: Point2, direction: Point2) -> impl Iterator<Item = f64> {
+    // Which hand a corner is on is decided for the corner, so that no line slips through between two sides.
+    let hand = move |corner: Point2| {
+        let way = minus(corner, origin);
+        direction[0] * way[1] - direction[1] * way[0]
+    };
+    sides(corners).filter_map(move |(a, b)| {
+        let (of_a, of_b) = (hand(a), hand(b));
+        let place = match (of_a >= 0.0) != (of_b >= 0.0) {
+            true => [0, 1].map(|axis: usize| a[axis] + (b[axis] - a[axis]) * (of_a / (of_a - of_b))),
+            false if of_a == 0.0 => a,
+            false => return None,
+        };
+        let at = dot(minus(place, origin), direction) / dot(direction, direction);
+        at.is_finite().then_some(at)
+    })
+}
+
+/// True where a side shares a point with the closed rectangle.
+pub(super) fn meets_rectangle(corners: &[Point2], min: Point2, max: Point2) -> bool {
+    sides(corners).any(|(a, b)| {
+        let mut span = (0.0f64, 1.0f64);
+        for axis in 0..2 {
+            let way = b[axis] - a[axis];
+            if way == 0.0 {
+                if !(min[axis]..=max[axis]).contains(&a[axis]) {
+                    return false;
+                }
+                continue;
+            }
+            let (one, other) = ((min[axis] - a[axis]) / way, (max[axis] - a[axis]) / way);
+            span = (span.0.max(one.min(other)), span.1.min(one.max(other)));
+        }
+        span.0 <= span.1
+    })
+}
+
+/// The corners of the smallest convex polygon around points (Andrew's monotone chain).
+pub(super) fn hull(mut points: Vec<Point2>) -> Vec<Point2> {
+    points.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let chain = |points: &mut dyn Iterator<Item = &Point2>| {
+        let mut chain: Vec<Point2> = Vec::new();
+        for &point in points {
+            while let [.., a, b] = chain[..]
+                && turn(a, b, point) <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        // It is the first of the other chain.
+        chain.pop();
+        chain
+    };
+    let mut corners = chain(&mut points.iter());
+    corners.extend(chain(&mut points.iter().rev()));
+    corners
 }
 
 /// The sides, from each corner to the next and from the last to the first.

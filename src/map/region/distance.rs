@@ -17,6 +17,29 @@ impl Region {
     }
 }
 
+impl Region {
+    /// How far the border is from a point inside, meters; 0 or less on the border and outside.
+    pub fn depth_m(&self, point_m: [f64; 3]) -> f64 {
+        match self {
+            Self::Box { min_m, max_m } => {
+                least(|axis| (point_m[axis] - min_m[axis]).min(max_m[axis] - point_m[axis]))
+            }
+            Self::Sphere { center_m, radius_m } => {
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| point_m[axis] - center_m[axis]);
+                radius_m - x.hypot(y).hypot(z)
+            }
+            Self::OrientedBox(of) => {
+                let in_box = of.map_from_box().inverse_transform_point(&point_m.into());
+                least(|axis| of.size_m()[axis] / 2.0 - in_box[axis].abs())
+            }
+        }
+    }
+}
+
+fn least(coordinate: impl Fn(usize) -> f64) -> f64 {
+    (0..3).map(coordinate).fold(f64::INFINITY, f64::min)
+}
+
 impl OrientedBox {
     fn distance_m(&self, point_m: [f64; 3]) -> f64 {
         let in_box = self.map_from_box().inverse_transform_point(&point_m.into());
@@ -52,6 +75,19 @@ mod tests {
                 Region::oriented_box(placed, size).unwrap()
             }),
         ]
+    }
+
+    proptest! {
+        #[test]
+        fn all_points_nearer_than_the_border_lie_inside(
+            region in region(), point in prop::array::uniform3(-6.0..6.0f64), away in prop::array::uniform3(-1.0..1.0f64),
+        ) {
+            let depth = region.depth_m(point);
+            prop_assert_eq!(depth >= 0.0, region.contains(point) || depth.abs() < 1e-9);
+            let length = away.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let at = |far: f64| std::array::from_fn(|axis| point[axis] + far * away[axis] / length);
+            prop_assert!(depth <= 0.0 || region.contains(at(depth * (1.0 - 1e-9))));
+        }
     }
 
     /// The distance of the nearest of points that fill the region's bounds and lie in it.

@@ -1,11 +1,13 @@
 //! The map from above: which cells of a grid in x y have a voxel within a band of height, and how high it reaches.
 
+mod keep_outs;
 mod map_server;
 #[cfg(test)]
 mod tests;
 
 pub use map_server::NotOccupied;
 
+use super::keep_outs::Shapes;
 use crate::map::{MapView, Region, VoxelSelection};
 use crate::util::StopSignal;
 use crate::voxel::{BlockMask, INDEX_MAX, INDEX_MIN, Lattice, VoxelKey};
@@ -82,7 +84,7 @@ pub struct Grid {
     pub origin_m: [f64; 2],
     /// Number of cells along x and y; none where an area was asked for that is as large as what is there, and nothing is.
     pub size: [usize; 2],
-    /// Whether cell i has a voxel: bit i % 64 of `occupied[i / 64]`.
+    /// Whether cell i has a voxel or a keep-out: bit i % 64 of `occupied[i / 64]`.
     pub occupied: Vec<u64>,
     /// Height of the top of the highest voxel of each cell that lies in the band, meters; NaN for a cell without one.
     pub tops_m: Vec<f32>,
@@ -94,7 +96,7 @@ impl Grid {
         self.tops_m.len()
     }
 
-    /// True when cell `number` has a voxel.
+    /// True when cell `number` has a voxel or a keep-out.
     pub fn is_occupied(&self, number: usize) -> bool {
         self.occupied[number / 64] >> (number % 64) & 1 == 1
     }
@@ -146,6 +148,9 @@ fn whole(number: f64) -> Option<f64> {
 /// Cells are whole numbers of voxels and begin at whole multiples of their side from the map's origin, so that each voxel
 /// lies in one cell. Voxels of the band are those whose centers lie in it, as those of a [`Region`] are.
 ///
+/// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied too; they
+/// have no top, and make no grid larger that is as large as what is there.
+///
 /// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a cell.
 /// The view must cover the whole map. Once stopped, the grid lacks voxels.
 ///
@@ -165,7 +170,11 @@ pub fn project_grid(
     if count > request.cells_max as f64 {
         return Err(GridError::Cells { cells: count, cell_m: projection.cell_m, most: request.cells_max });
     }
-    Ok(projection.grid(&cells, stop))
+    let mut grid = projection.grid(&cells, stop);
+    if let Some(shapes) = Shapes::of(view) {
+        keep_outs::mark(&shapes, &cells, &mut grid, request.band_m, stop);
+    }
+    Ok(grid)
 }
 
 /// A request that was checked, with the view that answers it.

@@ -1,13 +1,15 @@
 //! The nearest voxel of points: how far away it is, and which way leads away from it.
 
 mod block;
+mod keep_outs;
 mod search;
 mod seeker;
 #[cfg(test)]
 mod tests;
 
+use super::keep_outs::Shapes;
 use crate::geometry::Point;
-use crate::map::MapView;
+use crate::map::{KeepOutName, MapView};
 use crate::util::{Keyword, StopSignal};
 use crate::voxel::{Cluster, VoxelKey};
 use search::Search;
@@ -72,15 +74,17 @@ pub enum NearestError {
 /// The nearest voxel of each point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NearestVoxels {
-    /// Whether there is a voxel within the radius of point i: bit i % 64 of `found[i / 64]`.
+    /// Whether there is a voxel or a keep-out within the radius of point i: bit i % 64 of `found[i / 64]`.
     pub found: Vec<u64>,
-    /// Distance to the voxel, meters; infinite where there is none.
+    /// Distance to it, meters; infinite where there is none.
     pub distances_m: Vec<f32>,
-    /// The voxel; where there is none, the voxel of index 0 0 0.
+    /// The voxel; where there is none or a keep-out is nearer, the voxel of index 0 0 0.
     pub voxels: Vec<VoxelKey>,
     /// The unit vector from the nearest place of the voxel to the point, x y z: the way on which the distance grows
     /// fastest. Zero where the distance is, and where there is no voxel.
     pub away: Vec<[f32; 3]>,
+    /// The keep-out of each point to which one is nearer than all voxels; empty where there is no such point.
+    pub keep_outs: Vec<Option<KeepOutName>>,
 }
 
 /// The nearest voxel of a point.
@@ -98,6 +102,7 @@ impl NearestVoxels {
             distances_m: Vec::with_capacity(points),
             voxels: Vec::with_capacity(points),
             away: Vec::with_capacity(points),
+            keep_outs: Vec::new(),
         }
     }
 
@@ -116,6 +121,12 @@ impl NearestVoxels {
         self.found.iter().map(|word| word.count_ones() as usize).sum()
     }
 
+    fn set(&mut self, at: usize, Nearest { distance_m, voxel, away }: Nearest) {
+        self.found[at / 64] |= 1 << (at % 64);
+        (self.distances_m[at], self.voxels[at]) = (distance_m as f32, voxel);
+        self.away[at] = away.map(|c| c as f32);
+    }
+
     fn push(&mut self, nearest: Option<Nearest>) {
         let at = self.len();
         self.found[at / 64] |= u64::from(nearest.is_some()) << (at % 64);
@@ -131,6 +142,9 @@ impl NearestVoxels {
 ///
 /// Exact: distances are those of f64, in voxels, from the point to the closed cube from i r_n to (i + 1) r_n, or to its
 /// center. A voxel just at the radius is within it. Of voxels equally far, the one of the smallest packed key is taken.
+///
+/// Where the view has keep-outs ([`MapView::with_keep_outs`]), one that is nearer than all voxels takes their place; distances
+/// to it are those to its border, whatever distances to voxels are measured to.
 ///
 /// The view must cover the whole map. Takes 24 bytes a point. Once stopped, the answer has fewer points.
 ///
@@ -151,6 +165,9 @@ pub fn find_nearest(
     let mut nearest = NearestVoxels::of_capacity(points.len());
     for &point in stop.paced(points, POINTS_PER_LOOK) {
         nearest.push(search.nearest(point));
+    }
+    if let Some(shapes) = Shapes::of(view) {
+        keep_outs::mend(&shapes, points, radius_m, &mut nearest, stop);
     }
     Ok(nearest)
 }

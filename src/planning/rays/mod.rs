@@ -1,13 +1,15 @@
 //! Rays: what each meets first, and how far away.
 
+mod keep_outs;
 mod ray;
 mod space;
 #[cfg(test)]
 mod tests;
 mod turns;
 
+use super::keep_outs::Shapes;
 use crate::geometry::Point;
-use crate::map::MapView;
+use crate::map::{KeepOutName, MapView};
 use crate::util::StopSignal;
 use crate::voxel::{Cluster, VoxelKey};
 use ray::Ray;
@@ -93,13 +95,16 @@ pub enum RayError {
 /// What rays met.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RayHits {
-    /// Whether ray i met a voxel: bit i % 64 of `hit[i / 64]`.
+    /// Whether ray i met a voxel or a keep-out: bit i % 64 of `hit[i / 64]`.
     pub hit: Vec<u64>,
-    /// From the origin to where the ray enters the cube of the voxel, meters; 0 where it begins in it, infinite where it met
-    /// none.
+    /// From the origin to where the ray enters the cube of the voxel or the keep-out, meters; 0 where it begins in it, infinite
+    /// where it met none.
     pub distances_m: Vec<f32>,
-    /// The voxel, of the level that was asked; of a ray that met none, the voxel of index 0 0 0.
+    /// The voxel, of the level that was asked; of a ray that met none, the voxel of index 0 0 0, and of one
+    /// that met a keep-out too.
     pub voxels: Vec<VoxelKey>,
+    /// The keep-out of each ray that met one instead of a voxel; empty where no ray did.
+    pub keep_outs: Vec<Option<KeepOutName>>,
 }
 
 impl RayHits {
@@ -109,6 +114,7 @@ impl RayHits {
             hit: vec![0; rays.div_ceil(64)],
             distances_m: vec![f32::INFINITY; rays],
             voxels: vec![VoxelKey::default(); rays],
+            keep_outs: Vec::new(),
         }
     }
 
@@ -235,6 +241,9 @@ fn length([x, y, z]: [f64; 3]) -> f64 {
 /// border that it crosses belongs to the voxel that it moves into, and a border along which it runs to the upper voxel, as
 /// points on it do. A voxel that it would enter just where it ends is not met.
 ///
+/// Where the view has keep-outs ([`MapView::with_keep_outs`]), a ray meets the first one that it is inside, its border
+/// included, before it meets a voxel.
+///
 /// The view must cover the whole map. The walk leaps over empty space by the blocks and clusters of blocks that are not
 /// there, and comes out where single steps would (both computed in f64, and compared bit for bit in tests). Takes 12 bytes
 /// a ray. Once stopped, rays are left that met nothing yet.
@@ -254,6 +263,9 @@ pub fn cast_rays(
     match view.cell_bounds(level) {
         Some(bounds) => Turns::new(Space::new(tier, bounds, &nothing), request).walk(&mut hits, stop)?,
         None => (0..rays.len()).try_for_each(|number| request.ray(number).map(|_| ()))?,
+    }
+    if let Some(shapes) = Shapes::of(view) {
+        keep_outs::end_at(&shapes, rays, &mut hits, stop)?;
     }
     Ok(hits)
 }

@@ -1,6 +1,6 @@
 //! What checks of bodies have in common: how they are answered, and what is in the answer.
 
-use crate::planning::{CLEARANCE_CELLS_MAX, Clearance, Hit, PlanningError, PlanningView};
+use crate::planning::{Clearance, Hit, PlanningError, PlanningView, clearance_max_m};
 use crate::service::{Limits, Reason, ServiceError};
 
 /// How a check is answered.
@@ -44,7 +44,15 @@ impl Collisions {
         }
     }
 
-    /// Whether each meets a voxel: number i is bit i % 64 of word i / 64.
+    /// How much room number `i` has, meters; 0 where that was not asked for.
+    pub(super) fn clearance_m(&self, i: usize) -> f64 {
+        match self {
+            Self::Colliding { .. } | Self::FirstHits(_) => 0.0,
+            Self::Clearances(clearances) => clearances.get(i).map_or(0.0, |of| f64::from(of.distance_m)),
+        }
+    }
+
+    /// Whether each meets a voxel or a keep-out: number i is bit i % 64 of word i / 64.
     pub fn words(&self) -> Vec<u64> {
         let pack = |bits: &mut dyn Iterator<Item = bool>| {
             let mut words = vec![0; self.checked().div_ceil(64)];
@@ -59,17 +67,12 @@ impl Collisions {
     }
 }
 
-/// Bytes of one check in an answer, at most: a link, a part, a voxel, and a bit.
-pub(super) const BYTES_EACH: usize = 17;
+/// Bytes of one check in an answer, at most: a link, a part, a voxel, the number of a keep-out, and a bit.
+pub(super) const BYTES_EACH: usize = 21;
 
 /// Up to where clearances are told, meters.
 pub(super) fn clearance_most_m(view: &PlanningView<'_>, level: u32, most_m: Option<f32>) -> f32 {
-    let voxels_m = CLEARANCE_CELLS_MAX * view.lattice().resolution_m(level);
-    most_m.unwrap_or_else(|| {
-        // The largest float that is not more.
-        let rounded = voxels_m as f32;
-        if f64::from(rounded) > voxels_m { rounded.next_down() } else { rounded }
-    })
+    most_m.unwrap_or_else(|| clearance_max_m(view.lattice(), level))
 }
 
 /// Refuses more spheres and points of a body, or of all groups, than may be.

@@ -1,6 +1,6 @@
 //! The map from above, as a 2-D grid.
 
-use super::{Asked, Question, QuestionedMap};
+use super::{Asked, KnownPart, Question, QuestionedMap};
 use crate::map::ContentVersion;
 use crate::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
 use crate::service::{Limits, Reason, ServiceError};
@@ -62,10 +62,25 @@ impl Question for GridQuestion {
         let GridScope { area, band_m, cell_m } = self.scope;
         let level = self.asked.level;
         // It walks all voxels of the area: never a short question.
-        map.in_view(usize::MAX, stop, |view| {
+        map.in_view(&self.asked, usize::MAX, stop, |view| {
             let cell_m = cell_m.unwrap_or_else(|| view.lattice().resolution_m(level));
             let cells_max = Self::cells_max(limits);
             Ok(project_grid(view, &GridRequest { level, area, band_m, cell_m, cells_max }, stop)?)
+        })
+    }
+
+    fn check_known(&self, answer: &Grid, known: &KnownPart) -> Result<(), ServiceError> {
+        let GridScope { area, band_m, .. } = self.scope;
+        if area == GridArea::Occupied {
+            let message =
+                "area must be given where a replica copies a region: what is occupied elsewhere is not known";
+            return Err(ServiceError::new(Reason::PointOutOfRange, message));
+        }
+        let end_m = |axis: usize| answer.origin_m[axis] + answer.size[axis] as f64 * answer.cell_m;
+        let [xs, ys] = [0, 1].map(|axis| [answer.origin_m[axis], end_m(axis)]);
+        (0..8usize).try_for_each(|corner| {
+            let corner_m = [xs[corner & 1], ys[corner >> 1 & 1], known.within(band_m[corner >> 2])];
+            known.check_ball(|| "a corner of the area between min_z_m and max_z_m".to_owned(), corner_m, 0.0)
         })
     }
 }

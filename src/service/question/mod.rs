@@ -2,6 +2,7 @@
 
 mod check;
 mod grid;
+mod known;
 mod motions;
 mod nearest;
 mod poses;
@@ -10,6 +11,7 @@ mod spheres;
 
 pub use check::{CheckAs, Collisions};
 pub use grid::{GridQuestion, GridScope};
+pub use known::KnownPart;
 pub use motions::MotionCheck;
 pub use nearest::NearestQuestion;
 pub use poses::PoseCheck;
@@ -26,7 +28,7 @@ use super::hosted_map::HostedMap;
 use super::time_limit::TimeLimit;
 use super::{Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early};
 use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap};
-use crate::planning::Planner;
+use crate::planning::{Planner, PlanningView};
 use crate::util::StopSignal;
 
 /// What all questions have in common.
@@ -38,6 +40,8 @@ pub struct Asked {
     pub min_revision: Option<u64>,
     /// The incarnation of the map that `min_revision` belongs to.
     pub map_uuid: Option<Uuid>,
+    /// True where keep-outs do not count; otherwise they count as voxels do.
+    pub ignore_keep_outs: bool,
 }
 
 /// A question of a planner.
@@ -70,6 +74,12 @@ pub trait Question: Debug + Send + Sync + 'static {
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Self::Answer, ContentVersion), ServiceError>;
+
+    /// Refuses an answer that what is not known could change: it was given from a part of the map, and all keep-outs.
+    ///
+    /// # Errors
+    /// `InvalidArgument`, naming the element that needs more, what it needs and what is known.
+    fn check_known(&self, answer: &Self::Answer, known: &KnownPart) -> Result<(), ServiceError>;
 }
 
 /// A map that questions are asked of, and the planner of it, which is made when it is first needed.
@@ -95,16 +105,24 @@ impl<'a> QuestionedMap<'a> {
         self.planner.get_or_init(|| Planner::with_field_bytes(Arc::clone(self.map), self.field_bytes_max))
     }
 
+    /// A view of the whole map for checks of bodies.
+    pub(super) fn planning_view(&self, asked: &Asked) -> PlanningView<'a> {
+        let view = self.planner().view();
+        if asked.ignore_keep_outs { view } else { view.with_keep_outs() }
+    }
+
     /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
     /// are kept from beginning meanwhile, so that no shorter question queues behind a change that waits for this one.
     pub(super) fn in_view<A>(
         &self,
+        asked: &Asked,
         elements: usize,
         stop: StopSignal<'_>,
         f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
     ) -> Result<(A, ContentVersion), ServiceError> {
         let _long_read = (elements > SHORT_ELEMENTS).then(|| self.map.long_read());
         let view = self.map.view();
+        let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))
@@ -140,7 +158,7 @@ impl MapService {
     ) -> Result<Answered<Q::Answer>, ServiceError> {
         let work = async {
             let map = self.map(map)?;
-            let Asked { level, min_revision, map_uuid } = *question.asked();
+            let Asked { level, min_revision, map_uuid, .. } = *question.asked();
             question.check(self.limits())?;
             map.check_level(level)?;
             map.check_uuid(map_uuid)?;

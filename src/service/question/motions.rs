@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::check::{check_ignored, check_parts};
-use super::{Asked, Question, QuestionedMap, check_elements};
+use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
 use crate::planning::{Body, Configurations, MotionAnswer, MotionQuestion, Surroundings};
 use crate::service::{Limits, ServiceError, check_not_stopped};
@@ -68,9 +68,30 @@ impl Question for MotionCheck {
             level: self.asked.level,
             surroundings: &self.surroundings,
         };
-        let view = map.planner().view();
+        let view = map.planning_view(&self.asked);
         let answers = view.check_motions(&question, stop)?;
         check_not_stopped(stop)?;
         answers.map(|answers| (answers, view.version())).ok_or_else(|| super::ended_early(stop))
+    }
+
+    fn check_known(&self, answer: &Vec<MotionAnswer>, known: &KnownPart) -> Result<(), ServiceError> {
+        let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
+        let mut first = 0;
+        for (length, motion) in self.lengths.iter().zip(answer) {
+            let end = first + *length as usize;
+            let told_m = f64::from(motion.clearance_m.unwrap_or_default());
+            for i in first..end {
+                // The region is convex: what is known at both ends is known between them, but for the turn of a link.
+                let turns = [i.checked_sub(1).filter(|from| *from >= first), (i + 1 < end).then_some(i)];
+                self.body.placed(configurations, i).try_for_each(|part| {
+                    let strays = |from: usize| self.body.strays_m(configurations, from, part.link);
+                    let strays_m = turns.into_iter().flatten().map(strays).fold(0.0, f64::max);
+                    let what = || format!("configurations[{i}].links[{}]", part.link);
+                    known.check_ball(what, part.center_m, part.radius_m + strays_m + told_m)
+                })?;
+            }
+            first = end;
+        }
+        Ok(())
     }
 }

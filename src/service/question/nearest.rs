@@ -1,6 +1,6 @@
 //! The nearest voxel of points.
 
-use super::{Asked, Question, QuestionedMap, check_elements};
+use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::geometry::Point;
 use crate::map::ContentVersion;
 use crate::planning::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, find_nearest};
@@ -20,8 +20,8 @@ pub struct NearestQuestion {
     pub to: MeasuredTo,
 }
 
-/// Bytes of a point in an answer: a distance, a voxel, a direction, and a bit.
-const BYTES_EACH: usize = 25;
+/// Bytes of a point in an answer: a distance, a voxel, a direction, the number of a keep-out, and a bit.
+const BYTES_EACH: usize = 29;
 
 impl Question for NearestQuestion {
     type Answer = NearestVoxels;
@@ -53,7 +53,15 @@ impl Question for NearestQuestion {
         let Self { asked, points, radius_m, to } = self;
         let request =
             NearestRequest { points: points.as_slice(), level: asked.level, radius_m: *radius_m, to: *to };
-        map.in_view(points.len(), stop, |view| Ok(find_nearest(view, &request, stop)?))
+        map.in_view(asked, points.len(), stop, |view| Ok(find_nearest(view, &request, stop)?))
+    }
+
+    fn check_known(&self, answer: &NearestVoxels, known: &KnownPart) -> Result<(), ServiceError> {
+        let points = self.points.as_slice().iter().zip(&answer.distances_m).enumerate();
+        points.into_iter().try_for_each(|(i, (point, told_m))| {
+            let what = || format!("points[{i}]");
+            known.check_ball(what, point.xyz().map(f64::from), f64::from(*told_m).min(self.radius_m))
+        })
     }
 }
 

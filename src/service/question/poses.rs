@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, check_parts, clearance_most_m};
-use super::{Asked, Question, QuestionedMap, check_elements};
+use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
 use crate::planning::{Body, Configurations, PoseQuestion, Surroundings};
 use crate::service::{Limits, ServiceError, check_not_stopped};
@@ -54,7 +54,7 @@ impl Question for PoseCheck {
         let level = self.asked.level;
         let question =
             PoseQuestion { body: &self.body, configurations, level, surroundings: &self.surroundings };
-        let view = map.planner().view();
+        let view = map.planning_view(&self.asked);
         let collisions = match self.answer {
             CheckAs::Colliding => view
                 .bodies_meet(&question, stop)?
@@ -67,5 +67,17 @@ impl Question for PoseCheck {
         };
         check_not_stopped(stop)?;
         collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| super::ended_early(stop))
+    }
+
+    fn check_known(&self, answer: &Collisions, known: &KnownPart) -> Result<(), ServiceError> {
+        let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
+        for i in 0..configurations.len() {
+            let told_m = answer.clearance_m(i);
+            self.body.placed(configurations, i).try_for_each(|part| {
+                let what = || format!("configurations[{i}].links[{}]", part.link);
+                known.check_ball(what, part.center_m, part.radius_m + told_m)
+            })?;
+        }
+        Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Rays: what each meets first.
 
-use super::{Asked, Question, QuestionedMap, check_elements};
+use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
 use crate::planning::{RayError, RayHits, Rays, Toward, cast_rays};
 use crate::service::{Limits, PointCloud, Reason, ServiceError};
@@ -33,8 +33,8 @@ pub enum RaysToward {
     Ends(PointCloud),
 }
 
-/// Bytes of a ray in an answer: a distance, a voxel, and a bit.
-const BYTES_EACH: usize = 13;
+/// Bytes of a ray in an answer: a distance, a voxel, the number of a keep-out, and a bit.
+const BYTES_EACH: usize = 17;
 
 impl RayQuestion {
     fn rays(&self) -> Rays<'_> {
@@ -75,7 +75,21 @@ impl Question for RayQuestion {
         _: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(RayHits, ContentVersion), ServiceError> {
-        map.in_view(self.elements(), stop, |view| Ok(cast_rays(view, &self.rays(), self.asked.level, stop)?))
+        map.in_view(&self.asked, self.elements(), stop, |view| {
+            Ok(cast_rays(view, &self.rays(), self.asked.level, stop)?)
+        })
+    }
+
+    fn check_known(&self, answer: &RayHits, known: &KnownPart) -> Result<(), ServiceError> {
+        let rays = self.rays();
+        for (i, told_m) in answer.distances_m.iter().enumerate() {
+            let (origin_m, end_m) = rays.ends_m(i, f64::from(*told_m))?;
+            for (of, place_m) in [("begins", origin_m), ("goes on", end_m)] {
+                let what = || format!("rays[{i}] {of} where it");
+                known.check_ball(what, place_m.map(|c| known.within(c)), 0.0)?;
+            }
+        }
+        Ok(())
     }
 }
 

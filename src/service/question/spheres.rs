@@ -1,7 +1,7 @@
 //! Do these spheres of the map frame meet voxels?
 
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
-use super::{Asked, Question, QuestionedMap, check_elements};
+use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
 use crate::planning::{Sphere, SphereGroups, SphereQuestion, Surroundings};
 use crate::service::{Limits, ServiceError, check_not_stopped};
@@ -54,7 +54,7 @@ impl Question for SphereCheck {
         let groups = SphereGroups::new(&self.spheres, &self.sizes)?;
         let (level, padding_m) = (self.asked.level, self.padding_m);
         let question = SphereQuestion { groups, padding_m, level, surroundings: &self.surroundings };
-        let view = map.planner().view();
+        let view = map.planning_view(&self.asked);
         let collisions = match self.answer {
             CheckAs::Colliding => view
                 .spheres_meet(&question, stop)?
@@ -67,5 +67,14 @@ impl Question for SphereCheck {
         };
         check_not_stopped(stop)?;
         collisions.map(|collisions| (collisions, view.version())).ok_or_else(|| super::ended_early(stop))
+    }
+
+    fn check_known(&self, answer: &Collisions, known: &KnownPart) -> Result<(), ServiceError> {
+        let groups = self.sizes.iter().enumerate().flat_map(|(i, size)| (0..*size).map(move |_| i));
+        self.spheres.iter().enumerate().zip(groups).try_for_each(|((number, sphere), group)| {
+            let radius_m = f64::from(sphere.radius_m) + f64::from(self.padding_m);
+            let what = || format!("spheres[{number}]");
+            known.check_ball(what, sphere.center_m.map(f64::from), radius_m + answer.clearance_m(group))
+        })
     }
 }

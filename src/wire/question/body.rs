@@ -2,8 +2,9 @@
 
 use bytes::Bytes;
 
+use super::keep_outs::{keep_outs_from, keep_outs_of};
 use crate::map::Region;
-use crate::planning::{Body, Clearance, Hit, Link, NUMBERS_PER_POSE, Sphere, Surroundings};
+use crate::planning::{Body, Clearance, Hit, Link, Met, NUMBERS_PER_POSE, Sphere, Surroundings};
 use crate::service::{CheckAs, Collisions, PointCloud, Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::array::{bitmap_of, bytes_of, numbers_of, voxels_of, words_of};
@@ -125,6 +126,11 @@ pub(super) fn answer_of(answer: CheckAs) -> (pb::CheckAnswer, Option<f32>) {
     }
 }
 
+/// The packed key of the voxel that is met; 0 where none is.
+fn voxel_bits(hit: &Option<Hit>) -> u64 {
+    hit.as_ref().and_then(|hit| hit.met.voxel()).map_or(0, VoxelKey::to_bits)
+}
+
 impl From<Collisions> for pb::Collisions {
     fn from(collisions: Collisions) -> Self {
         let (checked, words) = (collisions.checked(), collisions.words());
@@ -138,9 +144,12 @@ impl From<Collisions> for pb::Collisions {
         match collisions {
             Collisions::Colliding { .. } => all,
             Collisions::FirstHits(hits) => Self {
-                hit_links_u32le: bytes_of(hits.iter().map(|hit| hit.map_or(NO_LINK, |hit| hit.link))),
-                hit_parts_u32le: bytes_of(hits.iter().map(|hit| hit.map_or(0, |hit| hit.part))),
-                hit_voxels_u64le: bytes_of(hits.iter().map(|hit| hit.map_or(0, |hit| hit.voxel.to_bits()))),
+                hit_keep_outs: keep_outs_of(hits.iter().map(|hit| hit.as_ref()?.met.keep_out())),
+                hit_links_u32le: bytes_of(
+                    hits.iter().map(|hit| hit.as_ref().map_or(NO_LINK, |hit| hit.link)),
+                ),
+                hit_parts_u32le: bytes_of(hits.iter().map(|hit| hit.as_ref().map_or(0, |hit| hit.part))),
+                hit_voxels_u64le: bytes_of(hits.iter().map(voxel_bits)),
                 ..all
             },
             Collisions::Clearances(clearances) => Self {
@@ -162,8 +171,11 @@ impl TryFrom<pb::Collisions> for Collisions {
             let links = numbers_of(&of.hit_links_u32le, checked, "hit_links_u32le")?;
             let parts = numbers_of(&of.hit_parts_u32le, checked, "hit_parts_u32le")?;
             let voxels = voxels_of(&of.hit_voxels_u64le, checked, "hit_voxels_u64le")?;
-            let hit =
-                |((of, part), voxel): ((u32, u32), VoxelKey)| Some(Hit { link: link(of)?, part, voxel });
+            let mut keep_outs = keep_outs_from(of.hit_keep_outs, checked, "hit_keep_outs")?.into_iter();
+            let hit = |((of, part), voxel): ((u32, u32), VoxelKey)| {
+                let met = keep_outs.next().flatten().map_or(Met::Voxel(voxel), Met::KeepOut);
+                Some(Hit { link: link(of)?, part, met })
+            };
             return Ok(Self::FirstHits(links.into_iter().zip(parts).zip(voxels).map(hit).collect()));
         }
         if !of.clearances_m_f32le.is_empty() {

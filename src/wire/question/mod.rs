@@ -2,6 +2,7 @@
 
 mod body;
 mod grid;
+mod keep_outs;
 mod motions;
 mod nearest;
 mod poses;
@@ -18,16 +19,17 @@ impl TryFrom<pb::Asked> for Of<Asked> {
     type Error = ServiceError;
 
     fn try_from(asked: pb::Asked) -> Result<Self, ServiceError> {
-        let pb::Asked { map, level, min_revision, map_uuid } = asked;
+        let pb::Asked { map, level, min_revision, map_uuid, ignore_keep_outs } = asked;
         let map_uuid = (!map_uuid.is_empty()).then(|| uuid_from(&map_uuid)).transpose()?;
-        Ok((MapName::new(&map)?, Asked { level, min_revision, map_uuid }))
+        Ok((MapName::new(&map)?, Asked { level, min_revision, map_uuid, ignore_keep_outs }))
     }
 }
 
 impl From<(&MapName, Asked)> for pb::Asked {
-    fn from((map, Asked { level, min_revision, map_uuid }): (&MapName, Asked)) -> Self {
+    fn from((map, asked): (&MapName, Asked)) -> Self {
+        let Asked { level, min_revision, map_uuid, ignore_keep_outs } = asked;
         let map_uuid = map_uuid.map(|uuid| uuid.to_string()).unwrap_or_default();
-        Self { map: map.to_string(), level, min_revision, map_uuid }
+        Self { map: map.to_string(), level, min_revision, map_uuid, ignore_keep_outs }
     }
 }
 

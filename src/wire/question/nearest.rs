@@ -1,5 +1,6 @@
 //! The nearest voxel of points.
 
+use super::keep_outs::{keep_outs_from, keep_outs_of};
 use super::{Of, answered, asked_of};
 use crate::map::MapName;
 use crate::planning::{MeasuredTo, NearestVoxels};
@@ -46,7 +47,7 @@ impl From<MeasuredTo> for pb::MeasuredTo {
 impl From<Answered<NearestVoxels>> for pb::FindNearestResponse {
     fn from(Answered { answer, version }: Answered<NearestVoxels>) -> Self {
         let points = answer.len();
-        let NearestVoxels { found, distances_m, voxels, away } = answer;
+        let NearestVoxels { found, distances_m, voxels, away, keep_outs } = answer;
         Self {
             found: bitmap_of(found, points),
             points: points as u64,
@@ -54,6 +55,7 @@ impl From<Answered<NearestVoxels>> for pb::FindNearestResponse {
             voxels_u64le: bytes_of(voxels.into_iter().map(|voxel| voxel.to_bits())),
             away_f32le: bytes_of(away.into_iter().flatten()),
             version: Some(version.into()),
+            keep_outs: keep_outs_of(keep_outs.iter().map(Option::as_ref)),
         }
     }
 }
@@ -69,6 +71,7 @@ impl TryFrom<pb::FindNearestResponse> for Answered<NearestVoxels> {
             distances_m: numbers_of(&response.distances_m_f32le, points, "distances_m_f32le")?,
             voxels: voxels_of(&response.voxels_u64le, points, "voxels_u64le")?,
             away: away.as_chunks::<3>().0.to_vec(),
+            keep_outs: keep_outs_from(response.keep_outs, points, "keep_outs")?,
         };
         answered(nearest, response.version)
     }

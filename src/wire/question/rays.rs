@@ -1,5 +1,6 @@
 //! Rays.
 
+use super::keep_outs::{keep_outs_from, keep_outs_of};
 use super::{Of, answered, asked_of};
 use crate::map::MapName;
 use crate::planning::RayHits;
@@ -43,7 +44,7 @@ impl From<(&MapName, RayQuestion)> for pb::CastRaysRequest {
 impl From<Answered<RayHits>> for pb::CastRaysResponse {
     fn from(Answered { answer, version }: Answered<RayHits>) -> Self {
         let (rays, hits) = (answer.len(), answer.hits());
-        let RayHits { hit, distances_m, voxels } = answer;
+        let RayHits { hit, distances_m, voxels, keep_outs } = answer;
         Self {
             hit: bitmap_of(hit, rays),
             rays: rays as u64,
@@ -51,6 +52,7 @@ impl From<Answered<RayHits>> for pb::CastRaysResponse {
             distances_m_f32le: bytes_of(distances_m),
             voxels_u64le: bytes_of(voxels.into_iter().map(|voxel| voxel.to_bits())),
             version: Some(version.into()),
+            keep_outs: keep_outs_of(keep_outs.iter().map(Option::as_ref)),
         }
     }
 }
@@ -64,6 +66,7 @@ impl TryFrom<pb::CastRaysResponse> for Answered<RayHits> {
             hit: words_of(&response.hit, rays, "hit")?,
             distances_m: numbers_of(&response.distances_m_f32le, rays, "distances_m_f32le")?,
             voxels: voxels_of(&response.voxels_u64le, rays, "voxels_u64le")?,
+            keep_outs: keep_outs_from(response.keep_outs, rays, "keep_outs")?,
         };
         answered(hits, response.version)
     }

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "all of it is a test")]
 
+mod planning;
+
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -11,9 +13,9 @@ use std::time::{Duration, Instant};
 
 use mrol::client::{Client, NewMap};
 use mrol::geometry::{Point, Pose};
-use mrol::map::{Lookup, MapName, RobotName};
+use mrol::map::{KeepOutName, KeepOutShape, Lookup, MapName, Region, RobotName};
 use mrol::mapping::Guess;
-use mrol::service::{PointQuery, ScanRequest};
+use mrol::service::{PointQuery, PutKeepOut, ScanRequest};
 
 /// How long anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -159,7 +161,7 @@ async fn insert(client: &Client, points: Vec<Point>) -> u64 {
     client.insert_scan(&map(), scan).await.unwrap().version.revision
 }
 
-/// tests/driver.c at work.
+/// A program that reads commands, at work.
 struct Driver {
     process: Child,
     commands: ChildStdin,
@@ -167,8 +169,8 @@ struct Driver {
 }
 
 impl Driver {
-    fn start(linked: Linked) -> Self {
-        let mut program = compile("driver.c", linked);
+    fn start(source: &str, linked: Linked) -> Self {
+        let mut program = compile(source, linked);
         let mut process = program.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let (commands, lines) = (process.stdin.take().unwrap(), process.stdout.take().unwrap());
         Self { process, commands, lines: BufReader::new(lines) }
@@ -211,7 +213,8 @@ async fn question(client: &Client, query: PointQuery) -> (String, String) {
         let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
         numbers.map(f64::to_string).collect::<Vec<_>>().join(" ")
     });
-    let mut command = format!("query {} {lookup} {pose} {}", query.level, query.points.len());
+    let keep_out = u8::from(query.keep_out);
+    let mut command = format!("query {} {lookup} {keep_out} {pose} {}", query.level, query.points.len());
     for [x, y, z] in query.points.as_slice().iter().map(|point| point.xyz()) {
         command += &format!(" {x} {y} {z}");
     }
@@ -229,13 +232,13 @@ async fn question(client: &Client, query: PointQuery) -> (String, String) {
     (command, line)
 }
 
-/// Compares answers at every level, by both look-ups, with and without a pose.
+/// Compares answers at every level, by both look-ups, with and without keep-outs and a pose.
 async fn compare(driver: &mut Driver, client: &Client) {
     let turned = mrol::geometry::pose([0.31, -0.07, 0.02], [0.0, 0.0, 0.6, 0.8]).unwrap();
     let points: Vec<Point> =
         (0..203).map(|i| Point::new((i % 29) as f32 * 0.07, (i / 29) as f32 * 0.05, 0.05)).collect();
     for level in 0..4 {
-        for lookup in [Lookup::Exact, Lookup::Bloom] {
+        for (lookup, keep_out) in [(Lookup::Exact, false), (Lookup::Bloom, false), (Lookup::Exact, true)] {
             for map_from_points in [None, Some(turned)] {
                 let points = points.clone().into();
                 let query = PointQuery {
@@ -245,7 +248,7 @@ async fn compare(driver: &mut Driver, client: &Client) {
                     lookup,
                     min_revision: None,
                     map_uuid: None,
-                    keep_out: false,
+                    keep_out,
                 };
                 let (command, line) = question(client, query).await;
                 assert_eq!(driver.told(&command), line, "level {level}, {lookup:?}");
@@ -259,7 +262,7 @@ async fn a_c_program_answers_as_grpc_does(linked: Linked) {
     let client = server.client().await;
     make_map(&client).await;
     insert(&client, row(5)).await;
-    let mut driver = Driver::start(linked);
+    let mut driver = Driver::start("driver.c", linked);
     driver.does(&format!("open {} a 1", server.grpc));
     compare(&mut driver, &client).await;
     let revision = insert(&client, row(19)).await;
@@ -268,6 +271,13 @@ async fn a_c_program_answers_as_grpc_does(linked: Linked) {
     let version = driver.told("version");
     let [uuid, _, hash] = version.split(' ').collect::<Vec<_>>()[..] else { panic!("{version}") };
     assert_eq!(version, format!("{uuid} {revision} {hash}"));
+
+    let ball = KeepOutShape::of_region(Region::ball([0.4, 0.3, 0.05], 0.16).unwrap()).unwrap();
+    let name = KeepOutName::new("crate").unwrap();
+    let put = PutKeepOut { name, shape: ball, expires_at_ns: None, request_id: None };
+    let revision = client.put_keep_out(&map(), put).await.unwrap().version.revision;
+    driver.does(&format!("wait {revision} 20000"));
+    compare(&mut driver, &client).await;
 
     // Killed, the server is missed; the copy answers, and goes on without a reset when it is back.
     let server = server.kill_and_start();
@@ -307,14 +317,14 @@ async fn a_copy_of_a_region_refuses_what_lies_outside() {
     let client = server.client().await;
     make_map(&client).await;
     insert(&client, row(19)).await;
-    let mut driver = Driver::start(Linked::Dynamically);
+    let mut driver = Driver::start("driver.c", Linked::Dynamically);
     driver.does(&format!("open {} a 0 0 -1 -1 1 1 1", server.grpc));
-    let inside = driver.told("query 0 1 - 2 0.55 0.05 0.05 0.55 0.55 0.05");
+    let inside = driver.told("query 0 1 0 - 2 0.55 0.05 0.05 0.55 0.55 0.05");
     let [_, revision, hash, asked, positive, bits] = inside.split(' ').collect::<Vec<_>>()[..] else {
         panic!("{inside}")
     };
     assert_eq!([revision, hash, asked, positive, bits], ["1", "-", "2", "1", "01"]);
-    let outside = driver.told("query 0 0 - 2 0.55 0.05 0.05 1.55 0.05 0.05");
+    let outside = driver.told("query 0 0 0 - 2 0.55 0.05 0.05 1.55 0.05 0.05");
     assert!(outside.starts_with("MROL_INVALID_ARGUMENT point_out_of_range: points[1]"), "{outside}");
     driver.end();
 }
@@ -364,4 +374,12 @@ async fn the_examples_ask_about_a_point() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut python = Command::new("python3");
     example(python.arg(folder.join("examples/follow.py")).arg(built().join("libmrol_replica.so")));
+    let mut python = Command::new("python3");
+    let motions = ["0.1", "0.15", "1.05", "0.05", "0.15", "0.5", "0.05", "0.15", "-0.5", "0.05"];
+    python.arg(folder.join("examples/motions.py")).arg(built().join("libmrol_replica.so"));
+    let output = python.args([&server.grpc, "a"]).args(motions).output().unwrap();
+    let [said, complained] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    let expected = "[0.15, 1.05, 0.05] to [0.15, 0.5, 0.05]: free\n\
+                    [0.15, 0.5, 0.05] to [0.15, -0.5, 0.05]: met after 33% of the way\n";
+    assert!(output.status.success() && said == expected, "{said}{complained}");
 }

@@ -1,0 +1,125 @@
+//! The map from above, as a 2-D grid.
+
+use mrol::planning::{Grid, GridArea};
+use mrol::service::GridScope;
+
+use super::{Form, asked, check_reserved, ones, unless_zero};
+use crate::abi::Answer;
+use crate::failure::Failure;
+use crate::memory::{Out, Places, Question, flag};
+use crate::replicas::OpenReplica;
+
+/// `mrol_grid_question`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct GridQuestion {
+    pub(crate) struct_size: usize,
+    pub(crate) area_min_m: [f64; 2],
+    pub(crate) area_max_m: [f64; 2],
+    pub(crate) min_z_m: f64,
+    pub(crate) max_z_m: f64,
+    pub(crate) cell_m: f64,
+    pub(crate) level: u32,
+    pub(crate) has_area: u8,
+    pub(crate) has_min_z: u8,
+    pub(crate) has_max_z: u8,
+    pub(crate) ignore_keep_outs: u8,
+    pub(crate) reserved: [u8; 8],
+}
+
+// SAFETY: it begins with its size, and any bytes are one.
+unsafe impl Question for GridQuestion {
+    const NAME: &'static str = "question";
+    const BYTES_MIN: usize = size_of::<Self>();
+}
+
+/// `mrol_grid_shape`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(crate) struct GridShape {
+    pub(crate) cell_m: f64,
+    pub(crate) origin_m: [f64; 2],
+    pub(crate) cells: [u64; 2],
+    pub(crate) reserved: [u64; 2],
+}
+
+/// `mrol_grid_answers`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct GridPlaces {
+    pub(crate) struct_size: usize,
+    pub(crate) capacity: usize,
+    pub(crate) shape: *mut GridShape,
+    pub(crate) occupied: *mut u8,
+    pub(crate) tops_m: *mut f32,
+}
+
+// SAFETY: it begins with its size, and any bytes are one.
+unsafe impl Question for GridPlaces {
+    const NAME: &'static str = "answers";
+    const BYTES_MIN: usize = size_of::<Self>();
+}
+
+impl GridQuestion {
+    fn scope(&self) -> Result<GridScope, Failure> {
+        check_reserved(&self.reserved, "question")?;
+        let bound = |has: u8, name: &str, bound: f64, otherwise: f64| {
+            flag(has, name).map(|has| if has { bound } else { otherwise })
+        };
+        let low_m = bound(self.has_min_z, "question.has_min_z", self.min_z_m, f64::NEG_INFINITY)?;
+        let high_m = bound(self.has_max_z, "question.has_max_z", self.max_z_m, f64::INFINITY)?;
+        let area = match flag(self.has_area, "question.has_area")? {
+            true => GridArea::Rectangle { min_m: self.area_min_m, max_m: self.area_max_m },
+            false => GridArea::Occupied,
+        };
+        Ok(GridScope { area, band_m: [low_m, high_m], cell_m: unless_zero(self.cell_m) })
+    }
+}
+
+fn shape_of(grid: &Grid) -> GridShape {
+    let cells = grid.size.map(|cells| cells as u64);
+    GridShape { cell_m: grid.cell_m, origin_m: grid.origin_m, cells, reserved: [0; 2] }
+}
+
+impl GridPlaces {
+    /// Writes the arrays.
+    ///
+    /// # Safety
+    /// Pointers are NULL or point to memory for `capacity` cells.
+    unsafe fn write(&self, grid: &Grid) -> Result<(), Failure> {
+        if self.occupied.is_null() && self.tops_m.is_null() {
+            return Ok(());
+        }
+        let mut room = Places::new(grid.cells(), self.capacity)?;
+        // SAFETY: as the caller promises.
+        let (occupied, tops_m) = unsafe {
+            (room.bitmap(self.occupied, "answers.occupied")?, room.array(self.tops_m, "answers.tops_m")?)
+        };
+        if let Some(to) = occupied {
+            to.write_bits(&grid.occupied);
+        }
+        if let Some(to) = tops_m {
+            to.write(grid.tops_m.iter().copied());
+        }
+        Ok(())
+    }
+}
+
+impl Form for GridQuestion {
+    type Places = GridPlaces;
+
+    unsafe fn ask(&self, places: &GridPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
+        // SAFETY: as the caller promises.
+        let shape = unsafe { Out::of(places.shape, "answers.shape") }.required()?;
+        let question = mrol::service::GridQuestion {
+            asked: asked(self.level, self.ignore_keep_outs)?,
+            scope: self.scope()?,
+        };
+        let answered = replica.ask(&question)?;
+        let grid = &answered.answer;
+        shape.write(shape_of(grid));
+        // SAFETY: as the caller promises.
+        unsafe { places.write(grid) }?;
+        Ok(Answer::of(answered.version, grid.cells(), ones(&grid.occupied)))
+    }
+}

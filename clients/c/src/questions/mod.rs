@@ -1,0 +1,116 @@
+//! Questions of planners in the form that all of them have: what is asked, and where the arrays of the answer go.
+
+mod check;
+pub(crate) mod grid;
+mod motions;
+mod nearest;
+mod rays;
+pub(crate) mod regions;
+
+pub(crate) use check::{CollisionPlaces, PoseCheck, SphereCheck};
+pub(crate) use grid::{GridPlaces, GridQuestion};
+pub(crate) use motions::{MotionCheck, MotionPlaces};
+pub(crate) use nearest::{NearestPlaces, NearestQuestion};
+pub(crate) use rays::{RayPlaces, RayQuestion};
+
+use mrol::map::{KeepOutName, NAME_LENGTH_MAX};
+use mrol::service::Asked;
+
+use crate::abi::{Answer, Error, ReplicaHandle};
+use crate::failure::Failure;
+use crate::memory::{self, Array, Out, Plain};
+use crate::replicas::{OpenReplica, REPLICAS};
+
+/// A question, as a struct of mrol.h.
+pub(crate) trait Form: memory::Question {
+    /// Where the arrays of its answer go.
+    type Places: memory::Question;
+
+    /// Asks, and writes the answer.
+    ///
+    /// # Safety
+    /// Pointers of both structs are NULL or point to what mrol.h says, and nobody writes there meanwhile.
+    unsafe fn ask(&self, places: &Self::Places, replica: &OpenReplica) -> Result<Answer, Failure>;
+}
+
+/// Asks in the regular form.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says, and nobody writes there meanwhile.
+pub(crate) unsafe fn ask<F: Form>(
+    replica: ReplicaHandle,
+    question: *const F,
+    answers: *const F::Places,
+    answer: *mut Answer,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
+    crate::guarded(error, || {
+        let (replica, out) = (REPLICAS.get(replica)?, out.optional()?);
+        // SAFETY: as the caller promises.
+        let (question, answers) =
+            unsafe { (memory::read_question(question)?, memory::read_question(answers)?) };
+        // SAFETY: as the caller promises.
+        let answered = unsafe { question.ask(&answers, &replica) }?;
+        if let Some(out) = out {
+            out.write(answered);
+        }
+        Ok(())
+    })
+}
+
+/// What all questions have in common. A copy is asked as it is: programs wait for revisions beforehand.
+fn asked(level: u32, ignore_keep_outs: u8) -> Result<Asked, Failure> {
+    let ignore_keep_outs = memory::flag(ignore_keep_outs, "ignore_keep_outs")?;
+    Ok(Asked { level, ignore_keep_outs, ..Asked::default() })
+}
+
+/// `mrol_name`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(crate) struct Name {
+    text: [u8; NAME_BYTES],
+}
+
+/// Bytes of a name with its zero: `MROL_NAME_BYTES`.
+const NAME_BYTES: usize = 72;
+const _: () = assert!(NAME_BYTES > NAME_LENGTH_MAX);
+
+// SAFETY: any bytes are one.
+unsafe impl Plain for Name {}
+
+impl Name {
+    /// The name, or none.
+    fn of(name: Option<&KeepOutName>) -> Self {
+        let mut text = [0; NAME_BYTES];
+        let name = name.map_or("", KeepOutName::as_str);
+        text.iter_mut().zip(name.bytes()).for_each(|(to, byte)| *to = byte);
+        Self { text }
+    }
+}
+
+/// Writes the keep-outs of `count` elements, of which there are none where the list is empty.
+fn write_names(to: Option<Array<Name>>, keep_outs: &[Option<KeepOutName>], count: usize) {
+    if let Some(to) = to {
+        to.write((0..count).map(|i| Name::of(keep_outs.get(i).and_then(Option::as_ref))));
+    }
+}
+
+/// Refuses bytes that must be zero.
+fn check_reserved(reserved: &[u8], name: &str) -> Result<(), Failure> {
+    match reserved.iter().all(|byte| *byte == 0) {
+        true => Ok(()),
+        false => Err(Failure::argument(format!("{name}.reserved must be zero"))),
+    }
+}
+
+/// A number for which 0 stands for the default.
+fn unless_zero<T: PartialEq + Default>(number: T) -> Option<T> {
+    (number != T::default()).then_some(number)
+}
+
+/// How many bits are set.
+fn ones(words: &[u64]) -> u64 {
+    words.iter().map(|word| u64::from(word.count_ones())).sum()
+}

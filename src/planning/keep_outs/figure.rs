@@ -1,0 +1,120 @@
+//! Bodies in meters, as shapes are asked about them.
+
+use super::Shapes;
+use crate::map::KeepOut;
+use crate::planning::parts::{Link, Sphere};
+use crate::planning::placement::CellsFromLink;
+
+/// A body: its links, each in its own frame.
+#[derive(Debug)]
+pub(in crate::planning) struct Figure(pub(super) Vec<Solid>);
+
+/// A link.
+#[derive(Debug)]
+pub(in crate::planning) struct Solid {
+    /// Spheres in their order, points with padding after them: center and radius.
+    spheres: Vec<([f64; 3], f64)>,
+    /// Points without padding.
+    points: Vec<[f64; 3]>,
+    /// The ball around all of them.
+    center_m: [f64; 3],
+    radius_m: f64,
+}
+
+impl Figure {
+    /// The body of these links.
+    pub(in crate::planning) fn of(links: &[Link]) -> Self {
+        Self(links.iter().map(Solid::of_link).collect())
+    }
+
+    /// Its links.
+    pub(in crate::planning) fn links(&self) -> &[Solid] {
+        &self.0
+    }
+}
+
+impl Solid {
+    fn of_link(link: &Link) -> Self {
+        let (padding_m, is_padded) = (f64::from(link.padding_m), link.padding_m > 0.0);
+        let points = || link.points.iter().map(|point| point.xyz().map(f64::from));
+        let padded = points().filter(|_| is_padded).map(|point| (point, padding_m));
+        let spheres = spheres_of(&link.spheres, padding_m).chain(padded).collect();
+        Self::of_parts(spheres, points().filter(|_| !is_padded).collect())
+    }
+
+    /// Spheres alone.
+    pub(in crate::planning) fn of_spheres(spheres: &[Sphere], padding_m: f32) -> Self {
+        Self::of_parts(spheres_of(spheres, f64::from(padding_m)).collect(), Vec::new())
+    }
+
+    fn of_parts(spheres: Vec<([f64; 3], f64)>, points: Vec<[f64; 3]>) -> Self {
+        let all = || spheres.iter().copied().chain(points.iter().map(|point| (*point, 0.0)));
+        let count = all().count().max(1) as f64;
+        let center_m =
+            [0, 1, 2].map(|axis: usize| all().map(|(center, _)| center[axis]).sum::<f64>() / count);
+        let reach = |(center, radius): ([f64; 3], f64)| {
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| center[axis] - center_m[axis]);
+            x.hypot(y).hypot(z) + radius
+        };
+        let radius_m = all().map(reach).fold(0.0, f64::max) * (1.0 + 1e-9);
+        Self { spheres, points, center_m, radius_m }
+    }
+
+    /// The shapes that may be within `most_m` of it.
+    pub(super) fn near<'a>(
+        &self,
+        shapes: &Shapes<'a>,
+        map_from_link: &CellsFromLink,
+        most_m: f64,
+    ) -> Shapes<'a> {
+        shapes.near(map_from_link.cells(self.center_m), self.radius_m, most_m)
+    }
+
+    /// The first part that meets a shape, and the shape: spheres before points.
+    pub(super) fn first_met<'a>(
+        &self,
+        shapes: &Shapes<'a>,
+        map_from_link: &CellsFromLink,
+    ) -> Option<(usize, &'a KeepOut)> {
+        let near = self.near(shapes, map_from_link, 0.0);
+        if near.is_empty() {
+            return None;
+        }
+        let of_sphere = |(part, (center, radius)): (usize, &([f64; 3], f64))| {
+            near.nearest(map_from_link.cells(*center), *radius).map(|(_, keep_out)| (part, keep_out))
+        };
+        let of_point = |(part, point): (usize, &[f64; 3])| {
+            let keep_out = near.containing(map_from_link.cells(*point));
+            keep_out.map(|keep_out| (self.spheres.len() + part, keep_out))
+        };
+        let sphere = self.spheres.iter().enumerate().find_map(of_sphere);
+        sphere.or_else(|| self.points.iter().enumerate().find_map(of_point))
+    }
+
+    /// The distance to the nearest shape, meters, 0 where they meet; none where it is more than `most_m`.
+    pub(super) fn distance_m(
+        &self,
+        shapes: &Shapes<'_>,
+        map_from_link: &CellsFromLink,
+        most_m: f64,
+    ) -> Option<f64> {
+        let near = self.near(shapes, map_from_link, most_m);
+        let mut least_m = None;
+        if near.is_empty() {
+            return None;
+        }
+        for (center, radius) in
+            self.spheres.iter().copied().chain(self.points.iter().map(|point| (*point, 0.0)))
+        {
+            let reach_m = radius + least_m.unwrap_or(most_m);
+            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), reach_m) {
+                least_m = Some((distance_m - radius).max(0.0));
+            }
+        }
+        least_m
+    }
+}
+
+fn spheres_of(spheres: &[Sphere], padding_m: f64) -> impl Iterator<Item = ([f64; 3], f64)> {
+    spheres.iter().map(move |sphere| (sphere.center_m.map(f64::from), f64::from(sphere.radius_m) + padding_m))
+}
