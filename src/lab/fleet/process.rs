@@ -44,11 +44,21 @@ impl ServerProcess {
         Self::start_at(data_dir, ANY_PORT, &[]).await
     }
 
-    /// Starts the server on some processors only, as `taskset -c` names them.
-    pub(crate) async fn start_on(processors: &str, data_dir: &Path) -> Result<Self, FleetError> {
-        let mut command = Command::new("taskset");
-        command.args(["-c", processors]).arg(own_program()?);
-        Self::launch(command, data_dir, ANY_PORT, &[]).await
+    /// Starts the server with more settings, on some processors only where there are some, as `taskset -c` names them.
+    pub(crate) async fn start_on(
+        processors: Option<&str>,
+        data_dir: &Path,
+        settings: &[(&str, &str)],
+    ) -> Result<Self, FleetError> {
+        let command = match processors {
+            Some(processors) => {
+                let mut command = Command::new("taskset");
+                command.args(["-c", processors]).arg(own_program()?);
+                command
+            }
+            None => Command::new(own_program()?),
+        };
+        Self::launch(command, data_dir, ANY_PORT, settings).await
     }
 
     /// Starts the server at an address of gRPC, with more settings: variables with their values.

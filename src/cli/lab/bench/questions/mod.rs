@@ -64,6 +64,8 @@ pub(super) struct QuestionBench {
     folder: Option<PathBuf>,
 }
 
+/// The first question makes the fields of a whole map, however slow the machine.
+const UNHURRIED: [(&str, &str); 1] = [("MROL_LIMITS__QUESTION_TIME_MAX_S", "60")];
 /// Length of a ray, meters.
 const RANGE_M: f64 = 100.0;
 /// Configurations that are asked about after a scan.
@@ -74,10 +76,8 @@ impl QuestionBench {
         let time = Duration::try_from_secs_f64(self.seconds).map_err(CliError::usage)?;
         let folder = new_folder(self.folder.as_deref())?;
         let data_dir = folder.path().join("data");
-        let mut server = match &self.server_processors {
-            Some(processors) => ServerProcess::start_on(processors, &data_dir).await?,
-            None => ServerProcess::start(&data_dir).await?,
-        };
+        let processors = self.server_processors.as_deref();
+        let mut server = ServerProcess::start_on(processors, &data_dir, &UNHURRIED).await?;
         let target = self.target(&server).await?;
         output.say(format!("{}: {} voxels", self.workload, count(target.voxels)))?;
         output.say(Line::HEAD)?;
