@@ -106,8 +106,8 @@ impl Solid {
         for (center, radius) in
             self.spheres.iter().copied().chain(self.points.iter().map(|point| (*point, 0.0)))
         {
-            let reach_m = radius + least_m.unwrap_or(most_m);
-            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), reach_m) {
+            let within_m = radius + least_m.unwrap_or(most_m);
+            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), within_m) {
                 least_m = Some((distance_m - radius).max(0.0));
             }
         }

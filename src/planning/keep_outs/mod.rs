@@ -45,8 +45,8 @@ impl<'a> Shapes<'a> {
 
     /// Those that may be within `most` of a ball.
     pub(super) fn near(&self, center_m: [f64; 3], radius_m: f64, most_m: f64) -> Self {
-        let reach_m = radius_m + most_m;
-        Self(self.iter().filter(|of| of.distance_min_m(center_m) <= reach_m).copied().collect())
+        let within_m = radius_m + most_m;
+        Self(self.iter().filter(|of| of.distance_min_m(center_m) <= within_m).copied().collect())
     }
 
     /// True without a keep-out.
