@@ -65,7 +65,7 @@ class Problem:
         solver.setup()
         checks = self._checks()
         begin = time.perf_counter()
-        solver.solve(time_limit_s)
+        solver.solve(float(time_limit_s))
         seconds = time.perf_counter() - begin
         found = definition.hasExactSolution()
         path = corners(definition.getSolutionPath()) if found else None

@@ -14,6 +14,8 @@ from checker import Places
 STEPS_PER_VOXEL = 5
 BOX_VOXELS = 8
 STEPS_AT_ONCE = 16
+ROOM_M = 0.25
+"""Up to where clearances are told."""
 
 
 @dataclass
@@ -21,7 +23,7 @@ class Contact:
     """Where a path comes nearest to the map."""
 
     clearance_m: float
-    """From the surface of the nearest sphere to the nearest cube; below 0 where they overlap; infinite where all is far."""
+    """From the surface of the nearest sphere to the nearest cube, at most ROOM_M; below 0 where they overlap."""
     place: Places | None
     """Where the body is then."""
 
@@ -42,7 +44,7 @@ class Oracle:
 
     def contact(self, path: Places) -> Contact:
         """Where the body comes nearest to the map on the path."""
-        nearest = Contact(np.inf, None)
+        nearest = Contact(ROOM_M, None)
         steps = self._steps(path)
         for begin in range(0, len(steps), STEPS_AT_ONCE):
             places = steps[begin : begin + STEPS_AT_ONCE]
@@ -61,7 +63,7 @@ class Oracle:
 
     def _clearances(self, places: Places) -> NDArray[np.float64]:
         """Of the body at each place: the least distance from a sphere's surface to a cube."""
-        lows = self._lows_near(places.min(0) - self.reach_m, places.max(0) + self.reach_m)
+        lows = self._lows_near(places.min(0) - self.reach_m - ROOM_M, places.max(0) + self.reach_m + ROOM_M)
         if len(lows) == 0:
             return np.full(len(places), np.inf)
         centers = (places[:, None, :] + self.centers).reshape(-1, 3)

@@ -68,19 +68,21 @@ class View:
 class Rendering:
     """An image of voxels in a view, with the depth of each pixel."""
 
-    def __init__(self, centers: Places, side_m: float, view: View) -> None:
+    def __init__(self, centers: Places, side_m: float, view: View, shown: Places) -> None:
         self.view = view
         flat, near = view.project(centers)
-        self.corner = flat.min(0) - side_m
-        self.pixel_m = float(np.ptp(flat[:, 0]) + 2 * side_m) / PIXELS_WIDE
-        size = np.ceil((flat.max(0) + 2 * side_m - self.corner) / self.pixel_m).astype(int)
+        all_shown = np.concatenate([flat, view.project(shown)[0]])
+        self.corner = all_shown.min(0) - MARGIN_M
+        across, up = all_shown.max(0) + MARGIN_M - self.corner
+        self.pixel_m = float(across) / PIXELS_WIDE
+        size = np.ceil(np.array([across, up]) / self.pixel_m).astype(int)
         self.depth = np.full(size[::-1], -np.inf)
         heights = np.full(size[::-1], np.nan)
         order = np.argsort(near)
         across, up = self._pixels(flat[order]).T
         reach = int(np.ceil(side_m * 1.2 / self.pixel_m / 2))
         # Where several voxels fall on a pixel, the last assignment counts: that of the nearest one.
-        layers: list[tuple[int, int]] = [(x, y) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)]
+        layers = [(x, y) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)]
         rows = np.concatenate([up + y for _, y in layers]).clip(0, size[1] - 1)
         columns = np.concatenate([across + x for x, _ in layers]).clip(0, size[0] - 1)
         nears, tops = np.tile(near[order], len(layers)), np.tile(centers[order, 2], len(layers))
@@ -127,15 +129,16 @@ def draw(served: ServedMap, paths: tuple[Places, Places], file: str, view: View,
     centers = (served.voxels() + 0.5) * served.resolution_m
     low, high = np.percentile(centers, [0.5, 99.5], axis=0) + np.array([[-MARGIN_M], [MARGIN_M]])
     centers = centers[((centers >= low) & (centers <= [high[0], high[1], min(high[2], cut_m)])).all(1)]
-    rendering = Rendering(centers, served.resolution_m, view)
+    rendering = Rendering(centers, served.resolution_m, view, np.concatenate(paths))
     rows, columns = rendering.depth.shape
     across, up = high[:2] - low[:2]
     ratios = [columns / rows, across / up]
-    figure, axes = pyplot.subplots(1, 2, figsize=(HEIGHT_INCHES * sum(ratios), HEIGHT_INCHES), width_ratios=ratios)
+    size = (HEIGHT_INCHES * sum(ratios), HEIGHT_INCHES)
+    figure, axes = pyplot.subplots(1, 2, figsize=size, width_ratios=ratios, layout="constrained")
     figure.set_facecolor([BACKGROUND] * 3)
-    figure.subplots_adjust(wspace=0.06)
     _draw_voxels(axes[0], rendering, paths)
     _draw_grid(axes[1], served, (low, high), paths)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8, frameon=False)
     figure.savefig(file, dpi=DOTS_PER_INCH, bbox_inches="tight", pad_inches=0.08)
     pyplot.close(figure)
     with Image.open(file) as picture:
@@ -168,7 +171,7 @@ def _draw_grid(axes: Axes, served: ServedMap, box: tuple[Places, Places], paths:
     for path, style in zip(paths, (FOUND, SHORTENED)):
         axes.plot(path[:, 0], path[:, 1], label=style.label, **style.line())
     _mark_ends(axes, paths[1][:, :2])
-    axes.legend(loc="best", fontsize=8, framealpha=0.9)
+    axes.set_aspect("equal")
     axes.tick_params(labelsize=7)
     axes.yaxis.tick_right()
 

@@ -132,7 +132,9 @@ def told(plan: Plan) -> str:
 def freedom(oracle: Oracle, path: Places) -> str:
     """What brute force says of a path."""
     clearance_m = oracle.contact(path).clearance_m
-    return f"nearest obstacle {clearance_m:.3f} m" if clearance_m > 0 else f"{COLLIDES} by {-clearance_m:.3f} m"
+    if clearance_m <= 0:
+        return f"{COLLIDES} by {-clearance_m:.3f} m"
+    return f"nothing within {clearance_m:.3f} m"
 
 
 if __name__ == "__main__":
