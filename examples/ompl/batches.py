@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from checker import Checker, Places
-from ompl_planning import Plan
+from ompl_planning import NO_PATH, Plan
 
 SAMPLES_FIRST = 60
 """Places of the first round; each further round brings as many as there are."""
@@ -34,12 +34,12 @@ class Roadmap:
     def plan(self, start: Places, goal: Places, time_limit_s: float) -> Plan:
         """The shortest path of the first roadmap that has one between the two; they are places 0 and 1 of a new roadmap."""
         begin, checks = time.perf_counter(), self.checks
-        path = None
+        path = NO_PATH
         samples: Places = np.array([start, goal])
-        while path is None and time.perf_counter() - begin < time_limit_s:
+        while len(path) == 0 and time.perf_counter() - begin < time_limit_s:
             count = max(SAMPLES_FIRST, len(self.places))
             self._add(np.concatenate([samples, self.random.uniform(self.low, self.high, (count, 3))]))
-            samples = np.empty((0, 3))
+            samples = NO_PATH
             path = self._shortest()
         return Plan(path, time.perf_counter() - begin, self.checks - checks)
 
@@ -67,8 +67,8 @@ class Roadmap:
         self.tried |= pairs
         return np.array(sorted(pairs), np.int64)
 
-    def _shortest(self) -> Places | None:
-        """Dijkstra's path from place 0 to place 1."""
+    def _shortest(self) -> Places:
+        """Dijkstra's path from place 0 to place 1, empty where there is none."""
         costs, came_from = {0: 0.0}, {0: 0}
         queue = [(0.0, 0)]
         while queue:
@@ -81,7 +81,7 @@ class Roadmap:
                 if cost + length < costs.get(neighbor, np.inf):
                     costs[neighbor], came_from[neighbor] = cost + length, place
                     heapq.heappush(queue, (cost + length, neighbor))
-        return None
+        return NO_PATH
 
 
 def shorten(checker: Checker, path: Places) -> Plan:

@@ -13,13 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from batches import Roadmap, shorten
-from checker import DRONE, Bools, Checker, Places
-from ompl_planning import PLANNERS, Plan, Problem, set_seed
+from batches import shorten
+from checker import Bools, Checker, Places
+from ground import CHECKERS, COLLIDES, PLANNERS, Ground, plan_by, told_freedom
+from ompl_planning import Plan, set_seed
 from oracle import Oracle
-from pairs import draw_pairs
-from plan import BATCHES, CHECKERS, COLLIDES, Ground, freedom
-from server import ServerChecker
 from serving import SCANS_OF_HALL, Server, server_with_maps
 
 PAIRS = 5
@@ -53,46 +51,38 @@ def verdict(oracle: Oracle, plans: list[Plan], pairs: Places) -> Verdict:
     """What brute force says of plans for some pairs, in rounds."""
     faults = []
     for plan, (start, goal) in zip(plans, cycle(pairs)):
-        if plan.path is None:
+        if not plan.is_found:
             continue
         if not (np.allclose(plan.path[0], start) and np.allclose(plan.path[-1], goal)):
             faults.append("does not lead from start to goal")
-        elif (said := freedom(oracle, plan.path)).startswith(COLLIDES):
+        elif (said := told_freedom(oracle, plan.path)).startswith(COLLIDES):
             faults.append(said)
-    return Verdict(sum(plan.path is not None for plan in plans), faults)
+    return Verdict(sum(plan.is_found for plan in plans), faults)
 
 
 def plans_by(planner: str, checker: Checker, ground: Ground, pairs: Places) -> list[Plan]:
     """A plan for each pair, and then the same shortened."""
-    problem = Problem(checker, ground.low, ground.high)
-    plans = []
-    for i, (start, goal) in enumerate(pairs):
-        if planner == BATCHES:
-            plans.append(Roadmap(checker, ground.low, ground.high, i).plan(start, goal, TIME_LIMIT_S))
-        else:
-            plans.append(problem.plan(planner, start, goal, TIME_LIMIT_S))
-    return plans + [plan if plan.path is None else shorten(checker, plan.path) for plan in plans]
+    problem = ground.problem(checker)
+    plans = [plan_by(planner, problem, pair, TIME_LIMIT_S, SEED) for pair in pairs]
+    return plans + [shorten(checker, plan.path) if plan.is_found else plan for plan in plans]
 
 
 def check_map(server: Server, name: str, library: str | None) -> bool:
     """Whether all planners find paths in a map, none is wrong, and those of a careless checker are."""
     ground = Ground.of(server.http, name)
-    asked = ServerChecker(ground.served, DRONE)
-    pairs = draw_pairs(ground.served, asked, ground.low, ground.high, PAIRS, SEED)
-    oracle = ground.oracle()
+    pairs, oracle = ground.pairs(PAIRS, SEED), ground.oracle()
     is_good = True
     for kind in CHECKERS:
         if kind == "replica" and library is None:
             print("skipped: no replica is asked, --library is not given", file=sys.stderr)
             continue
         checker = ground.checker(kind, server.grpc, library)
-        for planner in (*PLANNERS, BATCHES):
+        for planner in PLANNERS:
             came = verdict(oracle, plans_by(planner, checker, ground, pairs), pairs)
             print(f"{name}, {planner}, {kind}: {came}", flush=True)
             is_good &= came.found > 0 and not came.faults
-    for planner in (*PLANNERS, BATCHES):
-        came = verdict(oracle, plans_by(planner, Careless(), ground, pairs), pairs)
-        if not came.faults:
+    for planner in PLANNERS:
+        if not verdict(oracle, plans_by(planner, Careless(), ground, pairs), pairs).faults:
             print(f"{name}, {planner}: nobody notices that motions are not checked", file=sys.stderr)
             is_good = False
     return is_good
@@ -107,7 +97,8 @@ def main() -> None:
     set_seed(SEED)
     with server_with_maps(chosen.binary, chosen.scans) as server:
         if "hall" not in server.maps:
-            print(f"skipped: no plans in the hall, whose scans are not at {chosen.scans / SCANS_OF_HALL}", file=sys.stderr)
+            hall = chosen.scans / SCANS_OF_HALL
+            print(f"skipped: no plans in the hall, whose scans are not at {hall}", file=sys.stderr)
         is_good = all([check_map(server, name, chosen.library) for name in server.maps])
     if not is_good:
         raise SystemExit("a path is wrong, or a planner found none")

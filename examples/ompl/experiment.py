@@ -11,25 +11,25 @@ import argparse
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from batches import Roadmap, shorten
+from batches import shorten
 from checker import DRONE, Checker, Places
-from ompl_planning import PLANNERS, Plan, Problem, set_seed
+from ground import CHECKERS, PLANNERS, Ground, plan_by
+from ompl_planning import Plan, set_seed
 from oracle import Oracle
-from pairs import draw_pairs
-from plan import BATCHES, CHECKERS, Ground
 from reach import Reach
-from server import ServerChecker
 from serving import Server, server_with_maps
 
+SHORTENED_PLANNER = "rrt-connect"
 SHORTENERS = ("OMPL's simplifier", "shorten")
 PATHS_FOR_SHORTENERS = 30
-MOTIONS_AT_ONCE = 1000
+MOTIONS_ALONE, MOTIONS_AT_ONCE = 300, 1000
 
 
 @dataclass
@@ -65,13 +65,12 @@ def measure(task: Task) -> Measured:
     checker = ground.checker(task.checker, task.server.grpc, task.library)
     # The first question makes the map's distance field.
     checker.motions_fit(task.pairs)
-    problem = Problem(checker, ground.low, ground.high)
-    planners: dict[str, Callable[[int, Places], Plan]] = {
-        name: lambda _, pair, name=name: problem.plan(name, *pair, task.time_limit_s) for name in PLANNERS
+    problem = ground.problem(checker)
+    plans = {
+        planner: [plan_by(planner, problem, pair, task.time_limit_s, seed) for seed, pair in enumerate(task.pairs)]
+        for planner in PLANNERS
     }
-    planners[BATCHES] = lambda i, pair: Roadmap(checker, ground.low, ground.high, i).plan(*pair, task.time_limit_s)
-    plans = {name: [plan(i, pair) for i, pair in enumerate(task.pairs)] for name, plan in planners.items()}
-    paths = [plan.path for plan in plans["rrt-connect"] if plan.path is not None][:PATHS_FOR_SHORTENERS]
+    paths = [plan.path for plan in plans[SHORTENED_PLANNER] if plan.is_found][:PATHS_FOR_SHORTENERS]
     shortened = {
         SHORTENERS[0]: [problem.simplify(path) for path in paths],
         SHORTENERS[1]: [shorten(checker, path) for path in paths],
@@ -85,8 +84,8 @@ def motion_times(checker: Checker, pairs: Places, seed: int) -> tuple[float, flo
     starts = pairs[random.integers(len(pairs), size=MOTIONS_AT_ONCE), 0]
     steps = random.normal(size=starts.shape)
     motions = np.stack([starts, starts + steps / np.linalg.norm(steps, axis=1, keepdims=True)], 1)
-    alone = [timed(lambda: checker.motions_fit(motion[None])) for motion in motions[:300]]
-    return float(np.median(alone)), timed(lambda: checker.motions_fit(motions)) / len(motions)
+    alone = [timed(partial(checker.motions_fit, motion[None])) for motion in motions[:MOTIONS_ALONE]]
+    return float(np.median(alone)), timed(partial(checker.motions_fit, motions)) / len(motions)
 
 
 def timed(work: Callable[[], object]) -> float:
@@ -100,42 +99,51 @@ def compare(task: Task, checkers: list[str]) -> bool:
     measured = {}
     for checker in checkers:
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
-            measured[checker] = process.submit(measure, Task(**{**vars(task), "checker": checker})).result()
+            measured[checker] = process.submit(measure, replace(task, checker=checker)).result()
     ground = Ground.of(task.server.http, task.map)
     oracle = ground.oracle()
     reach = Reach.of(ground.voxels, ground.served.resolution_m, DRONE, ground.low, ground.high)
     print(f"\n{task.map}: {len(task.pairs)} pairs, {told_reach(reach, task.pairs, measured)}")
-    print("\n| planner | asks | solved | median, ms | p95, ms | checks a plan | checks a second | least clearance, mm |")
+    least_m = min(print_plans(measured, oracle), print_shortened(measured, oracle))
+    print("\n| a motion of 1 m, us | alone | of 1,000 at once |\n|---|---|---|")
+    for checker, of_checker in measured.items():
+        print(f"| {checker} | {of_checker.motion_us:.1f} | {of_checker.motion_of_many_us:.2f} |")
+    return least_m > 0
+
+
+def print_plans(measured: dict[str, Measured], oracle: Oracle) -> float:
+    """Prints the table of planners; the least clearance of their paths, meters."""
+    print("\n| planner | asks | solved | median, ms | p95, ms | checks a plan | checks a second | clearance, mm |")
     print("|---|---|---|---|---|---|---|---|")
-    is_free = True
-    for planner in (*PLANNERS, BATCHES):
-        for checker in checkers:
-            plans = measured[checker].plans[planner]
-            least_m = least_clearance(oracle, plans)
-            is_free &= least_m > 0
-            print(f"| {planner} | {checker} | {row(plans)} | {least_m * 1e3:.1f} |")
-    print("\n| shortening a path of RRT-Connect | asks | median, ms | checks a path | length left | least clearance, mm |")
+    clearances = []
+    for planner in PLANNERS:
+        for checker, of_checker in measured.items():
+            plans = of_checker.plans[planner]
+            clearances.append(least_clearance(oracle, plans))
+            print(f"| {planner} | {checker} | {row(plans)} | {clearances[-1] * 1e3:.1f} |")
+    return min(clearances)
+
+
+def print_shortened(measured: dict[str, Measured], oracle: Oracle) -> float:
+    """Prints the table of shorter paths; their least clearance, meters."""
+    print(f"\n| shortening a path of {SHORTENED_PLANNER} | asks | median, ms | checks | length left | clearance, mm |")
     print("|---|---|---|---|---|---|")
+    clearances = []
     for shortener in SHORTENERS:
-        for checker in checkers:
-            short = measured[checker].shortened[shortener]
-            found = [plan.path for plan in measured[checker].plans["rrt-connect"] if plan.path is not None]
-            left = np.median([length(after.path) / length(before) for after, before in zip(short, found)])
-            least_m = least_clearance(oracle, short)
-            is_free &= least_m > 0
-            checks = np.median([plan.checks for plan in short])
-            print(f"| {shortener} | {checker} | {milliseconds(short, 50)} | {checks:.0f} | {left:.2f} | {least_m * 1e3:.1f} |")
-    print("\n| a motion of 1 m, us | alone | of 1,000 at once |")
-    print("|---|---|---|")
-    for checker in checkers:
-        print(f"| {checker} | {measured[checker].motion_us:.1f} | {measured[checker].motion_of_many_us:.2f} |")
-    return is_free
+        for checker, of_checker in measured.items():
+            short = of_checker.shortened[shortener]
+            found = [plan for plan in of_checker.plans[SHORTENED_PLANNER] if plan.is_found]
+            left = np.median([after.length_m / before.length_m for after, before in zip(short, found)])
+            clearances.append(least_clearance(oracle, short))
+            cells = [shortener, checker, milliseconds(short, 50), f"{np.median([plan.checks for plan in short]):.0f}"]
+            print("|", " | ".join([*cells, f"{left:.2f}", f"{clearances[-1] * 1e3:.1f}"]), "|")
+    return min(clearances)
 
 
 def told_reach(reach: Reach, pairs: Places, measured: dict[str, Measured]) -> str:
     """How many pairs are joined by a path, which no path joins, and which ones are open."""
     plans = [plans for of_checker in measured.values() for plans in of_checker.plans.values()]
-    solved = [any(of_planner[i].path is not None for of_planner in plans) for i in range(len(pairs))]
+    solved = [any(of_planner[i].is_found for of_planner in plans) for i in range(len(pairs))]
     apart = [reach.are_apart(*pair) for pair in pairs]
     undecided = [i for i in range(len(pairs)) if not solved[i] and not apart[i]]
     return f"{sum(solved)} joined by a path, {sum(apart)} proved to be unreachable, undecided: {undecided or 'none'}"
@@ -143,12 +151,12 @@ def told_reach(reach: Reach, pairs: Places, measured: dict[str, Measured]) -> st
 
 def least_clearance(oracle: Oracle, plans: list[Plan]) -> float:
     """The least distance of the drone from the map on any path, by brute force, meters."""
-    return min((oracle.contact(plan.path).clearance_m for plan in plans if plan.path is not None), default=np.inf)
+    return min((oracle.contact(plan.path).clearance_m for plan in plans if plan.is_found), default=np.inf)
 
 
 def row(plans: list[Plan]) -> str:
     """Cells of a table: solved, times of what was solved, checks."""
-    solved = [plan for plan in plans if plan.path is not None]
+    solved = [plan for plan in plans if plan.is_found]
     checks, seconds = sum(plan.checks for plan in plans), sum(plan.seconds for plan in plans)
     cells = [f"{len(solved)} of {len(plans)}", milliseconds(solved, 50), milliseconds(solved, 95)]
     cells += [f"{np.median([plan.checks for plan in solved]):.0f}", f"{checks / seconds:,.0f}"]
@@ -157,11 +165,6 @@ def row(plans: list[Plan]) -> str:
 
 def milliseconds(plans: list[Plan], percentile: float) -> str:
     return f"{np.percentile([plan.seconds * 1e3 for plan in plans], percentile):.1f}"
-
-
-def length(path: Places | None) -> float:
-    assert path is not None
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def main() -> None:
@@ -177,9 +180,7 @@ def main() -> None:
     is_free = True
     with server_with_maps(chosen.binary, chosen.scans) as server:
         for name in server.maps:
-            ground = Ground.of(server.http, name)
-            asked = ServerChecker(ground.served, DRONE)
-            pairs = draw_pairs(ground.served, asked, ground.low, ground.high, chosen.pairs, chosen.seed)
+            pairs = Ground.of(server.http, name).pairs(chosen.pairs, chosen.seed)
             task = Task(server, chosen.library, name, "", pairs, chosen.time_limit, chosen.seed)
             is_free &= compare(task, checkers)
     if not is_free:

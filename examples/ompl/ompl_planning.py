@@ -8,18 +8,31 @@ from ompl import base, geometric, util
 
 from checker import Checker, Places
 
-PLANNERS = {"rrt-connect": geometric.RRTConnect, "bit-star": geometric.BITstar}
+OMPL_PLANNERS = {"rrt-connect": geometric.RRTConnect, "bit-star": geometric.BITstar}
 
 
 @dataclass
 class Plan:
     """What a planner found, and what it cost."""
 
-    path: Places | None
-    """The corners of the path from start to goal; None where none was found."""
+    path: Places
+    """The corners of the path from start to goal; none where no path was found."""
     seconds: float
     checks: int
     """How often the planner asked the checker: each is a request where the checker asks a server."""
+
+    @property
+    def is_found(self) -> bool:
+        """Whether there is a path."""
+        return len(self.path) > 0
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path."""
+        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+
+
+NO_PATH: Places = np.empty((0, 3))
 
 
 class EdgeValidator(base.MotionValidator):
@@ -40,6 +53,7 @@ class Problem:
 
     def __init__(self, checker: Checker, low: Places, high: Places) -> None:
         self.checker = checker
+        self.low, self.high = low, high
         self.state_checks = 0
         bounds = base.RealVectorBounds(3)
         for axis in range(3):
@@ -58,7 +72,7 @@ class Problem:
         definition = base.ProblemDefinition(self.space)
         definition.setStartAndGoalStates(self._state(start), self._state(goal))
         definition.setOptimizationObjective(base.PathLengthOptimizationObjective(self.space))
-        solver = PLANNERS[planner](self.space)
+        solver = OMPL_PLANNERS[planner](self.space)
         if planner == "bit-star":
             solver.setStopOnSolnImprovement(True)
         solver.setProblemDefinition(definition)
@@ -68,7 +82,7 @@ class Problem:
         solver.solve(float(time_limit_s))
         seconds = time.perf_counter() - begin
         found = definition.hasExactSolution()
-        path = corners(definition.getSolutionPath()) if found else None
+        path = corners(definition.getSolutionPath()) if found else NO_PATH
         return Plan(path, seconds, self._checks() - checks)
 
     def simplify(self, path: Places) -> Plan:

@@ -135,7 +135,7 @@ def draw(served: ServedMap, paths: tuple[Places, Places], file: str, view: View,
     ratios = [columns / rows, across / up]
     size = (HEIGHT_INCHES * sum(ratios), HEIGHT_INCHES)
     figure, axes = pyplot.subplots(1, 2, figsize=size, width_ratios=ratios, layout="constrained")
-    figure.set_facecolor([BACKGROUND] * 3)
+    figure.set_facecolor((BACKGROUND, BACKGROUND, BACKGROUND))
     _draw_voxels(axes[0], rendering, paths)
     _draw_grid(axes[1], served, (low, high), paths)
     figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8, frameon=False)

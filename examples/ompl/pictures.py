@@ -9,11 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from batches import shorten
-from checker import DRONE
-from ompl_planning import Problem, set_seed
+from ground import Ground, plan_by
+from ompl_planning import set_seed
 from picture import View, draw
-from plan import Ground
-from server import ServerChecker
 from serving import server_with_maps
 
 # From, to, heights between which the drone flies, height above which no voxels are drawn, how the map is turned and tipped.
@@ -31,14 +29,13 @@ def main() -> None:
             start, goal, heights, cut_m, view = PLANS[name]
             ground = Ground.of(server.http, name)
             ground.low[2], ground.high[2] = heights
-            checker = ServerChecker(ground.served, DRONE)
-            path = Problem(checker, ground.low, ground.high).plan("rrt-connect", np.array(start), np.array(goal), 10).path
-            if path is None:
+            problem = ground.problem(ground.checker("wire", server.grpc, None))
+            plan = plan_by("rrt-connect", problem, np.array([start, goal]), 10.0, 1)
+            if not plan.is_found:
                 raise SystemExit(f"no path through {name}")
-            short = shorten(checker, path).path
-            assert short is not None
+            paths = (plan.path, shorten(problem.checker, plan.path).path)
             file = Path(folder) / f"ompl-{name}.png"
-            draw(ground.served, (path, short), str(file), view, cut_m)
+            draw(ground.served, paths, str(file), view, cut_m)
             print(f"{file}: {file.stat().st_size} bytes")
 
 

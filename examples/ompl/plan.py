@@ -5,55 +5,13 @@
 """
 
 import argparse
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from batches import Roadmap, shorten
-from checker import DRONE, Checker, Places
-from ompl_planning import PLANNERS, Plan, Problem, set_seed
-from oracle import Oracle
-from pairs import draw_pairs, region_of
-from server import ServedMap, ServerChecker
-
-BATCHES = "roadmap"
-CHECKERS = ("wire", "replica", "octree")
-COLLIDES = "COLLIDES"
-
-
-@dataclass
-class Ground:
-    """A map to plan in."""
-
-    served: ServedMap
-    voxels: NDArray[np.int64]
-    low: Places
-    high: Places
-
-    @staticmethod
-    def of(address: str, name: str) -> "Ground":
-        served = ServedMap(address, name)
-        voxels = served.voxels()
-        return Ground(served, voxels, *region_of(voxels, served.resolution_m, DRONE))
-
-    def checker(self, kind: str, grpc: str, library: str | None) -> Checker:
-        """What answers the planner's questions: the server, a copy of the map in this process, or an octree."""
-        if kind == "octree":
-            from octree import OctreeChecker
-
-            return OctreeChecker(self.voxels, self.served.resolution_m, DRONE)
-        if kind == "replica":
-            from replica import ReplicaChecker
-
-            if library is None:
-                raise SystemExit("--checker replica needs --library, the shared library of clients/c")
-            return ReplicaChecker(library, grpc, self.served.name, self.served.resolution_m, DRONE)
-        return ServerChecker(self.served, DRONE)
-
-    def oracle(self) -> Oracle:
-        """Who checks paths again."""
-        return Oracle(self.voxels, self.served.resolution_m, DRONE)
+from batches import shorten
+from checker import Places
+from ground import CHECKERS, PLANNERS, Ground, plan_by, told_freedom
+from ompl_planning import Plan, set_seed
 
 
 def options() -> argparse.Namespace:
@@ -64,7 +22,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--to", dest="goal", help="where it ends")
     parser.add_argument("--pairs", type=int, default=10, help="without --from and --to: how many random pairs")
     parser.add_argument("--heights", help='between which the drone flies: "low high", meters')
-    parser.add_argument("--planner", choices=(*PLANNERS, BATCHES), default="rrt-connect")
+    parser.add_argument("--planner", choices=PLANNERS, default="rrt-connect")
     parser.add_argument("--checker", choices=CHECKERS, default="wire")
     parser.add_argument("--library", help="of clients/c, for --checker replica")
     parser.add_argument("--grpc", default="http://127.0.0.1:7334", help="address of gRPC, for --checker replica")
@@ -82,36 +40,28 @@ def main() -> None:
     ground = Ground.of(chosen.server, chosen.map)
     if chosen.heights:
         ground.low[2], ground.high[2] = numbers(chosen.heights)
-    checker = ground.checker(chosen.checker, chosen.grpc, chosen.library)
-    problem, oracle = Problem(checker, ground.low, ground.high), ground.oracle()
-    shown = None
-    for start, goal in pairs_of(chosen, ground, checker):
-        if chosen.planner == BATCHES:
-            plan = Roadmap(checker, ground.low, ground.high, chosen.seed).plan(start, goal, chosen.time_limit)
-        else:
-            plan = problem.plan(chosen.planner, start, goal, chosen.time_limit)
-        if plan.path is None:
+    problem = ground.problem(ground.checker(chosen.checker, chosen.grpc, chosen.library))
+    oracle, shown = ground.oracle(), None
+    for start, goal in pairs_of(chosen, ground):
+        plan = plan_by(chosen.planner, problem, np.array([start, goal]), chosen.time_limit, chosen.seed)
+        if not plan.is_found:
             print(f"{text(start)} to {text(goal)}: no path in {plan.seconds:.1f} s and {plan.checks} checks")
             continue
-        short = shorten(checker, plan.path)
+        short = shorten(problem.checker, plan.path)
         shown = shown or (plan.path, short.path)
-        print(f"{text(start)} to {text(goal)}: {told(plan)}; shortened: {told(short)}; {freedom(oracle, short.path)}")
+        said = told_freedom(oracle, short.path)
+        print(f"{text(start)} to {text(goal)}: {told(plan)}; shortened: {told(short)}; {said}")
     if chosen.picture and shown:
-        draw_picture(chosen, ground, [*shown])
+        from picture import View, draw
+
+        draw(ground.served, shown, chosen.picture, View(*numbers(chosen.view)), chosen.cut)
 
 
-def pairs_of(chosen: argparse.Namespace, ground: Ground, checker: Checker) -> Places:
+def pairs_of(chosen: argparse.Namespace, ground: Ground) -> Places:
     """The pair that was given, or random ones."""
     if chosen.start is None or chosen.goal is None:
-        return draw_pairs(ground.served, checker, ground.low, ground.high, chosen.pairs, chosen.seed)
+        return ground.pairs(chosen.pairs, chosen.seed)
     return np.array([[numbers(chosen.start), numbers(chosen.goal)]])
-
-
-def draw_picture(chosen: argparse.Namespace, ground: Ground, paths: list[Places]) -> None:
-    from picture import View, draw
-
-    turn, tip = numbers(chosen.view)
-    draw(ground.served, paths, chosen.picture, View(turn, tip), chosen.cut)
 
 
 def numbers(words: str) -> list[float]:
@@ -124,17 +74,7 @@ def text(place: Places) -> str:
 
 def told(plan: Plan) -> str:
     """A plan in words."""
-    assert plan.path is not None
-    length_m = np.linalg.norm(np.diff(plan.path, axis=0), axis=1).sum()
-    return f"{length_m:.1f} m, {len(plan.path)} corners, {plan.seconds * 1e3:.1f} ms, {plan.checks} checks"
-
-
-def freedom(oracle: Oracle, path: Places) -> str:
-    """What brute force says of a path."""
-    clearance_m = oracle.contact(path).clearance_m
-    if clearance_m <= 0:
-        return f"{COLLIDES} by {-clearance_m:.3f} m"
-    return f"nothing within {clearance_m:.3f} m"
+    return f"{plan.length_m:.1f} m, {len(plan.path)} corners, {plan.seconds * 1e3:.1f} ms, {plan.checks} checks"
 
 
 if __name__ == "__main__":
