@@ -1,7 +1,7 @@
 """The same questions to a copy of the map in this process: the C library of clients/c, by ctypes."""
 
 import sys
-from ctypes import POINTER, Structure, byref, c_float, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p, sizeof
+from ctypes import POINTER, Structure, byref, c_float, c_size_t, c_uint8, c_uint32, c_uint64, sizeof
 from pathlib import Path
 
 import numpy as np
@@ -11,32 +11,18 @@ from checker import Bools, Places, padding_between_checks
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "clients" / "c" / "examples"))
 from follow import Answer, Copy, Error, Replica  # noqa: E402
+from motions import Body, Link, MotionAnswers, MotionCheck, Region  # noqa: E402
 
 MOTIONS_FIRST = 16
-
-
-class Body(Structure):
-    _fields_ = [("number", c_uint64)]
-
-
-class Link(Structure):
-    _fields_ = [
-        ("spheres", c_void_p),
-        ("spheres_count", c_size_t),
-        ("points", c_void_p),
-        ("points_count", c_size_t),
-        ("padding_m", c_float),
-        ("reserved", c_uint32 * 3),
-    ]
 
 
 class PoseCheck(Structure):
     _fields_ = [
         ("struct_size", c_size_t),
         ("body", Body),
-        ("configurations", c_void_p),
+        ("configurations", POINTER(c_float)),
         ("count", c_size_t),
-        ("ignored", c_void_p),
+        ("ignored", POINTER(Region)),
         ("ignored_count", c_size_t),
         ("level", c_uint32),
         ("clearance_max_m", c_float),
@@ -48,39 +34,12 @@ class Collisions(Structure):
     _fields_ = [
         ("struct_size", c_size_t),
         ("capacity", c_size_t),
-        ("colliding", c_void_p),
-        ("hit_links", c_void_p),
-        ("hit_parts", c_void_p),
-        ("hit_voxels", c_void_p),
-        ("clearances_m", c_void_p),
-        ("nearest_links", c_void_p),
-    ]
-
-
-class MotionCheck(Structure):
-    _fields_ = [
-        ("struct_size", c_size_t),
-        ("body", Body),
-        ("configurations", c_void_p),
-        ("count", c_size_t),
-        ("lengths", c_void_p),
-        ("motions", c_size_t),
-        ("ignored", c_void_p),
-        ("ignored_count", c_size_t),
-        ("level", c_uint32),
-        ("step_m", c_float),
-        ("clearance_max_m", c_float),
-        ("reserved", c_uint8 * 4),
-    ]
-
-
-class MotionAnswers(Structure):
-    _fields_ = [
-        ("struct_size", c_size_t),
-        ("capacity", c_size_t),
-        ("is_free", c_void_p),
-        ("first_hits", c_void_p),
-        ("clearances_m", c_void_p),
+        ("colliding", POINTER(c_uint8)),
+        ("hit_links", POINTER(c_uint32)),
+        ("hit_parts", POINTER(c_uint32)),
+        ("hit_voxels", POINTER(c_uint64)),
+        ("clearances_m", POINTER(c_float)),
+        ("nearest_links", POINTER(c_uint32)),
     ]
 
 
@@ -102,9 +61,9 @@ class ReplicaChecker:
         self.check_motions.argtypes = [Replica, POINTER(MotionCheck), POINTER(MotionAnswers), *pointers]
         parts = np.ascontiguousarray(spheres, np.float32)
         padding_m = padding_between_checks(resolution_m / 2)
-        link = Link(spheres=parts.ctypes.data, spheres_count=len(parts), padding_m=padding_m)
+        link = Link(spheres=parts.ctypes.data_as(POINTER(c_float)), spheres_count=len(parts), padding_m=padding_m)
         self.body = Body()
-        self.copy.call(mrol.mrol_body_new, byref(link), c_size_t(1), byref(self.body))
+        self.copy.call(mrol.mrol_body_new, byref(link), 1, byref(self.body))
         self._make_room(MOTIONS_FIRST)
 
     def places_fit(self, places: Places) -> Bools:
@@ -131,7 +90,8 @@ class ReplicaChecker:
         self.configurations = np.zeros((count, 7), np.float32)
         self.configurations[:, 6] = 1
         self.bits = np.zeros((count + 7) // 8, np.uint8)
-        at, bits = self.configurations.ctypes.data, self.bits.ctypes.data
+        at = self.configurations.ctypes.data_as(POINTER(c_float))
+        bits = self.bits.ctypes.data_as(POINTER(c_uint8))
         self.poses = PoseCheck(struct_size=sizeof(PoseCheck), body=self.body, configurations=at)
         self.motions = MotionCheck(struct_size=sizeof(MotionCheck), body=self.body, configurations=at)
         self.collisions = Collisions(struct_size=sizeof(Collisions), capacity=count, colliding=bits)
