@@ -34,12 +34,13 @@ class Reach:
         distances_m = ndimage.distance_transform_edt(is_free, sampling=resolution_m)
         is_open = np.ones(size, np.bool_)
         for sphere in spheres.astype(np.float64):
-            offset = np.rint(sphere[:3] / resolution_m).astype(int) + margin
-            moved = distances_m[tuple(slice(start, start + length) for start, length in zip(offset, size))]
-            # The sphere's center is within a cell's diagonal of the center of that cell, and half a side of the voxel lies about
-            # its center in any case.
-            slack_m = (np.sqrt(3) - 0.5) * resolution_m
-            is_open &= moved > sphere[3] - slack_m
+            offset = np.rint(sphere[:3] / resolution_m).astype(int)
+            begin = offset + margin
+            moved = distances_m[tuple(slice(first, first + length) for first, length in zip(begin, size))]
+            # The sphere's center is at most half a cell's diagonal and what was rounded away from the center of the cell that is
+            # looked up, and a voxel reaches half a side from its center in any direction.
+            rounded_m = float(np.linalg.norm(sphere[:3] - offset * resolution_m))
+            is_open &= moved > sphere[3] - (np.sqrt(3) / 2 - 0.5) * resolution_m - rounded_m
         labels, _ = ndimage.label(is_open, np.ones((3, 3, 3)))
         return Reach(labels, first, resolution_m)
 

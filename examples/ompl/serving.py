@@ -1,7 +1,9 @@
 """A server with maps to plan in, started for the experiment and the check: the building of `mrol demo`, and a hall."""
 
 import re
+import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +28,8 @@ class Server:
 @contextmanager
 def server_with_maps(binary: str, shared_scans: Path) -> Iterator[Server]:
     """The demonstration's server once its robots are done; with the hall too where its scans are."""
+    # A program that is told to end leaves no server behind.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by a signal"))
     command = [binary, "demo", "--http-listen", "127.0.0.1:0", "--grpc-listen", "127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
