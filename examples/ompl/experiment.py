@@ -177,7 +177,7 @@ def row(plans: list[Plan]) -> str:
 
 
 def milliseconds(plans: list[Plan], percentile: float) -> str:
-    return f"{np.percentile([plan.seconds * 1e3 for plan in plans], percentile):.1f}"
+    return f"{np.percentile([plan.seconds * 1e3 for plan in plans], percentile):.2f}"
 
 
 def main() -> None:
