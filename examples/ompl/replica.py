@@ -1,7 +1,7 @@
 """The same questions to a copy of the map in this process: the C library of clients/c, by ctypes."""
 
 import sys
-from ctypes import POINTER, Structure, byref, c_float, c_size_t, c_uint8, c_uint32, c_uint64, sizeof
+from ctypes import POINTER, Structure, byref, c_float, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p, sizeof
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,7 @@ class Collisions(Structure):
         ("hit_voxels", POINTER(c_uint64)),
         ("clearances_m", POINTER(c_float)),
         ("nearest_links", POINTER(c_uint32)),
+        ("hit_keep_outs", c_void_p),
     ]
 
 
