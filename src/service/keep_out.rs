@@ -57,7 +57,7 @@ impl MapService {
     pub async fn list_keep_outs(&self, map: &MapName) -> Result<KeepOutList, ServiceError> {
         let work = async {
             let map = self.map(map)?;
-            self.inner.queries.run(move |_| map.list_keep_outs()).await
+            self.inner.pools.queries.run(move |_| map.list_keep_outs()).await
         };
         self.observed("ListKeepOuts", Some(map), work, |_| Outcome::Read).await
     }
@@ -75,7 +75,7 @@ impl MapService {
         let submit = move |_: StopSignal<'_>| {
             map.submit_keep_out(&record, &inner.settings.limits, &inner.budget, unix_time_ns())
         };
-        self.submit_and_wait(&self.inner.mapping, None, submit).await
+        self.submit_and_wait(&self.inner.pools.mapping, None, submit).await
     }
 }
 

@@ -73,7 +73,7 @@ impl MapService {
             let maps = self.inner.catalog.within(&self.allowed_maps);
             let describe =
                 move |stop: StopSignal<'_>| maps.iter().map(|map| map.describe(RATE_SAMPLES, stop)).collect();
-            self.inner.queries.run(describe).await?
+            self.inner.pools.queries.run(describe).await?
         };
         self.observed("ListMaps", None, work, |_| Outcome::Read).await
     }
@@ -117,6 +117,7 @@ impl MapService {
         let work = async {
             let (map, inner) = (self.map(name)?, Arc::clone(&self.inner));
             self.inner
+                .pools
                 .map_files
                 .run(move |stop| map.to_file(&inner.budget, &inner.settings.limits, stop))
                 .await?
@@ -151,7 +152,7 @@ impl MapService {
             let inner = Arc::clone(&self.inner);
             let build =
                 move |stop: StopSignal<'_>| from_file(&file, &inner.settings.limits, &inner.budget, stop);
-            let built = self.inner.map_files.run(build).await??;
+            let built = self.inner.pools.map_files.run(build).await??;
             let inner = Arc::clone(&self.inner);
             let maps_max = self.limits().maps_max;
             let restore = async move { inner.catalog.restore(name, built, maps_max, replace).await };
@@ -191,7 +192,7 @@ impl MapService {
     }
 
     async fn describe(&self, map: Arc<HostedMap>) -> Result<MapInfo, ServiceError> {
-        self.inner.queries.run(move |stop| map.describe(RATE_SAMPLES, stop)).await?
+        self.inner.pools.queries.run(move |stop| map.describe(RATE_SAMPLES, stop)).await?
     }
 }
 
@@ -226,12 +227,11 @@ mod tests {
         let (hold, held) = std::sync::mpsc::channel::<()>();
         let held = std::sync::Mutex::new(held);
         let inner = Arc::clone(&service.inner);
-        let first =
-            tokio::spawn(
-                async move { inner.queries.run(move |_| held.lock().unwrap().recv().is_ok()).await },
-            );
+        let first = tokio::spawn(async move {
+            inner.pools.queries.run(move |_| held.lock().unwrap().recv().is_ok()).await
+        });
         let inner = Arc::clone(&service.inner);
-        let second = tokio::spawn(async move { inner.queries.run(|_| ()).await });
+        let second = tokio::spawn(async move { inner.pools.queries.run(|_| ()).await });
         let waiting = || service.pools().iter().find(|pool| pool.name == "query").unwrap().waiting;
         while waiting() == 0 {
             tokio::task::yield_now().await;

@@ -31,6 +31,7 @@ mod observer;
 mod observers;
 mod point_query;
 mod pool;
+mod pools;
 mod question;
 mod reason;
 mod recent_changes;
@@ -86,6 +87,7 @@ use commit_queue::{Refusal, Step};
 use hosted_map::HostedMap;
 use mapping::Effort;
 use pool::{FreeThread, Pool};
+use pools::Pools;
 use resource_budget::ResourceBudget;
 use time_limit::{TimeLimit, check_not_stopped, ended_early};
 
@@ -101,50 +103,11 @@ pub struct MapService {
     caller: Option<CallerName>,
 }
 
-/// Of the jobs that may wait for a thread, one in so many may wait for one of [`Inner::long_mapping`].
-const LONG_SHARE: usize = 4;
-/// See [`Inner::undo`].
-const UNDO_THREADS: usize = 1;
-/// See [`Inner::observers`].
-const OBSERVERS_THREADS: usize = 1;
-/// See [`Inner::watch`].
-const WATCH_THREADS: usize = 1;
-/// Threads for map files.
-const MAP_FILE_THREADS: usize = 1;
-
 #[derive(Debug)]
 struct Inner {
     settings: ServiceSettings,
     catalog: Catalog,
-    /// For queries, listings and descriptions, so that no alignment starves them.
-    queries: Pool,
-    /// For insertions, with their alignments, and deletions. Nothing else: whatever others ask for, robots map.
-    mapping: Pool,
-    /// For scans that take long, since they do not fit from their guess: a second and more each, while robots whose scans
-    /// fit map on.
-    long_mapping: Pool,
-    /// For alignments of scans that are not inserted: a key for reading may ask for any number of them.
-    alignment: Pool,
-    /// For finding out what an undo takes back, which reads a snapshot and the journal behind it: one at a time, since each
-    /// takes memory as a snapshot does.
-    undo: Pool,
-    /// For map files, out of the server and in, which take seconds and much memory each: one at a time, and no query
-    /// or scan waits for them.
-    map_files: Pool,
-    /// For searches with no guess, which take seconds: no alignment waits for them.
-    localization: Pool,
-    /// For searches for lost robots, which nobody waits for.
-    recovery: Pool,
-    /// For what watches are told of besides the last changes: whole states, and changes that the journal has. One at a time,
-    /// since each takes memory as a part of the map or a segment of the journal does.
-    watch: Pool,
-    /// For finding the scans that touched a voxel, which may read much of the journal: one at a time, since each takes memory
-    /// as a segment of it does.
-    observers: Pool,
-    /// For blocks, which take up to seconds: no query of points waits for them.
-    blocks: Pool,
-    /// For what planners ask besides points: no query of points waits for a long one.
-    planning: Pool,
+    pools: Pools,
     budget: Arc<ResourceBudget>,
 }
 
@@ -157,24 +120,9 @@ impl MapService {
     pub fn open(settings: ServiceSettings, progress: &OpeningProgress) -> Result<Self, ServiceError> {
         settings.alignment.checked().map_err(|e| ServiceError::new(Reason::BadSettings, e.to_string()))?;
         settings.filter.checked()?;
-        let waiting = settings.limits.jobs_waiting_max;
-        let mapping = Pool::new("mapping", settings.mapping_threads, waiting)?;
-        let localization = Pool::new("localization", settings.localization_threads, waiting)?;
-        let queries = Pool::new("query", settings.query_threads, waiting)?;
         let inner = Inner {
             catalog: Catalog::open(settings.data_dir.as_deref(), &settings.store, progress)?,
-            long_mapping: Pool::beside("long_mapping", &mapping, waiting.div_ceil(LONG_SHARE))?,
-            mapping,
-            alignment: Pool::new("alignment", settings.alignment_threads, waiting)?,
-            undo: Pool::new("undo", UNDO_THREADS, waiting)?,
-            map_files: Pool::new("map_file", MAP_FILE_THREADS, waiting)?,
-            recovery: Pool::beside("recovery", &localization, 0)?,
-            watch: Pool::new("watch", WATCH_THREADS, waiting.max(settings.limits.watches_max))?,
-            observers: Pool::new("observers", OBSERVERS_THREADS, waiting)?,
-            blocks: Pool::beside("blocks", &queries, waiting)?,
-            queries,
-            planning: Pool::new("planning", settings.query_threads, waiting)?,
-            localization,
+            pools: Pools::start(&settings)?,
             budget: ResourceBudget::new(settings.gauges.clone(), settings.limits.marks()).into(),
             settings,
         };
@@ -220,36 +168,7 @@ impl MapService {
 
     /// What the threads for work that uses the CPU are doing.
     pub fn pools(&self) -> [PoolUse; 12] {
-        let Inner {
-            queries,
-            mapping,
-            long_mapping,
-            alignment,
-            localization,
-            recovery,
-            undo,
-            map_files,
-            watch,
-            observers,
-            blocks,
-            planning,
-            ..
-        } = &*self.inner;
-        let all = [
-            queries,
-            mapping,
-            long_mapping,
-            alignment,
-            localization,
-            recovery,
-            undo,
-            map_files,
-            watch,
-            observers,
-            blocks,
-            planning,
-        ];
-        all.map(Pool::in_use)
+        self.inner.pools.in_use()
     }
 
     /// Says of each point whether its voxel is occupied, all at one revision.
@@ -279,7 +198,7 @@ impl MapService {
             }
             let inner = Arc::clone(&self.inner);
             let answer = move |stop: StopSignal<'_>| map.query(&query, &inner.settings.limits, stop);
-            self.inner.queries.run(answer).await?
+            self.inner.pools.queries.run(answer).await?
         };
         self.observed("QueryPoints", Some(map), work, |answer| Outcome::Points {
             lookup,
@@ -304,7 +223,7 @@ impl MapService {
             if map.is_new(&scan) {
                 self.inner.budget.check_to_grow()?;
             }
-            let turn = Arc::new(self.inner.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
+            let turn = Arc::new(self.inner.pools.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
             let scan = Arc::new(scan);
             let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
             let submit = |effort| {
@@ -317,7 +236,7 @@ impl MapService {
                     })
                 }
             };
-            let Inner { mapping, long_mapping, .. } = &*self.inner;
+            let Pools { mapping, long_mapping, .. } = &self.inner.pools;
             let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
             let answer = loop {
                 if let Some(answer) = self.submit_and_wait(pool, thread.take(), submit(effort)).await? {
@@ -355,7 +274,7 @@ impl MapService {
             let align = move |stop: StopSignal<'_>| {
                 limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop))
             };
-            self.inner.alignment.run(align).await?
+            self.inner.pools.alignment.run(align).await?
         };
         self.observed("AlignScan", Some(map), work, |_| Outcome::Read).await
     }
@@ -378,7 +297,7 @@ impl MapService {
             let inner = Arc::clone(&self.inner);
             let search =
                 move |stop: StopSignal<'_>| map.localize(&request, &inner.settings, &inner.budget, stop);
-            self.inner.localization.run(search).await?
+            self.inner.pools.localization.run(search).await?
         };
         self.observed("Localize", Some(map), work, |_| Outcome::Read).await
     }
@@ -405,7 +324,7 @@ impl MapService {
                 (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
             let submit =
                 move |_: StopSignal<'_>| map.submit_deletion(&deletion, caller.as_ref(), &inner.budget);
-            self.submit_and_wait(&self.inner.mapping, None, submit).await
+            self.submit_and_wait(&self.inner.pools.mapping, None, submit).await
         };
         self.observed("DeleteVoxels", Some(map), work, |answer| Outcome::Changed(Change::of_deletion(answer)))
             .await
@@ -426,7 +345,7 @@ impl MapService {
             let (inner, caller) = (Arc::clone(&self.inner), self.caller.clone());
             let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             // Until its outcome is known: what was withdrawn before it is then what it found.
-            let pool = &self.inner.undo;
+            let pool = &self.inner.pools.undo;
             let _turn = pool.in_turn(map.turn_of_undo()).await?;
             // A thread first: the robot's scans wait for this undo, and not for those of other maps.
             let thread = pool.thread().await?;
@@ -457,7 +376,7 @@ impl MapService {
                 true => map.count(&request, most, stop),
                 false => map.list(&request, most, stop),
             };
-            self.inner.queries.run(list).await?
+            self.inner.pools.queries.run(list).await?
         };
         self.observed("ListVoxels", Some(map), work, |_| Outcome::Read).await
     }

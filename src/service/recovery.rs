@@ -26,14 +26,14 @@ impl MapService {
         if !inner.settings.recovers(request) {
             return;
         }
-        if inner.localization.is_wanted() {
+        if inner.pools.localization.is_wanted() {
             return;
         }
         let (robot, method) = (request.robot.clone(), request.method);
         let pool = Arc::clone(&self.inner);
         tokio::spawn(async move {
             let search = move |_: StopSignal<'_>| {
-                let (settings, is_wanted) = (&inner.settings, || inner.localization.is_wanted());
+                let (settings, is_wanted) = (&inner.settings, || inner.pools.localization.is_wanted());
                 let mapper = map.mapper(method, true, settings);
                 if let Some(task) = mapper.begin_search(&robot) {
                     map.search(&mapper, &task, settings, &inner.budget, StopSignal::when(&is_wanted));
@@ -41,7 +41,7 @@ impl MapService {
             };
             // Nobody waits for the answer. What came of it is noted with the robot; where others are searched for, the
             // next scan asks again.
-            drop(pool.recovery.run(search).await);
+            drop(pool.pools.recovery.run(search).await);
         });
     }
 }

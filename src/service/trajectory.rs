@@ -32,7 +32,7 @@ impl MapService {
                 let (trajectory, version) = map.map.trajectory_and_version();
                 page(&trajectory, map.version(version), &query, most)
             };
-            self.inner.queries.run(page_of).await
+            self.inner.pools.queries.run(page_of).await
         };
         self.observed("GetTrajectory", Some(map), work, |_| Outcome::Read).await
     }
@@ -51,7 +51,7 @@ impl MapService {
             let left = query.limit.map(|limit| self.limits().page(Some(limit))).transpose()?;
             let map = self.map(map)?;
             let shared = Arc::clone(&map);
-            let copy = self.inner.queries.run(move |_| shared.map.trajectory_and_version()).await?;
+            let copy = self.inner.pools.queries.run(move |_| shared.map.trajectory_and_version()).await?;
             let (trajectory, version) = copy;
             let version = map.version(version);
             Ok(TrajectoryPieces { service: self.clone(), trajectory, version, query, left, ended: false })
@@ -97,7 +97,8 @@ impl TrajectoryPieces {
         }
         let most = self.left.map_or(POSES_PER_PIECE, |left| left.min(POSES_PER_PIECE));
         let (trajectory, version, query) = (self.trajectory.clone(), self.version, self.query.clone());
-        let piece = self.service.inner.queries.run(move |_| page(&trajectory, version, &query, most)).await;
+        let piece =
+            self.service.inner.pools.queries.run(move |_| page(&trajectory, version, &query, most)).await;
         Some(piece.map(|piece| self.follow(piece)).inspect_err(|_| self.ended = true))
     }
 

@@ -175,7 +175,7 @@ impl MapService {
                     limit.run(stop, |stop| question.answer_from(&map.questioned(limits), limits, stop))?;
                 Ok(Answered { answer, version: map.version(version) })
             };
-            self.inner.planning.run(answer).await?
+            self.inner.pools.planning.run(answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
