@@ -291,7 +291,7 @@ async fn what_is_no_question_is_refused_by_name() {
         ("nearest", json!({"points": [[0, 0, 0]], "radius_m": 100}), "radius_m"),
         ("nearest", json!({"points": [[0, null, 0]], "radius_m": 1}), "points[0]"),
         ("grid", json!({"cell_m": 0.15}), "cell_m"),
-        ("grid", json!({"ignore_keep_outs": 1}), "boolean"),
+        ("grid", json!({"ignore_keep_outs": 1}), "ignore_keep_outs: must be true or false"),
         ("grid", json!({"area": {"min_m": [0, 0], "max_m": [1e6, 1e6]}, "cell_m": 0.1}), "grid_cells_max"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "groups"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "level": 9}), "level"),
