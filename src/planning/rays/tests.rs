@@ -57,10 +57,12 @@ fn first_of_all(
             let (enters, leaves) = within(origin[axis], direction[axis], voxel.index()[axis], voxel_m);
             (enters_m, leaves_m) = (enters_m.max(enters), leaves_m.min(leaves));
         }
-        (enters_m < leaves_m).then_some((enters_m as f32, voxel))
+        (enters_m < leaves_m).then_some((enters_m, voxel))
     };
     let all = view.lists(level).flat_map(|list| list.iter());
-    all.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0))
+    // A ray may run in a voxel for less than an f32 tells.
+    let first = all.filter_map(met).min_by(|a, b| a.0.total_cmp(&b.0));
+    first.map(|(enters_m, voxel)| (enters_m as f32, voxel))
 }
 
 /// Directions along axes, along diagonals, and any.
