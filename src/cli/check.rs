@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::asked::AskedOptions;
 use super::error::CliError;
 use super::met::met;
 use super::output::Output;
@@ -16,12 +17,13 @@ use crate::client::Client;
 use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
 use crate::map::MapName;
 use crate::planning::{Body, Link, Sphere, Surroundings};
-use crate::service::{Asked, CheckAs, Collisions, MotionCheck, PoseCheck};
+use crate::service::{CheckAs, Collisions, MotionCheck, PoseCheck};
 use crate::voxel::VoxelKey;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol check --map office --sphere \"0 0 0.2 0.3\" --pose \"1 2 0 0 0 0 1\"
+  mrol check --map office --sphere \"0 0 0.2 0.3\" --pose \"1 2 0 0 0 0 1\" --clearance 1
   mrol check --map office --body arm.json --pose \"1 2 0 0 0 0 1\" --pose \"2 2 0 0 0 0 1\"
   mrol check --map office --sphere \"0 0 0 0.3\" --motion --pose \"1 2 1 0 0 0 1\" --pose \"4 2 1 0 0 0 1\"
 
@@ -46,12 +48,11 @@ pub(super) struct Check {
     /// Check the motion from pose to pose
     #[arg(long)]
     motion: bool,
-    /// Level to ask: 0 is the finest
-    #[arg(long, default_value_t = 0)]
-    level: u32,
-    /// Regard no keep-outs, which count as voxels do otherwise
-    #[arg(long)]
-    ignore_keep_outs: bool,
+    /// Tell how much room there is, up to so many meters (and to 64 voxels of the level)
+    #[arg(long, value_name = "METERS")]
+    clearance: Option<f32>,
+    #[command(flatten)]
+    asked: AskedOptions,
 }
 
 impl Check {
@@ -68,18 +69,15 @@ impl Check {
         let client = self.map.server.connect().await?;
         let configurations = self.pose.iter().flat_map(numbers_of).collect();
         let body = Arc::new(body);
-        match self.motion {
-            true => self.check_motion(&client, body, configurations, &output).await,
-            false => self.check_poses(&client, body, configurations, &output).await,
+        match (self.motion, self.clearance) {
+            (true, _) => self.check_motion(&client, body, configurations, &output).await,
+            (false, None) => self.check_poses(&client, body, configurations, &output).await,
+            (false, most_m) => self.measure_poses(&client, body, configurations, most_m, &output).await,
         }
     }
 
     fn map_name(&self) -> &MapName {
         &self.map.name
-    }
-
-    fn asked(&self) -> Asked {
-        Asked { level: self.level, ignore_keep_outs: self.ignore_keep_outs, ..Asked::default() }
     }
 
     async fn check_poses(
@@ -89,7 +87,7 @@ impl Check {
         configurations: Vec<f32>,
         output: &Output,
     ) -> Result<(), CliError> {
-        let (asked, surroundings) = (self.asked(), Surroundings::default());
+        let (asked, surroundings) = (self.asked.asked(), Surroundings::default());
         let check = PoseCheck { asked, body, configurations, surroundings, answer: CheckAs::FirstHit };
         let answered = client.check_poses(self.map_name(), check).await?;
         let Collisions::FirstHits(hits) = answered.answer else {
@@ -109,6 +107,28 @@ impl Check {
         })
     }
 
+    async fn measure_poses(
+        &self,
+        client: &Client,
+        body: Arc<Body>,
+        configurations: Vec<f32>,
+        most_m: Option<f32>,
+        output: &Output,
+    ) -> Result<(), CliError> {
+        let (asked, surroundings) = (self.asked.asked(), Surroundings::default());
+        let answer = CheckAs::Clearance { most_m };
+        let check = PoseCheck { asked, body, configurations, surroundings, answer };
+        let answered = client.check_poses(self.map_name(), check).await?;
+        let Collisions::Clearances(clearances) = answered.answer else {
+            return Err(CliError::failed("the server did not say how much room there is"));
+        };
+        let revision = answered.version.revision;
+        clearances.iter().enumerate().try_for_each(|(pose, clearance)| {
+            let (clearance_m, is_all) = (clearance.distance_m, clearance.link.is_some());
+            output.print(&RoomLine { pose, clearance_m, is_all, revision })
+        })
+    }
+
     async fn check_motion(
         &self,
         client: &Client,
@@ -117,19 +137,19 @@ impl Check {
         output: &Output,
     ) -> Result<(), CliError> {
         let check = MotionCheck {
-            asked: self.asked(),
+            asked: self.asked.asked(),
             body,
             configurations,
             lengths: vec![self.pose.len() as u32],
             step_m: None,
-            clearance_max_m: None,
+            clearance_max_m: self.clearance,
             surroundings: Surroundings::default(),
         };
         let answered = client.check_motions(self.map_name(), check).await?;
         let revision = answered.version.revision;
         answered.answer.iter().try_for_each(|motion| {
-            let (is_free, first_hit) = (motion.is_free(), motion.first_hit);
-            output.print(&MotionLine { is_free, first_hit, revision })
+            let (is_free, first_hit, clearance_m) = (motion.is_free(), motion.first_hit, motion.clearance_m);
+            output.print(&MotionLine { is_free, first_hit, clearance_m, revision })
         })
     }
 }
@@ -192,9 +212,27 @@ impl Display for PoseLine {
 }
 
 #[derive(Serialize)]
+struct RoomLine {
+    pose: usize,
+    clearance_m: f32,
+    /// False where there may be more: nobody looked further.
+    is_all: bool,
+    revision: u64,
+}
+
+impl Display for RoomLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at_least = if self.is_all { "" } else { "at least " };
+        write!(f, "pose {} has {at_least}{:.3} m of room", self.pose, self.clearance_m)
+    }
+}
+
+#[derive(Serialize)]
 struct MotionLine {
     is_free: bool,
     first_hit: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clearance_m: Option<f32>,
     revision: u64,
 }
 
@@ -203,6 +241,7 @@ impl Display for MotionLine {
         match self.first_hit {
             Some(share) => write!(f, "the motion meets something after {:.1} % of it", 100.0 * share),
             None => f.write_str("the motion is free"),
-        }
+        }?;
+        self.clearance_m.map_or(Ok(()), |m| write!(f, "; the least clearance on it is {m:.3} m"))
     }
 }

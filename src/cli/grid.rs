@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::asked::AskedOptions;
 use super::error::CliError;
 use super::map_report::count;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
 use crate::planning::{Grid, GridArea, NotOccupied};
-use crate::service::{Asked, GridQuestion, GridScope};
+use crate::service::{GridQuestion, GridScope};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -40,23 +41,19 @@ pub(super) struct DrawGrid {
     /// Side of a cell, meters: a whole number of voxels [default: one voxel]
     #[arg(long, value_name = "METERS")]
     cell: Option<f64>,
-    /// Level to draw: 0 is the finest
-    #[arg(long, default_value_t = 0)]
-    level: u32,
     /// Call cells without a voxel unknown, not free
     #[arg(long)]
     unknown: bool,
-    /// Regard no keep-outs, which are occupied otherwise
-    #[arg(long)]
-    ignore_keep_outs: bool,
+    #[command(flatten)]
+    asked: AskedOptions,
 }
 
 impl DrawGrid {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, out, band, area, cell, level, unknown, ignore_keep_outs } = self;
+        let Self { map, out, band, area, cell, unknown, asked } = self;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let scope = GridScope { area: area.unwrap_or(GridArea::Occupied), band_m, cell_m: cell };
-        let question = GridQuestion { asked: Asked { level, ignore_keep_outs, ..Asked::default() }, scope };
+        let question = GridQuestion { asked: asked.asked(), scope };
         let client = map.server.connect().await?;
         let answered = client.project_grid(&map.name, question).await?;
         let not_occupied = if unknown { NotOccupied::Unknown } else { NotOccupied::Free };

@@ -5,6 +5,7 @@
 //! makes no sense, and 3 when a scan was answered and not accepted (`insert` and `localize`).
 
 mod alignment_options;
+mod asked;
 mod block;
 mod check;
 mod config;

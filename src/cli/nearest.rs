@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::asked::AskedOptions;
 use super::error::CliError;
 use super::met::met;
 use super::output::Output;
@@ -13,7 +14,7 @@ use super::query::points_of;
 use super::remote::MapOptions;
 use crate::geometry::Point;
 use crate::planning::MeasuredTo;
-use crate::service::{Asked, NearestQuestion};
+use crate::service::NearestQuestion;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -41,23 +42,19 @@ pub(super) struct Nearest {
     /// What distances are measured to: the voxels' cubes, or their centers
     #[arg(long, value_parser = parse::keyword::<MeasuredTo>(), default_value = "cubes")]
     to: MeasuredTo,
-    /// Level to ask: 0 is the finest
-    #[arg(long, default_value_t = 0)]
-    level: u32,
-    /// Regard no keep-outs, which count as voxels do otherwise
-    #[arg(long)]
-    ignore_keep_outs: bool,
+    #[command(flatten)]
+    asked: AskedOptions,
 }
 
 impl Nearest {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { points_file, point, map, radius, to, level, ignore_keep_outs } = self;
+        let Self { points_file, point, map, radius, to, asked } = self;
         let points = match &points_file {
             Some(path) => points_of(path)?,
             None => point,
         };
-        let asked = Asked { level, ignore_keep_outs, ..Asked::default() };
-        let question = NearestQuestion { asked, points: points.clone().into(), radius_m: radius, to };
+        let question =
+            NearestQuestion { asked: asked.asked(), points: points.clone().into(), radius_m: radius, to };
         let client = map.server.connect().await?;
         let answered = client.find_nearest(&map.name, question).await?;
         let (nearest, revision) = (answered.answer, answered.version.revision);

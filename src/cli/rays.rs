@@ -4,13 +4,14 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
+use super::asked::AskedOptions;
 use super::error::CliError;
 use super::met::met;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
 use crate::geometry::Point;
-use crate::service::{Asked, RayQuestion, RaysToward};
+use crate::service::{RayQuestion, RaysToward};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -38,25 +39,20 @@ pub(super) struct CastRays {
     /// Length of the rays with a direction, meters [default: as far as the map goes]
     #[arg(long, value_name = "METERS", requires = "direction")]
     range: Option<f64>,
-    /// Level to ask: 0 is the finest
-    #[arg(long, default_value_t = 0)]
-    level: u32,
-    /// Regard no keep-outs, which count as voxels do otherwise
-    #[arg(long)]
-    ignore_keep_outs: bool,
+    #[command(flatten)]
+    asked: AskedOptions,
 }
 
 impl CastRays {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, from, direction, to, range, level, ignore_keep_outs } = self;
+        let Self { map, from, direction, to, range, asked } = self;
         let toward = if to.is_empty() {
             let range_m = range.unwrap_or(f64::INFINITY);
             RaysToward::Directions { directions: direction.into(), range_m }
         } else {
             RaysToward::Ends(to.into())
         };
-        let asked = Asked { level, ignore_keep_outs, ..Asked::default() };
-        let question = RayQuestion { asked, origins: vec![from].into(), toward };
+        let question = RayQuestion { asked: asked.asked(), origins: vec![from].into(), toward };
         let client = map.server.connect().await?;
         let answered = client.cast_rays(&map.name, question).await?;
         let (hits, revision) = (answered.answer, answered.version.revision);

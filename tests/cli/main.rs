@@ -10,6 +10,7 @@ mod experiment;
 mod help;
 mod local;
 mod localize;
+mod questions;
 mod remote;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,0 +1,92 @@
+//! `mrol check`, `rays`, `nearest` and `grid`: what planners ask, among voxels and keep-outs.
+
+use serde_json::{Value, json};
+
+use super::{complaint, mrol, number, objects};
+use crate::support::process::Process;
+
+/// A daemon with a wall at x = 1.0 to 1.1, and a keep-out of 0.3 m around (0, 1, 0).
+struct Building {
+    daemon: Process,
+    _scan: tempfile::TempDir,
+}
+
+impl Building {
+    fn open() -> Self {
+        let (daemon, folder) = (Process::start("", &[]), tempfile::tempdir().unwrap());
+        let file = folder.path().join("0000.xyz");
+        let row = |y: i32| {
+            (-20..20)
+                .map(move |z| format!("1.05 {} {}\n", f64::from(y) / 10.0 + 0.05, f64::from(z) / 10.0 + 0.05))
+        };
+        std::fs::write(&file, (-20..20).flat_map(row).collect::<String>()).unwrap();
+        let building = Self { daemon, _scan: folder };
+        let file = file.to_str().unwrap();
+        let insert = ["insert", file, "--create", "--resolution", "0.1", "--guess", "0 0 0 0 0 0 1"];
+        assert_eq!(building.ask(&insert)[0]["accepted"], true);
+        building.ask(&["keepout", "put", "dock", "--sphere", "0 1 0 0.3"]);
+        building
+    }
+
+    fn ask(&self, arguments: &[&str]) -> Vec<Value> {
+        objects(&[arguments, &["--map", "a", "--server", &self.daemon.grpc]].concat())
+    }
+
+    fn says(&self, arguments: &[&str]) -> String {
+        let arguments = [arguments, &["--map", "a", "--server", &self.daemon.grpc]].concat();
+        String::from_utf8(mrol(&arguments).assert().success().get_output().stdout.clone()).unwrap()
+    }
+}
+
+const BALL: [&str; 3] = ["check", "--sphere", "0 0 0 0.2"];
+
+#[test]
+fn a_body_is_checked_at_poses_and_along_a_motion() {
+    let building = Building::open();
+    let poses = ["--pose", "0 0 0 0 0 0 1", "--pose", "0.9 0 0 0 0 0 1", "--pose", "0 0.6 0 0 0 0 1"];
+    let lines = building.ask(&[&BALL[..], &poses].concat());
+    let fits: Vec<&Value> = lines.iter().map(|line| &line["fits"]).collect();
+    assert_eq!(fits, [true, false, false]);
+    assert_eq!((&lines[1]["voxel"][0], &lines[1]["keep_out"]), (&json!(10), &Value::Null));
+    assert_eq!((&lines[2]["voxel"], &lines[2]["keep_out"]), (&Value::Null, &json!("dock")));
+    let ignoring = building.ask(&[&BALL[..], &poses, &["--ignore-keep-outs"]].concat());
+    assert_eq!(ignoring[2]["fits"], true);
+
+    let room = building.ask(&[&BALL[..], &poses[..2], &["--clearance", "2"]].concat());
+    assert!((number(&room[0], "clearance_m") - 0.5).abs() < 1e-6 && room[0]["is_all"] == true, "{room:?}");
+    let little = building.says(&[&BALL[..], &poses[..2], &["--clearance", "0.1"]].concat());
+    assert_eq!(little, "pose 0 has at least 0.100 m of room\n");
+
+    let way = ["--motion", "--pose", "0 0 0 0 0 0 1", "--pose", "1 0 0 0 0 0 1"];
+    let motion = &building.ask(&[&BALL[..], &way].concat())[0];
+    assert!(motion["is_free"] == false && (number(motion, "first_hit") - 0.8).abs() < 0.05, "{motion}");
+    let free = ["--motion", "--clearance", "1", "--pose", "0 0 0 0 0 0 1", "--pose", "0 -1 0 0 0 0 1"];
+    let said = building.says(&[&BALL[..], &free].concat());
+    assert_eq!(said, "the motion is free; the least clearance on it is 0.500 m\n");
+}
+
+#[test]
+fn rays_nearest_voxels_and_a_grid_name_what_they_find() {
+    let building = Building::open();
+    let rays = building.ask(&["rays", "--from", "0,0,0", "--direction", "1,0,0", "--direction", "0,1,0"]);
+    assert!((number(&rays[0], "distance_m") - 1.0).abs() < 1e-6 && rays[0]["voxel"][0] == 10, "{rays:?}");
+    assert!((number(&rays[1], "distance_m") - 0.7).abs() < 1e-6 && rays[1]["keep_out"] == "dock", "{rays:?}");
+    let nearest = &building.ask(&["nearest", "--point", "0,0.5,0", "--radius", "1"])[0];
+    assert!((number(nearest, "distance_m") - 0.2).abs() < 1e-6 && nearest["keep_out"] == "dock", "{nearest}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let image = folder.path().join("a.pgm");
+    let grid = &building.ask(&["grid", "--out", image.to_str().unwrap(), "--area", "-0.5 0 0.5 2"])[0];
+    assert!(number(grid, "cells_occupied") > 20.0, "{grid}");
+    assert!(std::fs::read(&image).unwrap().starts_with(b"P5") && image.with_extension("yaml").exists());
+}
+
+#[test]
+fn a_question_waits_for_a_revision_as_long_as_it_may() {
+    let building = Building::open();
+    let pose = ["--pose", "0 0 0 0 0 0 1", "--min-revision", "2"];
+    assert_eq!(building.ask(&[&BALL[..], &pose].concat())[0]["revision"], 2);
+    let ahead = ["--pose", "0 0 0 0 0 0 1", "--min-revision", "3", "--map", "a"];
+    let told = complaint(&[&BALL[..], &ahead, &["--server", &building.daemon.grpc]].concat(), 1);
+    assert!(told.contains("revision"), "{told}");
+}
