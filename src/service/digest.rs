@@ -39,7 +39,7 @@ impl Digest {
             Region::OrientedBox(of) => {
                 let (pose, size_m) = (of.map_from_box(), of.size_m());
                 let digest = self.bytes(b"oriented_box").numbers(&translation_m(pose));
-                digest.numbers(&rotation_xyzw(pose)).numbers(&size_m)
+                digest.numbers(&one_of_two(rotation_xyzw(pose))).numbers(&size_m)
             }
         }
     }
@@ -49,6 +49,13 @@ impl Digest {
         let hash = self.0.finalize();
         u64::from_le_bytes(std::array::from_fn(|i| hash[i]))
     }
+}
+
+/// Of the two quaternions that are one rotation, that whose last number that is not zero is positive.
+fn one_of_two(xyzw: [f64; 4]) -> [f64; 4] {
+    let last = xyzw.into_iter().rev().find(|number| *number != 0.0).unwrap_or_default();
+    // Adding zero makes 0 of -0.
+    xyzw.map(|number| number * last.signum() + 0.0)
 }
 
 /// What data folders of version 3 and before have in its place: a checksum and the number of bytes. A request that was
@@ -81,6 +88,18 @@ impl FormerDigest {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_rotation_is_the_same_whichever_of_its_two_quaternions_says_it() {
+        let of = |xyzw: [f64; 4]| {
+            let pose = crate::geometry::pose([1.0, 2.0, 3.0], xyzw).unwrap();
+            let region = Region::oriented_box(pose, [1.0, 2.0, 3.0]).unwrap();
+            Digest::new("deletion").region(&region).finish()
+        };
+        assert_eq!(of([0.0, 0.6, 0.0, 0.8]), of([0.0, -0.6, 0.0, -0.8]));
+        assert_eq!(of([0.0, 0.0, 1.0, 0.0]), of([0.0, 0.0, -1.0, -0.0]));
+        assert_ne!(of([0.0, 0.6, 0.0, 0.8]), of([0.0, -0.6, 0.0, 0.8]));
+    }
 
     #[test]
     fn fields_are_told_apart_by_their_kind_and_their_borders() {
