@@ -7,6 +7,7 @@
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
 
+use super::effort::Effort;
 use super::surroundings::Surroundings;
 
 /// The squared distance from `center` to the cube of `side` cells that begins at `low`, in cells.
@@ -28,7 +29,7 @@ pub(super) struct NearestCube {
 
 /// An exact search for voxels near a point.
 #[derive(Debug)]
-pub(super) struct CubeSearch<'a> {
+pub(super) struct CubeSearch<'a, 'e> {
     view: &'a MapView<'a>,
     surroundings: &'a Surroundings,
     level: u32,
@@ -38,6 +39,8 @@ pub(super) struct CubeSearch<'a> {
     found: Option<NearestCube>,
     /// True where any voxel will do.
     is_any: bool,
+    /// Counts what is looked at. Once stopped the search ends, and what it found means nothing.
+    effort: &'a mut Effort<'e>,
 }
 
 /// Cells beyond a ball that are looked at, whatever the rounding.
@@ -45,15 +48,16 @@ pub(super) const SLACK: f64 = 1e-6;
 /// Blocks along an axis that are searched one by one; where there are more, their presence is asked first.
 const BLOCKS_MAX: i32 = 3;
 
-impl<'a> CubeSearch<'a> {
+impl<'a, 'e> CubeSearch<'a, 'e> {
     /// A search around `center`, in cells of `level`.
     pub(super) fn new(
         view: &'a MapView<'a>,
         surroundings: &'a Surroundings,
         level: u32,
         center: [f64; 3],
+        effort: &'a mut Effort<'e>,
     ) -> Self {
-        Self { view, surroundings, level, center, squared_max: 0.0, found: None, is_any: false }
+        Self { view, surroundings, level, center, squared_max: 0.0, found: None, is_any: false, effort }
     }
 
     /// True where a voxel is at most `radius` cells away.
@@ -95,7 +99,7 @@ impl<'a> CubeSearch<'a> {
     }
 
     fn is_done(&self) -> bool {
-        self.is_any && self.found.is_some()
+        self.effort.is_stopped() || self.is_any && self.found.is_some()
     }
 
     /// True where the cube of `side` cells at `index` of them may hold a voxel that counts.
@@ -106,6 +110,7 @@ impl<'a> CubeSearch<'a> {
 
     /// Searches the block at `key`, whose voxels of `level` are `side` cells wide.
     fn search_block(&mut self, level: u32, side: i32, key: VoxelKey) {
+        self.effort.spend(1);
         if !self.is_near(key.index(), side * BLOCK_SIDE) {
             return;
         }
@@ -136,6 +141,7 @@ impl<'a> CubeSearch<'a> {
     }
 
     fn consider(&mut self, voxel: VoxelKey) {
+        self.effort.spend(1);
         let squared = squared_distance(self.center, voxel.index().map(f64::from), 1.0);
         let is_better = squared < self.squared_max
             || squared == self.squared_max && self.found.is_none_or(|found| voxel < found.voxel);

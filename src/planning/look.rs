@@ -2,12 +2,17 @@
 
 use super::clearance::{FieldBlockKey, Fields};
 use super::cubes::{CubeSearch, NearestCube};
+use super::effort::Effort;
 use super::eight::{self, Bounds, Centers, Found, LANES};
 use super::in_cells::Group;
 use super::nearby::{self, Nearby};
 use super::surroundings::Surroundings;
 use crate::map::MapView;
+use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, VoxelKey};
+
+/// Most blocks of the field that are made between two looks.
+pub(super) const UNMADE_MAX: usize = 4096;
 
 /// A coarse voxel holds a fine one, which is no further away than the coarse one and its diagonal, in coarse cells.
 const DIAGONAL: f32 = 1.7321;
@@ -21,10 +26,13 @@ pub(super) struct Look<'a> {
     /// Coarser levels that have a field.
     levels_above: u32,
     fields: &'a Fields,
-    /// Blocks of the field that were asked for and are not made.
+    /// Blocks of the field that were asked for and are not made; some more than once.
     unmade: Vec<FieldBlockKey>,
+    /// True once so many are to be made that the rest has to wait.
+    is_full: bool,
     /// True where what is not made is not waited for: the voxels answer.
     pub(super) is_last: bool,
+    effort: Effort<'a>,
 }
 
 /// Where the field of a level, or of a coarser one, says of eight points how far the nearest voxel is.
@@ -76,17 +84,50 @@ impl<'a> Look<'a> {
         level: u32,
         fields: &'a Fields,
         is_last: bool,
+        stop: StopSignal<'a>,
     ) -> Self {
         let levels_above = view.map().block_levels_end() - level;
-        Self { view, surroundings, level, levels_above, fields, unmade: Vec::new(), is_last }
+        let (unmade, effort) = (Vec::new(), Effort::new(stop));
+        Self { view, surroundings, level, levels_above, fields, unmade, is_full: false, is_last, effort }
     }
 
-    /// The blocks that were asked for and are not made, each once.
-    pub(super) fn into_unmade(self) -> Vec<FieldBlockKey> {
-        let mut unmade = self.unmade;
-        unmade.sort_unstable();
-        unmade.dedup();
-        unmade
+    /// The blocks that were asked for and are not made, each once; at most [`UNMADE_MAX`].
+    pub(super) fn into_unmade(mut self) -> Vec<FieldBlockKey> {
+        self.leave_each_once();
+        self.unmade
+    }
+
+    fn leave_each_once(&mut self) {
+        self.unmade.sort_unstable();
+        self.unmade.dedup();
+    }
+
+    /// Notes a block that is to be made, where there is room for it.
+    fn note(&mut self, block: FieldBlockKey) {
+        if self.unmade.last() == Some(&block) || self.is_full {
+            return;
+        }
+        self.unmade.push(block);
+        if self.unmade.len() == UNMADE_MAX {
+            self.leave_each_once();
+            self.is_full = self.unmade.len() > UNMADE_MAX / 2;
+        }
+    }
+
+    /// True once the question is to end, or what it waits for has to be made first: the answers are none then.
+    #[inline(always)]
+    pub(super) fn is_over(&self) -> bool {
+        self.effort.is_stopped() || self.is_full && !self.is_last
+    }
+
+    /// True where not all of what it waits for could be noted.
+    pub(super) fn is_full(&self) -> bool {
+        self.is_full
+    }
+
+    /// True once the question is to end.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.effort.is_stopped()
     }
 
     /// What the field says of the spheres of `group` with these centers, cells.
@@ -106,6 +147,7 @@ impl<'a> Look<'a> {
     /// [`Look::find`] in the field of a level so many levels coarser, or of the coarsest.
     #[inline(always)]
     fn find_in(&mut self, coarser_by: u32, centers: &Centers, found: &mut FoundGroup<'a>) {
+        self.effort.spend(1);
         let coarser_by = coarser_by.min(self.levels_above);
         let side = (1u32 << coarser_by) as f32;
         (found.side, found.beyond) = (side, if coarser_by == 0 { 0.0 } else { DIAGONAL });
@@ -143,7 +185,7 @@ impl<'a> Look<'a> {
         for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
             if let Some(index) = eight::cell(centers, scale, lane) {
                 let block = VoxelKey::pack(index.map(|i| i >> BLOCK_LEVELS));
-                self.unmade.push(FieldBlockKey { level: self.level + coarser_by, block });
+                self.note(FieldBlockKey { level: self.level + coarser_by, block });
                 noted |= 1 << lane;
             }
         }
@@ -166,20 +208,18 @@ impl<'a> Look<'a> {
                 Nearby::Unknown => {}
                 Nearby::Unmade(cell) => {
                     let block = VoxelKey::pack(cell.map(|i| i >> BLOCK_LEVELS));
-                    self.unmade.push(FieldBlockKey { level: self.level, block });
+                    self.note(FieldBlockKey { level: self.level, block });
                 }
             }
         }
-        self.search(center).meets(radius)
+        let Self { view, surroundings, level, effort, .. } = self;
+        CubeSearch::new(view, surroundings, *level, center, effort).meets(radius)
     }
 
     /// The nearest voxel that is at most `radius` cells away.
-    pub(super) fn nearest(&self, center: [f64; 3], radius: f64) -> Option<NearestCube> {
-        self.search(center).nearest(radius)
-    }
-
-    fn search(&self, center: [f64; 3]) -> CubeSearch<'_> {
-        CubeSearch::new(self.view, self.surroundings, self.level, center)
+    pub(super) fn nearest(&mut self, center: [f64; 3], radius: f64) -> Option<NearestCube> {
+        let Self { view, surroundings, level, effort, .. } = self;
+        CubeSearch::new(view, surroundings, *level, center, effort).nearest(radius)
     }
 
     /// A lower bound of the distance from a point to the nearest voxel, cells, by fields of ever coarser levels until one

@@ -11,6 +11,7 @@ mod clearance;
 mod configurations;
 mod cover;
 mod cubes;
+mod effort;
 mod eight;
 mod error;
 mod grid;
@@ -37,6 +38,8 @@ mod rigid;
 mod simd;
 mod spheres;
 mod steps;
+#[cfg(test)]
+mod stop_tests;
 mod surroundings;
 #[cfg(test)]
 mod test_maps;

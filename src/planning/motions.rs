@@ -197,10 +197,11 @@ impl BodyMotion<'_> {
                 break;
             }
         }
-        let clearance_m = self.clearances.map(|clearances| match first_hit {
-            Some(_) => 0.0,
-            None => clearances.told_m(self.clearance(look, clearances.most())),
-        });
+        let clearance_m = match (self.clearances, first_hit) {
+            (None, _) => None,
+            (Some(_), Some(_)) => Some(0.0),
+            (Some(clearances), None) => Some(clearances.told_m(self.clearance(look, clearances.most())?)),
+        };
         Some(MotionAnswer { first_hit, clearance_m })
     }
 
@@ -254,6 +255,9 @@ impl BodyMotion<'_> {
             let per_step = motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
             let mut step = first;
             while step < end {
+                if look.is_over() {
+                    return None;
+                }
                 let pose = motion.at(step as f64 / segment.steps as f64);
                 let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
                 match link::state(look, link, &pose, &cells_from_link, open) {
@@ -270,8 +274,8 @@ impl BodyMotion<'_> {
         (!waits).then_some(Some(end).filter(|end| *end <= segment.steps))
     }
 
-    /// The least distance at any step, cells, up to `most`.
-    fn clearance(&self, look: &mut Look<'_>, most: f64) -> f64 {
+    /// The least distance at any step, cells, up to `most`; none once the look is over.
+    fn clearance(&self, look: &mut Look<'_>, most: f64) -> Option<f64> {
         let mut least = most;
         for segment in &self.segments {
             for (link, motion) in self.body.links.iter().zip(&segment.links) {
@@ -279,6 +283,9 @@ impl BodyMotion<'_> {
                     motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
                 let mut step = 0;
                 while step <= segment.steps {
+                    if look.is_over() {
+                        return None;
+                    }
                     let pose = motion.at(step as f64 / segment.steps as f64);
                     let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
                     let lower = link::lower_bound(look, link, &cells_from_link);
@@ -291,7 +298,7 @@ impl BodyMotion<'_> {
                 }
             }
         }
-        least
+        Some(least)
     }
 }
 

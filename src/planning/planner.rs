@@ -15,6 +15,8 @@ use crate::voxel::Lattice;
 
 /// Times that a question is asked again for what was not made; then the voxels answer.
 const ROUNDS_MAX: usize = 3;
+/// The same for what there was no room to make at once, which may be more than the fields may hold.
+const FULL_ROUNDS_MAX: usize = 64;
 
 /// Answers planners' questions about a map.
 ///
@@ -33,7 +35,7 @@ pub(super) trait Answerer {
     type Answer;
 
     /// The answer of the item; none where it waits for a part of the field that is not made: it is asked again when that
-    /// is. On the last look ([`Look::is_last`]) it always answers.
+    /// is. On the last look ([`Look::is_last`]) it always answers, unless the question is to end.
     fn answer(&mut self, look: &mut Look<'_>, item: usize) -> Option<Self::Answer>;
 
     /// Answers the items from `first` on that have no answer yet.
@@ -164,20 +166,23 @@ impl PlanningView<'_> {
         let mut answers: Vec<Option<A::Answer>> = Vec::with_capacity(count);
         answers.resize_with(count, || None);
         for (chunk, answers) in answers.chunks_mut(per_look).enumerate() {
-            if stop.is_stopped() {
-                return None;
-            }
-            for round in 1..=ROUNDS_MAX {
+            let (mut rounds, mut full_rounds) = (0, 0);
+            while answers.iter().any(Option::is_none) {
+                if stop.is_stopped() {
+                    return None;
+                }
+                let is_last = rounds + 1 >= ROUNDS_MAX || full_rounds >= FULL_ROUNDS_MAX;
                 let fields = self.planner.fields.read();
-                let mut look = Look::new(&self.view, surroundings, level, &fields, round == ROUNDS_MAX);
+                let mut look = Look::new(&self.view, surroundings, level, &fields, is_last, stop);
                 let (answerer, look_at) = (&mut answerer, &mut look);
                 simd::run(Chunk { answerer, look: look_at, first: chunk * per_look, answers });
+                if look.is_stopped() {
+                    return None;
+                }
+                *(if look.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
                 let unmade = look.into_unmade();
                 drop(fields);
                 self.make(unmade);
-                if answers.iter().all(Option::is_some) {
-                    break;
-                }
             }
         }
         answers.into_iter().collect()

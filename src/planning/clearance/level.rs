@@ -125,17 +125,27 @@ impl FieldLevel {
 
     /// Takes a cluster out; the bytes that it held.
     pub(super) fn remove_cluster(&mut self, cluster: VoxelKey) -> usize {
-        let slots = self.slots.len();
-        let before = std::mem::replace(self, Self::with_slots(slots));
-        let mut bytes = 0;
-        for slot in before.slots {
-            if slot.key == cluster.to_bits() {
-                bytes += slot.cluster.map_or(0, |cluster| cluster.bytes());
-            } else {
-                self.put(slot.key, slot.cluster);
+        let (key, mask) = (cluster.to_bits(), self.slots.len() - 1);
+        let mut hole = Self::hash(key) & mask;
+        while self.slots[hole].key != key {
+            if self.slots[hole].key == VACANT {
+                return 0;
             }
+            hole = (hole + 1) & mask;
         }
-        bytes
+        let removed = std::mem::replace(&mut self.slots[hole], Slot::NONE);
+        self.clusters -= 1;
+        // Searches end at a vacant slot: those behind it that it would hide move up.
+        let mut at = (hole + 1) & mask;
+        while self.slots[at].key != VACANT {
+            let home = Self::hash(self.slots[at].key) & mask;
+            if at.wrapping_sub(home) & mask >= at.wrapping_sub(hole) & mask {
+                self.slots.swap(hole, at);
+                hole = at;
+            }
+            at = (at + 1) & mask;
+        }
+        removed.cluster.map_or(0, |cluster| cluster.bytes())
     }
 
     /// Forgets a block; true where it was made.
@@ -148,5 +158,41 @@ impl FieldLevel {
     /// True without a cluster.
     pub(super) fn is_empty(&self) -> bool {
         self.clusters == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The block at the beginning of a cluster.
+    fn block(cluster: i32) -> VoxelKey {
+        VoxelKey::pack([cluster % 7 * 8, cluster / 7 * 8, -8 * (cluster % 3)])
+    }
+
+    proptest! {
+        #[test]
+        fn clusters_that_stay_are_found_whatever_is_taken_out(
+            acts in prop::collection::vec((any::<bool>(), 0i32..60), 1..200),
+        ) {
+            let (mut level, mut model) = (FieldLevel::default(), BTreeSet::new());
+            for (adds, cluster) in acts {
+                let key = block(cluster);
+                if adds && model.insert(cluster) {
+                    level.add_cluster(key);
+                } else if !adds {
+                    let bytes = level.remove_cluster(key.ancestor(CLUSTER_LEVELS));
+                    prop_assert_eq!(bytes > 0, model.remove(&cluster));
+                }
+                for cluster in 0..60 {
+                    prop_assert_eq!(level.cluster_mut(block(cluster)).is_some(), model.contains(&cluster));
+                }
+                prop_assert_eq!(level.is_empty(), model.is_empty());
+            }
+        }
     }
 }

@@ -1,0 +1,114 @@
+//! Questions of which a single part is large: they look at the stop signal in proportion to their work, and ask for no more of
+//! the field at once than there is room for.
+
+use std::cell::Cell;
+use std::sync::Arc;
+
+use super::*;
+use crate::geometry::Point;
+use crate::map::{MapContents, MapSettings, MultiResolutionMap, Region};
+use crate::util::StopSignal;
+use crate::voxel::VoxelKey;
+
+const EVERYTHING: [f64; 3] = [1000.0; 3];
+static ALL_VOXELS: Surroundings = Surroundings::ALL_VOXELS;
+
+/// A floor of 100 x 100 voxels of 0.1 m.
+fn floor() -> Planner {
+    let voxels = (0..10_000).filter_map(|i| VoxelKey::new([i % 100, i / 100, 0]));
+    let contents = MapContents::at(1, voxels.collect());
+    Planner::new(Arc::new(MultiResolutionMap::restore(MapSettings::new(0.1, 4), contents).unwrap()))
+}
+
+/// A body of points in a row of 1 m, side by side.
+fn row(points: usize) -> Body {
+    let points = (0..points).map(|i| Point::new(i as f32 / points as f32, 0.0, 0.0)).collect();
+    Body::new(vec![Link { points, ..Link::default() }]).unwrap()
+}
+
+fn ball(radius_m: f32) -> Body {
+    let spheres = vec![Sphere { center_m: [0.0; 3], radius_m }];
+    Body::new(vec![Link { spheres, ..Link::default() }]).unwrap()
+}
+
+/// The numbers of poses at these places.
+fn at(places: &[[f32; 3]]) -> Vec<f32> {
+    places.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0, 0.0, 0.0, 1.0]).collect()
+}
+
+/// Asks until the question is answered, then again with a signal that stops it at each of some looks: how often it looked.
+fn looks<A: std::fmt::Debug>(ask: impl Fn(StopSignal<'_>) -> Option<A>) -> usize {
+    let looks = Cell::new(0);
+    let never = || looks.replace(looks.get() + 1) == usize::MAX;
+    assert!(ask(StopSignal::when(&never)).is_some());
+    let all = looks.get();
+    for most in [0, 1, 2, all / 2] {
+        looks.set(0);
+        let stops = || looks.replace(looks.get() + 1) >= most;
+        assert!(ask(StopSignal::when(&stops)).is_none(), "it was told to stop at look {most} of {all}");
+        assert!(looks.get() <= most + 3, "{} looks of which {most} let it go on", looks.get());
+    }
+    all
+}
+
+fn motion<'a>(body: &'a Body, numbers: &'a [f32], step_m: f32, clear_m: Option<f32>) -> MotionQuestion<'a> {
+    MotionQuestion {
+        body,
+        configurations: Configurations::new(numbers, 1).unwrap(),
+        lengths: &[2],
+        step_m: Some(step_m),
+        clearance_max_m: clear_m,
+        level: 0,
+        surroundings: &ALL_VOXELS,
+    }
+}
+
+#[test]
+fn one_motion_of_many_steps_and_points_looks_at_the_signal_in_proportion_to_them() {
+    let (planner, body) = (floor(), row(4000));
+    // So low that no step is skipped.
+    let numbers = at(&[[1.0, 5.0, 0.11], [2.0, 5.0, 0.11]]);
+    let steps = |step_m: f32| {
+        looks(|stop| planner.view().check_motions(&motion(&body, &numbers, step_m, None), stop).unwrap())
+    };
+    let (few, many) = (steps(0.004), steps(0.001));
+    assert!(few >= 8 && many >= 2 * few, "{few} and {many} looks");
+}
+
+#[test]
+fn the_clearance_of_one_motion_looks_at_the_signal() {
+    let (planner, body) = (floor(), ball(0.01));
+    let numbers = at(&[[1.0, 5.0, 3.0], [2.0, 5.0, 3.0]]);
+    let ask = |stop: StopSignal<'_>| {
+        planner.view().check_motions(&motion(&body, &numbers, 0.001, Some(6.0)), stop).unwrap()
+    };
+    assert!(looks(ask) >= 8);
+}
+
+#[test]
+fn one_sphere_that_ignores_what_it_meets_looks_at_the_signal() {
+    let (planner, body) = (floor(), ball(20.0));
+    let everything = Region::cuboid(EVERYTHING.map(|c| -c), EVERYTHING).unwrap();
+    let surroundings = Surroundings { ignored: vec![everything] };
+    let numbers = at(&[[5.0, 5.0, 1.0]; 8]);
+    let configurations = Configurations::new(&numbers, 1).unwrap();
+    let question = PoseQuestion { body: &body, configurations, level: 0, surroundings: &surroundings };
+    assert!(looks(|stop| planner.view().bodies_meet(&question, stop).unwrap()) >= 8);
+    assert!(looks(|stop| planner.view().first_hits(&question, stop).unwrap()) >= 8);
+}
+
+/// What a motion waits for was noted at every step again: gigabytes of it.
+#[test]
+fn a_motion_far_beyond_what_is_made_is_answered_in_rounds_of_so_much() {
+    let voxels = (0..40_000).filter_map(|i| VoxelKey::new([i / 4 * 10, i % 4 * 20, 0]));
+    let contents = MapContents::at(1, voxels.collect());
+    let map = Arc::new(MultiResolutionMap::restore(MapSettings::new(0.1, 4), contents).unwrap());
+    let (planner, body) = (Planner::new(map), row(64));
+    // Above the floor, along it for 10 km: the field around it has more blocks than are made at once.
+    let numbers = at(&[[0.0, 0.0, 0.35], [9_900.0, 0.0, 0.35]]);
+    let question = motion(&body, &numbers, 0.2, None);
+    let answer = planner.view().check_motions(&question, StopSignal::NEVER).unwrap().unwrap();
+    assert!(answer[0].is_free(), "{answer:?}");
+    let blocks = planner.field_bytes() / 512;
+    assert!(blocks > 2 * look::UNMADE_MAX, "{blocks} blocks");
+}
