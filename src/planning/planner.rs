@@ -42,6 +42,9 @@ pub(super) trait Answerer {
     #[inline(always)]
     fn answer_all(&mut self, look: &mut Look<'_>, first: usize, answers: &mut [Option<Self::Answer>]) {
         for (item, answer) in answers.iter_mut().enumerate().filter(|(_, answer)| answer.is_none()) {
+            if look.is_over() {
+                return;
+            }
             *answer = self.answer(look, first + item);
         }
     }

@@ -45,6 +45,9 @@ pub(super) fn answer_in_steps<'f, P: InSteps<'f>>(
 ) {
     let mut under_way: [P; STEPS] = std::array::from_fn(|_| new());
     for step in 0..parts + STEPS - 1 {
+        if look.is_over() {
+            return;
+        }
         if step < parts {
             under_way[step % STEPS].begin(look, step);
         }
