@@ -19,6 +19,8 @@ fn generate() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(out.join("mrol.v1.bin"), prost::Message::encode_to_vec(&api))?;
     tonic_prost_build::configure()
         .bytes(".")
+        // Bounded as it is read.
+        .extern_path(".mrol.v1.Body", "crate::wire::pb::Body")
         .build_server(std::env::var_os("CARGO_FEATURE_SERVER").is_some())
         .compile_fds(descriptors)?;
     Ok(())

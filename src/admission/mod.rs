@@ -20,6 +20,7 @@ mod inbound_body;
 mod lifecycle;
 mod metered_body;
 mod of_connection;
+mod off_runtime;
 mod probes;
 mod quota;
 mod rate;
@@ -30,6 +31,7 @@ pub use body_state::CloseConnection;
 pub use inbound_body::InboundBody;
 pub use lifecycle::{Lifecycle, draining};
 pub use of_connection::OfConnection;
+pub use off_runtime::off_runtime;
 pub use rate::{Peer, RateLimitKey};
 
 use std::num::NonZeroU32;

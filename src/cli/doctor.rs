@@ -79,9 +79,9 @@ fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
 fn aside(data_dir: &DataDir, name: &MapName, output: &Output) -> Result<(), CliError> {
     match set_aside(data_dir, name)? {
         None => output.say(format!("map {name} can be opened as it is")),
-        Some(SetAside { folder, revision }) => {
+        Some(SetAside { folder, revision, keep_outs }) => {
             output.note(format!("set aside: {}", folder.display()));
-            output.print(&Opens { map: name.to_string(), revision })
+            output.print(&Opens { map: name.to_string(), revision, keep_outs })
         }
     }
 }
@@ -90,14 +90,18 @@ fn aside(data_dir: &DataDir, name: &MapName, output: &Output) -> Result<(), CliE
 struct Opens {
     map: String,
     revision: u64,
+    keep_outs: usize,
 }
 
 impl Display for Opens {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "map {} opens at revision {}; what came after it is lost to the map",
-            self.map, self.revision
+            "map {} opens at revision {} with {} keep-outs; what came after it is lost to the map: scans, deletions, undos, and \
+             keep-outs that were put or deleted",
+            self.map,
+            self.revision,
+            count(self.keep_outs)
         )
     }
 }

@@ -4,10 +4,11 @@ use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::stream::{Answers, Message, same_map};
+use super::former::{Keeping, same_map};
+use super::stream::{Answers, Message};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
-use crate::service::MapService;
+use crate::service::{MapService, ServiceError};
 use crate::wire::pb;
 use pb::mapping_server::Mapping;
 
@@ -31,7 +32,7 @@ impl Mapping for Adapter {
         requests: Request<Streaming<pb::InsertScanRequest>>,
     ) -> Result<Response<Self::InsertScanStreamStream>, Status> {
         let failed = Some(pb::InsertScanResponse::from as fn(pb::Failure) -> pb::InsertScanResponse);
-        let insert = |service: MapService, request: pb::InsertScanRequest| async move {
+        let insert = |service: MapService, request: pb::InsertScanRequest, _| async move {
             let (map, scan) = request.try_into()?;
             let answer = service.insert_scan(&map, scan).await?;
             Ok(answer.into())
@@ -125,7 +126,8 @@ impl Mapping for Adapter {
 impl Message for pb::InsertScanRequest {
     type Former = String;
 
-    fn complete(&mut self, former: &mut String) {
+    fn complete(&mut self, former: &mut String, _: Keeping<'_>) -> Result<(), ServiceError> {
         same_map(&mut self.map, former);
+        Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 mod deadline;
 mod decompression;
+mod former;
 mod mapping;
 mod maps;
 mod message_framing;

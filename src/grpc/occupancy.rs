@@ -4,7 +4,8 @@ use tokio_stream::StreamExt;
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::stream::{Answers, Message, same_map};
+use super::former::{Keeping, same_map};
+use super::stream::{Answers, Message};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use crate::map::MapName;
@@ -43,7 +44,7 @@ impl Occupancy for Adapter {
             Operation::QueryPointsStream,
             requests,
             None,
-            |service, request| async move {
+            |service, request, _| async move {
                 let (map, query) = request.try_into()?;
                 let answer = service.query_points(&map, query).await?;
                 Ok(answer.into())
@@ -185,7 +186,8 @@ impl Occupancy for Adapter {
 impl Message for pb::QueryPointsRequest {
     type Former = String;
 
-    fn complete(&mut self, former: &mut String) {
+    fn complete(&mut self, former: &mut String, _: Keeping<'_>) -> Result<(), ServiceError> {
         same_map(&mut self.map, former);
+        Ok(())
     }
 }

@@ -3,24 +3,27 @@
 use prost::Message;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::stream::{self, Answers, same_map};
+use super::former::{FormerBody, Keeping, same_map};
+use super::stream::{self, Answers, Counted};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
+use crate::admission::{InboundBody, off_runtime};
 use crate::map::MapName;
-use crate::service::{Answered, Question, ServiceError};
-use crate::wire::pb;
+use crate::service::{Answered, MapService, Question, ServiceError};
+use crate::wire::{Asking, pb, question_of};
 
 impl Adapter {
     /// Answers one question.
     pub(super) async fn ask<Q, M, A>(&self, request: Request<M>) -> Result<Response<A>, Status>
     where
         Q: Question,
-        M: Message,
+        M: Message + Asking + 'static,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
         A: Message + From<Answered<Q::Answer>>,
     {
         let service = service_of(&request)?;
-        let (map, question) = <(MapName, Q)>::try_from(request.into_inner())?;
+        let arrival = InboundBody::of(request.extensions())?.clone();
+        let (map, question) = question::<Q, _, _>(&service, request.into_inner(), arrival).await?;
         Ok(answered(service.ask(&map, question).await?.into()))
     }
 
@@ -32,61 +35,62 @@ impl Adapter {
     ) -> Result<Response<Answers<A>>, Status>
     where
         Q: Question,
-        M: stream::Message,
+        M: stream::Message + Asking,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
         A: Message + From<Answered<Q::Answer>> + 'static,
     {
-        let answers = self.answer_in_order(operation, requests, None, |service, request| async move {
-            let (map, question) = <(MapName, Q)>::try_from(request)?;
+        let ask = |service: MapService, request: M, counted: Counted| async move {
+            let (map, question) = question::<Q, _, _>(&service, request, counted).await?;
             Ok(service.ask(&map, question).await?.into())
-        })?;
+        };
+        let answers = self.answer_in_order(operation, requests, None, ask)?;
         Ok(Response::new(answers))
     }
 }
 
-impl stream::Message for pb::CastRaysRequest {
-    type Former = String;
-
-    fn complete(&mut self, former: &mut String) {
-        same_map(&mut self.asked.get_or_insert_default().map, former);
-    }
+/// The question of a message of a call or a stream, whose memory `counted` counts.
+async fn question<Q, M, C>(service: &MapService, message: M, counted: C) -> Result<(MapName, Q), ServiceError>
+where
+    Q: Question,
+    M: Message + Asking + 'static,
+    (MapName, Q): TryFrom<M, Error = ServiceError>,
+    C: Send + 'static,
+{
+    let (bytes, service) = (message.encoded_len(), service.clone());
+    off_runtime(bytes, counted, move || question_of(message, service.limits())).await?
 }
 
-impl stream::Message for pb::FindNearestRequest {
-    type Former = String;
+/// Makes messages of streams of requests that may leave out their map.
+macro_rules! streamed {
+    ($($request:ident),+) => {
+        $(impl stream::Message for pb::$request {
+            type Former = String;
 
-    fn complete(&mut self, former: &mut String) {
-        same_map(&mut self.asked.get_or_insert_default().map, former);
-    }
+            fn complete(&mut self, former: &mut String, _: Keeping<'_>) -> Result<(), ServiceError> {
+                same_map(&mut self.asked.get_or_insert_default().map, former);
+                Ok(())
+            }
+        })+
+    };
 }
 
-impl stream::Message for pb::CheckSpheresRequest {
-    type Former = String;
+/// Makes messages of streams of requests that may leave out their map and their body.
+macro_rules! streamed_with_a_body {
+    ($($request:ident),+) => {
+        $(impl stream::Message for pb::$request {
+            type Former = (String, FormerBody);
 
-    fn complete(&mut self, former: &mut String) {
-        same_map(&mut self.asked.get_or_insert_default().map, former);
-    }
+            fn complete(
+                &mut self,
+                (map, body): &mut Self::Former,
+                keeping: Keeping<'_>,
+            ) -> Result<(), ServiceError> {
+                same_map(&mut self.asked.get_or_insert_default().map, map);
+                body.complete(&mut self.body, keeping)
+            }
+        })+
+    };
 }
 
-impl stream::Message for pb::CheckPosesRequest {
-    type Former = (String, Option<pb::Body>);
-
-    fn complete(&mut self, (map, body): &mut Self::Former) {
-        same_map(&mut self.asked.get_or_insert_default().map, map);
-        same_body(&mut self.body, body);
-    }
-}
-
-impl stream::Message for pb::CheckMotionsRequest {
-    type Former = (String, Option<pb::Body>);
-
-    fn complete(&mut self, (map, body): &mut Self::Former) {
-        same_map(&mut self.asked.get_or_insert_default().map, map);
-        same_body(&mut self.body, body);
-    }
-}
-
-/// The body of a request, or that of the request before. Its arrays are shared, not copied.
-fn same_body(body: &mut Option<pb::Body>, former: &mut Option<pb::Body>) {
-    if body.is_none() { body.clone_from(former) } else { former.clone_from(body) }
-}
+streamed!(CastRaysRequest, FindNearestRequest, CheckSpheresRequest);
+streamed_with_a_body!(CheckPosesRequest, CheckMotionsRequest);

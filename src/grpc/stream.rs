@@ -1,6 +1,7 @@
 //! Streams of requests, answered in order.
 
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Instant;
 
@@ -10,6 +11,7 @@ use tonic::{Code, Request, Status, Streaming};
 use tracing::Instrument;
 
 use super::decompression::{Compressed, Inflation};
+use super::former::Keeping;
 use super::middleware::Grpc;
 use super::{Adapter, status};
 use crate::access::{Authorized, Operation};
@@ -61,12 +63,10 @@ pub(super) trait Message: prost::Message + 'static {
     type Former: Default + Send + 'static;
 
     /// Takes what it leaves out from the requests before it, and gives what it says to those that follow.
-    fn complete(&mut self, former: &mut Self::Former);
-}
-
-/// The map that a request names; where the name is empty, that of the request before.
-pub(super) fn same_map(map: &mut String, former: &mut String) {
-    if map.is_empty() { map.clone_from(former) } else { former.clone_from(map) }
+    ///
+    /// # Errors
+    /// When what it says is more than is kept.
+    fn complete(&mut self, former: &mut Self::Former, keeping: Keeping<'_>) -> Result<(), ServiceError>;
 }
 
 impl Adapter {
@@ -84,7 +84,7 @@ impl Adapter {
     where
         M: Message,
         A: prost::Message + 'static,
-        H: Fn(MapService, M) -> F + Send + 'static,
+        H: Fn(MapService, M, Counted) -> F + Send + 'static,
         F: Future<Output = Result<A, ServiceError>> + Send,
     {
         let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
@@ -120,6 +120,9 @@ impl Adapter {
 
 /// A request of a stream, with the memory that it takes until it is answered.
 type Read<M> = Result<(M, MemoryPermit), Status>;
+
+/// The memory that a request takes: it counts until the request is answered, and nobody works on it still.
+pub(super) type Counted = Arc<MemoryPermit>;
 
 struct Reader<M> {
     requests: Streaming<M>,
@@ -174,7 +177,7 @@ impl<A: prost::Message, H, P> Worker<A, H, P> {
     async fn run<M, F>(mut self, mut inbox: Receiver<Read<M>>, outbox: Sender<Made<A>>)
     where
         M: Message<Former = P>,
-        H: Fn(MapService, M) -> F,
+        H: Fn(MapService, M, Counted) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         loop {
@@ -198,13 +201,13 @@ impl<A: prost::Message, H, P> Worker<A, H, P> {
     async fn answer<M, F>(&mut self, request: Read<M>) -> Made<A>
     where
         M: Message<Former = P>,
-        H: Fn(MapService, M) -> F,
+        H: Fn(MapService, M, Counted) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
         let start = Instant::now();
         let mut told = None;
         let answer = match request {
-            Ok((request, _until_answered)) => self.kept(request).await.map_err(|error| {
+            Ok((request, charge)) => self.kept(request, charge.into()).await.map_err(|error| {
                 told = self
                     .failed
                     .filter(|_| !status::ends_stream(&error))
@@ -221,26 +224,31 @@ impl<A: prost::Message, H, P> Worker<A, H, P> {
     }
 
     /// The answer, with room for it.
-    async fn kept<M, F>(&mut self, request: M) -> Result<(A, Option<MemoryPermit>), ServiceError>
+    async fn kept<M, F>(
+        &mut self,
+        request: M,
+        counted: Counted,
+    ) -> Result<(A, Option<MemoryPermit>), ServiceError>
     where
         M: Message<Former = P>,
-        H: Fn(MapService, M) -> F,
+        H: Fn(MapService, M, Counted) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
-        let answer = self.handled(request).await?;
+        let answer = self.handled(request, Arc::clone(&counted)).await?;
         let unsent = self.admission.keep_answer(answer.encoded_len())?;
         Ok((answer, unsent))
     }
 
-    async fn handled<M, F>(&mut self, mut request: M) -> Result<A, ServiceError>
+    async fn handled<M, F>(&mut self, mut request: M, counted: Counted) -> Result<A, ServiceError>
     where
         M: Message<Former = P>,
-        H: Fn(MapService, M) -> F,
+        H: Fn(MapService, M, Counted) -> F,
         F: Future<Output = Result<A, ServiceError>>,
     {
-        request.complete(&mut self.former);
+        let keeping = Keeping { admission: &self.admission, limits: self.authorized.service.limits() };
+        request.complete(&mut self.former, keeping)?;
         self.admission.check_rate(&self.asking)?;
-        let handled = (self.handle)(self.authorized.service.clone(), request);
+        let handled = (self.handle)(self.authorized.service.clone(), request, counted);
         self.admission.lifecycle().admit(handled).await?
     }
 }

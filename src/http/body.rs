@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use super::error::HttpError;
 use super::object::Object;
 use super::{Adapter, params, unreadable};
-use crate::admission::InboundBody;
+use crate::admission::{InboundBody, off_runtime};
 use crate::service::{PointCloud, Reason, ServiceError};
 use crate::util::excerpt;
 use crate::wire::InField;
@@ -20,9 +20,6 @@ const OCTET_STREAM: &str = "application/octet-stream";
 /// eight bytes, and lie in a list that doubles its room, the old one beside the new; the answer to them is shorter.
 const JSON_AND_PARSED: usize = 6;
 
-/// JSON of more bytes than this is parsed away from the threads that serve connections.
-const PARSED_INLINE_MAX: usize = 64 << 10;
-
 /// A body that is all of the request.
 pub(super) struct Json<T>(pub(super) T);
 
@@ -31,7 +28,7 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for Json<T> {
 
     async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
         match content_type(request.headers()).as_str() {
-            JSON => parse_all(request, adapter).await.map(Self),
+            JSON => parse_all(request, adapter).await.map(|(parsed, _)| Self(parsed)),
             other => Err(unsupported(other, JSON)),
         }
     }
@@ -52,7 +49,7 @@ where
 
     async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
         match content_type(request.headers()).as_str() {
-            JSON => parse_all(request, adapter).await.map(Self::Json),
+            JSON => parse_all(request, adapter).await.map(|(parsed, _)| Self::Json(parsed)),
             OCTET_STREAM => {
                 let rest = params::from_query(request.uri())?;
                 Ok(Self::Bytes(read(request, adapter).await?, rest))
@@ -64,7 +61,7 @@ where
 
 /// A body that holds all of a request: JSON, or bytes.
 pub(super) enum Sent<T> {
-    Json(T),
+    Json { parsed: T, bytes: usize },
     Octets(Bytes),
 }
 
@@ -74,7 +71,10 @@ pub(super) async fn json_or_octets<T: DeserializeOwned + Send + 'static>(
     adapter: &Adapter,
 ) -> Result<Sent<T>, HttpError> {
     match content_type(request.headers()).as_str() {
-        JSON => parse_all(request, adapter).await.map(Sent::Json),
+        JSON => {
+            let (parsed, bytes) = parse_all(request, adapter).await?;
+            Ok(Sent::Json { parsed, bytes })
+        }
         OCTET_STREAM => {
             no_query(&request, OCTET_STREAM)?;
             read(request, adapter).await.map(Sent::Octets)
@@ -110,26 +110,26 @@ fn unsupported(got: &str, supported: &str) -> HttpError {
     HttpError::from(ServiceError::new(Reason::UnsupportedContentType, message))
 }
 
-/// Parses a body that holds the whole request; parameters beside it would go unheard.
+/// Parses a body that holds the whole request, of so many bytes; parameters beside it would go unheard.
 async fn parse_all<T: DeserializeOwned + Send + 'static>(
     request: Request,
     adapter: &Adapter,
-) -> Result<T, HttpError> {
+) -> Result<(T, usize), HttpError> {
     no_query(&request, JSON)?;
     let arrival = InboundBody::of(request.extensions())?.clone();
     let body = read(request, adapter).await?;
-    arrival.at_least(body.len() * JSON_AND_PARSED)?;
-    if body.len() <= PARSED_INLINE_MAX {
-        return parse(&body);
-    }
-    let parsed = tokio::task::spawn_blocking(move || {
-        // It takes its memory to the end, whether or not somebody waits for it still.
-        let _counted = arrival;
-        parse(&body)
-    });
-    parsed.await.unwrap_or_else(|_| {
-        Err(ServiceError::new(Reason::ParserFailed, "the body could not be parsed").into())
-    })
+    let bytes = body.len();
+    Ok((parse_beside(body, 0, arrival).await?, bytes))
+}
+
+/// Parses JSON that is in memory beside other bytes of its request; it counts with what is made of it.
+pub(super) async fn parse_beside<T: DeserializeOwned + Send + 'static>(
+    json: Bytes,
+    others: usize,
+    arrival: InboundBody,
+) -> Result<T, HttpError> {
+    arrival.at_least(json.len() * JSON_AND_PARSED + others)?;
+    off_runtime(json.len(), arrival, move || parse(&json)).await?
 }
 
 fn no_query(request: &Request, content_type: &str) -> Result<(), HttpError> {
@@ -139,7 +139,7 @@ fn no_query(request: &Request, content_type: &str) -> Result<(), HttpError> {
     Err(ServiceError::new(Reason::UnexpectedQuery, message).into())
 }
 
-pub(super) fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
+fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, HttpError> {
     let not_json = |error| ServiceError::new(Reason::BadJson, unreadable::body::<T>(body, &error));
     let Object(parsed) = serde_json::from_slice(body).map_err(not_json)?;
     Ok(parsed)

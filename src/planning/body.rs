@@ -29,9 +29,9 @@ impl Body {
         Ok(Self { links, prepared: Prepared::default() })
     }
 
-    /// Number of spheres and points of all links.
+    /// Number of links, and of spheres and points of all links.
     pub fn parts(&self) -> usize {
-        self.links.iter().map(|link| link.spheres.len() + link.points.len()).sum()
+        self.links.iter().map(|link| 1 + link.spheres.len() + link.points.len()).sum()
     }
 
     /// The links.

@@ -97,8 +97,9 @@ impl Clearances {
     /// When that is negative, or more than [`CLEARANCE_CELLS_MAX`] cells.
     pub(super) fn up_to(most_m: f32, cells_per_m: f64) -> Result<Self, PlanningError> {
         let (value, max) = (f64::from(most_m), CLEARANCE_CELLS_MAX / cells_per_m);
-        let most = value * cells_per_m;
-        let is_in_range = (0.0..=CLEARANCE_CELLS_MAX).contains(&most);
+        let most = (value * cells_per_m).min(CLEARANCE_CELLS_MAX);
+        // Who asks for the largest distance says the float next to it, which may be more.
+        let is_in_range = (0.0..=max as f32).contains(&most_m);
         let refused = PlanningError::Number { field: "clearance_max_m", value, min: 0.0, max };
         is_in_range.then_some(Self { most_m, most, cells_per_m }).ok_or(refused)
     }
@@ -140,5 +141,20 @@ impl Kind for Clearances {
     fn answer(&self, configuration: &mut Configuration<'_>, look: &mut Look<'_>) -> Option<Clearance> {
         let NearestLink { distance, link } = configuration.nearest(look, self.most)?;
         Some(Clearance { distance_m: self.told_m(distance), link: link.map(|link| link as u32) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_distance_is_taken_as_the_float_that_says_it() {
+        // 6.4 is no float: the one next to it is more.
+        assert_eq!(Clearances::up_to(6.4, 10.0).unwrap().most(), CLEARANCE_CELLS_MAX);
+        assert!(Clearances::up_to(0.0, 10.0).is_ok());
+        for most_m in [6.4f32.next_up(), -1e-9, f32::NAN, f32::INFINITY] {
+            assert!(Clearances::up_to(most_m, 10.0).is_err(), "{most_m}");
+        }
     }
 }

@@ -53,7 +53,7 @@ pub use cover::{COVER_SPHERES_MAX, CoverError, cover_box, cover_capsule};
 pub use error::PlanningError;
 pub use grid::{Grid, GridArea, GridError, GridRequest, NotOccupied, project_grid};
 pub use kind::{CLEARANCE_CELLS_MAX, Clearance, Hit, Met, clearance_max_m};
-pub use motions::{MotionAnswer, MotionQuestion};
+pub use motions::{MotionAnswer, MotionQuestion, prepared_bytes};
 pub use nearest::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, RADIUS_VOXELS_MAX, find_nearest};
 pub use parts::{Link, Sphere};
 pub use planner::{Planner, PlanningView};

@@ -58,6 +58,15 @@ pub struct MotionAnswer {
     pub clearance_m: Option<f32>,
 }
 
+/// Bytes of memory in which so many `motions` of a body of `links` links, with so many `configurations` in all, are prepared.
+pub fn prepared_bytes(motions: usize, configurations: usize, links: usize) -> usize {
+    // A list that grows takes up to three times what is in it, and one that begins has room for four.
+    let (per_motion, per_segment) = (3 * size_of::<BodyMotion<'_>>(), 3 * size_of::<Segment>());
+    let of_links = links.saturating_mul(size_of::<LinkMotion>());
+    let segments = configurations.saturating_mul(per_segment.saturating_add(of_links));
+    motions.saturating_mul(per_motion + 4 * size_of::<Segment>()).saturating_add(segments)
+}
+
 impl MotionAnswer {
     /// True where the body meets nothing on its way.
     pub fn is_free(&self) -> bool {
@@ -154,7 +163,8 @@ impl MotionQuestion<'_> {
     fn step_m(&self, cells_per_m: f64) -> Result<f64, PlanningError> {
         let value = self.step_m.map_or(0.5 / cells_per_m, f64::from);
         let max = f64::from(super::parts::RADIUS_MAX_M);
-        let is_valid = (STEP_MIN_M..=max).contains(&value);
+        // Who asks for the least step says the float next to it, which may be less.
+        let is_valid = (STEP_MIN_M as f32..=max as f32).contains(&(value as f32));
         is_valid.then_some(value).ok_or(PlanningError::Number {
             field: "step_m",
             value,

@@ -412,6 +412,9 @@ fn questions_that_make_no_sense_are_refused_by_name() {
     assert!(motions(&[2, 2], None, Some(64.0)).is_ok());
     assert!(motions(&[2, 2], None, Some(64.1)).unwrap_err().contains("clearance_max_m must lie in 0..=64"));
     assert!(motions(&[4], Some(0.0), None).unwrap_err().contains("step_m must lie in"));
+    // The float next to the least step is less than it.
+    assert_eq!(motions(&[4], Some(1e-5), None).err(), None);
+    assert!(motions(&[4], Some(1e-5f32.next_down()), None).unwrap_err().contains("step_m must lie in"));
     assert!(
         motions(&[3, 1], None, None)
             .unwrap_err()

@@ -261,6 +261,28 @@ impl Limits {
     }
 
     /// # Errors
+    /// When the body of a question has more links, spheres and points in all than `body_parts_max`.
+    pub(crate) fn check_body_parts(&self, parts: usize) -> Result<(), ServiceError> {
+        let most = self.body_parts_max;
+        if parts <= most {
+            return Ok(());
+        }
+        let message = format!("body has {parts} links, spheres and points, body_parts_max is {most}");
+        Err(ServiceError::new(Reason::BatchTooLarge, message))
+    }
+
+    /// # Errors
+    /// When one of the groups, of so many spheres each, has more than `body_parts_max`.
+    pub(super) fn check_group_sizes(&self, sizes: &[u32]) -> Result<(), ServiceError> {
+        let most = self.body_parts_max;
+        let Some((i, size)) = sizes.iter().enumerate().find(|(_, size)| **size as usize > most) else {
+            return Ok(());
+        };
+        let message = format!("sizes[{i}] has {size} spheres, body_parts_max is {most}");
+        Err(ServiceError::new(Reason::BatchTooLarge, message))
+    }
+
+    /// # Errors
     /// When a query of so many points would be compared with more sides of keep-outs than `keep_out_tests_max` in all.
     pub(super) fn check_keep_out_tests(&self, points: usize, sides: usize) -> Result<(), ServiceError> {
         let most = self.keep_out_tests_max;
@@ -392,6 +414,16 @@ mod tests {
             let error = limits.check_keep_out_tests(points, sides).unwrap_err();
             assert!(error.message.contains("keep_out_tests_max, 1000"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_body_or_a_group_has_as_many_parts_as_the_limit_says_and_no_more() {
+        let limits = Limits { body_parts_max: 5, ..Limits::default() };
+        assert!(limits.check_body_parts(5).is_ok() && limits.check_group_sizes(&[5, 1, 5]).is_ok());
+        let refused = limits.check_body_parts(6).unwrap_err().message;
+        assert_eq!(refused, "body has 6 links, spheres and points, body_parts_max is 5");
+        let refused = limits.check_group_sizes(&[5, 6]).unwrap_err().message;
+        assert_eq!(refused, "sizes[1] has 6 spheres, body_parts_max is 5");
     }
 
     #[test]

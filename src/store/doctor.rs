@@ -61,6 +61,8 @@ pub struct SetAside {
     pub folder: PathBuf,
     /// Revision of the map that was made of what can be read.
     pub revision: u64,
+    /// Keep-outs that this map has.
+    pub keep_outs: usize,
 }
 
 /// Checks a map: reads every snapshot and every record, replays the journal from the oldest snapshot, and compares the
@@ -257,7 +259,8 @@ pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>,
     let map = readable(data_dir.files(), &path)?;
     let first = Snapshot::of(&map, Uuid::new_v4());
     let folder = data_dir.replace_damaged(name, &path, &first)?;
-    Ok(Some(SetAside { folder, revision: first.contents.revision }))
+    let (revision, keep_outs) = (first.contents.revision, first.contents.keep_outs.len());
+    Ok(Some(SetAside { folder, revision, keep_outs }))
 }
 
 /// The map that a folder still gives: that of the newest snapshot, and the changes after it up to what cannot be read.

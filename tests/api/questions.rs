@@ -251,6 +251,27 @@ async fn a_stream_of_checks_has_its_body_once() {
 }
 
 #[tokio::test]
+async fn a_stream_keeps_a_small_body_of_a_large_message_and_no_more() {
+    use mrol::wire::pb;
+    let (daemon, _, _) = row_of_voxels().await;
+    let poses: Vec<u8> = at(0.55, 9.0, 0.05).repeat(20_000).iter().flat_map(|c| c.to_le_bytes()).collect();
+    let request = pb::CheckPosesRequest {
+        asked: Some(pb::Asked { map: "a".into(), ..Default::default() }),
+        body: Some((&*ball(0.15)).into()),
+        configurations_f32le: poses.into(),
+        ..Default::default()
+    };
+    let (requests, read) = tokio::sync::mpsc::channel(1);
+    requests.send(request).await.unwrap();
+    let requests_of = tokio_stream::wrappers::ReceiverStream::new(read);
+    let mut occupancy = daemon.occupancy().await;
+    let mut answers = occupancy.check_poses_stream(requests_of).await.unwrap().into_inner();
+    assert_eq!(answers.message().await.unwrap().unwrap().collisions.unwrap().checked, 20_000);
+    let kept = daemon.metric("mrol_body_bytes").await.unwrap();
+    assert!(kept > 0.0 && kept < 1024.0, "{kept}");
+}
+
+#[tokio::test]
 async fn what_is_no_question_is_refused_by_name() {
     let (daemon, _, _) = row_of_voxels().await;
     let body = |radius: Value| json!({"links": [{"spheres": [[0, 0, 0, radius]]}]});
@@ -304,6 +325,74 @@ async fn what_is_no_question_is_refused_by_name() {
     for short in [&[][..], &[9, 0, 0, 0, b'{'], &[255; 8]] {
         let answer = daemon.post_bytes("/v1/maps/a/rays", short.to_vec()).await;
         assert_eq!(json_of(answer).await["reason"], "bad_array");
+    }
+}
+
+#[tokio::test]
+async fn links_count_as_parts_of_a_body_and_groups_are_bounded_in_every_form() {
+    use mrol::wire::pb;
+    let daemon = Daemon::start_with(|config| config.limits.body_parts_max = 3).await;
+    daemon.make_map("a").await;
+    let words = "body has 4 links, spheres and points, body_parts_max is 3";
+    for (links, is_taken) in [(3, true), (4, false)] {
+        let pose: Vec<u8> = at(0.0, 0.0, 0.0).repeat(links).iter().flat_map(|c| c.to_le_bytes()).collect();
+        let body = json!({"links": vec![json!({}); links]});
+        for (route, rest) in [("poses", json!({})), ("motions", json!({"lengths": [2]}))] {
+            let configurations = if route == "motions" { pose.repeat(2) } else { pose.clone() };
+            let mut head = json!({"body": body, "configurations": {"at": 0, "bytes": configurations.len()}});
+            head.as_object_mut().unwrap().extend(rest.as_object().unwrap().clone());
+            let answer =
+                daemon.post_bytes(&format!("/v1/maps/a/{route}"), framed(&head, &configurations)).await;
+            assert_eq!(answer.status().is_success(), is_taken, "{route}");
+            if !is_taken {
+                let said = json_of(answer).await;
+                assert!(said["detail"].as_str().unwrap().contains(words), "{route}: {said}");
+            }
+        }
+        let request = pb::CheckPosesRequest {
+            asked: Some(pb::Asked { map: "a".into(), ..Default::default() }),
+            body: Some(pb::Body { links: vec![pb::Link::default(); links] }),
+            configurations_f32le: pose.into(),
+            ..Default::default()
+        };
+        let mut occupancy = daemon.occupancy().await;
+        let told = occupancy.check_poses(request.clone()).await;
+        assert_eq!(told.is_ok(), is_taken);
+        let mut answers =
+            occupancy.check_poses_stream(tokio_stream::iter([request])).await.unwrap().into_inner();
+        let streamed = answers.message().await;
+        assert_eq!(streamed.is_ok(), is_taken);
+        for refused in [told.err(), streamed.err()].into_iter().flatten() {
+            assert_eq!(refused.message(), words);
+        }
+    }
+    let spheres = |sizes: Value| json!({"spheres": vec![[0, 0, 0, 1]; 5], "sizes": sizes});
+    assert!(daemon.post("/v1/maps/a/spheres", spheres(json!([3, 2]))).await.status().is_success());
+    let said = json_of(daemon.post("/v1/maps/a/spheres", spheres(json!([1, 4]))).await).await;
+    assert_eq!(said["detail"], json!("sizes[1] has 4 spheres, body_parts_max is 3"));
+}
+
+#[tokio::test]
+async fn a_head_in_the_form_for_programs_counts_as_json_does() {
+    let daemon = Daemon::start_with(|config| {
+        config.limits.message_bytes_max = 1 << 20;
+        config.limits.body_bytes_max = 1 << 20;
+    })
+    .await;
+    daemon.make_map("a").await;
+    // An array behind the head takes what it is; JSON takes what is made of it too.
+    for (blanks, array_bytes, is_taken) in [(0, 1 << 19, true), (100 << 10, 12, true), (200 << 10, 12, false)]
+    {
+        let slice = json!({"at": 0, "bytes": 12});
+        let head = json!({"points": slice, "radius_m": 1}).to_string() + &" ".repeat(blanks);
+        let length = (head.len() as u32).to_le_bytes();
+        let request = [&length[..], head.as_bytes(), &vec![0; array_bytes]].concat();
+        let answer = daemon.post_bytes("/v1/maps/a/nearest", request).await;
+        assert_eq!(answer.status().is_success(), is_taken, "{blanks}");
+        if !is_taken {
+            let said = json_of(answer).await;
+            assert!(said["detail"].as_str().unwrap().contains("body_bytes_max"), "{said}");
+        }
     }
 }
 

@@ -1,7 +1,10 @@
 //! Bodies and what checks of them have in common, in JSON.
 
+use std::fmt::{Formatter, Result as FmtResult};
+
 use axum::body::Bytes;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::answer::Array;
 use super::form::{NumbersField, PointsField};
@@ -16,8 +19,11 @@ use crate::wire::{InField, pb};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BodyField {
-    links: Vec<Object<LinkField>>,
+    links: LinksField,
 }
+
+/// The links of a body: no more are read than a body may have.
+struct LinksField(Vec<Object<LinkField>>);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -68,6 +74,33 @@ impl From<AnswerWord> for pb::CheckAnswer {
     }
 }
 
+impl<'de> Deserialize<'de> for LinksField {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(LinksVisitor)
+    }
+}
+
+struct LinksVisitor;
+
+impl<'de> Visitor<'de> for LinksVisitor {
+    type Value = LinksField;
+
+    fn expecting(&self, f: &mut Formatter<'_>) -> FmtResult {
+        f.write_str("an array of links")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<LinksField, A::Error> {
+        let mut links = Vec::new();
+        while let Some(link) = seq.next_element()? {
+            if links.len() == pb::LINKS_MAX {
+                return Err(A::Error::custom(format!("links has more than {} entries", pb::LINKS_MAX)));
+            }
+            links.push(link);
+        }
+        Ok(LinksField(links))
+    }
+}
+
 impl BodyField {
     /// The body as a message has it.
     pub(super) fn into_message(self, arrays: &Bytes) -> Result<pb::Body, ServiceError> {
@@ -79,7 +112,7 @@ impl BodyField {
             Ok(pb::Link { spheres_f32le: spheres.unwrap_or_default(), points, padding_m })
         };
         Ok(pb::Body {
-            links: self.links.into_iter().enumerate().map(link).collect::<Result<_, ServiceError>>()?,
+            links: self.links.0.into_iter().enumerate().map(link).collect::<Result<_, ServiceError>>()?,
         })
     }
 }
@@ -129,4 +162,20 @@ pub(super) fn collisions_of(
         ]),
     }
     (head, arrays)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_that_are_too_many_are_not_read() {
+        let read = |links: usize| {
+            let text = format!(r#"{{"links": [{}]}}"#, vec!["{}"; links].join(","));
+            serde_json::from_str::<BodyField>(&text).map(|body| body.links.0.len())
+        };
+        assert_eq!(read(pb::LINKS_MAX).unwrap(), pb::LINKS_MAX);
+        let refused = read(pb::LINKS_MAX + 1).unwrap_err().to_string();
+        assert!(refused.contains("links has more than 65536 entries"), "{refused}");
+    }
 }

@@ -19,12 +19,14 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{DeserializeOwned, Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::admission::{InboundBody, off_runtime};
 use crate::http::Adapter;
 use crate::http::body::{self, Sent};
 use crate::http::error::HttpError;
 use crate::http::json::JsonPoints;
-use crate::service::{PointCloud, Reason, ServiceError};
-use crate::wire::{bytes_of, pb};
+use crate::map::MapName;
+use crate::service::{MapService, PointCloud, Question, Reason, ServiceError};
+use crate::wire::{Asking, bytes_of, pb, question_of};
 
 /// In which form something is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,8 +38,12 @@ pub(in crate::http) enum Form {
 /// A question: its head, and the arrays that the head speaks of.
 pub(in crate::http) struct QuestionBody<T> {
     pub(super) head: T,
-    pub(super) arrays: Bytes,
+    arrays: Bytes,
     pub(super) form: Form,
+    /// Bytes of all of it.
+    bytes: usize,
+    /// Counts them, and what is made of them.
+    arrival: InboundBody,
 }
 
 /// Bytes that say how long the head is.
@@ -47,9 +53,13 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody
     type Rejection = HttpError;
 
     async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
+        let arrival = InboundBody::of(request.extensions())?.clone();
         match body::json_or_octets(request, adapter).await? {
-            Sent::Json(head) => Ok(Self { head, arrays: Bytes::new(), form: Form::Json }),
+            Sent::Json { parsed: head, bytes } => {
+                Ok(Self { head, arrays: Bytes::new(), form: Form::Json, bytes, arrival })
+            }
             Sent::Octets(mut body) => {
+                let bytes = body.len();
                 let length = body.get(..LENGTH_BYTES).map(|bytes| {
                     let length = u32::from_le_bytes(std::array::from_fn(|i| bytes[i]));
                     usize::try_from(length).unwrap_or(usize::MAX)
@@ -58,9 +68,29 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody
                 let length = length.ok_or_else(|| no_head(body.len()))?;
                 let mut rest = body.split_off(LENGTH_BYTES);
                 let arrays = rest.split_off(length);
-                Ok(Self { head: body::parse(&rest)?, arrays, form: Form::Arrays })
+                let head = body::parse_beside(rest, LENGTH_BYTES + arrays.len(), arrival.clone()).await?;
+                Ok(Self { head, arrays, form: Form::Arrays, bytes, arrival })
             }
         }
+    }
+}
+
+impl<T: Send + 'static> QuestionBody<T> {
+    /// The question, of which `message` makes the message that asks it.
+    pub(super) async fn question<M, Q>(
+        self,
+        service: &MapService,
+        message: impl FnOnce(T, &Bytes) -> Result<M, ServiceError> + Send + 'static,
+    ) -> Result<(MapName, Q), HttpError>
+    where
+        M: Asking,
+        Q: Question,
+        (MapName, Q): TryFrom<M, Error = ServiceError>,
+    {
+        let Self { head, arrays, bytes, arrival, .. } = self;
+        let service = service.clone();
+        let make = move || question_of(message(head, &arrays)?, service.limits());
+        Ok(off_runtime(bytes, arrival, make).await??)
     }
 }
 

@@ -1,5 +1,6 @@
 //! `POST /v1/maps/{map}/grid`: the map from above, as a 2-D grid.
 
+use axum::body::Bytes;
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,7 @@ use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::params::Map;
+use crate::service::GridQuestion;
 use crate::wire::pb;
 
 #[derive(Deserialize)]
@@ -45,14 +47,19 @@ struct GridHead {
 pub(in crate::http) async fn project_grid(
     Service(service): Service,
     Map(map): Map,
-    QuestionBody { head, form, .. }: QuestionBody<GridBody>,
+    asking: QuestionBody<GridBody>,
 ) -> Result<Response, HttpError> {
-    let GridBody { area, min_z_m, max_z_m, cell_m, level, min_revision, map_uuid, ignore_keep_outs } = head;
-    let area = area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
-        pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
-    });
-    let asked = asked(&map, (level, ignore_keep_outs), min_revision, map_uuid);
-    let (map, question) = pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m }.try_into()?;
+    let form = asking.form;
+    let message = move |of: GridBody, _: &Bytes| {
+        let area =
+            of.area.map(|Object(AreaBody { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] })| {
+                pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
+            });
+        let asked = asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid);
+        let GridBody { min_z_m, max_z_m, cell_m, .. } = of;
+        Ok(pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m })
+    };
+    let (map, question): (_, GridQuestion) = asking.question(&service, message).await?;
     let answered = service.ask(&map, question).await?;
     let version = answered.version;
     let response = pb::ProjectGridResponse::from(answered);

@@ -1,5 +1,6 @@
 //! `POST /v1/maps/{map}/motions`: can a body move along these configurations?
 
+use axum::body::Bytes;
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +12,7 @@ use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::params::Map;
+use crate::service::MotionCheck;
 use crate::wire::pb;
 
 #[derive(Deserialize)]
@@ -42,19 +44,22 @@ struct MotionsHead {
 pub(in crate::http) async fn check_motions(
     Service(service): Service,
     Map(map): Map,
-    QuestionBody { head, arrays, form }: QuestionBody<MotionsBody>,
+    asking: QuestionBody<MotionsBody>,
 ) -> Result<Response, HttpError> {
-    let MotionsBody { body: Object(body), configurations, lengths, ignored, .. } = head;
-    let request = pb::CheckMotionsRequest {
-        asked: asked(&map, (head.level, head.ignore_keep_outs), head.min_revision, head.map_uuid),
-        body: Some(body.into_message(&arrays)?),
-        configurations_f32le: configurations.into_bytes(&arrays, "configurations")?,
-        lengths_u32le: lengths.into_bytes(&arrays, "lengths")?,
-        step_m: head.step_m,
-        clearance_max_m: head.clearance_max_m,
-        ignored: ignored_of(ignored)?,
+    let form = asking.form;
+    let message = move |of: MotionsBody, arrays: &Bytes| {
+        let Object(body) = of.body;
+        Ok(pb::CheckMotionsRequest {
+            asked: asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid),
+            body: Some(body.into_message(arrays)?),
+            configurations_f32le: of.configurations.into_bytes(arrays, "configurations")?,
+            lengths_u32le: of.lengths.into_bytes(arrays, "lengths")?,
+            step_m: of.step_m,
+            clearance_max_m: of.clearance_max_m,
+            ignored: ignored_of(of.ignored)?,
+        })
     };
-    let (map, check) = request.try_into()?;
+    let (map, check): (_, MotionCheck) = asking.question(&service, message).await?;
     let answered = service.ask(&map, check).await?;
     let version = answered.version;
     let response = pb::CheckMotionsResponse::from(answered);

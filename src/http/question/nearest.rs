@@ -1,5 +1,6 @@
 //! `POST /v1/maps/{map}/nearest`: the occupied voxel nearest to each point.
 
+use axum::body::Bytes;
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,7 @@ use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
 use crate::planning::MeasuredTo;
+use crate::service::NearestQuestion;
 use crate::wire::json::ByKeyword;
 use crate::wire::pb;
 
@@ -36,17 +38,19 @@ struct NearestHead {
 pub(in crate::http) async fn find_nearest(
     Service(service): Service,
     Map(map): Map,
-    QuestionBody { head, arrays, form }: QuestionBody<NearestBody>,
+    asking: QuestionBody<NearestBody>,
 ) -> Result<Response, HttpError> {
-    let NearestBody { points, radius_m, to: ByKeyword(to), level, min_revision, map_uuid, ignore_keep_outs } =
-        head;
-    let request = pb::FindNearestRequest {
-        asked: asked(&map, (level, ignore_keep_outs), min_revision, map_uuid),
-        points: Some(points.into_message(&arrays, "points")?),
-        radius_m,
-        to: pb::MeasuredTo::from(to).into(),
+    let form = asking.form;
+    let message = move |of: NearestBody, arrays: &Bytes| {
+        let ByKeyword(to) = of.to;
+        Ok(pb::FindNearestRequest {
+            asked: asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid),
+            points: Some(of.points.into_message(arrays, "points")?),
+            radius_m: of.radius_m,
+            to: pb::MeasuredTo::from(to).into(),
+        })
     };
-    let (map, question) = request.try_into()?;
+    let (map, question): (_, NearestQuestion) = asking.question(&service, message).await?;
     let answered = service.ask(&map, question).await?;
     let version = answered.version;
     let response = pb::FindNearestResponse::from(answered);

@@ -1,5 +1,6 @@
 //! `POST /v1/maps/{map}/poses`: does a body fit at these configurations?
 
+use axum::body::Bytes;
 use axum::response::Response;
 use serde::Deserialize;
 
@@ -37,18 +38,21 @@ pub(in crate::http) struct PosesBody {
 pub(in crate::http) async fn check_poses(
     Service(service): Service,
     Map(map): Map,
-    QuestionBody { head, arrays, form }: QuestionBody<PosesBody>,
+    asking: QuestionBody<PosesBody>,
 ) -> Result<Response, HttpError> {
-    let PosesBody { body: Object(body), configurations, ignored, answer: ByKeyword(answer), .. } = head;
-    let request = pb::CheckPosesRequest {
-        asked: asked(&map, (head.level, head.ignore_keep_outs), head.min_revision, head.map_uuid),
-        body: Some(body.into_message(&arrays)?),
-        configurations_f32le: configurations.into_bytes(&arrays, "configurations")?,
-        ignored: ignored_of(ignored)?,
-        answer: pb::CheckAnswer::from(answer).into(),
-        clearance_max_m: head.clearance_max_m,
+    let form = asking.form;
+    let message = move |of: PosesBody, arrays: &Bytes| {
+        let (Object(body), ByKeyword(answer)) = (of.body, of.answer);
+        Ok(pb::CheckPosesRequest {
+            asked: asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid),
+            body: Some(body.into_message(arrays)?),
+            configurations_f32le: of.configurations.into_bytes(arrays, "configurations")?,
+            ignored: ignored_of(of.ignored)?,
+            answer: pb::CheckAnswer::from(answer).into(),
+            clearance_max_m: of.clearance_max_m,
+        })
     };
-    let (map, check): (_, PoseCheck) = request.try_into()?;
+    let (map, check): (_, PoseCheck) = asking.question(&service, message).await?;
     let answer = check.answer;
     let answered = service.ask(&map, check).await?;
     let (head, arrays) = collisions_of(answered.answer.into(), answer);

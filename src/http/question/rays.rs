@@ -1,5 +1,6 @@
 //! `POST /v1/maps/{map}/rays`: what each ray meets first.
 
+use axum::body::Bytes;
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +10,7 @@ use super::form::{PointsField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
+use crate::service::RayQuestion;
 use crate::wire::pb;
 
 #[derive(Deserialize)]
@@ -35,20 +37,21 @@ struct RaysHead {
 pub(in crate::http) async fn cast_rays(
     Service(service): Service,
     Map(map): Map,
-    QuestionBody { head, arrays, form }: QuestionBody<RaysBody>,
+    asking: QuestionBody<RaysBody>,
 ) -> Result<Response, HttpError> {
-    let RaysBody { origins, directions, ends, range_m, level, min_revision, map_uuid, ignore_keep_outs } =
-        head;
-    let points =
-        |field: Option<PointsField>, name| field.map(|of| of.into_message(&arrays, name)).transpose();
-    let request = pb::CastRaysRequest {
-        asked: asked(&map, (level, ignore_keep_outs), min_revision, map_uuid),
-        origins: points(Some(origins), "origins")?,
-        directions: points(directions, "directions")?,
-        ends: points(ends, "ends")?,
-        range_m,
+    let form = asking.form;
+    let message = move |of: RaysBody, arrays: &Bytes| {
+        let points =
+            |field: Option<PointsField>, name| field.map(|of| of.into_message(arrays, name)).transpose();
+        Ok(pb::CastRaysRequest {
+            asked: asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid),
+            origins: points(Some(of.origins), "origins")?,
+            directions: points(of.directions, "directions")?,
+            ends: points(of.ends, "ends")?,
+            range_m: of.range_m,
+        })
     };
-    let (map, question) = request.try_into()?;
+    let (map, question): (_, RayQuestion) = asking.question(&service, message).await?;
     let answered = service.ask(&map, question).await?;
     let version = answered.version;
     let response = pb::CastRaysResponse::from(answered);

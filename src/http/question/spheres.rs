@@ -1,5 +1,6 @@
 //! `POST /v1/maps/{map}/spheres`: do these spheres of the map frame meet voxels?
 
+use axum::body::Bytes;
 use axum::response::Response;
 use serde::Deserialize;
 
@@ -38,24 +39,27 @@ pub(in crate::http) struct SpheresBody {
 pub(in crate::http) async fn check_spheres(
     Service(service): Service,
     Map(map): Map,
-    QuestionBody { head, arrays, form }: QuestionBody<SpheresBody>,
+    asking: QuestionBody<SpheresBody>,
 ) -> Result<Response, HttpError> {
-    let SpheresBody { spheres, sizes, ignored, answer: ByKeyword(answer), .. } = head;
-    let spheres = spheres.into_bytes(&arrays, "spheres")?;
-    let sizes = match sizes {
-        Some(sizes) => sizes.into_bytes(&arrays, "sizes")?,
-        None => CountsField::ones(spheres.len() / SPHERE_BYTES),
+    let form = asking.form;
+    let message = move |of: SpheresBody, arrays: &Bytes| {
+        let ByKeyword(answer) = of.answer;
+        let spheres = of.spheres.into_bytes(arrays, "spheres")?;
+        let sizes = match of.sizes {
+            Some(sizes) => sizes.into_bytes(arrays, "sizes")?,
+            None => CountsField::ones(spheres.len() / SPHERE_BYTES),
+        };
+        Ok(pb::CheckSpheresRequest {
+            asked: asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid),
+            spheres_f32le: spheres,
+            sizes_u32le: sizes,
+            padding_m: of.padding_m,
+            ignored: ignored_of(of.ignored)?,
+            answer: pb::CheckAnswer::from(answer).into(),
+            clearance_max_m: of.clearance_max_m,
+        })
     };
-    let request = pb::CheckSpheresRequest {
-        asked: asked(&map, (head.level, head.ignore_keep_outs), head.min_revision, head.map_uuid),
-        spheres_f32le: spheres,
-        sizes_u32le: sizes,
-        padding_m: head.padding_m,
-        ignored: ignored_of(ignored)?,
-        answer: pb::CheckAnswer::from(answer).into(),
-        clearance_max_m: head.clearance_max_m,
-    };
-    let (map, check): (_, SphereCheck) = request.try_into()?;
+    let (map, check): (_, SphereCheck) = asking.question(&service, message).await?;
     let answer = check.answer;
     let answered = service.ask(&map, check).await?;
     let (head, arrays) = collisions_of(answered.answer.into(), answer);

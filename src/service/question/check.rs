@@ -75,16 +75,6 @@ pub(super) fn clearance_most_m(view: &PlanningView<'_>, level: u32, most_m: Opti
     most_m.unwrap_or_else(|| clearance_max_m(view.lattice(), level))
 }
 
-/// Refuses more spheres and points of a body, or of all groups, than may be.
-pub(super) fn check_parts(field: &str, parts: usize, limits: &Limits) -> Result<(), ServiceError> {
-    if parts <= limits.body_parts_max {
-        return Ok(());
-    }
-    let message =
-        format!("{field} has {parts} spheres and points, body_parts_max is {}", limits.body_parts_max);
-    Err(ServiceError::new(Reason::BatchTooLarge, message))
-}
-
 /// Refuses more regions to ignore than may be.
 pub(super) fn check_ignored(regions: usize, limits: &Limits) -> Result<(), ServiceError> {
     if regions <= limits.ignored_regions_max {

@@ -58,6 +58,11 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// Bytes of memory that its answer takes, at most.
     fn answer_bytes(&self, limits: &Limits) -> usize;
 
+    /// Bytes of memory that finding the answer takes besides it, where that grows with the question.
+    fn work_bytes(&self) -> usize {
+        0
+    }
+
     /// Checks it against the server's limits.
     ///
     /// # Errors
@@ -141,6 +146,9 @@ pub struct Answered<A> {
 /// Elements up to which a question is answered without keeping changes from beginning meanwhile: some milliseconds.
 const SHORT_ELEMENTS: usize = 4096;
 
+/// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
+const CHECKED_INLINE_BYTES: usize = 64 << 10;
+
 /// Whom memory is lent to, in refusals.
 const ANSWER: &str = "the answer to a question";
 
@@ -159,7 +167,7 @@ impl MapService {
         let work = async {
             let map = self.map(map)?;
             let Asked { level, min_revision, map_uuid, .. } = *question.asked();
-            question.check(self.limits())?;
+            let question = self.checked(question).await?;
             map.check_level(level)?;
             map.check_uuid(map_uuid)?;
             if let Some(revision) = min_revision {
@@ -170,7 +178,8 @@ impl MapService {
             let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
-                let _lent = inner.budget.reserve_transient(question.answer_bytes(limits) as u64, ANSWER)?;
+                let bytes = question.answer_bytes(limits).saturating_add(question.work_bytes());
+                let _lent = inner.budget.reserve_transient(bytes as u64, ANSWER)?;
                 let (answer, version) =
                     limit.run(stop, |stop| question.answer_from(&map.questioned(limits), limits, stop))?;
                 Ok(Answered { answer, version: map.version(version) })
@@ -178,6 +187,16 @@ impl MapService {
             self.inner.pools.planning.run(answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
+    }
+
+    /// A question within the limits: a large one is looked through on a thread for planners.
+    async fn checked<Q: Question>(&self, question: Q) -> Result<Q, ServiceError> {
+        if question.answer_bytes(self.limits()) <= CHECKED_INLINE_BYTES {
+            return question.check(self.limits()).map(|()| question);
+        }
+        let inner = Arc::clone(&self.inner);
+        let check = move |_: StopSignal<'_>| question.check(&inner.settings.limits).map(|()| question);
+        self.inner.pools.planning.run(check).await?
     }
 }
 

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use super::check::{check_ignored, check_parts};
+use super::check::check_ignored;
 use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
-use crate::planning::{Body, Configurations, MotionAnswer, MotionQuestion, Surroundings};
+use crate::planning::{
+    Body, Configurations, MotionAnswer, MotionQuestion, NUMBERS_PER_POSE, Surroundings, prepared_bytes,
+};
 use crate::service::{Limits, ServiceError, check_not_stopped};
 use crate::util::StopSignal;
 
@@ -44,8 +46,13 @@ impl Question for MotionCheck {
         self.lengths.len() * BYTES_EACH
     }
 
+    fn work_bytes(&self) -> usize {
+        let (links, poses) = (self.body.links().len(), self.configurations.len() / NUMBERS_PER_POSE);
+        prepared_bytes(self.lengths.len(), poses / links, links)
+    }
+
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
-        check_parts("body", self.body.parts(), limits)?;
+        limits.check_body_parts(self.body.parts())?;
         check_ignored(self.surroundings.ignored.len(), limits)?;
         let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
         check_elements("configurations", configurations.len(), BYTES_EACH, limits)?;
@@ -93,5 +100,27 @@ impl Question for MotionCheck {
             first = end;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planning::Link;
+
+    #[test]
+    fn what_is_made_of_motions_counts_before_it_is_made() {
+        let check = |motions: usize| MotionCheck {
+            asked: Asked::default(),
+            body: Arc::new(Body::new(vec![Link::default()]).unwrap()),
+            configurations: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].repeat(2 * motions),
+            lengths: vec![2; motions],
+            step_m: None,
+            clearance_max_m: None,
+            surroundings: Surroundings::default(),
+        };
+        // Two ways of a link, of two poses each, and their lists.
+        assert!(check(1000).work_bytes() > 1000 * 2 * 128, "{}", check(1000).work_bytes());
+        assert_eq!(check(2000).work_bytes(), 2 * check(1000).work_bytes());
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, check_parts, clearance_most_m};
+use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
 use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
 use crate::planning::{Body, Configurations, PoseQuestion, Surroundings};
@@ -38,7 +38,7 @@ impl Question for PoseCheck {
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
-        check_parts("body", self.body.parts(), limits)?;
+        limits.check_body_parts(self.body.parts())?;
         check_ignored(self.surroundings.ignored.len(), limits)?;
         let configurations = Configurations::new(&self.configurations, self.body.links().len())?;
         check_elements("configurations", configurations.len(), BYTES_EACH, limits)

@@ -41,6 +41,7 @@ impl Question for SphereCheck {
         check_ignored(self.surroundings.ignored.len(), limits)?;
         check_elements("spheres", self.spheres.len(), size_of::<Sphere>(), limits)?;
         check_elements("sizes", self.sizes.len(), BYTES_EACH, limits)?;
+        limits.check_group_sizes(&self.sizes)?;
         SphereGroups::new(&self.spheres, &self.sizes)?;
         Ok(())
     }

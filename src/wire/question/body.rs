@@ -16,6 +16,48 @@ const NUMBERS_PER_SPHERE: usize = 4;
 /// The link of nothing.
 const NO_LINK: u32 = u32::MAX;
 
+#[cfg(feature = "server")]
+impl pb::Body {
+    /// Number of its links, and of the spheres and points of all of them.
+    pub(crate) fn parts(&self) -> usize {
+        let parts = |link: &pb::Link| {
+            let spheres = link.spheres_f32le.len() / (NUMBERS_PER_SPHERE * size_of::<f32>());
+            1 + spheres + link.points.as_ref().map_or(0, pb::Points::count)
+        };
+        self.links.iter().map(parts).sum()
+    }
+
+    /// The same body in memory of its own: it keeps nothing of the message that it came in.
+    pub(crate) fn copied(&self) -> Self {
+        let link = |link: &pb::Link| pb::Link {
+            spheres_f32le: Bytes::copy_from_slice(&link.spheres_f32le),
+            points: link.points.as_ref().map(pb::Points::copied),
+            padding_m: link.padding_m,
+        };
+        Self { links: self.links.iter().map(link).collect() }
+    }
+
+    /// Bytes of memory that its copy takes.
+    pub(crate) fn copied_bytes(&self) -> usize {
+        let points = |points: &pb::Points| points.xyz_f32le.len() + size_of_val(&*points.xyz);
+        let link = |link: &pb::Link| {
+            size_of::<pb::Link>() + link.spheres_f32le.len() + link.points.as_ref().map_or(0, points)
+        };
+        self.links.iter().map(link).sum()
+    }
+}
+
+#[cfg(feature = "server")]
+impl pb::Points {
+    fn count(&self) -> usize {
+        self.xyz_f32le.len() / size_of::<crate::geometry::Point>() + self.xyz.len() / 3
+    }
+
+    fn copied(&self) -> Self {
+        Self { xyz_f32le: Bytes::copy_from_slice(&self.xyz_f32le), xyz: self.xyz.clone() }
+    }
+}
+
 impl TryFrom<pb::Body> for Body {
     type Error = ServiceError;
 
@@ -185,5 +227,26 @@ impl TryFrom<pb::Collisions> for Collisions {
             return Ok(Self::Clearances(distances.into_iter().zip(links).map(clearance).collect()));
         }
         Ok(Self::Colliding { words: words_of(&of.colliding, checked, "colliding")?, checked })
+    }
+}
+
+#[cfg(all(test, feature = "server"))]
+mod tests {
+    use super::*;
+    use crate::geometry::Point;
+
+    #[test]
+    fn links_count_as_parts_and_a_message_counts_as_its_body_does() {
+        let sphere = Sphere { center_m: [0.0; 3], radius_m: 0.1 };
+        let full =
+            Link { spheres: vec![sphere; 2], points: vec![Point::new(0.0, 0.0, 0.0); 3], padding_m: 0.0 };
+        let body = Body::new(vec![Link::default(), full]).unwrap();
+        let message = pb::Body::from(&body);
+        assert_eq!((message.parts(), body.parts()), (7, 7));
+        let listed = pb::Points { xyz: vec![0.0; 9], ..pb::Points::default() };
+        let link = pb::Link { points: Some(listed), ..pb::Link::default() };
+        assert_eq!(pb::Body { links: vec![link] }.parts(), 4);
+        assert_eq!(message.copied(), message);
+        assert_eq!(message.copied_bytes(), 2 * size_of::<pb::Link>() + 2 * 16 + 3 * 12);
     }
 }

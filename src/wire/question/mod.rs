@@ -11,9 +11,66 @@ mod rays;
 use super::{InField, pb, required, uuid_from};
 use crate::map::MapName;
 use crate::service::{Answered, Asked, MapVersion, ServiceError};
+#[cfg(feature = "server")]
+use crate::service::{Limits, Reason};
 
 /// A question with the map that it is about.
 pub(super) type Of<Q> = (MapName, Q);
+
+/// A message that asks a question.
+#[cfg(feature = "server")]
+pub(crate) trait Asking {
+    /// The body that it asks about, where it does.
+    fn body(&self) -> Option<&pb::Body> {
+        None
+    }
+}
+
+/// The question of a message, with the map that it is about. Of a body of more parts than may be, nothing is made.
+#[cfg(feature = "server")]
+pub(crate) fn question_of<M: Asking, Q>(message: M, limits: &Limits) -> Result<Of<Q>, ServiceError>
+where
+    Of<Q>: TryFrom<M, Error = ServiceError>,
+{
+    message.body().map_or(Ok(()), |body| check_body(body, limits))?;
+    message.try_into()
+}
+
+/// Refuses a body of more parts than may be.
+#[cfg(feature = "server")]
+pub(crate) fn check_body(body: &pb::Body, limits: &Limits) -> Result<(), ServiceError> {
+    limits.check_body_parts(body.parts())?;
+    if body.links.len() <= pb::LINKS_MAX {
+        return Ok(());
+    }
+    let message = format!("body.links has more than {} entries", pb::LINKS_MAX);
+    Err(ServiceError::new(Reason::BatchTooLarge, message))
+}
+
+/// Says of messages that they ask a question about no body.
+#[cfg(feature = "server")]
+macro_rules! asks_without_a_body {
+    ($($request:ident),+) => {
+        $(impl Asking for pb::$request {})+
+    };
+}
+
+/// Says of messages that they ask a question about a body.
+#[cfg(feature = "server")]
+macro_rules! asks_about_a_body {
+    ($($request:ident),+) => {
+        $(impl Asking for pb::$request {
+            fn body(&self) -> Option<&pb::Body> {
+                self.body.as_ref()
+            }
+        })+
+    };
+}
+
+#[cfg(feature = "server")]
+asks_without_a_body!(CastRaysRequest, FindNearestRequest, CheckSpheresRequest, ProjectGridRequest);
+#[cfg(feature = "server")]
+asks_about_a_body!(CheckPosesRequest, CheckMotionsRequest);
 
 impl TryFrom<pb::Asked> for Of<Asked> {
     type Error = ServiceError;
