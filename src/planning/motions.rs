@@ -3,14 +3,14 @@
 //! Between two configurations a link's translation goes along a line and its rotation along the shorter arc. A motion is
 //! checked in even steps, so that no point of the body moves further than a step. Steps are skipped by clearance: a link
 //! that is clear by d cannot meet a voxel before one of its spheres' centers has moved by d. So the answer is that of all
-//! steps.
+//! steps. Keep-outs, which may be thinner than any step, are met along the whole way.
 
 use super::PlanningError;
 use super::aim::OpenSpheres;
 use super::body::Body;
 use super::configurations::Configurations;
 use super::in_cells::BodyInCells;
-use super::keep_outs::{Figure, Shapes, Way};
+use super::keep_outs::{Among, Figure, Strides, Way, Work};
 use super::kind::Clearances;
 use super::link::{self, LinkState};
 use super::look::Look;
@@ -51,10 +51,11 @@ pub struct MotionQuestion<'a> {
 /// How far a body can move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionAnswer {
-    /// The first step at which the body meets a voxel or a keep-out, as a share of the motion: configuration i of n is i / (n - 1). None
-    /// where the motion is free.
+    /// Where the body first meets a voxel (at a step) or a keep-out (anywhere on the way), as a share of the motion:
+    /// configuration i of n is i / (n - 1). None where the motion is free.
     pub first_hit: Option<f32>,
-    /// The least distance from the body to a voxel or a keep-out at any step, meters, where it was asked for: 0 where they meet.
+    /// The least distance from the body to a voxel at any step or to a keep-out on the way, meters, where it was asked
+    /// for: 0 where they meet.
     pub clearance_m: Option<f32>,
 }
 
@@ -93,11 +94,13 @@ impl PlanningView<'_> {
         let answers = self.each(level, surroundings, chunks, stop, Motions(&motions));
         let Some(shapes) = self.shapes() else { return Ok(answers) };
         let Some(mut answers) = answers else { return Ok(None) };
-        let figure = Figure::of(question.body.links());
-        for (motion, answer) in stop.paced(motions.iter().zip(&mut answers), 1) {
-            motion.mend(answer, &figure, &shapes);
+        let (figure, work) = (Figure::of(question.body.links()), Work::until(stop));
+        let finest_m = self.lattice().resolution_m(0);
+        let strides = Strides::of(question.step_m(cells_per_m)?, finest_m);
+        for (motion, answer) in motions.iter().zip(&mut answers).take_while(|_| work.goes_on(1)) {
+            motion.mend(answer, &figure, &Among { shapes: &shapes, strides, work: &work });
         }
-        Ok((!stop.is_stopped()).then_some(answers))
+        Ok(work.done(answers))
     }
 }
 
@@ -216,17 +219,14 @@ impl BodyMotion<'_> {
     }
 
     /// Makes the answer about voxels one about keep-outs too.
-    fn mend(&self, answer: &mut MotionAnswer, figure: &Figure, shapes: &Shapes<'_>) {
-        let told = |(number, step): (usize, u64), segment: &Segment| {
-            let share = step as f64 / segment.steps as f64;
-            ((number as f64 + share) / self.segments.len() as f64) as f32
-        };
+    fn mend(&self, answer: &mut MotionAnswer, figure: &Figure, among: &Among<'_, '_>) {
+        let share =
+            |number: usize, of_segment: f64| (number as f64 + of_segment) / self.segments.len() as f64;
         let met = self.segments.iter().enumerate().find_map(|(number, segment)| {
-            let first = u64::from(number > 0);
-            let end = segment.steps + 1;
             let ways = self.ways(segment, figure);
-            let step = ways.fold(end, |end, way| way.first_met(shapes, first, end));
-            (step < end).then(|| told((number, step), segment))
+            let met =
+                ways.fold(None, |met: Option<f64>, way| way.first_met(among, met.unwrap_or(1.0)).or(met));
+            met.map(|of_segment| share(number, of_segment) as f32)
         });
         answer.first_hit = match (answer.first_hit, met) {
             (Some(voxel), Some(keep_out)) => Some(voxel.min(keep_out)),
@@ -238,16 +238,17 @@ impl BodyMotion<'_> {
             return;
         }
         for way in self.segments.iter().flat_map(|segment| self.ways(segment, figure)) {
-            *clearance_m = clearance_m.min(way.least_m(shapes, f64::from(*clearance_m)) as f32);
+            *clearance_m = clearance_m.min(way.least_m(among, f64::from(*clearance_m)) as f32);
         }
     }
 
     /// The links on their ways through a segment, in meters.
     fn ways<'w>(&'w self, segment: &'w Segment, figure: &'w Figure) -> impl Iterator<Item = Way<'w>> {
         let links = figure.links().iter().zip(&segment.links).zip(&self.body.links);
-        links.map(|((link, motion), in_cells)| {
-            let per_step_m = motion.length_m(in_cells.center_extent_m) / segment.steps as f64;
-            Way { link, motion, steps: segment.steps, per_step_m }
+        links.map(|((link, motion), in_cells)| Way {
+            link,
+            motion,
+            length_m: motion.length_m(in_cells.center_extent_m),
         })
     }
 

@@ -1,6 +1,6 @@
 //! Bodies in meters, as shapes are asked about them.
 
-use super::Shapes;
+use super::{Shapes, Work};
 use crate::map::KeepOut;
 use crate::planning::parts::{Link, Sphere};
 use crate::planning::placement::CellsFromLink;
@@ -61,13 +61,14 @@ impl Solid {
     }
 
     /// The shapes that may be within `most_m` of it.
-    pub(super) fn near<'a>(
+    fn near<'a>(
         &self,
         shapes: &Shapes<'a>,
         map_from_link: &CellsFromLink,
         most_m: f64,
+        work: &Work<'_>,
     ) -> Shapes<'a> {
-        shapes.near(map_from_link.cells(self.center_m), self.radius_m, most_m)
+        shapes.near(map_from_link.cells(self.center_m), self.radius_m, most_m, work)
     }
 
     /// The first part that meets a shape, and the shape: spheres before points.
@@ -75,20 +76,23 @@ impl Solid {
         &self,
         shapes: &Shapes<'a>,
         map_from_link: &CellsFromLink,
+        work: &Work<'_>,
     ) -> Option<(usize, &'a KeepOut)> {
-        let near = self.near(shapes, map_from_link, 0.0);
+        let near = self.near(shapes, map_from_link, 0.0, work);
         if near.is_empty() {
             return None;
         }
         let of_sphere = |(part, (center, radius)): (usize, &([f64; 3], f64))| {
-            near.nearest(map_from_link.cells(*center), *radius).map(|(_, keep_out)| (part, keep_out))
+            let met = near.nearest(map_from_link.cells(*center), *radius, work);
+            met.map(|(_, keep_out)| (part, keep_out))
         };
         let of_point = |(part, point): (usize, &[f64; 3])| {
-            let keep_out = near.containing(map_from_link.cells(*point));
+            let keep_out = near.containing(map_from_link.cells(*point), work);
             keep_out.map(|keep_out| (self.spheres.len() + part, keep_out))
         };
-        let sphere = self.spheres.iter().enumerate().find_map(of_sphere);
-        sphere.or_else(|| self.points.iter().enumerate().find_map(of_point))
+        let mut spheres = self.spheres.iter().enumerate().take_while(|_| work.goes_on(1));
+        let mut points = self.points.iter().enumerate().take_while(|_| work.goes_on(1));
+        spheres.find_map(of_sphere).or_else(|| points.find_map(of_point))
     }
 
     /// The distance to the nearest shape, meters, 0 where they meet; none where it is more than `most_m`.
@@ -97,21 +101,39 @@ impl Solid {
         shapes: &Shapes<'_>,
         map_from_link: &CellsFromLink,
         most_m: f64,
+        work: &Work<'_>,
     ) -> Option<f64> {
-        let near = self.near(shapes, map_from_link, most_m);
+        let near = self.near(shapes, map_from_link, most_m, work);
         let mut least_m = None;
         if near.is_empty() {
             return None;
         }
-        for (center, radius) in
-            self.spheres.iter().copied().chain(self.points.iter().map(|point| (*point, 0.0)))
-        {
+        for (center, radius) in self.parts().take_while(|_| work.goes_on(1)) {
             let within_m = radius + least_m.unwrap_or(most_m);
-            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), within_m) {
+            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), within_m, work) {
                 least_m = Some((distance_m - radius).max(0.0));
             }
         }
         least_m
+    }
+
+    /// True where a part of at most `radius_m` goes through a shape between two places that are so near to each other that
+    /// its way is a line.
+    pub(super) fn crosses(
+        &self,
+        shapes: &Shapes<'_>,
+        [from, to]: [&CellsFromLink; 2],
+        (radius_m, stride_m): (f64, f64),
+        work: &Work<'_>,
+    ) -> bool {
+        let near = self.near(shapes, from, stride_m, work);
+        let mut thin = self.parts().filter(|(_, radius)| *radius <= radius_m).take_while(|_| work.goes_on(1));
+        !near.is_empty() && thin.any(|(center, _)| near.cross(from.cells(center), to.cells(center), work))
+    }
+
+    /// Centers and radii of all parts.
+    fn parts(&self) -> impl Iterator<Item = ([f64; 3], f64)> {
+        self.spheres.iter().copied().chain(self.points.iter().map(|point| (*point, 0.0)))
     }
 }
 

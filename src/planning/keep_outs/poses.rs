@@ -1,13 +1,10 @@
 //! Bodies at poses among shapes.
 
-use super::{Figure, Shapes, Solid};
+use super::{Figure, Shapes, Solid, Work};
 use crate::planning::configurations::{Configurations, MAP_FRAME};
 use crate::planning::kind::{Clearance, Hit, Met};
 use crate::planning::placement::{CellsFromLink, LinkPose};
 use crate::util::StopSignal;
-
-/// Configurations between two looks at the stop signal.
-const PER_LOOK: usize = 16;
 
 /// Something that is asked about again and again, each time elsewhere or another one.
 #[derive(Debug, Clone, Copy)]
@@ -26,15 +23,16 @@ impl<'a> Posed<'a> {
         mut words: Vec<u64>,
         stop: StopSignal<'_>,
     ) -> Option<Vec<u64>> {
-        for i in stop.paced(0..self.count(), PER_LOOK) {
+        let work = Work::until(stop);
+        for i in (0..self.count()).take_while(|_| work.goes_on(1)) {
             let bit = 1 << (i % 64);
             if words[i / 64] & bit == 0
-                && self.placed(i).any(|(_, link, at)| link.first_met(shapes, &at).is_some())
+                && self.placed(i).any(|(_, link, at)| link.first_met(shapes, &at, &work).is_some())
             {
                 words[i / 64] |= bit;
             }
         }
-        (!stop.is_stopped()).then_some(words)
+        work.done(words)
     }
 
     /// Puts what is met of shapes before what is met of voxels, where the link or the part comes before. None once stopped.
@@ -44,11 +42,12 @@ impl<'a> Posed<'a> {
         mut hits: Vec<Option<Hit>>,
         stop: StopSignal<'_>,
     ) -> Option<Vec<Option<Hit>>> {
-        for (i, hit) in stop.paced(hits.iter_mut().enumerate(), PER_LOOK) {
+        let work = Work::until(stop);
+        for (i, hit) in hits.iter_mut().enumerate().take_while(|_| work.goes_on(1)) {
             let end = hit.as_ref().map_or((u32::MAX, u32::MAX), |hit| (hit.link, hit.part));
             let mut links = self.placed(i).take_while(|(number, ..)| *number as u32 <= end.0);
             let first = links.find_map(|(number, link, at)| {
-                let (part, keep_out) = link.first_met(shapes, &at)?;
+                let (part, keep_out) = link.first_met(shapes, &at, &work)?;
                 let met = Met::KeepOut(keep_out.name.clone());
                 Some(Hit { link: number as u32, part: part as u32, met })
             });
@@ -56,7 +55,7 @@ impl<'a> Posed<'a> {
                 *hit = Some(first);
             }
         }
-        (!stop.is_stopped()).then_some(hits)
+        work.done(hits)
     }
 
     /// Shortens clearances to the distance from shapes, where that is less. None once stopped.
@@ -66,9 +65,10 @@ impl<'a> Posed<'a> {
         mut clearances: Vec<Clearance>,
         stop: StopSignal<'_>,
     ) -> Option<Vec<Clearance>> {
-        for (i, clearance) in stop.paced(clearances.iter_mut().enumerate(), PER_LOOK) {
+        let work = Work::until(stop);
+        for (i, clearance) in clearances.iter_mut().enumerate().take_while(|_| work.goes_on(1)) {
             for (number, link, at) in self.placed(i) {
-                let distance_m = link.distance_m(shapes, &at, f64::from(clearance.distance_m));
+                let distance_m = link.distance_m(shapes, &at, f64::from(clearance.distance_m), &work);
                 let Some(distance_m) = distance_m.map(|distance_m| distance_m as f32) else { continue };
                 let number = number as u32;
                 let is_first = clearance.link.is_some_and(|link| number < link);
@@ -77,7 +77,7 @@ impl<'a> Posed<'a> {
                 }
             }
         }
-        (!stop.is_stopped()).then_some(clearances)
+        work.done(clearances)
     }
 
     /// How many configurations there are.

@@ -6,34 +6,38 @@ use proptest::prelude::*;
 
 use crate::geometry::Point;
 use crate::map::test_shapes::shape;
-use crate::map::{KeepOut, KeepOutName, KeepOuts, MapContents, MapSettings, MultiResolutionMap, ShapeRay};
-use crate::planning::path::LinkMotion;
+use crate::map::{
+    KeepOut, KeepOutName, KeepOutShape, KeepOuts, MapContents, MapSettings, MultiResolutionMap, ShapeRay,
+};
 use crate::planning::placement::{CellsFromLink, LinkPose};
 use crate::planning::*;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
-const RESOLUTION_M: f64 = 0.5;
+pub(super) const RESOLUTION_M: f64 = 0.5;
 const NEVER: StopSignal<'static> = StopSignal::NEVER;
 
 /// A map of a few voxels, and keep-outs.
-fn map() -> impl Strategy<Value = Arc<MultiResolutionMap>> {
+pub(super) fn map() -> impl Strategy<Value = Arc<MultiResolutionMap>> {
     let voxels = prop::collection::vec(prop::array::uniform3(-40i32..40), 0..30);
-    (voxels, prop::collection::vec(shape(), 1..5)).prop_map(|(voxels, shapes)| {
-        let named = |(i, shape)| KeepOut {
-            name: KeepOutName::new(&format!("k{i}")).unwrap(),
-            shape,
-            made_by: None,
-            made_revision: 1,
-            expires_at_ns: None,
-        };
-        let keep_outs: KeepOuts = shapes.into_iter().enumerate().map(named).collect();
-        let voxels = voxels.into_iter().filter_map(VoxelKey::new).collect();
-        let contents =
-            MapContents { revision: 9, voxels, keep_outs: Arc::new(keep_outs), ..MapContents::default() };
-        let settings = MapSettings::new(RESOLUTION_M, 3);
-        Arc::new(MultiResolutionMap::restore(settings, contents.checked().unwrap()).unwrap())
-    })
+    (voxels, prop::collection::vec(shape(), 1..5)).prop_map(|(voxels, shapes)| map_of(voxels, shapes))
+}
+
+/// A map of three levels.
+pub(super) fn map_of(voxels: Vec<[i32; 3]>, shapes: Vec<KeepOutShape>) -> Arc<MultiResolutionMap> {
+    let named = |(i, shape)| KeepOut {
+        name: KeepOutName::new(&format!("k{i}")).unwrap(),
+        shape,
+        made_by: None,
+        made_revision: 1,
+        expires_at_ns: None,
+    };
+    let keep_outs: KeepOuts = shapes.into_iter().enumerate().map(named).collect();
+    let voxels = voxels.into_iter().filter_map(VoxelKey::new).collect();
+    let contents =
+        MapContents { revision: 9, voxels, keep_outs: Arc::new(keep_outs), ..MapContents::default() };
+    let settings = MapSettings::new(RESOLUTION_M, 3);
+    Arc::new(MultiResolutionMap::restore(settings, contents.checked().unwrap()).unwrap())
 }
 
 fn link() -> impl Strategy<Value = Link> {
@@ -58,13 +62,13 @@ fn pose() -> impl Strategy<Value = [f32; 7]> {
 }
 
 /// A body of two links, and an even number of configurations.
-fn body_and_poses() -> impl Strategy<Value = (Body, Vec<f32>)> {
+pub(super) fn body_and_poses() -> impl Strategy<Value = (Body, Vec<f32>)> {
     (prop::collection::vec(link(), 2), prop::collection::vec(pose(), 2 * 6))
         .prop_map(|(links, poses)| (Body::new(links).unwrap(), poses.concat()))
 }
 
 /// All shapes, looked at one by one.
-struct BruteForce(Arc<KeepOuts>);
+pub(super) struct BruteForce(pub(super) Arc<KeepOuts>);
 
 impl BruteForce {
     /// The parts of a link in the map frame: center, radius, and whether it is a bare point.
@@ -87,7 +91,7 @@ impl BruteForce {
         meeting.min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|keep_out| &keep_out.name)
     }
 
-    fn first_hit(&self, body: &Body, poses: &[LinkPose]) -> Option<Hit> {
+    pub(super) fn first_hit(&self, body: &Body, poses: &[LinkPose]) -> Option<Hit> {
         body.links().iter().zip(poses).zip(0..).find_map(|((link, pose), number)| {
             let parts = Self::parts(link, &CellsFromLink::of(pose, 1.0));
             let met = parts.into_iter().zip(0..).find_map(|(part, i)| Some((i, self.met(part)?)));
@@ -95,8 +99,19 @@ impl BruteForce {
         })
     }
 
+    /// How far a part is within a shape at most, meters: spheres by their radius, bare points not at all; less than 0
+    /// outside.
+    pub(super) fn depth_m(&self, body: &Body, poses: &[LinkPose]) -> f64 {
+        let parts = body.links().iter().zip(poses);
+        let parts = parts.flat_map(|(link, pose)| Self::parts(link, &CellsFromLink::of(pose, 1.0)));
+        let depths = parts.flat_map(|(center, radius, _)| {
+            self.0.iter().map(move |keep_out| radius - keep_out.shape.distance_m(center))
+        });
+        depths.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The distance of each link.
-    fn distances_m(&self, body: &Body, poses: &[LinkPose]) -> Vec<f64> {
+    pub(super) fn distances_m(&self, body: &Body, poses: &[LinkPose]) -> Vec<f64> {
         let of_link = |(link, pose): (&Link, &LinkPose)| {
             let parts = Self::parts(link, &CellsFromLink::of(pose, 1.0)).into_iter();
             let far = parts.flat_map(|(center, radius, _)| {
@@ -120,7 +135,7 @@ impl BruteForce {
     }
 }
 
-fn poses_of(numbers: &[f32]) -> Vec<LinkPose> {
+pub(super) fn poses_of(numbers: &[f32]) -> Vec<LinkPose> {
     numbers.as_chunks().0.iter().map(LinkPose::of).collect()
 }
 
@@ -171,40 +186,6 @@ proptest! {
         prop_assert_eq!(view.spheres_meet(&question, NEVER), view.bodies_meet(&same, NEVER), "at {} {} {}", x, y, z);
         prop_assert_eq!(view.first_sphere_hits(&question, NEVER), view.first_hits(&same, NEVER));
         prop_assert_eq!(view.sphere_clearances(&question, 5.0, NEVER), view.clearances(&same, 5.0, NEVER));
-    }
-
-    #[test]
-    fn motions_skip_no_step_at_which_a_shape_is_met((body, numbers) in body_and_poses(), map in map(), length in prop::sample::select(vec![2usize, 3])) {
-        let planner = Planner::new(Arc::clone(&map));
-        let configurations = Configurations::new(&numbers, 2).unwrap();
-        let (lengths, step_m) = (vec![length as u32; 6 / length], 0.3);
-        let question = MotionQuestion {
-            body: &body, configurations, lengths: &lengths, step_m: Some(step_m), clearance_max_m: Some(6.0), level: 0,
-            surroundings: &Surroundings::ALL_VOXELS,
-        };
-        let of_voxels = planner.view().check_motions(&question, NEVER).unwrap().unwrap();
-        let told = planner.view().with_keep_outs().check_motions(&question, NEVER).unwrap().unwrap();
-        let (brute, in_cells) = (BruteForce(map.keep_outs()), body.in_cells(1.0 / RESOLUTION_M).unwrap());
-        for (i, motion) in told.iter().enumerate() {
-            let (mut first, mut least_m) = (None, of_voxels[i].clearance_m.unwrap());
-            for segment in 0..length - 1 {
-                let at = |of: usize| poses_of(&numbers[14 * (i * length + of)..][..14]);
-                let motions: Vec<_> = at(segment).iter().zip(&at(segment + 1)).map(|(a, b)| LinkMotion::new(a, b)).collect();
-                let far = motions.iter().zip(&in_cells.links).map(|(motion, link)| motion.length_m(link.extent_m));
-                let steps = (far.fold(0.0, f64::max) / f64::from(step_m)).ceil().max(1.0) as u64;
-                for step in 0..=steps {
-                    let share = step as f64 / steps as f64;
-                    let poses: Vec<_> = motions.iter().map(|motion| motion.at(share)).collect();
-                    if first.is_none() && brute.first_hit(&body, &poses).is_some() {
-                        first = Some(((segment as f64 + share) / (length - 1) as f64) as f32);
-                    }
-                    least_m = brute.distances_m(&body, &poses).into_iter().fold(least_m, |least, d| least.min(d as f32));
-                }
-            }
-            let expected = [of_voxels[i].first_hit, first].into_iter().flatten().reduce(f32::min);
-            prop_assert_eq!(motion.first_hit, expected);
-            prop_assert_eq!(motion.clearance_m, Some(if expected.is_some() { 0.0 } else { least_m }));
-        }
     }
 
     #[test]
