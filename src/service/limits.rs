@@ -86,7 +86,7 @@ pub struct Limits {
     /// Bytes of the distance fields that a map keeps for checks of bodies. Less is slower and as exact: the oldest part goes.
     /// 128 MiB.
     pub planning_field_bytes_max: usize,
-    /// How long a question of a planner may take, while changes of the map wait for it. 1 s.
+    /// How long a question of a planner may take, while changes of the map wait for it. 0.5 s.
     pub question_time_max_s: f64,
     /// Cells of one 2-D grid. 4,000,000.
     pub grid_cells_max: usize,
@@ -181,7 +181,7 @@ impl Default for Limits {
             body_parts_max: 16_384,
             ignored_regions_max: 64,
             planning_field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
-            question_time_max_s: 1.0,
+            question_time_max_s: 0.5,
             grid_cells_max: 4_000_000,
             block_bytes_max: 16 << 20,
             block_cells_max: 64 << 20,
