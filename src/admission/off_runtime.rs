@@ -1,11 +1,11 @@
-//! What is made of large requests, away from the threads that serve connections.
+//! What is made of large requests and answers, away from the threads that serve connections.
 
 use crate::service::{Reason, ServiceError};
 
-/// Requests of more bytes than this are parsed and converted away from the threads that serve connections.
+/// Requests and answers of more bytes than this are read and written away from the threads that serve connections.
 const INLINE_BYTES_MAX: usize = 64 << 10;
 
-/// What `make` makes of a request of `bytes`. `held` is what counts the request's memory: it is kept to the end of the work,
+/// What `make` makes of a request, or an answer, of `bytes`. `held` is what counts the request's memory: it is kept to the end of the work,
 /// whether or not somebody waits for it still.
 ///
 /// # Errors
@@ -27,7 +27,9 @@ where
         drop(held);
         made
     });
-    made.await.map_err(|_| ServiceError::new(Reason::ParserFailed, "the request could not be parsed"))
+    made.await.map_err(|_| {
+        ServiceError::new(Reason::ParserFailed, "the request could not be read, or its answer not written")
+    })
 }
 
 #[cfg(test)]

@@ -168,3 +168,17 @@ impl Display for Report {
         self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_that_opens_again_is_told_with_its_keep_outs() {
+        let opens = Opens { map: "office".into(), revision: 7, keep_outs: 2 };
+        let text = opens.to_string();
+        assert!(text.starts_with("map office opens at revision 7 with 2 keep-outs;"), "{text}");
+        assert!(text.contains("undos, and keep-outs"), "{text}");
+        assert_eq!(serde_json::to_value(&opens).unwrap()["keep_outs"], 2);
+    }
+}

@@ -10,14 +10,14 @@ use crate::access::Operation;
 use crate::admission::{InboundBody, off_runtime};
 use crate::map::MapName;
 use crate::service::{Answered, MapService, Question, ServiceError};
-use crate::wire::{Asking, pb, question_of};
+use crate::wire::{QuestionMessage, pb, question_of};
 
 impl Adapter {
     /// Answers one question.
     pub(super) async fn ask<Q, M, A>(&self, request: Request<M>) -> Result<Response<A>, Status>
     where
         Q: Question,
-        M: Message + Asking + 'static,
+        M: Message + QuestionMessage + 'static,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
         A: Message + From<Answered<Q::Answer>>,
     {
@@ -35,7 +35,7 @@ impl Adapter {
     ) -> Result<Response<Answers<A>>, Status>
     where
         Q: Question,
-        M: stream::Message + Asking,
+        M: stream::Message + QuestionMessage,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
         A: Message + From<Answered<Q::Answer>> + 'static,
     {
@@ -52,7 +52,7 @@ impl Adapter {
 async fn question<Q, M, C>(service: &MapService, message: M, counted: C) -> Result<(MapName, Q), ServiceError>
 where
     Q: Question,
-    M: Message + Asking + 'static,
+    M: Message + QuestionMessage + 'static,
     (MapName, Q): TryFrom<M, Error = ServiceError>,
     C: Send + 'static,
 {

@@ -31,7 +31,8 @@ pub struct Limits {
     pub requests_max: usize,
     /// Calls whose client streams messages. 256.
     pub streams_max: usize,
-    /// Bytes of bodies that have arrived and of listings and files that are being sent. 1 GiB.
+    /// Bytes of bodies that have arrived, of what streams keep of them, and of answers, listings and files that are being
+    /// sent. 1 GiB.
     pub body_bytes_max: usize,
     /// How long a body may be silent before its end. 30 s.
     pub body_silence_max_s: f64,
@@ -79,7 +80,8 @@ pub struct Limits {
     pub voxels_per_map_max: usize,
     /// Voxels that one listing may return. 20,000,000.
     pub listed_voxels_max: usize,
-    /// Spheres and points of a body that is checked. 16,384.
+    /// Links, spheres and points, in all, of a body that is checked, and spheres of a group that is checked as one. A body has
+    /// 65,536 links at most, whatever this is. 16,384.
     pub body_parts_max: usize,
     /// Regions in which a check ignores voxels. 64.
     pub ignored_regions_max: usize,

@@ -283,6 +283,34 @@ mod tests {
     };
     use crate::store::{Record, StoreSettings};
 
+    fn put(name: &str) -> Change {
+        let shape = KeepOutShape::of_region(Region::ball([0.0; 3], 1.0).unwrap()).unwrap();
+        let act = KeepOutAct::Put { shape, made_by: None, expires_at_ns: None };
+        let change = KeepOutChange { name: KeepOutName::new(name).unwrap(), act };
+        Change::KeepOut(KeepOutRecord { change, request: None })
+    }
+
+    #[test]
+    fn keep_outs_before_the_damage_are_counted_and_those_behind_it_are_lost() {
+        let data = tempfile::tempdir().unwrap();
+        let data_dir = DataDir::open(data.path(), StoreSettings::default()).unwrap();
+        let name = MapName::new("office").unwrap();
+        let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
+        let folder = data_dir.create(&name, &Snapshot::of(&map, Uuid::from_u128(7))).unwrap();
+        for name in ["dock", "lift", "ramp"] {
+            folder.append(&[&Record::of(&put(name)).unwrap()]).unwrap();
+        }
+        folder.sync().unwrap();
+        let journal = folder.path().join("journal-00000000000000000001.log");
+        drop(folder);
+        let mut bytes = std::fs::read(&journal).unwrap();
+        let lift = bytes.windows(4).position(|word| word == b"lift").unwrap();
+        bytes[lift] ^= 1;
+        std::fs::write(&journal, bytes).unwrap();
+        let SetAside { revision, keep_outs, .. } = set_aside(&data_dir, &name).unwrap().unwrap();
+        assert_eq!((revision, keep_outs), (1, 1));
+    }
+
     #[test]
     fn a_snapshot_whose_keep_outs_the_journal_does_not_make_is_told() {
         let data = tempfile::tempdir().unwrap();
@@ -290,10 +318,7 @@ mod tests {
         let (name, uuid) = (MapName::new("office").unwrap(), Uuid::from_u128(7));
         let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
         let folder = data_dir.create(&name, &Snapshot::of(&map, uuid)).unwrap();
-        let shape = KeepOutShape::of_region(Region::ball([0.0; 3], 1.0).unwrap()).unwrap();
-        let act = KeepOutAct::Put { shape, made_by: None, expires_at_ns: None };
-        let change = KeepOutChange { name: KeepOutName::new("dock").unwrap(), act };
-        let change = Change::KeepOut(KeepOutRecord { change, request: None });
+        let change = put("dock");
         folder.append(&[&Record::of(&change).unwrap()]).unwrap();
         folder.sync().unwrap();
         map.committer().apply(&change);

@@ -36,7 +36,7 @@ pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::create_map;
 pub use occupancy::{KEYS_PER_CHUNK, listing_bytes, voxel_chunks};
 #[cfg(feature = "server")]
-pub(crate) use question::{Asking, check_body, question_of};
+pub(crate) use question::{QuestionMessage, check_body, question_of};
 #[cfg(feature = "server")]
 pub(crate) use scan::gravity_in_sensor;
 pub(crate) use types::uuid_from;

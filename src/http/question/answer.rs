@@ -7,6 +7,7 @@ use serde::ser::{Error, SerializeMap};
 use serde::{Serialize, Serializer};
 
 use super::form::Form;
+use crate::admission::off_runtime;
 use crate::http::error::HttpError;
 use crate::service::{MapVersion, Reason, ServiceError};
 use crate::voxel::VoxelKey;
@@ -73,23 +74,36 @@ impl Array {
     }
 }
 
-impl<H: Serialize> Answer<H> {
-    /// The answer in a form.
-    pub(super) fn respond(self, form: Form) -> Result<Response, HttpError> {
-        let head = serde_json::to_vec(&Head { answer: &self, form })
-            .map_err(|error| ServiceError::new(Reason::NotWritten, error.to_string()))?;
-        let (content_type, body) = match form {
-            Form::Json => ("application/json", head),
-            Form::Arrays => ("application/octet-stream", self.behind(&head)),
+impl<H: Serialize + Send + 'static> Answer<H> {
+    /// The answer in a form. A large one is written away from the threads that serve connections.
+    pub(super) async fn respond(self, form: Form) -> Result<Response, HttpError> {
+        let content_type = match form {
+            Form::Json => "application/json",
+            Form::Arrays => "application/octet-stream",
         };
+        let body = off_runtime(self.array_bytes(), (), move || self.written(form)).await??;
         Ok(([(header::CONTENT_TYPE, content_type)], body).into_response())
+    }
+}
+
+impl<H: Serialize> Answer<H> {
+    fn array_bytes(&self) -> usize {
+        self.arrays.iter().map(|(_, array)| array.bytes().len()).sum()
+    }
+
+    fn written(&self, form: Form) -> Result<Vec<u8>, ServiceError> {
+        let head = serde_json::to_vec(&Head { answer: self, form })
+            .map_err(|error| ServiceError::new(Reason::NotWritten, error.to_string()))?;
+        Ok(match form {
+            Form::Json => head,
+            Form::Arrays => self.behind(&head),
+        })
     }
 
     /// The length of the head, the head, and the arrays.
     fn behind(&self, head: &[u8]) -> Vec<u8> {
         let length = u32::try_from(head.len()).unwrap_or(u32::MAX).to_le_bytes();
-        let arrays: usize = self.arrays.iter().map(|(_, array)| array.bytes().len()).sum();
-        let mut body = Vec::with_capacity(length.len() + head.len() + arrays);
+        let mut body = Vec::with_capacity(length.len() + head.len() + self.array_bytes());
         body.extend_from_slice(&length);
         body.extend_from_slice(head);
         self.arrays.iter().for_each(|(_, array)| body.extend_from_slice(array.bytes()));

@@ -26,7 +26,7 @@ use crate::http::error::HttpError;
 use crate::http::json::JsonPoints;
 use crate::map::MapName;
 use crate::service::{MapService, PointCloud, Question, Reason, ServiceError};
-use crate::wire::{Asking, bytes_of, pb, question_of};
+use crate::wire::{QuestionMessage, bytes_of, pb, question_of};
 
 /// In which form something is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,7 +54,8 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<Adapter> for QuestionBody
 
     async fn from_request(request: Request, adapter: &Adapter) -> Result<Self, HttpError> {
         let arrival = InboundBody::of(request.extensions())?.clone();
-        match body::json_or_octets(request, adapter).await? {
+        let sent = body::json_or_octets(request, adapter).await?;
+        match sent {
             Sent::Json { parsed: head, bytes } => {
                 Ok(Self { head, arrays: Bytes::new(), form: Form::Json, bytes, arrival })
             }
@@ -83,7 +84,7 @@ impl<T: Send + 'static> QuestionBody<T> {
         message: impl FnOnce(T, &Bytes) -> Result<M, ServiceError> + Send + 'static,
     ) -> Result<(MapName, Q), HttpError>
     where
-        M: Asking,
+        M: QuestionMessage,
         Q: Question,
         (MapName, Q): TryFrom<M, Error = ServiceError>,
     {

@@ -73,5 +73,5 @@ pub(in crate::http) async fn project_grid(
         ("occupied", Array::Bits(response.occupied, (response.cells_x * response.cells_y) as usize)),
         ("tops_m", Array::Floats(response.tops_m_f32le)),
     ];
-    Answer { head, version, arrays }.respond(form)
+    Answer { head, version, arrays }.respond(form).await
 }

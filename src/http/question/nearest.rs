@@ -63,5 +63,5 @@ pub(in crate::http) async fn find_nearest(
         ("away", Array::Vectors(response.away_f32le)),
     ];
     arrays.extend(Array::keep_outs("keep_outs", response.keep_outs));
-    Answer { head: NearestHead { points }, version, arrays }.respond(form)
+    Answer { head: NearestHead { points }, version, arrays }.respond(form).await
 }

@@ -19,7 +19,7 @@ pub(super) type Of<Q> = (MapName, Q);
 
 /// A message that asks a question.
 #[cfg(feature = "server")]
-pub(crate) trait Asking {
+pub(crate) trait QuestionMessage {
     /// The body that it asks about, where it does.
     fn body(&self) -> Option<&pb::Body> {
         None
@@ -28,7 +28,7 @@ pub(crate) trait Asking {
 
 /// The question of a message, with the map that it is about. Of a body of more parts than may be, nothing is made.
 #[cfg(feature = "server")]
-pub(crate) fn question_of<M: Asking, Q>(message: M, limits: &Limits) -> Result<Of<Q>, ServiceError>
+pub(crate) fn question_of<M: QuestionMessage, Q>(message: M, limits: &Limits) -> Result<Of<Q>, ServiceError>
 where
     Of<Q>: TryFrom<M, Error = ServiceError>,
 {
@@ -51,7 +51,7 @@ pub(crate) fn check_body(body: &pb::Body, limits: &Limits) -> Result<(), Service
 #[cfg(feature = "server")]
 macro_rules! asks_without_a_body {
     ($($request:ident),+) => {
-        $(impl Asking for pb::$request {})+
+        $(impl QuestionMessage for pb::$request {})+
     };
 }
 
@@ -59,7 +59,7 @@ macro_rules! asks_without_a_body {
 #[cfg(feature = "server")]
 macro_rules! asks_about_a_body {
     ($($request:ident),+) => {
-        $(impl Asking for pb::$request {
+        $(impl QuestionMessage for pb::$request {
             fn body(&self) -> Option<&pb::Body> {
                 self.body.as_ref()
             }
