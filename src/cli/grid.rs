@@ -23,6 +23,9 @@ EXAMPLES:
 
 Writes the image and, beside it, office.yaml, which names it: both are what map_server of ROS 1 and nav2_map_server read.";
 
+/// What names of descriptions end in.
+const DESCRIPTION: &str = "yaml";
+
 /// Draw a map from above, as a 2-D grid for Nav2
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -51,6 +54,7 @@ pub(super) struct DrawGrid {
 impl DrawGrid {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let Self { map, out, band, area, cell, unknown, asked } = self;
+        check_is_image(&out)?;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let scope = GridScope { area: area.unwrap_or(GridArea::Occupied), band_m, cell_m: cell };
         let question = GridQuestion { asked: asked.asked(), scope };
@@ -68,10 +72,22 @@ impl DrawGrid {
     }
 }
 
+/// Refuses an image that its own description would replace.
+fn check_is_image(out: &Path) -> Result<(), CliError> {
+    match out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(DESCRIPTION)) {
+        true => Err(CliError::usage(format!(
+            "--out {} is the name of the description, which is written beside the image: name the image, as in {}",
+            out.display(),
+            out.with_extension("pgm").display()
+        ))),
+        false => Ok(()),
+    }
+}
+
 /// Writes the image and its description, whose path is returned.
 fn write_files(grid: &Grid, image: &Path, not_occupied: NotOccupied) -> Result<PathBuf, CliError> {
     let name = image.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let description = image.with_extension("yaml");
+    let description = image.with_extension(DESCRIPTION);
     fs::write(image, grid.to_pgm(not_occupied)).map_err(CliError::writing(image))?;
     fs::write(&description, grid.to_yaml(&name)).map_err(CliError::writing(&description))?;
     Ok(description)

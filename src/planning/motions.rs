@@ -1,6 +1,7 @@
 //! Can a body move along these configurations?
 //!
-//! Between two configurations a link's translation goes along a line and its rotation along the shorter arc. A motion is
+//! Between two configurations a link's translation goes along a line and its rotation along the shorter arc; of two that are
+//! equally long, half a turn each, the signs of the quaternions decide. A motion is
 //! checked in even steps, so that no point of the body moves further than a step. Steps are skipped by clearance: a link
 //! that is clear by d cannot meet a voxel before one of its spheres' centers has moved by d. So the answer is that of all
 //! steps. Keep-outs, which may be thinner than any step, are met along the whole way.
@@ -38,7 +39,8 @@ pub struct MotionQuestion<'a> {
     pub configurations: Configurations<'a>,
     /// How many configurations each motion has: two or more.
     pub lengths: &'a [u32],
-    /// How far a point of the body moves in a step at most, meters; half a voxel of the level without.
+    /// How far a point of the body moves in a step at most, meters; half a voxel of the level without. Keep-outs are met along
+    /// the whole way, to within 1 mm, half a voxel of level 0, or the step, whichever is least.
     pub step_m: Option<f32>,
     /// Up to where the least clearance of each motion is told, meters; it is not told without.
     pub clearance_max_m: Option<f32>,

@@ -313,7 +313,13 @@ async fn what_is_no_question_is_refused_by_name() {
         ("nearest", json!({"points": [[0, null, 0]], "radius_m": 1}), "points[0]"),
         ("grid", json!({"cell_m": 0.15}), "cell_m"),
         ("grid", json!({"ignore_keep_outs": 1}), "ignore_keep_outs: must be true or false"),
-        ("grid", json!({"area": {"min_m": [0, 0], "max_m": [1e6, 1e6]}, "cell_m": 0.1}), "grid_cells_max"),
+        ("grid", json!({"area": {"min_m": [0, 0], "max_m": [1e5, 1e5]}, "cell_m": 0.1}), "grid_cells_max"),
+        (
+            "grid",
+            json!({"area": {"min_m": [1e300, 0], "max_m": [1e300, 1]}}),
+            "area.min_m must lie within -104857.6 m and 104857.6 m",
+        ),
+        ("poses", json!({"body": {"links": [{"points": []}]}, "configurations": pose}), "at least one point"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "groups"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "level": 9}), "level"),
     ] {
@@ -394,6 +400,15 @@ async fn a_head_in_the_form_for_programs_counts_as_json_does() {
             assert!(said["detail"].as_str().unwrap().contains("body_bytes_max"), "{said}");
         }
     }
+}
+
+#[tokio::test]
+async fn no_points_beside_spheres_are_none() {
+    let (daemon, ..) = row_of_voxels().await;
+    let body = json!({"links": [{"spheres": [[0, 0, 0, 0.1]], "points": []}]});
+    let asked = json!({"body": body, "configurations": [at(0.55, 0.2, 0.05)]});
+    let answer = daemon.post("/v1/maps/a/poses", asked).await;
+    assert_eq!((answer.status().as_u16(), json_of(answer).await["checked"].as_u64()), (200, Some(1)));
 }
 
 /// A server with the row, and a crate: a box from y = 1 to 2 along all of the row.

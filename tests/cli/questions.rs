@@ -82,6 +82,16 @@ fn rays_nearest_voxels_and_a_grid_name_what_they_find() {
 }
 
 #[test]
+fn a_grid_is_not_written_over_by_its_own_description() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["x.yaml", "x.YAML"] {
+        let out = folder.path().join(name);
+        let told = complaint(&["grid", "--map", "a", "--out", out.to_str().unwrap()], 2);
+        assert!(told.contains("x.pgm") && !out.exists(), "{told}");
+    }
+}
+
+#[test]
 fn a_question_waits_for_a_revision_as_long_as_it_may() {
     let building = Building::open();
     let pose = ["--pose", "0 0 0 0 0 0 1", "--min-revision", "2"];

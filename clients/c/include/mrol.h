@@ -54,8 +54,9 @@
 extern "C" {
 #endif
 
-/* Version of this interface. A library is of use to programs that were compiled against the same one. */
-#define MROL_ABI_VERSION 1
+/* Version of this interface. A library is of use to programs that were compiled against the same one. From 2 on keep-outs count:
+ * a library of version 1 knows none, and says free where they are. */
+#define MROL_ABI_VERSION 2
 
 /* Bytes of a reason and of a message with their terminating zero. */
 #define MROL_REASON_BYTES 48
@@ -317,7 +318,9 @@ typedef struct mrol_collisions {
 } mrol_collisions;
 
 /* A question: can a body move along these configurations? Between two of them a link's translation goes along a line, its
- * rotation along the shorter arc. Take it from mrol_motion_check_default(). */
+ * rotation along the shorter arc. Of the two arcs of half a turn the signs of the quaternions decide: x y z w and -x -y -z -w are
+ * one pose, but lead there by different ways; whoever turns a link by 180 degrees gives a configuration between. Take it from
+ * mrol_motion_check_default(). */
 typedef struct mrol_motion_check {
     size_t struct_size;
     mrol_body body;
@@ -330,7 +333,10 @@ typedef struct mrol_motion_check {
     const mrol_region *ignored;
     size_t ignored_count;
     uint32_t level;
-    /* How far a point of the body moves from one check to the next, at most. 0: half a voxel of the level. */
+    /* How far a point of the body moves from one check for voxels to the next, at most. 0: half a voxel of the level. Keep-outs,
+     * which may be thinner, are met along the whole way, to within X: 1 mm, half a voxel of level 0, or the step, whichever is
+     * least, at every level. Nothing enters a keep-out by more than half of X unnoticed, and what is no larger than that goes
+     * through none, however thin. */
     float step_m;
     /* As in mrol_pose_check. */
     float clearance_max_m;
@@ -347,14 +353,15 @@ typedef struct mrol_motion_answers {
     size_t capacity;
     /* A bit each: the body meets nothing on its way. */
     uint8_t *is_free;
-    /* The first check at which the body meets something, as a share of the motion: configuration i of n is i / (n - 1). NaN of
-     * a motion that is free. */
+    /* The first check at which the body meets a voxel, or where it meets a keep-out (at most X late), as a share of the motion:
+     * configuration i of n is i / (n - 1). NaN of a motion that is free. */
     float *first_hits;
-    /* The least distance to a voxel at any check, 0 where one is met. Costs more than the bit. */
+    /* The least distance to a voxel at any check, and to a keep-out along the way: too much by a sixteenth of it (and no more
+     * than half a step) or by half of X, whichever is more. 0 where one is met. Costs more than the bit. */
     float *clearances_m;
 } mrol_motion_answers;
 
-/* A question: what do these rays meet? Take it from mrol_ray_question_default(). */
+/* A question: what do these rays meet? What a ray would enter just where it ends is not met, voxel or keep-out. Take it from mrol_ray_question_default(). */
 typedef struct mrol_ray_question {
     size_t struct_size;
     /* Where rays begin: one point for all of them, or one each. */

@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::memory::{self, Question};
 
 /// Version of the interface: `MROL_ABI_VERSION`.
-pub(crate) const VERSION: u32 = 1;
+pub(crate) const VERSION: u32 = 2;
 /// Bytes of a reason and of a message, with their zero: `MROL_REASON_BYTES`, `MROL_MESSAGE_BYTES`.
 const REASON_BYTES: usize = 48;
 const MESSAGE_BYTES: usize = 464;

@@ -51,6 +51,18 @@ pub enum GridError {
     /// A rectangle with corners that are not finite or in the wrong order.
     #[error("area.min_m must be finite and not exceed area.max_m in x or y, got {0:?} and {1:?}")]
     Rectangle([f64; 2], [f64; 2]),
+    /// A corner that no map of this resolution reaches.
+    #[error("area.{field} must lie within {min_m} m and {max_m} m, as the map does, got {value:?}")]
+    Range {
+        /// The corner.
+        field: &'static str,
+        /// Its x and y, meters.
+        value: [f64; 2],
+        /// The smallest coordinate of the map, meters.
+        min_m: f64,
+        /// The largest.
+        max_m: f64,
+    },
     /// A band with NaN or in the wrong order.
     #[error("band_m must not descend, got {0:?}")]
     Band([f64; 2]),
@@ -137,6 +149,13 @@ impl Cells {
     }
 }
 
+/// Refuses a corner out of the range of a map.
+fn check_range(field: &'static str, value: [f64; 2], lattice: &Lattice) -> Result<(), GridError> {
+    let (min_m, max_m) = lattice.range_m();
+    let is_within = value.iter().all(|c| (min_m..=max_m).contains(c));
+    is_within.then_some(()).ok_or(GridError::Range { field, value, min_m, max_m })
+}
+
 /// The whole number that `number` nearly is.
 fn whole(number: f64) -> Option<f64> {
     let whole = number.round();
@@ -198,6 +217,8 @@ impl<'a> Projection<'a> {
             if !is_ordered || !min_m.iter().chain(&max_m).all(|c| c.is_finite()) {
                 return Err(GridError::Rectangle(min_m, max_m));
             }
+            check_range("min_m", min_m, view.lattice())?;
+            check_range("max_m", max_m, view.lattice())?;
         }
         let is_in_order = band_m[0] <= band_m[1];
         if !is_in_order {

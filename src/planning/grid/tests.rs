@@ -130,8 +130,18 @@ fn what_cannot_be_drawn_is_named() {
         said(GridRequest { cells_max: 999, ..REQUEST })
             .contains("may have 999 cells, the area has 1000 of 0.1 m")
     );
-    let area = GridArea::Rectangle { min_m: [-1e300; 2], max_m: [1e300; 2] };
+    let (min, max) = map.lattice().range_m();
+    let area = GridArea::Rectangle { min_m: [min; 2], max_m: [max; 2] };
     assert!(said(GridRequest { area, ..REQUEST }).contains("may have 1000 cells"));
+    let far = |min_m, max_m| said(GridRequest { area: GridArea::Rectangle { min_m, max_m }, ..REQUEST });
+    let limits = format!("within {min} m and {max} m");
+    for (told, field) in [
+        (far([1e300; 2], [1e300; 2]), "area.min_m"),
+        (far([0.0, min - 0.1], [1.0; 2]), "area.min_m"),
+        (far([0.0; 2], [max + 0.1, 1.0]), "area.max_m"),
+    ] {
+        assert!(told.starts_with(field) && told.contains(&limits), "{told}");
+    }
 }
 
 #[test]

@@ -68,11 +68,8 @@ impl Way<'_> {
         let (mut share, mut at) = (0.0, self.at(0.0));
         while work.goes_on(1) {
             let far_m = (until - share) * self.length_m;
-            let clear_m = match self.link.distance_m(shapes, &at, far_m, work) {
-                // Further than all of the way leads.
-                None => return None,
-                Some(clear_m) => clear_m,
-            };
+            // Where it is further than all of the way leads, nothing is met.
+            let clear_m = self.link.distance_m(shapes, &at, far_m, work)?;
             // What a point lies on the border of, or just beside it, is no distance away.
             if clear_m <= 0.0 && self.link.first_met(shapes, &at, work).is_some() {
                 return Some(share);

@@ -242,7 +242,7 @@ fn length([x, y, z]: [f64; 3]) -> f64 {
 /// points on it do. A voxel that it would enter just where it ends is not met.
 ///
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a ray meets the first one that it is inside, its border
-/// included, before it meets a voxel.
+/// included, before it meets a voxel; not one that it would enter just where it ends.
 ///
 /// The view must cover the whole map. The walk leaps over empty space by the blocks and clusters of blocks that are not
 /// there, and comes out where single steps would (both computed in f64, and compared bit for bit in tests). Takes 12 bytes

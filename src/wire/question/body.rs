@@ -79,11 +79,13 @@ impl TryFrom<pb::Link> for Link {
     type Error = ServiceError;
 
     fn try_from(link: pb::Link) -> Result<Self, ServiceError> {
-        let points = match link.points {
+        let spheres = spheres_from(&link.spheres_f32le)?;
+        // No points beside spheres are none; a list of points that is all of a link, and empty, is a mistake.
+        let is_none = |points: &pb::Points| points.xyz.is_empty() && points.xyz_f32le.is_empty();
+        let points = match link.points.filter(|points| spheres.is_empty() || !is_none(points)) {
             Some(points) => PointCloud::try_from(points).in_field("points")?.as_slice().to_vec(),
             None => Vec::new(),
         };
-        let spheres = spheres_from(&link.spheres_f32le)?;
         Ok(Self { spheres, points, padding_m: link.padding_m })
     }
 }
