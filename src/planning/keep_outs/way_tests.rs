@@ -260,6 +260,8 @@ fn questions_among_shapes_look_at_the_signal_in_proportion_to_their_work_and_end
             &|stop| view.check_motions(&motions, stop).unwrap().is_some(),
         ];
         for (number, ask) in asks.into_iter().enumerate() {
+            // What the field lacks is made the first time, in rounds with looks of their own.
+            ask(StopSignal::NEVER);
             let (is_answered, looks) = asked_until(u64::MAX, ask);
             assert!(is_answered);
             // What is away from the ball around the link is tested once for it, and not for each sphere.
