@@ -91,6 +91,7 @@ mod sync;
 #[cfg(feature = "server")]
 pub mod telemetry;
 pub mod util;
+pub mod visibility;
 pub mod voxel;
 #[cfg(feature = "client")]
 pub mod wire;

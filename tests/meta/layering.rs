@@ -12,7 +12,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 const LAYERS: [&[&str]; 16] = [
     &["util", "geometry", "sync"],
     &["voxel", "bloom"],
-    &["scan"],
+    &["scan", "visibility"],
     &["map"],
     &["align", "planning"],
     &["mapping"],

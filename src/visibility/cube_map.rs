@@ -1,0 +1,126 @@
+//! Directions as pixels of a cube around the sensor.
+
+/// Faces of the cube.
+pub(super) const FACES: usize = 6;
+/// Pixels along the side of a tile.
+pub(super) const TILE_SIDE: usize = 8;
+
+/// The grid of pixels on each of the six faces of a cube around the sensor: `tiles` tiles of 8 x 8 pixels along each side.
+///
+/// A direction lies on the face of its largest coordinate, at the quotients of the two others and that one. So a pixel is found
+/// without a root and without an angle, and everything is computed in f32 in one order: the same pixel on every machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct CubeMap {
+    tiles: usize,
+}
+
+/// A pixel of a cube map, and how deep a point lies in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Projection {
+    /// Face 0..6: that of +x, -x, +y, -y, +z, -z.
+    pub(super) face: usize,
+    /// Column and row on the face.
+    pub(super) pixel: [usize; 2],
+    /// Distance along the face's axis, meters.
+    pub(super) depth_m: f32,
+}
+
+impl CubeMap {
+    pub(super) fn new(tiles: usize) -> Self {
+        Self { tiles }
+    }
+
+    /// Tiles along the side of a face.
+    pub(super) fn tiles(self) -> usize {
+        self.tiles
+    }
+
+    /// Pixels along the side of a face.
+    pub(super) fn pixels(self) -> usize {
+        self.tiles * TILE_SIDE
+    }
+
+    /// Tiles of all faces.
+    pub(super) fn tiles_of_all_faces(self) -> usize {
+        FACES * self.tiles * self.tiles
+    }
+
+    /// The side of a pixel at depth 1.
+    pub(super) fn pitch(self) -> f32 {
+        2.0 / self.pixels() as f32
+    }
+
+    /// Where the point at `offset` from the sensor, in its frame and finite, is seen; none of the sensor's own place.
+    #[inline(always)]
+    pub(super) fn project(self, offset: [f32; 3]) -> Option<Projection> {
+        let (face, [u, v], depth_m) = face_of(offset)?;
+        let half = (self.pixels() / 2) as f32;
+        let last = self.pixels() - 1;
+        let pixel = [u, v].map(|along| (((along + 1.0) * half) as usize).min(last));
+        Some(Projection { face, pixel, depth_m })
+    }
+
+    /// The number of the tile that holds a pixel, and of the pixel in it.
+    #[inline(always)]
+    pub(super) fn place(self, face: usize, [column, row]: [usize; 2]) -> (usize, usize) {
+        let tile = (face * self.tiles + row / TILE_SIDE) * self.tiles + column / TILE_SIDE;
+        (tile, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
+    }
+
+    /// The direction of the middle of a pixel, of depth 1.
+    pub(super) fn direction(self, face: usize, pixel: [usize; 2]) -> [f32; 3] {
+        let [u, v] = pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0);
+        let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+        match face / 2 {
+            0 => [sign, u, v],
+            1 => [v, sign, u],
+            _ => [u, v, sign],
+        }
+    }
+}
+
+/// The face that the point at `offset` lies on, where on it (-1 to 1 along each side), and its distance along the face's axis.
+#[inline(always)]
+fn face_of([x, y, z]: [f32; 3]) -> Option<(usize, [f32; 2], f32)> {
+    let [ax, ay, az] = [x.abs(), y.abs(), z.abs()];
+    let (axis, along, u, v) = if ax >= ay && ax >= az {
+        (0, x, y, z)
+    } else if ay >= az {
+        (1, y, z, x)
+    } else {
+        (2, z, x, y)
+    };
+    let depth = along.abs();
+    if depth == 0.0 {
+        return None;
+    }
+    let scale = 1.0 / depth;
+    Some((axis * 2 + usize::from(along < 0.0), [u * scale, v * scale], depth))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_each_pixel_is_seen_in_it() {
+        for tiles in [1, 3, 10] {
+            let map = CubeMap::new(tiles);
+            for face in 0..FACES {
+                for row in 0..map.pixels() {
+                    for column in 0..map.pixels() {
+                        let direction = map.direction(face, [column, row]);
+                        let seen = map.project(direction.map(|c| c * 3.0)).unwrap();
+                        assert_eq!((seen.face, seen.pixel), (face, [column, row]));
+                        assert!((seen.depth_m - 3.0).abs() < 1e-6);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_sensors_own_place_is_seen_nowhere() {
+        assert_eq!(CubeMap::new(4).project([0.0; 3]), None);
+    }
+}

@@ -1,0 +1,18 @@
+//! Visibility: where scans looked through (paper III-B).
+//!
+//! The paper stores no free space and generates it on demand from the recorded poses and a sensor model. Here the model is what the
+//! sensor saw: a scan that sees something new leaves a [`Viewpoint`], its pose with a small [`RangeImage`] of how far it
+//! saw in each direction. A voxel is free where a viewpoint saw through its center and nothing occupies it.
+
+mod cube_map;
+mod range_image;
+mod reach;
+mod set;
+#[cfg(test)]
+mod tests;
+mod tile;
+mod viewpoint;
+
+pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, SeenRange};
+pub use set::{Gaze, ViewpointSet};
+pub use viewpoint::Viewpoint;

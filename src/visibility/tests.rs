@@ -1,0 +1,141 @@
+//! The set against every viewpoint, asked one by one.
+
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::geometry::{Point, Pose};
+
+const RANGE: SeenRange = SeenRange { min_m: 0.1, max_m: 40.0 };
+
+/// A scan from the middle of a room of 6 x 4 x 3 m, seen through a window of directions.
+fn room(random: &mut ChaCha8Rng, points: usize, around: f32) -> Vec<Point> {
+    let half = [3.0f32, 2.0, 1.5];
+    let mut point = || {
+        let direction = [1.0, random.random_range(-around..around), random.random_range(-around..around)];
+        let to_wall = (0..3).map(|axis| half[axis] / f32::abs(direction[axis])).fold(f32::INFINITY, f32::min);
+        Point::from(direction.map(|c| c * to_wall))
+    };
+    (0..points).map(|_| point()).collect()
+}
+
+fn any_pose(random: &mut ChaCha8Rng, spread_m: f64) -> Pose {
+    let mut any = || random.random_range(-1.0..1.0);
+    let translation = nalgebra::Translation3::new(any() * spread_m, any() * spread_m, any() * spread_m);
+    let rotation = nalgebra::UnitQuaternion::from_euler_angles(any() * 3.0, any() * 1.5, any() * 3.0);
+    Pose::from_parts(translation, rotation)
+}
+
+#[test]
+fn an_image_tells_up_to_the_wall_and_never_beyond() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let points = room(&mut random, 40_000, 0.5);
+    let image = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
+    assert!(image.stored_bytes() <= IMAGE_BYTES_MAX);
+    let mut before = 0;
+    for point in &points {
+        let beyond = point.xyz().map(|c| c * 1.001);
+        assert!(!image.sees_through(beyond), "{point:?} was seen through");
+        before += usize::from(image.sees_through(point.xyz().map(|c| c * 0.95)));
+    }
+    assert!(before * 100 > points.len() * 97, "{before} of {}", points.len());
+    // Nothing was seen behind the sensor.
+    assert!(!image.sees_through([-0.5, 0.0, 0.0]));
+}
+
+#[test]
+fn an_image_comes_back_from_its_bytes_and_garbage_does_not() {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    let image = RangeImage::of_points(&room(&mut random, 9000, 3.0), RANGE, IMAGE_BYTES_MAX).unwrap();
+    let bytes = image.to_bytes();
+    assert_eq!(bytes.len(), image.stored_bytes());
+    assert_eq!(RangeImage::from_bytes(&bytes).unwrap(), image);
+    for end in [0, 3, 5, bytes.len() / 2, bytes.len() - 1] {
+        assert!(matches!(RangeImage::from_bytes(&bytes[..end]), Err(RangeImageError::Length { .. })));
+    }
+    let garbled = |at: usize, with: &[u8]| {
+        let mut bytes = bytes.clone();
+        bytes[at..at + with.len()].copy_from_slice(with);
+        RangeImage::from_bytes(&bytes)
+    };
+    assert_eq!(garbled(0, &[0]), Err(RangeImageError::Tiles(0)));
+    assert!(matches!(garbled(1, &f32::NAN.to_le_bytes()), Err(RangeImageError::Unit(_))));
+    assert!(matches!(garbled(1, &f32::MAX.to_le_bytes()), Err(RangeImageError::Unit(_))));
+}
+
+#[test]
+fn an_image_of_any_scan_keeps_to_its_bytes() {
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    for count in [1, 2, 30, 3000, 60_000] {
+        let mut any = || random.random_range(-30.0f32..30.0);
+        let points: Vec<_> = (0..count).map(|_| Point::new(any(), any(), any())).collect();
+        for bytes_max in [2000, IMAGE_BYTES_MAX] {
+            let image = RangeImage::of_points(&points, RANGE, bytes_max).unwrap();
+            assert!(image.stored_bytes() <= bytes_max, "{count} points took {}", image.stored_bytes());
+        }
+    }
+    assert_eq!(RangeImage::of_points(&[Point::new(0.0, 0.0, 0.0)], RANGE, IMAGE_BYTES_MAX), None);
+}
+
+#[test]
+fn a_ball_is_seen_through_only_where_all_of_it_is() {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let mut points = room(&mut random, 60_000, 0.6);
+    // A plate hides half of the wall.
+    for point in &mut points {
+        let [x, y, z] = point.xyz();
+        if y / x > 0.0 {
+            *point = Point::new(1.5, 1.5 * y / x, 1.5 * z / x);
+        }
+    }
+    let image = RangeImage::of_pixels(&points, RANGE, 10).unwrap();
+    assert!(image.sees_through_all_of([2.0, -0.5, 0.1], 0.05));
+    assert!(!image.sees_through_all_of([2.0, 0.5, 0.1], 0.05), "behind the plate");
+    assert!(!image.sees_through_all_of([2.0, -0.02, 0.1], 0.05), "at the plate's rim");
+    assert!(!image.sees_through_all_of([2.97, -0.5, 0.1], 0.05), "at the wall");
+    assert!(!image.sees_through_all_of([2.0, -1.25, 0.1], 0.05), "at the edge of what was seen");
+    assert!(!image.sees_through_all_of([-2.0, -0.5, 0.1], 0.05), "behind the sensor");
+}
+
+#[test]
+fn a_set_says_of_every_point_what_its_viewpoints_say() {
+    for seed in 0..6 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut set = ViewpointSet::default();
+        let mut all: Vec<(u64, Arc<Viewpoint>)> = Vec::new();
+        for revision in 1..40 {
+            let pose = any_pose(&mut random, 6.0);
+            let around = random.random_range(0.2..4.0);
+            let far = random.random_range(0.05..6.0f32);
+            let points: Vec<_> = room(&mut random, 3000, around)
+                .iter()
+                .map(|p| Point::from(p.xyz().map(|c| c * far)))
+                .collect();
+            let Some(image) = RangeImage::of_points(&points, RANGE, 4096) else { continue };
+            let viewpoint = Arc::new(Viewpoint::new(pose, image));
+            set.insert(revision, viewpoint.clone());
+            all.push((revision, viewpoint));
+            if revision % 3 == 0 {
+                let (gone, _) = all.swap_remove(random.random_range(0..all.len()));
+                assert!(set.remove(gone).is_some() && set.remove(gone).is_none());
+            }
+        }
+        assert_eq!(set.len(), all.len());
+        let (mut gaze, mut seen) = (set.gaze(), 0);
+        for _ in 0..4000 {
+            let mut any = || random.random_range(-15.0..15.0);
+            let point = [any(), any(), any()];
+            let expected = all.iter().any(|(_, viewpoint)| viewpoint.sees_through(point));
+            assert_eq!(set.sees_through(point), expected, "{point:?}");
+            assert_eq!(gaze.sees_through(point), expected, "{point:?}");
+            seen += usize::from(expected);
+        }
+        assert!((200..3800).contains(&seen), "{seen} seen: the test says nothing");
+        for (revision, _) in all {
+            set.remove(revision);
+        }
+        assert_eq!((set.len(), set.memory_bytes(), set.stored_bytes()), (0, 0, 0));
+    }
+}
