@@ -87,7 +87,7 @@ fn what_a_record_says_of_a_voxel_takes_no_more_memory_than_it_says() {
     let pose = MappedScan::new(RobotName::new("r1").unwrap(), Pose::identity());
     let insertion = |voxels| {
         let (carved, moments) = (VoxelSet::default(), MomentSet::default());
-        Change::Insertion(ScanRecord { pose: pose.clone(), voxels, carved, moments })
+        Change::Insertion(ScanRecord { pose: pose.clone(), voxels, carved, moments, viewpoint: None })
     };
     let deletion = Change::Deletion(DeletionRecord { voxels: scattered(2_000_000), request: None });
     for change in [insertion(scattered(2_000_000)), deletion, insertion(scattered(10))] {

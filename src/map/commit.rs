@@ -16,9 +16,11 @@ use super::update::{Moved, ShardUpdate, Wanted};
 use super::{
     Change, Committed, CompletedRequest, ContentHash, ContentVersion, DeletionRecord, KeepOutRecord,
     LevelChange, LevelSet, MappedScan, MultiResolutionMap, ScanRecord, TrajectorySpacing, UndoRecord,
+    ViewpointRecord,
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::util::StopSignal;
+use crate::visibility::Viewpoint;
 use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
@@ -98,11 +100,19 @@ impl<'a> Committer<'a> {
         let mut update = self.plan(&scan.carved, &scan.voxels, stop)?;
         let made = self.next(&mut update);
         let committed = &made.0;
+        let image = scan.viewpoint.as_ref().map(|viewpoint| viewpoint.image.clone());
+        let viewpoint = image.map(|image| Arc::new(Viewpoint::new(scan.pose.map_from_sensor, image)));
         let _locks = self.carry_out(update, self.adding(&scan.moments), stop)?;
+        let mut viewpoints = self.map.viewpoints.write();
         let mut trajectory = self.map.trajectory.write();
         let pose =
             MappedScan { revision: committed.revision, new_voxels: committed.added, ..scan.pose.clone() };
         trajectory.push(pose);
+        if let Some((viewpoint, ViewpointRecord { displaced, .. })) = viewpoint.zip(scan.viewpoint.as_ref()) {
+            let viewpoints = Arc::make_mut(&mut viewpoints);
+            displaced.iter().for_each(|&displaced| drop(viewpoints.remove(displaced)));
+            viewpoints.insert(made.0.revision, viewpoint);
+        }
         Some(self.publish(made))
     }
 
@@ -141,6 +151,11 @@ impl<'a> Committer<'a> {
         let made = self.next(&mut update);
         let known = self.grouped(&undo.moments);
         let _locks = self.carry_out(update, Gained { known, ..Gained::default() }, StopSignal::NEVER)?;
+        let mut viewpoints = self.map.viewpoints.write();
+        if undo.scans.iter().any(|&scan| viewpoints.get(scan).is_some()) {
+            let viewpoints = Arc::make_mut(&mut viewpoints);
+            undo.scans.iter().for_each(|&scan| drop(viewpoints.remove(scan)));
+        }
         let mut trajectory = self.map.trajectory.write();
         trajectory.withdraw(undo.changes(), made.0.revision);
         if let Some(request) = &undo.request {

@@ -7,6 +7,7 @@ use super::{
     MultiResolutionMap, Trajectory,
 };
 use crate::util::StopSignal;
+use crate::visibility::ViewpointSet;
 use crate::voxel::{MomentSet, VoxelSet};
 
 /// The largest revision, 2^53: the last whole number up to which every program that reads JSON counts exactly. A map
@@ -33,6 +34,9 @@ pub enum ContentsError {
     /// A keep-out that was made at a revision beyond the map's.
     #[error("the keep-out {0} was made at revision {1}, the map is at {2}")]
     KeepOutRevision(String, u64, u64),
+    /// A viewpoint of a revision beyond the map's.
+    #[error("a viewpoint of revision {0}, the map is at {1}")]
+    ViewpointRevision(u64, u64),
 }
 
 /// What a map holds at one revision, besides its settings. Coarser levels and filters follow from the finest
@@ -51,6 +55,8 @@ pub struct MapContents {
     pub requests: IdempotencyLog,
     /// Where no robot may go.
     pub keep_outs: Arc<KeepOuts>,
+    /// Where scans saw through.
+    pub viewpoints: Arc<ViewpointSet>,
 }
 
 impl MapContents {
@@ -77,6 +83,9 @@ impl MapContents {
         self.check_order("withdrawn changes", withdrawn.iter().map(|withdrawn| withdrawn.revision))?;
         self.check_order("requests", self.requests.iter().map(|request| request.revision))?;
         self.check_keep_outs()?;
+        if let Some((late, _)) = self.viewpoints.iter().last().filter(|(last, _)| *last > self.revision) {
+            return Err(ContentsError::ViewpointRevision(late, self.revision));
+        }
         Ok(self)
     }
 
@@ -122,11 +131,12 @@ impl MultiResolutionMap {
         // of one revision.
         let locked = self.keep_outs.read();
         let (revision, keep_outs) = (self.revision(), Arc::clone(&locked));
-        let (trajectory, requests) = (self.trajectory(), self.requests().clone());
+        let (viewpoints, trajectory, requests) =
+            (self.viewpoints(), self.trajectory(), self.requests().clone());
         drop(locked);
         let moments = moments.map_or_else(MomentSet::default, |moments| moments.to_set_until(stop));
         let voxels = view.voxels_until(stop);
-        MapContents { revision, voxels, moments, trajectory, requests, keep_outs }
+        MapContents { revision, voxels, moments, trajectory, requests, keep_outs, viewpoints }
     }
 
     /// The map of `settings` that holds `contents`, without their moments where it keeps none.
@@ -160,6 +170,7 @@ impl MultiResolutionMap {
         *self.trajectory.write() = contents.trajectory;
         *self.requests.write() = contents.requests;
         *self.keep_outs.write() = contents.keep_outs;
+        *self.viewpoints.write() = contents.viewpoints;
         self.published.publish(ContentVersion { revision: contents.revision, hash });
         true
     }

@@ -52,6 +52,10 @@ pub struct MapDescription {
     pub follower_bytes: usize,
     /// Bytes of memory of the trajectory, with what is known of scans whose poses are not kept.
     pub trajectory_bytes: usize,
+    /// How many scans left a viewpoint, see [`crate::visibility`].
+    pub viewpoints: usize,
+    /// Bytes of memory of the viewpoints.
+    pub viewpoint_bytes: usize,
 }
 
 impl MultiResolutionMap {
@@ -74,6 +78,7 @@ impl MultiResolutionMap {
         let (moments, view) = (long.moments(), long.view());
         let describe_level = |level| self.describe_level(&view, level, samples, seed, stop);
         let levels = (0..self.settings.levels).map(describe_level);
+        let viewpoints = self.viewpoints();
         MapDescription {
             version: view.version(),
             levels: levels.collect(),
@@ -81,6 +86,8 @@ impl MultiResolutionMap {
             moment_bytes: moments.map_or(0, |moments| moments.bytes()),
             follower_bytes: self.followers.bytes(),
             trajectory_bytes: self.trajectory().memory_bytes(),
+            viewpoints: viewpoints.len(),
+            viewpoint_bytes: viewpoints.memory_bytes(),
         }
     }
 
@@ -92,6 +99,7 @@ impl MultiResolutionMap {
         view.shards().map(Shard::set_bytes).sum::<usize>()
             + moments.map_or(0, |moments| moments.bytes())
             + self.trajectory().memory_bytes()
+            + self.viewpoints().memory_bytes()
             + self.followers.bytes()
     }
 

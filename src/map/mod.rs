@@ -80,7 +80,7 @@ pub use sharding::SHARDS;
 pub(crate) use tier_view::TierView;
 pub use trajectory::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, KnownScan, MappedScan, OverlapOfNoLevel, SESSIONS_PER_ROBOT_MAX,
-    ScanRecord, Trajectory, TrajectorySpacing, WithdrawnChange,
+    ScanRecord, Trajectory, TrajectorySpacing, ViewpointRecord, WithdrawnChange,
 };
 pub use view::{LongRead, MapView};
 pub use voxel_ownership::{Reversal, VoxelOwnership};
@@ -90,6 +90,7 @@ use std::sync::Arc;
 
 use crate::geometry::{Point, Pose};
 use crate::sync::{Mutex, Rank, RwLock, RwLockReadGuard};
+use crate::visibility::ViewpointSet;
 use crate::voxel::{Cell, Lattice, MOMENT_LEVEL, Moments, VoxelKey};
 use followers::Followers;
 use moments::ShardedMoments;
@@ -115,6 +116,7 @@ pub struct MultiResolutionMap {
     trajectory: RwLock<Trajectory>,
     requests: RwLock<IdempotencyLog>,
     keep_outs: RwLock<Arc<KeepOuts>>,
+    viewpoints: RwLock<Arc<ViewpointSet>>,
     published: Published,
     followers: Followers,
     commit_queue: Mutex<()>,
@@ -138,6 +140,7 @@ impl MultiResolutionMap {
             trajectory: RwLock::new(Rank::Trajectory, Trajectory::default()),
             requests: RwLock::new(Rank::Requests, IdempotencyLog::default()),
             keep_outs: RwLock::new(Rank::KeepOuts, Arc::default()),
+            viewpoints: RwLock::new(Rank::Viewpoints, Arc::default()),
             published: Published::default(),
             followers: Followers::default(),
             commit_queue: Mutex::new(Rank::Commit, ()),
@@ -207,6 +210,11 @@ impl MultiResolutionMap {
         // Who changes them publishes the revision before others may read.
         let keep_outs = self.keep_outs.read();
         (Arc::clone(&keep_outs), self.content_version())
+    }
+
+    /// Where scans saw through, as they are now.
+    pub fn viewpoints(&self) -> Arc<ViewpointSet> {
+        Arc::clone(&self.viewpoints.read())
     }
 
     /// Answers to changes that were asked for under an id.

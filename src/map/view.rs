@@ -13,6 +13,7 @@ use super::{
 use crate::geometry::Point;
 use crate::sync::RwLockReadGuard;
 use crate::util::StopSignal;
+use crate::visibility::ViewpointSet;
 use crate::voxel::{
     BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice,
     LatticeFromPoints, VoxelKey, VoxelSet,
@@ -26,6 +27,7 @@ pub struct MapView<'a> {
     version: ContentVersion,
     /// Where they were asked for.
     keep_outs: Option<Arc<KeepOuts>>,
+    viewpoints: Option<Arc<ViewpointSet>>,
 }
 
 /// A read that takes long, see [`MultiResolutionMap::long_read`].
@@ -53,7 +55,7 @@ impl<'a> MapView<'a> {
     /// read once they are held: a change that is published later touches none of these shards.
     pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
         let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
-        Self { map, shards, version: map.content_version(), keep_outs: None }
+        Self { map, shards, version: map.content_version(), keep_outs: None, viewpoints: None }
     }
 
     /// A view where no lock has to be waited for; none elsewhere.
@@ -62,7 +64,7 @@ impl<'a> MapView<'a> {
         for i in (0..SHARDS).filter(|&i| touched.contains(i)) {
             shards[i] = Some(map.shards[i].try_read()?);
         }
-        Some(Self { map, shards, version: map.content_version(), keep_outs: None })
+        Some(Self { map, shards, version: map.content_version(), keep_outs: None, viewpoints: None })
     }
 
     /// This view with the keep-outs of the map, all at one revision, which may be a later one: what the view covers has not
@@ -85,6 +87,24 @@ impl<'a> MapView<'a> {
     /// The keep-outs, where the view was asked for them.
     pub fn keep_outs(&self) -> Option<&Arc<KeepOuts>> {
         self.keep_outs.as_ref()
+    }
+
+    /// This view with where scans saw through, all at one revision, which may be a later one: what the view covers has not
+    /// changed since.
+    #[must_use]
+    pub fn with_viewpoints(self) -> Self {
+        // Keep-outs may have changed since they were asked for: both are taken anew, at once.
+        let keep_outs = self.keep_outs.is_some().then(|| self.map.keep_outs.read());
+        let viewpoints = self.map.viewpoints.read();
+        let version = self.map.content_version();
+        let keep_outs = keep_outs.as_deref().map(Arc::clone);
+        let viewpoints = Some(Arc::clone(&viewpoints));
+        Self { keep_outs, viewpoints, version, ..self }
+    }
+
+    /// Where scans saw through, where the view was asked for that.
+    pub fn viewpoints(&self) -> Option<&Arc<ViewpointSet>> {
+        self.viewpoints.as_ref()
     }
 
     /// The lattices of the map's levels.

@@ -346,6 +346,7 @@ mod tests {
                 trajectory: trajectory_of(pose),
                 requests: [request].into_iter().collect(),
                 keep_outs: Arc::new(keep_outs()),
+                viewpoints: Arc::default(),
             },
         }
     }
@@ -389,7 +390,8 @@ mod tests {
 
     /// All of it in one message.
     fn message(snapshot: &Snapshot) -> pb::Snapshot {
-        let MapContents { revision, voxels, moments, trajectory, requests, keep_outs } = &snapshot.contents;
+        let MapContents { revision, voxels, moments, trajectory, requests, keep_outs, .. } =
+            &snapshot.contents;
         pb::Snapshot {
             uuid: snapshot.uuid.as_bytes().to_vec().into(),
             resolution_m: snapshot.settings.resolution_m,

@@ -52,6 +52,8 @@ pub(crate) enum Rank {
     Shard(u8),
     /// The keep-outs of a map.
     KeepOuts,
+    /// The viewpoints of a map.
+    Viewpoints,
     /// The trajectory of a map.
     Trajectory,
     /// The answers to requests that a map remembers.

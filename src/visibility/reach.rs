@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use hashbrown::HashMap;
 
-use super::Viewpoint;
+use super::RangeImage;
+use crate::geometry::Pose;
 
 /// How many cells a viewpoint reaches in each direction, at most.
 const CELLS_OF_REACH: f64 = 8.0;
@@ -36,24 +37,25 @@ struct Entry {
 }
 
 /// The cells that a viewpoint looked into.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reach {
     exponent: i32,
     cells: Vec<(CellIndex, u32)>,
 }
 
 impl Reach {
-    /// The cells with a point that `viewpoint` saw, and some beside.
-    pub(super) fn of(viewpoint: &Viewpoint) -> Self {
-        let origin: [f64; 3] = viewpoint.map_from_sensor().translation.vector.into();
-        let ends: Vec<_> = viewpoint.seen_m().collect();
+    /// The cells with a point that was seen from `map_from_sensor`, as `image` tells, and some beside.
+    pub(super) fn of(map_from_sensor: &Pose, image: &RangeImage) -> Self {
+        let origin: [f64; 3] = map_from_sensor.translation.vector.into();
+        let in_map = |offset: [f32; 3]| map_from_sensor * nalgebra::Point3::from(offset.map(f64::from));
+        let ends: Vec<[f64; 3]> = image.seen().map(|offset| in_map(offset).into()).collect();
         let distance =
             |end: &[f64; 3]| (0..3).map(|axis| (end[axis] - origin[axis]).powi(2)).sum::<f64>().sqrt();
         let reach_m = ends.iter().map(distance).fold(0.0, f64::max).max(f64::from(f32::MIN_POSITIVE));
         let exponent = (reach_m / CELLS_OF_REACH).log2().ceil() as i32;
         let side_m = 2f64.powi(exponent);
         let mut grid = LocalGrid::around(origin, reach_m, side_m);
-        let half_pixel = f64::from(viewpoint.image().pitch()) * std::f64::consts::FRAC_1_SQRT_2;
+        let half_pixel = f64::from(image.pitch()) * std::f64::consts::FRAC_1_SQRT_2;
         for end in &ends {
             let steps = (distance(end) / side_m * STEPS_A_CELL).ceil().max(1.0);
             // A ball around each step holds the frustum of the pixel up to the next.

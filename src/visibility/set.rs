@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::Viewpoint;
-use super::reach::{Reach, ReachIndex, Slot};
+use super::reach::{ReachIndex, Slot};
 
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct ViewpointSet {
-    slots: Vec<Option<Kept>>,
+    slots: Vec<Option<Arc<Viewpoint>>>,
     by_revision: BTreeMap<u64, Slot>,
     unused: Vec<Slot>,
     index: ReachIndex,
@@ -17,55 +17,40 @@ pub struct ViewpointSet {
     stored_bytes: usize,
 }
 
-/// A viewpoint, and where it is in the index.
-#[derive(Debug, Clone)]
-struct Kept {
-    viewpoint: Arc<Viewpoint>,
-    reach: Reach,
-}
-
-impl Kept {
-    fn memory_bytes(&self) -> usize {
-        self.viewpoint.memory_bytes() + self.reach.memory_bytes()
-    }
-}
-
 impl ViewpointSet {
     /// Keeps the viewpoint of the scan that made `revision`.
     pub fn insert(&mut self, revision: u64, viewpoint: Arc<Viewpoint>) {
         self.remove(revision);
-        let reach = Reach::of(&viewpoint);
         let slot = self.unused.pop().unwrap_or_else(|| {
             self.slots.push(None);
             (self.slots.len() - 1) as Slot
         });
-        self.index.insert(slot, &reach);
+        self.index.insert(slot, viewpoint.reach());
         self.by_revision.insert(revision, slot);
-        let kept = Kept { viewpoint, reach };
-        self.bytes += kept.memory_bytes();
-        self.stored_bytes += kept.viewpoint.image().stored_bytes();
-        self.slots[slot as usize] = Some(kept);
+        self.bytes += viewpoint.memory_bytes();
+        self.stored_bytes += viewpoint.image().stored_bytes();
+        self.slots[slot as usize] = Some(viewpoint);
     }
 
     /// Forgets the viewpoint of the scan that made `revision`; returns it, where there was one.
     pub fn remove(&mut self, revision: u64) -> Option<Arc<Viewpoint>> {
         let slot = self.by_revision.remove(&revision)?;
-        let kept = self.slots[slot as usize].take()?;
-        self.index.remove(slot, &kept.reach);
+        let viewpoint = self.slots[slot as usize].take()?;
+        self.index.remove(slot, viewpoint.reach());
         self.unused.push(slot);
-        self.bytes -= kept.memory_bytes();
-        self.stored_bytes -= kept.viewpoint.image().stored_bytes();
-        Some(kept.viewpoint)
+        self.bytes -= viewpoint.memory_bytes();
+        self.stored_bytes -= viewpoint.image().stored_bytes();
+        Some(viewpoint)
     }
 
     /// The viewpoints, with the revisions of the scans that left them, in that order.
     pub fn iter(&self) -> impl Iterator<Item = (u64, &Arc<Viewpoint>)> {
-        self.by_revision.iter().filter_map(|(&revision, &slot)| Some((revision, &self.kept(slot)?.viewpoint)))
+        self.by_revision.iter().filter_map(|(&revision, &slot)| Some((revision, self.at(slot)?)))
     }
 
     /// The viewpoint of the scan that made `revision`.
     pub fn get(&self, revision: u64) -> Option<&Arc<Viewpoint>> {
-        Some(&self.kept(*self.by_revision.get(&revision)?)?.viewpoint)
+        self.at(*self.by_revision.get(&revision)?)
     }
 
     /// Number of viewpoints.
@@ -98,20 +83,31 @@ impl ViewpointSet {
         Gaze { set: self, last: None }
     }
 
-    /// The part of space that the viewpoint of `revision` can have changed the state of: boxes (map frame, meters: the smallest and the
-    /// largest coordinates).
-    pub fn reach_m(&self, revision: u64) -> impl Iterator<Item = [[f64; 3]; 2]> {
-        let kept = self.by_revision.get(&revision).and_then(|slot| self.kept(*slot));
-        kept.into_iter().flat_map(|kept| kept.reach.boxes_m())
-    }
-
     fn observer(&self, point_m: [f64; 3]) -> Option<&Viewpoint> {
-        let candidates = self.index.around(point_m).filter_map(|slot| Some(&*self.kept(slot)?.viewpoint));
-        candidates.into_iter().find(|viewpoint| viewpoint.sees_through(point_m))
+        let mut candidates = self.index.around(point_m).filter_map(|slot| self.at(slot));
+        candidates.find(|viewpoint| viewpoint.sees_through(point_m)).map(Arc::as_ref)
     }
 
-    fn kept(&self, slot: Slot) -> Option<&Kept> {
+    fn at(&self, slot: Slot) -> Option<&Arc<Viewpoint>> {
         self.slots.get(slot as usize)?.as_ref()
+    }
+}
+
+impl PartialEq for ViewpointSet {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl std::fmt::Debug for ViewpointSet {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_map().entries(self.iter()).finish()
+    }
+}
+
+impl Extend<(u64, Arc<Viewpoint>)> for ViewpointSet {
+    fn extend<I: IntoIterator<Item = (u64, Arc<Viewpoint>)>>(&mut self, viewpoints: I) {
+        viewpoints.into_iter().for_each(|(revision, viewpoint)| self.insert(revision, viewpoint));
     }
 }
 

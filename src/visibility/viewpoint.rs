@@ -1,6 +1,7 @@
 //! A viewpoint: where a scan was taken, and how far it saw from there.
 
 use super::RangeImage;
+use super::reach::Reach;
 use crate::geometry::Pose;
 
 /// Where a scan was taken, and how far it saw in each direction (paper III-B).
@@ -10,6 +11,7 @@ pub struct Viewpoint {
     image: RangeImage,
     /// Rows of the rotation from the map to the sensor.
     rotation: [[f32; 3]; 3],
+    reach: Reach,
 }
 
 impl Viewpoint {
@@ -17,7 +19,8 @@ impl Viewpoint {
     pub fn new(map_from_sensor: Pose, image: RangeImage) -> Self {
         let rotation = map_from_sensor.rotation.inverse().to_rotation_matrix();
         let row = |r: usize| std::array::from_fn(|c| rotation[(r, c)] as f32);
-        Self { map_from_sensor, image, rotation: std::array::from_fn(row) }
+        let reach = Reach::of(&map_from_sensor, &image);
+        Self { map_from_sensor, image, rotation: std::array::from_fn(row), reach }
     }
 
     /// Where the scan was taken.
@@ -45,17 +48,18 @@ impl Viewpoint {
         self.rotation.map(|[r0, r1, r2]| (r0 * x + r1 * y) + r2 * z)
     }
 
-    /// The points up to which it saw, map frame, meters.
-    pub fn seen_m(&self) -> impl Iterator<Item = [f64; 3]> {
-        self.image.seen().map(|offset| {
-            let point: [f64; 3] =
-                (self.map_from_sensor * nalgebra::Point3::from(offset.map(f64::from))).into();
-            point
-        })
+    /// The part of space that it can have seen a point of: boxes of the map frame, each as the smallest and the largest
+    /// coordinates, meters.
+    pub fn reach_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+        self.reach.boxes_m()
     }
 
-    /// Bytes of memory.
+    pub(super) fn reach(&self) -> &Reach {
+        &self.reach
+    }
+
+    /// Bytes of memory, those of its places in an index with them.
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>() + self.image.memory_bytes()
+        size_of::<Self>() + self.image.memory_bytes() + self.reach.memory_bytes()
     }
 }

@@ -23,7 +23,7 @@ mod thinning;
 
 pub use id_ranges::ID_RANGES_PER_SESSION_MAX;
 pub use robot_scans::SESSIONS_PER_ROBOT_MAX;
-pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, WithdrawnChange};
+pub use scan::{MappedScan, OverlapOfNoLevel, ScanRecord, ViewpointRecord, WithdrawnChange};
 pub use thinning::TrajectorySpacing;
 
 use std::collections::{BTreeMap, BTreeSet};

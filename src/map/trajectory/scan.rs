@@ -2,6 +2,7 @@
 
 use crate::geometry::{Point, Pose};
 use crate::map::{RobotName, SessionName};
+use crate::visibility::RangeImage;
 use crate::voxel::{Lattice, MomentSet, VoxelSet};
 
 /// A scan as it enters a map: everything that replaying the insertion needs, nothing that would have to be
@@ -16,6 +17,18 @@ pub struct ScanRecord {
     pub carved: VoxelSet,
     /// What its points add to the moments of their voxels; nothing in a map that keeps none.
     pub moments: MomentSet,
+    /// What it saw through, where it saw something new.
+    pub viewpoint: Option<ViewpointRecord>,
+}
+
+/// The viewpoint that a scan leaves: its pose is the scan's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewpointRecord {
+    /// How far it saw in each direction.
+    pub image: RangeImage,
+    /// The revisions of the scans whose viewpoints go, since there is no more room for them; ascending. They stay gone when the
+    /// scan is undone: what they saw is unknown then, never free.
+    pub displaced: Vec<u64>,
 }
 
 impl ScanRecord {
@@ -25,7 +38,7 @@ impl ScanRecord {
         let quantize = lattice.from_points(&pose.map_from_sensor);
         let (voxels, out_of_range) = VoxelSet::of_points(points, &quantize);
         pose.points_skipped += out_of_range;
-        Self { pose, voxels, carved: VoxelSet::default(), moments: MomentSet::of_points(points, &quantize) }
+        Self { moments: MomentSet::of_points(points, &quantize), ..Self::of_voxels(pose, voxels) }
     }
 
     /// [`ScanRecord::of_points`] for a map that keeps no moments.
@@ -37,7 +50,7 @@ impl ScanRecord {
 
     /// A record of voxels whose points are not known: the refinement of alignments learns nothing from it.
     pub fn of_voxels(pose: MappedScan, voxels: VoxelSet) -> Self {
-        Self { pose, voxels, carved: VoxelSet::default(), moments: MomentSet::default() }
+        Self { pose, voxels, carved: VoxelSet::default(), moments: MomentSet::default(), viewpoint: None }
     }
 }
 

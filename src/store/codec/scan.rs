@@ -78,6 +78,7 @@ impl TryFrom<pb::Insertion> for ScanRecord {
             moments: moments::read(&message.moments.unwrap_or_default(), &voxels, StopSignal::NEVER)?,
             voxels,
             carved,
+            viewpoint: None,
         })
     }
 }

@@ -120,6 +120,7 @@ mod tests {
                 voxels: voxels(5000),
                 carved: other_voxels(),
                 moments: moments(),
+                viewpoint: None,
             }),
             Change::Deletion(DeletionRecord { voxels: voxels(10), request: None }),
             Change::Undo(UndoRecord {

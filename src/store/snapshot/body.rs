@@ -189,6 +189,7 @@ impl<'a> Body<'a> {
             trajectory: self.trajectory(memory)?,
             requests: self.requests()?,
             keep_outs: Arc::new(self.keep_outs()?),
+            viewpoints: Arc::default(),
         };
         let contents = contents.checked().map_err(|e| e.to_string())?;
         Ok(Snapshot { uuid, settings, contents })

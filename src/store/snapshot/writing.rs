@@ -19,7 +19,7 @@ const NUMBERS_PER_LOOK: usize = 128 << 10;
 /// Encodes the body of a snapshot; incomplete once stopped.
 pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
     let Snapshot { uuid, settings, contents } = snapshot;
-    let MapContents { revision, voxels, moments, trajectory, requests, keep_outs } = contents;
+    let MapContents { revision, voxels, moments, trajectory, requests, keep_outs, viewpoints: _ } = contents;
     let mut body = pb::Snapshot {
         uuid: uuid.as_bytes().to_vec().into(),
         resolution_m: settings.resolution_m,
