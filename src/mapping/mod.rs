@@ -12,6 +12,7 @@ mod guess;
 mod recovery;
 mod sightings;
 mod stationary;
+mod viewpoints;
 
 pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
@@ -20,6 +21,7 @@ pub use guess::Guess;
 pub use recovery::{LOST_ROBOTS_MAX, LostRobots, Recovered, RecoverySettings, SearchTask};
 pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
+pub use viewpoints::ViewpointSettings;
 
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
@@ -71,6 +73,8 @@ pub struct MappingSettings {
     pub stationary: Option<StationarySettings>,
     /// When a motion is believed that scans are deskewed with.
     pub deskew: DeskewSettings,
+    /// When a scan leaves a viewpoint.
+    pub viewpoints: ViewpointSettings,
 }
 
 /// A scan to map.
@@ -286,7 +290,7 @@ impl<'a> ScanMapper<'a> {
     }
 
     /// The record of a scan where it was found: every voxel it touches, the moments of its points where the map keeps them,
-    /// and its pose.
+    /// its pose, and its viewpoint where it sees something new.
     ///
     /// # Errors
     /// No point lies within the map's range.
@@ -306,7 +310,7 @@ impl<'a> ScanMapper<'a> {
             digest: scan.digest,
         };
         let points = scan.points_at(located.velocity.as_ref());
-        let record = match self.map.settings().moments {
+        let mut record = match self.map.settings().moments {
             true => ScanRecord::of_points(pose, &points, self.map.lattice()),
             false => ScanRecord::without_moments(pose, &points, self.map.lattice()),
         };
@@ -314,6 +318,9 @@ impl<'a> ScanMapper<'a> {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });
         }
+        let viewpoints = self.map.viewpoints();
+        record.viewpoint =
+            self.settings.viewpoints.viewpoint_of(&points, &alignment.map_from_sensor, &viewpoints);
         Ok(record)
     }
 

@@ -228,8 +228,8 @@ impl std::fmt::Debug for RangeImage {
 }
 
 impl SeenRange {
-    /// The point at `offset` from the sensor, as far as it is seen; none of the robot itself.
-    fn limited(self, offset: [f32; 3]) -> Option<[f32; 3]> {
+    /// The point at `offset` from the sensor, as far as it is seen; none of the robot itself, and of what is not finite.
+    pub fn limited(self, offset: [f32; 3]) -> Option<[f32; 3]> {
         let squared = offset.iter().map(|c| c * c).sum::<f32>();
         if !(squared > 0.0 && squared >= self.min_m * self.min_m && squared.is_finite()) {
             return None;

@@ -5,11 +5,14 @@ use std::sync::Arc;
 
 use super::Viewpoint;
 use super::reach::{ReachIndex, Slot};
+use crate::geometry::{Pose, pose_difference};
 
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.
 #[derive(Clone, Default)]
 pub struct ViewpointSet {
     slots: Vec<Option<Arc<Viewpoint>>>,
+    /// Where each was taken: those near a place are found by a walk through memory.
+    places_m: Vec<[f32; 3]>,
     by_revision: BTreeMap<u64, Slot>,
     unused: Vec<Slot>,
     index: ReachIndex,
@@ -17,18 +20,24 @@ pub struct ViewpointSet {
     stored_bytes: usize,
 }
 
+/// How far an f32 of a place in a map may be off, meters.
+const PLACE_ERROR_M: f64 = 0.01;
+
 impl ViewpointSet {
     /// Keeps the viewpoint of the scan that made `revision`.
     pub fn insert(&mut self, revision: u64, viewpoint: Arc<Viewpoint>) {
         self.remove(revision);
         let slot = self.unused.pop().unwrap_or_else(|| {
             self.slots.push(None);
+            self.places_m.push([0.0; 3]);
             (self.slots.len() - 1) as Slot
         });
         self.index.insert(slot, viewpoint.reach());
         self.by_revision.insert(revision, slot);
         self.bytes += viewpoint.memory_bytes();
         self.stored_bytes += viewpoint.image().stored_bytes();
+        self.places_m[slot as usize] =
+            viewpoint.map_from_sensor().translation.vector.map(|c| c as f32).into();
         self.slots[slot as usize] = Some(viewpoint);
     }
 
@@ -81,6 +90,27 @@ impl ViewpointSet {
     /// Looks at many points that lie near each other, one after the other.
     pub fn gaze(&self) -> Gaze<'_> {
         Gaze { set: self, last: None }
+    }
+
+    /// True where one of the viewpoints but that of `revision` saw beyond `point_m`.
+    pub fn others_see_through(&self, point_m: [f64; 3], revision: u64) -> bool {
+        let own = self.by_revision.get(&revision);
+        let others = self.index.around(point_m).filter(|slot| Some(slot) != own);
+        others.filter_map(|slot| self.at(slot)).any(|viewpoint| viewpoint.sees_through(point_m))
+    }
+
+    /// True where a viewpoint is at most `distance_m` from `map_from_sensor` and turned by at most `rotation_deg` against it.
+    pub fn any_near(&self, map_from_sensor: &Pose, distance_m: f64, rotation_deg: f64) -> bool {
+        let place = map_from_sensor.translation.vector;
+        let near = self.places_m.iter().zip(&self.slots).filter(|(viewpoint_m, _)| {
+            let squared: f64 = (0..3).map(|axis| (f64::from(viewpoint_m[axis]) - place[axis]).powi(2)).sum();
+            // f32 places find out who may be near; what decides is the pose.
+            squared.sqrt() <= distance_m + PLACE_ERROR_M
+        });
+        near.filter_map(|(_, viewpoint)| viewpoint.as_ref()).any(|viewpoint| {
+            let (meters, degrees) = pose_difference(viewpoint.map_from_sensor(), map_from_sensor);
+            meters <= distance_m && degrees <= rotation_deg
+        })
     }
 
     fn observer(&self, point_m: [f64; 3]) -> Option<&Viewpoint> {

@@ -1,0 +1,227 @@
+//! Which scans leave a viewpoint (paper III-B: free space is generated from recorded poses), and which viewpoints make room.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::geometry::{Point, Pose};
+use crate::map::ViewpointRecord;
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange, Viewpoint, ViewpointSet};
+
+/// When a scan sees something new, so that it leaves a viewpoint.
+///
+/// Viewpoints are no nearer to each other than this but for what they see, so that their number grows with the space that robots
+/// were in, not with time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewpointSettings {
+    /// Bytes of memory of all viewpoints of a map; 0 keeps none. 64 MiB: some 5,000.
+    pub bytes_max: usize,
+    /// A pose is new that lies further than this from every viewpoint, meters. 0.5.
+    pub distance_m: f64,
+    /// Or that is turned by more than this against those that are nearer, degrees. 15.
+    pub rotation_deg: f64,
+    /// A scan from a known pose is new if this share of what it sees was unknown. 0.1: a door that was opened, a robot with
+    /// another sensor.
+    pub unknown: f64,
+    /// Between which distances a scan is believed to see. 0 to 60 m.
+    pub range: SeenRange,
+}
+
+impl Default for ViewpointSettings {
+    fn default() -> Self {
+        Self {
+            bytes_max: 64 << 20,
+            distance_m: 0.5,
+            rotation_deg: 15.0,
+            unknown: 0.1,
+            range: SeenRange { min_m: 0.0, max_m: 60.0 },
+        }
+    }
+}
+
+/// Rays that are looked along for what is unknown.
+const RAYS: usize = 300;
+/// Where along each: its middle, and a quarter of it on both sides. At its end a ray grazes what it meets.
+const ALONG: [f64; 3] = [0.25, 0.5, 0.75];
+/// Viewpoints that are compared when one has to go.
+const COMPARED: usize = 24;
+
+impl ViewpointSettings {
+    /// The viewpoint that a scan of `points` (sensor frame) from `map_from_sensor` leaves beside those that are there; none of a scan
+    /// that sees nothing new.
+    pub(super) fn viewpoint_of(
+        &self,
+        points: &[Point],
+        map_from_sensor: &Pose,
+        viewpoints: &ViewpointSet,
+    ) -> Option<ViewpointRecord> {
+        if self.bytes_max == 0 {
+            return None;
+        }
+        let is_known_pose = viewpoints.any_near(map_from_sensor, self.distance_m, self.rotation_deg);
+        // The image takes a while to make: most scans end here.
+        if is_known_pose && self.unknown_to(viewpoints, map_from_sensor, spread(points)) < self.unknown {
+            return None;
+        }
+        let image = RangeImage::of_points(points, self.range, IMAGE_BYTES_MAX)?;
+        let viewpoint = Viewpoint::new(*map_from_sensor, image);
+        let unknown = share_unknown(&samples_of(&viewpoint), |point| viewpoints.sees_through(point));
+        if is_known_pose && unknown < self.unknown {
+            return None;
+        }
+        let displaced = self.displaced_by(&viewpoint, unknown, viewpoints)?;
+        Some(ViewpointRecord { image: viewpoint.image().clone(), displaced })
+    }
+
+    /// The share of what is before `points` that no viewpoint saw.
+    fn unknown_to<'p>(
+        &self,
+        viewpoints: &ViewpointSet,
+        map_from_sensor: &Pose,
+        points: impl Iterator<Item = &'p Point>,
+    ) -> f64 {
+        let seen = points.filter_map(|point| self.range.limited(point.xyz()));
+        let samples: Vec<_> = seen.flat_map(|offset| along(map_from_sensor, offset)).collect();
+        share_unknown(&samples, |point| viewpoints.sees_through(point))
+    }
+
+    /// The revisions of the viewpoints that go so that `viewpoint` has room, ascending: of some that are compared those that add least.
+    /// None where it adds less than they do, `unknown` being the share of what it sees.
+    fn displaced_by(
+        &self,
+        viewpoint: &Viewpoint,
+        unknown: f64,
+        viewpoints: &ViewpointSet,
+    ) -> Option<Vec<u64>> {
+        let over =
+            |freed: usize| viewpoints.memory_bytes() + viewpoint.memory_bytes() > self.bytes_max + freed;
+        if !over(0) {
+            return Some(Vec::new());
+        }
+        let mut left: Vec<_> = viewpoints.iter().map(|(revision, _)| revision).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(left.last().copied().unwrap_or(0));
+        let (mut displaced, mut freed) = (Vec::new(), 0);
+        while over(freed) {
+            let mut compared = Vec::new();
+            while compared.len() < COMPARED && !left.is_empty() {
+                compared.push(left.swap_remove(random.random_range(0..left.len())));
+            }
+            let added = |revision: &u64| {
+                let kept = viewpoints.get(*revision)?;
+                let by_others =
+                    |point| viewpoint.sees_through(point) || viewpoints.others_see_through(point, *revision);
+                Some((share_unknown(&samples_of(kept), by_others), *revision, kept.memory_bytes()))
+            };
+            let (adds, revision, bytes) =
+                compared.iter().filter_map(added).min_by(|a, b| a.0.total_cmp(&b.0))?;
+            if adds > unknown {
+                return None;
+            }
+            left.extend(compared.into_iter().filter(|&other| other != revision));
+            displaced.push(revision);
+            freed += bytes;
+        }
+        displaced.sort_unstable();
+        Some(displaced)
+    }
+}
+
+/// Some of the points, from all over the scan.
+fn spread(points: &[Point]) -> impl Iterator<Item = &Point> {
+    points.iter().step_by(points.len().div_ceil(RAYS).max(1))
+}
+
+/// Places along the ray to `offset` (sensor frame), in the map.
+fn along(map_from_sensor: &Pose, offset: [f32; 3]) -> impl Iterator<Item = [f64; 3]> {
+    ALONG.into_iter().map(move |along| {
+        let offset = nalgebra::Point3::from(offset.map(|c| f64::from(c) * along));
+        (map_from_sensor * offset).into()
+    })
+}
+
+/// Places that a viewpoint saw through, from all over its image.
+fn samples_of(viewpoint: &Viewpoint) -> Vec<[f64; 3]> {
+    let seen: Vec<_> = viewpoint.image().seen().collect();
+    let rays = seen.iter().step_by(seen.len().div_ceil(RAYS).max(1));
+    rays.flat_map(|&offset| along(viewpoint.map_from_sensor(), offset)).collect()
+}
+
+/// The share of places that are not known.
+fn share_unknown(places: &[[f64; 3]], is_known: impl Fn([f64; 3]) -> bool) -> f64 {
+    let unknown = places.iter().filter(|place| !is_known(**place)).count();
+    unknown as f64 / places.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    /// A scan of the walls around a square room of 8 m, from `x_m` along its middle.
+    fn scan(x_m: f32) -> Vec<Point> {
+        let point = |i: usize| {
+            let (azimuth, z) = ((i % 720) as f32 * 0.5f32.to_radians(), (i / 720) as f32 * 0.05 - 1.0);
+            let (sin, cos) = azimuth.sin_cos();
+            let to_wall = |origin: f32, along: f32| {
+                if along > 0.0 { (4.0 - origin) / along } else { (-4.0 - origin) / along }
+            };
+            let r = to_wall(x_m, cos).min(to_wall(0.0, sin));
+            Point::new(r * cos, r * sin, z)
+        };
+        (0..720 * 40).map(point).collect()
+    }
+
+    /// Drives through the room and back; the viewpoints, and how many there were after each scan.
+    fn drive(settings: &ViewpointSettings, rounds: usize) -> (ViewpointSet, Vec<usize>) {
+        let (mut set, mut counts) = (ViewpointSet::default(), Vec::new());
+        let there = (0..60).map(|i| -3.0 + i as f32 * 0.1);
+        let back = there.clone().rev();
+        for (revision, x_m) in (0..rounds).flat_map(|_| there.clone().chain(back.clone())).enumerate() {
+            let pose = Pose::translation(f64::from(x_m), 0.0, 0.0);
+            if let Some(ViewpointRecord { image, displaced }) = settings.viewpoint_of(&scan(x_m), &pose, &set)
+            {
+                displaced.iter().for_each(|&gone| assert!(set.remove(gone).is_some()));
+                set.insert(revision as u64, Arc::new(Viewpoint::new(pose, image)));
+            }
+            counts.push(set.len());
+        }
+        (set, counts)
+    }
+
+    #[test]
+    fn a_robot_leaves_viewpoints_where_it_comes_first_and_none_when_it_comes_again() {
+        let (_, counts) = drive(&ViewpointSettings::default(), 3);
+        assert!((8..=14).contains(&counts[59]), "{counts:?}");
+        assert_eq!(counts[59], counts[359], "the way back and two more rounds left some");
+    }
+
+    #[test]
+    fn no_more_than_has_room_is_kept_and_what_adds_least_goes() {
+        let one = drive(&ViewpointSettings::default(), 1).0;
+        let bytes_max = one.memory_bytes() / 3;
+        let (kept, _) = drive(&ViewpointSettings { bytes_max, ..ViewpointSettings::default() }, 2);
+        assert!(
+            kept.memory_bytes() <= bytes_max && kept.len() >= 2,
+            "{} of {bytes_max}",
+            kept.memory_bytes()
+        );
+        // The room is known as well as by all of them.
+        let place = |i: usize| [(i % 20) as f64 * 0.35 - 3.4, (i / 20) as f64 * 0.35 - 3.4, 0.1];
+        let seen = |set: &ViewpointSet| (0..400).filter(|&i| set.sees_through(place(i))).count();
+        assert!(seen(&kept) * 100 >= seen(&one) * 97, "{} of {}", seen(&kept), seen(&one));
+        assert_eq!(drive(&ViewpointSettings { bytes_max: 0, ..ViewpointSettings::default() }, 1).0.len(), 0);
+    }
+
+    #[test]
+    fn what_a_known_pose_sees_anew_leaves_a_viewpoint() {
+        let settings = ViewpointSettings::default();
+        let near: Vec<_> = scan(0.0).iter().map(|p| Point::from(p.xyz().map(|c| c * 0.4))).collect();
+        let mut set = ViewpointSet::default();
+        let first = settings.viewpoint_of(&near, &Pose::identity(), &set).unwrap();
+        set.insert(1, Arc::new(Viewpoint::new(Pose::identity(), first.image)));
+        assert_eq!(settings.viewpoint_of(&near, &Pose::identity(), &set), None);
+        assert!(
+            settings.viewpoint_of(&scan(0.0), &Pose::identity(), &set).is_some(),
+            "a curtain was drawn aside"
+        );
+    }
+}
