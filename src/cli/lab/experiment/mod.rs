@@ -2,6 +2,7 @@
 
 mod convergence;
 mod deskewing;
+mod free_space;
 mod hostile_guesses;
 mod lookup;
 mod mapping;
@@ -23,6 +24,8 @@ EXAMPLES:
   mrol experiment convergence scans/0000.ply scans/0001.ply --truth poses.txt --resolution 0.1 --out results/
                                                share of alignments that find the pose, against how far off the guess is
   mrol experiment deskewing --out results/     poses of a lidar that moves while it turns
+  mrol experiment free-space hall/ --truth hall/poses.txt --resolution 0.1 --peer-scans scans.bin
+                                               what is known to be free, beside OctoMap
   mrol experiment hostile-guesses hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
 
@@ -40,6 +43,7 @@ pub(in crate::cli) struct Experiment {
 enum Which {
     Convergence(convergence::Convergence),
     Deskewing(deskewing::Deskewing),
+    FreeSpace(free_space::FreeSpace),
     HostileGuesses(hostile_guesses::HostileGuesses),
     Lookup(lookup::Lookup),
     Mapping(mapping::Mapping),
@@ -52,6 +56,7 @@ impl Experiment {
         match self.which {
             Which::Convergence(convergence) => convergence.run(&output),
             Which::Deskewing(deskewing) => deskewing.run(&output),
+            Which::FreeSpace(free_space) => free_space.run(&output),
             Which::HostileGuesses(hostile) => hostile.run(&output),
             Which::Lookup(lookup) => lookup.run(&output),
             Which::Mapping(mapping) => mapping.run(&output),
