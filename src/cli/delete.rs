@@ -21,6 +21,7 @@ EXAMPLES:
   mrol delete --map office --sphere \"1.5 2 0.8 0.4\"
   mrol delete --map office --point 1.0,2.5,0.3 --level 2        a coarse voxel with all it contains
   mrol delete --map office --points gone.ply
+  mrol delete --map office --box \"0 0 0 9 9 3\" --not-seen-since 120   what was taken away since revision 120
 
 A region deletes the voxels whose centers are inside. Voxels that do not exist are no error.";
 
@@ -35,6 +36,9 @@ pub(super) struct Delete {
     /// Level of the voxels; all their descendants are deleted too
     #[arg(long, default_value_t = 0)]
     level: u32,
+    /// Of a region, only what no scan after this revision touched although one saw through it
+    #[arg(long, value_name = "REVISION")]
+    not_seen_since: Option<u64>,
     /// An id of this deletion, which makes it safe to send again
     #[arg(long, value_name = "ID", value_parser = parse::request_id)]
     request_id: Option<RequestId>,
@@ -62,8 +66,9 @@ struct Target {
 
 impl Delete {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, target, level, request_id } = self;
-        let deletion = Deletion { target: target.resolve()?, level, request_id };
+        let Self { map, target, level, request_id, not_seen_since } = self;
+        let target = target.resolve()?.not_seen_since(not_seen_since).map_err(CliError::usage)?;
+        let deletion = Deletion { target, level, request_id };
         let client = map.server.connect().await?;
         let answer = client.delete_voxels(&map.name, deletion).await?;
         output.print(&Deleted::from(answer))

@@ -25,6 +25,7 @@ pub(super) struct DeletionBody {
     #[serde(default)]
     level: u32,
     request_id: Option<String>,
+    not_seen_since: Option<u64>,
 }
 
 #[derive(Deserialize)]
@@ -61,7 +62,9 @@ impl TryFrom<DeletionPoints> for Deletion {
         match body {
             Points::Json(mut json) => {
                 let request_id = request_id_of(json.request_id.take())?;
-                Ok(Self { level: json.level, request_id, target: json.try_into()? })
+                let (level, since) = (json.level, json.not_seen_since);
+                let target = DeletionTarget::try_from(json)?.not_seen_since(since)?;
+                Ok(Self { level, request_id, target })
             }
             Points::Bytes(body, DeletionParams { level, request_id }) => {
                 let points = points_of(body)?;

@@ -6,7 +6,9 @@ use super::commit_queue::{Decided, Refusal, Step, Submission};
 use super::digest::{Digest, FormerDigest};
 use super::hosted_map::HostedMap;
 use super::resource_budget::ResourceBudget;
-use super::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError, check_not_stopped};
+use super::{
+    Deletion, DeletionAnswer, DeletionTarget, NotSeenSince, Reason, ServiceError, check_not_stopped,
+};
 use crate::geometry::Point;
 use crate::map::{
     CallerName, Change, Committed, CompletedRequest, DeletionRecord, MultiResolutionMap, Region, Request,
@@ -22,6 +24,7 @@ impl HostedMap {
         deletion: &Arc<Deletion>,
         caller: Option<&CallerName>,
         budget: &Arc<ResourceBudget>,
+        stop: StopSignal<'_>,
     ) -> Result<Step<DeletionAnswer>, ServiceError> {
         self.check_writable()?;
         let request = deletion.request_id.clone().map(|id| Request {
@@ -35,12 +38,21 @@ impl HostedMap {
             return Ok(Step::Answered(DeletionAnswer { removed: answered.removed, version, replayed: true }));
         }
         budget.check_to_shrink()?;
+        let unseen = match &deletion.target {
+            DeletionTarget::NotSeenSince(target) => {
+                Some(self.find_unseen(target, deletion.level, budget, stop)?)
+            }
+            DeletionTarget::Points(_) | DeletionTarget::Keys(_) | DeletionTarget::Region(_) => None,
+        };
         let (map, deletion, budget) = (Arc::clone(self), Arc::clone(deletion), Arc::clone(budget));
         // Which voxels are meant is decided when nobody else can change the map.
         let decide = move |core: &MultiResolutionMap, stop: StopSignal<'_>| {
             map.still_unanswered(RequestKind::Deletion, request.as_ref(), former)?;
             let lent = budget.reserve_transient(search_bytes(core, &deletion), "a deletion")?;
-            let voxels = map.targets_of(&deletion, stop)?;
+            let voxels = match unseen {
+                Some(unseen) => unseen.decided(&map, core, stop)?,
+                None => map.targets_of(&deletion, stop)?,
+            };
             if voxels.is_empty() {
                 return Ok(None);
             }
@@ -98,7 +110,7 @@ impl HostedMap {
             DeletionTarget::Keys(keys) => {
                 keys.iter().map(|&key| in_range("keys", key, level)).collect::<Result<_, _>>()?
             }
-            DeletionTarget::Region(region) => {
+            DeletionTarget::Region(region) | DeletionTarget::NotSeenSince(NotSeenSince { region, .. }) => {
                 let found = self.map.long_read().view().finest_in_until(region, level, stop);
                 return check_not_stopped(stop).map(|()| found);
             }
@@ -120,7 +132,7 @@ fn search_bytes(map: &MultiResolutionMap, deletion: &Deletion) -> u64 {
     let named = match &deletion.target {
         DeletionTarget::Points(points) => points.len(),
         DeletionTarget::Keys(keys) => keys.len(),
-        DeletionTarget::Region(_) => 0,
+        DeletionTarget::Region(_) | DeletionTarget::NotSeenSince(_) => 0,
     };
     (named * (size_of::<VoxelKey>() + BLOCK_BYTES) + 2 * map.set_bytes()) as u64
 }
@@ -164,6 +176,9 @@ fn digest(deletion: &Deletion) -> u64 {
             digest.bytes(b"keys").bytes(bytemuck::cast_slice(&bits))
         }
         DeletionTarget::Region(region) => digest.region(region),
+        DeletionTarget::NotSeenSince(NotSeenSince { region, revision }) => {
+            digest.bytes(b"not_seen_since").number(*revision).region(region)
+        }
     }
     .finish()
 }
@@ -181,7 +196,9 @@ fn former_digest(deletion: &Deletion) -> u64 {
             digest.numbers(center_m).numbers(&[*radius_m])
         }
         // There were none then: this is no digest of theirs.
-        DeletionTarget::Region(Region::OrientedBox(_)) => return self::digest(deletion),
+        DeletionTarget::Region(Region::OrientedBox(_)) | DeletionTarget::NotSeenSince(_) => {
+            return self::digest(deletion);
+        }
     }
     .finish()
 }

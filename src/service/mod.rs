@@ -43,6 +43,7 @@ mod shortage;
 mod time_limit;
 mod trajectory;
 mod undo;
+mod unseen;
 mod watch;
 mod watermarks;
 
@@ -66,10 +67,11 @@ pub use reason::{Reason, ToldBy};
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
     Deletion, DeletionAnswer, DeletionTarget, Foreground, KeepOutAnswer, KeepOutList, ListingRequest,
-    MapFile, MapInfo, MapList, MapStorage, MapVersion, ObservedVoxel, ObserversAnswer, ObserversRequest,
-    ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanRequest,
-    StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer,
-    UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
+    MapFile, MapInfo, MapList, MapStorage, MapVersion, NotSeenSince, ObservedVoxel, ObserversAnswer,
+    ObserversRequest, ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer,
+    ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo,
+    UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
+    WatchedSince,
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;
@@ -318,13 +320,21 @@ impl MapService {
             match &deletion.target {
                 DeletionTarget::Points(points) => self.limits().check_points(points.len())?,
                 DeletionTarget::Keys(keys) => self.limits().check_keys(keys.len())?,
-                DeletionTarget::Region(_) => {}
+                DeletionTarget::Region(_) | DeletionTarget::NotSeenSince(_) => {}
             }
+            // Who touched what since is read from the journal, as for an undo.
+            let reads_journal = matches!(deletion.target, DeletionTarget::NotSeenSince(_));
+            let pool = if reads_journal { &self.inner.pools.undo } else { &self.inner.pools.mapping };
+            let limit = TimeLimit::new("undo_time_max", self.limits().undo_time_max_s);
             let (inner, deletion, caller) =
                 (Arc::clone(&self.inner), Arc::new(deletion), self.caller.clone());
-            let submit =
-                move |_: StopSignal<'_>| map.submit_deletion(&deletion, caller.as_ref(), &inner.budget);
-            self.submit_and_wait(&self.inner.pools.mapping, None, submit).await
+            let submit = move |stop: StopSignal<'_>| {
+                let submit = |stop: StopSignal<'_>| {
+                    map.submit_deletion(&deletion, caller.as_ref(), &inner.budget, stop)
+                };
+                if reads_journal { limit.run(stop, submit) } else { submit(stop) }
+            };
+            self.submit_and_wait(pool, None, submit).await
         };
         self.observed("DeleteVoxels", Some(map), work, |answer| Outcome::Changed(Change::of_deletion(answer)))
             .await

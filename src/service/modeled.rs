@@ -73,7 +73,10 @@ fn outcome<A>(step: Result<Step<A>, ServiceError>) -> Result<A, ServiceError> {
 fn delete_everything(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>) -> u64 {
     let region = Region::ball([0.0; 3], 100.0).unwrap();
     let deletion = Deletion { target: DeletionTarget::Region(region), level: 0, request_id: None };
-    outcome(map.submit_deletion(&Arc::new(deletion), None, budget)).unwrap().version.revision
+    outcome(map.submit_deletion(&Arc::new(deletion), None, budget, StopSignal::NEVER))
+        .unwrap()
+        .version
+        .revision
 }
 
 fn crowd() {

@@ -77,6 +77,7 @@ reasons! {
         BadGrid "bad_grid" Both: "a grid's rectangle or band is in the wrong order or not finite, or a cell is no whole number of voxels", "correct it";
         BadGuess "bad_guess" Grpc: "`constant_velocity` is false", "leave the guess out";
         BadGravity "bad_gravity" Both: "a scan's `gravity_in_sensor` is zero or not finite", "send the direction in which things fall, in the sensor frame; an accelerometer at rest reads the opposite";
+        BadRevision "bad_revision" Both: "`not_seen_since` is a revision that the map has not reached, or comes without a region", "send a revision that an answer of this map had";
         BadExpiry "bad_expiry" Both: "the `expires_at_ns` of a keep-out lies in the past", "send nanoseconds since 1970, in the future";
         BadInformation "bad_information" Client: "the server's answer has an information matrix that is none", "update the client";
         BadJson "bad_json" Http: "the body is no JSON of this request: place, what is there, what belongs there", "correct it; unknown fields are errors";

@@ -10,7 +10,7 @@ use crate::geometry::{Pose, pose_difference};
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.
 #[derive(Clone, Default)]
 pub struct ViewpointSet {
-    slots: Vec<Option<Arc<Viewpoint>>>,
+    slots: Vec<Option<(u64, Arc<Viewpoint>)>>,
     /// Where each was taken: those near a place are found by a walk through memory.
     places_m: Vec<[f32; 3]>,
     by_revision: BTreeMap<u64, Slot>,
@@ -38,13 +38,13 @@ impl ViewpointSet {
         self.stored_bytes += viewpoint.image().stored_bytes();
         self.places_m[slot as usize] =
             viewpoint.map_from_sensor().translation.vector.map(|c| c as f32).into();
-        self.slots[slot as usize] = Some(viewpoint);
+        self.slots[slot as usize] = Some((revision, viewpoint));
     }
 
     /// Forgets the viewpoint of the scan that made `revision`; returns it, where there was one.
     pub fn remove(&mut self, revision: u64) -> Option<Arc<Viewpoint>> {
         let slot = self.by_revision.remove(&revision)?;
-        let viewpoint = self.slots[slot as usize].take()?;
+        let (_, viewpoint) = self.slots[slot as usize].take()?;
         self.index.remove(slot, viewpoint.reach());
         self.unused.push(slot);
         self.bytes -= viewpoint.memory_bytes();
@@ -99,6 +99,13 @@ impl ViewpointSet {
         others.filter_map(|slot| self.at(slot)).any(|viewpoint| viewpoint.sees_through(point_m))
     }
 
+    /// True where a viewpoint of a scan after `revision` saw beyond `point_m`.
+    pub fn since_saw_through(&self, point_m: [f64; 3], revision: u64) -> bool {
+        let candidates =
+            self.index.around(point_m).filter_map(|slot| self.slots.get(slot as usize)?.as_ref());
+        candidates.filter(|(made, _)| *made > revision).any(|(_, viewpoint)| viewpoint.sees_through(point_m))
+    }
+
     /// True where a viewpoint is at most `distance_m` from `map_from_sensor` and turned by at most `rotation_deg` against it.
     pub fn any_near(&self, map_from_sensor: &Pose, distance_m: f64, rotation_deg: f64) -> bool {
         let place = map_from_sensor.translation.vector;
@@ -107,7 +114,7 @@ impl ViewpointSet {
             // f32 places find out who may be near; what decides is the pose.
             squared.sqrt() <= distance_m + PLACE_ERROR_M
         });
-        near.filter_map(|(_, viewpoint)| viewpoint.as_ref()).any(|viewpoint| {
+        near.filter_map(|(_, viewpoint)| viewpoint.as_ref()).any(|(_, viewpoint)| {
             let (meters, degrees) = pose_difference(viewpoint.map_from_sensor(), map_from_sensor);
             meters <= distance_m && degrees <= rotation_deg
         })
@@ -119,7 +126,7 @@ impl ViewpointSet {
     }
 
     fn at(&self, slot: Slot) -> Option<&Arc<Viewpoint>> {
-        self.slots.get(slot as usize)?.as_ref()
+        Some(&self.slots.get(slot as usize)?.as_ref()?.1)
     }
 }
 

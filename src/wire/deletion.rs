@@ -4,7 +4,7 @@ use super::occupancy::keys_from;
 use super::types::{count_from, request_id_from, text_of};
 use super::{InField, pb, required};
 use crate::map::{MapName, Region};
-use crate::service::{Deletion, DeletionAnswer, DeletionTarget, ServiceError};
+use crate::service::{Deletion, DeletionAnswer, DeletionTarget, NotSeenSince, ServiceError};
 
 impl TryFrom<pb::DeleteVoxelsRequest> for (MapName, Deletion) {
     type Error = ServiceError;
@@ -16,6 +16,7 @@ impl TryFrom<pb::DeleteVoxelsRequest> for (MapName, Deletion) {
             Target::Keys(keys) => DeletionTarget::Keys(keys_from(&keys.keys)?),
             Target::Region(region) => DeletionTarget::Region(Region::try_from(region)?),
         };
+        let target = target.not_seen_since(request.not_seen_since)?;
         let request_id = request_id_from(&request.request_id)?;
         Ok((MapName::new(&request.map)?, Deletion { target, level: request.level, request_id }))
     }
@@ -24,15 +25,21 @@ impl TryFrom<pb::DeleteVoxelsRequest> for (MapName, Deletion) {
 impl From<(&MapName, Deletion)> for pb::DeleteVoxelsRequest {
     fn from((map, deletion): (&MapName, Deletion)) -> Self {
         use pb::delete_voxels_request::Target;
+        let not_seen_since = match &deletion.target {
+            DeletionTarget::NotSeenSince(target) => Some(target.revision),
+            DeletionTarget::Points(_) | DeletionTarget::Keys(_) | DeletionTarget::Region(_) => None,
+        };
         let target = match deletion.target {
             DeletionTarget::Points(points) => Target::Points(points.into()),
             DeletionTarget::Keys(keys) => {
                 Target::Keys(pb::VoxelKeys { keys: keys.iter().map(|key| key.to_bits()).collect() })
             }
-            DeletionTarget::Region(region) => Target::Region(region.into()),
+            DeletionTarget::Region(region) | DeletionTarget::NotSeenSince(NotSeenSince { region, .. }) => {
+                Target::Region(region.into())
+            }
         };
         let request_id = text_of(deletion.request_id);
-        Self { map: map.to_string(), target: Some(target), level: deletion.level, request_id }
+        Self { map: map.to_string(), target: Some(target), level: deletion.level, request_id, not_seen_since }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::point_cloud::PointCloud;
 use super::version::MapVersion;
 use crate::map::{Region, RequestId};
+use crate::service::{Reason, ServiceError};
 use crate::voxel::VoxelKey;
 
 /// Which voxels to take out.
@@ -25,6 +26,39 @@ pub enum DeletionTarget {
     Keys(Vec<VoxelKey>),
     /// The voxels whose centers lie inside.
     Region(Region),
+    /// Those of a region that were not seen any more.
+    NotSeenSince(NotSeenSince),
+}
+
+/// The voxels of a region that no scan touched after a revision, although a viewpoint after it saw through them: what was taken
+/// away.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NotSeenSince {
+    /// The voxels whose centers lie inside.
+    pub region: Region,
+    /// Within the undo window.
+    pub revision: u64,
+}
+
+impl DeletionTarget {
+    /// This target, or of its region only what was not seen since a revision, where one is given.
+    ///
+    /// # Errors
+    /// For a revision without a region.
+    pub fn not_seen_since(self, revision: Option<u64>) -> Result<Self, ServiceError> {
+        match (self, revision) {
+            (target, None) => Ok(target),
+            (Self::Region(region), Some(revision)) => {
+                Ok(Self::NotSeenSince(NotSeenSince { region, revision }))
+            }
+            (_, Some(revision)) => {
+                let message = format!(
+                    "not_seen_since is {revision}, and needs a region: a box, an oriented box or a sphere"
+                );
+                Err(ServiceError::new(Reason::BadRevision, message))
+            }
+        }
+    }
 }
 
 /// What a deletion did.

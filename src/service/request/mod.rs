@@ -15,7 +15,7 @@ mod version;
 mod watch;
 
 pub use block::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
-pub use deletion::{Deletion, DeletionAnswer, DeletionTarget};
+pub use deletion::{Deletion, DeletionAnswer, DeletionTarget, NotSeenSince};
 pub use keep_out::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};
 pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
 pub use observers::{ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan};

@@ -121,6 +121,15 @@ async fn batches_are_neither_empty_nor_beyond_the_limit() {
     assert_invalid(&robot.delete_voxels(keys(vec![0, 1 << 63])).await.unwrap_err(), &["keys[1]", "bit 63"]);
     let neither = pb::DeleteVoxelsRequest { target: None, ..keys(vec![]) };
     assert_invalid(&robot.delete_voxels(neither).await.unwrap_err(), &["target is missing"]);
+    let without_region = pb::DeleteVoxelsRequest { not_seen_since: Some(0), ..keys(vec![0]) };
+    let refusal = robot.delete_voxels(without_region).await.unwrap_err();
+    assert_invalid(&refusal, &["not_seen_since is 0", "needs a region"]);
+    let not_reached = json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}, "not_seen_since": 99});
+    let answer = daemon.post("/v1/maps/a/deletions", not_reached).await;
+    assert_refused(refused(answer).await, &["not_seen_since", "got 99"]);
+    let of_points = json!({"points": row(1), "not_seen_since": 1});
+    let answer = daemon.post("/v1/maps/a/deletions", of_points).await;
+    assert_refused(refused(answer).await, &["not_seen_since is 1", "needs a region"]);
     for body in [json!({}), json!({"points": row(1), "voxels": [[0, 0, 0]]})] {
         let answer = daemon.post("/v1/maps/a/deletions", body).await;
         assert_refused(
