@@ -9,8 +9,8 @@ use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange, Viewpoint, Viewp
 
 /// When a scan sees something new, so that it leaves a viewpoint.
 ///
-/// Viewpoints are no nearer to each other than this but for what they see, so that their number grows with the space that robots
-/// were in, not with time.
+/// Viewpoints are no nearer to each other than this but for what they see, whichever robot left them, so that their number grows with
+/// the space that robots saw, not with time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewpointSettings {
     /// Bytes of memory of all viewpoints of a map; 0 keeps none. 64 MiB: some 5,000.
@@ -19,9 +19,12 @@ pub struct ViewpointSettings {
     pub distance_m: f64,
     /// Or that is turned by more than this against those that are nearer, degrees. 15.
     pub rotation_deg: f64,
+    /// A scan from a new pose is new if this share of what it sees was unknown. 0.005: who passes between two viewpoints that saw
+    /// all of it already leaves none.
+    pub unknown_from_new_pose: f64,
     /// A scan from a known pose is new if this share of what it sees was unknown. 0.1: a door that was opened, a robot with
     /// another sensor.
-    pub unknown: f64,
+    pub unknown_from_known_pose: f64,
     /// Between which distances a scan is believed to see. 0 to 60 m.
     pub range: SeenRange,
 }
@@ -32,7 +35,8 @@ impl Default for ViewpointSettings {
             bytes_max: 64 << 20,
             distance_m: 0.5,
             rotation_deg: 15.0,
-            unknown: 0.1,
+            unknown_from_new_pose: 0.005,
+            unknown_from_known_pose: 0.1,
             range: SeenRange { min_m: 0.0, max_m: 60.0 },
         }
     }
@@ -58,14 +62,15 @@ impl ViewpointSettings {
             return None;
         }
         let is_known_pose = viewpoints.any_near(map_from_sensor, self.distance_m, self.rotation_deg);
+        let least = if is_known_pose { self.unknown_from_known_pose } else { self.unknown_from_new_pose };
         // The image takes a while to make: most scans end here.
-        if is_known_pose && self.unknown_to(viewpoints, map_from_sensor, spread(points)) < self.unknown {
+        if self.unknown_to(viewpoints, map_from_sensor, spread(points)) < least {
             return None;
         }
         let image = RangeImage::of_points(points, self.range, IMAGE_BYTES_MAX)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
         let unknown = share_unknown(&samples_of(&viewpoint), |point| viewpoints.sees_through(point));
-        if is_known_pose && unknown < self.unknown {
+        if unknown < least {
             return None;
         }
         let displaced = self.displaced_by(&viewpoint, unknown, viewpoints)?;

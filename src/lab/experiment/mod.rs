@@ -6,4 +6,5 @@ pub mod drift;
 pub mod free_space;
 pub mod hostile_guesses;
 pub mod mapping;
+pub mod rounds;
 pub mod stages;

@@ -13,4 +13,4 @@ pub use scene::Scene;
 #[cfg(feature = "lab")]
 pub(crate) use sensor::gaussian;
 pub use sensor::{DepthCamera, Sensor, SpinningLidar};
-pub use tour::{Tour, tours};
+pub use tour::{LIDAR_LAP_M, Tour, lidar_at, tours};

@@ -65,7 +65,7 @@ impl Ride {
         meters <= self.step_max_m && degrees <= self.turn_max_deg
     }
 
-    fn map_from_sensor(&self, way_m: f64) -> Pose {
+    pub(super) fn map_from_sensor(&self, way_m: f64) -> Pose {
         let swing = |amplitude: f64, every_m: f64| amplitude * (way_m / every_m * TAU).sin();
         let [x, y] = self.route.position(way_m);
         let z = self.height_m + swing(HEAVE_M, HEAVE_WAY_M);

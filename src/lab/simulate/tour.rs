@@ -31,6 +31,14 @@ pub fn tours(steps: usize) -> [Tour; 2] {
     ]
 }
 
+/// Length of a lap of robot `lidar`, meters.
+pub const LIDAR_LAP_M: f64 = 44.0;
+
+/// Where the sensor of robot `lidar` stands after `way_m` meters, lap after lap, map_from_sensor.
+pub fn lidar_at(way_m: f64) -> Pose {
+    LIDAR_RIDE.map_from_sensor(way_m)
+}
+
 const LIDAR_RIDE: Ride = Ride {
     route: LIDAR_ROUTE,
     height_m: 0.9,
@@ -83,6 +91,12 @@ mod tests {
             let mean = steps.iter().map(|(meters, _)| meters).sum::<f64>() / steps.len() as f64;
             assert!(mean > mean_m, "{mean} m a step");
         }
+    }
+
+    #[test]
+    fn a_lap_ends_where_it_began() {
+        assert!((LIDAR_RIDE.route.length_m() - LIDAR_LAP_M).abs() < 0.5, "{}", LIDAR_RIDE.route.length_m());
+        assert!((place(&lidar_at(LIDAR_LAP_M)) - place(&lidar_at(0.0))).norm() < 0.6);
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod free_space;
 mod hostile_guesses;
 mod lookup;
 mod mapping;
+mod rounds;
 mod scaling;
 mod simulation;
 
@@ -26,6 +27,7 @@ EXAMPLES:
   mrol experiment deskewing --out results/     poses of a lidar that moves while it turns
   mrol experiment free-space hall/ --truth hall/poses.txt --resolution 0.1 --peer-scans scans.bin
                                                what is known to be free, beside OctoMap
+  mrol experiment rounds                       what a map keeps of a robot that drives the same way for an hour
   mrol experiment hostile-guesses hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
 
@@ -47,6 +49,7 @@ enum Which {
     HostileGuesses(hostile_guesses::HostileGuesses),
     Lookup(lookup::Lookup),
     Mapping(mapping::Mapping),
+    Rounds(rounds::Rounds),
     Scaling(scaling::Scaling),
     Simulation(simulation::Simulation),
 }
@@ -60,6 +63,7 @@ impl Experiment {
             Which::HostileGuesses(hostile) => hostile.run(&output),
             Which::Lookup(lookup) => lookup.run(&output),
             Which::Mapping(mapping) => mapping.run(&output),
+            Which::Rounds(rounds) => rounds.run(&output),
             Which::Scaling(scaling) => scaling.run(&output),
             Which::Simulation(simulation) => simulation.run(&output),
         }
