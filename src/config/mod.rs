@@ -165,6 +165,9 @@ impl Config {
             if let Err(error) = robot.filter().checked() {
                 return Err(ConfigError::Robot { name: name.clone(), error });
             }
+            if let Err(error) = robot.carving().checked() {
+                return Err(ConfigError::RobotCarving { name: name.clone(), error });
+            }
         }
         Ok(self)
     }

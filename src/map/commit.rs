@@ -100,8 +100,12 @@ impl<'a> Committer<'a> {
         let committed = &made.0;
         let _locks = self.carry_out(update, self.adding(&scan.moments), stop)?;
         let mut trajectory = self.map.trajectory.write();
-        let pose =
-            MappedScan { revision: committed.revision, new_voxels: committed.added, ..scan.pose.clone() };
+        let pose = MappedScan {
+            revision: committed.revision,
+            new_voxels: committed.added,
+            carved_voxels: committed.removed,
+            ..scan.pose.clone()
+        };
         trajectory.push(pose);
         Some(self.publish(made))
     }

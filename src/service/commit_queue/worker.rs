@@ -10,12 +10,14 @@ use super::{
     outcome_unknown, record_of, revisions_used_up,
 };
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
+use crate::mapping::Carving;
 use crate::service::ServiceError;
 use crate::service::recent_changes::WatchedChange;
 use crate::service::resource_budget::Reservation;
 use crate::store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, RecvTimeoutError};
 use crate::util::{SharedDurations, StopSignal};
+use crate::voxel::VoxelSet;
 
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
@@ -91,13 +93,18 @@ impl Worker {
         for Waiting { submission, answer } in waiting {
             match submission {
                 Submission::Prepared(prepared) => {
-                    let Prepared { change, record, if_empty, turn, reservation } = *prepared;
+                    let Prepared { mut change, mut record, if_empty, carved_at, turn, reservation } =
+                        *prepared;
                     if if_empty {
                         self.commit_group(&mut group);
                         if !self.map.is_empty() {
                             drop(answer.send(Err(Refusal::Stale)));
                             continue;
                         }
+                    }
+                    if let Err(error) = self.cut_carving(&mut change, &mut record, carved_at, &group) {
+                        drop(answer.send(Err(Refusal::Failed(error))));
+                        continue;
                     }
                     let (_turn, _memory) = (Some(turn), vec![reservation]);
                     group.push(Pending { change, record, answer, _turn, _memory, _pin: None });
@@ -110,6 +117,41 @@ impl Worker {
             }
         }
         self.commit_group(&mut group);
+    }
+
+    /// Cuts what a scan carves to what is there when its turn comes, and what no change since `carved_at` touched: another
+    /// scan that saw something there meanwhile is not contradicted. Of changes that are no longer kept nobody knows what they
+    /// touched: then the scan carves nothing.
+    fn cut_carving(
+        &self,
+        change: &mut Change,
+        record: &mut Option<Record>,
+        carved_at: u64,
+        group: &[Pending],
+    ) -> Result<(), ServiceError> {
+        let Change::Insertion(scan) = &mut *change else { return Ok(()) };
+        if scan.carved.is_empty() {
+            return Ok(());
+        }
+        let mut carving = Carving { voxels: std::mem::take(&mut scan.carved), revision: carved_at };
+        let carved = carving.voxels.clone();
+        for revision in carved_at + 1..=self.map.revision() {
+            match self.told.recent.get(revision) {
+                Some(change) => change.touched().into_iter().for_each(|touched| carving.cut(touched)),
+                None => carving.voxels = VoxelSet::default(),
+            }
+            if carving.voxels.is_empty() {
+                break;
+            }
+        }
+        let before_it = group.iter().flat_map(|pending| pending.change.touched());
+        before_it.for_each(|touched| carving.cut(touched));
+        let is_cut = carving.voxels != carved;
+        scan.carved = carving.voxels;
+        if is_cut && record.is_some() {
+            *record = Some(record_of(change)?);
+        }
+        Ok(())
     }
 
     fn decide(&self, decide: Decision, answer: oneshot::Sender<Outcome>, group: &mut Vec<Pending>) {

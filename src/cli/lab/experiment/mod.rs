@@ -1,5 +1,6 @@
 //! `mrol experiment`: repeats the paper's experiments, with plots and tables as results.
 
+mod carving;
 mod convergence;
 mod deskewing;
 mod hostile_guesses;
@@ -23,6 +24,7 @@ EXAMPLES:
   mrol experiment convergence scans/0000.ply scans/0001.ply --truth poses.txt --resolution 0.1 --out results/
                                                share of alignments that find the pose, against how far off the guess is
   mrol experiment deskewing --out results/     poses of a lidar that moves while it turns
+  mrol experiment carving                      what a map loses of what is taken away, and keeps of what stands
   mrol experiment hostile-guesses hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
 
@@ -38,6 +40,7 @@ pub(in crate::cli) struct Experiment {
 
 #[derive(Debug, Subcommand)]
 enum Which {
+    Carving(carving::Carving),
     Convergence(convergence::Convergence),
     Deskewing(deskewing::Deskewing),
     HostileGuesses(hostile_guesses::HostileGuesses),
@@ -50,6 +53,7 @@ enum Which {
 impl Experiment {
     pub(super) fn run(self, output: Output) -> Result<(), CliError> {
         match self.which {
+            Which::Carving(carving) => carving.run(&output),
             Which::Convergence(convergence) => convergence.run(&output),
             Which::Deskewing(deskewing) => deskewing.run(&output),
             Which::HostileGuesses(hostile) => hostile.run(&output),
