@@ -231,3 +231,6 @@ impl Sight<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

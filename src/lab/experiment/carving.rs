@@ -253,20 +253,20 @@ mod tests {
 
     #[test]
     fn what_goes_is_lost_and_what_stands_is_kept() {
-        let lidar = SpinningLidar { rings: 64, azimuths: 600, ..SpinningLidar::default() };
+        let lidar = SpinningLidar { rings: 48, azimuths: 400, ..SpinningLidar::default() };
         let trial = CarvingTrial {
             scans: 14,
             scans_a_round: 35,
-            resolution_m: 0.05,
+            resolution_m: 0.1,
             lidar,
             carving: CarvingSettings::default(),
             at_true_poses: true,
             seed: 1,
         };
         let CarvingFigures { box_voxels, trail_voxels, still_voxels, .. } = trial.run(|| ()).unwrap();
-        println!("{box_voxels:?} {trail_voxels:?} {still_voxels:?}");
-        assert!(box_voxels.0 > 100 && box_voxels.1 * 20 <= box_voxels.0, "{box_voxels:?}");
-        assert!(trail_voxels.0 > 100 && trail_voxels.1 * 10 <= trail_voxels.0, "{trail_voxels:?}");
+        // Of 10 cm voxels the lowest layer, which the margin keeps, is one in fifteen.
+        assert!(box_voxels.0 > 100 && box_voxels.1 * 10 <= box_voxels.0, "{box_voxels:?}");
+        assert!(trail_voxels.0 > 100 && trail_voxels.1 * 5 <= trail_voxels.0, "{trail_voxels:?}");
         assert!(still_voxels.1 as f64 >= 0.999 * still_voxels.0 as f64, "{still_voxels:?}");
     }
 }

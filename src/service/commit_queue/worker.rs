@@ -293,3 +293,74 @@ impl Drop for Worker {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::map::{DeletionRecord, MapSettings, MappedScan, RobotName, ScanRecord};
+    use crate::service::recent_changes::RecentChanges;
+    use crate::voxel::VoxelKey;
+
+    fn voxels(x: std::ops::Range<i32>) -> VoxelSet {
+        x.filter_map(|x| VoxelKey::new([x, 0, 0])).collect()
+    }
+
+    fn scan(seen: VoxelSet, carved: VoxelSet) -> Change {
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
+        Change::Insertion(ScanRecord { carved, ..ScanRecord::of_voxels(pose, seen) })
+    }
+
+    fn deletion(voxels: VoxelSet) -> Change {
+        Change::Deletion(DeletionRecord { voxels, request: None })
+    }
+
+    /// A worker of a map to which these changes were made, and which remembers so many bytes of them.
+    fn worker(changes: &[Change], recent_bytes: usize) -> Worker {
+        let map = Arc::new(MultiResolutionMap::new(MapSettings::new(0.1, 2)).unwrap());
+        let recent = Arc::new(RecentChanges::new(0, recent_bytes));
+        for change in changes {
+            let committed = map.committer().apply(change);
+            recent.push(WatchedChange::of(committed.revision, None, change.clone(), Vec::new()));
+        }
+        let told = Told { announced: tokio::sync::watch::Sender::new(0), recent };
+        let settings = StoreSettings::default();
+        Worker::new(MapName::new("a").unwrap(), map, None, told, Arc::default(), Arc::default(), &settings)
+    }
+
+    /// What a scan carves that saw voxels 0 to 99 gone at revision 1, when its turn comes.
+    fn cut(worker: &Worker, group: &[Change]) -> VoxelSet {
+        let pending = |change: &Change| Pending {
+            change: change.clone(),
+            record: None,
+            answer: oneshot::channel().0,
+            _turn: None,
+            _memory: Vec::new(),
+            _pin: None,
+        };
+        let group: Vec<Pending> = group.iter().map(pending).collect();
+        let mut change = scan(voxels(200..210), voxels(0..100));
+        worker.cut_carving(&mut change, &mut None, 1, &group).unwrap();
+        let Change::Insertion(scan) = change else { panic!("a scan is a scan") };
+        scan.carved
+    }
+
+    #[test]
+    fn what_went_or_was_seen_since_is_not_carved() {
+        let first = scan(voxels(0..100), VoxelSet::default());
+        let (gone, seen) = (deletion(voxels(0..10)), scan(voxels(90..120), voxels(80..90)));
+        let nothing = [];
+        assert_eq!(cut(&worker(&[first.clone()], 1 << 20), &nothing), voxels(0..100));
+        let all = [first.clone(), gone.clone(), seen.clone()];
+        assert_eq!(cut(&worker(&all, 1 << 20), &nothing), voxels(10..80));
+        assert_eq!(cut(&worker(&[first.clone(), gone], 1 << 20), &[seen.clone()]), voxels(10..80));
+        assert_eq!(cut(&worker(&[first], 1 << 20), &[seen]), voxels(0..80));
+    }
+
+    #[test]
+    fn where_nobody_knows_what_came_between_nothing_is_carved() {
+        let first = scan(voxels(0..100), VoxelSet::default());
+        assert_eq!(cut(&worker(&[first.clone()], 0), &[]), voxels(0..100));
+        assert!(cut(&worker(&[first, deletion(voxels(50..51))], 0), &[]).is_empty());
+    }
+}
