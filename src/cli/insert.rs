@@ -63,6 +63,9 @@ pub(super) struct Insert {
     /// Look for the robot where a scan is refused, whatever the server is set to [default: as the server is set]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     recover: Option<bool>,
+    /// Take out of the map what the scans saw through, whatever the server is set to [default: as the server is set]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
+    carve: Option<bool>,
     /// Guess of every scan but the first: the last accepted pose, or one as far on as that is from the pose before
     #[arg(long, value_enum, value_name = "GUESS", default_value_t)]
     next_guess: GuessName,
@@ -115,6 +118,7 @@ impl Insert {
             filter: self.points.filter().map_err(CliError::usage)?,
             force: self.force,
             recover: self.recover,
+            carve: self.carve,
         };
         let reader = tokio::task::spawn_blocking({
             let files = files.clone();
@@ -224,6 +228,7 @@ struct Plan {
     filter: PointFilter,
     force: bool,
     recover: Option<bool>,
+    carve: Option<bool>,
 }
 
 impl Plan {
@@ -238,6 +243,7 @@ impl Plan {
                 at_guess,
                 force: self.force,
                 recover: self.recover,
+                carve: self.carve,
                 method: self.method,
                 filter: self.filter,
                 ..ScanRequest::new(self.robot.clone(), read_points(file)?.into())
@@ -307,7 +313,10 @@ impl Display for ScanLine {
             JsonScan { replayed: true, .. } => write!(f, "  (was there already)"),
             JsonScan { stationary: true, .. } => write!(f, "  (nothing new from where it stands)"),
             JsonScan { recovered: Some(how), .. } => write!(f, "  recovered: {how}"),
-            JsonScan { verdict: "accepted", .. } => Ok(()),
+            JsonScan { verdict: "accepted", carved_voxels: 0, .. } => Ok(()),
+            JsonScan { verdict: "accepted", carved_voxels, .. } => {
+                write!(f, "  {} carved", count(*carved_voxels))
+            }
             JsonScan { reason, .. } => write!(f, "  {reason}"),
         }
     }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::mapping::CarvingSettingsError;
 use crate::scan::PointFilterError;
 
 /// Why the settings are not valid.
@@ -64,5 +65,13 @@ pub enum ConfigError {
         name: String,
         /// What is wrong with the filter.
         error: PointFilterError,
+    },
+    /// What the scans of a robot are to carve is not valid.
+    #[error("robots.{name}: {error}")]
+    RobotCarving {
+        /// The name of the robot's table.
+        name: String,
+        /// What is wrong with it.
+        error: CarvingSettingsError,
     },
 }

@@ -165,6 +165,9 @@ impl Config {
             if let Err(error) = robot.filter().checked() {
                 return Err(ConfigError::Robot { name: name.clone(), error });
             }
+            if let Err(error) = robot.carving().checked() {
+                return Err(ConfigError::RobotCarving { name: name.clone(), error });
+            }
         }
         Ok(self)
     }
@@ -284,6 +287,8 @@ mod tests {
         assert!(error("[tls]\nkey = \"a\"").contains("tls.certificate is missing"));
         assert!(error("[tls]\ncertificate = \"a\"").contains("tls.key is missing"));
         assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
+        let margin = error("[robots.r]\ncarve = true\ncarve_margin_voxels = 9");
+        assert!(margin.contains("robots.r: carve_margin_voxels must be at most 8, got 9"), "{margin}");
         let threads = error("[threads]\nmapping = 1025");
         assert!(threads.contains("threads.mapping must be 0 to 1024, got 1025"), "{threads}");
         assert!(

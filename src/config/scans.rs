@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::align::Method;
+use crate::mapping::CarvingSettings;
 use crate::scan::PointFilter;
 use crate::service::RobotSettings;
 use crate::wire::json::ByKeyword;
@@ -16,7 +17,7 @@ pub struct AlignmentConfig {
 }
 
 /// Settings of a robot's scans; a request may override each value.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotConfig {
     /// Least range: points nearer to the sensor than this are skipped, meters.
@@ -28,11 +29,49 @@ pub struct RobotConfig {
     pub body_m: Option<[[f64; 3]; 2]>,
     /// Look for the robot where its scans are refused. false.
     pub recover: bool,
+    /// Take out of the map what the robot's scans saw through. false.
+    pub carve: bool,
+    /// Voxels around the surface that a scan shows that it never takes out. 1.
+    pub carve_margin_voxels: u32,
+    /// A surface that is seen at a smaller angle than this is not told from a rim, and nothing beside rims is taken out,
+    /// degrees. 8.
+    pub carve_grazing_deg: f64,
+    /// Voxels farther from the sensor than this are not taken out, meters. 20.
+    pub carve_range_max_m: f64,
+}
+
+impl Default for RobotConfig {
+    fn default() -> Self {
+        let CarvingSettings { margin_voxels, grazing_deg, range_max_m } = CarvingSettings::default();
+        Self {
+            range_min_m: None,
+            range_max_m: None,
+            body_m: None,
+            recover: false,
+            carve: false,
+            carve_margin_voxels: margin_voxels,
+            carve_grazing_deg: grazing_deg,
+            carve_range_max_m: range_max_m,
+        }
+    }
 }
 
 impl RobotConfig {
     pub(super) fn settings(&self) -> RobotSettings {
-        RobotSettings { filter: self.filter(), recover: self.recover }
+        RobotSettings {
+            filter: self.filter(),
+            recover: self.recover,
+            carve: self.carve,
+            carving: self.carving(),
+        }
+    }
+
+    pub(super) fn carving(&self) -> CarvingSettings {
+        CarvingSettings {
+            margin_voxels: self.carve_margin_voxels,
+            grazing_deg: self.carve_grazing_deg,
+            range_max_m: self.carve_range_max_m,
+        }
     }
 
     pub(super) fn filter(&self) -> PointFilter {

@@ -43,6 +43,7 @@ pub(super) struct ScanBody {
     #[serde(default)]
     force: bool,
     recover: Option<bool>,
+    carve: Option<bool>,
     method: Option<ByKeyword<Method>>,
     foreground_level: Option<u32>,
     range_min_m: Option<f64>,
@@ -76,6 +77,7 @@ pub(super) struct ScanParams {
     #[serde(default)]
     force: bool,
     recover: Option<bool>,
+    carve: Option<bool>,
     method: Option<ByKeyword<Method>>,
     foreground_level: Option<u32>,
     range_min_m: Option<f64>,
@@ -135,6 +137,7 @@ impl TryFrom<ScanBody> for ScanRequest {
             at_guess: !scan.align,
             force: scan.force,
             recover: scan.recover,
+            carve: scan.carve,
             method: scan.method.map(|method| method.0),
             foreground_level: scan.foreground_level,
             filter: PointFilter {
@@ -174,6 +177,7 @@ impl ScanParams {
             at_guess: !self.align,
             force: self.force,
             recover: self.recover,
+            carve: self.carve,
             method: self.method.map(|method| method.0),
             foreground_level: self.foreground_level,
             filter: PointFilter {

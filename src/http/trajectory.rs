@@ -55,6 +55,7 @@ struct PoseResponse {
     revision: u64,
     overlap: f64,
     new_voxels: usize,
+    carved_voxels: usize,
 }
 
 pub(super) async fn get(
@@ -131,6 +132,7 @@ impl From<&MappedScan> for PoseResponse {
             revision: pose.revision,
             overlap: pose.overlap(),
             new_voxels: pose.new_voxels,
+            carved_voxels: pose.carved_voxels,
         }
     }
 }

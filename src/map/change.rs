@@ -68,6 +68,16 @@ pub struct Request {
 }
 
 impl Change {
+    /// The sets of finest voxels that it touches: those that it takes out, brings, or shows again.
+    pub fn touched(&self) -> Vec<&VoxelSet> {
+        match self {
+            Self::Insertion(scan) => vec![&scan.voxels, &scan.carved],
+            Self::Deletion(deletion) => vec![&deletion.voxels],
+            Self::Undo(undo) => vec![&undo.removed, &undo.restored],
+            Self::KeepOut(_) => Vec::new(),
+        }
+    }
+
     /// Under which id it was asked for, where that is not a scan's.
     pub fn request(&self) -> Option<&Request> {
         match self {

@@ -105,8 +105,12 @@ impl<'a> Committer<'a> {
         let _locks = self.carry_out(update, self.adding(&scan.moments), stop)?;
         let mut viewpoints = self.map.viewpoints.write();
         let mut trajectory = self.map.trajectory.write();
-        let pose =
-            MappedScan { revision: committed.revision, new_voxels: committed.added, ..scan.pose.clone() };
+        let pose = MappedScan {
+            revision: committed.revision,
+            new_voxels: committed.added,
+            carved_voxels: committed.removed,
+            ..scan.pose.clone()
+        };
         trajectory.push(pose);
         if let Some((viewpoint, ViewpointRecord { displaced, .. })) = viewpoint.zip(scan.viewpoint.as_ref()) {
             let viewpoints = Arc::make_mut(&mut viewpoints);

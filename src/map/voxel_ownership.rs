@@ -81,7 +81,7 @@ impl VoxelOwnership {
         const OF_BLOCK: usize = 4 * size_of::<(VoxelKey, Sides)>();
         const OF_MOMENTS: usize = 4 * size_of::<(VoxelKey, Moments)>();
         let coarse = |(_, mask): &(VoxelKey, BlockMask)| mask.count(MOMENT_LEVEL);
-        let touched = touched_by(target).into_iter();
+        let touched = target.touched().into_iter();
         let bytes_of = |voxels: &VoxelSet| {
             let with_moments = voxels.blocks().iter().filter(|_| self.keeps_moments);
             let moments: usize = with_moments.map(coarse).sum();
@@ -101,7 +101,7 @@ impl VoxelOwnership {
     /// Takes note of what a target touches.
     pub fn touch(&mut self, target: &Change) {
         let nothing = Sides { with: BlockMask::EMPTY, without: BlockMask::EMPTY };
-        for (block, mask) in touched_by(target).into_iter().flat_map(VoxelSet::blocks) {
+        for (block, mask) in target.touched().into_iter().flat_map(VoxelSet::blocks) {
             self.blocks.entry(*block).or_insert(nothing);
             for cell in mask.cells(MOMENT_LEVEL).filter(|_| self.keeps_moments) {
                 self.moments.entry(cell.voxel(*block).ancestor(MOMENT_LEVEL)).or_default();
@@ -210,16 +210,6 @@ impl VoxelOwnership {
     /// The changes that are to be undone, by revision, ascending.
     pub fn targets(&self) -> &[u64] {
         &self.targets
-    }
-}
-
-/// The sets of finest voxels that a change touches.
-fn touched_by(change: &Change) -> Vec<&VoxelSet> {
-    match change {
-        Change::Insertion(scan) => vec![&scan.voxels, &scan.carved],
-        Change::Deletion(deletion) => vec![&deletion.voxels],
-        Change::Undo(undo) => vec![&undo.removed, &undo.restored],
-        Change::KeepOut(_) => Vec::new(),
     }
 }
 

@@ -5,6 +5,7 @@
 //! make the record durable before it is visible, calls [`ScanMapper::locate`], [`ScanMapper::record`] and
 //! [`ScanMapper::note_stationary`] by themselves and inserts through its commit queue.
 
+mod carving;
 mod deskew;
 mod error;
 mod filtered_points;
@@ -14,6 +15,10 @@ mod sightings;
 mod stationary;
 mod viewpoints;
 
+pub use carving::{
+    CARVING_GRAZING_MAX_DEG, CARVING_GRAZING_MIN_DEG, CARVING_MARGIN_MAX, CARVING_RANGE_MAX_M, Carving,
+    CarvingSettings, CarvingSettingsError,
+};
 pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
@@ -33,6 +38,7 @@ use crate::align::{
 use crate::geometry::{Point, Pose, Twist};
 use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecord, SessionName};
 use crate::util::StopSignal;
+use carving::CarvingScan;
 use recovery::Recovery;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
@@ -75,6 +81,8 @@ pub struct MappingSettings {
     pub deskew: DeskewSettings,
     /// When a scan leaves a viewpoint.
     pub viewpoints: ViewpointSettings,
+    /// What a scan that fits carves out of the map; none: it only adds.
+    pub carving: Option<CarvingSettings>,
 }
 
 /// A scan to map.
@@ -116,6 +124,14 @@ impl<'a> Scan<'a> {
             Some((times_s, velocity)) => deskewed(self.points, times_s, velocity).into(),
             None => self.points.into(),
         }
+    }
+
+    /// How far the sensor moved with `velocity` between the scan's timestamp and the point that is farthest from it in time,
+    /// meters.
+    fn moved_m(&self, velocity: Option<&Twist>) -> f64 {
+        let times_s = self.times_s.unwrap_or_default();
+        let longest_s = times_s.iter().fold(0.0, |longest: f32, time_s| longest.max(time_s.abs()));
+        velocity.map_or(0.0, |velocity| velocity.linear.norm() * f64::from(longest_s))
     }
 
     /// What is known of its pose, where it is thought to have been taken at `guess` (map_from_sensor).
@@ -212,9 +228,15 @@ impl<'a> ScanMapper<'a> {
             return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
         }
         let start = Instant::now();
-        let record = self.record(scan, &located)?;
+        let mut record = self.record(scan, &located)?;
+        let carving = self.carve(scan, &located, &record, stop)?;
+        record.carved.clone_from(&carving.voxels);
         let is_new = !self.note_stationary(scan, &record);
-        let committed = is_new.then(|| self.map.committer().insert_scan(record));
+        let committed = is_new.then(|| {
+            let committer = self.map.committer();
+            record.carved = carving.at(self.map.revision());
+            committer.insert_scan(record)
+        });
         Ok(ScanOutcome { located, committed, insert_time: start.elapsed() })
     }
 
@@ -225,6 +247,12 @@ impl<'a> ScanMapper<'a> {
         let mut settings = self.settings;
         settings.alignment.multi_start.ascents = 0;
         Self { settings, recovery: None, ..self }
+    }
+
+    /// This mapper, whose scans carve the map as `carving` says, or not.
+    #[must_use]
+    pub fn carving(self, carving: Option<CarvingSettings>) -> Self {
+        Self { settings: MappingSettings { carving, ..self.settings }, ..self }
     }
 
     /// Finds where a scan was taken; changes nothing.
@@ -307,6 +335,7 @@ impl<'a> ScanMapper<'a> {
             iterations: alignment.iterations,
             points_skipped: scan.points_skipped,
             new_voxels: 0,
+            carved_voxels: 0,
             digest: scan.digest,
         };
         let points = scan.points_at(located.velocity.as_ref());
@@ -324,12 +353,36 @@ impl<'a> ScanMapper<'a> {
         Ok(record)
     }
 
-    /// True of a scan that shows again what its robot's last one showed, from where that was taken. That the robot was
-    /// seen there is noted for its next guess.
+    /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve, or the
+    /// scan does not fit.
+    ///
+    /// They are those of the map's revision that the answer names: whoever inserts the scan later
+    /// [cuts](Carving::cut) them to what is still there.
+    ///
+    /// # Errors
+    /// When `stop` said so.
+    pub fn carve(
+        &self,
+        scan: &Scan<'_>,
+        located: &LocatedScan,
+        record: &ScanRecord,
+        stop: StopSignal<'_>,
+    ) -> Result<Carving, MappingError> {
+        let Some(settings) = self.settings.carving.filter(|_| located.is_accepted()) else {
+            return Ok(Carving::default());
+        };
+        let points = scan.points_at(located.velocity.as_ref());
+        let moved_m = scan.moved_m(located.velocity.as_ref());
+        CarvingScan { points: &points, record, moved_m }.carve(self.map, &settings, stop)
+    }
+
+    /// True of a scan that shows again what its robot's last one showed, from where that was taken, and carves nothing. That
+    /// the robot was seen there is noted for its next guess.
     ///
     /// Never true of a scan that the caller wants at its guess, or in the map whatever it shows (`force`).
     pub fn note_stationary(&self, scan: &Scan<'_>, record: &ScanRecord) -> bool {
-        let Some(settings) = self.settings.stationary.filter(|_| !scan.at_guess && !scan.force) else {
+        let is_kept = scan.at_guess || scan.force || !record.carved.is_empty();
+        let Some(settings) = self.settings.stationary.filter(|_| !is_kept) else {
             return false;
         };
         let Some(last) = self.map.trajectory().last_of(scan.robot).cloned() else { return false };

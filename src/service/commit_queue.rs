@@ -65,6 +65,8 @@ pub(super) struct Prepared {
     pub(super) record: Option<Record>,
     /// True of a change that was decided on an empty map, and holds for no other.
     pub(super) if_empty: bool,
+    /// The revision in which a scan that carves saw what it carves.
+    pub(super) carved_at: u64,
     pub(super) turn: Turn,
     /// The memory that it takes.
     pub(super) reservation: Reservation,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::commit_queue::{Prepared, Step, Submission, Turn, record_of};
+use super::deletion::removal_bytes;
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
@@ -15,7 +16,7 @@ use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSe
 use crate::align::{AlignmentSettings, Method, Verdict};
 use crate::geometry::Point;
 use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
-use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
+use crate::mapping::{Carving, LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
 use crate::util::StopSignal;
 
 /// How far a scan is looked for.
@@ -48,7 +49,7 @@ impl HostedMap {
         self.check_robots(&request.robot, &settings.limits)?;
         budget.check_to_grow()?;
         let recovers = settings.recovers(request);
-        let mapper = self.mapper(request.method, recovers, settings);
+        let mapper = self.mapper(request.method, recovers, settings).carving(settings.carving(request));
         let mapper = if effort == Effort::Whole { mapper } else { mapper.from_one_start() };
         let located = self.locate(&scan, &mapper, stop)?;
         let takes_long = located.alignment.wants_more_starts || recovers && !located.is_accepted();
@@ -67,19 +68,25 @@ impl HostedMap {
         if !answer.accepted && !request.force {
             return Ok(Step::Answered(Some(answer)));
         }
-        let scan_record = mapper.record(&scan.to_map(), &located)?;
+        let mut scan_record = mapper.record(&scan.to_map(), &located)?;
         check_not_stopped(stop)?;
+        let carving = mapper.carve(&scan.to_map(), &located, &scan_record, stop);
+        check_not_stopped(stop)?;
+        let Carving { voxels: carved, revision: carved_at } = carving?;
+        scan_record.carved = carved;
         if mapper.note_stationary(&scan.to_map(), &scan_record) {
             let answer = ScanAnswer { accepted: true, stationary: true, ..answer };
             return Ok(Step::Answered(Some(answer)));
         }
-        let ScanRecord { voxels, moments, .. } = &scan_record;
+        let ScanRecord { voxels, carved, moments, .. } = &scan_record;
         let moments = moments.as_slice().len();
-        let reservation = budget.reserve_growth(growth_bytes(self.map.settings(), voxels, moments))?;
+        let growth = growth_bytes(self.map.settings(), voxels, moments);
+        let removal = if carved.is_empty() { 0 } else { removal_bytes(&self.map, carved) };
+        let reservation = budget.reserve_growth(growth + removal)?;
         let points_skipped = scan_record.pose.points_skipped;
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
-        let prepared = Prepared { change, record, if_empty: located.is_first, turn, reservation };
+        let prepared = Prepared { change, record, if_empty: located.is_first, carved_at, turn, reservation };
         let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let answer = ScanAnswer { points_skipped, ..answer };
@@ -89,7 +96,8 @@ impl HostedMap {
     /// What to say of a scan that was committed.
     fn committed(&self, answer: ScanAnswer, committed: Committed) -> ScanAnswer {
         let version = self.version(committed.version());
-        ScanAnswer { accepted: true, new_voxels: committed.added, version, ..answer }
+        let (new_voxels, carved_voxels) = (committed.added, committed.removed);
+        ScanAnswer { accepted: true, new_voxels, carved_voxels, version, ..answer }
     }
 
     /// Says what [`HostedMap::submit_scan`] would; changes nothing.
@@ -246,6 +254,7 @@ impl HostedMap {
             align_time: Duration::ZERO,
             points_skipped: pose.points_skipped,
             new_voxels: pose.new_voxels,
+            carved_voxels: pose.carved_voxels,
             foreground: None,
             version: self.version_at(pose.revision),
             replayed: true,
@@ -271,6 +280,7 @@ impl HostedMap {
             align_time: located.align_time,
             points_skipped: scan.skipped(),
             new_voxels: 0,
+            carved_voxels: 0,
             foreground: None,
             version: self.version_now(),
             replayed: false,

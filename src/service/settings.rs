@@ -8,7 +8,7 @@ use super::{Gauges, Limits, Observer, ScanRequest};
 use crate::align::AlignmentSettings;
 use crate::bloom::FilterSettings;
 use crate::map::RobotName;
-use crate::mapping::StationarySettings;
+use crate::mapping::{CarvingSettings, StationarySettings};
 use crate::scan::PointFilter;
 use crate::store::StoreSettings;
 
@@ -51,6 +51,10 @@ pub struct RobotSettings {
     /// Look for it where its scans are refused: from other guesses, then by a search with no guess around its last good
     /// pose, which two scans have to confirm.
     pub recover: bool,
+    /// Take out of the map what its scans saw through.
+    pub carve: bool,
+    /// How much is believed of what they saw through.
+    pub carving: CarvingSettings,
 }
 
 /// The key of [`ServiceSettings::robots`] that stands for every robot without an entry.
@@ -66,5 +70,11 @@ impl ServiceSettings {
     /// True where the robot of a scan is to be looked for if the scan is refused.
     pub(super) fn recovers(&self, scan: &ScanRequest) -> bool {
         scan.recover.unwrap_or_else(|| self.of_robot(&scan.robot).recover)
+    }
+
+    /// What a scan carves; none where it does not.
+    pub(super) fn carving(&self, scan: &ScanRequest) -> Option<CarvingSettings> {
+        let RobotSettings { carve, carving, .. } = self.of_robot(&scan.robot);
+        scan.carve.unwrap_or(carve).then_some(carving)
     }
 }

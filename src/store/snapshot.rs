@@ -319,6 +319,7 @@ mod tests {
             iterations: 12,
             points_skipped: 3,
             new_voxels: 5000,
+            carved_voxels: 40,
             digest: u64::MAX,
         };
         let mut moments = Moments::of_offset([3, -4, 5]);

@@ -69,7 +69,11 @@ impl CubeMap {
 
     /// The direction of the middle of a pixel, of depth 1.
     pub(super) fn direction(self, face: usize, pixel: [usize; 2]) -> [f32; 3] {
-        let [u, v] = pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0);
+        self.on_face(face, pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0))
+    }
+
+    /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on others).
+    pub(super) fn on_face(self, face: usize, [u, v]: [f32; 2]) -> [f32; 3] {
         let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
         match face / 2 {
             0 => [sign, u, v],

@@ -7,6 +7,7 @@
 mod cube_map;
 mod range_image;
 mod reach;
+mod scan_surface;
 mod set;
 #[cfg(test)]
 mod tests;
@@ -14,5 +15,6 @@ mod tile;
 mod viewpoint;
 
 pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, SeenRange};
+pub use scan_surface::{ScanSurface, SurfaceSettings};
 pub use set::{Gaze, ViewpointSet};
 pub use viewpoint::Viewpoint;

@@ -8,8 +8,6 @@ use crate::geometry::Point;
 pub const IMAGE_BYTES_MAX: usize = 8192;
 /// Tiles along the side of a face, finest first: pixels of 0.45 to 22 degrees. The first that fits is taken.
 const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
-/// Most tiles along the side of a face.
-const TILES_MAX: usize = 100;
 /// Bytes of an image before its tiles: how many there are along a side, and the unit of depths.
 const HEAD_BYTES: usize = 1 + 4;
 /// Depths in the image's unit are at most this.
@@ -83,13 +81,6 @@ impl RangeImage {
         fitting.map(|depths| Self::of_depths(&depths))
     }
 
-    /// The image of a scan of `points` with `tiles` tiles along the side of a face, however many bytes that takes.
-    pub fn of_pixels(points: &[Point], range: SeenRange, tiles: usize) -> Option<Self> {
-        let offsets: Vec<_> = points.iter().filter_map(|point| range.limited(point.xyz())).collect();
-        let map = CubeMap::new(tiles.clamp(1, TILES_MAX));
-        (!offsets.is_empty()).then(|| Self::of_depths(&NearestDepths::of(map, &offsets)))
-    }
-
     fn of_depths(depths: &NearestDepths) -> Self {
         let map = depths.map;
         let unit_m = (depths.max() / DEPTH_MAX).max(f32::MIN_POSITIVE);
@@ -111,30 +102,6 @@ impl RangeImage {
     pub fn sees_through(&self, offset: [f32; 3]) -> bool {
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
             self.depth_m(face, pixel).is_some_and(|seen_m| depth_m < seen_m)
-        })
-    }
-
-    /// True where the scan saw beyond a ball of `radius_m` around `offset` in each direction in which the ball lies, and a
-    /// pixel around it.
-    ///
-    /// At the rim of a nearer thing, beside a direction that was not seen, and where a surface is seen at a grazing angle this is
-    /// false: some pixel of the ball is no deeper than it.
-    pub fn sees_through_all_of(&self, offset: [f32; 3], radius_m: f32) -> bool {
-        let Some(Projection { depth_m, .. }) = self.map.project(offset) else { return false };
-        let pixel_m = depth_m * self.map.pitch();
-        let reach_m = radius_m + pixel_m;
-        // Where faces meet pixels are half as wide as in their middle.
-        let steps = (2.0 * reach_m / (0.5 * pixel_m)).ceil();
-        let [right, up] = across(offset);
-        let along = |i: f32| i / steps * 2.0 * reach_m - reach_m;
-        (0..=steps as usize).all(|row| {
-            (0..=steps as usize).all(|column| {
-                let (a, b) = (along(column as f32), along(row as f32));
-                let around = std::array::from_fn(|axis| offset[axis] + right[axis] * a + up[axis] * b);
-                self.map.project(around).is_some_and(|Projection { face, pixel, depth_m }| {
-                    self.depth_m(face, pixel).is_some_and(|seen_m| depth_m + radius_m < seen_m)
-                })
-            })
         })
     }
 
@@ -238,14 +205,6 @@ impl SeenRange {
         let scale = (self.max_m / distance_m).min(1.0);
         Some(offset.map(|c| c * scale))
     }
-}
-
-/// Two directions at right angles to each other and to `offset`, of length 1.
-fn across(offset: [f32; 3]) -> [[f32; 3]; 2] {
-    let offset = nalgebra::Vector3::from(offset);
-    let other = nalgebra::Vector3::ith(offset.iamin(), 1.0);
-    let right = offset.cross(&other).normalize();
-    [right.into(), offset.cross(&right).normalize().into()]
 }
 
 /// Bytes of an image with `kept` tiles where it is stored.

@@ -79,24 +79,66 @@ fn an_image_of_any_scan_keeps_to_its_bytes() {
     assert_eq!(RangeImage::of_points(&[Point::new(0.0, 0.0, 0.0)], RANGE, IMAGE_BYTES_MAX), None);
 }
 
-#[test]
-fn a_ball_is_seen_through_only_where_all_of_it_is() {
-    let mut random = ChaCha8Rng::seed_from_u64(4);
-    let mut points = room(&mut random, 60_000, 0.6);
-    // A plate hides half of the wall.
+/// A scan of a room, half of which a plate hides.
+fn half_hidden(random: &mut ChaCha8Rng) -> Vec<Point> {
+    let mut points = room(random, 60_000, 0.6);
     for point in &mut points {
         let [x, y, z] = point.xyz();
         if y / x > 0.0 {
             *point = Point::new(1.5, 1.5 * y / x, 1.5 * z / x);
         }
     }
-    let image = RangeImage::of_pixels(&points, RANGE, 10).unwrap();
-    assert!(image.sees_through_all_of([2.0, -0.5, 0.1], 0.05));
-    assert!(!image.sees_through_all_of([2.0, 0.5, 0.1], 0.05), "behind the plate");
-    assert!(!image.sees_through_all_of([2.0, -0.02, 0.1], 0.05), "at the plate's rim");
-    assert!(!image.sees_through_all_of([2.97, -0.5, 0.1], 0.05), "at the wall");
-    assert!(!image.sees_through_all_of([2.0, -1.25, 0.1], 0.05), "at the edge of what was seen");
-    assert!(!image.sees_through_all_of([-2.0, -0.5, 0.1], 0.05), "behind the sensor");
+    points
+}
+
+const SURFACE: SurfaceSettings = SurfaceSettings { grazing_rad: 0.14, noise_m: 0.05, spacing_m: 0.1 };
+
+#[test]
+fn a_ball_is_seen_through_only_where_all_of_it_is() {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let surface = ScanSurface::of(&half_hidden(&mut random), SURFACE).unwrap();
+    let sees_through = |offset| surface.sees_through(offset, 0.05);
+    assert!(sees_through([2.0, -0.5, 0.1]) && surface.sees_beyond([2.0, -0.5, 0.1], 0.05));
+    assert!(
+        !sees_through([2.0, 0.5, 0.1]) && !surface.sees_beyond([2.0, 0.5, 0.1], 0.05),
+        "behind the plate"
+    );
+    assert!(!sees_through([2.0, -0.02, 0.1]), "at the plate's rim");
+    assert!(!sees_through([2.97, -0.5, 0.1]), "at the wall");
+    assert!(!sees_through([2.0, -1.25, 0.1]), "at the edge of what was seen");
+    assert!(!sees_through([-2.0, -0.5, 0.1]), "behind the sensor");
+    assert!(!sees_through([0.0; 3]) && !sees_through([0.15, -0.05, 0.0]), "at the sensor");
+}
+
+#[test]
+fn samples_leave_no_gap_wider_than_their_spacing_and_join_no_rims() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    // Points farther apart than samples, which only a surface at a sharper angle than half a radian would join to the plate.
+    let points: Vec<_> = half_hidden(&mut random).into_iter().step_by(40).collect();
+    let surface = ScanSurface::of(&points, SurfaceSettings { grazing_rad: 0.5, ..SURFACE }).unwrap();
+    let mut samples: Vec<[f32; 3]> = points.iter().map(|point| point.xyz()).collect();
+    surface.for_samples(10.0, |sample| samples.push(sample));
+    for &[x, _, _] in &samples {
+        assert!(
+            (x - 1.5).abs() < 1e-3 || (x - 3.0).abs() < 1e-3,
+            "a sample at {x} m, between plate and wall"
+        );
+    }
+    // Where the wall is seen, and not at its edges.
+    let mut bare = 0;
+    for i in 0..1000 {
+        let (y, z) = ((i % 40) as f32 * -0.035 - 0.2, (i / 40) as f32 * 0.08 - 1.0);
+        let is_near = |&[a, b, c]: &[f32; 3]| (a - 3.0).abs() < 0.01 && (b - y).hypot(c - z) < 0.1;
+        bare += usize::from(!samples.iter().any(is_near));
+    }
+    assert!(bare < 10, "{bare} of 1000 places of the wall are bare");
+    surface.for_samples(1.0, |sample| panic!("{sample:?} is beyond the range"));
+}
+
+#[test]
+fn a_scan_without_points_has_no_surface() {
+    assert!(ScanSurface::of(&[], SURFACE).is_none());
+    assert!(ScanSurface::of(&[Point::new(0.0, 0.0, 0.0)], SURFACE).is_none());
 }
 
 #[test]

@@ -74,6 +74,19 @@ impl VoxelSet {
         })
     }
 
+    /// The voxels of this that are not in `other`.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Self {
+        let mut others = other.blocks.iter().peekable();
+        let rest = self.blocks.iter().filter_map(|(block, mask)| {
+            while others.next_if(|(other, _)| other < block).is_some() {}
+            let same = others.peek().filter(|(other, _)| other == block);
+            let mask = same.map_or(*mask, |(_, other)| mask.difference(other));
+            (!mask.is_empty()).then_some((*block, mask))
+        });
+        Self { blocks: rest.collect() }
+    }
+
     /// True where a voxel of the block lies in `voxel` of `level`.
     pub fn block_touches((block, mask): &(VoxelKey, BlockMask), voxel: VoxelKey, level: u32) -> bool {
         match level.checked_sub(BLOCK_LEVELS) {
@@ -160,6 +173,19 @@ mod tests {
                 prop_assert_eq!(set.contains(key), keys.contains(&key));
             }
             prop_assert_eq!(set, keys.into_iter().collect::<VoxelSet>());
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_difference_is_that_of_the_voxels(ours: Vec<[i8; 3]>, theirs: Vec<[i8; 3]>) {
+            let keys = |all: &[[i8; 3]]| -> BTreeSet<VoxelKey> {
+                all.iter().filter_map(|i| VoxelKey::new(i.map(|i| i32::from(i) / 16))).collect()
+            };
+            let (ours, theirs) = (keys(&ours), keys(&theirs));
+            let expected: VoxelSet = ours.difference(&theirs).copied().collect();
+            let set = |keys: &BTreeSet<VoxelKey>| keys.iter().copied().collect::<VoxelSet>();
+            prop_assert_eq!(set(&ours).difference(&set(&theirs)), expected);
         }
     }
 

@@ -20,7 +20,7 @@ impl TryFrom<pb::InsertScanRequest> for (MapName, ScanRequest) {
         let scan = scan_from(request.scan, request.guess, request.at_guess, request.method)?;
         Ok((
             MapName::new(&request.map)?,
-            ScanRequest { force: request.force, recover: request.recover, ..scan },
+            ScanRequest { force: request.force, recover: request.recover, carve: request.carve, ..scan },
         ))
     }
 }
@@ -190,9 +190,9 @@ impl From<ScanRequest> for pb::Scan {
 impl From<(&MapName, ScanRequest)> for pb::InsertScanRequest {
     fn from((map, scan): (&MapName, ScanRequest)) -> Self {
         let (guess, at_guess) = (guess_of(&scan), scan.at_guess);
-        let (force, recover) = (scan.force, scan.recover);
+        let (force, recover, carve) = (scan.force, scan.recover, scan.carve);
         let method = pb::Method::from(scan.method).into();
-        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, force, recover }
+        Self { map: map.to_string(), scan: Some(scan.into()), guess, at_guess, method, force, recover, carve }
     }
 }
 
@@ -316,6 +316,7 @@ impl From<ScanAnswer> for pb::InsertScanResponse {
             stationary: answer.stationary,
             error: None,
             recovered: pb::Recovered::from(answer.recovered).into(),
+            carved_voxels: answer.carved_voxels as u64,
         }
     }
 }
@@ -350,9 +351,9 @@ impl TryFrom<pb::InsertScanResponse> for ScanAnswer {
         };
         let recovered = recovered_from(answer.recovered)?;
         let judged = Self::try_from(judged)?;
-        let (new_voxels, replayed, stationary) =
-            (count_from(answer.new_voxels), answer.replayed, answer.stationary);
-        Ok(Self { new_voxels, replayed, stationary, recovered, ..judged })
+        let (new_voxels, carved_voxels) = (count_from(answer.new_voxels), count_from(answer.carved_voxels));
+        let (replayed, stationary) = (answer.replayed, answer.stationary);
+        Ok(Self { new_voxels, carved_voxels, replayed, stationary, recovered, ..judged })
     }
 }
 
@@ -380,6 +381,7 @@ impl TryFrom<pb::AlignScanResponse> for ScanAnswer {
             align_time: Duration::try_from_secs_f64(alignment.align_ms / 1e3).unwrap_or_default(),
             points_skipped: count_from(alignment.points_skipped),
             new_voxels: 0,
+            carved_voxels: 0,
             foreground: (!answer.foreground.is_empty()).then_some(Foreground {
                 bitmap: answer.foreground,
                 points: count_from(answer.foreground_points),

@@ -72,6 +72,7 @@ impl From<&MappedScan> for pb::TrajectoryPose {
             revision: pose.revision,
             overlap: pose.overlap(),
             new_voxels: pose.new_voxels as u64,
+            carved_voxels: pose.carved_voxels as u64,
         }
     }
 }
@@ -114,6 +115,7 @@ impl TryFrom<pb::TrajectoryPose> for MappedScan {
             iterations: 0,
             points_skipped: 0,
             new_voxels: count_from(pose.new_voxels),
+            carved_voxels: count_from(pose.carved_voxels),
             digest: 0,
         })
     }

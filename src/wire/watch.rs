@@ -2,6 +2,7 @@
 
 use prost::bytes::{BufMut, Bytes, BytesMut};
 
+use super::types::count_from;
 use super::types::uuid_from;
 use super::{InField, pb, required};
 use crate::map::{ContentHash, ContentVersion, MapName, RobotName, SessionName};
@@ -171,6 +172,7 @@ impl From<WatchedScan> for pb::WatchedScan {
             scan_id: scan.scan_id,
             timestamp_ns: scan.timestamp_ns,
             map_from_sensor: Some((&scan.map_from_sensor).into()),
+            carved_voxels: scan.carved_voxels as u64,
         }
     }
 }
@@ -187,6 +189,7 @@ impl TryFrom<pb::WatchedScan> for WatchedScan {
             map_from_sensor: required(scan.map_from_sensor, "scan.map_from_sensor")?
                 .try_into()
                 .in_field("scan.map_from_sensor")?,
+            carved_voxels: count_from(scan.carved_voxels),
         })
     }
 }

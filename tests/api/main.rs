@@ -6,6 +6,7 @@
 mod bad_input;
 mod blocks;
 mod callers_gone;
+mod carving;
 mod deskewing;
 mod grpc;
 mod http;

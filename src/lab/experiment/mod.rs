@@ -1,5 +1,6 @@
 //! The paper's experiments (IV), and measurements of convergence and scaling.
 
+pub mod carving;
 pub mod convergence;
 pub mod deskewing;
 pub mod drift;

@@ -1,12 +1,14 @@
 //! Reports: results as plots and tables in files.
 
 pub mod chart;
+mod plan;
 mod spread;
 mod table;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use plan::{PlanLayer, plan};
 pub use spread::Spread;
 pub use table::{Table, folder};
 

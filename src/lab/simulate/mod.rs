@@ -9,7 +9,7 @@ mod scene;
 mod sensor;
 mod tour;
 
-pub use scene::Scene;
+pub use scene::{Mover, Scene};
 #[cfg(feature = "lab")]
 pub(crate) use sensor::gaussian;
 pub use sensor::{DepthCamera, Sensor, SpinningLidar};

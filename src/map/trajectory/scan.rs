@@ -9,7 +9,7 @@ use crate::voxel::{Lattice, MomentSet, VoxelSet};
 /// computed again in floating point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanRecord {
-    /// What is kept of it in the trajectory; its revision and new voxels are filled in by the commit.
+    /// What is kept of it in the trajectory; its revision, new and carved voxels are filled in by the commit.
     pub pose: MappedScan,
     /// Every distinct finest voxel that the scan touches, known before or not.
     pub voxels: VoxelSet,
@@ -77,6 +77,8 @@ pub struct MappedScan {
     pub points_skipped: usize,
     /// Finest voxels that it added.
     pub new_voxels: usize,
+    /// Finest voxels that it carved.
+    pub carved_voxels: usize,
     /// A digest of the request, so that the same scan sent again is told from another under its id.
     pub digest: u64,
 }
@@ -95,6 +97,7 @@ impl MappedScan {
             iterations: 0,
             points_skipped: 0,
             new_voxels: 0,
+            carved_voxels: 0,
             digest: 0,
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::map::{Change, ContentHash, LevelChange, Region};
+use crate::map::{Change, ContentHash, LevelChange, MappedScan, Region};
 use crate::service::{BlockBytes, Cause, ChangePart, WatchForm};
 use crate::voxel::{Lattice, VoxelSet};
 
@@ -45,7 +45,10 @@ impl WatchedChange {
         levels: Vec<LevelChange>,
     ) -> Self {
         let (cause, removed, added) = match change {
-            Change::Insertion(scan) => (Cause::Scan(Box::new(scan.pose.into())), scan.carved, scan.voxels),
+            Change::Insertion(scan) => {
+                let pose = MappedScan { carved_voxels: scan.carved.len(), ..scan.pose };
+                (Cause::Scan(Box::new(pose.into())), scan.carved, scan.voxels)
+            }
             Change::Deletion(deletion) => (Cause::Deletion, deletion.voxels, VoxelSet::default()),
             Change::Undo(undo) => {
                 let cause = Cause::Undo { scans: undo.scans, deletions: undo.deletions };
@@ -68,6 +71,11 @@ impl WatchedChange {
             Cause::Scan(_) | Cause::Deletion => 0,
         };
         size_of::<Self>() + of_cause + sets.map(Exchanged::memory_bytes).sum::<usize>()
+    }
+
+    /// The finest voxels that it touched: those that went, and those that came or were seen again.
+    pub(in crate::service) fn touched(&self) -> [&VoxelSet; 2] {
+        [&self.finest.removed, &self.finest.added]
     }
 
     /// Blocks of the finest voxels that went and came.

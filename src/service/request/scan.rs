@@ -42,6 +42,8 @@ pub struct ScanRequest {
     pub force: bool,
     /// Look for the robot where the scan is refused; where none, as the server is set for this robot.
     pub recover: Option<bool>,
+    /// Take out of the map what the scan saw through; where none, as the server is set for this robot.
+    pub carve: Option<bool>,
     /// How to align; the server's own where none.
     pub method: Option<Method>,
     /// Say too which points fall in no occupied voxel of this level; of an alignment only.
@@ -69,7 +71,9 @@ impl ScanRequest {
             return Err(ServiceError::new(Reason::UnexpectedField, message));
         }
         let message = "recover is for an insertion: an alignment remembers nothing, leave it out";
-        self.recover.map_or(Ok(()), |_| Err(ServiceError::new(Reason::UnexpectedField, message)))
+        self.recover.map_or(Ok(()), |_| Err(ServiceError::new(Reason::UnexpectedField, message)))?;
+        let message = "carve is for an insertion: an alignment takes nothing out of the map, leave it out";
+        self.carve.map_or(Ok(()), |_| Err(ServiceError::new(Reason::UnexpectedField, message)))
     }
 
     /// # Errors
@@ -97,6 +101,7 @@ impl ScanRequest {
             at_guess: false,
             force: false,
             recover: None,
+            carve: None,
             method: None,
             foreground_level: None,
             filter: PointFilter::default(),
@@ -134,6 +139,8 @@ pub struct ScanAnswer {
     pub points_skipped: usize,
     /// Finest voxels added; 0 where nothing was.
     pub new_voxels: usize,
+    /// Finest voxels carved: those that the scan saw through.
+    pub carved_voxels: usize,
     /// After it, or where it was refused, before.
     pub version: MapVersion,
     /// The points that the map does not show, where they were asked for.

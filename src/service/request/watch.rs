@@ -137,12 +137,14 @@ pub struct WatchedScan {
     pub timestamp_ns: Option<i64>,
     /// Where it was taken.
     pub map_from_sensor: Pose,
+    /// Finest voxels that it carved.
+    pub carved_voxels: usize,
 }
 
 impl From<MappedScan> for WatchedScan {
     fn from(scan: MappedScan) -> Self {
-        let MappedScan { robot, session, scan_id, timestamp_ns, map_from_sensor, .. } = scan;
-        Self { robot, session, scan_id, timestamp_ns, map_from_sensor }
+        let MappedScan { robot, session, scan_id, timestamp_ns, map_from_sensor, carved_voxels, .. } = scan;
+        Self { robot, session, scan_id, timestamp_ns, map_from_sensor, carved_voxels }
     }
 }
 

@@ -24,6 +24,7 @@ impl From<&MappedScan> for pb::ScanPose {
             iterations: pose.iterations,
             points_skipped: pose.points_skipped as u64,
             new_voxels: pose.new_voxels as u64,
+            carved_voxels: pose.carved_voxels as u64,
             digest: pose.digest,
             session: pose.session.as_str().to_owned(),
         }
@@ -48,6 +49,7 @@ impl TryFrom<pb::ScanPose> for MappedScan {
             iterations: message.iterations,
             points_skipped: count(message.points_skipped),
             new_voxels: count(message.new_voxels),
+            carved_voxels: count(message.carved_voxels),
             digest: message.digest,
         })
     }

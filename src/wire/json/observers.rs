@@ -47,7 +47,7 @@ impl From<ObserversAnswer> for JsonObservers {
 
 impl From<ObservingScan> for JsonObservingScan {
     fn from(ObservingScan { revision, scan }: ObservingScan) -> Self {
-        let WatchedScan { robot, session, scan_id, timestamp_ns, map_from_sensor } = scan;
+        let WatchedScan { robot, session, scan_id, timestamp_ns, map_from_sensor, carved_voxels: _ } = scan;
         Self {
             revision,
             robot: robot.to_string(),

@@ -37,6 +37,8 @@ pub struct JsonScan {
     pub align_ms: f64,
     /// Finest voxels added.
     pub new_voxels: usize,
+    /// Finest voxels carved.
+    pub carved_voxels: usize,
     /// Points that were left out.
     pub points_skipped: usize,
     /// True of a scan that was accepted before: this is that answer.
@@ -83,6 +85,7 @@ impl From<ScanAnswer> for JsonScan {
             overlap: answer.overlap(),
             iterations: answer.iterations,
             new_voxels: answer.new_voxels,
+            carved_voxels: answer.carved_voxels,
             points_skipped: answer.points_skipped,
             replayed: answer.replayed,
             stationary: answer.stationary,

@@ -1,5 +1,6 @@
 //! `mrol experiment`: repeats the paper's experiments, with plots and tables as results.
 
+mod carving;
 mod convergence;
 mod deskewing;
 mod free_space;
@@ -28,6 +29,7 @@ EXAMPLES:
   mrol experiment free-space hall/ --truth hall/poses.txt --resolution 0.1 --peer-scans scans.bin
                                                what is known to be free, beside OctoMap
   mrol experiment rounds                       what a map keeps of a robot that drives the same way for an hour
+  mrol experiment carving                      what a map loses of what is taken away, and keeps of what stands
   mrol experiment hostile-guesses hall/:0.1:hall office/:0.04:office
                                                what is accepted of guesses far off, and of scans of other places
 
@@ -43,6 +45,7 @@ pub(in crate::cli) struct Experiment {
 
 #[derive(Debug, Subcommand)]
 enum Which {
+    Carving(carving::Carving),
     Convergence(convergence::Convergence),
     Deskewing(deskewing::Deskewing),
     FreeSpace(free_space::FreeSpace),
@@ -57,6 +60,7 @@ enum Which {
 impl Experiment {
     pub(super) fn run(self, output: Output) -> Result<(), CliError> {
         match self.which {
+            Which::Carving(carving) => carving.run(&output),
             Which::Convergence(convergence) => convergence.run(&output),
             Which::Deskewing(deskewing) => deskewing.run(&output),
             Which::FreeSpace(free_space) => free_space.run(&output),

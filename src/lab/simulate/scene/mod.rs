@@ -5,11 +5,13 @@ mod equal_rooms;
 mod furnish;
 mod furniture;
 mod hall;
+mod mover;
 mod ray;
 mod shape;
 
 use nalgebra::{Point3, Vector3};
 
+pub use mover::Mover;
 use ray::{Bounds, Ray};
 use shape::Shape;
 

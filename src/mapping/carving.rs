@@ -1,0 +1,236 @@
+//! Carving: what a scan saw through is no longer there, and leaves the map.
+//!
+//! A map that only grows keeps everything that ever stood or walked in it. A scan that looks through a voxel and sees what lies
+//! behind it tells that the voxel is empty now. What it tells is believed of few voxels, for a wall that is carved away is a
+//! worse map than one with a ghost in it:
+//!
+//! * never of one that the scan touches, or that lies within a margin of the surface that it shows, the surface between its
+//!   points included;
+//! * only where each direction in which the voxel lies was seen to end behind it;
+//! * never at a rim: where a direction beside these was not seen, or ends in front of the voxel on another surface. A surface
+//!   that is seen at a grazing angle is one rim beside the other, so nothing is carved in front of it or from it;
+//! * only as far as the points lie as close to each other as voxels do, and within a range.
+
+use super::MappingError;
+use crate::geometry::{Point, Pose};
+use crate::map::{MultiResolutionMap, Region, ScanRecord};
+use crate::util::StopSignal;
+use crate::visibility::{ScanSurface, SurfaceSettings};
+use crate::voxel::{BlockMask, Lattice, VoxelKey, VoxelSet};
+
+/// Widest margin, voxels.
+pub const CARVING_MARGIN_MAX: u32 = 8;
+/// Largest range, meters.
+pub const CARVING_RANGE_MAX_M: f64 = 200.0;
+/// Smallest grazing angle, degrees.
+pub const CARVING_GRAZING_MIN_DEG: f64 = 1.0;
+/// Largest grazing angle, degrees.
+pub const CARVING_GRAZING_MAX_DEG: f64 = 80.0;
+/// Blocks of voxels that are looked at between two looks at the stop signal.
+const BLOCKS_PER_LOOK: usize = 16;
+/// Samples of a surface are so much closer to each other than its margins are wide, since they lie askew to the voxels.
+const SAMPLE_SHARE: f64 = 0.7;
+
+/// Which voxels a scan carves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarvingSettings {
+    /// Voxels around those of the scan's surface that are never carved: what the pose, and noise, may be off by. 1.
+    pub margin_voxels: u32,
+    /// A surface that is seen at a smaller angle than this is not told from a rim, degrees. 8.
+    pub grazing_deg: f64,
+    /// Voxels farther from the sensor than this are not carved, meters: a pose that is a tenth of a degree off moves what is 20 m
+    /// away by 3.5 cm. 20.
+    pub range_max_m: f64,
+}
+
+impl Default for CarvingSettings {
+    fn default() -> Self {
+        Self { margin_voxels: 1, grazing_deg: 8.0, range_max_m: 20.0 }
+    }
+}
+
+/// Why settings of carving are not valid.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum CarvingSettingsError {
+    /// The margin is too wide.
+    #[error("carve_margin_voxels must be at most {CARVING_MARGIN_MAX}, got {0}")]
+    Margin(u32),
+    /// The grazing angle is out of range.
+    #[error(
+        "carve_grazing_deg must lie in {CARVING_GRAZING_MIN_DEG} to {CARVING_GRAZING_MAX_DEG} degrees, got {0}"
+    )]
+    Grazing(f64),
+    /// The range is out of range.
+    #[error("carve_range_max_m must be more than 0 and at most {CARVING_RANGE_MAX_M} m, got {0}")]
+    Range(f64),
+}
+
+impl CarvingSettings {
+    /// Checks the numbers, and returns the settings.
+    ///
+    /// # Errors
+    /// Names what is out of range.
+    pub fn checked(self) -> Result<Self, CarvingSettingsError> {
+        let Self { margin_voxels, grazing_deg, range_max_m } = self;
+        if margin_voxels > CARVING_MARGIN_MAX {
+            return Err(CarvingSettingsError::Margin(margin_voxels));
+        }
+        if !(CARVING_GRAZING_MIN_DEG..=CARVING_GRAZING_MAX_DEG).contains(&grazing_deg) {
+            return Err(CarvingSettingsError::Grazing(grazing_deg));
+        }
+        if !(range_max_m > 0.0 && range_max_m <= CARVING_RANGE_MAX_M) {
+            return Err(CarvingSettingsError::Range(range_max_m));
+        }
+        Ok(self)
+    }
+}
+
+/// What a scan saw through.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Carving {
+    /// Finest voxels that were occupied, and that the scan saw through.
+    pub voxels: VoxelSet,
+    /// The revision of the map in which they were.
+    pub revision: u64,
+}
+
+impl Carving {
+    /// This without the voxels that a change which came between took out or touched: they are gone, or another scan saw
+    /// something there meanwhile.
+    pub fn cut(&mut self, touched: &VoxelSet) {
+        if !self.voxels.is_disjoint(touched) {
+            self.voxels = self.voxels.difference(touched);
+        }
+    }
+
+    /// What is carved of a map that is at `revision` now: nothing where something came between.
+    pub(super) fn at(self, revision: u64) -> VoxelSet {
+        if self.revision == revision { self.voxels } else { VoxelSet::default() }
+    }
+}
+
+/// A scan that carves, where it was found.
+pub(super) struct CarvingScan<'a> {
+    /// Sensor frame, finite.
+    pub(super) points: &'a [Point],
+    pub(super) record: &'a ScanRecord,
+    /// How far the sensor moved while the points were measured, meters.
+    pub(super) moved_m: f64,
+}
+
+impl CarvingScan<'_> {
+    /// The voxels of `map` that the scan saw through.
+    ///
+    /// # Errors
+    /// When `stop` said so.
+    pub(super) fn carve(
+        &self,
+        map: &MultiResolutionMap,
+        settings: &CarvingSettings,
+        stop: StopSignal<'_>,
+    ) -> Result<Carving, MappingError> {
+        let resolution_m = map.lattice().resolution_m(0);
+        let surface = SurfaceSettings {
+            grazing_rad: settings.grazing_deg.to_radians() as f32,
+            noise_m: resolution_m as f32,
+            spacing_m: (SAMPLE_SHARE * resolution_m * f64::from(2 * settings.margin_voxels + 1)) as f32,
+        };
+        let surface = ScanSurface::of(self.points, surface);
+        let region = surface.as_ref().and_then(|surface| self.seen_region(surface, settings));
+        let (Some(surface), Some(region)) = (surface, region) else { return Ok(Carving::default()) };
+        let (occupied, revision) = occupied_in(map, &region, stop);
+        let solid = self.solid(&surface, map.lattice(), settings);
+        let sight = Sight {
+            surface: &surface,
+            solid: &solid,
+            lattice: map.lattice(),
+            sensor_from_map: self.record.pose.map_from_sensor.inverse(),
+            radius_m: (resolution_m * 3f64.sqrt() / 2.0 + self.moved_m) as f32,
+            settings,
+        };
+        let candidates = occupied.difference(&solid);
+        let seen_through = |&(block, ref mask): &(VoxelKey, BlockMask)| {
+            let sight = &sight;
+            mask.cells(0).map(move |cell| cell.voxel(block)).filter(|voxel| sight.sees_through(*voxel))
+        };
+        let voxels = stop.paced(candidates.blocks(), BLOCKS_PER_LOOK).flat_map(seen_through).collect();
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
+        Ok(Carving { voxels, revision })
+    }
+
+    /// A box around what the scan saw within its range: no other voxel was seen through.
+    fn seen_region(&self, surface: &ScanSurface, settings: &CarvingSettings) -> Option<Region> {
+        let pose = &self.record.pose.map_from_sensor;
+        let origin: [f64; 3] = pose.translation.vector.into();
+        let seen = surface.seen(settings.range_max_m as f32);
+        let corners = seen.fold((origin, origin), |(min_m, max_m), offset| {
+            let point: [f64; 3] = (pose * nalgebra::Point3::from(offset.map(f64::from))).into();
+            (
+                std::array::from_fn(|axis| f64::min(min_m[axis], point[axis])),
+                std::array::from_fn(|axis| f64::max(max_m[axis], point[axis])),
+            )
+        });
+        Region::cuboid(corners.0, corners.1).ok()
+    }
+
+    /// The voxels of the surface that the scan shows: those of its points, and those between them.
+    fn solid(&self, surface: &ScanSurface, lattice: &Lattice, settings: &CarvingSettings) -> VoxelSet {
+        let mut samples = Vec::new();
+        surface.for_samples(settings.range_max_m as f32, |offset| samples.push(Point::from(offset)));
+        let from_points = lattice.from_points(&self.record.pose.map_from_sensor);
+        let (between, _) = VoxelSet::of_points(&samples, &from_points);
+        between.blocks().iter().chain(self.record.voxels.blocks()).copied().collect()
+    }
+}
+
+/// The finest voxels of a map in a region, and the map's revision.
+fn occupied_in(map: &MultiResolutionMap, region: &Region, stop: StopSignal<'_>) -> (VoxelSet, u64) {
+    let long_read = map.long_read();
+    let view = long_read.view();
+    (view.finest_in_until(region, 0, stop), view.revision())
+}
+
+/// What a scan sees of voxels.
+struct Sight<'a> {
+    surface: &'a ScanSurface,
+    solid: &'a VoxelSet,
+    lattice: &'a Lattice,
+    sensor_from_map: Pose,
+    /// Of a ball around a voxel.
+    radius_m: f32,
+    settings: &'a CarvingSettings,
+}
+
+impl Sight<'_> {
+    fn sees_through(&self, voxel: VoxelKey) -> bool {
+        let center_m = nalgebra::Point3::from(self.lattice.center_m(voxel, 0));
+        let offset = self.sensor_from_map * center_m;
+        let range_m = self.settings.range_max_m;
+        if offset.coords.norm_squared() > range_m * range_m {
+            return false;
+        }
+        let offset = offset.coords.map(|c| c as f32).into();
+        self.surface.sees_beyond(offset, self.radius_m)
+            && !self.is_near_solid(voxel)
+            && self.surface.sees_through(offset, self.radius_m)
+    }
+
+    /// True of a voxel within the margin of the scan's surface.
+    fn is_near_solid(&self, voxel: VoxelKey) -> bool {
+        let margin = self.settings.margin_voxels as i32;
+        let around = || -margin..=margin;
+        let [x, y, z] = voxel.index();
+        around().any(|dz| {
+            around().any(|dy| {
+                around().any(|dx| {
+                    VoxelKey::new([x + dx, y + dy, z + dz]).is_some_and(|near| self.solid.contains(near))
+                })
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

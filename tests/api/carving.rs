@@ -1,0 +1,159 @@
+//! Carving: scans take out of a map what they saw through, and what that leaves is told, undone and kept like all else.
+
+use mrol::client::Client;
+use mrol::config::Config;
+use mrol::map::MapName;
+use mrol::service::{Cause, WatchEvent, WatchRequest};
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+
+use crate::support::daemon::{Daemon, PATIENCE, bytes_of, identity_json, json_of, row};
+
+/// Half the sides of a room around the sensor, meters.
+const ROOM_M: [f32; 3] = [3.03, 2.53, 1.24];
+/// A box in it: smallest and largest corner.
+const BOX_M: [[f32; 3]; 2] = [[1.23, -0.44, -0.53], [1.83, 0.44, 0.53]];
+
+/// What a sensor in the middle of the room sees all around, with the box or without it.
+fn room(has_box: bool) -> Vec<[f32; 3]> {
+    let range_m = |direction: [f32; 3]| {
+        let to_wall = (0..3).map(|axis| ROOM_M[axis] / direction[axis].abs()).fold(f32::INFINITY, f32::min);
+        let ends = (0..3).map(|axis| {
+            let ends = [BOX_M[0][axis] / direction[axis], BOX_M[1][axis] / direction[axis]];
+            (ends[0].min(ends[1]), ends[0].max(ends[1]))
+        });
+        let (from, to) = ends.fold((0.0f32, f32::INFINITY), |(from, to), (a, b)| (from.max(a), to.min(b)));
+        if has_box && from <= to { from.min(to_wall) } else { to_wall }
+    };
+    let directions = (0..180).flat_map(|i| (-44..=44).map(move |k| (i as f32 * 2.0 + 0.3, k as f32 * 2.0)));
+    directions
+        .map(|(azimuth, elevation)| {
+            let ((sin, cos), (up, along)) =
+                (azimuth.to_radians().sin_cos(), elevation.to_radians().sin_cos());
+            let direction = [cos * along, sin * along, up];
+            direction.map(|c| c * range_m(direction))
+        })
+        .collect()
+}
+
+async fn insert(daemon: &Daemon, id: u64, has_box: bool, more: &str) -> Value {
+    let guess = if more.contains("align=true") { "" } else { "&guess=0,0,0,0,0,0,1&align=false" };
+    let route = format!("/v1/maps/a/scans?robot=r&scan_id={id}{guess}{more}");
+    let answer = daemon.post_bytes(&route, bytes_of(&room(has_box))).await;
+    assert_eq!(answer.status(), StatusCode::OK, "{more}");
+    json_of(answer).await
+}
+
+fn is_of_box(index: &[i64; 3]) -> bool {
+    (0..3).all(|axis| {
+        let center_m = (index[axis] as f32 + 0.5) * 0.1;
+        (BOX_M[0][axis] - 0.1..=BOX_M[1][axis] + 0.1).contains(&center_m)
+    })
+}
+
+async fn box_voxels(daemon: &Daemon) -> usize {
+    daemon.contents("a").await.1.iter().filter(|index| is_of_box(index)).count()
+}
+
+fn carves(config: &mut Config) {
+    config.robots.entry("*".into()).or_default().carve = true;
+}
+
+#[tokio::test]
+async fn a_box_that_was_taken_away_goes_where_the_request_or_the_settings_say_so() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    assert_eq!(insert(&daemon, 1, true, "").await["carved_voxels"], 0);
+    let before = box_voxels(&daemon).await;
+    assert!(before > 50, "{before} voxels");
+    assert_eq!(insert(&daemon, 2, false, "").await["carved_voxels"], 0);
+    assert_eq!(box_voxels(&daemon).await, before);
+    let carved = insert(&daemon, 3, false, "&carve=true").await["carved_voxels"].as_u64().unwrap();
+    assert!(carved as usize * 100 >= before * 95, "{carved} of {before}");
+    assert_eq!(box_voxels(&daemon).await, before - carved as usize);
+    // The same scan again is answered as before.
+    let again = insert(&daemon, 3, false, "&carve=true").await;
+    assert_eq!((&again["replayed"], &again["carved_voxels"]), (&json!(true), &json!(carved)));
+
+    let daemon = Daemon::start_with(carves).await;
+    daemon.make_map("a").await;
+    insert(&daemon, 1, true, "").await;
+    assert_eq!(insert(&daemon, 2, false, "&carve=false").await["carved_voxels"], 0);
+    assert_eq!(insert(&daemon, 3, false, "").await["carved_voxels"], carved);
+}
+
+#[tokio::test]
+async fn what_was_carved_is_told_undone_with_its_scan_and_the_same_after_a_restart() {
+    let daemon = Daemon::start_with(carves).await;
+    daemon.make_map("a").await;
+    insert(&daemon, 1, true, "").await;
+    let before = daemon.contents("a").await;
+    let client = Client::connect(&format!("http://{}", daemon.grpc)).await.unwrap();
+    let mut messages = client.watch(&MapName::new("a").unwrap(), WatchRequest::default()).await.unwrap();
+    let carved = insert(&daemon, 2, false, "").await["carved_voxels"].as_u64().unwrap() as usize;
+    let after = daemon.contents("a").await;
+    let told = loop {
+        let message = tokio::time::timeout(PATIENCE, messages.next()).await.unwrap().unwrap().unwrap();
+        if let WatchEvent::Change(part) = message.event {
+            break part;
+        }
+    };
+    let Cause::Scan(scan) = told.cause else { panic!("{:?}", told.cause) };
+    let removed: Vec<[i64; 3]> =
+        told.removed.to_set().unwrap().iter().map(|voxel| voxel.index().map(i64::from)).collect();
+    assert!(scan.carved_voxels == carved && carved > 50 && removed.len() == carved);
+    assert!(removed.iter().all(|index| before.1.contains(index) && !after.1.contains(index)));
+    drop(messages);
+
+    let daemon = Daemon::start_in(daemon.stop().await, carves).await;
+    assert_eq!(daemon.contents("a").await, after);
+    let trajectory = json_of(daemon.get("/v1/maps/a/trajectory").await).await;
+    assert_eq!(trajectory["poses"][1]["carved_voxels"], carved);
+    let undone = daemon.post("/v1/maps/a/undo", json!({"robot": "r", "scan_id": 2})).await;
+    assert_eq!(undone.status(), StatusCode::OK);
+    assert_eq!(daemon.contents("a").await.1, before.1);
+}
+
+#[tokio::test]
+async fn a_robot_that_stands_still_is_kept_only_where_it_carves() {
+    let daemon = Daemon::start_with(carves).await;
+    daemon.make_map("a").await;
+    insert(&daemon, 1, true, "").await;
+    // The wall behind the box is seen now; from then on nothing is new.
+    for (id, has_box, is_stationary) in
+        [(2, false, false), (3, false, true), (4, true, false), (5, true, true)]
+    {
+        let answer = insert(&daemon, id, has_box, "&align=true").await;
+        assert_eq!(answer["accepted"], true, "{answer}");
+        assert_eq!(answer["stationary"], is_stationary, "scan {id}: {answer}");
+    }
+    let last = insert(&daemon, 6, false, "&align=true").await;
+    assert!(last["stationary"] == false && last["new_voxels"] == 0, "{last}");
+    assert!(last["carved_voxels"].as_u64().unwrap() > 50, "{last}");
+}
+
+#[tokio::test]
+async fn an_alignment_carves_nothing_and_says_so() {
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &row(30)).await;
+    let body = json!({"robot": "r", "points": row(30), "guess": identity_json(), "carve": true});
+    let answer = daemon.post("/v1/maps/a/alignment", body).await;
+    assert_eq!(answer.status(), StatusCode::BAD_REQUEST);
+    let error = json_of(answer).await;
+    assert_eq!(error["reason"], "unexpected_field");
+    assert!(error.to_string().contains("carve is for an insertion"), "{error}");
+}
+
+#[tokio::test]
+async fn a_map_without_moments_is_carved_as_well() {
+    let daemon = Daemon::start_with(carves).await;
+    let settings = json!({"resolution_m": 0.1, "levels": 4, "filter": "none", "moments": false});
+    daemon.put("/v1/maps/a", settings).await;
+    insert(&daemon, 1, true, "").await;
+    let (before, voxels) = (daemon.contents("a").await.1, box_voxels(&daemon).await);
+    let carved = insert(&daemon, 2, false, "").await["carved_voxels"].as_u64().unwrap() as usize;
+    assert!(carved * 100 >= voxels * 95, "{carved} of {voxels}");
+    daemon.post("/v1/maps/a/undo", json!({"robot": "r", "scan_id": 2})).await;
+    assert_eq!(daemon.contents("a").await.1, before);
+}
