@@ -33,6 +33,9 @@ use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecor
 use crate::util::StopSignal;
 use recovery::Recovery;
 
+/// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
+pub const VIEWPOINT_BYTES_MAX_DEFAULT: usize = 64 << 20;
+
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
 ///
 /// ```
@@ -63,7 +66,7 @@ pub struct ScanMapper<'a> {
 }
 
 /// Settings of a [`ScanMapper`].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MappingSettings {
     /// How scans are aligned.
     pub alignment: AlignmentSettings,
@@ -71,6 +74,20 @@ pub struct MappingSettings {
     pub stationary: Option<StationarySettings>,
     /// When a motion is believed that scans are deskewed with.
     pub deskew: DeskewSettings,
+    /// Most bytes of memory of the map's viewpoints: where they are full, those that add least go.
+    /// [`VIEWPOINT_BYTES_MAX_DEFAULT`].
+    pub viewpoint_bytes_max: usize,
+}
+
+impl Default for MappingSettings {
+    fn default() -> Self {
+        Self {
+            alignment: AlignmentSettings::default(),
+            stationary: None,
+            deskew: DeskewSettings::default(),
+            viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
+        }
+    }
 }
 
 /// A scan to map.
