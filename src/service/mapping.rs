@@ -17,6 +17,7 @@ use crate::geometry::Point;
 use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
 use crate::mapping::{LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
 use crate::util::StopSignal;
+use crate::visibility::VIEWPOINT_MEMORY_MAX;
 
 /// How far a scan is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,9 +74,11 @@ impl HostedMap {
             let answer = ScanAnswer { accepted: true, stationary: true, ..answer };
             return Ok(Step::Answered(Some(answer)));
         }
-        let ScanRecord { voxels, moments, .. } = &scan_record;
+        let ScanRecord { voxels, moments, viewpoint, .. } = &scan_record;
         let moments = moments.as_slice().len();
-        let reservation = budget.reserve_growth(growth_bytes(self.map.settings(), voxels, moments))?;
+        let of_viewpoint = viewpoint.as_ref().map_or(0, |_| VIEWPOINT_MEMORY_MAX as u64);
+        let growth = growth_bytes(self.map.settings(), voxels, moments) + of_viewpoint;
+        let reservation = budget.reserve_growth(growth)?;
         let points_skipped = scan_record.pose.points_skipped;
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
@@ -186,6 +189,7 @@ impl HostedMap {
             MappingSettings {
                 alignment,
                 stationary: Some(settings.stationary),
+                viewpoint_bytes_max: settings.limits.viewpoint_bytes_max,
                 ..MappingSettings::default()
             },
         );
