@@ -79,9 +79,9 @@ fn check(data_dir: &DataDir, output: Output) -> Result<(), CliError> {
 fn aside(data_dir: &DataDir, name: &MapName, output: &Output) -> Result<(), CliError> {
     match set_aside(data_dir, name)? {
         None => output.say(format!("map {name} can be opened as it is")),
-        Some(SetAside { folder, revision, keep_outs }) => {
+        Some(SetAside { folder, revision, keep_outs, viewpoints }) => {
             output.note(format!("set aside: {}", folder.display()));
-            output.print(&Opens { map: name.to_string(), revision, keep_outs })
+            output.print(&Opens { map: name.to_string(), revision, keep_outs, viewpoints })
         }
     }
 }
@@ -91,17 +91,19 @@ struct Opens {
     map: String,
     revision: u64,
     keep_outs: usize,
+    viewpoints: usize,
 }
 
 impl Display for Opens {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "map {} opens at revision {} with {} keep-outs; what came after it is lost to the map: scans, deletions, undos, and \
+            "map {} opens at revision {} with {} keep-outs and {} viewpoints; what came after it is lost to the map: scans, deletions, undos, and \
              keep-outs that were put or deleted",
             self.map,
             self.revision,
-            count(self.keep_outs)
+            count(self.keep_outs),
+            count(self.viewpoints)
         )
     }
 }
@@ -111,6 +113,7 @@ struct Report {
     map: String,
     revision: Option<u64>,
     voxels: usize,
+    viewpoints: usize,
     snapshots: Vec<u64>,
     segments: usize,
     records: u64,
@@ -128,7 +131,8 @@ struct AsideOut {
 
 impl Report {
     fn of(name: &MapName, diagnosis: Diagnosis) -> Self {
-        let Diagnosis { snapshots, segments, records, revision, voxels, torn_bytes, .. } = diagnosis;
+        let Diagnosis { snapshots, segments, records, revision, voxels, viewpoints, torn_bytes, .. } =
+            diagnosis;
         let Diagnosis { set_aside, not_understood, problems, .. } = diagnosis;
         let map = name.to_string();
         let aside = |AsideFile { name, bytes }| AsideOut { file: name, bytes };
@@ -137,6 +141,7 @@ impl Report {
             map,
             revision,
             voxels,
+            viewpoints,
             snapshots,
             segments,
             records,
@@ -152,7 +157,8 @@ impl Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let state = if self.problems.is_empty() { "well" } else { "NOT WELL" };
         let revision = self.revision.map_or("none".into(), |revision| revision.to_string());
-        write!(f, "map {}: {state}; revision {revision}, {} voxels; ", self.map, count(self.voxels))?;
+        write!(f, "map {}: {state}; revision {revision}, {} voxels, ", self.map, count(self.voxels))?;
+        write!(f, "{} viewpoints; ", count(self.viewpoints))?;
         let (snapshots, records) = (self.snapshots.len(), count(self.records as usize));
         write!(f, "{snapshots} snapshots, {records} records in {} segments", self.segments)?;
         if self.torn_bytes > 0 {
@@ -175,9 +181,12 @@ mod tests {
 
     #[test]
     fn a_map_that_opens_again_is_told_with_its_keep_outs() {
-        let opens = Opens { map: "office".into(), revision: 7, keep_outs: 2 };
+        let opens = Opens { map: "office".into(), revision: 7, keep_outs: 2, viewpoints: 5 };
         let text = opens.to_string();
-        assert!(text.starts_with("map office opens at revision 7 with 2 keep-outs;"), "{text}");
+        assert!(
+            text.starts_with("map office opens at revision 7 with 2 keep-outs and 5 viewpoints;"),
+            "{text}"
+        );
         assert!(text.contains("undos, and keep-outs"), "{text}");
         assert_eq!(serde_json::to_value(&opens).unwrap()["keep_outs"], 2);
     }

@@ -48,7 +48,9 @@ impl Display for MapReport {
         let moments = if map.settings.moments { bytes(map.moment_bytes) } else { "none kept".into() };
         let sets = bytes(map.set_bytes);
         let (scans, poses) = (count(map.scans), bytes(map.trajectory_bytes));
-        writeln!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}")?;
+        let (viewpoints, seen) = (count(map.viewpoints), bytes(map.viewpoint_bytes));
+        write!(f, "{scans} scans from {robots}; exact sets {sets}, moments {moments}, trajectory {poses}, ")?;
+        writeln!(f, "{viewpoints} viewpoints {seen}")?;
         map.sightings.iter().try_for_each(|sighting| write_sighting(f, sighting))?;
         match &map.storage {
             Some(storage) => write_storage(f, storage)?,

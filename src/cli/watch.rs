@@ -43,7 +43,7 @@ pub(super) struct Watch {
 impl Watch {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let form = self.level.map_or(WatchForm::Changes, |level| WatchForm::Deltas { level });
-        let request = WatchRequest { since: None, region: self.region, form };
+        let request = WatchRequest { region: self.region, form, ..WatchRequest::default() };
         let client = self.map.server.connect().await?;
         let mut messages = client.watch(&self.map.name, request).await?;
         let (mut line, mut told) = (Line::default(), 0);

@@ -40,7 +40,9 @@ pub use answers::Answers;
 pub use credentials::Credentials;
 pub use error::ClientError;
 pub use new_map::{NewFilter, NewMap};
-pub use replica::{BLOCKS_MAX_DEFAULT, Replica, ReplicaError, ReplicaOptions, ReplicaStatus};
+pub use replica::{
+    BLOCKS_MAX_DEFAULT, Replica, ReplicaError, ReplicaOptions, ReplicaStatus, VIEWPOINT_BYTES_MAX_DEFAULT,
+};
 
 use std::time::Duration;
 

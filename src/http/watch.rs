@@ -1,4 +1,5 @@
-//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&delta_level=&min=x,y,z&max=x,y,z`: the changes of a map.
+//! `GET /v1/maps/{map}/watch?since_revision=&map_uuid=&delta_level=&min=x,y,z&max=x,y,z&viewpoints=`: the changes of
+//! a map.
 //!
 //! The answer is a stream of messages, each the protobuf message `WatchResponse` that gRPC sends (`occupancy.proto`) behind
 //! its length in four bytes, little-endian. It ends with a message that says why.
@@ -30,6 +31,8 @@ pub(super) struct WatchParams {
     max: Option<String>,
     map_from_box: Option<String>,
     size: Option<String>,
+    #[serde(default)]
+    viewpoints: bool,
 }
 
 pub(super) async fn watch(
@@ -64,6 +67,7 @@ impl WatchParams {
             map_uuid: self.map_uuid.unwrap_or_default(),
             region: region.map(Into::into),
             delta_level: self.delta_level,
+            viewpoints: self.viewpoints,
         };
         let (_, request) = request.try_into()?;
         Ok(request)

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::sync::{MutexGuard, RwLockWriteGuard};
 use crate::util::StopSignal;
-use crate::visibility::Viewpoint;
+use crate::visibility::{Viewpoint, ViewpointSet};
 use crate::voxel::{BLOCK_LEVELS, MomentSet, VoxelSet};
 
 /// The turn to change a map. Others wait for it; readers do not.
@@ -85,11 +85,18 @@ impl<'a> Committer<'a> {
     /// Takes finest voxels out and then adds others, as another map did; always makes a revision, with neither pose nor
     /// moments. For copies of a map.
     pub fn exchange(self, removed: &VoxelSet, added: &VoxelSet) -> Committed {
+        self.exchange_seen(removed, added, ViewpointChange::default())
+    }
+
+    /// [`Committer::exchange`], where viewpoints come and go as well.
+    pub fn exchange_seen(self, removed: &VoxelSet, added: &VoxelSet, seen: ViewpointChange) -> Committed {
         let unchanged = self.unchanged();
         let exchange = || {
             let mut update = self.plan(removed, added, StopSignal::NEVER)?;
             let made = self.next(&mut update);
             let _locks = self.carry_out(update, Gained::default(), StopSignal::NEVER)?;
+            let mut viewpoints = self.map.viewpoints.write();
+            seen.apply(&mut viewpoints, made.0.revision);
             Some(self.publish(made).0)
         };
         // It is always made: nobody stops it.
@@ -112,11 +119,9 @@ impl<'a> Committer<'a> {
             ..scan.pose.clone()
         };
         trajectory.push(pose);
-        if let Some((viewpoint, ViewpointRecord { displaced, .. })) = viewpoint.zip(scan.viewpoint.as_ref()) {
-            let viewpoints = Arc::make_mut(&mut viewpoints);
-            displaced.iter().for_each(|&displaced| drop(viewpoints.remove(displaced)));
-            viewpoints.insert(made.0.revision, viewpoint);
-        }
+        let gone = scan.viewpoint.as_ref().map(|ViewpointRecord { displaced, .. }| displaced.clone());
+        let seen = ViewpointChange { left: viewpoint, gone: gone.unwrap_or_default() };
+        seen.apply(&mut viewpoints, made.0.revision);
         Some(self.publish(made))
     }
 
@@ -156,10 +161,7 @@ impl<'a> Committer<'a> {
         let known = self.grouped(&undo.moments);
         let _locks = self.carry_out(update, Gained { known, ..Gained::default() }, StopSignal::NEVER)?;
         let mut viewpoints = self.map.viewpoints.write();
-        if undo.scans.iter().any(|&scan| viewpoints.get(scan).is_some()) {
-            let viewpoints = Arc::make_mut(&mut viewpoints);
-            undo.scans.iter().for_each(|&scan| drop(viewpoints.remove(scan)));
-        }
+        ViewpointChange { left: None, gone: undo.scans.clone() }.apply(&mut viewpoints, made.0.revision);
         let mut trajectory = self.map.trajectory.write();
         trajectory.withdraw(undo.changes(), made.0.revision);
         if let Some(request) = &undo.request {
@@ -298,6 +300,29 @@ impl<'a> Committer<'a> {
     fn tell(&self, touched: TouchedBlocks) {
         let touched = if self.followed { touched } else { TouchedBlocks::everything() };
         self.map.followers.tell(touched);
+    }
+}
+
+/// Viewpoints that come and go with a change.
+#[derive(Debug, Clone, Default)]
+pub struct ViewpointChange {
+    /// The one that the change's scan left.
+    pub left: Option<Arc<Viewpoint>>,
+    /// The revisions of the scans whose viewpoints go, where they are there.
+    pub gone: Vec<u64>,
+}
+
+impl ViewpointChange {
+    /// Makes the change of revision `revision`. Those who hold the viewpoints as they are keep them.
+    fn apply(self, viewpoints: &mut Arc<ViewpointSet>, revision: u64) {
+        if self.left.is_none() && self.gone.iter().all(|&gone| viewpoints.get(gone).is_none()) {
+            return;
+        }
+        let viewpoints = Arc::make_mut(viewpoints);
+        self.gone.iter().for_each(|&gone| drop(viewpoints.remove(gone)));
+        if let Some(viewpoint) = self.left {
+            viewpoints.insert(revision, viewpoint);
+        }
     }
 }
 

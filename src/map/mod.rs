@@ -48,7 +48,7 @@ mod voxel_selection;
 pub(crate) use cell_bounds::CellBounds;
 pub use cell_box::CellBox;
 pub use change::{Change, DeletionRecord, KeepOutRecord, Request, UndoRecord};
-pub use commit::Committer;
+pub use commit::{Committer, ViewpointChange};
 pub use committed::Committed;
 pub use content_hash::{ContentHash, ContentVersion};
 pub use contents::{ContentsError, MapContents, REVISION_MAX};

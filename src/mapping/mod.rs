@@ -26,7 +26,7 @@ pub use guess::Guess;
 pub use recovery::{LOST_ROBOTS_MAX, LostRobots, Recovered, RecoverySettings, SearchTask};
 pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
-pub use viewpoints::ViewpointSettings;
+pub use viewpoints::{VIEWPOINT_BYTES_MAX_DEFAULT, ViewpointSettings};
 
 use std::borrow::Cow;
 use std::time::{Duration, Instant};

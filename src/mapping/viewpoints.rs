@@ -7,6 +7,9 @@ use crate::geometry::{Point, Pose};
 use crate::map::ViewpointRecord;
 use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange, Viewpoint, ViewpointSet};
 
+/// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
+pub const VIEWPOINT_BYTES_MAX_DEFAULT: usize = 64 << 20;
+
 /// When a scan sees something new, so that it leaves a viewpoint.
 ///
 /// Viewpoints are no nearer to each other than this but for what they see, whichever robot left them, so that their number grows with
@@ -32,7 +35,7 @@ pub struct ViewpointSettings {
 impl Default for ViewpointSettings {
     fn default() -> Self {
         Self {
-            bytes_max: 64 << 20,
+            bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             distance_m: 0.5,
             rotation_deg: 15.0,
             unknown_from_new_pose: 0.005,

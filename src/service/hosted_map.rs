@@ -393,6 +393,8 @@ impl HostedMap {
             moment_bytes: described.moment_bytes,
             commits: self.commit_queue.durations(),
             trajectory_bytes: described.trajectory_bytes,
+            viewpoints: described.viewpoints,
+            viewpoint_bytes: described.viewpoint_bytes,
             storage,
         })
     }

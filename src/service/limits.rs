@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Reason, ServiceError};
 use crate::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
+use crate::mapping::VIEWPOINT_BYTES_MAX_DEFAULT;
 use crate::planning::FIELD_BYTES_MAX_DEFAULT;
 
 /// The limits of the server: on what callers may ask, on what is done at once, and on what the machine has. Each is named
@@ -109,6 +110,8 @@ pub struct Limits {
     pub keep_out_tests_max: usize,
     /// Corners of a keep-out that is a prism. 64, which is also the most.
     pub keep_out_corners_max: usize,
+    /// Bytes of memory of a map's viewpoints, by which it knows what is free. Where it is full, those that add least go. 64 MiB.
+    pub viewpoint_bytes_max: usize,
     /// Robots of which one map keeps scans, or ids of scans. 4,096.
     pub robots_per_map_max: usize,
     /// Jobs that may wait for a query thread, and as many for a thread of each other pool. 256.
@@ -193,6 +196,7 @@ impl Default for Limits {
             keep_outs_max: KEEP_OUTS_MAX,
             keep_out_tests_max: 400_000_000,
             keep_out_corners_max: PRISM_CORNERS_MAX,
+            viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             robots_per_map_max: 4_096,
             jobs_waiting_max: 256,
             map_file_bytes_max: 1 << 30,

@@ -61,6 +61,7 @@ pub(super) fn from_file(
         body_bytes_max: limits.map_file_bytes_max as u64,
         voxels_max: limits.voxels_per_map_max,
         scans_max: limits.map_file_scans_max,
+        viewpoint_bytes_max: limits.viewpoint_bytes_max,
     };
     // What was reserved before lies in memory by the time more is asked for, and is measured there.
     let mut part = None;

@@ -16,8 +16,11 @@ use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSe
 use crate::align::{AlignmentSettings, Method, Verdict};
 use crate::geometry::Point;
 use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
-use crate::mapping::{Carving, LocatedScan, MappingError, MappingSettings, ScanMapper, deskewed};
+use crate::mapping::{
+    Carving, LocatedScan, MappingError, MappingSettings, ScanMapper, ViewpointSettings, deskewed,
+};
 use crate::util::StopSignal;
+use crate::visibility::VIEWPOINT_MEMORY_MAX;
 
 /// How far a scan is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,9 +81,10 @@ impl HostedMap {
             let answer = ScanAnswer { accepted: true, stationary: true, ..answer };
             return Ok(Step::Answered(Some(answer)));
         }
-        let ScanRecord { voxels, carved, moments, .. } = &scan_record;
+        let ScanRecord { voxels, carved, moments, viewpoint, .. } = &scan_record;
         let moments = moments.as_slice().len();
-        let growth = growth_bytes(self.map.settings(), voxels, moments);
+        let of_viewpoint = viewpoint.as_ref().map_or(0, |_| VIEWPOINT_MEMORY_MAX as u64);
+        let growth = growth_bytes(self.map.settings(), voxels, moments) + of_viewpoint;
         let removal = if carved.is_empty() { 0 } else { removal_bytes(&self.map, carved) };
         let reservation = budget.reserve_growth(growth + removal)?;
         let points_skipped = scan_record.pose.points_skipped;
@@ -194,6 +198,10 @@ impl HostedMap {
             MappingSettings {
                 alignment,
                 stationary: Some(settings.stationary),
+                viewpoints: ViewpointSettings {
+                    bytes_max: settings.limits.viewpoint_bytes_max,
+                    ..ViewpointSettings::default()
+                },
                 ..MappingSettings::default()
             },
         );

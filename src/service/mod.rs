@@ -22,6 +22,8 @@ mod limits;
 mod localization;
 #[cfg(test)]
 mod looks;
+#[cfg(test)]
+mod made_changes;
 mod map_file;
 mod mapping;
 mod maps;
@@ -66,12 +68,12 @@ pub use question::{
 pub use reason::{Reason, ToldBy};
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
-    Deletion, DeletionAnswer, DeletionTarget, Foreground, KeepOutAnswer, KeepOutList, ListingRequest,
-    MapFile, MapInfo, MapList, MapStorage, MapVersion, NotSeenSince, ObservedVoxel, ObserversAnswer,
-    ObserversRequest, ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer,
-    ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo,
-    UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
-    WatchedSince,
+    Deletion, DeletionAnswer, DeletionTarget, Foreground, KeepOutAnswer, KeepOutList, LeftViewpoint,
+    ListingRequest, MapFile, MapInfo, MapList, MapStorage, MapVersion, NotSeenSince, ObservedVoxel,
+    ObserversAnswer, ObserversRequest, ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes,
+    PutKeepOut, ScanAnswer, ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery,
+    UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage,
+    WatchRequest, WatchedScan, WatchedSince, WatchedViewpoint,
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;

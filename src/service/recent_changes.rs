@@ -2,7 +2,7 @@
 
 mod watched_change;
 
-pub(super) use watched_change::{BLOCKS_PER_PART, ChangeParts, WatchedChange};
+pub(super) use watched_change::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, has_looked_into};
 
 use std::collections::VecDeque;
 use std::sync::Arc;

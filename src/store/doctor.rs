@@ -10,8 +10,10 @@ use super::folder::FolderPath;
 use super::journal::{self, Inspected};
 use super::{
     DataDir, DataDirContents, FileSystem, OpeningProgress, Snapshot, StoreError, snapshot, snapshot_files,
+    viewpoint_parts,
 };
 use crate::map::{MapContents, MapName, MappedScan, MultiResolutionMap};
+use crate::util::StopSignal;
 
 /// Findings about a map.
 #[derive(Debug, Default)]
@@ -28,6 +30,8 @@ pub struct Diagnosis {
     pub acknowledged: u64,
     /// Number of finest voxels at that revision.
     pub voxels: usize,
+    /// Number of viewpoints at that revision.
+    pub viewpoints: usize,
     /// Bytes that a crash left unfinished, which the next start cuts off: nothing acknowledged is among them.
     pub torn_bytes: u64,
     /// Files that were set aside because they cannot be read. Damaged snapshots are removed together with the snapshots
@@ -63,6 +67,8 @@ pub struct SetAside {
     pub revision: u64,
     /// Keep-outs that this map has.
     pub keep_outs: usize,
+    /// Viewpoints that this map has.
+    pub viewpoints: usize,
 }
 
 /// Checks a map: reads every snapshot and every record, replays the journal from the oldest snapshot, and compares the
@@ -101,6 +107,7 @@ pub fn diagnose(data_dir: &DataDir, name: &MapName) -> Result<Diagnosis, StoreEr
     diagnosis.problems.append(&mut replay.problems);
     let revision = replay.map.revision();
     (diagnosis.revision, diagnosis.voxels) = (Some(revision), replay.map.voxels(0));
+    diagnosis.viewpoints = replay.map.viewpoints().len();
     if revision < diagnosis.acknowledged && diagnosis.problems.is_empty() {
         let acknowledged = diagnosis.acknowledged;
         let missing = StoreError::RevisionsMissing { folder: path, last: revision, acknowledged };
@@ -131,19 +138,25 @@ fn read_snapshots(
     for revision in snapshot_files::snapshot_revisions(files, path)?.into_iter().rev() {
         let file = path.join(snapshot_files::snapshot_name(revision));
         let bytes = files.read(&file).map_err(StoreError::io(&file))?;
-        match Snapshot::decode(&bytes).map_err(|reason| StoreError::damaged(&file, reason)) {
-            Ok(snapshot) if snapshot.contents.revision != revision => {
+        let decoded = Snapshot::decode_own(&bytes, StopSignal::NEVER)?;
+        match decoded.map_err(|reason| StoreError::damaged(&file, reason)) {
+            Ok((snapshot, _)) if snapshot.contents.revision != revision => {
                 let found = snapshot.contents.revision;
                 diagnosis.problems.push(format!("{}: it holds revision {found}", file.display()));
             }
-            Ok(snapshot)
+            Ok((snapshot, _))
                 if expected
                     .or(snapshots.first().map(|newest| newest.uuid))
                     .is_some_and(|it| it != snapshot.uuid) =>
             {
                 diagnosis.problems.push(format!("{}: another map's, by its uuid", file.display()));
             }
-            Ok(snapshot) => {
+            Ok((mut snapshot, parts)) => {
+                if !parts.is_empty() {
+                    let note = |error: StoreError| diagnosis.problems.push(error.to_string());
+                    let viewpoints = viewpoint_parts::load_readable(files, path, snapshot.uuid, &parts, note);
+                    snapshot.contents.viewpoints = Arc::new(viewpoints);
+                }
                 let head = snapshot::head_of(&bytes).unwrap_or_default().max(revision);
                 diagnosis.acknowledged = diagnosis.acknowledged.max(head);
                 snapshots.push(snapshot);
@@ -236,6 +249,7 @@ fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
     let same = (&written.revision, &written.voxels, &written.requests) == (revision, voxels, requests);
     let is_known = |pose: &MappedScan| made.trajectory.at(pose.revision) == Some(pose);
     let same = same && written.keep_outs == made.keep_outs;
+    let same = same && written.viewpoints == made.viewpoints;
     same && written.moments == made.moments && written.trajectory.poses().all(is_known)
 }
 
@@ -247,20 +261,27 @@ fn is_made_by(written: &MapContents, made: &MapContents) -> bool {
 /// # Errors
 /// When the system refuses, or there is no snapshot that can be read.
 pub fn set_aside(data_dir: &DataDir, name: &MapName) -> Result<Option<SetAside>, StoreError> {
-    use StoreError::{Foreign, JournalDamaged, RevisionsMissing};
+    use StoreError::{Damaged, Foreign, JournalDamaged, RevisionsMissing};
     // An exchange that a crash interrupted may be that of an earlier call.
     data_dir.end_replacements(&mut DataDirContents::default())?;
-    match data_dir.map(name, &OpeningProgress::default()) {
+    let refusal = match data_dir.map(name, &OpeningProgress::default()) {
         Ok(_) => return Ok(None),
-        Err(JournalDamaged { .. } | Foreign { .. } | RevisionsMissing { .. }) => {}
+        Err(error @ (Damaged { .. } | JournalDamaged { .. } | Foreign { .. } | RevisionsMissing { .. })) => {
+            error
+        }
         Err(error) => return Err(error),
-    }
+    };
     let path = data_dir.path(name)?;
-    let map = readable(data_dir.files(), &path)?;
+    let map = match readable(data_dir.files(), &path) {
+        // It says which file is at fault.
+        Err(Damaged { .. }) => return Err(refusal),
+        map => map?,
+    };
     let first = Snapshot::of(&map, Uuid::new_v4());
     let folder = data_dir.replace_damaged(name, &path, &first)?;
     let (revision, keep_outs) = (first.contents.revision, first.contents.keep_outs.len());
-    Ok(Some(SetAside { folder, revision, keep_outs }))
+    let viewpoints = first.contents.viewpoints.len();
+    Ok(Some(SetAside { folder, revision, keep_outs, viewpoints }))
 }
 
 /// The map that a folder still gives: that of the newest snapshot, and the changes after it up to what cannot be read.

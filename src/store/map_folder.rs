@@ -5,6 +5,7 @@
 //! office.UUID/snapshot-00000000000000004711.mrol
 //! office.UUID/journal-00000000000000000001.log        from that revision on
 //! office.UUID/journal-00000000000000004712.log
+//! office.UUID/viewpoints-00000000000000000003.part    see `viewpoint_parts`
 //! ```
 //!
 //! Two locks are held while files are written, one for the snapshots and one for the journal; only writers wait for
@@ -29,7 +30,8 @@ use uuid::Uuid;
 use super::folder::FolderPath;
 use super::journal::{Journal, Record, SegmentFolder, SegmentedJournal};
 use super::retention::UndoWindow;
-use super::snapshot_files::{Sizes, forget_damaged, snapshot_name};
+use super::snapshot_files::{Sizes, forget_damaged, snapshot_name, unneeded_parts};
+use super::viewpoint_parts::{ViewpointParts, part_names, section_of};
 use super::{FileSystem, Snapshot, StoreError, StoreSettings, folder, snapshot};
 use crate::map::WithdrawnChange;
 use crate::sync::{Mutex, Rank};
@@ -45,8 +47,8 @@ pub struct MapFolder {
     /// Location of the journal's segments.
     place: SegmentFolder,
     journal: Mutex<SegmentedJournal>,
-    /// Held while a snapshot is written, or old ones are removed.
-    snapshots: Mutex<()>,
+    /// The parts that the newest snapshot names. Held while a snapshot is written, or old ones are removed.
+    snapshots: Mutex<ViewpointParts>,
     /// True once the folder was deleted. Changed while both locks are held.
     is_gone: AtomicBool,
     facts: Facts,
@@ -60,6 +62,7 @@ impl MapFolder {
         settings: StoreSettings,
         journal: SegmentedJournal,
         snapshots: Vec<u64>,
+        parts: ViewpointParts,
         found: u64,
     ) -> Self {
         let folder = Self {
@@ -70,7 +73,7 @@ impl MapFolder {
             place: journal.place().clone(),
             facts: Facts::new(&journal, snapshots, found),
             journal: Mutex::new(Rank::Journal, journal),
-            snapshots: Mutex::new(Rank::Snapshots, ()),
+            snapshots: Mutex::new(Rank::Snapshots, parts),
             is_gone: AtomicBool::default(),
         };
         folder.count_bytes();
@@ -129,11 +132,8 @@ impl MapFolder {
     fn write(&self, snapshot: &Snapshot, bytes_max: u64) -> Result<(), StoreError> {
         let revision = snapshot.contents.revision;
         // Done before any lock is taken: it takes seconds for a large map.
-        let mut file = snapshot.encode().map_err(StoreError::io(self.path.get()))?;
-        if file.len() as u64 > bytes_max {
-            return Err(StoreError::NoRoom { bytes: file.len() as u64, bytes_max });
-        }
-        let _writing = self.snapshots.lock();
+        let mut file = snapshot.encode_without_viewpoints().map_err(StoreError::io(self.path.get()))?;
+        let mut parts = self.snapshots.lock();
         self.check_there()?;
         if snapshot.uuid != self.uuid {
             let (found, expected) = (snapshot.uuid, self.uuid);
@@ -142,6 +142,13 @@ impl MapFolder {
         if revision < self.facts.newest_snapshot() {
             return Ok(());
         }
+        let plan = parts.plan(&snapshot.contents.viewpoints);
+        let new_part = plan.new_part(&snapshot.contents.viewpoints, self.uuid);
+        let (written, part) = new_part.map_err(StoreError::io(self.path.get()))?.unzip();
+        let bytes = (file.len() + 2 * part.as_ref().map_or(0, Vec::len)) as u64;
+        if bytes > bytes_max {
+            return Err(StoreError::NoRoom { bytes, bytes_max });
+        }
         // Everything in the snapshot is durable in the journal first; the next record begins a segment.
         let (head, appended) = self.in_journal(|journal| {
             journal.end_segment()?;
@@ -149,10 +156,21 @@ impl MapFolder {
         })?;
         // What was acknowledged during the encoding is only in the journal: opening the map must notice where that is
         // missing.
-        snapshot::set_head(&mut file, head.max(revision));
-        folder::replace(&*self.files, &self.path.file(&snapshot_name(revision)), &file)?;
+        snapshot::complete(&mut file, head.max(revision), &section_of(&plan.uses(written.as_ref())));
+        parts.use_up_number(&plan);
+        let write = || {
+            if let (Some(written), Some(part)) = (&written, &part) {
+                for name in part_names(written.number()) {
+                    folder::replace(&*self.files, &self.path.file(&name), part)?;
+                }
+            }
+            folder::replace(&*self.files, &self.path.file(&snapshot_name(revision)), &file)
+        };
+        // A part that no snapshot names would take the space that is missing.
+        write().inspect_err(|_| drop(self.forget_parts(&parts)))?;
+        parts.tell_written(plan, written);
         self.facts.tell_saved(revision, appended);
-        self.forget(self.undo_window(), snapshot.contents.trajectory.withdrawn())
+        self.forget(self.undo_window(), snapshot.contents.trajectory.withdrawn(), &parts)
     }
 
     /// True when there is much journal since the last snapshot, or that is old; false just after a failure.
@@ -170,9 +188,9 @@ impl MapFolder {
             return Ok(false);
         }
         let before = self.used().kept_from;
-        let _writing = self.snapshots.lock();
+        let parts = self.snapshots.lock();
         self.check_there()?;
-        let forgotten = self.forget(UndoWindow { bytes_max: 0, ..self.undo_window() }, &[]);
+        let forgotten = self.forget(UndoWindow { bytes_max: 0, ..self.undo_window() }, &[], &parts);
         let gave_up = forgotten.is_ok() && self.used().kept_from != before;
         self.facts.tell_given_up(gave_up);
         self.count_bytes();
@@ -183,8 +201,14 @@ impl MapFolder {
         UndoWindow { revisions: self.settings.undo_revisions, bytes_max: self.settings.undo_bytes_max }
     }
 
-    /// Removes snapshots and journal that are no longer needed; the caller holds the lock of the snapshots.
-    fn forget(&self, window: UndoWindow, withdrawn: &[WithdrawnChange]) -> Result<(), StoreError> {
+    /// Removes snapshots and journal that are no longer needed, and the parts that only those named; `parts` are those of the
+    /// newest, whose lock the caller holds.
+    fn forget(
+        &self,
+        window: UndoWindow,
+        withdrawn: &[WithdrawnChange],
+        parts: &ViewpointParts,
+    ) -> Result<(), StoreError> {
         let path = self.path.get();
         let sizes = Sizes::of(&*self.files, &path)?;
         let kept = self.facts.forget(window, withdrawn, &sizes);
@@ -196,6 +220,27 @@ impl MapFolder {
         for revision in sizes.snapshots.keys().filter(|revision| !kept.contains(revision)) {
             let path = path.join(snapshot_name(*revision));
             self.files.remove(&path).map_err(StoreError::io(&path))?;
+        }
+        self.files.sync(&path).map_err(StoreError::io(&path))?;
+        self.forget_parts(parts)
+    }
+
+    /// Removes the parts that no snapshot names; those of the newest snapshot are `parts`. What was removed of snapshots is
+    /// durable before: after a crash none is there that names a part which is not.
+    fn forget_parts(&self, parts: &ViewpointParts) -> Result<(), StoreError> {
+        let path = self.path.get();
+        let unneeded = unneeded_parts(&*self.files, &path, parts.numbers())?;
+        for number in &unneeded {
+            for path in part_names(*number).map(|name| path.join(name)) {
+                match self.files.remove(&path) {
+                    // The copy of one that was cut short.
+                    Err(missing) if missing.kind() == std::io::ErrorKind::NotFound => {}
+                    removed => removed.map_err(StoreError::io(&path))?,
+                }
+            }
+        }
+        if unneeded.is_empty() {
+            return Ok(());
         }
         self.files.sync(&path).map_err(StoreError::io(&path))
     }

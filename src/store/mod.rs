@@ -19,6 +19,7 @@
 
 mod checked_files;
 mod codec;
+mod compression;
 mod data_dir;
 pub mod doctor;
 mod entry;
@@ -35,6 +36,7 @@ mod retention;
 mod settings;
 mod snapshot;
 mod snapshot_files;
+mod viewpoint_parts;
 
 pub use data_dir::{DataDir, DataDirContents};
 pub use error::StoreError;

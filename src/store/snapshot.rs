@@ -3,52 +3,57 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-MAP"
-//!      8  4      format version, u32 little-endian: 7
+//!      8  4      format version, u32 little-endian: 8
 //!     12  4      CRC-32C of the version, from version 3 on, and of everything from offset 16, u32 little-endian
 //!     16  8      bytes of the body before compression, u64 little-endian
 //!     24  8      from version 4 on: head of the map's journal when the file was written, the last revision that may
 //!                have been acknowledged, u64 little-endian
 //!     32  16     from version 4 on: uuid of the map, as in the body
-//!     48  rest   the body: a zstd frame of a protobuf message, proto/mrol/store/v1/snapshot.proto; from 24 on up to
+//!     48  4      from version 8 on: bytes n of the list of parts, u32 little-endian; 0 of a map file outside of a map's folder
+//!     52  4      from version 8 on: CRC-32C of the list of parts, u32 little-endian
+//!     56  n      the list of parts that the map's viewpoints lie in: `UsedViewpointParts` of
+//!                proto/mrol/store/v1/snapshot.proto, see `viewpoint_parts`
+//! 56 + n  rest   the body: a zstd frame of the message `Snapshot` of that file; from 48 on up to version 7, from 24 on up to
 //!                version 3
 //! ```
+//!
+//! The list of parts stands before the body, so that who asks which parts are needed reads only the start of the file.
 
 mod body;
-mod compression;
 mod fields;
+mod header;
 mod limits;
+mod viewpoints;
 mod writing;
 
+pub(crate) use header::body_bytes;
+pub(super) use header::{HEADER_BYTES, bytes_with_parts, complete, head_of, parts_in_start, uuid_in};
 pub use limits::{MapFileError, MapFileLimits};
 
 use std::convert::Infallible;
 use std::path::Path;
+use std::sync::Arc;
 
 use uuid::Uuid;
 
 use super::codec::Unreadable;
+use super::compression::{WINDOW_BYTES, compress_onto, decompress};
+use super::viewpoint_parts::{self, PartUse, uses_in};
 use super::{FileSystem, StoreError, folder};
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
 use crate::util::StopSignal;
+use crate::visibility::ViewpointSet;
 use body::Body;
-use compression::{WINDOW_BYTES, checksum_after, compress_onto, decompress};
+use header::{Frames, begun, checked_frames, set_checksum};
 use limits::Memory;
 use writing::body_of;
 
 /// Format version that this build writes; it reads this one and all earlier ones. Version 1 has the voxels as masks of
 /// 64 bytes, and neither withdrawn scans nor requests. Up to version 2 moments have no forms; up to version 3 the
 /// header has neither head nor uuid; up to version 4 scans have no session, and those that were undone are not stored; up to
-/// version 5 no deletion was taken back; up to version 6 there are no keep-outs, and all maps have filters and moments.
-pub const FORMAT_VERSION: u32 = 7;
-const MAGIC: &[u8; 8] = b"MROL-MAP";
-pub(super) const HEADER_BYTES: usize = 48;
-/// Bytes of the header up to version 3.
-const OLD_HEADER_BYTES: usize = 24;
-const BODY_BYTES_AT: usize = 16;
-const HEAD_AT: usize = 24;
-const UUID_AT: usize = 32;
-const VERSION: std::ops::Range<usize> = 8..12;
-const CHECKED_FROM: usize = 16;
+/// version 5 no deletion was taken back; up to version 6 there are no keep-outs, and all maps have filters and moments; up to
+/// version 7 there are no viewpoints.
+pub const FORMAT_VERSION: u32 = 8;
 
 /// A map at one revision.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +107,7 @@ impl Snapshot {
         folder::replace(files, path, &bytes)
     }
 
-    /// Reads the file at `path`.
+    /// Reads the file at `path`, with the viewpoints that lie in parts beside it.
     ///
     /// # Errors
     /// When the file cannot be read, is not a map file, is damaged, or was written by a newer version.
@@ -116,7 +121,14 @@ impl Snapshot {
     /// As for [`Snapshot::read`]; `Cancelled` once stopped.
     pub fn read_until(files: &dyn FileSystem, path: &Path, stop: StopSignal<'_>) -> Result<Self, StoreError> {
         let bytes = folder::read_until(files, path, stop)?;
-        Self::decode_own(&bytes, stop)?.map_err(|reason| StoreError::damaged(path, reason))
+        let decoded = Self::decode_own(&bytes, stop)?;
+        let (mut snapshot, parts) = decoded.map_err(|reason| StoreError::damaged(path, reason))?;
+        if !parts.is_empty() {
+            let of = folder::folder_of(path);
+            let loaded = viewpoint_parts::load(files, of, snapshot.uuid, &parts, stop)?;
+            snapshot.contents.viewpoints = Arc::new(loaded.viewpoints);
+        }
+        Ok(snapshot)
     }
 
     /// Encodes the snapshot as the bytes of a map file.
@@ -133,18 +145,24 @@ impl Snapshot {
     /// # Errors
     /// As for [`Snapshot::encode`].
     pub fn encode_until(&self, stop: StopSignal<'_>) -> std::io::Result<Option<Vec<u8>>> {
-        let body = body_of(self, stop);
+        self.encode_with(&self.contents.viewpoints, stop)
+    }
+
+    /// Encodes the snapshot for its map's folder, where its viewpoints lie in parts; [`complete`] names them.
+    pub(super) fn encode_without_viewpoints(&self) -> std::io::Result<Vec<u8>> {
+        self.encode_with(&ViewpointSet::default(), StopSignal::NEVER).map(Option::unwrap_or_default)
+    }
+
+    fn encode_with(
+        &self,
+        viewpoints: &ViewpointSet,
+        stop: StopSignal<'_>,
+    ) -> std::io::Result<Option<Vec<u8>>> {
+        let body = body_of(self, viewpoints, stop);
         if stop.is_stopped() {
             return Ok(None);
         }
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + body.len() / 2);
-        bytes.extend_from_slice(MAGIC);
-        bytes.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
-        bytes.extend_from_slice(&[0; 4]);
-        bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
-        bytes.extend_from_slice(&self.contents.revision.to_le_bytes());
-        bytes.extend_from_slice(self.uuid.as_bytes());
-        let mut bytes = compress_onto(bytes, &body, stop)?;
+        let mut bytes = compress_onto(begun(body.len(), self.contents.revision, self.uuid), &body, stop)?;
         if stop.is_stopped() {
             return Ok(None);
         }
@@ -184,20 +202,38 @@ impl Snapshot {
         reserve: impl FnMut(u64) -> Result<(), E>,
         stop: StopSignal<'_>,
     ) -> Result<Self, MapFileError<E>> {
+        match Self::decode_but_parts(bytes, limits, reserve, stop)? {
+            (snapshot, parts) if parts.is_empty() => Ok(snapshot),
+            (_, parts) => Err(format!(
+                "its viewpoints lie in {} files beside it, in its map's folder: `mrol snapshot` makes one file of a map",
+                parts.len()
+            )
+            .into()),
+        }
+    }
+
+    /// [`Snapshot::decode_until`] of a file that may lie in a map's folder: without the viewpoints that lie in parts, which it
+    /// names.
+    pub(super) fn decode_but_parts<E>(
+        bytes: &[u8],
+        limits: &MapFileLimits,
+        reserve: impl FnMut(u64) -> Result<(), E>,
+        stop: StopSignal<'_>,
+    ) -> Result<(Self, Vec<PartUse>), MapFileError<E>> {
         let decoded = Self::decode_paced(bytes, limits, &mut Memory(reserve), stop);
         // A part that was read incompletely looks like damage.
         if stop.is_stopped() { Err(MapFileError::Stopped) } else { decoded }
     }
 
-    /// Decodes a map file of a server's own under a stop signal.
+    /// Decodes a map file of a server's own under a stop signal, but for the viewpoints that lie in parts.
     ///
     /// # Errors
     /// `Cancelled` once stopped; else what is wrong with the bytes.
     pub(super) fn decode_own(
         bytes: &[u8],
         stop: StopSignal<'_>,
-    ) -> Result<Result<Self, Unreadable>, StoreError> {
-        match Self::decode_until(bytes, &MapFileLimits::OWN, |_| Ok::<_, Infallible>(()), stop) {
+    ) -> Result<Result<(Self, Vec<PartUse>), Unreadable>, StoreError> {
+        match Self::decode_but_parts(bytes, &MapFileLimits::OWN, |_| Ok::<_, Infallible>(()), stop) {
             Err(MapFileError::Stopped) => Err(StoreError::Cancelled),
             decoded => Ok(decoded.map_err(|refusal| refusal.to_string())),
         }
@@ -208,8 +244,8 @@ impl Snapshot {
         limits: &MapFileLimits,
         memory: &mut Memory<impl FnMut(u64) -> Result<(), E>>,
         stop: StopSignal<'_>,
-    ) -> Result<Self, MapFileError<E>> {
-        let (compressed, length) = Self::checked_frame(bytes, stop)?;
+    ) -> Result<(Self, Vec<PartUse>), MapFileError<E>> {
+        let Frames { parts, body: compressed, body_bytes: length } = checked_frames(bytes, stop)?;
         let most = limits.body_bytes_max;
         if length > most {
             return Err(format!("a body of {length} bytes, at most {most} are read").into());
@@ -218,76 +254,18 @@ impl Snapshot {
         memory.reserve(length as usize + WINDOW_BYTES.min(length as usize))?;
         let body = decompress(compressed, length as usize, stop)
             .map_err(|e| format!("the body from offset {} on: {e}", bytes.len() - compressed.len()))?;
-        Body::of(&body, stop).map_err(|e| format!("the body: {e}"))?.read(limits, memory)
+        let snapshot = Body::of(&body, stop).map_err(|e| format!("the body: {e}"))?.read(limits, memory)?;
+        let parts = uses_in(parts)?;
+        let last = parts.iter().filter_map(|part| part.revisions.last()).max();
+        if let Some(late) = last.filter(|last| **last > snapshot.contents.revision) {
+            let revision = snapshot.contents.revision;
+            return Err(format!("a viewpoint of revision {late} in a part, the map is at {revision}").into());
+        }
+        if !parts.is_empty() && !snapshot.contents.viewpoints.is_empty() {
+            return Err("viewpoints in its body as well as in parts".to_owned().into());
+        }
+        Ok((snapshot, parts))
     }
-
-    /// Checks the header and checksum of a file; returns its compressed body and the size before compression.
-    fn checked_frame<'b>(bytes: &'b [u8], stop: StopSignal<'_>) -> Result<(&'b [u8], u64), Unreadable> {
-        let header = bytes.get(..OLD_HEADER_BYTES).ok_or_else(|| too_short(bytes))?;
-        if &header[..8] != MAGIC {
-            return Err("not a map file: it does not begin with MROL-MAP".into());
-        }
-        let version = u32_at(header, 8);
-        if version == 0 || version > FORMAT_VERSION {
-            return Err(format!(
-                "format version {version}, this build reads 1 to {FORMAT_VERSION}: use a newer one"
-            ));
-        }
-        let header_bytes = if version < 4 { OLD_HEADER_BYTES } else { HEADER_BYTES };
-        let compressed = bytes.get(header_bytes..).ok_or_else(|| too_short(bytes))?;
-        let (stored, computed) = (u32_at(header, 12), checksum(bytes, version, stop));
-        if stored != computed {
-            return Err(format!(
-                "checksum {computed:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
-            ));
-        }
-        Ok((compressed, u64_at(header, BODY_BYTES_AT)))
-    }
-}
-
-fn too_short(bytes: &[u8]) -> Unreadable {
-    format!("{} bytes are too few for a map file's header", bytes.len())
-}
-
-/// The journal's head in the map file `bytes`, which must be complete; none up to version 3.
-pub(super) fn head_of(bytes: &[u8]) -> Option<u64> {
-    let header = bytes.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
-    Some(u64_at(header, HEAD_AT))
-}
-
-/// Writes the head of the journal into the map file `bytes`.
-pub(super) fn set_head(bytes: &mut [u8], head: u64) {
-    bytes[HEAD_AT..UUID_AT].copy_from_slice(&head.to_le_bytes());
-    set_checksum(bytes, StopSignal::NEVER);
-}
-
-/// The uuid in the header of a map file, which may be damaged; none up to version 3.
-pub(super) fn uuid_in(header: &[u8]) -> Option<Uuid> {
-    let header = header.get(..HEADER_BYTES).filter(|header| u32_at(header, VERSION.start) >= 4)?;
-    Uuid::from_slice(&header[UUID_AT..]).ok()
-}
-
-/// Bytes of the body of the map file `bytes` before compression.
-pub(crate) fn body_bytes(bytes: &[u8]) -> u64 {
-    bytes.get(..OLD_HEADER_BYTES).map_or(0, |header| u64_at(header, BODY_BYTES_AT))
-}
-
-fn set_checksum(bytes: &mut [u8], stop: StopSignal<'_>) {
-    let checksum = checksum(bytes, FORMAT_VERSION, stop);
-    bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
-}
-
-fn u64_at(bytes: &[u8], offset: usize) -> u64 {
-    u64::from(u32_at(bytes, offset)) | u64::from(u32_at(bytes, offset + 4)) << 32
-}
-
-fn checksum(bytes: &[u8], version: u32, stop: StopSignal<'_>) -> u32 {
-    let of_version = if version < 3 { 0 } else { crc32c::crc32c(&bytes[VERSION]) };
-    checksum_after(of_version, &bytes[CHECKED_FROM..], stop)
-}
-
-fn u32_at(bytes: &[u8], offset: usize) -> u32 {
-    u32::from_le_bytes(std::array::from_fn(|i| bytes[offset + i]))
 }
 
 #[cfg(test)]
@@ -296,14 +274,17 @@ mod tests {
 
     use prost::Message;
 
+    use super::header::VERSION;
     use super::*;
-    use crate::geometry;
+    use crate::geometry::{self, Point};
     use crate::map::{
         CallerName, CompletedRequest, ForgottenIds, KeepOut, KeepOutName, KeepOutShape, KeepOuts, MappedScan,
         Prism, Region, RequestId, RequestKind, RobotName, SessionName, Trajectory, WithdrawnChange,
     };
     use crate::store::codec::moments;
     use crate::store::pb;
+    use crate::store::viewpoint_parts::section_of;
+    use crate::visibility::{RangeImage, SeenRange, Viewpoint};
     use crate::voxel::{MomentSet, Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
@@ -347,9 +328,21 @@ mod tests {
                 trajectory: trajectory_of(pose),
                 requests: [request].into_iter().collect(),
                 keep_outs: Arc::new(keep_outs()),
-                viewpoints: Arc::default(),
+                viewpoints: Arc::new(viewpoints()),
             },
         }
+    }
+
+    /// Two, of which one was left by a scan whose pose is not kept.
+    fn viewpoints() -> ViewpointSet {
+        let points: Vec<_> = (0..400).map(|i| Point::new(2.0, (i % 20) as f32 / 9.0, 0.3)).collect();
+        let image = RangeImage::of_points(&points, SeenRange { min_m: 0.1, max_m: 9.0 }, 900).unwrap();
+        let pose = geometry::pose([1.0, -2.0, 0.5], [0.0, 0.6, 0.0, 0.8]).unwrap();
+        let mut viewpoints = ViewpointSet::default();
+        for revision in [3, 41] {
+            viewpoints.insert(revision, Arc::new(Viewpoint::new(pose, image.clone())));
+        }
+        viewpoints
     }
 
     /// One of each shape.
@@ -391,7 +384,7 @@ mod tests {
 
     /// All of it in one message.
     fn message(snapshot: &Snapshot) -> pb::Snapshot {
-        let MapContents { revision, voxels, moments, trajectory, requests, keep_outs, .. } =
+        let MapContents { revision, voxels, moments, trajectory, requests, keep_outs, viewpoints } =
             &snapshot.contents;
         pb::Snapshot {
             uuid: snapshot.uuid.as_bytes().to_vec().into(),
@@ -411,17 +404,17 @@ mod tests {
             keep_outs: keep_outs.iter().map(Into::into).collect(),
             no_filter: snapshot.settings.filter.is_none(),
             no_moments: !snapshot.settings.moments,
+            viewpoints: viewpoints.iter().map(|(revision, it)| (revision, &**it).into()).collect(),
         }
     }
 
     #[test]
     fn a_body_is_written_as_the_message_that_it_is() {
-        assert!(body_of(&snapshot(), StopSignal::NEVER) == message(&snapshot()).encode_to_vec());
         let contents = MapContents::default();
-        let empty = Snapshot { contents, ..snapshot() };
-        assert!(body_of(&empty, StopSignal::NEVER) == message(&empty).encode_to_vec());
-        let query_only = query_only(true, true);
-        assert!(body_of(&query_only, StopSignal::NEVER) == message(&query_only).encode_to_vec());
+        for snapshot in [snapshot(), Snapshot { contents, ..snapshot() }, query_only(true, true)] {
+            let body = body_of(&snapshot, &snapshot.contents.viewpoints, StopSignal::NEVER);
+            assert!(body == message(&snapshot).encode_to_vec());
+        }
     }
 
     /// The snapshot of a map without filters, without moments, or without either.
@@ -457,7 +450,7 @@ mod tests {
             let stop = StopSignal::when(&count);
             let bytes = snapshot.encode_until(stop).unwrap().unwrap();
             assert!(entries / looks.replace(0) <= 16 << 10);
-            assert!(Snapshot::decode_own(&bytes, stop).unwrap().unwrap() == snapshot);
+            assert!(Snapshot::decode_own(&bytes, stop).unwrap().unwrap().0 == snapshot);
             assert!(entries / looks.replace(0) <= 16 << 10);
             let map = MultiResolutionMap::restore_until(snapshot.settings, snapshot.contents, stop)
                 .unwrap()
@@ -503,9 +496,35 @@ mod tests {
     fn a_snapshot_says_whose_it_is_and_where_the_journal_was() {
         let mut bytes = snapshot().encode().unwrap();
         assert_eq!((head_of(&bytes), uuid_in(&bytes)), (Some(42), Some(snapshot().uuid)));
-        set_head(&mut bytes, 45);
+        complete(&mut bytes, 45, &[]);
         assert_eq!(head_of(&bytes), Some(45));
         assert_eq!(Snapshot::decode(&bytes).unwrap(), snapshot());
+    }
+
+    #[test]
+    fn a_snapshot_that_names_parts_tells_which_from_its_start_and_is_no_map_file() {
+        let uses = vec![PartUse { number: 3, checksum: 7, revisions: vec![2, 5, 42] }];
+        let mut bytes = snapshot().encode_without_viewpoints().unwrap();
+        assert_eq!(bytes_with_parts(&bytes), None);
+        complete(&mut bytes, 45, &section_of(&uses));
+        let (read, parts) = Snapshot::decode_own(&bytes, StopSignal::NEVER).unwrap().unwrap();
+        assert_eq!(parts, uses);
+        let contents = MapContents { viewpoints: Arc::default(), ..snapshot().contents };
+        assert_eq!(read, Snapshot { contents, ..snapshot() });
+        let refused = Snapshot::decode(&bytes).unwrap_err();
+        assert!(refused.contains("its viewpoints lie in 1 files beside it"), "{refused}");
+
+        let start = &bytes[..bytes_with_parts(&bytes).unwrap()];
+        assert_eq!(uses_in(parts_in_start(start).unwrap()).unwrap(), uses);
+        for bit in HEADER_BYTES * 8 - 32..start.len() * 8 {
+            let mut damaged = start.to_vec();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(parts_in_start(&damaged), None, "bit {bit}");
+        }
+        let mut late = snapshot().encode_without_viewpoints().unwrap();
+        complete(&mut late, 45, &section_of(&[PartUse { number: 3, checksum: 7, revisions: vec![43] }]));
+        let refused = Snapshot::decode_own(&late, StopSignal::NEVER).unwrap().unwrap_err();
+        assert!(refused.contains("a viewpoint of revision 43 in a part, the map is at 42"), "{refused}");
     }
 
     #[test]
@@ -540,6 +559,30 @@ mod tests {
         message.requests.insert(0, older);
         let refused = read(&message).unwrap_err().to_string();
         assert!(refused.contains("their ids must differ"), "{refused}");
+    }
+
+    #[test]
+    fn viewpoints_that_no_map_has_are_refused() {
+        let message = message(&snapshot());
+        let refused = |change: &dyn Fn(&mut Vec<pb::Viewpoint>)| {
+            let mut message = message.clone();
+            change(&mut message.viewpoints);
+            read(&message).unwrap_err().to_string()
+        };
+        assert!(refused(&|all| all.swap(0, 1)).contains("must ascend"));
+        assert!(refused(&|all| all[0].revision = 0).contains("must ascend from 1"));
+        assert!(refused(&|all| all[1].revision = 43).contains("revision 43, the map is at 42"));
+        assert!(
+            refused(&|all| all[0].image = all[0].image.slice(1..)).contains("the viewpoint of revision 3")
+        );
+        assert!(refused(&|all| all[0].image = vec![1; 9000].into()).contains("a record of"));
+        let limits = MapFileLimits { viewpoint_bytes_max: 100, ..MapFileLimits::OWN };
+        let bytes = snapshot().encode().unwrap();
+        let refused = Snapshot::decode_within(&bytes, &limits, |_| Ok::<_, Infallible>(())).unwrap_err();
+        assert!(
+            refused.to_string().ends_with("bytes of viewpoints, viewpoint_bytes_max is 100"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -78,6 +78,20 @@ pub(super) fn write_maps(text: &mut String, maps: &[MapInfo]) {
     for map in maps {
         family.sample(&[("map", &map.name)], map.trajectory_bytes);
     }
+    let mut family = Family::begin(
+        text,
+        "mrol_map_viewpoint_bytes",
+        Kind::Gauge,
+        "Bytes of the viewpoints, by which a map knows what is free, by map",
+    );
+    for map in maps {
+        family.sample(&[("map", &map.name)], map.viewpoint_bytes);
+    }
+    let mut family =
+        Family::begin(text, "mrol_map_viewpoints", Kind::Gauge, "Viewpoints that scans left, by map");
+    for map in maps {
+        family.sample(&[("map", &map.name)], map.viewpoints);
+    }
     write_filters(text, maps);
     let mut family = Family::begin(text, "mrol_map_revision", Kind::Gauge, "Committed changes, by map");
     for map in maps {

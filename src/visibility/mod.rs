@@ -17,4 +17,4 @@ mod viewpoint;
 pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, SeenRange};
 pub use scan_surface::{ScanSurface, SurfaceSettings};
 pub use set::{Gaze, ViewpointSet};
-pub use viewpoint::Viewpoint;
+pub use viewpoint::{VIEWPOINT_MEMORY_MAX, Viewpoint};

@@ -9,6 +9,8 @@ use crate::geometry::Pose;
 
 /// How many cells a viewpoint reaches in each direction, at most.
 const CELLS_OF_REACH: f64 = 8.0;
+/// Largest index of a cell that a viewpoint is in, and some more.
+const CELL_INDEX_MAX: f64 = (1 << 30) as f64;
 /// Steps along a ray within a cell.
 const STEPS_A_CELL: f64 = 2.0;
 
@@ -52,7 +54,10 @@ impl Reach {
         let distance =
             |end: &[f64; 3]| (0..3).map(|axis| (end[axis] - origin[axis]).powi(2)).sum::<f64>().sqrt();
         let reach_m = ends.iter().map(distance).fold(0.0, f64::max).max(f64::from(f32::MIN_POSITIVE));
-        let exponent = (reach_m / CELLS_OF_REACH).log2().ceil() as i32;
+        // Indices of cells are of 32 bits, however far away and however small a thing was seen.
+        let far_m = origin.iter().fold(reach_m, |far, c| far.max(c.abs()));
+        let side_m = (reach_m / CELLS_OF_REACH).max(far_m / CELL_INDEX_MAX);
+        let exponent = side_m.log2().ceil() as i32;
         let side_m = 2f64.powi(exponent);
         let mut grid = LocalGrid::around(origin, reach_m, side_m);
         let half_pixel = f64::from(image.pitch()) * std::f64::consts::FRAC_1_SQRT_2;

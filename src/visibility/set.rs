@@ -57,6 +57,11 @@ impl ViewpointSet {
         self.by_revision.iter().filter_map(|(&revision, &slot)| Some((revision, self.at(slot)?)))
     }
 
+    /// [`ViewpointSet::iter`] from `revision` on.
+    pub fn iter_from(&self, revision: u64) -> impl Iterator<Item = (u64, &Arc<Viewpoint>)> {
+        self.by_revision.range(revision..).filter_map(|(&revision, &slot)| Some((revision, self.at(slot)?)))
+    }
+
     /// The viewpoint of the scan that made `revision`.
     pub fn get(&self, revision: u64) -> Option<&Arc<Viewpoint>> {
         self.at(*self.by_revision.get(&revision)?)

@@ -14,6 +14,10 @@ pub struct Viewpoint {
     reach: Reach,
 }
 
+/// Most bytes of memory of a viewpoint whose image has at most [`IMAGE_BYTES_MAX`](super::IMAGE_BYTES_MAX) bytes: the places of
+/// 104 x 104 tiles on each face, and 17 x 17 x 17 cells of an index, read and in a growing list.
+pub const VIEWPOINT_MEMORY_MAX: usize = 512 << 10;
+
 impl Viewpoint {
     /// The viewpoint of a scan that was taken at `map_from_sensor`.
     pub fn new(map_from_sensor: Pose, image: RangeImage) -> Self {

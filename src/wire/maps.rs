@@ -152,6 +152,8 @@ impl From<MapInfo> for pb::MapInfo {
             storage: info.storage.map(Into::into),
             moment_bytes: info.moment_bytes as u64,
             trajectory_bytes: info.trajectory_bytes as u64,
+            viewpoints: info.viewpoints as u64,
+            viewpoint_bytes: info.viewpoint_bytes as u64,
         }
     }
 }
@@ -180,6 +182,8 @@ impl TryFrom<pb::MapInfo> for MapInfo {
             storage: info.storage.map(Into::into),
             moment_bytes: count_from(info.moment_bytes),
             trajectory_bytes: count_from(info.trajectory_bytes),
+            viewpoints: count_from(info.viewpoints),
+            viewpoint_bytes: count_from(info.viewpoint_bytes),
         })
     }
 }

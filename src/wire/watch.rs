@@ -7,8 +7,8 @@ use super::types::uuid_from;
 use super::{InField, pb, required};
 use crate::map::{ContentHash, ContentVersion, MapName, RobotName, SessionName};
 use crate::service::{
-    BlockBytes, Cause, ChangePart, Reason, ServiceError, StatePart, WatchEvent, WatchForm, WatchMessage,
-    WatchRequest, WatchedScan, WatchedSince,
+    BlockBytes, Cause, ChangePart, LeftViewpoint, Reason, ServiceError, StatePart, WatchEvent, WatchForm,
+    WatchMessage, WatchRequest, WatchedScan, WatchedSince, WatchedViewpoint,
 };
 
 impl TryFrom<pb::WatchRequest> for (MapName, WatchRequest) {
@@ -25,7 +25,10 @@ impl TryFrom<pb::WatchRequest> for (MapName, WatchRequest) {
         };
         let region = request.region.map(TryInto::try_into).transpose()?;
         let form = request.delta_level.map_or(WatchForm::Changes, |level| WatchForm::Deltas { level });
-        Ok((MapName::new(&request.map)?, WatchRequest { since, region, form }))
+        Ok((
+            MapName::new(&request.map)?,
+            WatchRequest { since, region, form, viewpoints: request.viewpoints },
+        ))
     }
 }
 
@@ -35,7 +38,8 @@ fn half_a_version(got: &str) -> ServiceError {
 }
 
 impl From<(&MapName, WatchRequest)> for pb::WatchRequest {
-    fn from((map, WatchRequest { since, region, form }): (&MapName, WatchRequest)) -> Self {
+    fn from((map, request): (&MapName, WatchRequest)) -> Self {
+        let WatchRequest { since, region, form, viewpoints } = request;
         Self {
             map: map.to_string(),
             since_revision: since.map(|since| since.revision),
@@ -45,6 +49,7 @@ impl From<(&MapName, WatchRequest)> for pb::WatchRequest {
                 WatchForm::Changes => None,
                 WatchForm::Deltas { level } => Some(level),
             },
+            viewpoints,
         }
     }
 }
@@ -99,6 +104,7 @@ impl From<StatePart> for pb::WatchedState {
             level: part.level,
             blocks: part.voxels.into_bytes(),
             keep_outs: part.keep_outs.into_iter().map(Into::into).collect(),
+            viewpoints: part.viewpoints.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -109,6 +115,7 @@ impl TryFrom<pb::WatchedState> for StatePart {
     fn try_from(part: pb::WatchedState) -> Result<Self, ServiceError> {
         let hash = ContentHash::from_bits(part.content_hash);
         let keep_outs = part.keep_outs.into_iter().map(TryInto::try_into);
+        let viewpoints = part.viewpoints.into_iter().map(TryInto::try_into);
         Ok(Self {
             is_first: part.reset,
             is_last: part.complete,
@@ -118,6 +125,7 @@ impl TryFrom<pb::WatchedState> for StatePart {
             level: part.level,
             voxels: BlockBytes::new(part.blocks)?,
             keep_outs: keep_outs.collect::<Result<_, _>>()?,
+            viewpoints: viewpoints.collect::<Result<_, _>>()?,
         })
     }
 }
@@ -138,6 +146,7 @@ impl From<ChangePart> for pb::WatchedChange {
             removed: part.removed.into_bytes(),
             added: part.added.into_bytes(),
             cause: Some(cause),
+            viewpoint: part.viewpoint.map(Into::into),
         }
     }
 }
@@ -160,7 +169,36 @@ impl TryFrom<pb::WatchedChange> for ChangePart {
             cause,
             removed: BlockBytes::new(part.removed)?,
             added: BlockBytes::new(part.added)?,
+            viewpoint: part.viewpoint.map(Into::into),
         })
+    }
+}
+
+impl From<WatchedViewpoint> for pb::Viewpoint {
+    fn from(WatchedViewpoint { revision, map_from_sensor, image }: WatchedViewpoint) -> Self {
+        Self { revision, map_from_sensor: Some((&map_from_sensor).into()), image }
+    }
+}
+
+impl TryFrom<pb::Viewpoint> for WatchedViewpoint {
+    type Error = ServiceError;
+
+    fn try_from(message: pb::Viewpoint) -> Result<Self, ServiceError> {
+        let pose = required(message.map_from_sensor, "viewpoints.map_from_sensor")?;
+        let map_from_sensor = pose.try_into().in_field("viewpoints.map_from_sensor")?;
+        Ok(Self { revision: message.revision, map_from_sensor, image: message.image })
+    }
+}
+
+impl From<LeftViewpoint> for pb::LeftViewpoint {
+    fn from(LeftViewpoint { image, displaced }: LeftViewpoint) -> Self {
+        Self { image, displaced }
+    }
+}
+
+impl From<pb::LeftViewpoint> for LeftViewpoint {
+    fn from(pb::LeftViewpoint { image, displaced }: pb::LeftViewpoint) -> Self {
+        Self { image, displaced }
     }
 }
 

@@ -261,6 +261,23 @@ async fn a_data_folder_of_version_6_is_opened_with_its_journal() {
     assert_eq!(keep_outs["keep_outs"][0]["made_revision"], 9);
 }
 
+/// The same, of map files of version 7 and journals of version 6, with keep-outs: no scan left a viewpoint.
+#[tokio::test]
+async fn a_data_folder_of_version_7_is_opened_with_its_journal() {
+    let daemon = Daemon::start_in(released("data-7"), |_| {}).await;
+    let office = json_of(daemon.get("/v1/maps/office").await).await;
+    assert_eq!((&office["revision"], &office["content_hash"]), (&json!(8), &json!("27e773a0ac1c1467")));
+    let keep_outs = json_of(daemon.get("/v1/maps/office/keep-outs").await).await;
+    let made: Vec<_> =
+        keep_outs["keep_outs"].as_array().unwrap().iter().map(|it| &it["made_revision"]).collect();
+    assert_eq!(made, [3, 7]);
+    let undone = json_of(daemon.post("/v1/maps/office/undo", json!({"revision": 8})).await).await;
+    assert_eq!((&undone["deletions"], &undone["restored"]), (&json!(1), &json!(29)));
+    let before = daemon.contents("office").await;
+    let daemon = Daemon::start_in(daemon.stop().await, |_| {}).await;
+    assert_eq!(daemon.contents("office").await, before);
+}
+
 #[tokio::test]
 async fn a_damaged_snapshot_is_set_aside_and_goes_with_those_of_its_age() {
     let daemon = Daemon::start_with(|config| config.store.undo_revisions = 1).await;

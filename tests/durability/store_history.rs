@@ -1,7 +1,7 @@
 //! Long random histories of a map that is kept: scans, deletions, undo, keep-outs, snapshots and restarts, against a plain model
 //! that replays what was not undone.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
@@ -10,16 +10,18 @@ use mrol::geometry::{Point, Pose};
 use mrol::map::{
     CallerName, Change, DeletionRecord, KeepOut, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord,
     KeepOutShape, MapName, MapSettings, MappedScan, MultiResolutionMap, Region, Reversal, RobotName,
-    ScanRecord, UndoRecord,
+    ScanRecord, UndoRecord, ViewpointRecord,
 };
 use mrol::store::{DataDir, MapFolder, NotObserved, OpeningProgress, Record, Snapshot, StoreSettings};
 use mrol::util::StopSignal;
+use mrol::visibility::RangeImage;
 use mrol::voxel::{Moments, VoxelKey, VoxelSet};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use uuid::Uuid;
 
 use crate::support::plain_set::{PlainSet, assert_equal, up};
+use crate::support::range_images::through_a_window;
 use crate::support::simulated_disk::SimulatedDisk;
 
 #[derive(Debug, Clone)]
@@ -29,6 +31,7 @@ enum Step {
         robot: usize,
         indices: Vec<[i32; 3]>,
         carved: Vec<[i32; 3]>,
+        viewpoint: Option<SeenSpace>,
     },
     Delete {
         level: u32,
@@ -54,6 +57,19 @@ enum Step {
     Restart,
 }
 
+/// The viewpoint that a scan leaves.
+#[derive(Debug, Clone)]
+struct SeenSpace {
+    distance: u8,
+    /// Those of the others that go.
+    displaced: Vec<Index>,
+}
+
+fn seen_space() -> impl Strategy<Value = SeenSpace> {
+    (1u8..9, prop::collection::vec(any::<Index>(), 0..3))
+        .prop_map(|(distance, displaced)| SeenSpace { distance, displaced })
+}
+
 fn index() -> impl Strategy<Value = [i32; 3]> {
     // So few places that most voxels are seen by several scans.
     prop_oneof![9 => prop::array::uniform3(-3i32..3), 1 => prop::array::uniform3(-90i32..90)]
@@ -62,8 +78,8 @@ fn index() -> impl Strategy<Value = [i32; 3]> {
 fn step() -> impl Strategy<Value = Step> {
     let indices = || prop::collection::vec(index(), 1..60);
     prop_oneof![
-        8 => (0usize..2, indices(), prop::collection::vec(index(), 0..20))
-            .prop_map(|(robot, indices, carved)| Step::Insert { robot, indices, carved }),
+        8 => (0usize..2, indices(), prop::collection::vec(index(), 0..20), prop::option::of(seen_space()))
+            .prop_map(|(robot, indices, carved, viewpoint)| Step::Insert { robot, indices, carved, viewpoint }),
         3 => (0u32..6, prop::collection::vec(index(), 1..8))
             .prop_map(|(level, indices)| Step::Delete { level, indices }),
         3 => any::<Index>().prop_map(Step::UndoScan),
@@ -85,6 +101,7 @@ struct Model {
     deletions: Vec<u64>,
     events: BTreeMap<u64, Event>,
     keep_outs: BTreeMap<KeepOutName, KeepOut>,
+    viewpoints: BTreeMap<u64, RangeImage>,
 }
 
 /// A change by the revision that it made, as it was recorded.
@@ -115,6 +132,27 @@ impl Model {
         self.events.retain(|revision, _| !changes.contains(revision));
         self.trajectory.retain(|(scan, _)| !changes.contains(scan));
         self.deletions.retain(|deletion| !changes.contains(deletion));
+        self.viewpoints.retain(|scan, _| !changes.contains(scan));
+    }
+
+    /// The viewpoint of the next scan, and the ones that go with it.
+    fn displacing(&mut self, SeenSpace { distance, displaced }: &SeenSpace) -> ViewpointRecord {
+        let there: Vec<u64> = self.viewpoints.keys().copied().collect();
+        let gone: BTreeSet<u64> = displaced.iter().filter_map(|which| pick(&there, which)).collect();
+        self.viewpoints.retain(|scan, _| !gone.contains(scan));
+        ViewpointRecord {
+            image: through_a_window(f32::from(*distance)),
+            displaced: gone.into_iter().collect(),
+        }
+    }
+
+    /// True where the map has the viewpoints that it should have.
+    fn has_viewpoints_of(&self, map: &MultiResolutionMap) -> bool {
+        let viewpoints = map.viewpoints();
+        viewpoints
+            .iter()
+            .map(|(scan, it)| (scan, it.image()))
+            .eq(self.viewpoints.iter().map(|(scan, it)| (*scan, it)))
     }
 }
 
@@ -214,7 +252,7 @@ impl Kept {
 
     fn step(&mut self, step: &Step, model: &mut Model) {
         match step {
-            Step::Insert { robot: number, indices, carved } => {
+            Step::Insert { robot: number, indices, carved, viewpoint } => {
                 let points: Vec<Point> = indices.iter().map(|i| i.map(|i| i as f32 + 0.5).into()).collect();
                 let pose = MappedScan::new(robot(*number), Pose::identity());
                 let there = model.held().voxels;
@@ -225,7 +263,10 @@ impl Kept {
                     true => ScanRecord::of_points(pose, &points, self.map.lattice()),
                     false => ScanRecord::without_moments(pose, &points, self.map.lattice()),
                 };
-                let revision = self.commit(&Change::Insertion(ScanRecord { carved, ..record }));
+                let viewpoint = viewpoint.as_ref().map(|seen| model.displacing(seen));
+                let scan = ScanRecord { carved, viewpoint: viewpoint.clone(), ..record };
+                let revision = self.commit(&Change::Insertion(scan));
+                model.viewpoints.extend(viewpoint.map(|viewpoint| (revision, viewpoint.image)));
                 model.events.insert(revision, Event { removed, points: indices.clone() });
                 model.trajectory.push((revision, robot(*number)));
             }
@@ -331,9 +372,11 @@ proptest! {
             prop_assert_eq!(found, moments.then_some(held.moments));
             let keep_outs = kept.map.keep_outs();
             prop_assert!(keep_outs.iter().eq(model.keep_outs.values()), "{:?}", keep_outs);
+            prop_assert!(model.has_viewpoints_of(&kept.map), "{:?}", kept.map.viewpoints());
         }
         kept.restart(7);
         assert_equal(&kept.map, &model.held().voxels);
         prop_assert!(kept.map.keep_outs().iter().eq(model.keep_outs.values()));
+        prop_assert!(model.has_viewpoints_of(&kept.map));
     }
 }

@@ -15,6 +15,7 @@ pub mod memory;
 pub mod plain_set;
 #[cfg(feature = "server")]
 pub mod process;
+pub mod range_images;
 pub mod shared_scans;
 #[cfg(feature = "client")]
 pub mod simulated_disk;

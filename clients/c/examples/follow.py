@@ -45,7 +45,8 @@ class Options(Structure):
         ("region_max_m", c_double * 3),
         ("has_region", c_uint8),
         ("with_filter", c_uint8),
-        ("reserved", c_uint8 * 6),
+        ("without_viewpoints", c_uint8),
+        ("reserved", c_uint8 * 5),
     ]
 
 

@@ -160,8 +160,11 @@ typedef struct mrol_replica_options {
     /* 1: the copy has Bloom filters, for MROL_LOOKUP_BLOOM. 0: it has none, and MROL_LOOKUP_BLOOM is answered by the exact
      * set. */
     uint8_t with_filter;
+    /* 1: the copy has no viewpoints, and does not know what is free. 0: it has them, some kilobytes for each place that scans
+     * saw something new from. */
+    uint8_t without_viewpoints;
     /* Not used: zero. */
-    uint8_t reserved[6];
+    uint8_t reserved[5];
 } mrol_replica_options;
 
 /* Which structure of a level answers. */

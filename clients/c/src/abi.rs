@@ -96,7 +96,8 @@ pub struct Options {
     pub(crate) region_max_m: [f64; 3],
     pub(crate) has_region: u8,
     pub(crate) with_filter: u8,
-    pub(crate) reserved: [u8; 6],
+    pub(crate) without_viewpoints: u8,
+    pub(crate) reserved: [u8; 5],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -255,7 +256,7 @@ mod tests {
             "mrol_map_version" MapVersion { map_uuid revision content_hash has_content_hash reserved }
             "mrol_replica_options" Options {
                 struct_size address map key ca_file certificate_file private_key_file open_timeout_ms silence_timeout_ms
-                blocks_max region_min_m region_max_m has_region with_filter reserved
+                blocks_max region_min_m region_max_m has_region with_filter without_viewpoints reserved
             }
             "mrol_point_query" PointQuery { struct_size xyz count map_from_points level lookup keep_out reserved }
             "mrol_answer" Answer { version asked positive reserved }

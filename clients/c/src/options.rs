@@ -27,7 +27,7 @@ pub(crate) struct Opening {
 impl Opening {
     /// Parses what mrol.h says of `mrol_replica_options`.
     pub(crate) fn of(options: Options) -> Result<Self, Failure> {
-        if options.reserved != [0; 6] {
+        if options.reserved != [0; 5] {
             return Err(Failure::argument("options.reserved must be zero"));
         }
         let map = required(options.map, "options.map")?;
@@ -54,6 +54,10 @@ fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
         region: region.transpose().map_err(ServiceError::from)?,
         blocks_max,
         field_bytes_max: usual.field_bytes_max,
+        viewpoint_bytes_max: match memory::flag(options.without_viewpoints, "options.without_viewpoints")? {
+            true => 0,
+            false => usual.viewpoint_bytes_max,
+        },
         silence_max: milliseconds(options.silence_timeout_ms, usual.silence_max),
         filter: memory::flag(options.with_filter, "options.with_filter")?.then(FilterSettings::default),
     })

@@ -92,7 +92,9 @@ static void bad_options(const char *address, const char *map) {
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.has_region must be 0 or 1, got 2");
     options = good, options.with_filter = 255;
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.with_filter must be 0 or 1, got 255");
-    options = good, options.reserved[5] = 1;
+    options = good, options.without_viewpoints = 2;
+    OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.without_viewpoints must be 0 or 1, got 2");
+    options = good, options.reserved[4] = 1;
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.reserved must be zero");
     options = good, options.has_region = 1, options.region_min_m[1] = 1.0;
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "");

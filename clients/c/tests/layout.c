@@ -37,6 +37,7 @@ int main(void) {
     FIELD(mrol_replica_options, region_max_m);
     FIELD(mrol_replica_options, has_region);
     FIELD(mrol_replica_options, with_filter);
+    FIELD(mrol_replica_options, without_viewpoints);
     FIELD(mrol_replica_options, reserved);
     SIZE(mrol_replica_options);
 

@@ -6,12 +6,16 @@ use uuid::Uuid;
 
 use super::{ReplicaError, ReplicaOptions};
 use crate::bloom::FilterSettings;
+use crate::geometry::Pose;
 use crate::map::{
     Change, ContentHash, ContentVersion, KEEP_OUTS_MAX, KeepOutRecord, KeepOuts, MapContents, MapSettings,
-    MultiResolutionMap,
+    MultiResolutionMap, ViewpointChange,
 };
 use crate::planning::Planner;
-use crate::service::{Cause, ChangePart, StatePart, WatchEvent, WatchMessage};
+use crate::service::{
+    Cause, ChangePart, LeftViewpoint, StatePart, WatchEvent, WatchMessage, WatchedViewpoint,
+};
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Viewpoint, ViewpointSet};
 use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 
 /// A map as a replica has it.
@@ -40,6 +44,8 @@ pub(super) enum Applied {
 pub(super) struct Builder {
     /// Finest blocks that the copy, or one change, may have.
     blocks_max: usize,
+    /// Bytes of viewpoints that it may have.
+    viewpoint_bytes_max: usize,
     /// Filters of the copy.
     filter: Option<FilterSettings>,
     /// True of a copy of the whole map, whose hash can be compared.
@@ -56,6 +62,7 @@ struct StateSoFar {
     version: ContentVersion,
     blocks: Vec<(VoxelKey, BlockMask)>,
     keep_outs: Arc<KeepOuts>,
+    viewpoints: ViewpointSet,
 }
 
 #[derive(Debug)]
@@ -68,8 +75,9 @@ struct ChangeSoFar {
 impl Builder {
     /// Nothing is copied yet.
     pub(super) fn new(options: &ReplicaOptions) -> Self {
-        let ReplicaOptions { region, blocks_max, filter, .. } = *options;
-        Self { blocks_max, filter, is_whole: region.is_none(), copied: None, state: None, change: None }
+        let ReplicaOptions { region, blocks_max, viewpoint_bytes_max, filter, .. } = *options;
+        let is_whole = region.is_none();
+        Self { blocks_max, viewpoint_bytes_max, filter, is_whole, copied: None, state: None, change: None }
     }
 
     /// What was copied last.
@@ -109,7 +117,8 @@ impl Builder {
             let (version, blocks) = (part.version, Vec::new());
             let keep_outs = Arc::new(part.keep_outs.into_iter().collect());
             self.change = None;
-            self.state = Some(StateSoFar { map_uuid, settings, version, blocks, keep_outs });
+            let viewpoints = ViewpointSet::default();
+            self.state = Some(StateSoFar { map_uuid, settings, version, blocks, keep_outs, viewpoints });
         }
         let state = self.state.as_mut().ok_or_else(|| damaged("a state without its first part"))?;
         if (state.map_uuid, state.version) != (map_uuid, part.version) || part.level != 0 {
@@ -117,14 +126,19 @@ impl Builder {
         }
         let voxels = part.voxels.to_set().map_err(|e| damaged(e.message))?;
         extend(&mut state.blocks, &voxels, self.blocks_max)?;
+        for WatchedViewpoint { revision, map_from_sensor, image } in part.viewpoints {
+            let viewpoint = viewpoint_of(map_from_sensor, &image)?;
+            state.viewpoints.insert(revision, viewpoint);
+            check_bytes(state.viewpoints.memory_bytes(), self.viewpoint_bytes_max)?;
+        }
         let Some(state) = self.state.take_if(|_| part.is_last) else {
             return Ok(Applied::Nothing);
         };
-        let StateSoFar { map_uuid, settings, version, blocks, keep_outs } = state;
+        let StateSoFar { map_uuid, settings, version, blocks, keep_outs, viewpoints } = state;
         let voxels: VoxelSet = blocks.into_iter().collect();
         self.check_hash(ContentHash::of(&voxels), Some(version.hash))?;
-        let contents =
-            MapContents { revision: version.revision, voxels, keep_outs, ..MapContents::default() };
+        let (revision, viewpoints) = (version.revision, Arc::new(viewpoints));
+        let contents = MapContents { revision, voxels, keep_outs, viewpoints, ..MapContents::default() };
         let contents = contents.checked().map_err(|e| damaged(e.to_string()))?;
         let map = MultiResolutionMap::restore(settings, contents);
         let map = Arc::new(map.map_err(|e| damaged(format!("the map's settings: {e}")))?);
@@ -161,12 +175,33 @@ impl Builder {
                     .map_err(|e| damaged(e.to_string()))?;
                 map.committer().apply(&Change::KeepOut(KeepOutRecord { change, request: None }))
             }
-            Cause::Scan(_) | Cause::Deletion | Cause::Undo { .. } => {
-                map.committer().exchange(&removed, &added)
+            Cause::Scan(scan) => {
+                let seen = self.seen(&map, &scan.map_from_sensor, part.viewpoint)?;
+                map.committer().exchange_seen(&removed, &added, seen)
             }
+            Cause::Undo { scans, .. } => {
+                map.committer().exchange_seen(&removed, &added, ViewpointChange { left: None, gone: scans })
+            }
+            Cause::Deletion => map.committer().exchange(&removed, &added),
         };
         self.check_hash(committed.hash, part.content_hash)?;
         Ok(Applied::Changed)
+    }
+
+    /// What becomes of the viewpoints with a scan that was taken at `map_from_sensor`.
+    fn seen(
+        &self,
+        map: &MultiResolutionMap,
+        map_from_sensor: &Pose,
+        told: Option<LeftViewpoint>,
+    ) -> Result<ViewpointChange, ReplicaError> {
+        let Some(LeftViewpoint { image, displaced: gone }) = told else {
+            return Ok(ViewpointChange::default());
+        };
+        let left = (!image.is_empty()).then(|| viewpoint_of(*map_from_sensor, &image)).transpose()?;
+        let bytes = left.as_ref().map_or(0, |viewpoint| viewpoint.memory_bytes());
+        check_bytes(map.viewpoints().memory_bytes() + bytes, self.viewpoint_bytes_max)?;
+        Ok(ViewpointChange { left, gone })
     }
 
     fn check_hash(&self, own: ContentHash, told: Option<ContentHash>) -> Result<(), ReplicaError> {
@@ -183,6 +218,21 @@ fn extend(blocks: &mut Vec<(VoxelKey, BlockMask)>, more: &VoxelSet, most: usize)
     }
     blocks.extend_from_slice(more.blocks());
     Ok(())
+}
+
+fn viewpoint_of(map_from_sensor: Pose, image: &[u8]) -> Result<Arc<Viewpoint>, ReplicaError> {
+    if image.len() > IMAGE_BYTES_MAX {
+        return Err(damaged(format!(
+            "a range image of {} bytes, at most {IMAGE_BYTES_MAX} are one",
+            image.len()
+        )));
+    }
+    let image = RangeImage::from_bytes(image).map_err(|e| damaged(e.to_string()))?;
+    Ok(Arc::new(Viewpoint::new(map_from_sensor, image)))
+}
+
+fn check_bytes(bytes: usize, most: usize) -> Result<(), ReplicaError> {
+    if bytes > most { Err(ReplicaError::TooManyViewpoints(most)) } else { Ok(()) }
 }
 
 fn damaged(what: impl Into<String>) -> ReplicaError {

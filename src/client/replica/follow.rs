@@ -42,7 +42,12 @@ impl Follower {
             let copied = builder.copied()?;
             Some(WatchedSince { revision: copied.map.revision(), map_uuid: copied.map_uuid })
         });
-        let request = WatchRequest { since, region: self.options.region, form: WatchForm::Changes };
+        let request = WatchRequest {
+            since,
+            region: self.options.region,
+            form: WatchForm::Changes,
+            viewpoints: self.options.viewpoint_bytes_max > 0,
+        };
         self.client.watch(&self.map, request).await
     }
 

@@ -18,6 +18,8 @@ mod block;
 mod copy;
 mod follow;
 mod question;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -41,6 +43,10 @@ use follow::Follower;
 /// Finest blocks that a replica may have where nobody says: those of 200 million voxels of a surface.
 pub const BLOCKS_MAX_DEFAULT: usize = 16 << 20;
 
+/// Bytes of viewpoints that a replica may have where nobody says: those of a map whose server was given four times as many as is
+/// usual.
+pub const VIEWPOINT_BYTES_MAX_DEFAULT: usize = 256 << 20;
+
 /// What a replica copies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReplicaOptions {
@@ -55,6 +61,9 @@ pub struct ReplicaOptions {
     /// Most bytes of the distance fields that the copy keeps for checks of bodies; less is slower, and as exact.
     /// [`FIELD_BYTES_MAX_DEFAULT`].
     pub field_bytes_max: usize,
+    /// Most bytes of memory of the copy's viewpoints, by which it knows what is free. 0: it has none, and they are not sent.
+    /// [`VIEWPOINT_BYTES_MAX_DEFAULT`].
+    pub viewpoint_bytes_max: usize,
     /// How long the server may be silent until the connection counts as lost: more than its `watch_heartbeat_s`. 35 s.
     pub silence_max: Duration,
 }
@@ -67,6 +76,7 @@ impl Default for ReplicaOptions {
             blocks_max: BLOCKS_MAX_DEFAULT,
             filter: None,
             field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
+            viewpoint_bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             silence_max,
         }
     }
@@ -117,6 +127,11 @@ pub enum ReplicaError {
     /// The map has more blocks than the replica may have.
     #[error("the map has more than blocks_max, {0}, blocks: copy a region, or raise blocks_max")]
     TooLarge(usize),
+    /// The map has more viewpoints than the replica may have.
+    #[error(
+        "the map's viewpoints take more than viewpoint_bytes_max, {0} bytes: raise it, or set it to 0 to copy none"
+    )]
+    TooManyViewpoints(usize),
     /// The question cannot be answered.
     #[error("{0}")]
     Question(#[from] ServiceError),
@@ -178,7 +193,8 @@ impl Replica {
     /// The copy: all that a map answers can be asked of it. It changes as the server's does, and a view of it is of one
     /// revision. A map that was made again is another one: ask for it anew now and then.
     ///
-    /// It has no moments, so that alignment finds poses by overlap alone, and no trajectory.
+    /// It has the map's viewpoints unless the options say otherwise, of a region those that looked into it. It has no moments, so
+    /// that alignment finds poses by overlap alone, and no trajectory.
     pub fn map(&self) -> Arc<MultiResolutionMap> {
         Arc::clone(&self.shared.copied.read().map)
     }

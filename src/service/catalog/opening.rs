@@ -65,6 +65,9 @@ fn report(name: &MapName, opened: &OpenedMap, start: Instant) {
     for damaged in &opened.damaged {
         tracing::warn!(map = %name, %damaged, "a snapshot is damaged: set aside, an older one and more journal are used");
     }
+    for damaged in &opened.damaged_parts {
+        tracing::warn!(map = %name, %damaged, "a part of the viewpoints is damaged: its copy is used, the next snapshot writes it again");
+    }
     for file in &opened.not_understood {
         tracing::warn!(map = %name, file, "a file in the map's folder is not understood, and left alone");
     }

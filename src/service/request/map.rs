@@ -46,6 +46,10 @@ pub struct MapInfo {
     pub commits: Durations,
     /// Bytes of memory of the trajectory, with what is known of scans whose poses are not kept.
     pub trajectory_bytes: usize,
+    /// Number of the viewpoints that scans left: where they saw through.
+    pub viewpoints: usize,
+    /// Bytes of memory of the viewpoints.
+    pub viewpoint_bytes: usize,
     /// How it is kept; not at all without a data folder.
     pub storage: Option<MapStorage>,
 }

@@ -27,6 +27,6 @@ pub use trajectory::{TrajectoryAnswer, TrajectoryQuery};
 pub use undo::{Undo, UndoAnswer, UndoTarget};
 pub use version::MapVersion;
 pub use watch::{
-    BlockBytes, Cause, ChangePart, StatePart, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan,
-    WatchedSince,
+    BlockBytes, Cause, ChangePart, LeftViewpoint, StatePart, WatchEvent, WatchForm, WatchMessage,
+    WatchRequest, WatchedScan, WatchedSince, WatchedViewpoint,
 };

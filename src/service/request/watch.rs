@@ -19,6 +19,8 @@ pub struct WatchRequest {
     pub region: Option<Region>,
     /// In which form changes are told.
     pub form: WatchForm,
+    /// True to be told of viewpoints: where scans saw through. Of a region those that may have looked into it, and some more.
+    pub viewpoints: bool,
 }
 
 /// What a caller has of a map.
@@ -84,6 +86,28 @@ pub struct StatePart {
     pub voxels: BlockBytes,
     /// All keep-outs of the map, by name, wherever they lie: in the first part.
     pub keep_outs: Vec<KeepOut>,
+    /// Viewpoints where they were asked for, ascending by revision, in the last parts.
+    pub viewpoints: Vec<WatchedViewpoint>,
+}
+
+/// A viewpoint, as a watch tells of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WatchedViewpoint {
+    /// The revision that its scan made.
+    pub revision: u64,
+    /// Where the scan was taken.
+    pub map_from_sensor: Pose,
+    /// The bytes of its range image.
+    pub image: Bytes,
+}
+
+/// The viewpoint that a scan left at its pose, as a watch tells of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftViewpoint {
+    /// The bytes of its range image; empty where it did not look into the region that is watched.
+    pub image: Bytes,
+    /// The revisions of the scans whose viewpoints went, ascending.
+    pub displaced: Vec<u64>,
 }
 
 /// A part of a change: the voxels of `removed` go, then those of `added` come. No voxel is in both.
@@ -104,6 +128,8 @@ pub struct ChangePart {
     /// Of changes: the finest voxels that a scan touched, new or not, or that an undo put back. Of deltas: the voxels of the
     /// level that appeared.
     pub added: BlockBytes,
+    /// The viewpoint that a scan left, where it was asked for: in the last part.
+    pub viewpoint: Option<LeftViewpoint>,
 }
 
 /// What made a change.

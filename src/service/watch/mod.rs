@@ -22,9 +22,9 @@ use tokio_stream::{Stream, StreamExt};
 
 use super::full_state::StateParts;
 use super::hosted_map::HostedMap;
-use super::recent_changes::{BLOCKS_PER_PART, ChangeParts, WatchedChange, WatchedLevel};
+use super::recent_changes::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, WatchedLevel};
 use super::{MapService, Outcome, Reason, ServiceError, WatchEvent, WatchForm, WatchMessage, WatchRequest};
-use crate::map::{MapName, Region};
+use crate::map::MapName;
 use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
 
@@ -54,8 +54,7 @@ impl MapService {
 pub struct Watch {
     service: MapService,
     map: Arc<HostedMap>,
-    region: Option<Region>,
-    form: WatchForm,
+    watched: Watched,
     _level: Option<WatchedLevel>,
     durable: watch::Receiver<u64>,
     /// The last revision that was told, or is being told; none where the whole state comes first.
@@ -87,7 +86,7 @@ impl Parts {
 
 impl Watch {
     fn begin(service: MapService, map: Arc<HostedMap>, request: WatchRequest) -> Self {
-        let WatchRequest { since, region, form } = request;
+        let WatchRequest { since, region, form, viewpoints } = request;
         let level = match form {
             WatchForm::Changes => None,
             WatchForm::Deltas { level } => Some(map.recent.watch_level(level)),
@@ -98,7 +97,8 @@ impl Watch {
         let told = since.filter(|since| since.map_uuid == map.uuid && since.revision <= head);
         let told = told.map(|since| since.revision);
         let (parts, read) = (Parts::Nothing, VecDeque::new());
-        Self { service, map, region, form, _level: level, durable, told, parts, read, is_greeted: false }
+        let watched = Watched { form, region, viewpoints };
+        Self { service, map, watched, _level: level, durable, told, parts, read, is_greeted: false }
     }
 
     /// The next message; it comes after `watch_heartbeat_s` at the latest, where the server is not busy.
@@ -137,7 +137,7 @@ impl Watch {
     /// Begins to tell of the whole state, once it is durable.
     async fn begin_state(&mut self) -> Result<(), ServiceError> {
         let (map, inner) = (Arc::clone(&self.map), Arc::clone(&self.service.inner));
-        let form = self.form;
+        let form = self.watched.form;
         let make = move |stop: StopSignal<'_>| map.whole_state(form, &inner.budget, stop);
         let state = self.service.inner.pools.watch.run(make).await??;
         let revision = state.version.revision;
@@ -150,7 +150,7 @@ impl Watch {
             return Err(self.ended());
         }
         (self.told, self.parts) =
-            (Some(revision), Parts::State(StateParts::of(state, self.region, self.map.map.lattice())));
+            (Some(revision), Parts::State(StateParts::of(state, self.watched, self.map.map.lattice())));
         Ok(())
     }
 
@@ -164,9 +164,10 @@ impl Watch {
             }
             return Ok(());
         };
-        let (map, form, region) = (Arc::clone(&self.map), self.form, self.region);
-        let is_small = change.blocks() <= BLOCKS_PER_PART;
-        let parts = move || change.parts(form, region.as_ref(), map.map.lattice());
+        let (map, watched) = (Arc::clone(&self.map), self.watched);
+        let asks_where = watched.viewpoints && watched.region.is_some() && change.has_viewpoint();
+        let is_small = change.blocks() <= BLOCKS_PER_PART && !asks_where;
+        let parts = move || change.parts(&watched, map.map.lattice());
         // What takes long keeps no thread of the runtime.
         let parts = match is_small {
             true => parts(),
@@ -180,7 +181,7 @@ impl Watch {
     /// Reads changes from `revision` on, as far as they are kept.
     async fn read_journal(&mut self, revision: u64) -> Result<(), ServiceError> {
         self.read.clear();
-        let folder = self.map.folder.clone().filter(|_| self.form == WatchForm::Changes);
+        let folder = self.map.folder.clone().filter(|_| self.watched.form == WatchForm::Changes);
         let (Some(folder), head) = (folder, *self.durable.borrow()) else { return Ok(()) };
         let read = move |stop: StopSignal<'_>| {
             let (mut batch, mut bytes) = (VecDeque::new(), 0);

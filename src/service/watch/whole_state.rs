@@ -32,16 +32,17 @@ impl HostedMap {
             return Ok(known);
         }
         let long_read = self.map.long_read();
-        let view = long_read.view().with_keep_outs();
+        let view = long_read.view().with_keep_outs().with_viewpoints();
         let stored: usize = view.lists(level).map(|list| list.blocks().len()).sum();
         // Lent while it is made; then it lies in memory, and is measured there.
         let _lent = budget.reserve_transient((stored * BLOCK_BYTES) as u64, WATCH)?;
         let (voxels, version) = (view.level_blocks(level, stop), view.version());
         let keep_outs = view.keep_outs().cloned().unwrap_or_default();
+        let viewpoints = view.viewpoints().cloned().unwrap_or_default();
         drop(view);
         drop(long_read);
         check_not_stopped(stop)?;
-        let state = Arc::new(FullState { version, level, voxels, keep_outs });
+        let state = Arc::new(FullState { version, level, voxels, keep_outs, viewpoints });
         self.full_states.put(key, &state);
         Ok(state)
     }
@@ -52,7 +53,7 @@ mod tests {
     use crate::geometry::{Point, Pose};
     use crate::map::{MapName, MapSettings, Region, RobotName};
     use crate::mapping::Guess;
-    use crate::service::{MapService, ScanRequest, ServiceSettings, WatchEvent, WatchForm, WatchRequest};
+    use crate::service::{MapService, ScanRequest, ServiceSettings, WatchEvent, WatchRequest};
     use crate::store::OpeningProgress;
 
     const WATCHERS: u32 = 20;
@@ -75,7 +76,7 @@ mod tests {
         for n in 0..WATCHERS {
             let region = Region::cuboid([0.0; 3], [f64::from(1 + n), 1.0, 1.0]).unwrap();
             let region = (n > 0).then_some(region);
-            let request = WatchRequest { since: None, region, form: WatchForm::Changes };
+            let request = WatchRequest { region, ..WatchRequest::default() };
             let mut watch = service.watch(&map, request).await.unwrap();
             let told = watch.next().await.unwrap().event;
             assert!(matches!(&told, WatchEvent::State(part) if !part.voxels.is_empty()), "{told:?}");

@@ -6,9 +6,11 @@ mod change;
 mod keep_out;
 pub(super) mod moments;
 mod scan;
+mod viewpoint;
 pub(super) mod voxels;
 
 pub(super) use scan::with_forgotten;
+pub(super) use viewpoint::{ascending_from, gaps_of};
 
 /// Description of what is wrong with a message; meaningless once its reading was stopped.
 pub(super) type Unreadable = String;

@@ -1,7 +1,7 @@
 //! Encoding of scans: their poses, and their voxels.
 
 use super::{Unreadable, count, moments, required};
-use crate::geometry::{self, rotation_xyzw, translation_m};
+use crate::geometry::{self, Pose, rotation_xyzw, translation_m};
 use crate::map::{
     ForgottenIds, ID_RANGES_PER_SESSION_MAX, MappedScan, RobotName, ScanRecord, SessionName, Trajectory,
     WithdrawnChange,
@@ -12,13 +12,11 @@ use crate::voxel::VoxelSet;
 
 impl From<&MappedScan> for pb::ScanPose {
     fn from(pose: &MappedScan) -> Self {
-        let [x, y, z] = translation_m(&pose.map_from_sensor);
-        let [qx, qy, qz, qw] = rotation_xyzw(&pose.map_from_sensor);
         Self {
             robot: pose.robot.as_str().to_owned(),
             scan_id: pose.scan_id,
             timestamp_ns: pose.timestamp_ns,
-            map_from_sensor: vec![x, y, z, qx, qy, qz, qw],
+            map_from_sensor: pose_numbers(&pose.map_from_sensor),
             revision: pose.revision,
             level_overlaps: pose.level_overlaps.clone(),
             iterations: pose.iterations,
@@ -35,15 +33,12 @@ impl TryFrom<pb::ScanPose> for MappedScan {
     type Error = Unreadable;
 
     fn try_from(message: pb::ScanPose) -> Result<Self, Unreadable> {
-        let [x, y, z, qx, qy, qz, qw] = message.map_from_sensor[..] else {
-            return Err(format!("a pose of {} numbers instead of 7", message.map_from_sensor.len()));
-        };
         Ok(Self {
             robot: RobotName::new(&message.robot).map_err(|e| e.to_string())?,
             session: SessionName::new(&message.session).map_err(|e| e.to_string())?,
             scan_id: message.scan_id,
             timestamp_ns: message.timestamp_ns,
-            map_from_sensor: geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())?,
+            map_from_sensor: pose_from(&message.map_from_sensor)?,
             revision: message.revision,
             level_overlaps: message.level_overlaps,
             iterations: message.iterations,
@@ -55,6 +50,19 @@ impl TryFrom<pb::ScanPose> for MappedScan {
     }
 }
 
+/// A pose as x y z qx qy qz qw.
+pub(super) fn pose_numbers(pose: &Pose) -> Vec<f64> {
+    [&translation_m(pose)[..], &rotation_xyzw(pose)].concat()
+}
+
+/// The inverse of [`pose_numbers`].
+pub(super) fn pose_from(numbers: &[f64]) -> Result<Pose, Unreadable> {
+    let [x, y, z, qx, qy, qz, qw] = *numbers else {
+        return Err(format!("a pose of {} numbers instead of 7", numbers.len()));
+    };
+    geometry::pose([x, y, z], [qx, qy, qz, qw]).map_err(|e| e.to_string())
+}
+
 impl From<&ScanRecord> for pb::Insertion {
     fn from(scan: &ScanRecord) -> Self {
         Self {
@@ -62,6 +70,7 @@ impl From<&ScanRecord> for pb::Insertion {
             voxels: Some((&scan.voxels).into()),
             moments: Some(moments::beside(&scan.voxels, &scan.moments, StopSignal::NEVER)),
             carved: (!scan.carved.is_empty()).then(|| (&scan.carved).into()),
+            viewpoint: scan.viewpoint.as_ref().map(Into::into),
         }
     }
 }
@@ -80,7 +89,7 @@ impl TryFrom<pb::Insertion> for ScanRecord {
             moments: moments::read(&message.moments.unwrap_or_default(), &voxels, StopSignal::NEVER)?,
             voxels,
             carved,
-            viewpoint: None,
+            viewpoint: message.viewpoint.map(TryInto::try_into).transpose()?,
         })
     }
 }

@@ -69,8 +69,9 @@ mod tests {
     use crate::geometry::{Point, Pose};
     use crate::map::{
         CallerName, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape,
-        MappedScan, Prism, Request, RequestId, RobotName, ScanRecord, UndoRecord,
+        MappedScan, Prism, Request, RequestId, RobotName, ScanRecord, UndoRecord, ViewpointRecord,
     };
+    use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
     use crate::voxel::{Lattice, MomentSet, VoxelKey, VoxelSet};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -82,6 +83,11 @@ mod tests {
     /// None of those.
     fn other_voxels() -> VoxelSet {
         (0..30).filter_map(|i| VoxelKey::new([i, 0, 9])).collect()
+    }
+
+    fn image() -> RangeImage {
+        let points: Vec<_> = (0..2000).map(|i| Point::new(2.0, (i % 50) as f32 / 20.0, 0.3)).collect();
+        RangeImage::of_points(&points, SeenRange { min_m: 0.1, max_m: 9.0 }, IMAGE_BYTES_MAX).unwrap()
     }
 
     fn moments() -> MomentSet {
@@ -120,7 +126,7 @@ mod tests {
                 voxels: voxels(5000),
                 carved: other_voxels(),
                 moments: moments(),
-                viewpoint: None,
+                viewpoint: Some(ViewpointRecord { image: image(), displaced: vec![2, 3, 900] }),
             }),
             Change::Deletion(DeletionRecord { voxels: voxels(10), request: None }),
             Change::Undo(UndoRecord {
@@ -135,6 +141,24 @@ mod tests {
             let record = Record::of(&change).unwrap();
             assert_eq!(change_of(&record.payload, record.bytes).unwrap(), change);
         }
+    }
+
+    #[test]
+    fn a_viewpoint_that_is_none_is_refused_with_what_is_wrong() {
+        let viewpoint = Some(ViewpointRecord { image: image(), displaced: vec![3, 4] });
+        let pose = MappedScan::new(RobotName::new("r1").unwrap(), Pose::identity());
+        let scan = ScanRecord { viewpoint, ..ScanRecord::of_voxels(pose, voxels(9)) };
+        let refused = |change: fn(&mut pb::ScanViewpoint)| {
+            let mut message = pb::Insertion::from(&scan);
+            change(message.viewpoint.as_mut().unwrap());
+            ScanRecord::try_from(message).unwrap_err()
+        };
+        let cut = refused(|it| it.image = it.image.slice(..20));
+        assert!(cut.starts_with("insertion.viewpoint: a range image of 20 bytes"), "{cut}");
+        let large = refused(|it| it.image = vec![0; 8193].into());
+        assert!(large.contains("of 8193 bytes, at most 8192"), "{large}");
+        let twice = refused(|it| it.displaced_gaps = vec![3, 0]);
+        assert!(twice.contains("displaced_gaps names 3 twice"), "{twice}");
     }
 
     #[test]

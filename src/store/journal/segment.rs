@@ -3,7 +3,7 @@
 //! ```text
 //! offset  bytes
 //!      0  8      magic "MROL-JNL"
-//!      8  4      format version, u32 little-endian: 6
+//!      8  4      format version, u32 little-endian: 7
 //!     12  4      CRC-32C of bytes 16 to 64, u32 little-endian
 //!     16  16     uuid of the map
 //!     32  8      revision of the first frame, u64 little-endian
@@ -25,8 +25,9 @@ use crate::store::StoreError;
 
 /// Format version that this build writes; it reads this one and all earlier ones. In version 1 moments have no forms;
 /// up to version 2 segments have no head; up to version 3 scans have no session; up to version 4 no undo
-/// put voxels back, and no scan carved; up to version 5 there are no keep-outs.
-pub const JOURNAL_VERSION: u32 = 6;
+/// put voxels back, and no scan carved; up to version 5 there are no keep-outs; up to version 6 no scan left a
+/// viewpoint.
+pub const JOURNAL_VERSION: u32 = 7;
 const MAGIC: &[u8; 8] = b"MROL-JNL";
 const CHECKED_FROM: usize = 16;
 const UUID_BYTES: usize = 16;

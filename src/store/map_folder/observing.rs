@@ -63,8 +63,9 @@ impl MapFolder {
             Err(StoreError::Cancelled) => return Err(NotObserved::Stopped),
             file => file?,
         };
-        let base = Snapshot::decode_until(&file, &MapFileLimits::OWN, &mut reserve, stop);
-        let base = base.map_err(|refusal| match refusal {
+        // An undo takes viewpoints away, and brings none back: those before it do not matter.
+        let base = Snapshot::decode_but_parts(&file, &MapFileLimits::OWN, &mut reserve, stop);
+        let (base, _) = base.map_err(|refusal| match refusal {
             MapFileError::NoMemory(refusal) => NotObserved::NoMemory(refusal),
             MapFileError::Stopped => NotObserved::Stopped,
             refusal => NotObserved::Unreadable(StoreError::damaged(&path, refusal.to_string())),

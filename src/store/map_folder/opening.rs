@@ -11,6 +11,7 @@ use crate::store::journal::{Known, Recovered, SegmentedJournal};
 use crate::store::snapshot_files::{
     Newest, check_owner, newest_good, not_understood, set_aside, snapshot_name, snapshot_revisions,
 };
+use crate::store::viewpoint_parts::{self, ViewpointParts};
 use crate::store::{FileSystem, OpeningProgress, Snapshot, StoreError, StoreSettings, folder};
 use crate::util::StopSignal;
 
@@ -29,6 +30,8 @@ pub struct OpenedMap {
     pub recovered: Recovered,
     /// Newer snapshots that could not be read and were set aside.
     pub damaged: Vec<String>,
+    /// Parts of the viewpoints that could not be read; their copies were.
+    pub damaged_parts: Vec<String>,
     /// Files in the folder that are not part of a map.
     pub not_understood: Vec<String>,
 }
@@ -53,7 +56,8 @@ impl MapFolder {
             &progress,
             |_, _| Ok(()),
         )?;
-        Ok(Self::with(files, first.uuid, path, settings, journal, vec![revision], 0))
+        let parts = ViewpointParts::default();
+        Ok(Self::with(files, first.uuid, path, settings, journal, vec![revision], parts, 0))
     }
 
     /// Opens the folder of the map `uuid`: the newest good snapshot, and every change of the journal after it.
@@ -72,7 +76,8 @@ impl MapFolder {
         folder::sweep(&*files, &path)?;
         let mut revisions = snapshot_revisions(&*files, &path)?;
         let last_written = revisions.last().copied().unwrap_or_default();
-        let Newest { snapshot, head, damaged } = newest_good(&*files, &path, &mut revisions, progress)?;
+        let Newest { snapshot, head, parts, damaged } =
+            newest_good(&*files, &path, &mut revisions, progress)?;
         let revision = snapshot.contents.revision;
         if snapshot.uuid != uuid {
             let path = path.join(snapshot_name(revision));
@@ -113,7 +118,19 @@ impl MapFolder {
         set_aside(&*files, &path, &damaged)?;
         let not_understood = not_understood(&*files, &path)?;
         let damaged = damaged.into_iter().map(|(_, error)| error.to_string()).collect();
-        let folder = Self::with(files, uuid, at, settings, journal, revisions, recovered.bytes);
-        Ok(OpenedMap { folder, uuid, map, snapshot: revision, recovered, damaged, not_understood })
+        let last_part = viewpoint_parts::numbers_in(&*files, &path)?.last().copied().unwrap_or_default();
+        let damaged_parts = parts.damaged.iter().map(ToString::to_string).collect();
+        let parts = ViewpointParts::new(parts.known, last_part);
+        let folder = Self::with(files, uuid, at, settings, journal, revisions, parts, recovered.bytes);
+        Ok(OpenedMap {
+            folder,
+            uuid,
+            map,
+            snapshot: revision,
+            recovered,
+            damaged,
+            damaged_parts,
+            not_understood,
+        })
     }
 }

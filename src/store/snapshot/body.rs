@@ -40,6 +40,7 @@ pub(super) mod number {
     pub(in crate::store::snapshot) const KEEP_OUTS: u64 = 15;
     pub(in crate::store::snapshot) const NO_FILTER: u64 = 16;
     pub(in crate::store::snapshot) const NO_MOMENTS: u64 = 17;
+    pub(in crate::store::snapshot) const VIEWPOINTS: u64 = 18;
 
     /// Field of `Voxels` and of `Moments`.
     pub(in crate::store::snapshot) const KEY_GAPS: u64 = 1;
@@ -81,7 +82,7 @@ const MOMENT_BYTES: usize =
 #[derive(Debug)]
 pub(super) struct Body<'a> {
     all: &'a [u8],
-    stop: StopSignal<'a>,
+    pub(super) stop: StopSignal<'a>,
     uuid: &'a [u8],
     settings: [f64; 2],
     levels: u32,
@@ -158,7 +159,8 @@ impl<'a> Body<'a> {
             }
             (number::FORGOTTEN, Bytes(robot)) => self.forgotten.push(robot),
             (number::KEEP_OUTS, Bytes(_)) => self.keep_outs += 1,
-            (known @ number::UUID..=number::NO_MOMENTS, _) => {
+            (number::VIEWPOINTS, Bytes(_)) => {}
+            (known @ number::UUID..=number::VIEWPOINTS, _) => {
                 return Err(format!("field {known} comes twice, or is of another kind"));
             }
             // A field of a newer version, which is reported where it matters.
@@ -189,7 +191,7 @@ impl<'a> Body<'a> {
             trajectory: self.trajectory(memory)?,
             requests: self.requests()?,
             keep_outs: Arc::new(self.keep_outs()?),
-            viewpoints: Arc::default(),
+            viewpoints: Arc::new(self.viewpoints(limits, memory)?),
         };
         let contents = contents.checked().map_err(|e| e.to_string())?;
         Ok(Snapshot { uuid, settings, contents })
@@ -312,7 +314,7 @@ impl<'a> Body<'a> {
 
     fn scans(&self) -> Result<Vec<MappedScan>, Unreadable> {
         let mut scans = Vec::with_capacity(self.scans);
-        for record in self.records(number::TRAJECTORY) {
+        for record in self.records(number::TRAJECTORY, RECORD_BYTES_MAX) {
             let scan: MappedScan = decoded::<pb::ScanPose>(record?, "a scan")?.try_into()?;
             scan.check_levels(self.levels).map_err(|e| e.to_string())?;
             scans.push(scan);
@@ -324,7 +326,7 @@ impl<'a> Body<'a> {
     /// answers are found by them.
     fn requests(&self) -> Result<IdempotencyLog, Unreadable> {
         let requests: Vec<CompletedRequest> =
-            self.records(number::REQUESTS).map(request).collect::<Result<_, _>>()?;
+            self.records(number::REQUESTS, RECORD_BYTES_MAX).map(request).collect::<Result<_, _>>()?;
         let ascend = requests.is_sorted_by(|one, next| one.revision < next.revision);
         let ids: HashSet<_> =
             requests.iter().map(|request| (&request.caller, &request.id, request.kind)).collect();
@@ -339,7 +341,7 @@ impl<'a> Body<'a> {
         let keep_out =
             |record: Result<_, Unreadable>| decoded::<pb::KeepOut>(record?, "a keep-out")?.try_into();
         let keep_outs: Vec<KeepOut> =
-            self.records(number::KEEP_OUTS).map(keep_out).collect::<Result<_, _>>()?;
+            self.records(number::KEEP_OUTS, RECORD_BYTES_MAX).map(keep_out).collect::<Result<_, _>>()?;
         match keep_outs.is_sorted_by(|one, next| one.name < next.name) {
             true => Ok(keep_outs.into_iter().collect()),
             false => Err("the names of its keep-outs must ascend".into()),
@@ -348,19 +350,21 @@ impl<'a> Body<'a> {
 
     fn withdrawn(&self) -> Result<Vec<crate::map::WithdrawnChange>, Unreadable> {
         let mut withdrawn = Vec::with_capacity(self.withdrawn);
-        for record in self.records(number::WITHDRAWN) {
+        for record in self.records(number::WITHDRAWN, RECORD_BYTES_MAX) {
             withdrawn.push(decoded::<pb::WithdrawnChange>(record?, "a withdrawn change")?.into());
         }
         Ok(withdrawn)
     }
 
-    /// The bytes of each of the messages of a repeated field.
-    fn records(&self, number: u64) -> impl Iterator<Item = Result<&'a [u8], Unreadable>> {
+    /// The bytes of each of the messages of a repeated field, which have at most `most` bytes.
+    pub(super) fn records(
+        &self,
+        number: u64,
+        most: usize,
+    ) -> impl Iterator<Item = Result<&'a [u8], Unreadable>> {
         let of_number = move |field: Result<_, Unreadable>| match field {
-            Ok((n, Value::Bytes(record))) if n == number => Some(match record.len() > RECORD_BYTES_MAX {
-                true => {
-                    Err(format!("a record of {} bytes, at most {RECORD_BYTES_MAX} are one", record.len()))
-                }
+            Ok((n, Value::Bytes(record))) if n == number => Some(match record.len() > most {
+                true => Err(format!("a record of {} bytes, at most {most} are one", record.len())),
                 false => Ok(record),
             }),
             Ok(_) => None,

@@ -11,12 +11,19 @@ pub struct MapFileLimits {
     pub voxels_max: usize,
     /// Most scans of the trajectory, and most withdrawn scans.
     pub scans_max: usize,
+    /// Most bytes of memory of the viewpoints.
+    pub viewpoint_bytes_max: usize,
 }
 
 impl MapFileLimits {
     /// Limits of files that are known to be a server's own: bodies beyond 8 GiB, 4 billion voxels of a surface, are
     /// refused.
-    pub const OWN: Self = Self { body_bytes_max: 8 << 30, voxels_max: usize::MAX, scans_max: usize::MAX };
+    pub const OWN: Self = Self {
+        body_bytes_max: 8 << 30,
+        voxels_max: usize::MAX,
+        scans_max: usize::MAX,
+        viewpoint_bytes_max: usize::MAX,
+    };
 }
 
 /// Why a map file was not read.

@@ -10,16 +10,17 @@ use crate::map::MapContents;
 use crate::store::codec::{moments, voxels};
 use crate::store::pb;
 use crate::util::StopSignal;
+use crate::visibility::ViewpointSet;
 
 /// Records (scans and requests) between two checks of the stop signal: a millisecond.
 const RECORDS_PER_LOOK: usize = 1024;
 /// Numbers between two checks of the stop signal: a millisecond.
 const NUMBERS_PER_LOOK: usize = 128 << 10;
 
-/// Encodes the body of a snapshot; incomplete once stopped.
-pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
+/// Encodes the body of a snapshot with those of its viewpoints that are to be in it; incomplete once stopped.
+pub(super) fn body_of(snapshot: &Snapshot, viewpoints: &ViewpointSet, stop: StopSignal<'_>) -> Vec<u8> {
     let Snapshot { uuid, settings, contents } = snapshot;
-    let MapContents { revision, voxels, moments, trajectory, requests, keep_outs, viewpoints: _ } = contents;
+    let MapContents { revision, voxels, moments, trajectory, requests, keep_outs, .. } = contents;
     let mut body = pb::Snapshot {
         uuid: uuid.as_bytes().to_vec().into(),
         resolution_m: settings.resolution_m,
@@ -50,6 +51,8 @@ pub(super) fn body_of(snapshot: &Snapshot, stop: StopSignal<'_>) -> Vec<u8> {
     append(&mut body, keep_outs.iter(), stop, |keep_outs| pb::Snapshot { keep_outs, ..Default::default() });
     let (no_filter, no_moments) = (settings.filter.is_none(), !settings.moments);
     body.append(&mut pb::Snapshot { no_filter, no_moments, ..Default::default() }.encode_to_vec());
+    let viewpoints = viewpoints.iter().map(|(revision, viewpoint)| (revision, &**viewpoint));
+    append(&mut body, viewpoints, stop, |viewpoints| pb::Snapshot { viewpoints, ..Default::default() });
     body
 }
 

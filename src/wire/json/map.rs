@@ -35,6 +35,10 @@ pub struct JsonMap {
     pub moment_bytes: usize,
     /// Bytes of the trajectory.
     pub trajectory_bytes: usize,
+    /// Number of viewpoints.
+    pub viewpoints: usize,
+    /// Bytes of the viewpoints.
+    pub viewpoint_bytes: usize,
     /// What lies on disk; null where nothing does.
     pub storage: Option<JsonStorage>,
 }
@@ -157,6 +161,8 @@ impl From<MapInfo> for JsonMap {
             set_bytes: info.set_bytes,
             moment_bytes: info.moment_bytes,
             trajectory_bytes: info.trajectory_bytes,
+            viewpoints: info.viewpoints,
+            viewpoint_bytes: info.viewpoint_bytes,
             storage: info.storage.map(Into::into),
         }
     }

@@ -38,8 +38,8 @@ fn files(disk: &SimulatedDisk) -> Vec<PathBuf> {
     disk.list(&folder).unwrap().into_iter().map(|name| folder.join(name)).collect()
 }
 
-fn is_snapshot(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "mrol")
+fn is_segment(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "log")
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn a_flipped_bit_anywhere_is_harmless_or_refused_by_file_and_offset() {
                     harmless += 1;
                 }
                 Err(StoreError::JournalDamaged { path: named, offset, .. }) => {
-                    assert!(!is_snapshot(&path) && named == path, "{} byte {at}", path.display());
+                    assert!(is_segment(&path) && named == path, "{} byte {at}", path.display());
                     assert!(offset <= at as u64 && at as u64 - offset < 4096, "byte {at}: offset {offset}");
                     refused += 1;
                 }
@@ -117,6 +117,7 @@ fn a_flipped_bit_anywhere_is_harmless_or_refused_by_file_and_offset() {
             }
         }
     }
+    assert!(files(&disk).iter().any(|path| path.extension().is_some_and(|it| it == "part")));
     assert!(harmless > 1000 && refused > 1000, "{harmless} harmless, {refused} refused");
 }
 
@@ -124,7 +125,7 @@ fn a_flipped_bit_anywhere_is_harmless_or_refused_by_file_and_offset() {
 fn a_refusal_names_the_command_that_helps() {
     let disk = SimulatedDisk::default();
     run(&disk);
-    let last = files(&disk).into_iter().rfind(|path| !is_snapshot(path)).unwrap();
+    let last = files(&disk).into_iter().rfind(|path| is_segment(path)).unwrap();
     let message = open(&disk.with_flipped_bit(&last, 90, 0)).unwrap_err().to_string();
     assert!(message.contains("damaged at offset 64"), "{message}");
     assert!(message.contains("`mrol doctor data --set-aside office`"), "{message}");
@@ -135,7 +136,7 @@ fn a_folder_of_another_map_is_not_mixed_in() {
     let (disk, other) = (SimulatedDisk::default(), SimulatedDisk::default());
     run(&disk);
     run(&other);
-    let last = |disk| files(disk).into_iter().rfind(|path| !is_snapshot(path)).unwrap();
+    let last = |disk| files(disk).into_iter().rfind(|path| is_segment(path)).unwrap();
     let foreign = other.read(&last(&other)).unwrap();
     disk.create(&last(&disk)).unwrap().append(&foreign).unwrap();
     let message = open(&disk).unwrap_err().to_string();

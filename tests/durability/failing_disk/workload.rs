@@ -7,6 +7,7 @@ use mrol::geometry::Pose;
 use mrol::map::{
     Change, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapContents,
     MapName, MapSettings, MappedScan, MultiResolutionMap, Region, Request, RequestId, RobotName, ScanRecord,
+    ViewpointRecord,
 };
 use mrol::store::{
     DataDir, MapFolder, OpenedMap, OpeningProgress, Record, Snapshot, StoreError, StoreSettings,
@@ -16,6 +17,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uuid::Uuid;
 
+use crate::support::range_images::through_a_window;
 use crate::support::simulated_disk::SimulatedDisk;
 
 pub const MAPS: &str = "data/maps";
@@ -135,7 +137,16 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
         level_overlaps: vec![rng.random(), rng.random()],
         ..MappedScan::new(robot, Pose::translation(rng.random(), 0.0, 1.0 / 3.0))
     };
-    Change::Insertion(ScanRecord::of_voxels(pose, voxels))
+    let viewpoint = rng.random_bool(0.6).then(|| viewpoint(model, rng));
+    Change::Insertion(ScanRecord { viewpoint, ..ScanRecord::of_voxels(pose, voxels) })
+}
+
+/// One in whose place some of the others go.
+fn viewpoint(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> ViewpointRecord {
+    let viewpoints = model.viewpoints();
+    let displaced =
+        viewpoints.iter().map(|(revision, _)| revision).filter(|_| rng.random_bool(0.1)).collect();
+    ViewpointRecord { image: through_a_window(rng.random_range(1.0..9.0)), displaced }
 }
 
 /// One of a few keep-outs is put, or ends.

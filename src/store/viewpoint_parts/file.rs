@@ -1,0 +1,129 @@
+//! The file of a part.
+//!
+//! ```text
+//! offset  bytes
+//!      0  8      magic "MROL-VPT"
+//!      8  4      format version, u32 little-endian: 1
+//!     12  4      CRC-32C of the version and of everything from offset 16, u32 little-endian
+//!     16  16     uuid of the map
+//!     32  8      bytes of the body before compression, u64 little-endian
+//!     40  rest   the body: a zstd frame of the message `ViewpointPart` of proto/mrol/store/v1/snapshot.proto
+//! ```
+
+use std::io;
+use std::sync::Arc;
+
+use prost::Message;
+use uuid::Uuid;
+
+use crate::map::REVISION_MAX;
+use crate::store::codec::Unreadable;
+use crate::store::compression::{checksum_after, compress_onto, decompress};
+use crate::store::pb;
+use crate::util::StopSignal;
+use crate::visibility::Viewpoint;
+
+const VERSION: u32 = 1;
+const MAGIC: &[u8; 8] = b"MROL-VPT";
+const CHECKED_FROM: usize = 16;
+pub(in crate::store) const PART_HEADER_BYTES: usize = 40;
+/// Most bytes of a part before compression. No memory is taken beyond it.
+const PART_BYTES_MAX: u64 = 8 << 30;
+
+/// Viewpoints between two checks of the stop signal: some milliseconds.
+const VIEWPOINTS_PER_LOOK: usize = 16;
+
+/// The file names of the part `number`, and of its copy.
+pub(in crate::store) fn part_names(number: u64) -> [String; 2] {
+    ["part", "copy"].map(|which| format!("viewpoints-{number:020}.{which}"))
+}
+
+/// The number of a part, from its file name or that of its copy; none where it is neither.
+pub(in crate::store) fn part_number(name: &str) -> Option<u64> {
+    let (number, _) = name.strip_prefix("viewpoints-")?.split_once('.')?;
+    let number = number.parse().ok()?;
+    // There is at most one for each revision.
+    (number <= REVISION_MAX && part_names(number).iter().any(|it| it == name)).then_some(number)
+}
+
+/// The map that the part with this header belongs to; none where the header is damaged.
+pub(in crate::store) fn owner_of_part(header: &[u8]) -> Option<Uuid> {
+    let header = header.get(..PART_HEADER_BYTES).filter(|header| &header[..8] == MAGIC)?;
+    Uuid::from_slice(&header[CHECKED_FROM..32]).ok()
+}
+
+/// What is in a part.
+#[derive(Debug, Clone)]
+pub(in crate::store) struct ViewpointPart {
+    /// By the revisions of their scans, ascending.
+    pub(in crate::store) viewpoints: Vec<(u64, Arc<Viewpoint>)>,
+    /// Checksum of the file; 0 before it is encoded.
+    pub(in crate::store) checksum: u32,
+}
+
+impl ViewpointPart {
+    pub(in crate::store) fn new(viewpoints: Vec<(u64, Arc<Viewpoint>)>) -> Self {
+        Self { viewpoints, checksum: 0 }
+    }
+
+    /// The bytes of the file of the map `uuid`.
+    ///
+    /// # Errors
+    /// When compression fails, for want of memory.
+    pub(in crate::store) fn encode(self, uuid: Uuid) -> io::Result<(Self, Vec<u8>)> {
+        let viewpoints = self.viewpoints.iter().map(|(revision, it)| (*revision, &**it).into()).collect();
+        let body = pb::ViewpointPart { viewpoints }.encode_to_vec();
+        let mut bytes = Vec::with_capacity(PART_HEADER_BYTES + body.len());
+        bytes.extend_from_slice(MAGIC);
+        bytes.extend_from_slice(&VERSION.to_le_bytes());
+        bytes.extend_from_slice(&[0; 4]);
+        bytes.extend_from_slice(uuid.as_bytes());
+        bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        let mut bytes = compress_onto(bytes, &body, StopSignal::NEVER)?;
+        let checksum = checksum_of(&bytes, StopSignal::NEVER);
+        bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
+        Ok((Self { checksum, ..self }, bytes))
+    }
+
+    /// The map that a file belongs to, and what is in it; meaningless once stopped.
+    ///
+    /// # Errors
+    /// A description of what is wrong with the bytes.
+    pub(in crate::store) fn decode(bytes: &[u8], stop: StopSignal<'_>) -> Result<(Uuid, Self), Unreadable> {
+        let Some((header, frame)) = bytes.split_at_checked(PART_HEADER_BYTES) else {
+            return Err(format!("{} bytes are too few for the header of a part", bytes.len()));
+        };
+        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| header[at + i]));
+        if &header[..8] != MAGIC {
+            return Err("not a part of a map's viewpoints: it does not begin with MROL-VPT".into());
+        }
+        let version = u32_at(8);
+        if version != VERSION {
+            return Err(format!("format version {version}, this build reads {VERSION}: use a newer one"));
+        }
+        let (stored, checksum) = (u32_at(12), checksum_of(bytes, stop));
+        if stored != checksum {
+            return Err(format!(
+                "checksum {checksum:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
+            ));
+        }
+        let length = u64::from(u32_at(32)) | u64::from(u32_at(36)) << 32;
+        if length > PART_BYTES_MAX {
+            return Err(format!("a body of {length} bytes, at most {PART_BYTES_MAX} are read"));
+        }
+        let body = decompress(frame, length as usize, stop)
+            .map_err(|e| format!("the body from offset {PART_HEADER_BYTES} on: {e}"))?;
+        let message = pb::ViewpointPart::decode(&body[..]).map_err(|e| format!("the body: {e}"))?;
+        let uuid = Uuid::from_slice(&header[CHECKED_FROM..32]).map_err(|e| format!("uuid: {e}"))?;
+        let viewpoints = stop.paced(message.viewpoints, VIEWPOINTS_PER_LOOK).map(TryInto::try_into);
+        let viewpoints: Vec<(u64, Arc<Viewpoint>)> = viewpoints.collect::<Result<_, Unreadable>>()?;
+        match viewpoints.is_sorted_by(|(one, _), (next, _)| one < next) {
+            true => Ok((uuid, Self { viewpoints, checksum })),
+            false => Err("the revisions of its viewpoints must ascend".into()),
+        }
+    }
+}
+
+fn checksum_of(bytes: &[u8], stop: StopSignal<'_>) -> u32 {
+    checksum_after(crc32c::crc32c(&bytes[8..12]), &bytes[CHECKED_FROM..], stop)
+}
