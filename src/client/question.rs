@@ -4,9 +4,10 @@ use tokio_stream::{Stream, StreamExt};
 
 use super::{Answers, Client, ClientError};
 use crate::map::MapName;
-use crate::planning::{Grid, MotionAnswer, NearestVoxels, RayHits};
+use crate::planning::{Grid, MotionAnswer, NearestVoxels, PointStates, RayHits};
 use crate::service::{
-    Answered, Collisions, GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion, SphereCheck,
+    Answered, ClassifyQuestion, Collisions, GridQuestion, MotionCheck, NearestQuestion, PoseCheck,
+    RayQuestion, SphereCheck,
 };
 use crate::wire::pb;
 
@@ -148,6 +149,34 @@ impl Client {
         let map = map.clone();
         let requests = batches.map(move |points| pb::FindNearestRequest::from((&map, points)));
         let answers = self.connection.occupancy().find_nearest_stream(requests).await;
+        self.connection.answers(answers)
+    }
+
+    /// Returns of each point whether it is occupied, free, or unknown, all at one revision.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn classify_points(
+        &self,
+        map: &MapName,
+        points: ClassifyQuestion,
+    ) -> Result<Answered<PointStates>, ClientError> {
+        let request = self.request((map, points));
+        self.domain(self.connection.occupancy().classify_points(request).await)
+    }
+
+    /// Classifies batch after batch of points, with one answer for each, without a round trip between two batches.
+    ///
+    /// # Errors
+    /// When the server cannot be reached; a refused batch ends the answers.
+    pub async fn classification_stream(
+        &self,
+        map: &MapName,
+        batches: impl Stream<Item = ClassifyQuestion> + Send + 'static,
+    ) -> Result<Answers<Answered<PointStates>>, ClientError> {
+        let map = map.clone();
+        let requests = batches.map(move |points| pb::ClassifyPointsRequest::from((&map, points)));
+        let answers = self.connection.occupancy().classify_points_stream(requests).await;
         self.connection.answers(answers)
     }
 

@@ -7,6 +7,7 @@
 
 mod aim;
 mod body;
+mod classify;
 mod clearance;
 mod configurations;
 mod cover;
@@ -14,6 +15,7 @@ mod cubes;
 mod effort;
 mod eight;
 mod error;
+mod free_space;
 mod grid;
 mod in_cells;
 mod keep_outs;
@@ -35,6 +37,8 @@ mod rays;
 mod reach;
 mod remembered;
 mod rigid;
+#[cfg(test)]
+mod seen_maps;
 mod simd;
 mod spheres;
 mod steps;
@@ -47,6 +51,7 @@ mod test_maps;
 mod tests;
 
 pub use body::Body;
+pub use classify::{OutOfRange, PointState, PointStates, classify_points};
 pub use clearance::FIELD_BYTES_MAX_DEFAULT;
 pub use configurations::{Configurations, NUMBERS_PER_POSE};
 pub use cover::{COVER_SPHERES_MAX, CoverError, cover_box, cover_capsule};

@@ -59,8 +59,8 @@ pub use localization::{
 pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
 pub use question::{
-    Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, KnownPart, MotionCheck, NearestQuestion,
-    PoseCheck, Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck,
+    Answered, Asked, CheckAs, ClassifyQuestion, Collisions, GridQuestion, GridScope, KnownPart, MotionCheck,
+    NearestQuestion, PoseCheck, Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck,
 };
 pub use reason::{Reason, ToldBy};
 pub use request::{

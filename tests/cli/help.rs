@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 25] = [
     "serve",
     "demo",
     "map",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 24] = [
     "check",
     "rays",
     "nearest",
+    "classify",
     "grid",
     "block",
     "observers",

@@ -2,6 +2,7 @@
 
 mod answer;
 mod body;
+mod classify;
 mod form;
 mod grid;
 mod motions;
@@ -10,6 +11,7 @@ mod poses;
 mod rays;
 mod spheres;
 
+pub(super) use classify::classify_points;
 pub(super) use grid::project_grid;
 pub(super) use motions::check_motions;
 pub(super) use nearest::find_nearest;

@@ -1,6 +1,7 @@
 //! Questions of planners: each is answered from a view of a whole map, the server's or a replica's.
 
 mod check;
+mod classify;
 mod grid;
 mod known;
 mod motions;
@@ -10,6 +11,7 @@ mod rays;
 mod spheres;
 
 pub use check::{CheckAs, Collisions};
+pub use classify::ClassifyQuestion;
 pub use grid::{GridQuestion, GridScope};
 pub use known::KnownPart;
 pub use motions::MotionCheck;
@@ -128,6 +130,7 @@ impl<'a> QuestionedMap<'a> {
         let _long_read = (elements > SHORT_ELEMENTS).then(|| self.map.long_read());
         let view = self.map.view();
         let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
+        let view = view.with_viewpoints();
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))

@@ -55,6 +55,9 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             let (asked, points) = (asked(map), points_pb(&POINTS));
             pb::FindNearestRequest { asked, points, radius_m: 1.0, ..Default::default() }.encode_to_vec()
         }
+        Operation::ClassifyPoints | Operation::ClassifyPointsStream => {
+            pb::ClassifyPointsRequest { asked: asked(map), points: points_pb(&POINTS) }.encode_to_vec()
+        }
         Operation::ProjectGrid => {
             pb::ProjectGridRequest { asked: asked(map), ..Default::default() }.encode_to_vec()
         }
@@ -151,6 +154,7 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         }
         Operation::CastRays => Some(json!({"origins": POINTS, "directions": [[1, 0, 0]]})),
         Operation::FindNearest => Some(json!({"points": POINTS, "radius_m": 1})),
+        Operation::ClassifyPoints => Some(json!({"points": POINTS})),
         Operation::ProjectGrid => Some(json!({})),
         Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::PutKeepOut => Some(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
@@ -175,6 +179,8 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::CastRaysStream
         | Operation::FindNearest
         | Operation::FindNearestStream
+        | Operation::ClassifyPoints
+        | Operation::ClassifyPointsStream
         | Operation::ProjectGrid
         | Operation::ListKeepOuts
         | Operation::PutKeepOut

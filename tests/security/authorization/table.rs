@@ -29,6 +29,8 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::CastRaysStream
         | Operation::FindNearest
         | Operation::FindNearestStream
+        | Operation::ClassifyPoints
+        | Operation::ClassifyPointsStream
         | Operation::ProjectGrid
         | Operation::GetBlock
         | Operation::ListObservers
