@@ -70,6 +70,7 @@ operations! {
     FindNearestStream: Some(Read),  grpc "/mrol.v1.Occupancy/FindNearestStream";
     ClassifyPoints:    Some(Read),  grpc "/mrol.v1.Occupancy/ClassifyPoints",    http POST "/v1/maps/{map}/classification";
     ClassifyPointsStream: Some(Read), grpc "/mrol.v1.Occupancy/ClassifyPointsStream";
+    ListFrontiers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListFrontiers",     http POST "/v1/maps/{map}/frontiers";
     ProjectGrid:       Some(Read),  grpc "/mrol.v1.Occupancy/ProjectGrid",       http POST "/v1/maps/{map}/grid";
     ListKeepOuts:      Some(Read),  grpc "/mrol.v1.Occupancy/ListKeepOuts",      http GET "/v1/maps/{map}/keep-outs";
     GetBlock:          Some(Read),  grpc "/mrol.v1.Occupancy/GetBlock",          http GET "/v1/maps/{map}/block";

@@ -13,6 +13,7 @@ mod config;
 mod delete;
 mod doctor;
 mod error;
+mod frontiers;
 mod grid;
 mod health;
 mod insert;
@@ -92,6 +93,7 @@ enum Command {
     Rays(rays::CastRays),
     Nearest(nearest::Nearest),
     Classify(classify::Classify),
+    Frontiers(frontiers::ListFrontiers),
     Grid(grid::DrawGrid),
     Block(block::Block),
     Observers(observers::Observers),
@@ -137,6 +139,7 @@ impl Command {
             Self::Rays(rays) => runtime::block_on(rays.run(output)),
             Self::Nearest(nearest) => runtime::block_on(nearest.run(output)),
             Self::Classify(classify) => runtime::block_on(classify.run(output)),
+            Self::Frontiers(frontiers) => runtime::block_on(frontiers.run(output)),
             Self::Grid(grid) => runtime::block_on(grid.run(output)),
             Self::Block(block) => runtime::block_on(block.run(output)),
             Self::Observers(observers) => runtime::block_on(observers.run(output)),

@@ -4,10 +4,10 @@ use tokio_stream::{Stream, StreamExt};
 
 use super::{Answers, Client, ClientError};
 use crate::map::MapName;
-use crate::planning::{Grid, MotionAnswer, NearestVoxels, PointStates, RayHits};
+use crate::planning::{Frontiers, Grid, MotionAnswer, NearestVoxels, PointStates, RayHits};
 use crate::service::{
-    Answered, ClassifyQuestion, Collisions, GridQuestion, MotionCheck, NearestQuestion, PoseCheck,
-    RayQuestion, SphereCheck,
+    Answered, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, MotionCheck, NearestQuestion,
+    PoseCheck, RayQuestion, SphereCheck,
 };
 use crate::wire::pb;
 
@@ -178,6 +178,19 @@ impl Client {
         let requests = batches.map(move |points| pb::ClassifyPointsRequest::from((&map, points)));
         let answers = self.connection.occupancy().classify_points_stream(requests).await;
         self.connection.answers(answers)
+    }
+
+    /// Returns the frontiers in a box, the largest first, each with a place from which it can be seen.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn list_frontiers(
+        &self,
+        map: &MapName,
+        question: FrontierQuestion,
+    ) -> Result<Answered<Frontiers>, ClientError> {
+        let request = self.request((map, question));
+        self.domain(self.connection.occupancy().list_frontiers(request).await)
     }
 
     /// Returns the map from above, as a 2-D grid.

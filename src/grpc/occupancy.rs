@@ -10,8 +10,8 @@ use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use crate::map::MapName;
 use crate::service::{
-    ClassifyQuestion, GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion, ServiceError,
-    SphereCheck,
+    ClassifyQuestion, FrontierQuestion, GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion,
+    ServiceError, SphereCheck,
 };
 use crate::wire::{listing_bytes, pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
@@ -189,6 +189,13 @@ impl Occupancy for Adapter {
         requests: Request<Streaming<pb::ClassifyPointsRequest>>,
     ) -> Result<Response<Self::ClassifyPointsStreamStream>, Status> {
         self.ask_in_order::<ClassifyQuestion, _, _>(Operation::ClassifyPointsStream, requests)
+    }
+
+    async fn list_frontiers(
+        &self,
+        request: Request<pb::ListFrontiersRequest>,
+    ) -> Result<Response<pb::ListFrontiersResponse>, Status> {
+        self.ask::<FrontierQuestion, _, _>(request).await
     }
 
     async fn project_grid(

@@ -41,6 +41,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::CastRays => on(method, question::cast_rays),
         Operation::FindNearest => on(method, question::find_nearest),
         Operation::ClassifyPoints => on(method, question::classify_points),
+        Operation::ListFrontiers => on(method, question::list_frontiers),
         Operation::ProjectGrid => on(method, question::project_grid),
         Operation::DeleteVoxels => on(method, deletions::delete),
         Operation::Undo => on(method, undo::undo),

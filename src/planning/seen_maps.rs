@@ -11,8 +11,8 @@ use super::test_maps::RESOLUTION_M;
 use crate::geometry::{Point, Pose};
 use crate::map::test_shapes::shape;
 use crate::map::{
-    Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapSettings, MapView,
-    MappedScan, MultiResolutionMap, RobotName, ScanRecord, UndoRecord, ViewpointRecord,
+    Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapContents, MapSettings,
+    MapView, MappedScan, MultiResolutionMap, RobotName, ScanRecord, UndoRecord, ViewpointRecord,
 };
 use crate::visibility::{RangeImage, SeenRange, Viewpoint};
 use crate::voxel::{MomentSet, VoxelKey, VoxelSet};
@@ -38,11 +38,19 @@ struct SeenScan {
     range_m: f32,
 }
 
-/// A map, and the viewpoints of its scans that were not taken back.
+/// A map, and the scans that it was made of.
 #[derive(Debug)]
 pub(super) struct SeenMap {
     pub(super) map: Arc<MultiResolutionMap>,
-    viewpoints: Vec<Viewpoint>,
+    scans: Vec<TakenScan>,
+}
+
+#[derive(Debug)]
+struct TakenScan {
+    revision: u64,
+    voxels: VoxelSet,
+    viewpoint: Option<Viewpoint>,
+    is_undone: bool,
 }
 
 impl SeenScan {
@@ -81,63 +89,108 @@ impl SeenScan {
 impl SeenHistory {
     /// The map of this history.
     pub(super) fn map(&self) -> SeenMap {
+        let mut seen = self.first();
+        (0..Self::STEPS).for_each(|step| self.go_on(&mut seen, step));
+        seen
+    }
+
+    /// Steps that lead to the map.
+    pub(super) const STEPS: usize = 4;
+
+    /// A map of which nothing has happened yet.
+    pub(super) fn first(&self) -> SeenMap {
         let map = MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, self.levels)).unwrap();
-        let (mut viewpoints, mut kept) = (Vec::new(), BTreeSet::<VoxelKey>::new());
-        let mut undone = Vec::new();
-        for (scan, is_undone) in &self.scans {
-            let record = scan.record();
-            let revision = map.committer().insert_scan(record.clone()).revision;
-            if *is_undone {
-                undone.push((revision, record.voxels));
-                continue;
+        SeenMap { map: Arc::new(map), scans: Vec::new() }
+    }
+
+    /// Makes a step: scans are taken in two, then voxels are deleted and scans taken back, then keep-outs are made.
+    pub(super) fn go_on(&self, seen: &mut SeenMap, step: usize) {
+        let (some, others) = self.scans.split_at(self.scans.len() / 2);
+        match step {
+            0 => some.iter().for_each(|(scan, _)| seen.insert(scan)),
+            1 => others.iter().for_each(|(scan, _)| seen.insert(scan)),
+            2 => {
+                seen.map.committer().remove(&self.deleted);
+                (0..self.scans.len()).filter(|&i| self.scans[i].1).for_each(|i| seen.undo(i));
             }
-            kept.extend(record.voxels.iter());
-            let image = record.viewpoint.map(|viewpoint| viewpoint.image);
-            viewpoints.extend(image.map(|image| Viewpoint::new(record.pose.map_from_sensor, image)));
+            _ => self.keep_outs.iter().enumerate().for_each(|(i, shape)| seen.keep_out(i, shape)),
         }
-        map.committer().remove(&self.deleted);
-        for (revision, voxels) in undone {
-            let view = map.view();
-            let goes = |voxel: &VoxelKey| !kept.contains(voxel) && view.contains(*voxel, 0);
-            let removed: VoxelSet = voxels.iter().filter(goes).collect();
-            drop(view);
-            map.committer().apply(&Change::Undo(UndoRecord {
-                scans: vec![revision],
-                deletions: Vec::new(),
-                removed,
-                restored: VoxelSet::default(),
-                moments: MomentSet::default(),
-                request: None,
-            }));
-        }
-        for (i, shape) in self.keep_outs.iter().enumerate() {
-            let name = KeepOutName::new(&format!("k{i}")).unwrap();
-            let act = KeepOutAct::Put { shape: shape.clone(), made_by: None, expires_at_ns: None };
-            let change = KeepOutChange { name, act };
-            map.committer().apply(&Change::KeepOut(KeepOutRecord { change, request: None }));
-        }
-        SeenMap { map: Arc::new(map), viewpoints }
     }
 }
 
 impl SeenMap {
-    /// True where a viewpoint saw through the center of a voxel.
+    fn insert(&mut self, scan: &SeenScan) {
+        let record = scan.record();
+        let revision = self.map.committer().insert_scan(record.clone()).revision;
+        let image = record.viewpoint.map(|viewpoint| viewpoint.image);
+        let viewpoint = image.map(|image| Viewpoint::new(record.pose.map_from_sensor, image));
+        self.scans.push(TakenScan { revision, voxels: record.voxels, viewpoint, is_undone: false });
+    }
+
+    /// Takes a scan back: the voxels go that no other holds.
+    fn undo(&mut self, number: usize) {
+        self.scans[number].is_undone = true;
+        let kept: BTreeSet<VoxelKey> =
+            self.scans.iter().filter(|scan| !scan.is_undone).flat_map(|scan| scan.voxels.iter()).collect();
+        let view = self.map.view();
+        let goes = |voxel: &VoxelKey| !kept.contains(voxel) && view.contains(*voxel, 0);
+        let removed: VoxelSet = self.scans[number].voxels.iter().filter(goes).collect();
+        drop(view);
+        self.map.committer().apply(&Change::Undo(UndoRecord {
+            scans: vec![self.scans[number].revision],
+            deletions: Vec::new(),
+            removed,
+            restored: VoxelSet::default(),
+            moments: MomentSet::default(),
+            request: None,
+        }));
+    }
+
+    fn keep_out(&self, number: usize, shape: &KeepOutShape) {
+        let name = KeepOutName::new(&format!("k{number}")).unwrap();
+        let act = KeepOutAct::Put { shape: shape.clone(), made_by: None, expires_at_ns: None };
+        let change = KeepOutChange { name, act };
+        self.map.committer().apply(&Change::KeepOut(KeepOutRecord { change, request: None }));
+    }
+
+    /// True where a viewpoint of a scan that was not taken back saw through the center of a voxel.
     pub(super) fn is_seen_through(&self, voxel: VoxelKey, level: u32) -> bool {
         let center_m = self.map.lattice().center_m(voxel, level);
-        self.viewpoints.iter().any(|viewpoint| viewpoint.sees_through(center_m))
+        let mut viewpoints =
+            self.scans.iter().filter(|scan| !scan.is_undone).flat_map(|scan| &scan.viewpoint);
+        viewpoints.any(|viewpoint| viewpoint.sees_through(center_m))
     }
 
     /// True where a voxel is free: seen through, and not occupied.
     pub(super) fn is_free(&self, view: &MapView<'_>, voxel: VoxelKey, level: u32) -> bool {
         !view.contains(voxel, level) && self.is_seen_through(voxel, level)
     }
+
+    /// A map of one level in whose middle each voxel is occupied that is not free at a level of this one.
+    pub(super) fn solid(&self, level: u32) -> Arc<MultiResolutionMap> {
+        let side_m = self.map.lattice().resolution_m(level);
+        let half = (SOLID_M / side_m).ceil() as i32 + SOLID_CELLS;
+        let view = self.map.view();
+        let axis = || -half..half;
+        let all = axis().flat_map(|z| axis().flat_map(move |y| axis().map(move |x| [x, y, z])));
+        let voxels =
+            all.filter_map(VoxelKey::new).filter(|voxel| !self.is_free(&view, *voxel, level)).collect();
+        drop(view);
+        Arc::new(
+            MultiResolutionMap::restore(MapSettings::new(side_m, 1), MapContents::at(1, voxels)).unwrap(),
+        )
+    }
 }
+
+/// How far a solid map goes from the origin along an axis: beyond all that scans see, and some cells more.
+const SOLID_M: f64 = 9.0;
+const SOLID_CELLS: i32 = 7;
 
 /// Around what scans see: small scenes, so that few voxels are looked at one by one.
 fn scan() -> impl Strategy<Value = SeenScan> {
-    let origin = prop::array::uniform3(-4.0f64..4.0);
+    let origin = prop::array::uniform3(-3.0f64..3.0);
     let turned = prop::array::uniform3(-3.0f64..3.0);
-    (any::<u64>(), origin, turned, 0.3f32..2.0, 1.0f32..8.0).prop_map(
+    (any::<u64>(), origin, turned, 0.3f32..1.0, 1.0f32..3.4).prop_map(
         |(seed, origin_m, turned, around, range_m)| SeenScan { seed, origin_m, turned, around, range_m },
     )
 }

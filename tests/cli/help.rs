@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 25] = [
+const COMMANDS: [&str; 26] = [
     "serve",
     "demo",
     "map",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 25] = [
     "rays",
     "nearest",
     "classify",
+    "frontiers",
     "grid",
     "block",
     "observers",

@@ -4,6 +4,7 @@ mod answer;
 mod body;
 mod classify;
 mod form;
+mod frontiers;
 mod grid;
 mod motions;
 mod nearest;
@@ -12,6 +13,7 @@ mod rays;
 mod spheres;
 
 pub(super) use classify::classify_points;
+pub(super) use frontiers::list_frontiers;
 pub(super) use grid::project_grid;
 pub(super) use motions::check_motions;
 pub(super) use nearest::find_nearest;

@@ -2,6 +2,7 @@
 
 mod body;
 mod classify;
+mod frontiers;
 mod grid;
 mod keep_outs;
 mod motions;
@@ -73,6 +74,7 @@ asks_without_a_body!(
     CastRaysRequest,
     FindNearestRequest,
     ClassifyPointsRequest,
+    ListFrontiersRequest,
     CheckSpheresRequest,
     ProjectGridRequest
 );

@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 30] = [
+const METHODS: [&str; 31] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -38,6 +38,7 @@ const METHODS: [&str; 30] = [
     "Occupancy/FindNearest",
     "Occupancy/ProjectGrid",
     "Occupancy/ClassifyPoints",
+    "Occupancy/ListFrontiers",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];

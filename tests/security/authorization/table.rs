@@ -31,6 +31,7 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::FindNearestStream
         | Operation::ClassifyPoints
         | Operation::ClassifyPointsStream
+        | Operation::ListFrontiers
         | Operation::ProjectGrid
         | Operation::GetBlock
         | Operation::ListObservers
