@@ -68,6 +68,9 @@ operations! {
     CastRaysStream:    Some(Read),  grpc "/mrol.v1.Occupancy/CastRaysStream";
     FindNearest:       Some(Read),  grpc "/mrol.v1.Occupancy/FindNearest",       http POST "/v1/maps/{map}/nearest";
     FindNearestStream: Some(Read),  grpc "/mrol.v1.Occupancy/FindNearestStream";
+    ClassifyPoints:    Some(Read),  grpc "/mrol.v1.Occupancy/ClassifyPoints",    http POST "/v1/maps/{map}/classification";
+    ClassifyPointsStream: Some(Read), grpc "/mrol.v1.Occupancy/ClassifyPointsStream";
+    ListFrontiers:     Some(Read),  grpc "/mrol.v1.Occupancy/ListFrontiers",     http POST "/v1/maps/{map}/frontiers";
     ProjectGrid:       Some(Read),  grpc "/mrol.v1.Occupancy/ProjectGrid",       http POST "/v1/maps/{map}/grid";
     ListKeepOuts:      Some(Read),  grpc "/mrol.v1.Occupancy/ListKeepOuts",      http GET "/v1/maps/{map}/keep-outs";
     GetBlock:          Some(Read),  grpc "/mrol.v1.Occupancy/GetBlock",          http GET "/v1/maps/{map}/block";
@@ -138,6 +141,7 @@ impl Operation {
                 | Self::CheckMotionsStream
                 | Self::CastRaysStream
                 | Self::FindNearestStream
+                | Self::ClassifyPointsStream
                 | Self::InsertScanStream
                 | Self::Watch
                 | Self::Reflect

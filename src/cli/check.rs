@@ -16,7 +16,7 @@ use super::remote::MapOptions;
 use crate::client::Client;
 use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
 use crate::map::MapName;
-use crate::planning::{Body, Link, Sphere, Surroundings};
+use crate::planning::{Body, Link, Sphere, Surroundings, Unknown};
 use crate::service::{CheckAs, Collisions, MotionCheck, PoseCheck};
 use crate::voxel::VoxelKey;
 
@@ -26,6 +26,7 @@ EXAMPLES:
   mrol check --map office --sphere \"0 0 0.2 0.3\" --pose \"1 2 0 0 0 0 1\" --clearance 1
   mrol check --map office --body arm.json --pose \"1 2 0 0 0 0 1\" --pose \"2 2 0 0 0 0 1\"
   mrol check --map office --sphere \"0 0 0 0.3\" --motion --pose \"1 2 1 0 0 0 1\" --pose \"4 2 1 0 0 0 1\"
+  mrol check --map office --sphere \"0 0 0 0.3\" --pose \"1 2 1 0 0 0 1\" --unknown occupied
 
 A body file is what HTTP takes, with one link here: {\"links\": [{\"spheres\": [[x, y, z, r], ...], \"points\": [[x, y, z], ...],
 \"padding_m\": 0.05}]}. With --motion the body moves from pose to pose.";
@@ -51,6 +52,10 @@ pub(super) struct Check {
     /// Tell how much room there is, up to so many meters (and to 64 voxels of the level)
     #[arg(long, value_name = "METERS")]
     clearance: Option<f32>,
+    /// What voxels count as that no scan saw through: free, or occupied, so that a body fits only where all of it was seen to
+    /// be free
+    #[arg(long, value_parser = parse::keyword::<Unknown>(), default_value = "free")]
+    unknown: Unknown,
     #[command(flatten)]
     asked: AskedOptions,
 }
@@ -76,6 +81,10 @@ impl Check {
         }
     }
 
+    fn surroundings(&self) -> Surroundings {
+        Surroundings { unknown: self.unknown, ..Surroundings::ALL_VOXELS }
+    }
+
     fn map_name(&self) -> &MapName {
         &self.map.name
     }
@@ -87,7 +96,7 @@ impl Check {
         configurations: Vec<f32>,
         output: &Output,
     ) -> Result<(), CliError> {
-        let (asked, surroundings) = (self.asked.asked(), Surroundings::default());
+        let (asked, surroundings) = (self.asked.asked(), self.surroundings());
         let check = PoseCheck { asked, body, configurations, surroundings, answer: CheckAs::FirstHit };
         let answered = client.check_poses(self.map_name(), check).await?;
         let Collisions::FirstHits(hits) = answered.answer else {
@@ -115,7 +124,7 @@ impl Check {
         most_m: Option<f32>,
         output: &Output,
     ) -> Result<(), CliError> {
-        let (asked, surroundings) = (self.asked.asked(), Surroundings::default());
+        let (asked, surroundings) = (self.asked.asked(), self.surroundings());
         let answer = CheckAs::Clearance { most_m };
         let check = PoseCheck { asked, body, configurations, surroundings, answer };
         let answered = client.check_poses(self.map_name(), check).await?;
@@ -143,7 +152,7 @@ impl Check {
             lengths: vec![self.pose.len() as u32],
             step_m: None,
             clearance_max_m: self.clearance,
-            surroundings: Surroundings::default(),
+            surroundings: self.surroundings(),
         };
         let answered = client.check_motions(self.map_name(), check).await?;
         let revision = answered.version.revision;

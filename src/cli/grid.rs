@@ -12,14 +12,14 @@ use super::map_report::count;
 use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
-use crate::planning::{Grid, GridArea, NotOccupied};
+use crate::planning::{Grid, GridArea};
 use crate::service::{GridQuestion, GridScope};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol grid --map office --band \"0.1 1.8\" --out office.pgm        what a robot of 1.8 m can run into
   mrol grid --map office --band \"0.1 1.8\" --cell 0.1 --area \"0 0 10 8\" --out office.pgm
-  mrol grid --map office --out office.pgm --unknown               nothing is said to be free
+  mrol grid --map office --out office.pgm --unknown               free is only what scans saw through
 
 Writes the image and, beside it, office.yaml, which names it: both are what map_server of ROS 1 and nav2_map_server read.";
 
@@ -44,7 +44,7 @@ pub(super) struct DrawGrid {
     /// Side of a cell, meters: a whole number of voxels [default: one voxel]
     #[arg(long, value_name = "METERS")]
     cell: Option<f64>,
-    /// Call cells without a voxel unknown, not free
+    /// Tell unknown cells: those without a voxel are free only where scans saw through
     #[arg(long)]
     unknown: bool,
     #[command(flatten)]
@@ -56,18 +56,22 @@ impl DrawGrid {
         let Self { map, out, band, area, cell, unknown, asked } = self;
         check_is_image(&out)?;
         let band_m = band.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let scope = GridScope { area: area.unwrap_or(GridArea::Occupied), band_m, cell_m: cell };
+        let scope = GridScope {
+            area: area.unwrap_or(GridArea::Occupied),
+            band_m,
+            cell_m: cell,
+            tells_unknown: unknown,
+        };
         let question = GridQuestion { asked: asked.asked(), scope };
         let client = map.server.connect().await?;
         let answered = client.project_grid(&map.name, question).await?;
-        let not_occupied = if unknown { NotOccupied::Unknown } else { NotOccupied::Free };
         let grid = answered.answer;
         if grid.cells() == 0 {
             let message =
                 "the map has no voxel in this band: there is nothing to draw; give --area, or another --band";
             return Err(CliError::failed(message));
         }
-        let description = write_files(&grid, &out, not_occupied)?;
+        let description = write_files(&grid, &out)?;
         output.print(&Drawn::of(&grid, &out, &description, answered.version.revision))
     }
 }
@@ -85,12 +89,16 @@ fn check_is_image(out: &Path) -> Result<(), CliError> {
 }
 
 /// Writes the image and its description, whose path is returned.
-fn write_files(grid: &Grid, image: &Path, not_occupied: NotOccupied) -> Result<PathBuf, CliError> {
+fn write_files(grid: &Grid, image: &Path) -> Result<PathBuf, CliError> {
     let name = image.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let description = image.with_extension(DESCRIPTION);
-    fs::write(image, grid.to_pgm(not_occupied)).map_err(CliError::writing(image))?;
+    fs::write(image, grid.to_pgm()).map_err(CliError::writing(image))?;
     fs::write(&description, grid.to_yaml(&name)).map_err(CliError::writing(&description))?;
     Ok(description)
+}
+
+fn ones(words: &[u64]) -> usize {
+    words.iter().map(|word| word.count_ones() as usize).sum()
 }
 
 #[derive(Serialize)]
@@ -101,6 +109,8 @@ struct Drawn {
     cell_m: f64,
     origin_m: [f64; 2],
     cells_occupied: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cells_free: Option<usize>,
     revision: u64,
 }
 
@@ -112,7 +122,8 @@ impl Drawn {
             size: grid.size,
             cell_m: grid.cell_m,
             origin_m: grid.origin_m,
-            cells_occupied: grid.occupied.iter().map(|word| word.count_ones() as usize).sum(),
+            cells_occupied: ones(&grid.occupied),
+            cells_free: grid.free.as_deref().map(ones),
             revision,
         }
     }
@@ -120,15 +131,16 @@ impl Drawn {
 
 impl Display for Drawn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [width, height] = self.size;
+        let ([width, height], occupied) = (self.size, count(self.cells_occupied));
         write!(
             f,
-            "{} and {}: {width} x {height} cells of {} m, {} of them occupied, at revision {}",
-            self.image,
-            self.description,
-            self.cell_m,
-            count(self.cells_occupied),
-            self.revision
-        )
+            "{} and {}: {width} x {height} cells of {} m, ",
+            self.image, self.description, self.cell_m
+        )?;
+        match self.cells_free {
+            Some(free) => write!(f, "{occupied} of them occupied and {} free", count(free))?,
+            None => write!(f, "{occupied} of them occupied")?,
+        }
+        write!(f, ", at revision {}", self.revision)
     }
 }

@@ -8,10 +8,12 @@ mod alignment_options;
 mod asked;
 mod block;
 mod check;
+mod classify;
 mod config;
 mod delete;
 mod doctor;
 mod error;
+mod frontiers;
 mod grid;
 mod health;
 mod insert;
@@ -90,6 +92,8 @@ enum Command {
     Check(check::Check),
     Rays(rays::CastRays),
     Nearest(nearest::Nearest),
+    Classify(classify::Classify),
+    Frontiers(frontiers::ListFrontiers),
     Grid(grid::DrawGrid),
     Block(block::Block),
     Observers(observers::Observers),
@@ -134,6 +138,8 @@ impl Command {
             Self::Check(check) => runtime::block_on(check.run(output)),
             Self::Rays(rays) => runtime::block_on(rays.run(output)),
             Self::Nearest(nearest) => runtime::block_on(nearest.run(output)),
+            Self::Classify(classify) => runtime::block_on(classify.run(output)),
+            Self::Frontiers(frontiers) => runtime::block_on(frontiers.run(output)),
             Self::Grid(grid) => runtime::block_on(grid.run(output)),
             Self::Block(block) => runtime::block_on(block.run(output)),
             Self::Observers(observers) => runtime::block_on(observers.run(output)),

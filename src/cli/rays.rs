@@ -11,6 +11,7 @@ use super::output::Output;
 use super::parse;
 use super::remote::MapOptions;
 use crate::geometry::Point;
+use crate::planning::Unknown;
 use crate::service::{RayQuestion, RaysToward};
 
 const EXAMPLES: &str = "\
@@ -18,6 +19,7 @@ EXAMPLES:
   mrol rays --map office --from 1,2,0.5 --direction 1,0,0           how far it is to the next wall along x
   mrol rays --map office --from 1,2,0.5 --direction 0.6,0.8,0 --direction 0,0,1 --range 10
   mrol rays --map office --from 1,2,0.5 --to 4,2,0.5                is there a line of sight?
+  mrol rays --map office --from 1,2,0.5 --to 4,2,0.5 --unknown occupied     and is all of it known to be free?
 
 A direction is a unit vector. A ray meets the first occupied voxel in which it runs for some way.";
 
@@ -39,20 +41,23 @@ pub(super) struct CastRays {
     /// Length of the rays with a direction, meters [default: as far as the map goes]
     #[arg(long, value_name = "METERS", requires = "direction")]
     range: Option<f64>,
+    /// What voxels count as that no scan saw through: free, or occupied, so that a ray ends where nothing was seen
+    #[arg(long, value_parser = parse::keyword::<Unknown>(), default_value = "free")]
+    unknown: Unknown,
     #[command(flatten)]
     asked: AskedOptions,
 }
 
 impl CastRays {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
-        let Self { map, from, direction, to, range, asked } = self;
+        let Self { map, from, direction, to, range, unknown, asked } = self;
         let toward = if to.is_empty() {
             let range_m = range.unwrap_or(f64::INFINITY);
             RaysToward::Directions { directions: direction.into(), range_m }
         } else {
             RaysToward::Ends(to.into())
         };
-        let question = RayQuestion { asked: asked.asked(), origins: vec![from].into(), toward };
+        let question = RayQuestion { asked: asked.asked(), origins: vec![from].into(), toward, unknown };
         let client = map.server.connect().await?;
         let answered = client.cast_rays(&map.name, question).await?;
         let (hits, revision) = (answered.answer, answered.version.revision);

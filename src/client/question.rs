@@ -4,9 +4,10 @@ use tokio_stream::{Stream, StreamExt};
 
 use super::{Answers, Client, ClientError};
 use crate::map::MapName;
-use crate::planning::{Grid, MotionAnswer, NearestVoxels, RayHits};
+use crate::planning::{Frontiers, Grid, MotionAnswer, NearestVoxels, PointStates, RayHits};
 use crate::service::{
-    Answered, Collisions, GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion, SphereCheck,
+    Answered, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, MotionCheck, NearestQuestion,
+    PoseCheck, RayQuestion, SphereCheck,
 };
 use crate::wire::pb;
 
@@ -149,6 +150,47 @@ impl Client {
         let requests = batches.map(move |points| pb::FindNearestRequest::from((&map, points)));
         let answers = self.connection.occupancy().find_nearest_stream(requests).await;
         self.connection.answers(answers)
+    }
+
+    /// Returns of each point whether it is occupied, free, or unknown, all at one revision.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn classify_points(
+        &self,
+        map: &MapName,
+        points: ClassifyQuestion,
+    ) -> Result<Answered<PointStates>, ClientError> {
+        let request = self.request((map, points));
+        self.domain(self.connection.occupancy().classify_points(request).await)
+    }
+
+    /// Classifies batch after batch of points, with one answer for each, without a round trip between two batches.
+    ///
+    /// # Errors
+    /// When the server cannot be reached; a refused batch ends the answers.
+    pub async fn classification_stream(
+        &self,
+        map: &MapName,
+        batches: impl Stream<Item = ClassifyQuestion> + Send + 'static,
+    ) -> Result<Answers<Answered<PointStates>>, ClientError> {
+        let map = map.clone();
+        let requests = batches.map(move |points| pb::ClassifyPointsRequest::from((&map, points)));
+        let answers = self.connection.occupancy().classify_points_stream(requests).await;
+        self.connection.answers(answers)
+    }
+
+    /// Returns the frontiers in a box, the largest first, each with a place from which it can be seen.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn list_frontiers(
+        &self,
+        map: &MapName,
+        question: FrontierQuestion,
+    ) -> Result<Answered<Frontiers>, ClientError> {
+        let request = self.request((map, question));
+        self.domain(self.connection.occupancy().list_frontiers(request).await)
     }
 
     /// Returns the map from above, as a 2-D grid.

@@ -10,7 +10,8 @@ use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use crate::map::MapName;
 use crate::service::{
-    GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion, ServiceError, SphereCheck,
+    ClassifyQuestion, FrontierQuestion, GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion,
+    ServiceError, SphereCheck,
 };
 use crate::wire::{listing_bytes, pb, voxel_chunks};
 use pb::occupancy_server::Occupancy;
@@ -24,6 +25,7 @@ impl Occupancy for Adapter {
     type CheckMotionsStreamStream = Answers<pb::CheckMotionsResponse>;
     type CastRaysStreamStream = Answers<pb::CastRaysResponse>;
     type FindNearestStreamStream = Answers<pb::FindNearestResponse>;
+    type ClassifyPointsStreamStream = Answers<pb::ClassifyPointsResponse>;
     type WatchStream = BoxStream<pb::WatchResponse>;
 
     async fn query_points(
@@ -173,6 +175,27 @@ impl Occupancy for Adapter {
         requests: Request<Streaming<pb::FindNearestRequest>>,
     ) -> Result<Response<Self::FindNearestStreamStream>, Status> {
         self.ask_in_order::<NearestQuestion, _, _>(Operation::FindNearestStream, requests)
+    }
+
+    async fn classify_points(
+        &self,
+        request: Request<pb::ClassifyPointsRequest>,
+    ) -> Result<Response<pb::ClassifyPointsResponse>, Status> {
+        self.ask::<ClassifyQuestion, _, _>(request).await
+    }
+
+    async fn classify_points_stream(
+        &self,
+        requests: Request<Streaming<pb::ClassifyPointsRequest>>,
+    ) -> Result<Response<Self::ClassifyPointsStreamStream>, Status> {
+        self.ask_in_order::<ClassifyQuestion, _, _>(Operation::ClassifyPointsStream, requests)
+    }
+
+    async fn list_frontiers(
+        &self,
+        request: Request<pb::ListFrontiersRequest>,
+    ) -> Result<Response<pb::ListFrontiersResponse>, Status> {
+        self.ask::<FrontierQuestion, _, _>(request).await
     }
 
     async fn project_grid(

@@ -92,5 +92,5 @@ macro_rules! streamed_with_a_body {
     };
 }
 
-streamed!(CastRaysRequest, FindNearestRequest, CheckSpheresRequest);
+streamed!(CastRaysRequest, FindNearestRequest, ClassifyPointsRequest, CheckSpheresRequest);
 streamed_with_a_body!(CheckPosesRequest, CheckMotionsRequest);

@@ -40,6 +40,8 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::CheckMotions => on(method, question::check_motions),
         Operation::CastRays => on(method, question::cast_rays),
         Operation::FindNearest => on(method, question::find_nearest),
+        Operation::ClassifyPoints => on(method, question::classify_points),
+        Operation::ListFrontiers => on(method, question::list_frontiers),
         Operation::ProjectGrid => on(method, question::project_grid),
         Operation::DeleteVoxels => on(method, deletions::delete),
         Operation::Undo => on(method, undo::undo),
@@ -62,6 +64,7 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         | Operation::CheckMotionsStream
         | Operation::CastRaysStream
         | Operation::FindNearestStream
+        | Operation::ClassifyPointsStream
         | Operation::InsertScanStream
         | Operation::StreamTrajectory
         | Operation::Reflect

@@ -2,7 +2,7 @@
 
 use super::MapView;
 use super::occupied_voxel_list::tier_of;
-use crate::voxel::BLOCK_LEVELS;
+use crate::voxel::{BLOCK_LEVELS, INDEX_MAX, INDEX_MIN};
 
 /// A box of cells: the first cell, and the one past the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,6 +12,12 @@ pub(crate) struct CellBounds {
 }
 
 impl MapView<'_> {
+    /// The box of all cells of the tier that serves `level`, whether something is there or not.
+    pub(crate) fn lattice_bounds(&self, level: u32) -> CellBounds {
+        let finer = tier_of(level).0 as u32 * BLOCK_LEVELS;
+        CellBounds { first: [INDEX_MIN >> finer; 3], end: [(INDEX_MAX >> finer) + 1; 3] }
+    }
+
     /// A box around all voxels that the view covers, in cells of the tier that serves `level`: as small as whole blocks of
     /// the coarsest tier allow. None without a voxel.
     pub(crate) fn cell_bounds(&self, level: u32) -> Option<CellBounds> {

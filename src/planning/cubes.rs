@@ -5,9 +5,10 @@
 //! `(x * x + y * y) + z * z` of the gaps along the axes, is at most `r * r`.
 
 use crate::map::MapView;
-use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
+use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey};
 
 use super::effort::Effort;
+use super::free_space::{ALL, FreeSpace};
 use super::surroundings::Surroundings;
 
 /// The squared distance from `center` to the cube of `side` cells that begins at `low`, in cells.
@@ -32,6 +33,8 @@ pub(super) struct NearestCube {
 pub(super) struct CubeSearch<'a, 'e> {
     view: &'a MapView<'a>,
     surroundings: &'a Surroundings,
+    /// Where unknown voxels count: what was seen through.
+    free_space: Option<FreeSpace<'a>>,
     level: u32,
     center: [f64; 3],
     /// Squared distance beyond which nothing counts.
@@ -45,6 +48,10 @@ pub(super) struct CubeSearch<'a, 'e> {
 
 /// Cells beyond a ball that are looked at, whatever the rounding.
 pub(super) const SLACK: f64 = 1e-6;
+/// The first radius of searches in which unknown voxels count, cells.
+const FIRST_CELLS: f64 = 4.0;
+/// What a voxel costs of which it is asked whether it was seen through, in units of effort.
+const SEEN_EFFORT: u32 = 4;
 /// Blocks along an axis that are searched one by one; where there are more, their presence is asked first.
 const BLOCKS_MAX: i32 = 3;
 
@@ -57,7 +64,9 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         center: [f64; 3],
         effort: &'a mut Effort<'e>,
     ) -> Self {
-        Self { view, surroundings, level, center, squared_max: 0.0, found: None, is_any: false, effort }
+        let free_space = surroundings.unknown_counts().then(|| FreeSpace::of(view));
+        let (squared_max, found, is_any) = (0.0, None, false);
+        Self { view, surroundings, free_space, level, center, squared_max, found, is_any, effort }
     }
 
     /// True where a voxel is at most `radius` cells away.
@@ -69,6 +78,17 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
 
     /// The nearest voxel, where there is one at most `radius` cells away; of several the one with the smallest key.
     pub(super) fn nearest(mut self, radius: f64) -> Option<NearestCube> {
+        if self.free_space.is_some() {
+            // Most of space is unknown, so that something is near: all of a ball is not looked at for it.
+            let mut near = FIRST_CELLS;
+            while near < radius && self.found.is_none() && !self.is_done() {
+                self.run(near);
+                near *= 2.0;
+            }
+            if self.found.is_some() {
+                return self.found;
+            }
+        }
         self.run(radius);
         self.found
     }
@@ -82,9 +102,9 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
             side *= BLOCK_SIDE;
         }
         let block = f64::from(BLOCK_SIDE * side);
-        let blocks_end = f64::from(1 << 20) / block + 1.0;
-        // Blocks beyond the map's range hold nothing.
-        let bound = |c: f64| (c / block).floor().clamp(-blocks_end, blocks_end) as i32;
+        // Blocks beyond the map's range hold nothing, unknown or not; a level's range is a whole number of them.
+        let range = f64::from(1u32 << 20 >> self.level) / block;
+        let bound = |c: f64| (c / block).floor().clamp(-range, range - 1.0) as i32;
         let [xs, ys, zs] = self.center.map(|c| bound(c - radius - SLACK)..=bound(c + radius + SLACK));
         for (z, y) in zs.flat_map(|z| ys.clone().map(move |y| (z, y))) {
             for x in xs.clone() {
@@ -114,10 +134,11 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         if !self.is_near(key.index(), side * BLOCK_SIDE) {
             return;
         }
-        let mask = self.view.level_block(level, key);
-        for cell in mask.cells(2) {
+        let occupied = self.view.level_block(level, key);
+        let candidates = if self.free_space.is_some() { ALL } else { occupied };
+        for cell in candidates.cells(2) {
             if self.is_near(cell.voxel(key).ancestor(2).index(), side * 4) {
-                self.search_part(level, side, key, mask.part(cell));
+                self.search_part((level, side), key, candidates.part(cell), &occupied);
             }
             if self.is_done() {
                 return;
@@ -125,14 +146,20 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         }
     }
 
-    /// Searches some voxels of a block.
-    fn search_part(&mut self, level: u32, side: i32, key: VoxelKey, cells: impl Iterator<Item = Cell>) {
+    /// Searches some voxels of a block, of which those of a mask are occupied.
+    fn search_part(
+        &mut self,
+        (level, side): (u32, i32),
+        key: VoxelKey,
+        cells: impl Iterator<Item = Cell>,
+        occupied: &BlockMask,
+    ) {
         for cell in cells {
             let voxel = cell.voxel(key);
             if side > 1 {
                 self.search_block(level - BLOCK_LEVELS, side / BLOCK_SIDE, voxel);
             } else {
-                self.consider(voxel);
+                self.consider(voxel, occupied.contains(cell, 0));
             }
             if self.is_done() {
                 return;
@@ -140,13 +167,22 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         }
     }
 
-    fn consider(&mut self, voxel: VoxelKey) {
+    fn consider(&mut self, voxel: VoxelKey, is_occupied: bool) {
         self.effort.spend(1);
         let squared = squared_distance(self.center, voxel.index().map(f64::from), 1.0);
         let is_better = squared < self.squared_max
             || squared == self.squared_max && self.found.is_none_or(|found| voxel < found.voxel);
-        if is_better && !self.surroundings.ignores(self.view.map().lattice(), voxel, self.level) {
+        let counts = is_better && (is_occupied || self.is_unknown(voxel));
+        if counts && !self.surroundings.ignores(self.view.map().lattice(), voxel, self.level) {
             (self.squared_max, self.found) = (squared, Some(NearestCube { squared, voxel }));
         }
+    }
+
+    /// True of a voxel that is not occupied where unknown ones count and it is one.
+    fn is_unknown(&mut self, voxel: VoxelKey) -> bool {
+        self.free_space.as_mut().is_some_and(|free_space| {
+            self.effort.spend(SEEN_EFFORT);
+            !free_space.is_seen_through(voxel, self.level)
+        })
     }
 }

@@ -4,6 +4,7 @@ use super::clearance::{FieldBlockKey, Fields};
 use super::cubes::{CubeSearch, NearestCube};
 use super::effort::Effort;
 use super::eight::{self, Bounds, Centers, Found, LANES};
+use super::free_space::FreeSpace;
 use super::in_cells::Group;
 use super::nearby::{self, Nearby};
 use super::surroundings::Surroundings;
@@ -86,7 +87,9 @@ impl<'a> Look<'a> {
         is_last: bool,
         stop: StopSignal<'a>,
     ) -> Self {
-        let levels_above = view.map().block_levels_end() - level;
+        // What is free at a level does not tell what is at a finer one: fields of coarser levels say nothing of this one then.
+        let levels_above =
+            if surroundings.unknown_counts() { 0 } else { view.map().block_levels_end() - level };
         let (unmade, effort) = (Vec::new(), Effort::new(stop));
         Self { view, surroundings, level, levels_above, fields, unmade, is_full: false, is_last, effort }
     }
@@ -151,7 +154,7 @@ impl<'a> Look<'a> {
         let coarser_by = coarser_by.min(self.levels_above);
         let side = (1u32 << coarser_by) as f32;
         (found.side, found.beyond) = (side, if coarser_by == 0 { 0.0 } else { DIAGONAL });
-        let field = self.fields.level(self.level + coarser_by);
+        let field = self.fields.level(self.surroundings.unknown, self.level + coarser_by);
         eight::find(field, centers, 1.0 / f64::from(side), &mut found.found);
         found.unmade = 0;
         if found.found.unknown != 0 {
@@ -185,7 +188,11 @@ impl<'a> Look<'a> {
         for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
             if let Some(index) = eight::cell(centers, scale, lane) {
                 let block = VoxelKey::pack(index.map(|i| i >> BLOCK_LEVELS));
-                self.note(FieldBlockKey { level: self.level + coarser_by, block });
+                self.note(FieldBlockKey {
+                    unknown: self.surroundings.unknown,
+                    level: self.level + coarser_by,
+                    block,
+                });
                 noted |= 1 << lane;
             }
         }
@@ -202,18 +209,26 @@ impl<'a> Look<'a> {
     #[inline(always)]
     pub(super) fn meets(&mut self, center: [f64; 3], radius: f64) -> bool {
         if !self.surroundings.ignores_some() {
-            match nearby::ask(self.fields.level(self.level), center, radius) {
+            match nearby::ask(self.fields.level(self.surroundings.unknown, self.level), center, radius) {
                 Nearby::Meets => return true,
                 Nearby::IsFree => return false,
                 Nearby::Unknown => {}
                 Nearby::Unmade(cell) => {
                     let block = VoxelKey::pack(cell.map(|i| i >> BLOCK_LEVELS));
-                    self.note(FieldBlockKey { level: self.level, block });
+                    self.note(FieldBlockKey { unknown: self.surroundings.unknown, level: self.level, block });
                 }
             }
         }
         let Self { view, surroundings, level, effort, .. } = self;
         CubeSearch::new(view, surroundings, *level, center, effort).meets(radius)
+    }
+
+    /// True where `voxel` counts.
+    pub(super) fn counts(&self, voxel: VoxelKey) -> bool {
+        let is_obstacle = self.view.contains(voxel, self.level)
+            || self.surroundings.unknown_counts()
+                && !FreeSpace::of(self.view).is_seen_through(voxel, self.level);
+        is_obstacle && !self.surroundings.ignores(self.view.map().lattice(), voxel, self.level)
     }
 
     /// The nearest voxel that is at most `radius` cells away.

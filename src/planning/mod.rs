@@ -7,6 +7,7 @@
 
 mod aim;
 mod body;
+mod classify;
 mod clearance;
 mod configurations;
 mod cover;
@@ -14,8 +15,12 @@ mod cubes;
 mod effort;
 mod eight;
 mod error;
+mod free_space;
+mod frontiers;
 mod grid;
 mod in_cells;
+#[cfg(test)]
+mod in_sight_tests;
 mod keep_outs;
 mod kind;
 mod link;
@@ -23,6 +28,7 @@ mod look;
 mod motions;
 mod nearby;
 mod nearest;
+mod obstacles;
 mod one;
 mod parts;
 mod path;
@@ -35,6 +41,8 @@ mod rays;
 mod reach;
 mod remembered;
 mod rigid;
+#[cfg(test)]
+mod seen_maps;
 mod simd;
 mod spheres;
 mod steps;
@@ -47,18 +55,23 @@ mod test_maps;
 mod tests;
 
 pub use body::Body;
+pub use classify::{OutOfRange, PointState, PointStates, classify_points};
 pub use clearance::FIELD_BYTES_MAX_DEFAULT;
 pub use configurations::{Configurations, NUMBERS_PER_POSE};
 pub use cover::{COVER_SPHERES_MAX, CoverError, cover_box, cover_capsule};
 pub use error::PlanningError;
-pub use grid::{Grid, GridArea, GridError, GridRequest, NotOccupied, project_grid};
+pub use frontiers::{
+    FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, FrontierView, Frontiers,
+    STANDOFF_VOXELS, STANDOFF_VOXELS_MAX, list_frontiers,
+};
+pub use grid::{Grid, GridArea, GridError, GridRequest, project_grid};
 pub use kind::{CLEARANCE_CELLS_MAX, Clearance, Hit, Met, clearance_max_m};
 pub use motions::{MotionAnswer, MotionQuestion, prepared_bytes};
 pub use nearest::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, RADIUS_VOXELS_MAX, find_nearest};
 pub use parts::{Link, Sphere};
 pub use planner::{Planner, PlanningView};
 pub use poses::PoseQuestion;
-pub use rays::{DIRECTION_LENGTH_TOLERANCE, RayError, RayHits, Rays, Toward, cast_rays};
+pub use rays::{DIRECTION_LENGTH_TOLERANCE, RayError, RayHits, Rays, Toward, cast_rays, cast_rays_in_sight};
 pub use reach::PlacedPart;
 pub use spheres::{SphereGroups, SphereQuestion};
-pub use surroundings::Surroundings;
+pub use surroundings::{Surroundings, Unknown};

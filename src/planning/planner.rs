@@ -6,17 +6,22 @@ use super::PlanningError;
 use super::clearance::{FIELD_BYTES_MAX_DEFAULT, FieldBlockKey, Fields};
 use super::keep_outs::Shapes;
 use super::look::Look;
+use super::obstacles::Obstacles;
 use super::simd::{self, Work};
-use super::surroundings::Surroundings;
+use super::surroundings::{Surroundings, Unknown};
 use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
 use crate::sync::{Rank, RwLock};
 use crate::util::StopSignal;
+use crate::visibility::ViewpointSet;
 use crate::voxel::Lattice;
 
 /// Times that a question is asked again for what was not made; then the voxels answer.
 const ROUNDS_MAX: usize = 3;
 /// The same for what there was no room to make at once, which may be more than the fields may hold.
 const FULL_ROUNDS_MAX: usize = 64;
+
+/// Blocks that are made between two looks at the stop signal.
+const MADE_PER_LOOK: usize = 32;
 
 /// Answers planners' questions about a map.
 ///
@@ -120,6 +125,16 @@ impl Planner {
         fields.forget(&touched, view);
         self.follower.set_bytes(fields.bytes());
     }
+
+    /// Forgets what is not true any more where unknown voxels count, since scans saw more or were undone.
+    fn see(&self, viewpoints: &Arc<ViewpointSet>) {
+        if self.fields.read().are_of(Some(viewpoints)) {
+            return;
+        }
+        let mut fields = self.fields.write();
+        fields.see(viewpoints, self.map.lattice());
+        self.follower.set_bytes(fields.bytes());
+    }
 }
 
 impl PlanningView<'_> {
@@ -137,6 +152,16 @@ impl PlanningView<'_> {
     #[must_use]
     pub fn with_keep_outs(self) -> Self {
         Self { view: self.view.with_keep_outs(), ..self }
+    }
+
+    /// This view with where scans saw through, without which all that is not occupied is unknown.
+    #[must_use]
+    pub fn with_viewpoints(self) -> Self {
+        let view = self.view.with_viewpoints();
+        if let Some(viewpoints) = view.viewpoints() {
+            self.planner.see(viewpoints);
+        }
+        Self { view, ..self }
     }
 
     /// The keep-outs that count; none where none do.
@@ -174,9 +199,13 @@ impl PlanningView<'_> {
                 if stop.is_stopped() {
                     return None;
                 }
-                let is_last = rounds + 1 >= ROUNDS_MAX || full_rounds >= FULL_ROUNDS_MAX;
                 let fields = self.planner.fields.read();
-                let mut look = Look::new(&self.view, surroundings, level, &fields, is_last, stop);
+                // The viewpoints may have changed since this view took them, by a change that touched no voxel.
+                let is_of_view = self.holds(&fields, surroundings.unknown);
+                let own = (!is_of_view).then(|| Fields::new(self.planner.map.block_levels_end() + 1, 0));
+                let is_last = rounds + 1 >= ROUNDS_MAX || full_rounds >= FULL_ROUNDS_MAX || !is_of_view;
+                let of_view = own.as_ref().unwrap_or(&fields);
+                let mut look = Look::new(&self.view, surroundings, level, of_view, is_last, stop);
                 let (answerer, look_at) = (&mut answerer, &mut look);
                 simd::run(Chunk { answerer, look: look_at, first: chunk * per_look, answers });
                 if look.is_stopped() {
@@ -185,20 +214,29 @@ impl PlanningView<'_> {
                 *(if look.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
                 let unmade = look.into_unmade();
                 drop(fields);
-                self.make(unmade);
+                self.make(unmade, surroundings.unknown, stop);
             }
         }
         answers.into_iter().collect()
     }
 
-    /// Makes blocks of the field.
-    fn make(&self, unmade: Vec<FieldBlockKey>) {
+    /// True where fields are those of what this view shows.
+    fn holds(&self, fields: &Fields, unknown: Unknown) -> bool {
+        unknown == Unknown::Free || fields.are_of(self.view.viewpoints())
+    }
+
+    /// Makes blocks of the field; once stopped, some of them.
+    fn make(&self, unmade: Vec<FieldBlockKey>, unknown: Unknown, stop: StopSignal<'_>) {
         if unmade.is_empty() {
             return;
         }
-        let blocks = unmade.into_iter().map(|key| (key, key.make(&self.view))).collect();
+        let mut obstacles = Obstacles::of(&self.view, unknown);
+        let made = stop.paced(unmade, MADE_PER_LOOK).map(|key| (key, key.make(&mut obstacles)));
+        let blocks = made.collect();
         let mut fields = self.planner.fields.write();
-        fields.keep(blocks);
-        self.planner.follower.set_bytes(fields.bytes());
+        if self.holds(&fields, unknown) {
+            fields.keep(blocks);
+            self.planner.follower.set_bytes(fields.bytes());
+        }
     }
 }

@@ -101,9 +101,7 @@ fn hit(
     lattice_from_points: &LatticeFromPoints,
 ) -> Option<PointHit> {
     let voxel = lattice_from_points.key(link.points[place])?.ancestor(look.level);
-    let counts = look.view.contains(voxel, look.level)
-        && !look.surroundings.ignores(look.view.map().lattice(), voxel, look.level);
-    counts.then(|| PointHit { point: link.numbers[place], voxel })
+    look.counts(voxel).then(|| PointHit { point: link.numbers[place], voxel })
 }
 
 /// How far from where it is a point may be looked up, in voxels of `level`, rounded up.

@@ -89,7 +89,7 @@ fn the_clearance_of_one_motion_looks_at_the_signal() {
 fn one_sphere_that_ignores_what_it_meets_looks_at_the_signal() {
     let (planner, body) = (floor(), ball(20.0));
     let everything = Region::cuboid(EVERYTHING.map(|c| -c), EVERYTHING).unwrap();
-    let surroundings = Surroundings { ignored: vec![everything] };
+    let surroundings = Surroundings { ignored: vec![everything], ..Surroundings::ALL_VOXELS };
     let numbers = at(&[[5.0, 5.0, 1.0]; 8]);
     let configurations = Configurations::new(&numbers, 1).unwrap();
     let question = PoseQuestion { body: &body, configurations, level: 0, surroundings: &surroundings };

@@ -186,7 +186,8 @@ fn surroundings() -> impl Strategy<Value = Surroundings> {
     let ball = (prop::array::uniform3(-5.0f64..5.0), 0.0f64..4.0)
         .prop_map(|(center_m, radius_m)| Region::ball(center_m, radius_m).unwrap());
     let regions = prop::collection::vec(prop_oneof![cuboid, ball], 1..3);
-    prop_oneof![3 => Just(Vec::new()), 1 => regions].prop_map(|ignored| Surroundings { ignored })
+    prop_oneof![3 => Just(Vec::new()), 1 => regions]
+        .prop_map(|ignored| Surroundings { ignored, ..Surroundings::ALL_VOXELS })
 }
 
 fn bits(words: &[u64], count: usize) -> Vec<bool> {

@@ -93,6 +93,10 @@ pub struct Limits {
     pub question_time_max_s: f64,
     /// Cells of one 2-D grid. 4,000,000.
     pub grid_cells_max: usize,
+    /// Voxels of a box in which frontiers are looked for. 4,000,000.
+    pub frontier_cells_max: usize,
+    /// Frontiers of one answer. 1,000.
+    pub frontiers_max: usize,
     /// Bytes of a block that is given out: one a cell of a dense one, 72 for 8 x 8 x 8 voxels of another. 16 MiB.
     pub block_bytes_max: usize,
     /// Cells of a dense block and as far around it as its distances go. 67,108,864.
@@ -188,6 +192,8 @@ impl Default for Limits {
             planning_field_bytes_max: FIELD_BYTES_MAX_DEFAULT,
             question_time_max_s: 0.5,
             grid_cells_max: 4_000_000,
+            frontier_cells_max: 4_000_000,
+            frontiers_max: 1000,
             block_bytes_max: 16 << 20,
             block_cells_max: 64 << 20,
             observers_max: 100,

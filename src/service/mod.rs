@@ -62,8 +62,9 @@ pub use localization::{
 pub use observer::{Change, End, Ended, Observer, Outcome};
 pub use pool::PoolUse;
 pub use question::{
-    Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, KnownPart, MotionCheck, NearestQuestion,
-    PoseCheck, Question, QuestionedMap, RayQuestion, RaysToward, SphereCheck,
+    Answered, Asked, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion,
+    GridQuestion, GridScope, KnownPart, MotionCheck, NearestQuestion, PoseCheck, Question, QuestionedMap,
+    RayQuestion, RaysToward, SphereCheck,
 };
 pub use reason::{Reason, ToldBy};
 pub use request::{

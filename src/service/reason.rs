@@ -83,6 +83,7 @@ reasons! {
         BadJson "bad_json" Http: "the body is no JSON of this request: place, what is there, what belongs there", "correct it; unknown fields are errors";
         BadKeepOut "bad_keep_out" Both: "a prism with too few corners or more than `keep_out_corners_max`, a corner twice or not finite, no area, sides that cross, or heights out of order; a box without an end", "correct it";
         BadKey "bad_key" Both: "a voxel key or index out of range", "correct it";
+        BadFrontiers "bad_frontiers" Both: "a box whose corners are in the wrong order or not finite, or a `standoff_m` that is not above 0 or more than 256 voxels of the level", "the message names the range";
         BadLookup "bad_lookup" Grpc: "a number that is none of the enum's", "use the generated constants";
         BadMapFile "bad_map_file" Both: "the file is no map file, or is damaged", "take another backup; `mrol map` and `mrol snapshot` write such files";
         BadMessage "bad_message" Grpc: "the message cannot be read", "check encoding and compression";
@@ -162,6 +163,7 @@ reasons! {
     ResourceExhausted {
         BlockTooLarge "block_too_large" Both: "a block exceeds `block_bytes_max`, or with what lies around it `block_cells_max`", "ask for a smaller part, a coarser level or a smaller `cap_m`";
         DiskFull "disk_full" Both 507: "little room on the disk of the data folder; changes are refused until there is more", "make room, or delete a map";
+        FrontierBoxTooLarge "frontier_box_too_large" Both: "a box of more than `frontier_cells_max` voxels", "ask for a smaller box or a coarser level";
         GridTooLarge "grid_too_large" Both: "a grid of more than `grid_cells_max` cells, or of more than a message holds", "ask for a smaller area or larger cells";
         ListingTooLarge "listing_too_large" Both: "more voxels than `listed_voxels_max`, with those that keep-outs take where they are asked for", "ask for a region or a coarser level";
         MapFileTooLarge "map_file_too_large" Both: "a map's file, or one that is to be restored, exceeds `map_file_bytes_max`", "raise the limit, here and where the file is to be restored";

@@ -82,11 +82,14 @@ impl Reach {
 
     /// The cells, as boxes of the map frame: the smallest and the largest coordinates, meters.
     pub(super) fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
-        let side_m = 2f64.powi(self.exponent);
-        self.cells
-            .iter()
-            .map(move |(cell, _)| [0.0, 1.0].map(|end| cell.map(|i| (f64::from(i) + end) * side_m)))
+        self.cells.iter().map(|(cell, _)| box_m(self.exponent, *cell))
     }
+}
+
+/// A cell as a box of the map frame: the smallest and the largest coordinates, meters.
+fn box_m(exponent: i32, cell: CellIndex) -> [[f64; 3]; 2] {
+    let side_m = 2f64.powi(exponent);
+    [0.0, 1.0].map(|end| cell.map(|i| (f64::from(i) + end) * side_m))
 }
 
 impl ReachIndex {
@@ -112,6 +115,11 @@ impl ReachIndex {
         if grid.is_empty() {
             self.grids.remove(&reach.exponent);
         }
+    }
+
+    /// The cells that a viewpoint looked into, each once.
+    pub(super) fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+        self.grids.iter().flat_map(|(&exponent, grid)| grid.keys().map(move |cell| box_m(exponent, *cell)))
     }
 
     /// The viewpoints that may have looked at a point of the map, first those that saw most of what is around it.

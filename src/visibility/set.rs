@@ -92,6 +92,12 @@ impl ViewpointSet {
         self.observer(point_m).is_some()
     }
 
+    /// The parts of space that a viewpoint may have seen a point of, each once: boxes of the map frame, as the smallest and the largest
+    /// coordinates, meters. Boxes of viewpoints that reach further are larger, and may hold others.
+    pub fn reach_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+        self.index.boxes_m()
+    }
+
     /// Looks at many points that lie near each other, one after the other.
     pub fn gaze(&self) -> Gaze<'_> {
         Gaze { set: self, last: None }

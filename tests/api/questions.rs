@@ -5,10 +5,12 @@ use std::sync::Arc;
 use mrol::client::{Client, Replica, ReplicaOptions};
 use mrol::geometry::Point;
 use mrol::map::{KeepOutName, KeepOutShape, MapName, Region};
-use mrol::planning::{Body, GridArea, Link, MeasuredTo, Met, Sphere, Surroundings};
+use mrol::planning::{
+    Body, Frontiers, GridArea, Link, MeasuredTo, Met, PointState, Sphere, Surroundings, Unknown,
+};
 use mrol::service::{
-    Asked, CheckAs, Collisions, GridQuestion, GridScope, MotionCheck, NearestQuestion, PoseCheck, PutKeepOut,
-    Question, RayQuestion, RaysToward, SphereCheck,
+    Asked, CheckAs, ClassifyQuestion, Collisions, FrontierQuestion, GridQuestion, GridScope, MotionCheck,
+    NearestQuestion, PoseCheck, PutKeepOut, Question, RayQuestion, RaysToward, SphereCheck,
 };
 use mrol::voxel::VoxelKey;
 use reqwest::StatusCode;
@@ -107,7 +109,10 @@ async fn poses_are_checked_alike_everywhere() {
 async fn what_is_ignored_does_not_collide() {
     let (daemon, client, _) = row_of_voxels().await;
     let ignored = vec![Region::cuboid([0.0; 3], [1.0; 3]).unwrap()];
-    let check = PoseCheck { surroundings: Surroundings { ignored }, ..poses(CheckAs::Colliding) };
+    let check = PoseCheck {
+        surroundings: Surroundings { ignored, ..Surroundings::ALL_VOXELS },
+        ..poses(CheckAs::Colliding)
+    };
     assert_eq!(client.check_poses(&map(), check).await.unwrap().answer.words(), [0]);
     let body = json!({"links": [{"spheres": [[0, 0, 0, 0.15]]}]});
     let asked = json!({"body": body, "configurations": [at(0.55, 0.2, 0.05)],
@@ -174,6 +179,7 @@ async fn rays_are_cast_alike_everywhere() {
             directions: points(&[[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
             range_m: f64::INFINITY,
         },
+        unknown: Unknown::Free,
     };
     let told = client.cast_rays(&map(), question.clone()).await.unwrap();
     assert_eq!((told.answer.hits(), told.answer.voxels[0].index()), (1, [0, 0, 0]));
@@ -207,7 +213,7 @@ async fn nearest_voxels_are_found_alike_everywhere() {
 async fn the_map_is_drawn_from_above_alike_everywhere() {
     let (daemon, client, replica) = row_of_voxels().await;
     let area = GridArea::Rectangle { min_m: [0.0, -0.1], max_m: [0.4, 0.2] };
-    let scope = GridScope { area, band_m: [0.0, 1.0], cell_m: Some(0.2) };
+    let scope = GridScope { area, band_m: [0.0, 1.0], cell_m: Some(0.2), tells_unknown: false };
     let question = GridQuestion { asked: Asked::default(), scope };
     let told = client.project_grid(&map(), question).await.unwrap();
     // Cells begin at whole multiples of their side: y from -0.2 on.
@@ -222,6 +228,136 @@ async fn the_map_is_drawn_from_above_alike_everywhere() {
         "{told}"
     );
     assert_eq!(told["tops_m"][0], Value::Null);
+}
+
+#[tokio::test]
+async fn points_that_nobody_saw_are_unknown_everywhere() {
+    let (daemon, client, replica) = row_of_voxels().await;
+    let points: Vec<Point> = [[0.55, 0.05, 0.05], [0.55, 0.35, 0.05]].map(Point::from).to_vec();
+    let question = ClassifyQuestion { asked: Asked::default(), points: points.clone().into() };
+    let told = client.classify_points(&map(), question.clone()).await.unwrap();
+    assert_eq!([0, 1].map(|i| told.answer.state(i)), [PointState::Occupied, PointState::Unknown]);
+    same(&replica, &question, &told);
+    let mut streamed =
+        client.classification_stream(&map(), tokio_stream::iter([question.clone(), question])).await.unwrap();
+    for _ in 0..2 {
+        assert_eq!(streamed.next().await.unwrap().unwrap(), told);
+    }
+    let asked = json!({"points": [[0.55, 0.05, 0.05], [0.55, 0.35, 0.05]]});
+    let told = json_of(daemon.post("/v1/maps/a/classification", asked).await).await;
+    assert_eq!((&told["occupied"], &told["free"]), (&json!([true, false]), &json!([false, false])), "{told}");
+    assert_eq!(
+        (&told["points_occupied"], &told["points_free"], &told["points"]),
+        (&json!(1), &json!(0), &json!(2))
+    );
+    let bytes: Vec<u8> = points.iter().flat_map(|point| point.xyz()).flat_map(f32::to_le_bytes).collect();
+    let head = json!({"points": {"at": 0, "bytes": bytes.len()}});
+    let answer =
+        daemon.post_bytes("/v1/maps/a/classification", framed(&head, &bytes)).await.bytes().await.unwrap();
+    let (head, arrays) = parts(&answer);
+    assert_eq!((array(&head, arrays, "occupied"), array(&head, arrays, "free")), (&[0b01][..], &[0b00][..]));
+}
+
+#[tokio::test]
+async fn what_nobody_saw_is_met_where_it_counts_as_occupied() {
+    let (daemon, client, replica) = row_of_voxels().await;
+    let surroundings = Surroundings { unknown: Unknown::Occupied, ..Surroundings::ALL_VOXELS };
+    let check = PoseCheck { surroundings: surroundings.clone(), ..poses(CheckAs::FirstHit) };
+    let told = client.check_poses(&map(), check.clone()).await.unwrap();
+    assert_eq!(told.answer.words(), [0b111]);
+    same(&replica, &check, &told);
+    let configurations = vec![at(0.55, 0.4, 0.05), at(0.55, 0.6, 0.05)];
+    let motion = MotionCheck {
+        asked: Asked::default(),
+        body: ball(0.1),
+        configurations: configurations.concat(),
+        lengths: vec![2],
+        step_m: None,
+        clearance_max_m: None,
+        surroundings: surroundings.clone(),
+    };
+    let told = client.check_motions(&map(), motion.clone()).await.unwrap();
+    assert_eq!(told.answer[0].first_hit, Some(0.0));
+    same(&replica, &motion, &told);
+    let spheres = SphereCheck {
+        asked: Asked::default(),
+        spheres: vec![Sphere { center_m: [0.55, 0.5, 0.05], radius_m: 0.1 }],
+        sizes: vec![1],
+        padding_m: 0.0,
+        surroundings,
+        answer: CheckAs::Colliding,
+    };
+    let told = client.check_spheres(&map(), spheres.clone()).await.unwrap();
+    assert_eq!(told.answer.words(), [1]);
+    same(&replica, &spheres, &told);
+    let points = |of: &[[f32; 3]]| of.iter().copied().map(Point::from).collect::<Vec<_>>().into();
+    let rays = RayQuestion {
+        asked: Asked::default(),
+        origins: points(&[[0.55, 0.45, 0.05]]),
+        toward: RaysToward::Directions { directions: points(&[[0.0, 1.0, 0.0]]), range_m: f64::INFINITY },
+        unknown: Unknown::Occupied,
+    };
+    let told = client.cast_rays(&map(), rays.clone()).await.unwrap();
+    assert_eq!(
+        (told.answer.hits(), told.answer.distances_m[0], told.answer.voxels[0].index()),
+        (1, 0.0, [5, 4, 0])
+    );
+    same(&replica, &rays, &told);
+
+    let body = json!({"links": [{"spheres": [[0, 0, 0, 0.1]]}]});
+    for (route, asked, array, met) in [
+        ("poses", json!({"body": body, "configurations": [configurations[0]]}), "colliding", true),
+        ("motions", json!({"body": body, "configurations": configurations, "lengths": [2]}), "free", false),
+        ("spheres", json!({"spheres": [[0.55, 0.5, 0.05, 0.1]]}), "colliding", true),
+        ("rays", json!({"origins": [[0.55, 0.45, 0.05]], "directions": [[0, 1, 0]]}), "hit", true),
+    ] {
+        for (word, expected) in [("occupied", met), ("free", !met)] {
+            let mut asked = asked.clone();
+            asked["unknown"] = json!(word);
+            let told = json_of(daemon.post(&format!("/v1/maps/a/{route}"), asked).await).await;
+            assert_eq!(told[array], json!([expected]), "{route} {word}: {told}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_map_that_nobody_saw_has_no_frontier_and_no_free_cell() {
+    let (daemon, client, replica) = row_of_voxels().await;
+    let question = FrontierQuestion {
+        asked: Asked::default(),
+        min_m: [-1.0; 3],
+        max_m: [1.0; 3],
+        size_min: Some(1),
+        frontiers_max: None,
+        standoff_m: Some(0.5),
+    };
+    let told = client.list_frontiers(&map(), question).await.unwrap();
+    assert_eq!(told.answer, Frontiers::default());
+    same(&replica, &question, &told);
+    let asked = json!({"box": {"min_m": [-1, -1, -1], "max_m": [1, 1, 1]}});
+    let told = json_of(daemon.post("/v1/maps/a/frontiers", asked).await).await;
+    assert_eq!(
+        (&told["frontiers"], &told["frontiers_total"], &told["revision"]),
+        (&json!([]), &json!(0), &json!(1))
+    );
+
+    let area = GridArea::Rectangle { min_m: [0.0, -0.1], max_m: [0.4, 0.2] };
+    let scope = GridScope { area, band_m: [0.0, 1.0], cell_m: Some(0.2), tells_unknown: true };
+    let question = GridQuestion { asked: Asked::default(), scope };
+    let told = client.project_grid(&map(), question).await.unwrap();
+    assert_eq!(
+        (0..4).map(|cell| told.answer.is_unknown(cell)).collect::<Vec<_>>(),
+        [true, true, false, false]
+    );
+    assert_eq!(replica.ask(&question).unwrap().answer.free, told.answer.free);
+    let asked =
+        json!({"area": {"min_m": [0, -0.1], "max_m": [0.4, 0.2]}, "cell_m": 0.2, "tell_unknown": true});
+    let told = json_of(daemon.post("/v1/maps/a/grid", asked).await).await;
+    assert_eq!(
+        (&told["free"], &told["cells_free"]),
+        (&json!([false, false, false, false]), &json!(0)),
+        "{told}"
+    );
 }
 
 #[tokio::test]
@@ -311,6 +447,25 @@ async fn what_is_no_question_is_refused_by_name() {
         ("rays", json!({"origins": [[0, 0, 0]]}), "directions"),
         ("nearest", json!({"points": [[0, 0, 0]], "radius_m": 100}), "radius_m"),
         ("nearest", json!({"points": [[0, null, 0]], "radius_m": 1}), "points[0]"),
+        (
+            "rays",
+            json!({"origins": [[0, 0, 0]], "directions": [[1, 0, 0]], "unknown": "maybe"}),
+            "unknown: must be",
+        ),
+        ("classification", json!({"points": []}), "points"),
+        ("classification", json!({"points": [[0, 0, 1e6]]}), "points[0]"),
+        ("frontiers", json!({"box": {"min_m": [0, 0, 0], "max_m": [-1, 1, 1]}}), "min_m"),
+        ("frontiers", json!({"box": {"min_m": [0, 0, 0], "max_m": [90, 90, 90]}}), "frontier_cells_max"),
+        (
+            "frontiers",
+            json!({"box": {"min_m": [0, 0, 0], "max_m": [1, 1, 1]}, "frontiers_max": 1001}),
+            "frontiers_max is 1001, limits.frontiers_max 1000",
+        ),
+        (
+            "frontiers",
+            json!({"box": {"min_m": [0, 0, 0], "max_m": [1, 1, 1]}, "standoff_m": 26}),
+            "standoff_m must lie above 0 and at most 25.6",
+        ),
         ("grid", json!({"cell_m": 0.15}), "cell_m"),
         ("grid", json!({"ignore_keep_outs": 1}), "ignore_keep_outs: must be true or false"),
         ("grid", json!({"area": {"min_m": [0, 0], "max_m": [1e5, 1e5]}, "cell_m": 0.1}), "grid_cells_max"),
@@ -448,7 +603,10 @@ async fn keep_outs_count_for_bodies_unless_they_are_ignored() {
     assert_eq!(replica.ask(&ignoring).unwrap().answer.words(), [0b001]);
     // A region of voxels that do not count has no say in keep-outs.
     let ignored = vec![Region::cuboid([-9.0; 3], [9.0; 3]).unwrap()];
-    let regions = PoseCheck { surroundings: Surroundings { ignored }, ..check(CheckAs::Colliding) };
+    let regions = PoseCheck {
+        surroundings: Surroundings { ignored, ..Surroundings::ALL_VOXELS },
+        ..check(CheckAs::Colliding)
+    };
     assert_eq!(client.check_poses(&map(), regions).await.unwrap().answer.words(), [0b010]);
 
     let body = json!({"links": [{"spheres": [[0, 0, 0, 0.15]]}]});
@@ -515,6 +673,7 @@ async fn keep_outs_count_for_rays_and_points_unless_they_are_ignored() {
             directions: points(&[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
             range_m: f64::INFINITY,
         },
+        unknown: Unknown::Free,
     };
     let told = client.cast_rays(&map(), rays.clone()).await.unwrap();
     same(&replica, &rays, &told);
@@ -554,7 +713,7 @@ async fn keep_outs_count_for_rays_and_points_unless_they_are_ignored() {
 async fn keep_outs_are_occupied_in_the_map_from_above_unless_they_are_ignored() {
     let (daemon, client, replica) = row_and_crate().await;
     let area = GridArea::Rectangle { min_m: [0.0, 0.0], max_m: [0.4, 1.2] };
-    let scope = |band_m| GridScope { area, band_m, cell_m: Some(0.2) };
+    let scope = |band_m| GridScope { area, band_m, cell_m: Some(0.2), tells_unknown: false };
     let question = GridQuestion { asked: Asked::default(), scope: scope([0.0, 1.0]) };
     let told = client.project_grid(&map(), question).await.unwrap().answer;
     assert_eq!((told.size, told.occupied.clone()), ([2, 6], vec![0b1100_0000_0011]));
@@ -672,7 +831,8 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
         ([0.1, 0.5, 0.05], [1.0, 0.0, 0.0], 0.5, false),
     ] {
         let toward = RaysToward::Directions { directions: points(direction), range_m };
-        let rays = RayQuestion { asked: Asked::default(), origins: points(from), toward };
+        let rays =
+            RayQuestion { asked: Asked::default(), origins: points(from), toward, unknown: Unknown::Free };
         let of_server = client.cast_rays(&map(), rays.clone()).await.unwrap().answer;
         assert_eq!(agrees(&part, &rays, &of_server, "rays[0]"), is_known, "{from:?} {direction:?}");
     }
@@ -683,8 +843,10 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
         (None, [-0.5, 0.5], false),
     ] {
         let area = area.map_or(GridArea::Occupied, |[min_m, max_m]| GridArea::Rectangle { min_m, max_m });
-        let question =
-            GridQuestion { asked: Asked::default(), scope: GridScope { area, band_m, cell_m: None } };
+        let question = GridQuestion {
+            asked: Asked::default(),
+            scope: GridScope { area, band_m, cell_m: None, tells_unknown: false },
+        };
         let own = part.ask(&question);
         assert_eq!(own.is_ok(), is_known, "{area:?} {band_m:?}");
         match own {

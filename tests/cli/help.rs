@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 26] = [
     "serve",
     "demo",
     "map",
@@ -12,6 +12,8 @@ const COMMANDS: [&str; 24] = [
     "check",
     "rays",
     "nearest",
+    "classify",
+    "frontiers",
     "grid",
     "block",
     "observers",

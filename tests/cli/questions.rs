@@ -82,6 +82,29 @@ fn rays_nearest_voxels_and_a_grid_name_what_they_find() {
 }
 
 #[test]
+fn what_nobody_saw_is_told_from_what_is_there() {
+    let building = Building::open();
+    let told = building.ask(&["classify", "--point", "1.05,0,0", "--point", "0,1,0", "--point", "0.5,0,0"]);
+    let states: Vec<&Value> = told.iter().map(|line| &line["state"]).collect();
+    assert_eq!(states[..2], ["occupied", "occupied"]);
+    assert!(["free", "unknown"].contains(&states[2].as_str().unwrap()), "{told:?}");
+    let beyond = ["rays", "--from", "1.5,0,0", "--direction", "1,0,0"];
+    assert_eq!(building.ask(&beyond)[0]["hit"], false);
+    assert_eq!(building.ask(&[&beyond[..], &["--unknown", "occupied"]].concat())[0]["distance_m"], 0.0);
+    let pose = [&BALL[..], &["--pose", "1.5 0 0 0 0 0 1"]].concat();
+    assert_eq!(building.ask(&pose)[0]["fits"], true);
+    assert_eq!(building.ask(&[&pose[..], &["--unknown", "occupied"]].concat())[0]["fits"], false);
+    let said = building.says(&["frontiers", "--box", "5 5 5 6 6 6"]);
+    assert_eq!(said, "0 of 0 frontiers, 0 voxels in all\n");
+    let folder = tempfile::tempdir().unwrap();
+    let image = folder.path().join("a.pgm");
+    let out = image.to_str().unwrap();
+    let grid = &building.ask(&["grid", "--out", out, "--area", "1.5 0 2.5 1", "--unknown"])[0];
+    assert_eq!(grid["cells_free"], 0, "{grid}");
+    assert!(std::fs::read(&image).unwrap().ends_with(&[205; 100]));
+}
+
+#[test]
 fn a_grid_is_not_written_over_by_its_own_description() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["x.yaml", "x.YAML"] {

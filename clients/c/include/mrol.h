@@ -272,8 +272,10 @@ typedef struct mrol_pose_check {
     float clearance_max_m;
     /* 1: keep-outs of the map do not count. */
     uint8_t ignore_keep_outs;
+    /* 1: a voxel counts unless it is free: seen through by a scan, and not occupied. Costs more. */
+    uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[7];
+    uint8_t reserved[6];
 } mrol_pose_check;
 
 /* A question: do these spheres meet anything? Take it from mrol_sphere_check_default(). */
@@ -294,8 +296,10 @@ typedef struct mrol_sphere_check {
     float clearance_max_m;
     /* 1: keep-outs of the map do not count. */
     uint8_t ignore_keep_outs;
+    /* As in mrol_pose_check. */
+    uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[3];
+    uint8_t reserved[2];
 } mrol_sphere_check;
 
 /* Where the answers to checks of poses and spheres go. What is NULL is not wanted; places for hits and for clearances are not
@@ -345,8 +349,10 @@ typedef struct mrol_motion_check {
     float clearance_max_m;
     /* 1: keep-outs of the map do not count. */
     uint8_t ignore_keep_outs;
+    /* As in mrol_pose_check. */
+    uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[3];
+    uint8_t reserved[2];
 } mrol_motion_check;
 
 /* Where the answers to checks of motions go; NULL: not wanted. Take it from mrol_motion_answers_default(). */
@@ -380,8 +386,10 @@ typedef struct mrol_ray_question {
     uint32_t level;
     /* 1: keep-outs of the map do not count. */
     uint8_t ignore_keep_outs;
+    /* As in mrol_pose_check. */
+    uint8_t unknown_is_occupied;
     /* Not used: zero. */
-    uint8_t reserved[3];
+    uint8_t reserved[2];
 } mrol_ray_question;
 
 /* Where the answers about rays go; NULL: not wanted. Take it from mrol_ray_answers_default(). */
@@ -440,6 +448,76 @@ typedef struct mrol_nearest_answers {
     mrol_name *keep_outs;
 } mrol_nearest_answers;
 
+/* A question: what is known of these points? Take it from mrol_classify_question_default(). */
+typedef struct mrol_classify_question {
+    size_t struct_size;
+    const float *points;
+    size_t count;
+    uint32_t level;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[3];
+} mrol_classify_question;
+
+/* Where the answers about points go; NULL: not wanted. A point that is neither occupied nor free is unknown. Take it from
+ * mrol_classify_answers_default(). */
+typedef struct mrol_classify_answers {
+    size_t struct_size;
+    /* Elements that each array has room for: at least one for each point. */
+    size_t capacity;
+    /* A bit each: its voxel is occupied, or the point lies in a keep-out. */
+    uint8_t *is_occupied;
+    /* A bit each: a scan saw through the center of its voxel, and it is not occupied. */
+    uint8_t *is_free;
+} mrol_classify_answers;
+
+/* A question: where does free space end, with nothing known beyond? Take it from mrol_frontier_question_default(), and set the
+ * box. */
+typedef struct mrol_frontier_question {
+    size_t struct_size;
+    /* Smallest and largest x y z of the box that is looked into, at most 4,000,000 voxels. */
+    double min_m[3];
+    double max_m[3];
+    /* How far from its middle a frontier is looked at: at most 256 voxels of the level. 0: 20 voxels. */
+    double standoff_m;
+    /* Least number of voxels of a frontier. 0: 8. */
+    uint64_t size_min;
+    uint32_t level;
+    /* 1: keep-outs of the map do not count. */
+    uint8_t ignore_keep_outs;
+    /* Not used: zero. */
+    uint8_t reserved[3];
+} mrol_frontier_question;
+
+/* Free voxels that hang together, each beside an unknown one. */
+typedef struct mrol_frontier {
+    uint64_t voxels;
+    /* The mean of their centers, and the box that holds them. */
+    double center_m[3];
+    double min_m[3];
+    double max_m[3];
+    /* Where has_view is 1: a place from which a line to target_m runs through free voxels alone, and the way it looks: x forward,
+     * y to the left and level, as the quaternion x y z w and as angles. */
+    double view_m[3];
+    double view_rotation[4];
+    double target_m[3];
+    double yaw_rad;
+    double elevation_rad;
+    uint8_t has_view;
+    /* Not used: zero. */
+    uint8_t reserved[7];
+} mrol_frontier;
+
+/* Where frontiers go, the largest first. Take it from mrol_frontier_answers_default(). */
+typedef struct mrol_frontier_answers {
+    size_t struct_size;
+    /* Frontiers that there is room for, at most 1,000: no more are told. */
+    size_t capacity;
+    /* NULL: not wanted. */
+    mrol_frontier *frontiers;
+} mrol_frontier_answers;
+
 /* A question: what is the map, seen from above? Take it from mrol_grid_question_default(). */
 typedef struct mrol_grid_question {
     size_t struct_size;
@@ -458,8 +536,10 @@ typedef struct mrol_grid_question {
     uint8_t has_max_z;
     /* 1: keep-outs of the map do not count. */
     uint8_t ignore_keep_outs;
+    /* 1: tell free cells from unknown ones. Takes more time. */
+    uint8_t tell_unknown;
     /* Not used: zero. */
-    uint8_t reserved[8];
+    uint8_t reserved[7];
 } mrol_grid_question;
 
 /* How large a grid is: cell (x, y) has the number y * cells[0] + x. */
@@ -485,6 +565,9 @@ typedef struct mrol_grid_answers {
     /* Height of the top of each cell's highest voxel in the band, NaN of a cell without one, for keep-outs have none;
      * NULL: not wanted. */
     float *tops_m;
+    /* A bit a cell: it is not occupied, and each of its columns of voxels has a free one in the band. What is neither occupied nor
+     * free is unknown. For questions with tell_unknown; NULL: not wanted. */
+    uint8_t *is_free;
 } mrol_grid_answers;
 
 /* How far a replica is. */
@@ -560,6 +643,8 @@ mrol_code mrol_body_free(mrol_body body, mrol_error *error);
  *     check_motions    motions, and those that are free
  *     cast_rays        rays, and those that hit
  *     find_nearest     points, and those that have something within the radius
+ *     classify_points  points, and those that are free
+ *     list_frontiers   frontiers that are written, and all that there are
  *     project_grid     cells, and those that are occupied
  *
  * Keep-outs of the map count as voxels do unless ignore_keep_outs is 1; where one is met instead of a voxel its name is told.
@@ -579,6 +664,10 @@ mrol_code mrol_replica_cast_rays(mrol_replica replica, const mrol_ray_question *
                                  mrol_answer *answer, mrol_error *error);
 mrol_code mrol_replica_find_nearest(mrol_replica replica, const mrol_nearest_question *question,
                                     const mrol_nearest_answers *answers, mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_classify_points(mrol_replica replica, const mrol_classify_question *question,
+                                       const mrol_classify_answers *answers, mrol_answer *answer, mrol_error *error);
+mrol_code mrol_replica_list_frontiers(mrol_replica replica, const mrol_frontier_question *question,
+                                      const mrol_frontier_answers *answers, mrol_answer *answer, mrol_error *error);
 mrol_code mrol_replica_project_grid(mrol_replica replica, const mrol_grid_question *question,
                                     const mrol_grid_answers *answers, mrol_answer *answer, mrol_error *error);
 
@@ -675,6 +764,38 @@ static inline mrol_nearest_question mrol_nearest_question_default(void) {
 /* Places for nothing. */
 static inline mrol_nearest_answers mrol_nearest_answers_default(void) {
     mrol_nearest_answers answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
+}
+
+/* A question about no points at level 0. */
+static inline mrol_classify_question mrol_classify_question_default(void) {
+    mrol_classify_question question;
+    memset(&question, 0, sizeof question);
+    question.struct_size = sizeof question;
+    return question;
+}
+
+/* Places for nothing. */
+static inline mrol_classify_answers mrol_classify_answers_default(void) {
+    mrol_classify_answers answers;
+    memset(&answers, 0, sizeof answers);
+    answers.struct_size = sizeof answers;
+    return answers;
+}
+
+/* A question about the box at the origin at level 0, with every default. */
+static inline mrol_frontier_question mrol_frontier_question_default(void) {
+    mrol_frontier_question question;
+    memset(&question, 0, sizeof question);
+    question.struct_size = sizeof question;
+    return question;
+}
+
+/* Places for nothing. */
+static inline mrol_frontier_answers mrol_frontier_answers_default(void) {
+    mrol_frontier_answers answers;
     memset(&answers, 0, sizeof answers);
     answers.struct_size = sizeof answers;
     return answers;

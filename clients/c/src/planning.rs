@@ -5,8 +5,9 @@ use crate::bodies::{BODIES, BodyHandle, LinkParts};
 use crate::guarded;
 use crate::memory::Out;
 use crate::questions::{
-    self, CollisionPlaces, GridPlaces, GridQuestion, MotionCheck, MotionPlaces, NearestPlaces,
-    NearestQuestion, PoseCheck, RayPlaces, RayQuestion, SphereCheck,
+    self, ClassifyPlaces, ClassifyQuestion, CollisionPlaces, FrontierPlaces, FrontierQuestion, GridPlaces,
+    GridQuestion, MotionCheck, MotionPlaces, NearestPlaces, NearestQuestion, PoseCheck, RayPlaces,
+    RayQuestion, SphereCheck,
 };
 
 /// Makes a body: `mrol_body_new` of mrol.h.
@@ -74,6 +75,10 @@ question! {
     mrol_replica_cast_rays: RayQuestion => RayPlaces;
     #[doc = "Finds the nearest voxels: `mrol_replica_find_nearest` of mrol.h."]
     mrol_replica_find_nearest: NearestQuestion => NearestPlaces;
+    #[doc = "Classifies points: `mrol_replica_classify_points` of mrol.h."]
+    mrol_replica_classify_points: ClassifyQuestion => ClassifyPlaces;
+    #[doc = "Lists frontiers: `mrol_replica_list_frontiers` of mrol.h."]
+    mrol_replica_list_frontiers: FrontierQuestion => FrontierPlaces;
     #[doc = "Looks at the map from above: `mrol_replica_project_grid` of mrol.h."]
     mrol_replica_project_grid: GridQuestion => GridPlaces;
 }

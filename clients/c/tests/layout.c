@@ -90,6 +90,7 @@ int main(void) {
     FIELD(mrol_pose_check, level);
     FIELD(mrol_pose_check, clearance_max_m);
     FIELD(mrol_pose_check, ignore_keep_outs);
+    FIELD(mrol_pose_check, unknown_is_occupied);
     FIELD(mrol_pose_check, reserved);
     SIZE(mrol_pose_check);
 
@@ -104,6 +105,7 @@ int main(void) {
     FIELD(mrol_sphere_check, padding_m);
     FIELD(mrol_sphere_check, clearance_max_m);
     FIELD(mrol_sphere_check, ignore_keep_outs);
+    FIELD(mrol_sphere_check, unknown_is_occupied);
     FIELD(mrol_sphere_check, reserved);
     SIZE(mrol_sphere_check);
 
@@ -130,6 +132,7 @@ int main(void) {
     FIELD(mrol_motion_check, step_m);
     FIELD(mrol_motion_check, clearance_max_m);
     FIELD(mrol_motion_check, ignore_keep_outs);
+    FIELD(mrol_motion_check, unknown_is_occupied);
     FIELD(mrol_motion_check, reserved);
     SIZE(mrol_motion_check);
 
@@ -149,6 +152,7 @@ int main(void) {
     FIELD(mrol_ray_question, range_m);
     FIELD(mrol_ray_question, level);
     FIELD(mrol_ray_question, ignore_keep_outs);
+    FIELD(mrol_ray_question, unknown_is_occupied);
     FIELD(mrol_ray_question, reserved);
     SIZE(mrol_ray_question);
 
@@ -179,6 +183,48 @@ int main(void) {
     FIELD(mrol_nearest_answers, keep_outs);
     SIZE(mrol_nearest_answers);
 
+    FIELD(mrol_classify_question, struct_size);
+    FIELD(mrol_classify_question, points);
+    FIELD(mrol_classify_question, count);
+    FIELD(mrol_classify_question, level);
+    FIELD(mrol_classify_question, ignore_keep_outs);
+    FIELD(mrol_classify_question, reserved);
+    SIZE(mrol_classify_question);
+
+    FIELD(mrol_classify_answers, struct_size);
+    FIELD(mrol_classify_answers, capacity);
+    FIELD(mrol_classify_answers, is_occupied);
+    FIELD(mrol_classify_answers, is_free);
+    SIZE(mrol_classify_answers);
+
+    FIELD(mrol_frontier_question, struct_size);
+    FIELD(mrol_frontier_question, min_m);
+    FIELD(mrol_frontier_question, max_m);
+    FIELD(mrol_frontier_question, standoff_m);
+    FIELD(mrol_frontier_question, size_min);
+    FIELD(mrol_frontier_question, level);
+    FIELD(mrol_frontier_question, ignore_keep_outs);
+    FIELD(mrol_frontier_question, reserved);
+    SIZE(mrol_frontier_question);
+
+    FIELD(mrol_frontier, voxels);
+    FIELD(mrol_frontier, center_m);
+    FIELD(mrol_frontier, min_m);
+    FIELD(mrol_frontier, max_m);
+    FIELD(mrol_frontier, view_m);
+    FIELD(mrol_frontier, view_rotation);
+    FIELD(mrol_frontier, target_m);
+    FIELD(mrol_frontier, yaw_rad);
+    FIELD(mrol_frontier, elevation_rad);
+    FIELD(mrol_frontier, has_view);
+    FIELD(mrol_frontier, reserved);
+    SIZE(mrol_frontier);
+
+    FIELD(mrol_frontier_answers, struct_size);
+    FIELD(mrol_frontier_answers, capacity);
+    FIELD(mrol_frontier_answers, frontiers);
+    SIZE(mrol_frontier_answers);
+
     FIELD(mrol_grid_question, struct_size);
     FIELD(mrol_grid_question, area_min_m);
     FIELD(mrol_grid_question, area_max_m);
@@ -190,6 +236,7 @@ int main(void) {
     FIELD(mrol_grid_question, has_min_z);
     FIELD(mrol_grid_question, has_max_z);
     FIELD(mrol_grid_question, ignore_keep_outs);
+    FIELD(mrol_grid_question, tell_unknown);
     FIELD(mrol_grid_question, reserved);
     SIZE(mrol_grid_question);
 
@@ -204,6 +251,7 @@ int main(void) {
     FIELD(mrol_grid_answers, shape);
     FIELD(mrol_grid_answers, occupied);
     FIELD(mrol_grid_answers, tops_m);
+    FIELD(mrol_grid_answers, is_free);
     SIZE(mrol_grid_answers);
     return 0;
 }

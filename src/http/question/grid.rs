@@ -22,6 +22,8 @@ pub(in crate::http) struct GridBody {
     max_z_m: Option<f64>,
     cell_m: Option<f64>,
     #[serde(default)]
+    tell_unknown: bool,
+    #[serde(default)]
     level: u32,
     min_revision: Option<u64>,
     map_uuid: Option<String>,
@@ -42,6 +44,8 @@ struct GridHead {
     origin_m: [f64; 2],
     size: [u64; 2],
     cells_occupied: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cells_free: Option<u64>,
 }
 
 pub(in crate::http) async fn project_grid(
@@ -56,8 +60,8 @@ pub(in crate::http) async fn project_grid(
                 pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m }
             });
         let asked = asked(&map, (of.level, of.ignore_keep_outs), of.min_revision, of.map_uuid);
-        let GridBody { min_z_m, max_z_m, cell_m, .. } = of;
-        Ok(pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m })
+        let GridBody { min_z_m, max_z_m, cell_m, tell_unknown, .. } = of;
+        Ok(pb::ProjectGridRequest { asked, area, min_z_m, max_z_m, cell_m, tell_unknown })
     };
     let (map, question): (_, GridQuestion) = asking.question(&service, message).await?;
     let answered = service.ask(&map, question).await?;
@@ -68,10 +72,13 @@ pub(in crate::http) async fn project_grid(
         origin_m: [response.origin_x_m, response.origin_y_m],
         size: [response.cells_x, response.cells_y],
         cells_occupied: response.cells_occupied,
+        cells_free: response.free.as_ref().map(|_| response.cells_free),
     };
-    let arrays = vec![
-        ("occupied", Array::Bits(response.occupied, (response.cells_x * response.cells_y) as usize)),
+    let cells = (response.cells_x * response.cells_y) as usize;
+    let mut arrays = vec![
+        ("occupied", Array::Bits(response.occupied, cells)),
         ("tops_m", Array::Floats(response.tops_m_f32le)),
     ];
+    arrays.extend(response.free.map(|free| ("free", Array::Bits(free, cells))));
     Answer { head, version, arrays }.respond(form).await
 }

@@ -2,7 +2,9 @@
 
 mod answer;
 mod body;
+mod classify;
 mod form;
+mod frontiers;
 mod grid;
 mod motions;
 mod nearest;
@@ -10,6 +12,8 @@ mod poses;
 mod rays;
 mod spheres;
 
+pub(super) use classify::classify_points;
+pub(super) use frontiers::list_frontiers;
 pub(super) use grid::project_grid;
 pub(super) use motions::check_motions;
 pub(super) use nearest::find_nearest;

@@ -12,7 +12,9 @@ use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::params::Map;
+use crate::planning::Unknown;
 use crate::service::MotionCheck;
+use crate::wire::json::ByKeyword;
 use crate::wire::pb;
 
 #[derive(Deserialize)]
@@ -27,6 +29,8 @@ pub(in crate::http) struct MotionsBody {
     clearance_max_m: Option<f32>,
     #[serde(default)]
     ignored: Vec<IgnoredField>,
+    #[serde(default)]
+    unknown: ByKeyword<Unknown>,
     #[serde(default)]
     level: u32,
     min_revision: Option<u64>,
@@ -57,6 +61,7 @@ pub(in crate::http) async fn check_motions(
             step_m: of.step_m,
             clearance_max_m: of.clearance_max_m,
             ignored: ignored_of(of.ignored)?,
+            unknown: pb::Unknown::from(of.unknown.0).into(),
         })
     };
     let (map, check): (_, MotionCheck) = asking.question(&service, message).await?;

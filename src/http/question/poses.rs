@@ -12,6 +12,7 @@ use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::params::Map;
+use crate::planning::Unknown;
 use crate::service::PoseCheck;
 use crate::wire::json::ByKeyword;
 use crate::wire::pb;
@@ -24,6 +25,8 @@ pub(in crate::http) struct PosesBody {
     configurations: NumbersField<7>,
     #[serde(default)]
     ignored: Vec<IgnoredField>,
+    #[serde(default)]
+    unknown: ByKeyword<Unknown>,
     #[serde(default)]
     answer: ByKeyword<AnswerWord>,
     clearance_max_m: Option<f32>,
@@ -48,6 +51,7 @@ pub(in crate::http) async fn check_poses(
             body: Some(body.into_message(arrays)?),
             configurations_f32le: of.configurations.into_bytes(arrays, "configurations")?,
             ignored: ignored_of(of.ignored)?,
+            unknown: pb::Unknown::from(of.unknown.0).into(),
             answer: pb::CheckAnswer::from(answer).into(),
             clearance_max_m: of.clearance_max_m,
         })

@@ -10,7 +10,9 @@ use super::form::{PointsField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
+use crate::planning::Unknown;
 use crate::service::RayQuestion;
+use crate::wire::json::ByKeyword;
 use crate::wire::pb;
 
 #[derive(Deserialize)]
@@ -20,6 +22,8 @@ pub(in crate::http) struct RaysBody {
     directions: Option<PointsField>,
     ends: Option<PointsField>,
     range_m: Option<f64>,
+    #[serde(default)]
+    unknown: ByKeyword<Unknown>,
     #[serde(default)]
     level: u32,
     min_revision: Option<u64>,
@@ -49,6 +53,7 @@ pub(in crate::http) async fn cast_rays(
             directions: points(of.directions, "directions")?,
             ends: points(of.ends, "ends")?,
             range_m: of.range_m,
+            unknown: pb::Unknown::from(of.unknown.0).into(),
         })
     };
     let (map, question): (_, RayQuestion) = asking.question(&service, message).await?;

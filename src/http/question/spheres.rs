@@ -11,6 +11,7 @@ use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::params::Map;
+use crate::planning::Unknown;
 use crate::service::SphereCheck;
 use crate::wire::json::ByKeyword;
 use crate::wire::pb;
@@ -25,6 +26,8 @@ pub(in crate::http) struct SpheresBody {
     padding_m: f32,
     #[serde(default)]
     ignored: Vec<IgnoredField>,
+    #[serde(default)]
+    unknown: ByKeyword<Unknown>,
     #[serde(default)]
     answer: ByKeyword<AnswerWord>,
     clearance_max_m: Option<f32>,
@@ -55,6 +58,7 @@ pub(in crate::http) async fn check_spheres(
             sizes_u32le: sizes,
             padding_m: of.padding_m,
             ignored: ignored_of(of.ignored)?,
+            unknown: pb::Unknown::from(of.unknown.0).into(),
             answer: pb::CheckAnswer::from(answer).into(),
             clearance_max_m: of.clearance_max_m,
         })

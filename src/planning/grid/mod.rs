@@ -1,11 +1,10 @@
 //! The map from above: which cells of a grid in x y have a voxel within a band of height, and how high it reaches.
 
+mod free;
 mod keep_outs;
 mod map_server;
 #[cfg(test)]
 mod tests;
-
-pub use map_server::NotOccupied;
 
 use super::keep_outs::Shapes;
 use crate::map::{MapView, Region, VoxelSelection};
@@ -26,6 +25,8 @@ pub struct GridRequest {
     pub band_m: [f64; 2],
     /// Side of a cell, meters: a whole number of the level's voxels.
     pub cell_m: f64,
+    /// True where cells without a voxel are told apart: free ones and unknown ones. It takes more time.
+    pub tells_unknown: bool,
     /// Most cells of the grid.
     pub cells_max: usize,
 }
@@ -100,6 +101,9 @@ pub struct Grid {
     pub occupied: Vec<u64>,
     /// Height of the top of the highest voxel of each cell that lies in the band, meters; NaN for a cell without one.
     pub tops_m: Vec<f32>,
+    /// Whether cell i is free, as `occupied`, where that was asked for: a cell is unknown that is neither. Where it was not, the
+    /// grid does not tell what was seen.
+    pub free: Option<Vec<u64>>,
 }
 
 impl Grid {
@@ -111,6 +115,12 @@ impl Grid {
     /// True when cell `number` has a voxel or a keep-out.
     pub fn is_occupied(&self, number: usize) -> bool {
         self.occupied[number / 64] >> (number % 64) & 1 == 1
+    }
+
+    /// True when cell `number` is unknown, where the grid tells that.
+    pub fn is_unknown(&self, number: usize) -> bool {
+        let is_free = |free: &Vec<u64>| free[number / 64] >> (number % 64) & 1 == 1;
+        !self.is_occupied(number) && self.free.as_ref().is_some_and(|free| !is_free(free))
     }
 }
 
@@ -170,7 +180,11 @@ fn whole(number: f64) -> Option<f64> {
 /// Where the view has keep-outs ([`MapView::with_keep_outs`]), a cell that has a point of one in the band is occupied too; they
 /// have no top, and make no grid larger that is as large as what is there.
 ///
-/// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a cell.
+/// Where that is asked for, a cell is free that is not occupied and in which each column of voxels has a free one in the band: one that
+/// a scan saw through, where the view has viewpoints ([`MapView::with_viewpoints`]). Whoever drives there drove or looked through the
+/// column at some height; what is above or below of it may be unknown. Cells that are neither are unknown.
+///
+/// Walks the blocks that the area and the band meet, or all that are stored where those are fewer. Takes 8 bytes a cell, and 4 more where cells are told apart.
 /// The view must cover the whole map. Once stopped, the grid lacks voxels.
 ///
 /// # Errors
@@ -192,6 +206,9 @@ pub fn project_grid(
     let mut grid = projection.grid(&cells, stop);
     if let Some(shapes) = Shapes::of(view) {
         keep_outs::mark(&shapes, &cells, &mut grid, request.band_m, stop);
+    }
+    if request.tells_unknown {
+        grid.free = Some(projection.free_cells(&cells, &grid, stop));
     }
     Ok(grid)
 }
@@ -274,6 +291,7 @@ impl<'a> Projection<'a> {
             size,
             occupied,
             tops_m,
+            free: None,
         }
     }
 
@@ -296,7 +314,7 @@ impl<'a> Projection<'a> {
 
 /// The lowest and the highest index of voxels of `level` whose centers lie in a band; in the wrong order where there are
 /// none.
-fn band_of(lattice: &Lattice, level: u32, [low_m, high_m]: [f64; 2]) -> [i32; 2] {
+pub(super) fn band_of(lattice: &Lattice, level: u32, [low_m, high_m]: [f64; 2]) -> [i32; 2] {
     let voxel_m = lattice.resolution_m(level);
     // The voxel that holds the border, from which its center is half a voxel away at most.
     let around = |c: f64| (c / voxel_m).floor().clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32;

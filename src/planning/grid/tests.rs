@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
+use crate::planning::seen_maps::seen_history_and_level;
 use crate::planning::test_maps::{RESOLUTION_M, history_and_level};
 use crate::voxel::VoxelSet;
 
@@ -20,6 +21,7 @@ const REQUEST: GridRequest = GridRequest {
     area: GridArea::Occupied,
     band_m: [f64::NEG_INFINITY, f64::INFINITY],
     cell_m: 0.1,
+    tells_unknown: false,
     cells_max: 1000,
 };
 
@@ -66,7 +68,7 @@ proptest! {
         let cell_m = f64::from(cell_voxels) * map.lattice().resolution_m(level);
         let high = std::array::from_fn(|axis| low[axis] + size[axis]);
         let area = GridArea::Rectangle { min_m: low, max_m: high };
-        let request = GridRequest { level, area, band_m, cell_m, cells_max: 1_000_000 };
+        let request = GridRequest { level, area, band_m, cell_m, tells_unknown: false, cells_max: 1_000_000 };
         let grid = project(&map, &request).unwrap();
         let end = |axis: usize| grid.origin_m[axis] + grid.size[axis] as f64 * cell_m;
         let near = 1e-5 * cell_m;
@@ -83,6 +85,44 @@ proptest! {
         prop_assert_eq!(tops_of(&grid), expected);
         for (number, top) in grid.tops_m.iter().enumerate() {
             prop_assert_eq!(top.is_nan(), !grid.is_occupied(number));
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_cell_is_free_where_every_column_of_it_has_a_free_voxel_in_the_band(
+        (history, level) in seen_history_and_level(),
+        low in prop::array::uniform2(-8.0f64..4.0),
+        size in prop::array::uniform2(0.0f64..6.0),
+        cell_voxels in 1u32..4,
+        band_m in prop_oneof![Just([f64::NEG_INFINITY, f64::INFINITY]), (-4.0f64..4.0, 0.0f64..3.0).prop_map(|(low, height)| [low, low + height])],
+    ) {
+        let seen = history.map();
+        let voxel_m = seen.map.lattice().resolution_m(level);
+        let cell_m = f64::from(cell_voxels) * voxel_m;
+        let area = GridArea::Rectangle { min_m: low, max_m: std::array::from_fn(|axis| low[axis] + size[axis]) };
+        let request = GridRequest { level, area, band_m, cell_m, tells_unknown: true, cells_max: 1_000_000 };
+        let view = seen.map.view().with_viewpoints();
+        let grid = project_grid(&view, &request, StopSignal::NEVER).unwrap();
+        let free = grid.free.as_ref().unwrap();
+        let first = grid.origin_m.map(|c| (c / voxel_m).round() as i32);
+        // Nobody sees further than this.
+        let far = (20.0 / voxel_m) as i32 + 2;
+        for number in 0..grid.cells() {
+            let cell = [number % grid.size[0], number / grid.size[0]].map(|i| i as i32 * cell_voxels as i32);
+            let column_is_free = |x: i32, y: i32| (-far..far).any(|z| {
+                let voxel = VoxelKey::new([first[0] + cell[0] + x, first[1] + cell[1] + y, z]).unwrap();
+                let height = seen.map.lattice().center_m(voxel, level)[2];
+                height >= band_m[0] && height <= band_m[1] && seen.is_free(&view, voxel, level)
+            });
+            let side = 0..cell_voxels as i32;
+            let all = side.clone().all(|y| side.clone().all(|x| column_is_free(x, y)));
+            let is_free = free[number / 64] >> (number % 64) & 1 == 1;
+            prop_assert_eq!(is_free, all && !grid.is_occupied(number), "cell {}", number);
+            prop_assert_eq!(grid.is_unknown(number), !is_free && !grid.is_occupied(number));
         }
     }
 }
@@ -149,8 +189,10 @@ fn the_files_of_map_server_show_the_map_from_above() {
     let map = map_of(&[[0, 0, 0], [2, 1, 0]], 0.1);
     let grid = project(&map, &REQUEST).unwrap();
     let rows = [[254, 254, 0], [0, 254, 254]];
-    assert_eq!(grid.to_pgm(NotOccupied::Free), [b"P5\n3 2\n255\n".as_slice(), rows.as_flattened()].concat());
-    assert_eq!(grid.to_pgm(NotOccupied::Unknown).iter().filter(|&&gray| gray == 205).count(), 4);
+    assert_eq!(grid.to_pgm(), [b"P5\n3 2\n255\n".as_slice(), rows.as_flattened()].concat());
+    // Of a map that nobody looked through.
+    let told = project(&map, &GridRequest { tells_unknown: true, ..REQUEST }).unwrap();
+    assert_eq!(told.to_pgm().iter().filter(|&&gray| gray == 205).count(), 4);
     let yaml = "image: 'it''s.pgm'\nmode: trinary\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n\
                 occupied_thresh: 0.65\nfree_thresh: 0.196\n";
     assert_eq!(grid.to_yaml("it's.pgm"), yaml);

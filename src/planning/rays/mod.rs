@@ -1,5 +1,6 @@
 //! Rays: what each meets first, and how far away.
 
+mod in_sight;
 mod keep_outs;
 mod ray;
 mod space;
@@ -7,11 +8,13 @@ mod space;
 mod tests;
 mod turns;
 
+use super::free_space::FreeSpace;
 use super::keep_outs::Shapes;
 use crate::geometry::Point;
 use crate::map::{KeepOutName, MapView};
 use crate::util::StopSignal;
 use crate::voxel::{Cluster, VoxelKey};
+pub(super) use in_sight::clear_m;
 use ray::Ray;
 use space::Space;
 use turns::Turns;
@@ -264,6 +267,38 @@ pub fn cast_rays(
         Some(bounds) => Turns::new(Space::new(tier, bounds, &nothing), request).walk(&mut hits, stop)?,
         None => (0..rays.len()).try_for_each(|number| request.ray(number).map(|_| ()))?,
     }
+    end_at_keep_outs(view, rays, hits, stop)
+}
+
+/// What each ray meets first of the voxels of `level` that are not free: those that are occupied, and those that no scan saw
+/// through, as far as the view has viewpoints ([`MapView::with_viewpoints`]).
+///
+/// As [`cast_rays`] otherwise. Rays go voxel by voxel, and end with the map's lattice.
+///
+/// # Errors
+/// As for [`cast_rays`].
+pub fn cast_rays_in_sight(
+    view: &MapView<'_>,
+    rays: &Rays<'_>,
+    level: u32,
+    stop: StopSignal<'_>,
+) -> Result<RayHits, RayError> {
+    rays.checked()?;
+    let mut hits = RayHits::none_of(rays.len());
+    let (nothing, tier) = (Cluster::default(), view.tier_view(level));
+    let request = Request { rays, range_m: view.lattice().range_m(), cell_m: tier.cell_m() };
+    let space = Space::new(tier, view.lattice_bounds(level), &nothing);
+    in_sight::walk(space, &request, (level, FreeSpace::of(view)), &mut hits, stop)?;
+    end_at_keep_outs(view, rays, hits, stop)
+}
+
+/// The hits of rays that end where they enter a keep-out of the view.
+fn end_at_keep_outs(
+    view: &MapView<'_>,
+    rays: &Rays<'_>,
+    mut hits: RayHits,
+    stop: StopSignal<'_>,
+) -> Result<RayHits, RayError> {
     if let Some(shapes) = Shapes::of(view) {
         keep_outs::end_at(&shapes, rays, &mut hits, stop)?;
     }

@@ -2,6 +2,7 @@
 
 use super::ray::{Place, Ray};
 use crate::map::{CellBounds, TierView};
+use crate::planning::free_space::FreeSpace;
 use crate::planning::remembered::Remembered;
 use crate::voxel::{BlockInCluster, Cell, Cluster, VoxelKey};
 
@@ -35,6 +36,13 @@ pub(super) enum Step {
     Missed,
 }
 
+impl Walk {
+    /// How far it has come, meters.
+    pub(super) fn at_m(&self) -> f64 {
+        self.place.at_m
+    }
+}
+
 impl<'a> Space<'a> {
     /// Space without a voxel beyond `bounds`; `nothing` is a cluster without a block.
     pub(super) fn new(view: TierView<'a>, bounds: CellBounds, nothing: &'a Cluster) -> Self {
@@ -57,6 +65,22 @@ impl<'a> Space<'a> {
             return Step::Hit(walk.place.at_m, VoxelKey::pack(cell.map(|i| i >> self.up)));
         };
         walk.place = walk.ray.beyond(&walk.place, levels);
+        if walk.place.at_m < walk.end_m { Step::Further } else { Step::Missed }
+    }
+
+    /// Goes on to the next voxel of `level` where that at the place of a walk is free.
+    pub(super) fn step_in_sight(
+        &mut self,
+        walk: &mut Walk,
+        level: u32,
+        free_space: &mut FreeSpace<'_>,
+    ) -> Step {
+        let cell = walk.ray.cell(&walk.place);
+        let voxel = VoxelKey::pack(cell.map(|i| i >> self.up));
+        if self.empty_levels(cell).is_none() || !free_space.is_seen_through(voxel, level) {
+            return Step::Hit(walk.place.at_m, voxel);
+        }
+        walk.place = walk.ray.beyond(&walk.place, self.up);
         if walk.place.at_m < walk.end_m { Step::Further } else { Step::Missed }
     }
 

@@ -24,10 +24,14 @@ pub struct GridScope {
     pub band_m: [f64; 2],
     /// Side of a cell, meters: a whole number of the level's voxels. One voxel without.
     pub cell_m: Option<f64>,
+    /// True where cells without a voxel are told apart: free ones and unknown ones.
+    pub tells_unknown: bool,
 }
 
-/// Bytes of a cell in an answer: a height and a bit.
+/// Bytes of a cell in an answer: a height and two bits.
 const BYTES_EACH: usize = 5;
+/// Bytes of a cell that is told to be free or unknown while that is found: how many of its columns are free.
+const WORK_BYTES_EACH: usize = 4;
 
 impl GridQuestion {
     /// Most cells of an answer.
@@ -46,7 +50,8 @@ impl Question for GridQuestion {
     }
 
     fn answer_bytes(&self, limits: &Limits) -> usize {
-        Self::cells_max(limits) * BYTES_EACH
+        let work = if self.scope.tells_unknown { WORK_BYTES_EACH } else { 0 };
+        Self::cells_max(limits) * (BYTES_EACH + work)
     }
 
     fn check(&self, _: &Limits) -> Result<(), ServiceError> {
@@ -59,13 +64,14 @@ impl Question for GridQuestion {
         limits: &Limits,
         stop: StopSignal<'_>,
     ) -> Result<(Grid, ContentVersion), ServiceError> {
-        let GridScope { area, band_m, cell_m } = self.scope;
+        let GridScope { area, band_m, cell_m, tells_unknown } = self.scope;
         let level = self.asked.level;
         // It walks all voxels of the area: never a short question.
         map.in_view(&self.asked, usize::MAX, stop, |view| {
             let cell_m = cell_m.unwrap_or_else(|| view.lattice().resolution_m(level));
             let cells_max = Self::cells_max(limits);
-            Ok(project_grid(view, &GridRequest { level, area, band_m, cell_m, cells_max }, stop)?)
+            let request = GridRequest { level, area, band_m, cell_m, tells_unknown, cells_max };
+            Ok(project_grid(view, &request, stop)?)
         })
     }
 

@@ -23,6 +23,11 @@ impl KnownPart {
         Self { region, margin_m: lattice.resolution_m(level) * 3f64.sqrt(), far_m: high_m.max(-low_m) * 2.0 }
     }
 
+    /// Side of a voxel of the level, meters.
+    pub(super) fn voxel_m(&self) -> f64 {
+        self.margin_m / 3f64.sqrt()
+    }
+
     /// Refuses a ball of which a part is not known.
     ///
     /// # Errors

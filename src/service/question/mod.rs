@@ -1,6 +1,8 @@
 //! Questions of planners: each is answered from a view of a whole map, the server's or a replica's.
 
 mod check;
+mod classify;
+mod frontiers;
 mod grid;
 mod known;
 mod motions;
@@ -10,6 +12,8 @@ mod rays;
 mod spheres;
 
 pub use check::{CheckAs, Collisions};
+pub use classify::ClassifyQuestion;
+pub use frontiers::{FRONTIERS_MAX_DEFAULT, FrontierQuestion};
 pub use grid::{GridQuestion, GridScope};
 pub use known::KnownPart;
 pub use motions::MotionCheck;
@@ -28,7 +32,7 @@ use super::hosted_map::HostedMap;
 use super::time_limit::TimeLimit;
 use super::{Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early};
 use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap};
-use crate::planning::{Planner, PlanningView};
+use crate::planning::{Planner, PlanningView, Surroundings, Unknown};
 use crate::util::StopSignal;
 
 /// What all questions have in common.
@@ -110,10 +114,14 @@ impl<'a> QuestionedMap<'a> {
         self.planner.get_or_init(|| Planner::with_field_bytes(Arc::clone(self.map), self.field_bytes_max))
     }
 
-    /// A view of the whole map for checks of bodies.
-    pub(super) fn planning_view(&self, asked: &Asked) -> PlanningView<'a> {
+    /// A view of the whole map for checks of bodies among what counts.
+    pub(super) fn planning_view(&self, asked: &Asked, surroundings: &Surroundings) -> PlanningView<'a> {
         let view = self.planner().view();
-        if asked.ignore_keep_outs { view } else { view.with_keep_outs() }
+        let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
+        match surroundings.unknown {
+            Unknown::Free => view,
+            Unknown::Occupied => view.with_viewpoints(),
+        }
     }
 
     /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
@@ -128,6 +136,7 @@ impl<'a> QuestionedMap<'a> {
         let _long_read = (elements > SHORT_ELEMENTS).then(|| self.map.long_read());
         let view = self.map.view();
         let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
+        let view = view.with_viewpoints();
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))
@@ -230,7 +239,7 @@ fn check_elements(
 mod tests {
     use super::*;
     use crate::map::{MapContents, MapSettings};
-    use crate::planning::{Body, Link, Sphere, Surroundings};
+    use crate::planning::{Body, Link, Sphere};
     use crate::voxel::VoxelKey;
 
     /// Bytes that the fields of a map hold after a check where a voxel is near, when they may hold so many.

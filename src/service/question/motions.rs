@@ -75,7 +75,7 @@ impl Question for MotionCheck {
             level: self.asked.level,
             surroundings: &self.surroundings,
         };
-        let view = map.planning_view(&self.asked);
+        let view = map.planning_view(&self.asked, &self.surroundings);
         let answers = view.check_motions(&question, stop)?;
         check_not_stopped(stop)?;
         answers.map(|answers| (answers, view.version())).ok_or_else(|| super::ended_early(stop))

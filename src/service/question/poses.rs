@@ -54,7 +54,7 @@ impl Question for PoseCheck {
         let level = self.asked.level;
         let question =
             PoseQuestion { body: &self.body, configurations, level, surroundings: &self.surroundings };
-        let view = map.planning_view(&self.asked);
+        let view = map.planning_view(&self.asked, &self.surroundings);
         let collisions = match self.answer {
             CheckAs::Colliding => view
                 .bodies_meet(&question, stop)?

@@ -2,7 +2,7 @@
 
 use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
-use crate::planning::{RayError, RayHits, Rays, Toward, cast_rays};
+use crate::planning::{RayError, RayHits, Rays, Toward, Unknown, cast_rays, cast_rays_in_sight};
 use crate::service::{Limits, PointCloud, Reason, ServiceError};
 use crate::util::StopSignal;
 
@@ -15,6 +15,8 @@ pub struct RayQuestion {
     pub origins: PointCloud,
     /// Where each ray leads.
     pub toward: RaysToward,
+    /// What unknown voxels count as.
+    pub unknown: Unknown,
 }
 
 /// Where rays lead.
@@ -76,7 +78,11 @@ impl Question for RayQuestion {
         stop: StopSignal<'_>,
     ) -> Result<(RayHits, ContentVersion), ServiceError> {
         map.in_view(&self.asked, self.elements(), stop, |view| {
-            Ok(cast_rays(view, &self.rays(), self.asked.level, stop)?)
+            let (rays, level) = (self.rays(), self.asked.level);
+            Ok(match self.unknown {
+                Unknown::Free => cast_rays(view, &rays, level, stop)?,
+                Unknown::Occupied => cast_rays_in_sight(view, &rays, level, stop)?,
+            })
         })
     }
 

@@ -55,7 +55,7 @@ impl Question for SphereCheck {
         let groups = SphereGroups::new(&self.spheres, &self.sizes)?;
         let (level, padding_m) = (self.asked.level, self.padding_m);
         let question = SphereQuestion { groups, padding_m, level, surroundings: &self.surroundings };
-        let view = map.planning_view(&self.asked);
+        let view = map.planning_view(&self.asked, &self.surroundings);
         let collisions = match self.answer {
             CheckAs::Colliding => view
                 .spheres_meet(&question, stop)?

@@ -4,7 +4,7 @@ use bytes::Bytes;
 
 use super::keep_outs::{keep_outs_from, keep_outs_of};
 use crate::map::Region;
-use crate::planning::{Body, Clearance, Hit, Link, Met, NUMBERS_PER_POSE, Sphere, Surroundings};
+use crate::planning::{Body, Clearance, Hit, Link, Met, NUMBERS_PER_POSE, Sphere, Surroundings, Unknown};
 use crate::service::{CheckAs, Collisions, PointCloud, Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::array::{bitmap_of, bytes_of, numbers_of, voxels_of, words_of};
@@ -130,14 +130,39 @@ fn whole_from(bytes: &Bytes, each: usize, field: &str) -> Result<Vec<f32>, Servi
 }
 
 /// What counts for a check.
-pub(super) fn surroundings_from(ignored: Vec<pb::Region>) -> Result<Surroundings, ServiceError> {
+pub(super) fn surroundings_from(
+    ignored: Vec<pb::Region>,
+    unknown: i32,
+) -> Result<Surroundings, ServiceError> {
     let region = |(number, region): (usize, pb::Region)| {
         Region::try_from(region).in_field(&format!("ignored[{number}]"))
     };
-    Ok(Surroundings { ignored: ignored.into_iter().enumerate().map(region).collect::<Result<_, _>>()? })
+    let ignored = ignored.into_iter().enumerate().map(region).collect::<Result<_, _>>()?;
+    Ok(Surroundings { ignored, unknown: unknown_from(unknown, Reason::BadCheck)? })
 }
 
-/// The inverse of [`surroundings_from`].
+/// What unknown voxels count as.
+pub(super) fn unknown_from(unknown: i32, reason: Reason) -> Result<Unknown, ServiceError> {
+    match pb::Unknown::try_from(unknown) {
+        Ok(pb::Unknown::Unspecified | pb::Unknown::Free) => Ok(Unknown::Free),
+        Ok(pb::Unknown::Occupied) => Ok(Unknown::Occupied),
+        Err(_) => {
+            let message = format!("unknown must be 0, 1 (free) or 2 (occupied), got {unknown}");
+            Err(ServiceError::new(reason, message))
+        }
+    }
+}
+
+impl From<Unknown> for pb::Unknown {
+    fn from(unknown: Unknown) -> Self {
+        match unknown {
+            Unknown::Free => Self::Free,
+            Unknown::Occupied => Self::Occupied,
+        }
+    }
+}
+
+/// The regions that do not count.
 pub(super) fn ignored_of(surroundings: Surroundings) -> Vec<pb::Region> {
     surroundings.ignored.into_iter().map(Into::into).collect()
 }

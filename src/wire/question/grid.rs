@@ -19,14 +19,19 @@ impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
         });
         let low_m = request.min_z_m.unwrap_or(f64::NEG_INFINITY);
         let high_m = request.max_z_m.unwrap_or(f64::INFINITY);
-        let scope = GridScope { area, band_m: [low_m, high_m], cell_m: request.cell_m };
+        let scope = GridScope {
+            area,
+            band_m: [low_m, high_m],
+            cell_m: request.cell_m,
+            tells_unknown: request.tell_unknown,
+        };
         Ok((map, GridQuestion { asked, scope }))
     }
 }
 
 impl From<(&MapName, GridQuestion)> for pb::ProjectGridRequest {
     fn from((map, GridQuestion { asked, scope }): (&MapName, GridQuestion)) -> Self {
-        let GridScope { area, band_m: [low_m, high_m], cell_m } = scope;
+        let GridScope { area, band_m: [low_m, high_m], cell_m, tells_unknown: tell_unknown } = scope;
         let area = match area {
             GridArea::Occupied => None,
             GridArea::Rectangle { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] } => {
@@ -34,15 +39,17 @@ impl From<(&MapName, GridQuestion)> for pb::ProjectGridRequest {
             }
         };
         let asked = Some((map, asked).into());
-        Self { asked, area, min_z_m: Some(low_m), max_z_m: Some(high_m), cell_m }
+        Self { asked, area, min_z_m: Some(low_m), max_z_m: Some(high_m), cell_m, tell_unknown }
     }
 }
 
 impl From<Answered<Grid>> for pb::ProjectGridResponse {
     fn from(Answered { answer, version }: Answered<Grid>) -> Self {
         let cells = answer.cells();
-        let Grid { cell_m, origin_m: [origin_x_m, origin_y_m], size: [x, y], occupied, tops_m } = answer;
-        let cells_occupied = occupied.iter().map(|word| u64::from(word.count_ones())).sum();
+        let Grid { cell_m, origin_m: [origin_x_m, origin_y_m], size: [x, y], occupied, tops_m, free } =
+            answer;
+        let ones = |words: &[u64]| words.iter().map(|word| u64::from(word.count_ones())).sum();
+        let (cells_occupied, cells_free) = (ones(&occupied), free.as_deref().map_or(0, ones));
         Self {
             cell_m,
             origin_x_m,
@@ -53,6 +60,8 @@ impl From<Answered<Grid>> for pb::ProjectGridResponse {
             cells_occupied,
             tops_m_f32le: bytes_of(tops_m),
             version: Some(version.into()),
+            free: free.map(|free| bitmap_of(free, cells)),
+            cells_free,
         }
     }
 }
@@ -69,6 +78,7 @@ impl TryFrom<pb::ProjectGridResponse> for Answered<Grid> {
             size,
             occupied: words_of(&response.occupied, cells, "occupied")?,
             tops_m: numbers_of(&response.tops_m_f32le, cells, "tops_m_f32le")?,
+            free: response.free.map(|free| words_of(&free, cells, "free")).transpose()?,
         };
         answered(grid, response.version)
     }

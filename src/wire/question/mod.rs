@@ -1,6 +1,8 @@
 //! Questions of planners and their answers (`planning.proto`).
 
 mod body;
+mod classify;
+mod frontiers;
 mod grid;
 mod keep_outs;
 mod motions;
@@ -68,7 +70,14 @@ macro_rules! asks_about_a_body {
 }
 
 #[cfg(feature = "server")]
-asks_without_a_body!(CastRaysRequest, FindNearestRequest, CheckSpheresRequest, ProjectGridRequest);
+asks_without_a_body!(
+    CastRaysRequest,
+    FindNearestRequest,
+    ClassifyPointsRequest,
+    ListFrontiersRequest,
+    CheckSpheresRequest,
+    ProjectGridRequest
+);
 #[cfg(feature = "server")]
 asks_about_a_body!(CheckPosesRequest, CheckMotionsRequest);
 

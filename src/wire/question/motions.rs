@@ -23,7 +23,7 @@ impl TryFrom<pb::CheckMotionsRequest> for Of<MotionCheck> {
             lengths: counts_from(&request.lengths_u32le, "lengths_u32le")?,
             step_m: request.step_m,
             clearance_max_m: request.clearance_max_m,
-            surroundings: surroundings_from(request.ignored)?,
+            surroundings: surroundings_from(request.ignored, request.unknown)?,
         };
         Ok((map, check))
     }
@@ -40,6 +40,7 @@ impl From<(&MapName, MotionCheck)> for pb::CheckMotionsRequest {
             lengths_u32le: bytes_of(lengths),
             step_m,
             clearance_max_m,
+            unknown: pb::Unknown::from(surroundings.unknown).into(),
             ignored: ignored_of(surroundings),
         }
     }

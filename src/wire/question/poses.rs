@@ -21,7 +21,7 @@ impl TryFrom<pb::CheckPosesRequest> for Of<PoseCheck> {
             asked,
             body: Arc::new(required(request.body, "body")?.try_into()?),
             configurations: configurations_from(&request.configurations_f32le)?,
-            surroundings: surroundings_from(request.ignored)?,
+            surroundings: surroundings_from(request.ignored, request.unknown)?,
             answer: answer_from(request.answer, request.clearance_max_m)?,
         };
         Ok((map, check))
@@ -36,6 +36,7 @@ impl From<(&MapName, PoseCheck)> for pb::CheckPosesRequest {
             asked: Some((map, asked).into()),
             body: Some((&*body).into()),
             configurations_f32le: bytes_of(configurations),
+            unknown: pb::Unknown::from(surroundings.unknown).into(),
             ignored: ignored_of(surroundings),
             answer: answer.into(),
             clearance_max_m,
@@ -53,7 +54,7 @@ impl TryFrom<pb::CheckSpheresRequest> for Of<SphereCheck> {
             spheres: spheres_from(&request.spheres_f32le)?,
             sizes: counts_from(&request.sizes_u32le, "sizes_u32le")?,
             padding_m: request.padding_m,
-            surroundings: surroundings_from(request.ignored)?,
+            surroundings: surroundings_from(request.ignored, request.unknown)?,
             answer: answer_from(request.answer, request.clearance_max_m)?,
         };
         Ok((map, check))
@@ -69,6 +70,7 @@ impl From<(&MapName, SphereCheck)> for pb::CheckSpheresRequest {
             spheres_f32le: spheres_bytes(&spheres),
             sizes_u32le: bytes_of(sizes),
             padding_m,
+            unknown: pb::Unknown::from(surroundings.unknown).into(),
             ignored: ignored_of(surroundings),
             answer: answer.into(),
             clearance_max_m,

@@ -1,5 +1,6 @@
 //! Rays.
 
+use super::body::unknown_from;
 use super::keep_outs::{keep_outs_from, keep_outs_of};
 use super::{Of, answered, asked_of};
 use crate::map::MapName;
@@ -26,18 +27,21 @@ impl TryFrom<pb::CastRaysRequest> for Of<RayQuestion> {
                 return Err(ServiceError::new(Reason::BadRay, message));
             }
         };
-        Ok((map, RayQuestion { asked, origins, toward }))
+        let unknown = unknown_from(request.unknown, Reason::BadRay)?;
+        Ok((map, RayQuestion { asked, origins, toward, unknown }))
     }
 }
 
 impl From<(&MapName, RayQuestion)> for pb::CastRaysRequest {
-    fn from((map, RayQuestion { asked, origins, toward }): (&MapName, RayQuestion)) -> Self {
+    fn from((map, rays): (&MapName, RayQuestion)) -> Self {
+        let RayQuestion { asked, origins, toward, unknown } = rays;
         let points = |points: PointCloud| Some(points.into());
         let (directions, ends, range_m) = match toward {
             RaysToward::Directions { directions, range_m } => (points(directions), None, Some(range_m)),
             RaysToward::Ends(ends) => (None, points(ends), None),
         };
-        Self { asked: Some((map, asked).into()), origins: points(origins), directions, ends, range_m }
+        let (asked, unknown) = (Some((map, asked).into()), pb::Unknown::from(unknown).into());
+        Self { asked, origins: points(origins), directions, ends, range_m, unknown }
     }
 }
 

@@ -41,6 +41,8 @@ fn body(operation: Operation) -> Body {
         }
         Operation::CastRays => Body::Json(json!({"origins": row(1), "directions": [[1, 0, 0]]})),
         Operation::FindNearest => Body::Json(json!({"points": row(1), "radius_m": 1})),
+        Operation::ClassifyPoints => Body::Json(json!({"points": row(1)})),
+        Operation::ListFrontiers => Body::Json(json!({"box": {"min_m": [0, 0, 0], "max_m": [1, 1, 1]}})),
         Operation::ProjectGrid => Body::Json(json!({})),
         Operation::Undo => Body::Json(json!({"revision": 1})),
         Operation::PutKeepOut => Body::Json(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
@@ -64,6 +66,7 @@ fn body(operation: Operation) -> Body {
         | Operation::CheckMotionsStream
         | Operation::CastRaysStream
         | Operation::FindNearestStream
+        | Operation::ClassifyPointsStream
         | Operation::InsertScanStream
         | Operation::Reflect
         | Operation::HealthCheck

@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 29] = [
+const METHODS: [&str; 31] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -37,6 +37,8 @@ const METHODS: [&str; 29] = [
     "Occupancy/CastRays",
     "Occupancy/FindNearest",
     "Occupancy/ProjectGrid",
+    "Occupancy/ClassifyPoints",
+    "Occupancy/ListFrontiers",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];

@@ -55,6 +55,14 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             let (asked, points) = (asked(map), points_pb(&POINTS));
             pb::FindNearestRequest { asked, points, radius_m: 1.0, ..Default::default() }.encode_to_vec()
         }
+        Operation::ClassifyPoints | Operation::ClassifyPointsStream => {
+            pb::ClassifyPointsRequest { asked: asked(map), points: points_pb(&POINTS) }.encode_to_vec()
+        }
+        Operation::ListFrontiers => {
+            let corner = |c: f64| Some(pb::Vector3 { x: c, y: c, z: c });
+            let r#box = Some(pb::Box { min_m: corner(0.0), max_m: corner(1.0) });
+            pb::ListFrontiersRequest { asked: asked(map), r#box, ..Default::default() }.encode_to_vec()
+        }
         Operation::ProjectGrid => {
             pb::ProjectGridRequest { asked: asked(map), ..Default::default() }.encode_to_vec()
         }
@@ -151,6 +159,8 @@ pub(crate) fn body(operation: Operation) -> Option<Value> {
         }
         Operation::CastRays => Some(json!({"origins": POINTS, "directions": [[1, 0, 0]]})),
         Operation::FindNearest => Some(json!({"points": POINTS, "radius_m": 1})),
+        Operation::ClassifyPoints => Some(json!({"points": POINTS})),
+        Operation::ListFrontiers => Some(json!({"box": {"min_m": [0, 0, 0], "max_m": [1, 1, 1]}})),
         Operation::ProjectGrid => Some(json!({})),
         Operation::Undo => Some(json!({"robot": "r", "scan_id": 1})),
         Operation::PutKeepOut => Some(json!({"sphere": {"center_m": [0, 0, 0], "radius_m": 1}})),
@@ -175,6 +185,9 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::CastRaysStream
         | Operation::FindNearest
         | Operation::FindNearestStream
+        | Operation::ClassifyPoints
+        | Operation::ClassifyPointsStream
+        | Operation::ListFrontiers
         | Operation::ProjectGrid
         | Operation::ListKeepOuts
         | Operation::PutKeepOut

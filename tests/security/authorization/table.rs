@@ -29,6 +29,9 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::CastRaysStream
         | Operation::FindNearest
         | Operation::FindNearestStream
+        | Operation::ClassifyPoints
+        | Operation::ClassifyPointsStream
+        | Operation::ListFrontiers
         | Operation::ProjectGrid
         | Operation::GetBlock
         | Operation::ListObservers

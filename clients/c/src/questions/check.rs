@@ -25,7 +25,8 @@ pub struct PoseCheck {
     pub(crate) level: u32,
     pub(crate) clearance_max_m: f32,
     pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 7],
+    pub(crate) unknown_is_occupied: u8,
+    pub(crate) reserved: [u8; 6],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -49,7 +50,8 @@ pub struct SphereCheck {
     pub(crate) padding_m: f32,
     pub(crate) clearance_max_m: f32,
     pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 3],
+    pub(crate) unknown_is_occupied: u8,
+    pub(crate) reserved: [u8; 2],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -183,7 +185,11 @@ impl Form for PoseCheck {
             let numbers =
                 memory::numbers_each(self.configurations, (self.count, each), "check.configurations")?;
             let room = Places::new(self.count, places.capacity)?.beside(numbers);
-            (numbers, surroundings_but(self.ignored, self.ignored_count)?, places.arrays(room)?)
+            (
+                numbers,
+                surroundings_but(self.ignored, self.ignored_count, self.unknown_is_occupied)?,
+                places.arrays(room)?,
+            )
         };
         let question = mrol::service::PoseCheck {
             asked: asked(self.level, self.ignore_keep_outs)?,
@@ -218,7 +224,12 @@ impl Form for SphereCheck {
             let spheres = memory::rows::<4>(self.spheres, self.count, "check.spheres")?;
             let sizes = self.sizes()?;
             let room = Places::new(sizes.len(), places.capacity)?.beside(spheres);
-            (spheres, sizes, surroundings_but(self.ignored, self.ignored_count)?, places.arrays(room)?)
+            (
+                spheres,
+                sizes,
+                surroundings_but(self.ignored, self.ignored_count, self.unknown_is_occupied)?,
+                places.arrays(room)?,
+            )
         };
         let question = mrol::service::SphereCheck {
             asked: asked(self.level, self.ignore_keep_outs)?,

@@ -24,7 +24,8 @@ pub struct GridQuestion {
     pub(crate) has_min_z: u8,
     pub(crate) has_max_z: u8,
     pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 8],
+    pub(crate) tell_unknown: u8,
+    pub(crate) reserved: [u8; 7],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -52,12 +53,13 @@ pub struct GridPlaces {
     pub(crate) shape: *mut GridShape,
     pub(crate) occupied: *mut u8,
     pub(crate) tops_m: *mut f32,
+    pub(crate) is_free: *mut u8,
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
 unsafe impl Question for GridPlaces {
     const NAME: &'static str = "answers";
-    const BYTES_MIN: usize = size_of::<Self>();
+    const BYTES_MIN: usize = std::mem::offset_of!(Self, is_free);
 }
 
 impl GridQuestion {
@@ -72,7 +74,8 @@ impl GridQuestion {
             true => GridArea::Rectangle { min_m: self.area_min_m, max_m: self.area_max_m },
             false => GridArea::Occupied,
         };
-        Ok(GridScope { area, band_m: [low_m, high_m], cell_m: unless_zero(self.cell_m) })
+        let tells_unknown = flag(self.tell_unknown, "question.tell_unknown")?;
+        Ok(GridScope { area, band_m: [low_m, high_m], cell_m: unless_zero(self.cell_m), tells_unknown })
     }
 }
 
@@ -87,19 +90,26 @@ impl GridPlaces {
     /// # Safety
     /// Pointers are NULL or point to memory for `capacity` cells.
     unsafe fn write(&self, grid: &Grid) -> Result<(), Failure> {
-        if self.occupied.is_null() && self.tops_m.is_null() {
+        if self.occupied.is_null() && self.tops_m.is_null() && self.is_free.is_null() {
             return Ok(());
         }
         let mut room = Places::new(grid.cells(), self.capacity)?;
         // SAFETY: as the caller promises.
-        let (occupied, tops_m) = unsafe {
-            (room.bitmap(self.occupied, "answers.occupied")?, room.array(self.tops_m, "answers.tops_m")?)
+        let (occupied, tops_m, is_free) = unsafe {
+            (
+                room.bitmap(self.occupied, "answers.occupied")?,
+                room.array(self.tops_m, "answers.tops_m")?,
+                room.bitmap(self.is_free, "answers.is_free")?,
+            )
         };
         if let Some(to) = occupied {
             to.write_bits(&grid.occupied);
         }
         if let Some(to) = tops_m {
             to.write(grid.tops_m.iter().copied());
+        }
+        if let (Some(to), Some(free)) = (is_free, &grid.free) {
+            to.write_bits(free);
         }
         Ok(())
     }
@@ -115,6 +125,9 @@ impl Form for GridQuestion {
             asked: asked(self.level, self.ignore_keep_outs)?,
             scope: self.scope()?,
         };
+        if !places.is_free.is_null() && !question.scope.tells_unknown {
+            return Err(Failure::argument("answers.is_free is told where question.tell_unknown is 1"));
+        }
         let answered = replica.ask(&question)?;
         let grid = &answered.answer;
         shape.write(shape_of(grid));

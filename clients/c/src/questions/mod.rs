@@ -1,6 +1,8 @@
 //! Questions of planners in the form that all of them have: what is asked, and where the arrays of the answer go.
 
 mod check;
+mod classify;
+pub(crate) mod frontiers;
 pub(crate) mod grid;
 mod motions;
 mod nearest;
@@ -8,12 +10,15 @@ mod rays;
 pub(crate) mod regions;
 
 pub(crate) use check::{CollisionPlaces, PoseCheck, SphereCheck};
+pub(crate) use classify::{ClassifyPlaces, ClassifyQuestion};
+pub(crate) use frontiers::{FrontierPlaces, FrontierQuestion};
 pub(crate) use grid::{GridPlaces, GridQuestion};
 pub(crate) use motions::{MotionCheck, MotionPlaces};
 pub(crate) use nearest::{NearestPlaces, NearestQuestion};
 pub(crate) use rays::{RayPlaces, RayQuestion};
 
 use mrol::map::{KeepOutName, NAME_LENGTH_MAX};
+use mrol::planning::Unknown;
 use mrol::service::Asked;
 
 use crate::abi::{Answer, Error, ReplicaHandle};
@@ -64,6 +69,12 @@ pub(crate) unsafe fn ask<F: Form>(
 fn asked(level: u32, ignore_keep_outs: u8) -> Result<Asked, Failure> {
     let ignore_keep_outs = memory::flag(ignore_keep_outs, "ignore_keep_outs")?;
     Ok(Asked { level, ignore_keep_outs, ..Asked::default() })
+}
+
+/// What unknown voxels count as.
+fn unknown(unknown_is_occupied: u8) -> Result<Unknown, Failure> {
+    let is_occupied = memory::flag(unknown_is_occupied, "unknown_is_occupied")?;
+    Ok(if is_occupied { Unknown::Occupied } else { Unknown::Free })
 }
 
 /// `mrol_name`.

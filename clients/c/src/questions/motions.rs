@@ -26,7 +26,8 @@ pub struct MotionCheck {
     pub(crate) step_m: f32,
     pub(crate) clearance_max_m: f32,
     pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 3],
+    pub(crate) unknown_is_occupied: u8,
+    pub(crate) reserved: [u8; 2],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -124,7 +125,12 @@ impl Form for MotionCheck {
                 memory::numbers_each(self.configurations, (self.count, each), "check.configurations")?;
             let lengths = self.lengths()?;
             let room = Places::new(lengths.len(), places.capacity)?.beside(numbers);
-            (numbers, lengths, surroundings_but(self.ignored, self.ignored_count)?, places.arrays(room)?)
+            (
+                numbers,
+                lengths,
+                surroundings_but(self.ignored, self.ignored_count, self.unknown_is_occupied)?,
+                places.arrays(room)?,
+            )
         };
         let clearance_max_m = arrays.clearances_m.as_ref().map(|_| match unless_zero(self.clearance_max_m) {
             Some(most_m) => most_m,

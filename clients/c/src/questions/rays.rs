@@ -2,7 +2,7 @@
 
 use mrol::service::{PointCloud, RaysToward};
 
-use super::{Form, Name, asked, check_reserved, unless_zero, write_names};
+use super::{Form, Name, asked, check_reserved, unknown, unless_zero, write_names};
 use crate::abi::Answer;
 use crate::failure::Failure;
 use crate::memory::{self, Places, Question};
@@ -21,7 +21,8 @@ pub struct RayQuestion {
     pub(crate) range_m: f64,
     pub(crate) level: u32,
     pub(crate) ignore_keep_outs: u8,
-    pub(crate) reserved: [u8; 3],
+    pub(crate) unknown_is_occupied: u8,
+    pub(crate) reserved: [u8; 2],
 }
 
 // SAFETY: it begins with its size, and any bytes are one.
@@ -104,6 +105,7 @@ impl Form for RayQuestion {
             asked: asked(self.level, self.ignore_keep_outs)?,
             origins,
             toward,
+            unknown: unknown(self.unknown_is_occupied)?,
         })?;
         let hits = &answered.answer;
         if let Some(to) = hit {

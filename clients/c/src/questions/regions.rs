@@ -44,18 +44,20 @@ impl RegionNumbers {
     }
 }
 
-/// What counts: all but what lies in these regions.
+/// What counts: all but what lies in these regions, and what no scan saw where that is said.
 ///
 /// # Safety
 /// The regions are there, and nobody writes them meanwhile.
 pub(super) unsafe fn surroundings_but(
     ignored: *const RegionNumbers,
     count: usize,
+    unknown_is_occupied: u8,
 ) -> Result<Surroundings, Failure> {
     // SAFETY: as the caller promises.
     let regions = unsafe { memory::span(ignored, count, "ignored") }?;
     let named = |(number, region): (usize, &RegionNumbers)| {
         region.parse().map_err(|failure| failure.of(&format!("ignored[{number}]")))
     };
-    Ok(Surroundings { ignored: regions.iter().enumerate().map(named).collect::<Result<_, _>>()? })
+    let ignored = regions.iter().enumerate().map(named).collect::<Result<_, _>>()?;
+    Ok(Surroundings { ignored, unknown: super::unknown(unknown_is_occupied)? })
 }

@@ -13,7 +13,7 @@ use crate::lab::workload::bodies::arm::{self, Hand};
 use crate::lab::workload::bodies::cart;
 use crate::lab::workload::bodies::place::Surface;
 use crate::map::MultiResolutionMap;
-use crate::planning::{Body, NUMBERS_PER_POSE, Planner, Surroundings};
+use crate::planning::{Body, NUMBERS_PER_POSE, Planner, Surroundings, Unknown};
 use crate::service::{Asked, CheckAs, MotionCheck, PointCloud, PoseCheck, RayQuestion, RaysToward};
 
 /// Messages that are asked in turn.
@@ -116,6 +116,7 @@ pub(crate) fn rays(shots: &Shots, range_m: f64) -> Vec<RayQuestion> {
             asked: Asked::default(),
             origins: PointCloud::from(if has_one { origins[..1].to_vec() } else { origins.to_vec() }),
             toward: RaysToward::Directions { directions: PointCloud::from(directions.to_vec()), range_m },
+            unknown: Unknown::Free,
         }
     };
     messages.map(message).collect()

@@ -1,0 +1,75 @@
+//! `mrol classify`: asks what is known of points.
+
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::asked::AskedOptions;
+use super::error::CliError;
+use super::output::Output;
+use super::parse;
+use super::query::points_of;
+use super::remote::MapOptions;
+use crate::geometry::Point;
+use crate::service::ClassifyQuestion;
+use crate::util::Keyword;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol classify --map office --point 1,2,0.5 --point 4,2,0.5
+  mrol classify --map office waypoints.xyz --level 1
+
+A point is occupied where a voxel or a keep-out is, free where a scan saw through its voxel's center and nothing is there,
+and unknown elsewhere.";
+
+/// Ask a server what is known of points: occupied, free, or unknown
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Classify {
+    /// Points to ask about: .ply .pcd .xyz .f32
+    #[arg(required_unless_present = "point", conflicts_with = "point")]
+    points_file: Option<PathBuf>,
+    /// A point to ask about, meters; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse::point)]
+    point: Vec<Point>,
+    #[command(flatten)]
+    map: MapOptions,
+    #[command(flatten)]
+    asked: AskedOptions,
+}
+
+impl Classify {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let Self { points_file, point, map, asked } = self;
+        let points = match &points_file {
+            Some(path) => points_of(path)?,
+            None => point,
+        };
+        let question = ClassifyQuestion { asked: asked.asked(), points: points.clone().into() };
+        let client = map.server.connect().await?;
+        let answered = client.classify_points(&map.name, question).await?;
+        let (states, revision) = (answered.answer, answered.version.revision);
+        if states.points != points.len() {
+            let message = format!("the server answered {} of {} points", states.points, points.len());
+            return Err(CliError::failed(message));
+        }
+        points.iter().enumerate().try_for_each(|(i, point)| {
+            output.print(&ClassifiedLine { point: point.xyz(), state: states.state(i).as_str(), revision })
+        })
+    }
+}
+
+#[derive(Serialize)]
+struct ClassifiedLine {
+    point: [f32; 3],
+    state: &'static str,
+    revision: u64,
+}
+
+impl Display for ClassifiedLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.point;
+        write!(f, "{x:>10} {y:>10} {z:>10}   {}", self.state)
+    }
+}

@@ -1,0 +1,89 @@
+//! Which cells are free: something was seen through in each column of voxels.
+
+use super::{Cells, Grid, Projection};
+use crate::planning::free_space::{CELLS, FreeSpace};
+use crate::util::StopSignal;
+use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
+
+/// Blocks between two looks at the stop signal.
+const BLOCKS_PER_LOOK: usize = 16;
+/// Columns of a block.
+const COLUMNS: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize;
+
+impl Projection<'_> {
+    /// Which cells of `grid`, which are `cells`, are free.
+    pub(super) fn free_cells(&self, cells: &Cells, grid: &Grid, stop: StopSignal<'_>) -> Vec<u64> {
+        let mut columns = vec![0u32; grid.cells()];
+        let mut free_space = FreeSpace::of(self.view);
+        let blocks = self.blocks_in_reach(cells, stop);
+        let stacks = blocks.chunk_by(|a, b| a[..2] == b[..2]);
+        let mut looked = 0;
+        'stacks: for stack in stacks {
+            let mut is_seen = [false; COLUMNS];
+            for &[x, y, z] in stack {
+                looked += 1;
+                if looked % BLOCKS_PER_LOOK == 0 && stop.is_stopped() {
+                    break 'stacks;
+                }
+                let Some(block) = VoxelKey::new([x, y, z]) else { continue };
+                self.look_at(block, &mut is_seen, &mut free_space);
+            }
+            for (column, _) in is_seen.iter().enumerate().filter(|(_, is_seen)| **is_seen) {
+                let at = [column as i64 % i64::from(BLOCK_SIDE), column as i64 / i64::from(BLOCK_SIDE)];
+                let cell = |axis: usize| {
+                    (i64::from(stack[0][axis]) * i64::from(BLOCK_SIDE) + at[axis])
+                        .div_euclid(self.cell_voxels)
+                };
+                if let Some(number) = cells.number([cell(0), cell(1)]) {
+                    columns[number] += 1;
+                }
+            }
+        }
+        let all = u64::try_from(self.cell_voxels * self.cell_voxels).unwrap_or(u64::MAX);
+        let mut free = vec![0u64; grid.cells().div_ceil(64)];
+        for (number, &seen) in columns.iter().enumerate() {
+            let is_free = u64::from(seen) == all && !grid.is_occupied(number);
+            free[number / 64] |= u64::from(is_free) << (number % 64);
+        }
+        free
+    }
+
+    /// Notes the columns of a block that have a free voxel in the band.
+    fn look_at(&self, block: VoxelKey, is_seen: &mut [bool; COLUMNS], free_space: &mut FreeSpace<'_>) {
+        let occupied = self.view.level_block(self.level, block);
+        for cell in (0..CELLS).map(Cell::from_bits).filter(|cell| !occupied.contains(*cell, 0)) {
+            let (voxel, [x, y, _]) = (cell.voxel(block), cell.index());
+            let column = &mut is_seen[x + y * BLOCK_SIDE as usize];
+            if !*column && (self.band[0]..=self.band[1]).contains(&voxel.index()[2]) {
+                *column = free_space.is_seen_through(voxel, self.level);
+            }
+        }
+    }
+
+    /// The blocks in the area and the band that a viewpoint may have looked into, ascending by x, y and z.
+    fn blocks_in_reach(&self, cells: &Cells, stop: StopSignal<'_>) -> Vec<[i32; 3]> {
+        let Some(viewpoints) = self.view.viewpoints() else { return Vec::new() };
+        let block =
+            |voxel: i64| (voxel >> BLOCK_LEVELS).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+        let area = |axis: usize| {
+            let [first, end] =
+                [cells.first[axis], cells.end[axis]].map(|cell| cell.saturating_mul(self.cell_voxels));
+            [block(first), block(end - 1)]
+        };
+        let bounds = [area(0), area(1), self.band.map(|z| block(z.into()))];
+        let mut blocks = Vec::new();
+        for [low_m, high_m] in stop.paced(viewpoints.reach_m(), BLOCKS_PER_LOOK) {
+            let range = |axis: usize| {
+                // A conversion keeps to what a number can hold.
+                let index = |c: f64| block((c / self.voxel_m).floor() as i64);
+                index(low_m[axis]).max(bounds[axis][0])..=index(high_m[axis]).min(bounds[axis][1])
+            };
+            for (x, y) in range(0).flat_map(|x| range(1).map(move |y| (x, y))) {
+                blocks.extend(range(2).map(|z| [x, y, z]));
+            }
+        }
+        blocks.sort_unstable();
+        blocks.dedup();
+        blocks
+    }
+}
