@@ -40,7 +40,7 @@ pub(super) struct CubeSearch<'a, 'e> {
     /// True where any voxel will do.
     is_any: bool,
     /// Counts what is looked at. Once stopped the search ends, and what it found means nothing.
-    effort: &'a mut Effort<'e>,
+    effort: &'a Effort<'e>,
 }
 
 /// Cells beyond a ball that are looked at, whatever the rounding.
@@ -55,7 +55,7 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         surroundings: &'a Surroundings,
         level: u32,
         center: [f64; 3],
-        effort: &'a mut Effort<'e>,
+        effort: &'a Effort<'e>,
     ) -> Self {
         Self { view, surroundings, level, center, squared_max: 0.0, found: None, is_any: false, effort }
     }

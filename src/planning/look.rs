@@ -87,7 +87,7 @@ impl<'a> Look<'a> {
         stop: StopSignal<'a>,
     ) -> Self {
         let levels_above = view.map().block_levels_end() - level;
-        let (unmade, effort) = (Vec::new(), Effort::new(stop));
+        let (unmade, effort) = (Vec::new(), Effort::until(stop));
         Self { view, surroundings, level, levels_above, fields, unmade, is_full: false, is_last, effort }
     }
 
