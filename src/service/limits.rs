@@ -83,7 +83,7 @@ pub struct Limits {
     /// Links, spheres and points, in all, of a body that is checked, and spheres of a group that is checked as one. A body has
     /// 65,536 links at most, whatever this is. 16,384.
     pub body_parts_max: usize,
-    /// Regions in which a check ignores voxels. 64.
+    /// Regions in which a check ignores voxels. A message has 4,096 at most, whatever this is. 64.
     pub ignored_regions_max: usize,
     /// Bytes of the distance fields that a map keeps for checks of bodies. Less is slower and as exact: the oldest part goes.
     /// 128 MiB.
