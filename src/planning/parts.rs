@@ -29,9 +29,12 @@ pub struct Link {
     pub padding_m: f32,
 }
 
+/// The center of a part and its radius with padding, meters.
+pub(super) type PaddedPart = ([f64; 3], f64);
+
 impl Sphere {
     /// The center and the radius with padding, meters.
-    pub(super) fn padded(&self, padding_m: f32) -> ([f64; 3], f64) {
+    pub(super) fn padded(&self, padding_m: f32) -> PaddedPart {
         (self.center_m.map(f64::from), f64::from(self.radius_m) + f64::from(padding_m))
     }
 
@@ -49,14 +52,14 @@ impl Sphere {
 
 impl Link {
     /// Centers and radii of all parts with padding, meters: spheres in their order, points after them.
-    pub(super) fn padded(&self) -> impl Iterator<Item = ([f64; 3], f64)> {
+    pub(super) fn padded(&self) -> impl Iterator<Item = PaddedPart> {
         let spheres = self.spheres.iter().map(|sphere| sphere.padded(self.padding_m));
         let points = self.points.iter().map(|point| (point.xyz().map(f64::from), f64::from(self.padding_m)));
         spheres.chain(points)
     }
 
     /// The same as balls and as points without padding: those meet what they fall in.
-    pub(super) fn balls_and_points(&self) -> (Vec<([f64; 3], f64)>, Vec<[f64; 3]>) {
+    pub(super) fn balls_and_points(&self) -> (Vec<PaddedPart>, Vec<[f64; 3]>) {
         let mut balls: Vec<_> = self.padded().collect();
         let is_padded = self.padding_m > 0.0;
         let points = if is_padded { Vec::new() } else { balls.split_off(self.spheres.len()) };
