@@ -3,7 +3,7 @@
 use axum::http::header::AUTHORIZATION;
 use axum::http::{Extensions, HeaderMap, Request};
 
-use super::{Access, Caller, Operation, Secret};
+use super::{Access, Caller, Operation, Peer, Secret, asker_of};
 use crate::map::CallerName;
 use crate::service::{MapService, Reason, ServiceError};
 
@@ -56,7 +56,9 @@ impl Gate {
         self.access.check_site(operation, request)?;
         let caller = self.access.authorize(operation, secret.as_ref())?;
         let name = caller.name().map(CallerName::new).transpose()?;
+        let asker = asker_of(caller.name(), request.extensions().get::<Peer>());
         let service = self.service.limited_to(name, caller.allowed_maps().clone(), caller.scans());
+        let service = service.asked_by(asker);
         Ok(Authorized { caller, service })
     }
 

@@ -32,7 +32,7 @@ pub use inbound_body::InboundBody;
 pub use lifecycle::{Lifecycle, draining};
 pub use of_connection::OfConnection;
 pub use off_runtime::off_runtime;
-pub use rate::{Peer, RateLimitKey};
+pub use rate::RateLimitKey;
 
 use std::num::NonZeroU32;
 use std::sync::Arc;

@@ -1,6 +1,5 @@
 //! How often a caller may ask.
 
-use std::net::IpAddr;
 use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,31 +9,13 @@ use governor::clock::{Clock, DefaultClock};
 use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 
-use crate::access::{Allowance, Authorized, InWork};
-use crate::service::{Limits, ServiceError};
-
-/// Where a request came from; whom it counts for where there is no key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Peer {
-    /// An address.
-    Address(IpAddr),
-    /// A socket of this machine.
-    Local,
-}
-
-impl std::fmt::Display for Peer {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Address(address) => write!(f, "{address}"),
-            Self::Local => f.write_str("local"),
-        }
-    }
-}
+use crate::access::{Allowance, Authorized, InWork, asker_of};
+use crate::service::{Asker, Limits, ServiceError};
 
 /// Whom a request counts for: the name of its key, or where there is none the place that it came from.
 #[derive(Debug, Clone)]
 pub struct RateLimitKey {
-    name: String,
+    asker: Asker,
     /// The bounds of its key.
     own: Option<Arc<Allowance>>,
 }
@@ -43,12 +24,8 @@ impl RateLimitKey {
     /// As a request's extensions say.
     pub fn of(request: &Extensions) -> Self {
         let caller = request.get::<Authorized>().map(|authorized| &authorized.caller);
-        let name = match (caller.and_then(|caller| caller.name()), request.get::<Peer>()) {
-            (Some(key), _) => format!("key {key}"),
-            (None, Some(peer)) => peer.to_string(),
-            (None, None) => "somebody".into(),
-        };
-        Self { name, own: caller.and_then(|caller| caller.allowance()).cloned() }
+        let asker = asker_of(caller.and_then(|caller| caller.name()), request.get());
+        Self { asker, own: caller.and_then(|caller| caller.allowance()).cloned() }
     }
 
     /// Counts a request by the rate of the caller's key, or by `rates` where it has none.
@@ -56,7 +33,7 @@ impl RateLimitKey {
     /// # Errors
     /// When the caller asks too often.
     pub(super) fn check_rate(&self, rates: Option<&Rates>) -> Result<(), ServiceError> {
-        let own = self.own.as_ref().and_then(|own| own.check_rate(&self.name));
+        let own = self.own.as_ref().and_then(|own| own.check_rate(self.asker.as_str()));
         own.unwrap_or_else(|| rates.map_or(Ok(()), |rates| rates.check(self)))
     }
 
@@ -65,13 +42,13 @@ impl RateLimitKey {
     /// # Errors
     /// When all are taken.
     pub(super) fn begin(&self, usual: Option<NonZeroU32>) -> Result<Option<InWork>, ServiceError> {
-        self.own.as_ref().map(|own| own.begin(&self.name, usual)).transpose()
+        self.own.as_ref().map(|own| own.begin(self.asker.as_str(), usual)).transpose()
     }
 }
 
 /// Counts requests by caller.
 pub(super) struct Rates {
-    limiter: RateLimiter<String, HashMapStateStore<String>, DefaultClock>,
+    limiter: RateLimiter<Asker, HashMapStateStore<Asker>, DefaultClock>,
     per_s_max: NonZeroU32,
 }
 
@@ -87,11 +64,11 @@ impl Rates {
     /// # Errors
     /// When the caller asks too often; the error says when to come again.
     pub(super) fn check(&self, asking: &RateLimitKey) -> Result<(), ServiceError> {
-        self.limiter.check_key(&asking.name).map_err(|not_yet| {
+        self.limiter.check_key(&asking.asker).map_err(|not_yet| {
             let wait = not_yet.wait_time_from(DefaultClock::default().now());
             let message = format!(
                 "caller_requests_per_s_max is {}: {} asks more often, try again in {wait:.1?}",
-                self.per_s_max, asking.name
+                self.per_s_max, asking.asker
             );
             ServiceError::overloaded(message).retry_after(wait.max(Duration::from_millis(1)))
         })

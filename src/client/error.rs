@@ -5,10 +5,7 @@ use std::error::Error;
 use tonic::{Code, Status};
 
 use crate::service::ServiceError;
-use crate::wire::pb;
-
-/// Metadata key of the failure's reason.
-const REASON: &str = "mrol-reason";
+use crate::wire::{REASON, pb};
 
 /// Start of the TLS error for a server's certificate.
 const BAD_CERTIFICATE: &str = "invalid peer certificate";

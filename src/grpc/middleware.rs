@@ -19,6 +19,7 @@ use crate::middleware::Protocol;
 use crate::service::ServiceError;
 use crate::telemetry::RequestOutcome;
 use crate::util::excerpt;
+use crate::wire::REASON;
 
 /// gRPC, whose messages may have `message_bytes_max` bytes.
 #[derive(Debug, Clone)]
@@ -75,7 +76,7 @@ impl Protocol for Grpc {
         }
         let headers = response.headers();
         let code = headers.get("grpc-status").map_or(Code::Ok, |value| Code::from_bytes(value.as_bytes()));
-        status::outcome(code, headers.get(status::REASON).map(|reason| reason.as_bytes()))
+        status::outcome(code, headers.get(REASON).map(|reason| reason.as_bytes()))
     }
 }
 

@@ -23,6 +23,7 @@ impl Adapter {
     {
         let service = service_of(&request)?;
         let arrival = InboundBody::of(request.extensions())?.clone();
+        arrival.at_least(request.get_ref().memory_bytes())?;
         let (map, question) = question::<Q, _, _>(&service, request.into_inner(), arrival).await?;
         Ok(answered(service.ask(&map, question).await?.into()))
     }
@@ -66,6 +67,10 @@ macro_rules! streamed {
         $(impl stream::Message for pb::$request {
             type Former = String;
 
+            fn memory_bytes(&self) -> usize {
+                QuestionMessage::memory_bytes(self)
+            }
+
             fn complete(&mut self, former: &mut String, _: Keeping<'_>) -> Result<(), ServiceError> {
                 same_map(&mut self.asked.get_or_insert_default().map, former);
                 Ok(())
@@ -79,6 +84,10 @@ macro_rules! streamed_with_a_body {
     ($($request:ident),+) => {
         $(impl stream::Message for pb::$request {
             type Former = (String, FormerBody);
+
+            fn memory_bytes(&self) -> usize {
+                QuestionMessage::memory_bytes(self)
+            }
 
             fn complete(
                 &mut self,

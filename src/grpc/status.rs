@@ -1,28 +1,10 @@
 //! What a failure is called in gRPC.
 
-use tonic::metadata::MetadataValue;
 use tonic::{Code, Status};
 
 use crate::service::{ErrorCode, Reason, ServiceError};
 use crate::telemetry::RequestOutcome;
-use crate::wire::status_code;
-
-/// The metadata that holds the word for programs.
-pub(super) const REASON: &str = "mrol-reason";
-
-/// The metadata that tells gRPC's own retries how many milliseconds to wait.
-const PUSHBACK: &str = "grpc-retry-pushback-ms";
-
-impl From<ServiceError> for Status {
-    fn from(error: ServiceError) -> Self {
-        let mut status = Self::new(status_code(error.code()), error.message);
-        status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason.as_str()));
-        if let Some(wait) = error.retry_after {
-            status.metadata_mut().insert(PUSHBACK, MetadataValue::from(wait.as_millis() as u64));
-        }
-        status
-    }
-}
+use crate::wire::REASON;
 
 /// True of a failure that concerns the stream and not one of its requests.
 pub(super) fn ends_stream(error: &ServiceError) -> bool {

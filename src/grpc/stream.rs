@@ -20,7 +20,7 @@ use crate::middleware::Protocol;
 use crate::service::{MapService, ServiceError};
 use crate::sync::polled_by_runtime;
 use crate::telemetry::RequestRecorder;
-use crate::wire::pb;
+use crate::wire::{REASON, pb};
 
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
 const MESSAGES_AHEAD_MAX: usize = 4;
@@ -61,6 +61,11 @@ impl<T> Stream for Answers<T> {
 pub(super) trait Message: prost::Message + 'static {
     /// What later requests may leave out.
     type Former: Default + Send + 'static;
+
+    /// Bytes of memory that it takes.
+    fn memory_bytes(&self) -> usize {
+        self.encoded_len()
+    }
 
     /// Takes what it leaves out from the requests before it, and gives what it says to those that follow.
     ///
@@ -149,7 +154,7 @@ impl<M: Message> Reader<M> {
         let message = self.inflation.within(self.compressed, self.requests.message()).await.transpose()?;
         Some(match message {
             // Compressed, it came as less.
-            Ok(message) => match self.arrival.take().at_least(message.encoded_len()) {
+            Ok(message) => match self.arrival.take().at_least(message.memory_bytes()) {
                 Ok(charge) => Ok((message, charge)),
                 Err(refusal) => Err(refusal.into()),
             },
@@ -217,7 +222,7 @@ impl<A: prost::Message, H, P> Worker<A, H, P> {
             Err(unreadable) => Err(unreadable),
         };
         let code = answer.as_ref().map_or_else(Status::code, |_| Code::Ok);
-        let reason = answer.as_ref().err().and_then(|status| status.metadata().get(status::REASON));
+        let reason = answer.as_ref().err().and_then(|status| status.metadata().get(REASON));
         let outcome = status::outcome(code, reason.map(|reason| reason.as_bytes()));
         self.recorder.answered(Grpc::NAME, self.operation.name(), outcome, start.elapsed());
         told.map_or(answer, |told| Ok((told, None)))

@@ -8,6 +8,7 @@ mod filter_choice;
 mod headers;
 mod json;
 mod keep_outs;
+mod list;
 mod localization;
 mod map_file;
 mod maps;

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::json::JsonPoints;
+use super::list::List;
 use super::middleware::Service;
 use super::object::Object;
 use super::params::{self, Map};
@@ -19,6 +20,9 @@ use crate::service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReferenc
 use crate::wire::json::ByKeyword;
 use crate::wire::json::{JsonPose, JsonScan};
 use crate::wire::{InField, gravity_in_sensor};
+
+/// Numbers of a covariance of a pose.
+const COVARIANCE_NUMBERS: usize = 36;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,7 +40,7 @@ pub(super) struct ScanBody {
     motion: Option<Object<JsonPose>>,
     #[serde(default)]
     constant_velocity: bool,
-    guess_covariance: Option<Vec<f64>>,
+    guess_covariance: Option<List<f64, COVARIANCE_NUMBERS>>,
     gravity_in_sensor: Option<[f64; 3]>,
     #[serde(default = "yes")]
     align: bool,
@@ -133,7 +137,7 @@ impl TryFrom<ScanBody> for ScanRequest {
                 .map(|times| PointTimes::new(&times, reference(scan.point_times_from_sweep_start))),
             gravity: scan.gravity_in_sensor.map(gravity_in_sensor).transpose()?,
             guess: guess_of(guess, motion, scan.constant_velocity)?,
-            guess_covariance: scan.guess_covariance.map(|rows| covariance_of(&rows)).transpose()?,
+            guess_covariance: scan.guess_covariance.map(|List(rows)| covariance_of(&rows)).transpose()?,
             at_guess: !scan.align,
             force: scan.force,
             recover: scan.recover,
@@ -160,8 +164,10 @@ impl ScanParams {
         let pose = |text: Option<String>, field| text.map(|text| params::pose(&text, field)).transpose();
         let gravity =
             self.gravity_in_sensor.map(|text| params::numbers(&text, "gravity_in_sensor")).transpose()?;
-        let covariance =
-            self.guess_covariance.map(|text| params::numbers::<36>(&text, "guess_covariance")).transpose()?;
+        let covariance = self
+            .guess_covariance
+            .map(|text| params::numbers::<COVARIANCE_NUMBERS>(&text, "guess_covariance"))
+            .transpose()?;
         Ok(ScanRequest {
             session: SessionName::new(&self.session)?,
             scan_id: self.scan_id,

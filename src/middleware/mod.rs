@@ -20,8 +20,8 @@ use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, RequestId
 use tracing::field::{Empty, display};
 use tracing::{Instrument, Span, info_span};
 
-use crate::access::{Gate, Operation};
-use crate::admission::{Admission, Peer};
+use crate::access::{Gate, Operation, Peer};
+use crate::admission::Admission;
 use crate::service::ServiceError;
 use crate::telemetry::{REQUEST, RequestRecorder};
 

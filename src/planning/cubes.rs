@@ -43,7 +43,7 @@ pub(super) struct CubeSearch<'a, 'e> {
     /// True where any voxel will do.
     is_any: bool,
     /// Counts what is looked at. Once stopped the search ends, and what it found means nothing.
-    effort: &'a mut Effort<'e>,
+    effort: &'a Effort<'e>,
 }
 
 /// Cells beyond a ball that are looked at, whatever the rounding.
@@ -62,7 +62,7 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         surroundings: &'a Surroundings,
         level: u32,
         center: [f64; 3],
-        effort: &'a mut Effort<'e>,
+        effort: &'a Effort<'e>,
     ) -> Self {
         let free_space = surroundings.unknown_counts().then(|| FreeSpace::of(view));
         let (squared_max, found, is_any) = (0.0, None, false);

@@ -1,42 +1,58 @@
 //! How much work there is between two looks at the stop signal.
 
+use std::cell::Cell;
+
 use crate::util::StopSignal;
 
 /// Units of work between two looks. A unit takes some ten nanoseconds: a look-up of eight places in the field, a voxel or a
-/// block that is considered.
-const WORK_PER_LOOK: u32 = 8192;
+/// block that is considered, a test of a place and the box around a keep-out, or a corner of a keep-out.
+pub(super) const WORK_PER_LOOK: u32 = 8192;
 
-/// The work of a question, counted so that the stop signal is looked at in proportion to it, whatever it asks.
+/// The work of a question, counted so that the stop signal is looked at in proportion to it, whatever it asks and however
+/// few things it asks about.
 #[derive(Debug)]
 pub(super) struct Effort<'a> {
     stop: StopSignal<'a>,
-    left: u32,
-    is_stopped: bool,
+    left: Cell<u32>,
+    is_stopped: Cell<bool>,
 }
 
 impl<'a> Effort<'a> {
-    pub(super) fn new(stop: StopSignal<'a>) -> Self {
-        Self { stop, left: WORK_PER_LOOK, is_stopped: false }
+    /// Work that ends when `stop` says so.
+    pub(super) fn until(stop: StopSignal<'a>) -> Self {
+        Self { stop, left: Cell::new(WORK_PER_LOOK), is_stopped: Cell::new(false) }
     }
 
     /// Counts work; looks at the signal where there was enough of it.
     #[inline(always)]
-    pub(super) fn spend(&mut self, work: u32) {
-        match self.left.checked_sub(work) {
-            Some(left) => self.left = left,
+    pub(super) fn spend(&self, work: u32) {
+        match self.left.get().checked_sub(work) {
+            Some(left) => self.left.set(left),
             None => self.look(),
         }
     }
 
     #[cold]
-    fn look(&mut self) {
-        self.left = WORK_PER_LOOK;
-        self.is_stopped |= self.stop.is_stopped();
+    fn look(&self) {
+        self.left.set(WORK_PER_LOOK);
+        self.is_stopped.set(self.is_stopped.get() || self.stop.is_stopped());
     }
 
     /// True once the signal was seen to stop the work.
     #[inline(always)]
     pub(super) fn is_stopped(&self) -> bool {
-        self.is_stopped
+        self.is_stopped.get()
+    }
+
+    /// Counts work before it is done; false once stopped, when what is found means nothing.
+    #[inline]
+    pub(super) fn goes_on(&self, work: u32) -> bool {
+        self.spend(work);
+        !self.is_stopped()
+    }
+
+    /// The answers, all of which are made; none once stopped.
+    pub(super) fn done<T>(self, answers: T) -> Option<T> {
+        (!self.is_stopped() && !self.stop.is_stopped()).then_some(answers)
     }
 }

@@ -124,13 +124,8 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 impl LinkInCells {
     pub(super) fn of(link: &Link, number: usize, cells_per_m: f64) -> Result<Self, PlanningError> {
-        let is_padded = link.padding_m > 0.0;
-        let padded = link.points.iter().filter(|_| is_padded);
-        let padded = padded.map(|point| Sphere { center_m: point.xyz(), radius_m: 0.0 });
-        let spheres: Vec<Sphere> = link.spheres.iter().copied().chain(padded).collect();
-        let bare = link.points.iter().filter(|_| !is_padded).map(|point| point.xyz().map(f64::from));
-        let bare: Vec<_> = bare.collect();
-        Self::of_parts(&spheres, &bare, link.padding_m, number, cells_per_m)
+        let (balls, points) = link.balls_and_points();
+        Self::of_parts(balls, &points, number, cells_per_m)
     }
 
     /// A link of spheres alone.
@@ -140,26 +135,23 @@ impl LinkInCells {
         number: usize,
         cells_per_m: f64,
     ) -> Result<Self, PlanningError> {
-        Self::of_parts(spheres, &[], padding_m, number, cells_per_m)
+        let balls = spheres.iter().map(|sphere| sphere.padded(padding_m)).collect();
+        Self::of_parts(balls, &[], number, cells_per_m)
     }
 
     fn of_parts(
-        spheres: &[Sphere],
-        bare_points_m: &[[f64; 3]],
-        padding_m: f32,
+        balls_m: Vec<([f64; 3], f64)>,
+        points_m: &[[f64; 3]],
         number: usize,
         cells_per_m: f64,
     ) -> Result<Self, PlanningError> {
-        let in_cells = |sphere: &Sphere| {
-            let radius_m = f64::from(sphere.radius_m) + f64::from(padding_m);
-            (sphere.center_m.map(f64::from), radius_m * cells_per_m)
-        };
-        let spheres: Vec<_> = spheres.iter().map(in_cells).collect();
+        let in_cells = |(center_m, radius_m): ([f64; 3], f64)| (center_m, radius_m * cells_per_m);
+        let spheres: Vec<_> = balls_m.into_iter().map(in_cells).collect();
         if let Some(sphere) = spheres.iter().position(|(_, radius)| *radius > RADIUS_CELLS_MAX) {
             let (radius, radius_max) = (spheres[sphere].1, RADIUS_CELLS_MAX);
             return Err(PlanningError::RadiusInVoxels { link: number, sphere, radius, radius_max });
         }
-        let (points, numbers, clumps) = clumps(bare_points_m, cells_per_m);
+        let (points, numbers, clumps) = clumps(points_m, cells_per_m);
         let of_points: Vec<_> = points.iter().map(|point| (point.xyz().map(f64::from), 0.0)).collect();
         let all = [&spheres[..], &of_points[..]].concat();
         let extent_m = |share: f64| {

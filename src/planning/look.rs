@@ -90,7 +90,7 @@ impl<'a> Look<'a> {
         // What is free at a level does not tell what is at a finer one: fields of coarser levels say nothing of this one then.
         let levels_above =
             if surroundings.unknown_counts() { 0 } else { view.map().block_levels_end() - level };
-        let (unmade, effort) = (Vec::new(), Effort::new(stop));
+        let (unmade, effort) = (Vec::new(), Effort::until(stop));
         Self { view, surroundings, level, levels_above, fields, unmade, is_full: false, is_last, effort }
     }
 

@@ -10,8 +10,9 @@ use super::PlanningError;
 use super::aim::OpenSpheres;
 use super::body::Body;
 use super::configurations::Configurations;
+use super::effort::Effort;
 use super::in_cells::BodyInCells;
-use super::keep_outs::{Among, Figure, Strides, Way, Work};
+use super::keep_outs::{Among, Figure, Strides, Way};
 use super::kind::Clearances;
 use super::link::{self, LinkState};
 use super::look::Look;
@@ -96,13 +97,13 @@ impl PlanningView<'_> {
         let answers = self.each(level, surroundings, chunks, stop, Motions(&motions));
         let Some(shapes) = self.shapes() else { return Ok(answers) };
         let Some(mut answers) = answers else { return Ok(None) };
-        let (figure, work) = (Figure::of(question.body.links()), Work::until(stop));
+        let (figure, effort) = (Figure::of(question.body.links()), Effort::until(stop));
         let finest_m = self.lattice().resolution_m(0);
         let strides = Strides::of(question.step_m(cells_per_m)?, finest_m);
-        for (motion, answer) in motions.iter().zip(&mut answers).take_while(|_| work.goes_on(1)) {
-            motion.mend(answer, &figure, &Among { shapes: &shapes, strides, work: &work });
+        for (motion, answer) in motions.iter().zip(&mut answers).take_while(|_| effort.goes_on(1)) {
+            motion.mend(answer, &figure, &Among { shapes: &shapes, strides, effort: &effort });
         }
-        Ok(work.done(answers))
+        Ok(effort.done(answers))
     }
 }
 

@@ -29,7 +29,15 @@ pub struct Link {
     pub padding_m: f32,
 }
 
+/// The center of a part and its radius with padding, meters.
+pub(super) type PaddedPart = ([f64; 3], f64);
+
 impl Sphere {
+    /// The center and the radius with padding, meters.
+    pub(super) fn padded(&self, padding_m: f32) -> PaddedPart {
+        (self.center_m.map(f64::from), f64::from(self.radius_m) + f64::from(padding_m))
+    }
+
     /// True of a finite center and a radius from 0 to [`RADIUS_MAX_M`].
     pub(super) fn is_valid(&self) -> bool {
         self.center_m.iter().all(|c| c.is_finite()) && (0.0..=RADIUS_MAX_M).contains(&self.radius_m)
@@ -43,6 +51,21 @@ impl Sphere {
 }
 
 impl Link {
+    /// Centers and radii of all parts with padding, meters: spheres in their order, points after them.
+    pub(super) fn padded(&self) -> impl Iterator<Item = PaddedPart> {
+        let spheres = self.spheres.iter().map(|sphere| sphere.padded(self.padding_m));
+        let points = self.points.iter().map(|point| (point.xyz().map(f64::from), f64::from(self.padding_m)));
+        spheres.chain(points)
+    }
+
+    /// The same as balls and as points without padding: those meet what they fall in.
+    pub(super) fn balls_and_points(&self) -> (Vec<PaddedPart>, Vec<[f64; 3]>) {
+        let mut balls: Vec<_> = self.padded().collect();
+        let is_padded = self.padding_m > 0.0;
+        let points = if is_padded { Vec::new() } else { balls.split_off(self.spheres.len()) };
+        (balls, points.into_iter().map(|(point, _)| point).collect())
+    }
+
     pub(super) fn check(&self, link: usize) -> Result<(), PlanningError> {
         if !(0.0..=RADIUS_MAX_M).contains(&self.padding_m) {
             let padding_m = self.padding_m;

@@ -2,7 +2,6 @@
 
 use super::body::Body;
 use super::configurations::Configurations;
-use super::parts::Link;
 use super::path::LinkMotion;
 use super::placement::{CellsFromLink, LinkPose};
 
@@ -30,7 +29,7 @@ impl Body {
         let poses = configurations.poses_of(configuration);
         self.links().iter().zip(poses).enumerate().flat_map(|(link, (of, pose))| {
             let map_from_link = CellsFromLink::of(&LinkPose::of(pose), 1.0);
-            parts_of(of).map(move |(center_m, radius_m)| PlacedPart {
+            of.padded().map(move |(center_m, radius_m)| PlacedPart {
                 link,
                 center_m: map_from_link.cells(center_m),
                 radius_m,
@@ -46,25 +45,17 @@ impl Body {
         let pose = |configuration: usize| LinkPose::of(&configurations.poses_of(configuration)[link]);
         let motion = LinkMotion::new(&pose(from), &pose(from + 1));
         let extent_m = |center: [f64; 3]| center.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let far_m = parts_of(&self.links()[link]).map(|(center, _)| extent_m(center)).fold(0.0, f64::max);
+        let far_m = self.links()[link].padded().map(|(center, _)| extent_m(center)).fold(0.0, f64::max);
         // After a share s of the turn by a, a center is s a r from where it would be without, and (1 - s) a r from where it
         // would be at the end: 2 s (1 - s) a r from the line at most.
         (motion.length_m(far_m) - motion.length_m(0.0)) / 2.0
     }
 }
 
-/// Centers and radii with padding, meters in the link's frame.
-fn parts_of(link: &Link) -> impl Iterator<Item = ([f64; 3], f64)> {
-    let padding_m = f64::from(link.padding_m);
-    let spheres = link.spheres.iter();
-    let spheres = spheres.map(move |of| (of.center_m.map(f64::from), f64::from(of.radius_m) + padding_m));
-    spheres.chain(link.points.iter().map(move |point| (point.xyz().map(f64::from), padding_m)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::planning::Sphere;
+    use crate::planning::{Link, Sphere};
     use proptest::prelude::*;
 
     fn pose() -> impl Strategy<Value = [f32; 7]> {

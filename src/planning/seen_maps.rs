@@ -69,7 +69,7 @@ impl SeenScan {
         let rotation = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
         let map_from_sensor = Pose::from_parts(self.origin_m.into(), rotation);
         let range = SeenRange { min_m: 0.05, max_m: 100.0 };
-        let image = RangeImage::of_pixels(&points, range, 2);
+        let image = RangeImage::of_points(&points, range, 2000);
         let in_map: Vec<Point> = points
             .iter()
             .step_by(6)

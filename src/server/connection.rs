@@ -21,7 +21,8 @@ use super::endpoint::Endpoint;
 use super::listener::Accepted;
 use super::stream::{Count, Counted, secure};
 use super::tracked_body::TrackedBody;
-use crate::admission::{CloseConnection, Peer};
+use crate::access::Peer;
+use crate::admission::CloseConnection;
 use crate::sync::polled_by_runtime;
 
 /// How long a client may leave unread what it asked for.

@@ -21,7 +21,8 @@ use tokio::time::{Instant, sleep};
 use tokio_util::sync::CancellationToken;
 
 use self::reserved::Reserved;
-use crate::admission::{OfConnection, Peer};
+use crate::access::Peer;
+use crate::admission::OfConnection;
 
 /// How long a client without a key may leave an answer unread while others find no place, and how old a connection is no
 /// newcomer any more.

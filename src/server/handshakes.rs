@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use parking_lot::Mutex;
 
 use super::protocol::Protocol;
-use crate::admission::Peer;
+use crate::access::Peer;
 
 /// How often one is told, at most: whoever scans ports fails many.
 const TELLING_INTERVAL: Duration = Duration::from_secs(10);

@@ -13,8 +13,7 @@ use super::ServerError;
 use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::stream::Stream;
-use crate::access::ReachedAt;
-use crate::admission::Peer;
+use crate::access::{Peer, ReachedAt};
 use crate::wire::transport::KEEPALIVE_INTERVAL;
 
 /// How long to wait after an error that the next connection would meet as well: too many open files.

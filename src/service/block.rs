@@ -35,7 +35,7 @@ impl MapService {
                 let reserve = |bytes| inner.budget.reserve_transient(bytes, BLOCK);
                 request.answer_in(&map.map, map.uuid, &inner.settings.limits, reserve, stop)
             };
-            self.inner.pools.blocks.run(make).await?
+            self.inner.pools.blocks.run_for(&self.asker, make).await?
         };
         self.observed("GetBlock", Some(map), work, |_| Outcome::Read).await
     }

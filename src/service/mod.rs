@@ -4,6 +4,7 @@
 
 mod allowed_maps;
 mod allowed_scans;
+mod asker;
 mod block;
 mod catalog;
 mod commit_queue;
@@ -42,6 +43,7 @@ mod request;
 mod resource_budget;
 mod settings;
 mod shortage;
+mod thread_queue;
 mod time_limit;
 mod trajectory;
 mod undo;
@@ -51,6 +53,7 @@ mod watermarks;
 
 pub use allowed_maps::AllowedMaps;
 pub use allowed_scans::AllowedScans;
+pub use asker::Asker;
 pub use error::ServiceError;
 pub use error_code::ErrorCode;
 pub use gauges::{Gauges, MemoryReading, Readings};
@@ -106,6 +109,8 @@ pub struct MapService {
     scans: AllowedScans,
     /// Whose requests a map remembers under this name.
     caller: Option<CallerName>,
+    /// Whom its work counts for, where callers take turns.
+    asker: Asker,
 }
 
 #[derive(Debug)]
@@ -136,6 +141,7 @@ impl MapService {
             allowed_maps: AllowedMaps::Every,
             scans: AllowedScans::default(),
             caller: None,
+            asker: Asker::default(),
         })
     }
 
@@ -147,7 +153,14 @@ impl MapService {
         allowed_maps: AllowedMaps,
         scans: AllowedScans,
     ) -> Self {
-        Self { inner: Arc::clone(&self.inner), allowed_maps, scans, caller }
+        let asker = self.asker.clone();
+        Self { inner: Arc::clone(&self.inner), allowed_maps, scans, caller, asker }
+    }
+
+    /// The same, where work counts for `asker`: callers take turns at the threads for questions.
+    #[must_use]
+    pub fn asked_by(self, asker: Asker) -> Self {
+        Self { asker, ..self }
     }
 
     /// The bounds on what callers may ask.

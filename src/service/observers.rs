@@ -47,7 +47,7 @@ impl MapService {
                 let search = Search { map: &map, folder: &folder, voxel, level: request.level, stop };
                 search.observers(limits, &inner.budget)
             };
-            self.inner.pools.observers.run(find).await?
+            self.inner.pools.observers.run_for(&self.asker, find).await?
         };
         self.observed("ListObservers", Some(map), work, |_| Outcome::Read).await
     }

@@ -11,6 +11,8 @@ use std::time::Instant;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
+use super::asker::Asker;
+use super::thread_queue::{HeldThread, ThreadQueue};
 use super::{Reason, ServiceError};
 use crate::util::{Durations, SharedDurations, StopSignal};
 
@@ -33,8 +35,8 @@ pub(super) struct Pool {
     threads: rayon::ThreadPool,
     /// One permit for each job that runs or waits.
     places: Arc<Semaphore>,
-    /// One permit for each thread that has no job.
-    free: Arc<Semaphore>,
+    /// Who gets a thread that has no job.
+    queue: ThreadQueue,
     /// One permit for each caller that waits for the turn of its map or robot.
     turns: Semaphore,
     jobs_waiting_max: usize,
@@ -104,7 +106,7 @@ impl Pool {
             name,
             threads,
             places: Semaphore::new(free + jobs_waiting_max).into(),
-            free: Semaphore::new(free).into(),
+            queue: ThreadQueue::new(free),
             turns: Semaphore::new(jobs_waiting_max),
             jobs_waiting_max,
             counts: Arc::default(),
@@ -140,7 +142,19 @@ impl Pool {
         &self,
         job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let thread = self.thread().await?;
+        self.run_for(&Asker::default(), job).await
+    }
+
+    /// As [`Pool::run`], where callers take turns.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) async fn run_for<T: Send + 'static>(
+        &self,
+        asker: &Asker,
+        job: impl FnOnce(StopSignal<'_>) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let thread = self.thread_for(asker).await?;
         self.run_on(thread, job).await
     }
 
@@ -149,10 +163,14 @@ impl Pool {
     /// # Errors
     /// `ResourceExhausted` at once when the queue is full.
     pub(super) async fn thread(&self) -> Result<FreeThread, ServiceError> {
+        self.thread_for(&Asker::default()).await
+    }
+
+    async fn thread_for(&self, asker: &Asker) -> Result<FreeThread, ServiceError> {
         let place = Arc::clone(&self.places).try_acquire_owned().map_err(|_| self.full())?;
         let unanswered = Unanswered { counts: Arc::clone(&self.counts), answered: false };
         let begin = Instant::now();
-        let thread = Arc::clone(&self.free).acquire_owned().await.map_err(|_| failed())?;
+        let thread = self.queue.take(asker).await;
         self.counts.waits.record(begin.elapsed());
         Ok(FreeThread { _place: place, _thread: thread, unanswered })
     }
@@ -190,7 +208,7 @@ impl Pool {
     }
 
     pub(super) fn in_use(&self) -> PoolUse {
-        let running = self.threads.current_num_threads() - self.free.available_permits();
+        let running = self.threads.current_num_threads() - self.queue.free();
         let all =
             self.threads.current_num_threads() + self.jobs_waiting_max - self.places.available_permits();
         PoolUse {
@@ -208,7 +226,7 @@ impl Pool {
 #[derive(Debug)]
 pub(super) struct FreeThread {
     _place: OwnedSemaphorePermit,
-    _thread: OwnedSemaphorePermit,
+    _thread: HeldThread,
     unanswered: Unanswered,
 }
 

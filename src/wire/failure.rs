@@ -1,9 +1,16 @@
-//! Failures as messages, and their codes.
+//! Failures as messages and as status, and their codes.
 
-use tonic::Code;
+use tonic::metadata::MetadataValue;
+use tonic::{Code, Status};
 
 use super::pb;
 use crate::service::{ErrorCode, ServiceError};
+
+/// The metadata that holds the word for programs.
+pub const REASON: &str = "mrol-reason";
+
+/// The metadata that tells gRPC's own retries how many milliseconds to wait.
+const PUSHBACK: &str = "grpc-retry-pushback-ms";
 
 /// The gRPC code of a failure.
 pub fn status_code(code: ErrorCode) -> Code {
@@ -18,6 +25,18 @@ pub fn status_code(code: ErrorCode) -> Code {
         ErrorCode::DeadlineExceeded => Code::DeadlineExceeded,
         ErrorCode::Unavailable => Code::Unavailable,
         ErrorCode::Internal => Code::Internal,
+    }
+}
+
+/// A failure as what ends a call.
+impl From<ServiceError> for Status {
+    fn from(error: ServiceError) -> Self {
+        let mut status = Self::new(status_code(error.code()), error.message);
+        status.metadata_mut().insert(REASON, MetadataValue::from_static(error.reason.as_str()));
+        if let Some(wait) = error.retry_after {
+            status.metadata_mut().insert(PUSHBACK, MetadataValue::from(wait.as_millis() as u64));
+        }
+        status
     }
 }
 

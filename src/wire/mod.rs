@@ -6,6 +6,7 @@
 
 mod array;
 mod block;
+pub mod codec;
 mod deletion;
 mod failure;
 mod field;
@@ -30,7 +31,9 @@ mod watch;
 pub(crate) use array::bitmap_of;
 #[cfg(feature = "server")]
 pub(crate) use array::bytes_of;
-pub use failure::status_code;
+#[cfg(feature = "server")]
+pub(crate) use codec::{IGNORED_MAX, LINKS_MAX};
+pub use failure::{REASON, status_code};
 pub(crate) use field::{InField, required};
 pub use map_file::{restore_pieces, snapshot_bytes, snapshot_pieces};
 pub use maps::create_map;

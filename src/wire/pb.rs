@@ -4,10 +4,6 @@
 #![allow(clippy::allow_attributes, reason = "the generator writes `allow`")]
 #![allow(unreachable_pub, clippy::all, reason = "generated code follows its generator's style")]
 
-mod body;
-
-pub use body::{Body, LINKS_MAX};
-
 tonic::include_proto!("mrol.v1");
 
 /// The contract as a `FileDescriptorSet`, for reflection.

@@ -15,8 +15,12 @@ const CONNECTIONS: usize = 8;
 
 /// Zeros of a few times what a message may be, by gzip: a thousandth of that.
 fn gzip(bytes: usize) -> Vec<u8> {
+    gzip_of(&vec![0; bytes])
+}
+
+fn gzip_of(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(&vec![0; bytes]).unwrap();
+    encoder.write_all(bytes).unwrap();
     encoder.finish().unwrap()
 }
 
@@ -25,7 +29,7 @@ fn zstd(bytes: usize) -> Vec<u8> {
 }
 
 /// Sends the same message again and again over several connections.
-async fn bombard(siege: &Siege, encoding: &'static str, bomb: Vec<u8>) {
+async fn bombard(siege: &Siege, path: &'static str, encoding: &'static str, bomb: Vec<u8>) {
     let message = [message_head(true, bomb.len() as u32), bomb].concat();
     let mut attackers = JoinSet::new();
     for _ in 0..CONNECTIONS {
@@ -33,7 +37,7 @@ async fn bombard(siege: &Siege, encoding: &'static str, bomb: Vec<u8>) {
         attackers.spawn(async move {
             let mut connection = Connection::open(server).await;
             for stream in (1..).step_by(2) {
-                let head = call(stream, QUERY, &[("grpc-encoding", encoding)], 0);
+                let head = call(stream, path, &[("grpc-encoding", encoding)], 0);
                 if !connection.send(&[head, data(stream, &message)].concat()).await {
                     connection = Connection::open(server).await;
                 }
@@ -47,15 +51,40 @@ async fn bombard(siege: &Siege, encoding: &'static str, bomb: Vec<u8>) {
 #[tokio::test]
 async fn gzip_messages_that_grow_beyond_the_limit() {
     let siege = Siege::begin("gzip bombs over gRPC").await;
-    bombard(&siege, "gzip", gzip(MESSAGE_BYTES_MAX + 16 * MIB)).await;
+    bombard(&siege, QUERY, "gzip", gzip(MESSAGE_BYTES_MAX + 16 * MIB)).await;
     siege.end().await;
 }
 
 #[tokio::test]
 async fn zstd_messages_that_grow_beyond_the_limit() {
     let siege = Siege::begin("zstd bombs over gRPC").await;
-    bombard(&siege, "zstd", zstd(1024 * MIB)).await;
+    bombard(&siege, QUERY, "zstd", zstd(1024 * MIB)).await;
     siege.end().await;
+}
+
+/// Four million regions without a shape, and as many links without a part: two bytes each, and a hundred in memory.
+#[tokio::test]
+async fn messages_whose_lists_grow_when_they_are_decoded() {
+    // A few messages of each kind, which have 8 MiB, and not what they would be: half a gigabyte each.
+    let siege = Siege::begin_within("lists of nothing over gRPC", "", 256 * MIB).await;
+    let ignored = [4 << 3 | 2, 0].repeat(4 * MIB);
+    bombard(&siege, "/mrol.v1.Occupancy/CheckPoses", "gzip", gzip_of(&ignored)).await;
+    let links = [1 << 3 | 2, 0].repeat(4 * MIB);
+    let head = [&[2 << 3 | 2][..], &varint(links.len())].concat();
+    let body = [head, links].concat();
+    bombard(&siege, "/mrol.v1.Occupancy/CheckMotionsStream", "gzip", gzip_of(&body)).await;
+    siege.end().await;
+}
+
+/// A length as protobuf writes it.
+fn varint(mut length: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    while length > 0x7f {
+        bytes.push(length as u8 | 0x80);
+        length >>= 7;
+    }
+    bytes.push(length as u8);
+    bytes
 }
 
 #[tokio::test]

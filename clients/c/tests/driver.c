@@ -4,22 +4,10 @@
  *     query LEVEL LOOKUP KEEP_OUT POSE(7, or -) COUNT X Y Z ...
  *     status | version | wait REVISION TIMEOUT_MS | close
  */
+#include "commands.h"
 #include <mrol.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 static mrol_replica replica;
-
-static void fail_to_read(void) {
-    fprintf(stderr, "a command cannot be read\n");
-    exit(2);
-}
-
-static double number(void) {
-    char *word = strtok(NULL, " ");
-    if (word == NULL) fail_to_read();
-    return strtod(word, NULL);
-}
 
 static void hex(const uint8_t *bytes, size_t count) {
     size_t i;
@@ -81,12 +69,8 @@ static void query_points(void) {
     }
     query.count = (size_t)number();
     bytes = MROL_BITMAP_BYTES(query.count);
-    /* Not a byte more, for the address sanitizer to see. */
-    xyz = (float *)malloc(query.count * 3 * sizeof *xyz);
-    occupied = (uint8_t *)malloc(bytes);
-    if (xyz == NULL || occupied == NULL) fail_to_read();
-    for (i = 0; i < 3 * query.count; i++) xyz[i] = (float)number();
-    query.xyz = xyz;
+    occupied = (uint8_t *)memory(bytes);
+    query.xyz = xyz = numbers(3 * query.count);
     if (!failed(mrol_replica_query_points(replica, &query, occupied, bytes, &answer, &error), &error)) {
         print_version(&answer.version);
         printf(" %llu %llu ", (unsigned long long)answer.asked, (unsigned long long)answer.positive);

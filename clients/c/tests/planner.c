@@ -11,9 +11,8 @@
  *     wait REVISION
  *     ignore 0|1                                         keep-outs, in all questions from then on
  */
+#include "commands.h"
 #include <mrol.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 static mrol_replica replica;
 static mrol_body body;
@@ -21,31 +20,6 @@ static size_t links;
 static mrol_error error;
 static mrol_answer answer;
 static uint8_t ignores;
-
-static void fail_to_read(void) {
-    fprintf(stderr, "a command cannot be read\n");
-    exit(2);
-}
-
-static double number(void) {
-    char *word = strtok(NULL, " ");
-    if (word == NULL) fail_to_read();
-    return strtod(word, NULL);
-}
-
-/* Not a byte more than is needed, for the address sanitizer to see. */
-static void *memory(size_t bytes) {
-    void *pointer = malloc(bytes);
-    if (pointer == NULL && bytes > 0) fail_to_read();
-    return pointer;
-}
-
-static float *numbers(size_t count) {
-    size_t i;
-    float *read = (float *)memory(count * sizeof *read);
-    for (i = 0; i < count; i++) read[i] = (float)number();
-    return read;
-}
 
 static void print_bits(const uint8_t *bits, size_t count) {
     size_t i;

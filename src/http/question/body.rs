@@ -1,29 +1,24 @@
 //! Bodies and what checks of them have in common, in JSON.
 
-use std::fmt::{Formatter, Result as FmtResult};
-
 use axum::body::Bytes;
-use serde::de::{Error, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use super::answer::Array;
 use super::form::{NumbersField, PointsField};
+use crate::http::list::List;
 use crate::http::object::Object;
 use crate::http::shapes::{BoxBody, OrientedBoxBody, SphereBody};
 use crate::map::Region;
 use crate::service::{CheckAs, ServiceError};
 use crate::util::Keyword;
-use crate::wire::{InField, pb};
+use crate::wire::{IGNORED_MAX, InField, LINKS_MAX, pb};
 
 /// A body: its links.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BodyField {
-    links: LinksField,
+    links: List<Object<LinkField>, LINKS_MAX>,
 }
-
-/// The links of a body: no more are read than a body may have.
-struct LinksField(Vec<Object<LinkField>>);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -33,6 +28,9 @@ struct LinkField {
     #[serde(default)]
     padding_m: f32,
 }
+
+/// The regions in which voxels do not count.
+pub(super) type IgnoredList = List<IgnoredField, IGNORED_MAX>;
 
 /// A region in which voxels do not count.
 #[derive(Deserialize)]
@@ -74,33 +72,6 @@ impl From<AnswerWord> for pb::CheckAnswer {
     }
 }
 
-impl<'de> Deserialize<'de> for LinksField {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(LinksVisitor)
-    }
-}
-
-struct LinksVisitor;
-
-impl<'de> Visitor<'de> for LinksVisitor {
-    type Value = LinksField;
-
-    fn expecting(&self, f: &mut Formatter<'_>) -> FmtResult {
-        f.write_str("an array of links")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<LinksField, A::Error> {
-        let mut links = Vec::new();
-        while let Some(link) = seq.next_element()? {
-            if links.len() == pb::LINKS_MAX {
-                return Err(A::Error::custom(format!("links has more than {} entries", pb::LINKS_MAX)));
-            }
-            links.push(link);
-        }
-        Ok(LinksField(links))
-    }
-}
-
 impl BodyField {
     /// The body as a message has it.
     pub(super) fn into_message(self, arrays: &Bytes) -> Result<pb::Body, ServiceError> {
@@ -118,7 +89,7 @@ impl BodyField {
 }
 
 /// The regions in which voxels do not count, as a message has them.
-pub(super) fn ignored_of(ignored: Vec<IgnoredField>) -> Result<Vec<pb::Region>, ServiceError> {
+pub(super) fn ignored_of(List(ignored): IgnoredList) -> Result<Vec<pb::Region>, ServiceError> {
     let region = |(number, field): (usize, IgnoredField)| {
         let region: Result<Region, ServiceError> = match field {
             IgnoredField::Box(Object(of)) => of.try_into().map_err(ServiceError::from),
@@ -162,20 +133,4 @@ pub(super) fn collisions_of(
         ]),
     }
     (head, arrays)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn links_that_are_too_many_are_not_read() {
-        let read = |links: usize| {
-            let text = format!(r#"{{"links": [{}]}}"#, vec!["{}"; links].join(","));
-            serde_json::from_str::<BodyField>(&text).map(|body| body.links.0.len())
-        };
-        assert_eq!(read(pb::LINKS_MAX).unwrap(), pb::LINKS_MAX);
-        let refused = read(pb::LINKS_MAX + 1).unwrap_err().to_string();
-        assert!(refused.contains("links has more than 65536 entries"), "{refused}");
-    }
 }

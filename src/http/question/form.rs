@@ -128,55 +128,30 @@ impl Slice {
     }
 }
 
-/// Points: a list of them, or where they are.
+/// What an array lists, or where the bytes of it are.
 #[derive(Debug)]
-pub(super) enum PointsField {
-    Listed(JsonPoints),
+enum ListOrSlice<L> {
+    Listed(L),
     Sliced(Slice),
 }
 
-impl PointsField {
-    /// The points as a message has them.
-    pub(super) fn into_message(self, arrays: &Bytes, field: &str) -> Result<pb::Points, ServiceError> {
-        match self {
-            Self::Listed(points) => Ok(PointCloud::from(points).into()),
-            Self::Sliced(slice) => {
-                Ok(pb::Points { xyz_f32le: slice.of(arrays, field)?, ..pb::Points::default() })
-            }
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for PointsField {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(PointsVisitor)
-    }
-}
-
-/// A list of `T`, or where the bytes of an array are.
-#[derive(Debug)]
-enum ListOrSlice<T> {
-    Listed(Vec<T>),
-    Sliced(Slice),
-}
-
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for ListOrSlice<T> {
+impl<'de, L: Deserialize<'de>> Deserialize<'de> for ListOrSlice<L> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(ListVisitor(PhantomData))
     }
 }
 
-struct ListVisitor<T>(PhantomData<T>);
+struct ListVisitor<L>(PhantomData<L>);
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for ListVisitor<T> {
-    type Value = ListOrSlice<T>;
+impl<'de, L: Deserialize<'de>> Visitor<'de> for ListVisitor<L> {
+    type Value = ListOrSlice<L>;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("an array, or {\"at\", \"bytes\"}")
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
-        Vec::deserialize(SeqAccessDeserializer::new(seq)).map(ListOrSlice::Listed)
+        L::deserialize(SeqAccessDeserializer::new(seq)).map(ListOrSlice::Listed)
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
@@ -184,10 +159,27 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for ListVisitor<T> {
     }
 }
 
+/// Points: a list of them, or where they are.
+#[derive(Debug, Deserialize)]
+#[serde(transparent)]
+pub(super) struct PointsField(ListOrSlice<JsonPoints>);
+
+impl PointsField {
+    /// The points as a message has them.
+    pub(super) fn into_message(self, arrays: &Bytes, field: &str) -> Result<pb::Points, ServiceError> {
+        match self.0 {
+            ListOrSlice::Listed(points) => Ok(PointCloud::from(points).into()),
+            ListOrSlice::Sliced(slice) => {
+                Ok(pb::Points { xyz_f32le: slice.of(arrays, field)?, ..pb::Points::default() })
+            }
+        }
+    }
+}
+
 /// Tuples of `N` floats: a list of them, or where they are.
 #[derive(Debug, Deserialize)]
 #[serde(transparent)]
-pub(super) struct NumbersField<const N: usize>(ListOrSlice<Tuple<N>>);
+pub(super) struct NumbersField<const N: usize>(ListOrSlice<Vec<Tuple<N>>>);
 
 /// `N` floats.
 #[derive(Debug)]
@@ -217,7 +209,7 @@ impl<const N: usize> NumbersField<N> {
 /// Counts: a list of them, or where they are.
 #[derive(Debug, Deserialize)]
 #[serde(transparent)]
-pub(super) struct CountsField(ListOrSlice<u32>);
+pub(super) struct CountsField(ListOrSlice<Vec<u32>>);
 
 impl CountsField {
     /// The bytes of all counts.
@@ -231,24 +223,6 @@ impl CountsField {
     /// The bytes of so many ones.
     pub(super) fn ones(count: usize) -> Bytes {
         bytes_of(std::iter::repeat_n(1u32, count))
-    }
-}
-
-struct PointsVisitor;
-
-impl<'de> Visitor<'de> for PointsVisitor {
-    type Value = PointsField;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("an array of points [x, y, z], or {\"at\", \"bytes\"}")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<PointsField, A::Error> {
-        JsonPoints::deserialize(SeqAccessDeserializer::new(seq)).map(PointsField::Listed)
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<PointsField, A::Error> {
-        Slice::deserialize(MapAccessDeserializer::new(map)).map(PointsField::Sliced)
     }
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::answer::{Answer, Array};
 use super::asked;
-use super::body::{BodyField, IgnoredField, ignored_of};
+use super::body::{BodyField, IgnoredList, ignored_of};
 use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
@@ -28,7 +28,7 @@ pub(in crate::http) struct MotionsBody {
     step_m: Option<f32>,
     clearance_max_m: Option<f32>,
     #[serde(default)]
-    ignored: Vec<IgnoredField>,
+    ignored: IgnoredList,
     #[serde(default)]
     unknown: ByKeyword<Unknown>,
     #[serde(default)]

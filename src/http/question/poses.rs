@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::answer::Answer;
 use super::asked;
-use super::body::{AnswerWord, BodyField, IgnoredField, collisions_of, ignored_of};
+use super::body::{AnswerWord, BodyField, IgnoredList, collisions_of, ignored_of};
 use super::form::{NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
@@ -24,7 +24,7 @@ pub(in crate::http) struct PosesBody {
     /// Seven numbers a link, link by link.
     configurations: NumbersField<7>,
     #[serde(default)]
-    ignored: Vec<IgnoredField>,
+    ignored: IgnoredList,
     #[serde(default)]
     unknown: ByKeyword<Unknown>,
     #[serde(default)]

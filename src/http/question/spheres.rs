@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::answer::Answer;
 use super::asked;
-use super::body::{AnswerWord, IgnoredField, collisions_of, ignored_of};
+use super::body::{AnswerWord, IgnoredList, collisions_of, ignored_of};
 use super::form::{CountsField, NumbersField, QuestionBody};
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
@@ -25,7 +25,7 @@ pub(in crate::http) struct SpheresBody {
     #[serde(default)]
     padding_m: f32,
     #[serde(default)]
-    ignored: Vec<IgnoredField>,
+    ignored: IgnoredList,
     #[serde(default)]
     unknown: ByKeyword<Unknown>,
     #[serde(default)]

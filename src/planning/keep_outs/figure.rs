@@ -1,7 +1,8 @@
 //! Bodies in meters, as shapes are asked about them.
 
-use super::{Shapes, Work};
+use super::Shapes;
 use crate::map::KeepOut;
+use crate::planning::effort::Effort;
 use crate::planning::parts::{Link, Sphere};
 use crate::planning::placement::CellsFromLink;
 
@@ -35,16 +36,13 @@ impl Figure {
 
 impl Solid {
     fn of_link(link: &Link) -> Self {
-        let (padding_m, is_padded) = (f64::from(link.padding_m), link.padding_m > 0.0);
-        let points = || link.points.iter().map(|point| point.xyz().map(f64::from));
-        let padded = points().filter(|_| is_padded).map(|point| (point, padding_m));
-        let spheres = spheres_of(&link.spheres, padding_m).chain(padded).collect();
-        Self::of_parts(spheres, points().filter(|_| !is_padded).collect())
+        let (spheres, points) = link.balls_and_points();
+        Self::of_parts(spheres, points)
     }
 
     /// Spheres alone.
     pub(in crate::planning) fn of_spheres(spheres: &[Sphere], padding_m: f32) -> Self {
-        Self::of_parts(spheres_of(spheres, f64::from(padding_m)).collect(), Vec::new())
+        Self::of_parts(spheres.iter().map(|sphere| sphere.padded(padding_m)).collect(), Vec::new())
     }
 
     fn of_parts(spheres: Vec<([f64; 3], f64)>, points: Vec<[f64; 3]>) -> Self {
@@ -66,9 +64,9 @@ impl Solid {
         shapes: &Shapes<'a>,
         map_from_link: &CellsFromLink,
         most_m: f64,
-        work: &Work<'_>,
+        effort: &Effort<'_>,
     ) -> Shapes<'a> {
-        shapes.near(map_from_link.cells(self.center_m), self.radius_m, most_m, work)
+        shapes.near(map_from_link.cells(self.center_m), self.radius_m, most_m, effort)
     }
 
     /// The first part that meets a shape, and the shape: spheres before points.
@@ -76,22 +74,22 @@ impl Solid {
         &self,
         shapes: &Shapes<'a>,
         map_from_link: &CellsFromLink,
-        work: &Work<'_>,
+        effort: &Effort<'_>,
     ) -> Option<(usize, &'a KeepOut)> {
-        let near = self.near(shapes, map_from_link, 0.0, work);
+        let near = self.near(shapes, map_from_link, 0.0, effort);
         if near.is_empty() {
             return None;
         }
         let of_sphere = |(part, (center, radius)): (usize, &([f64; 3], f64))| {
-            let met = near.nearest(map_from_link.cells(*center), *radius, work);
+            let met = near.nearest(map_from_link.cells(*center), *radius, effort);
             met.map(|(_, keep_out)| (part, keep_out))
         };
         let of_point = |(part, point): (usize, &[f64; 3])| {
-            let keep_out = near.containing(map_from_link.cells(*point), work);
+            let keep_out = near.containing(map_from_link.cells(*point), effort);
             keep_out.map(|keep_out| (self.spheres.len() + part, keep_out))
         };
-        let mut spheres = self.spheres.iter().enumerate().take_while(|_| work.goes_on(1));
-        let mut points = self.points.iter().enumerate().take_while(|_| work.goes_on(1));
+        let mut spheres = self.spheres.iter().enumerate().take_while(|_| effort.goes_on(1));
+        let mut points = self.points.iter().enumerate().take_while(|_| effort.goes_on(1));
         spheres.find_map(of_sphere).or_else(|| points.find_map(of_point))
     }
 
@@ -101,16 +99,16 @@ impl Solid {
         shapes: &Shapes<'_>,
         map_from_link: &CellsFromLink,
         most_m: f64,
-        work: &Work<'_>,
+        effort: &Effort<'_>,
     ) -> Option<f64> {
-        let near = self.near(shapes, map_from_link, most_m, work);
+        let near = self.near(shapes, map_from_link, most_m, effort);
         let mut least_m = None;
         if near.is_empty() {
             return None;
         }
-        for (center, radius) in self.parts().take_while(|_| work.goes_on(1)) {
+        for (center, radius) in self.parts().take_while(|_| effort.goes_on(1)) {
             let within_m = radius + least_m.unwrap_or(most_m);
-            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), within_m, work) {
+            if let Some((distance_m, _)) = near.nearest(map_from_link.cells(center), within_m, effort) {
                 least_m = Some((distance_m - radius).max(0.0));
             }
         }
@@ -124,19 +122,16 @@ impl Solid {
         shapes: &Shapes<'_>,
         [from, to]: [&CellsFromLink; 2],
         (radius_m, stride_m): (f64, f64),
-        work: &Work<'_>,
+        effort: &Effort<'_>,
     ) -> bool {
-        let near = self.near(shapes, from, stride_m, work);
-        let mut thin = self.parts().filter(|(_, radius)| *radius <= radius_m).take_while(|_| work.goes_on(1));
-        !near.is_empty() && thin.any(|(center, _)| near.cross(from.cells(center), to.cells(center), work))
+        let near = self.near(shapes, from, stride_m, effort);
+        let mut thin =
+            self.parts().filter(|(_, radius)| *radius <= radius_m).take_while(|_| effort.goes_on(1));
+        !near.is_empty() && thin.any(|(center, _)| near.cross(from.cells(center), to.cells(center), effort))
     }
 
     /// Centers and radii of all parts.
     fn parts(&self) -> impl Iterator<Item = ([f64; 3], f64)> {
         self.spheres.iter().copied().chain(self.points.iter().map(|point| (*point, 0.0)))
     }
-}
-
-fn spheres_of(spheres: &[Sphere], padding_m: f64) -> impl Iterator<Item = ([f64; 3], f64)> {
-    spheres.iter().map(move |sphere| (sphere.center_m.map(f64::from), f64::from(sphere.radius_m) + padding_m))
 }

@@ -11,13 +11,12 @@ mod poses;
 mod tests;
 #[cfg(test)]
 mod way_tests;
-mod work;
 
 pub(super) use figure::{Figure, Solid};
 pub(super) use motions::{Among, Strides, Way};
 pub(super) use poses::Posed;
-pub(super) use work::Work;
 
+use super::effort::Effort;
 use crate::map::{KeepOut, MapView, ShapeRay};
 
 /// What rounding may move a bound of a distance by, as a share of the numbers that enter it.
@@ -48,15 +47,15 @@ impl<'a> Shapes<'a> {
     }
 
     /// Those that may be within `most` of a ball.
-    fn near(&self, center_m: [f64; 3], radius_m: f64, most_m: f64, work: &Work<'_>) -> Self {
+    fn near(&self, center_m: [f64; 3], radius_m: f64, most_m: f64, effort: &Effort<'_>) -> Self {
         let within_m = radius_m + most_m;
-        let tested = self.tested(work).filter(|of| of.distance_min_m(center_m) <= within_m);
+        let tested = self.tested(effort).filter(|of| of.distance_min_m(center_m) <= within_m);
         Self(tested.copied().collect())
     }
 
     /// All of them, each counted as a test and its corners more; they end once stopped.
-    fn tested(&self, work: &Work<'_>) -> impl Iterator<Item = &Bounded<'a>> {
-        self.iter().take_while(|of| work.goes_on(1 + of.keep_out.shape.corners()))
+    fn tested(&self, effort: &Effort<'_>) -> impl Iterator<Item = &Bounded<'a>> {
+        self.iter().take_while(|of| effort.goes_on(1 + of.keep_out.shape.corners() as u32))
     }
 
     /// True without a keep-out.
@@ -69,11 +68,11 @@ impl<'a> Shapes<'a> {
         &self,
         point_m: [f64; 3],
         most_m: f64,
-        work: &Work<'_>,
+        effort: &Effort<'_>,
     ) -> Option<(f64, &'a KeepOut)> {
         let mut nearest = None;
         let mut best_m = most_m;
-        for of in self.tested(work).filter(|of| of.distance_min_m(point_m) <= most_m) {
+        for of in self.tested(effort).filter(|of| of.distance_min_m(point_m) <= most_m) {
             let distance_m = of.keep_out.shape.distance_m(point_m);
             if distance_m < best_m || distance_m == best_m && nearest.is_none() {
                 (best_m, nearest) = (distance_m, Some(of.keep_out));
@@ -83,17 +82,17 @@ impl<'a> Shapes<'a> {
     }
 
     /// The first one by name that contains the point.
-    fn containing(&self, point_m: [f64; 3], work: &Work<'_>) -> Option<&'a KeepOut> {
-        let mut near = self.tested(work).filter(|of| of.distance_min_m(point_m) <= 0.0);
+    fn containing(&self, point_m: [f64; 3], effort: &Effort<'_>) -> Option<&'a KeepOut> {
+        let mut near = self.tested(effort).filter(|of| of.distance_min_m(point_m) <= 0.0);
         near.find(|of| of.keep_out.shape.contains(point_m)).map(|of| of.keep_out)
     }
 
     /// True where the line between two places shares a point with one of them.
-    fn cross(&self, from_m: [f64; 3], to_m: [f64; 3], work: &Work<'_>) -> bool {
+    fn cross(&self, from_m: [f64; 3], to_m: [f64; 3], effort: &Effort<'_>) -> bool {
         let way = [0, 1, 2].map(|axis: usize| to_m[axis] - from_m[axis]);
         let length_m = way[0].hypot(way[1]).hypot(way[2]);
         let ray = ShapeRay { origin_m: from_m, direction: way.map(|c| c / length_m) };
-        let mut tested = self.tested(work).filter(|of| of.distance_min_m(from_m) <= length_m);
+        let mut tested = self.tested(effort).filter(|of| of.distance_min_m(from_m) <= length_m);
         length_m > 0.0 && tested.any(|of| of.keep_out.shape.entered_m(&ray).is_some_and(|at| at <= length_m))
     }
 }

@@ -6,7 +6,8 @@
 //! center gets nearer to a shape than its radius less half of that stride. Parts that are smaller than this could go through
 //! a shape between them, so their ways from the one place to the other are tested as lines.
 
-use super::{Shapes, Solid, Work};
+use super::{Shapes, Solid};
+use crate::planning::effort::Effort;
 use crate::planning::path::LinkMotion;
 use crate::planning::placement::CellsFromLink;
 
@@ -34,7 +35,7 @@ pub(in crate::planning) struct Among<'s, 'a> {
     /// How exactly they are met.
     pub(in crate::planning) strides: Strides,
     /// What was done.
-    pub(in crate::planning) work: &'s Work<'s>,
+    pub(in crate::planning) effort: &'s Effort<'s>,
 }
 
 /// A link on its way between two configurations.
@@ -64,14 +65,14 @@ impl Way<'_> {
     /// The share of the way, up to `until`, at which the link first meets a shape, no more than a stride late. None where
     /// it meets none.
     pub(in crate::planning) fn first_met(&self, among: &Among<'_, '_>, until: f64) -> Option<f64> {
-        let Among { shapes, strides: Strides { met_m, .. }, work } = *among;
+        let Among { shapes, strides: Strides { met_m, .. }, effort } = *among;
         let (mut share, mut at) = (0.0, self.at(0.0));
-        while work.goes_on(1) {
+        while effort.goes_on(1) {
             let far_m = (until - share) * self.length_m;
             // Where it is further than all of the way leads, nothing is met.
-            let clear_m = self.link.distance_m(shapes, &at, far_m, work)?;
+            let clear_m = self.link.distance_m(shapes, &at, far_m, effort)?;
             // What a point lies on the border of, or just beside it, is no distance away.
-            if clear_m <= 0.0 && self.link.first_met(shapes, &at, work).is_some() {
+            if clear_m <= 0.0 && self.link.first_met(shapes, &at, effort).is_some() {
                 return Some(share);
             }
             if share >= until {
@@ -80,7 +81,7 @@ impl Way<'_> {
             let next = self.after(share, (clear_m - ROUNDING_M).max(met_m)).min(until);
             let place = self.at(next);
             let thin = (met_m / 2.0, met_m);
-            if clear_m <= met_m && self.link.crosses(shapes, [&at, &place], thin, work) {
+            if clear_m <= met_m && self.link.crosses(shapes, [&at, &place], thin, effort) {
                 return Some(next);
             }
             (share, at) = (next, place);
@@ -90,12 +91,14 @@ impl Way<'_> {
 
     /// The least distance to a shape on the way, meters, where it is less than `least_m`: too much by half a stride at most.
     pub(in crate::planning) fn least_m(&self, among: &Among<'_, '_>, mut least_m: f64) -> f64 {
-        let Among { shapes, strides, work } = *among;
+        let Among { shapes, strides, effort } = *among;
         let mut share = 0.0;
-        while work.goes_on(1) {
+        while effort.goes_on(1) {
             let far_m = least_m + (1.0 - share) * self.length_m;
             // Whatever comes nearer is further than all of the way leads.
-            let Some(distance_m) = self.link.distance_m(shapes, &self.at(share), far_m, work) else { break };
+            let Some(distance_m) = self.link.distance_m(shapes, &self.at(share), far_m, effort) else {
+                break;
+            };
             least_m = least_m.min(distance_m);
             if share >= 1.0 {
                 break;

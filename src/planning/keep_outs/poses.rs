@@ -1,7 +1,8 @@
 //! Bodies at poses among shapes.
 
-use super::{Figure, Shapes, Solid, Work};
+use super::{Figure, Shapes, Solid};
 use crate::planning::configurations::{Configurations, MAP_FRAME};
+use crate::planning::effort::Effort;
 use crate::planning::kind::{Clearance, Hit, Met};
 use crate::planning::placement::{CellsFromLink, LinkPose};
 use crate::util::StopSignal;
@@ -23,16 +24,16 @@ impl<'a> Posed<'a> {
         mut words: Vec<u64>,
         stop: StopSignal<'_>,
     ) -> Option<Vec<u64>> {
-        let work = Work::until(stop);
-        for i in (0..self.count()).take_while(|_| work.goes_on(1)) {
+        let effort = Effort::until(stop);
+        for i in (0..self.count()).take_while(|_| effort.goes_on(1)) {
             let bit = 1 << (i % 64);
             if words[i / 64] & bit == 0
-                && self.placed(i).any(|(_, link, at)| link.first_met(shapes, &at, &work).is_some())
+                && self.placed(i).any(|(_, link, at)| link.first_met(shapes, &at, &effort).is_some())
             {
                 words[i / 64] |= bit;
             }
         }
-        work.done(words)
+        effort.done(words)
     }
 
     /// Puts what is met of shapes before what is met of voxels, where the link or the part comes before. None once stopped.
@@ -42,12 +43,12 @@ impl<'a> Posed<'a> {
         mut hits: Vec<Option<Hit>>,
         stop: StopSignal<'_>,
     ) -> Option<Vec<Option<Hit>>> {
-        let work = Work::until(stop);
-        for (i, hit) in hits.iter_mut().enumerate().take_while(|_| work.goes_on(1)) {
+        let effort = Effort::until(stop);
+        for (i, hit) in hits.iter_mut().enumerate().take_while(|_| effort.goes_on(1)) {
             let end = hit.as_ref().map_or((u32::MAX, u32::MAX), |hit| (hit.link, hit.part));
             let mut links = self.placed(i).take_while(|(number, ..)| *number as u32 <= end.0);
             let first = links.find_map(|(number, link, at)| {
-                let (part, keep_out) = link.first_met(shapes, &at, &work)?;
+                let (part, keep_out) = link.first_met(shapes, &at, &effort)?;
                 let met = Met::KeepOut(keep_out.name.clone());
                 Some(Hit { link: number as u32, part: part as u32, met })
             });
@@ -55,7 +56,7 @@ impl<'a> Posed<'a> {
                 *hit = Some(first);
             }
         }
-        work.done(hits)
+        effort.done(hits)
     }
 
     /// Shortens clearances to the distance from shapes, where that is less. None once stopped.
@@ -65,10 +66,10 @@ impl<'a> Posed<'a> {
         mut clearances: Vec<Clearance>,
         stop: StopSignal<'_>,
     ) -> Option<Vec<Clearance>> {
-        let work = Work::until(stop);
-        for (i, clearance) in clearances.iter_mut().enumerate().take_while(|_| work.goes_on(1)) {
+        let effort = Effort::until(stop);
+        for (i, clearance) in clearances.iter_mut().enumerate().take_while(|_| effort.goes_on(1)) {
             for (number, link, at) in self.placed(i) {
-                let distance_m = link.distance_m(shapes, &at, f64::from(clearance.distance_m), &work);
+                let distance_m = link.distance_m(shapes, &at, f64::from(clearance.distance_m), &effort);
                 let Some(distance_m) = distance_m.map(|distance_m| distance_m as f32) else { continue };
                 let number = number as u32;
                 let is_first = clearance.link.is_some_and(|link| number < link);
@@ -77,7 +78,7 @@ impl<'a> Posed<'a> {
                 }
             }
         }
-        work.done(clearances)
+        effort.done(clearances)
     }
 
     /// How many configurations there are.

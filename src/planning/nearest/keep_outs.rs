@@ -2,7 +2,8 @@
 
 use super::{Nearest, NearestVoxels};
 use crate::geometry::Point;
-use crate::planning::keep_outs::{Shapes, Work};
+use crate::planning::effort::Effort;
+use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;
 use crate::voxel::VoxelKey;
 
@@ -15,11 +16,11 @@ pub(super) fn mend(
     stop: StopSignal<'_>,
 ) {
     // Once stopped, there are fewer answers than points.
-    let (count, work) = (nearest.len(), Work::until(stop));
-    for (i, point) in points[..count].iter().enumerate().take_while(|_| work.goes_on(1)) {
+    let (count, effort) = (nearest.len(), Effort::until(stop));
+    for (i, point) in points[..count].iter().enumerate().take_while(|_| effort.goes_on(1)) {
         let at_m = point.xyz().map(f64::from);
         let voxel_m = f64::from(nearest.distances_m[i]);
-        let found = shapes.nearest(at_m, radius_m.min(voxel_m), &work).filter(|_| point.is_finite());
+        let found = shapes.nearest(at_m, radius_m.min(voxel_m), &effort).filter(|_| point.is_finite());
         let Some((distance_m, keep_out)) = found.filter(|(distance_m, _)| *distance_m < voxel_m) else {
             continue;
         };

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-use crate::admission::Peer;
+use crate::access::Peer;
 
 /// The reserved places that are taken, by the connection's number.
 #[derive(Debug, Default)]

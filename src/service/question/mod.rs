@@ -193,7 +193,7 @@ impl MapService {
                     limit.run(stop, |stop| question.answer_from(&map.questioned(limits), limits, stop))?;
                 Ok(Answered { answer, version: map.version(version) })
             };
-            self.inner.pools.planning.run(answer).await?
+            self.inner.pools.planning.run_for(&self.asker, answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
@@ -205,7 +205,7 @@ impl MapService {
         }
         let inner = Arc::clone(&self.inner);
         let check = move |_: StopSignal<'_>| question.check(&inner.settings.limits).map(|()| question);
-        self.inner.pools.planning.run(check).await?
+        self.inner.pools.planning.run_for(&self.asker, check).await?
     }
 }
 

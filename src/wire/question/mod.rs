@@ -12,19 +12,31 @@ mod rays;
 
 use super::{InField, pb, required, uuid_from};
 use crate::map::MapName;
-use crate::service::{Answered, Asked, MapVersion, ServiceError};
 #[cfg(feature = "server")]
-use crate::service::{Limits, Reason};
+use crate::service::Limits;
+use crate::service::{Answered, Asked, MapVersion, ServiceError};
 
 /// A question with the map that it is about.
 pub(super) type Of<Q> = (MapName, Q);
 
 /// A message that asks a question.
 #[cfg(feature = "server")]
-pub(crate) trait QuestionMessage {
+pub(crate) trait QuestionMessage: prost::Message {
     /// The body that it asks about, where it does.
     fn body(&self) -> Option<&pb::Body> {
         None
+    }
+
+    /// The regions in which voxels do not count, where it has some.
+    fn ignored(&self) -> Option<&Vec<pb::Region>> {
+        None
+    }
+
+    /// Bytes of memory that it takes: those that it came in, which its arrays share, and its lists.
+    fn memory_bytes(&self) -> usize {
+        let links = self.body().map_or(0, |body| body.links.capacity() * size_of::<pb::Link>());
+        let ignored = self.ignored().map_or(0, |ignored| ignored.capacity() * size_of::<pb::Region>());
+        self.encoded_len() + links + ignored
     }
 }
 
@@ -41,12 +53,7 @@ where
 /// Refuses a body of more parts than may be.
 #[cfg(feature = "server")]
 pub(crate) fn check_body(body: &pb::Body, limits: &Limits) -> Result<(), ServiceError> {
-    limits.check_body_parts(body.parts())?;
-    if body.links.len() <= pb::LINKS_MAX {
-        return Ok(());
-    }
-    let message = format!("body.links has more than {} entries", pb::LINKS_MAX);
-    Err(ServiceError::new(Reason::BatchTooLarge, message))
+    limits.check_body_parts(body.parts())
 }
 
 /// Says of messages that they ask a question about no body.
@@ -65,6 +72,10 @@ macro_rules! asks_about_a_body {
             fn body(&self) -> Option<&pb::Body> {
                 self.body.as_ref()
             }
+
+            fn ignored(&self) -> Option<&Vec<pb::Region>> {
+                Some(&self.ignored)
+            }
         })+
     };
 }
@@ -75,11 +86,17 @@ asks_without_a_body!(
     FindNearestRequest,
     ClassifyPointsRequest,
     ListFrontiersRequest,
-    CheckSpheresRequest,
     ProjectGridRequest
 );
 #[cfg(feature = "server")]
 asks_about_a_body!(CheckPosesRequest, CheckMotionsRequest);
+
+#[cfg(feature = "server")]
+impl QuestionMessage for pb::CheckSpheresRequest {
+    fn ignored(&self) -> Option<&Vec<pb::Region>> {
+        Some(&self.ignored)
+    }
+}
 
 impl TryFrom<pb::Asked> for Of<Asked> {
     type Error = ServiceError;

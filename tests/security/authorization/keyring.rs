@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrol::access::{Key, KeyName, Scope, Secret, add_to_file};
+use mrol::config::Config;
 use mrol::map::MapName;
 use mrol::service::AllowedMaps;
 use reqwest::{Method, Response, StatusCode};
@@ -59,12 +60,21 @@ pub(crate) struct Guarded {
 impl Guarded {
     /// With the keys that `fill` adds.
     pub(crate) async fn start_with<T>(fill: impl FnOnce(&Keyring) -> T) -> (Self, T) {
+        Self::start_configured(fill, |_| ()).await
+    }
+
+    /// As [`Guarded::start_with`], with settings that `configure` changes.
+    pub(crate) async fn start_configured<T>(
+        fill: impl FnOnce(&Keyring) -> T,
+        configure: impl FnOnce(&mut Config),
+    ) -> (Self, T) {
         let keyring = Keyring::empty();
         let master = keyring.add("master", Scope::Admin, None);
         let filled = fill(&keyring);
         let daemon = Daemon::start_with(|config| {
             config.data_dir = "".into();
             config.access.keys_file = Some(keyring.file());
+            configure(config);
         });
         (Self { daemon: daemon.await, keyring, master }, filled)
     }

@@ -13,3 +13,4 @@ mod reloading;
 mod requests;
 mod robots;
 mod table;
+mod turns;

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::workload::{MapOptions, WorkloadOptions, size_of, times};
+use super::workload::{MapOptions, ShotOptions, WorkloadOptions, size_of, times};
 use crate::cli::error::CliError;
 use crate::cli::map_report::{count, percent};
 use crate::cli::output::Output;
 use crate::lab::measure::peer_file;
 use crate::lab::measure::rays::{Cast, cast};
-use crate::lab::workload::{ShotLayout, Shots};
+use crate::lab::workload::Shots;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -31,15 +31,8 @@ pub(super) struct Rays {
     workload: WorkloadOptions,
     #[command(flatten)]
     map: MapOptions,
-    /// Places from which rays go
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
-    places: u16,
-    /// Azimuths at each place
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
-    azimuths: u16,
-    /// Elevations at each azimuth
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
-    rings: u16,
+    #[command(flatten)]
+    shots: ShotOptions,
     /// Length of a ray, meters
     #[arg(long, value_name = "METERS", default_value_t = 100.0)]
     range: f64,
@@ -58,8 +51,7 @@ impl Rays {
     pub(super) fn run(self, output: &Output) -> Result<(), CliError> {
         let map = self.map.map_of(self.workload.workload())?;
         self.map.check_level(self.level)?;
-        let [places, azimuths, rings] = [self.places, self.azimuths, self.rings].map(usize::from);
-        let shots = self.workload.workload().shots(ShotLayout { places, azimuths, rings });
+        let shots = self.shots.of(&self.workload);
         let (size, passes) = (size_of(&map, self.level), self.repeats);
         output.say(format!("{size}, {} rays, median of {passes} passes", count(shots.origins.len())))?;
         output.say(Line::HEAD)?;

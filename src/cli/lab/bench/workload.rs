@@ -8,7 +8,7 @@ use crate::bloom::FilterSettings;
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::geometry::Point;
-use crate::lab::workload::{Order, Queries, Room, Scatter, Site, Workload};
+use crate::lab::workload::{Order, Queries, Room, Scatter, ShotLayout, Shots, Site, Workload};
 use crate::map::{LEVELS_DEFAULT, MapSettings, MultiResolutionMap};
 
 /// Name of a workload.
@@ -95,6 +95,28 @@ impl Display for WorkloadOptions {
             name(&|| self.workload.to_possible_value()),
             name(&|| order.to_possible_value())
         )
+    }
+}
+
+/// Options of rays through a workload.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct ShotOptions {
+    /// Places from which rays go
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    places: u16,
+    /// Azimuths at each place
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
+    azimuths: u16,
+    /// Elevations at each azimuth
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
+    rings: u16,
+}
+
+impl ShotOptions {
+    /// The rays.
+    pub(in crate::cli) fn of(&self, workload: &WorkloadOptions) -> Shots {
+        let [places, azimuths, rings] = [self.places, self.azimuths, self.rings].map(usize::from);
+        workload.workload().shots(ShotLayout { places, azimuths, rings })
     }
 }
 

@@ -7,14 +7,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::journal::new_folder;
-use super::workload::{MapOptions, WorkloadOptions};
+use super::workload::{MapOptions, ShotOptions, WorkloadOptions};
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
 use crate::client::{Replica, ReplicaOptions};
 use crate::lab::fleet::questions::{Pressure, Questions, Scanner, Told, rays};
 use crate::lab::fleet::{ServerProcess, Target};
-use crate::lab::workload::{ShotLayout, Shots};
+use crate::lab::workload::Shots;
 use crate::map::MultiResolutionMap;
 use crate::planning::{NUMBERS_PER_POSE, Rays, Toward, cast_rays};
 use crate::service::{MotionCheck, PoseCheck};
@@ -41,15 +41,8 @@ pub(super) struct QuestionBench {
     workload: WorkloadOptions,
     #[command(flatten)]
     map: MapOptions,
-    /// Places from which rays go
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
-    places: u16,
-    /// Azimuths at each place
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
-    azimuths: u16,
-    /// Elevations at each azimuth
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u16).range(1..))]
-    rings: u16,
+    #[command(flatten)]
+    shots: ShotOptions,
     /// Messages under way on a stream
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1024))]
     in_flight: u16,
@@ -121,9 +114,7 @@ impl Stage<'_> {
 
     /// The same rays over the network and in this process.
     async fn rays(&self, copy: &MultiResolutionMap, stream: Pressure) -> Result<(), CliError> {
-        let [places, azimuths, rings] =
-            [self.options.places, self.options.azimuths, self.options.rings].map(usize::from);
-        let shots = self.options.workload.workload().shots(ShotLayout { places, azimuths, rings });
+        let shots = self.options.shots.of(&self.options.workload);
         let messages = rays(&shots, RANGE_M);
         self.show("rays", &stream.put(self.server, self.target, &messages, self.time).await?)?;
         self.show("rays, in process", &cast(copy, &shots, self.time)?)
