@@ -7,6 +7,7 @@
 //! * [`rivals`]: other structures that answer the same question, with the same transform.
 //! * [`measure`]: what look-ups, insertions, alignments, journals and starts cost.
 //! * [`experiment`]: the paper's experiments (IV).
+//! * [`explore`]: a robot that maps a building by itself.
 //! * `fleet`: a server under the load of planners and robots.
 //! * [`report`]: results as tables and plots in files.
 //!
@@ -15,6 +16,8 @@
 
 #[cfg(feature = "lab")]
 pub mod experiment;
+#[cfg(feature = "lab")]
+pub mod explore;
 #[cfg(feature = "lab")]
 pub(crate) mod fleet;
 #[cfg(feature = "lab")]

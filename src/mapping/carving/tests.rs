@@ -130,10 +130,10 @@ fn what_is_carved_was_seen_through_and_what_was_seen_through_widely_is_carved() 
             if carved.contains(voxel) {
                 gone += 1;
                 assert!(voxels_to_nearest(&touched, voxel) > settings.margin_voxels as i32, "{voxel:?}");
-                let ends = ends_m(&points, &offset, 0.9 * radius_m);
+                let nearest_m = nearest_end_m(&points, &offset, 0.9 * radius_m);
                 assert!(
-                    ends.is_none_or(|(nearest, _)| nearest > beyond_m),
-                    "{voxel:?}: {ends:?}, {beyond_m}"
+                    nearest_m.is_none_or(|end_m| end_m > beyond_m),
+                    "{voxel:?}: {nearest_m:?}, {beyond_m}"
                 );
                 continue;
             }

@@ -20,7 +20,7 @@ pub(super) fn walk(
     hits: &mut RayHits,
     stop: StopSignal<'_>,
 ) -> Result<(), RayError> {
-    let mut effort = Effort::until(stop);
+    let effort = Effort::until(stop);
     for number in 0..request.rays.len() {
         let (ray, range_m) = request.ray(number)?;
         let Some(mut walk) = space.walk(number, ray, range_m) else { continue };

@@ -123,8 +123,10 @@ async fn a_replica_of_a_region_says_which_motions_rays_and_grids_leave_it() {
         (None, [-0.5, 0.5], false),
     ] {
         let area = area.map_or(GridArea::Occupied, |[min_m, max_m]| GridArea::Rectangle { min_m, max_m });
-        let question =
-            GridQuestion { asked: Asked::default(), scope: GridScope { area, band_m, cell_m: None } };
+        let question = GridQuestion {
+            asked: Asked::default(),
+            scope: GridScope { area, band_m, cell_m: None, tells_unknown: false },
+        };
         let own = part.ask(&question);
         assert_eq!(own.is_ok(), is_known, "{area:?} {band_m:?}");
         match own {

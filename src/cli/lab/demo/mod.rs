@@ -5,6 +5,7 @@
 
 mod checks;
 mod daemon;
+mod explore;
 mod guide;
 mod journal;
 mod planner;
@@ -13,6 +14,7 @@ mod robot;
 mod summary;
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Instant;
@@ -27,6 +29,7 @@ use crate::client::{Client, NewMap};
 use crate::lab::simulate::{Scene, tours};
 use crate::map::{LEVELS_DEFAULT, MapName};
 use crate::server::shutdown_signal;
+use crate::service::MapInfo;
 use checks::Checks;
 use daemon::Daemon;
 use journal::Journal;
@@ -44,7 +47,9 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol demo              then look around with the commands that it prints; Ctrl-C ends it
   mrol demo --once       end when the robots are done: exit code 0 if all is as it should be
-  mrol demo --seed 7     other furniture, other noise";
+  mrol demo --seed 7     other furniture, other noise
+  mrol demo --explore --once --picture explored.svg
+                         a robot explores the building by itself";
 
 /// See it work: two simulated robots build one map in the real daemon, a planner asks about it
 #[derive(Debug, clap::Args)]
@@ -59,9 +64,15 @@ pub(in crate::cli) struct Demo {
     /// Scans of each robot
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=500))]
     scans: u16,
-    /// Side of a finest voxel, meters
-    #[arg(long, value_name = "METERS", default_value_t = 0.03)]
-    resolution: f64,
+    /// Side of a finest voxel, meters [default: 0.03, or 0.05 with --explore]
+    #[arg(long, value_name = "METERS")]
+    resolution: Option<f64>,
+    /// Instead, one robot that nobody steers maps the building: always to the nearest frontier
+    #[arg(long)]
+    explore: bool,
+    /// Draw what the explorer mapped, what it left and its path as an SVG file
+    #[arg(long, value_name = "FILE", requires = "explore")]
+    picture: Option<PathBuf>,
     /// Levels of the map
     #[arg(long, default_value_t = LEVELS_DEFAULT)]
     levels: u32,
@@ -73,12 +84,30 @@ pub(in crate::cli) struct Demo {
     grpc_listen: Option<SocketAddr>,
 }
 
+/// What was shown.
+enum Shown {
+    /// Two robots built a map.
+    Built(Checks),
+    /// A robot explored.
+    Explored(explore::Explored),
+}
+
+impl Shown {
+    /// An error where something was not as it should be.
+    fn verdict(&self) -> Result<(), CliError> {
+        match self {
+            Self::Built(checks) => checks.verdict(),
+            Self::Explored(explored) => explored.verdict(),
+        }
+    }
+}
+
 impl Demo {
     pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
         let mut interrupt = pin!(shutdown_signal());
         let daemon = Daemon::start(self.http_listen, self.grpc_listen, &output).await?;
         let shown = tokio::select! {
-            shown = self.show(daemon.serving(), &output) => shown,
+            shown = self.show(daemon.serving(), &output) => shown.and_then(|shown| shown.verdict()),
             () = &mut interrupt => Err(CliError::failed("interrupted before the robots were done")),
         };
         if !self.once && shown.is_ok() {
@@ -86,17 +115,34 @@ impl Demo {
             interrupt.await;
         }
         daemon.stop().await?;
-        shown?.verdict()
+        shown
+    }
+
+    async fn show(&self, serving: Serving, output: &Output) -> Result<Shown, CliError> {
+        let map = MapName::new(MAP).map_err(CliError::failed)?;
+        let operator = Client::connect(&serving.grpc.to_string()).await?;
+        let resolution_m = self.resolution.unwrap_or(if self.explore { 0.05 } else { 0.03 });
+        let new_map = NewMap { levels: Some(self.levels), ..NewMap::of(resolution_m) };
+        let (info, _) = operator.create_map(&map, new_map).await?;
+        if !self.explore {
+            return Ok(Shown::Built(self.show_building(serving, &operator, &info, output).await?));
+        }
+        let explored = explore::explore(&operator, &info, self.seed, self.picture.as_deref(), output).await?;
+        output.print(&explored)?;
+        Ok(Shown::Explored(explored))
     }
 
     /// Runs the demonstration; returns the checks of its results.
-    async fn show(&self, serving: Serving, output: &Output) -> Result<Checks, CliError> {
-        let map = MapName::new(MAP).map_err(CliError::failed)?;
-        let operator = Client::connect(&serving.grpc.to_string()).await?;
-        let new_map = NewMap { levels: Some(self.levels), ..NewMap::of(self.resolution) };
-        let (info, _) = operator.create_map(&map, new_map).await?;
+    async fn show_building(
+        &self,
+        serving: Serving,
+        operator: &Client,
+        info: &MapInfo,
+        output: &Output,
+    ) -> Result<Checks, CliError> {
+        let map = info.name.clone();
         let robots = self.robots();
-        output.print(&Beginning::new(serving, &info, self.seed, &robots))?;
+        output.print(&Beginning::new(serving, info, self.seed, &robots))?;
         output.say(Line::head())?;
 
         let start = Instant::now();

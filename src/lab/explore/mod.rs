@@ -1,0 +1,307 @@
+//! An explorer: a simulated robot that nobody steers maps a building by itself, with what the server answers planners.
+//!
+//! It goes to the nearest frontier, over and over, on ways on which its body meets nothing, where what no scan saw
+//! through counts as occupied. Its steps are those of any explorer: a scan; where does the body fit; which frontiers are there;
+//! the shortest way to the nearest; is the whole motion free.
+
+mod standing;
+mod visible;
+mod ways;
+
+pub use standing::{BODY_RADIUS_M, SENSOR_HEIGHT_M};
+pub use visible::{Visible, never_collided};
+
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::client::{Client, ClientError, new_session};
+use crate::geometry::{Pose, pose_difference};
+use crate::lab::simulate::{Scene, SpinningLidar};
+use crate::map::{MapName, Region, RobotName, SessionName};
+use crate::mapping::Guess;
+use crate::planning::{Body, Frontier, Surroundings, Unknown};
+use crate::service::{Asked, Collisions, FrontierQuestion, MotionCheck, PoseCheck, ScanAnswer, ScanRequest};
+use standing::{body, pose_at};
+use ways::{Cell, Ways};
+
+/// Level of the voxels that are asked about: 10 cm in a map of 5 cm.
+const LEVEL: u32 = 1;
+/// Level of the voxels of frontiers: 20 cm.
+const FRONTIER_LEVEL: u32 = 2;
+/// Voxels of a frontier that is worth a way.
+const FRONTIER_SIZE_MIN: u64 = 12;
+/// Heights in which frontiers are looked for, meters.
+const FRONTIER_HEIGHTS_M: [f64; 2] = [0.2, 2.2];
+/// How far around the places where the robot was it looks for ways and frontiers, meters.
+const AROUND_M: f64 = 8.0;
+/// How far from the place from which a frontier can be seen the robot may stop, meters.
+const NEAR_VIEW_M: f64 = 1.2;
+/// How far it drives between two scans, meters.
+const SCAN_EVERY_M: f64 = 0.6;
+/// A frontier that is still there within this of one that was visited is given up, meters.
+const GIVEN_UP_M: f64 = 0.5;
+/// Half the side of the place where the robot begins, which it knows to be free since it stands there, meters.
+const OWN_PLACE_M: f64 = 0.6;
+
+/// A robot that explores.
+pub struct Explorer {
+    client: Client,
+    map: MapName,
+    robot: RobotName,
+    session: SessionName,
+    scene: Arc<Scene>,
+    lidar: SpinningLidar,
+    random: ChaCha8Rng,
+    body: Arc<Body>,
+    /// Where the sensor is, and where the server found it.
+    truth: Pose,
+    believed: Pose,
+    scans: u64,
+    /// Where frontiers stay whatever the robot does.
+    given_up: Vec<[f64; 3]>,
+    /// Places of the sensor as they really were, one after the other.
+    path: Vec<[f64; 3]>,
+}
+
+/// What the robot did last.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// It drove to see a frontier.
+    Visited {
+        /// The frontier.
+        frontier: Frontier,
+        /// Length of the way, meters.
+        way_m: f64,
+        /// Frontiers that were listed, and those that could be reached.
+        listed: usize,
+        /// Answer to its last scan.
+        scan: Box<ScanAnswer>,
+        /// How far the pose that was found is from the true one, meters.
+        error_m: f64,
+    },
+    /// No frontier is left that it can get to.
+    Done {
+        /// Frontiers that are left.
+        left: usize,
+    },
+}
+
+impl Explorer {
+    /// An explorer of `scene` that stands at x and y (meters), sees nothing yet, and maps into `map` on the server of `client`.
+    ///
+    /// # Errors
+    /// For a name that is none.
+    pub fn new(
+        client: Client,
+        map: MapName,
+        scene: Arc<Scene>,
+        [x, y]: [f64; 2],
+        seed: u64,
+    ) -> Result<Self, crate::map::NameError> {
+        let start = pose_at([x, y]);
+        Ok(Self {
+            client,
+            map,
+            robot: RobotName::new("explorer")?,
+            session: new_session(),
+            scene,
+            lidar: Self::lidar(),
+            random: ChaCha8Rng::seed_from_u64(seed),
+            body: Arc::new(body()),
+            truth: start,
+            believed: start,
+            scans: 0,
+            given_up: Vec::new(),
+            path: vec![start.translation.vector.into()],
+        })
+    }
+
+    /// Its sensor: 64 rings, 50 degrees up and down, so that it sees where it drives.
+    pub fn lidar() -> SpinningLidar {
+        SpinningLidar {
+            rings: 64,
+            azimuths: 600,
+            elevation_max_deg: 50.0,
+            range_min_m: 0.3,
+            ..SpinningLidar::default()
+        }
+    }
+
+    /// The places where its sensor really was, one after the other, a step of the way each.
+    pub fn path(&self) -> &[[f64; 3]] {
+        &self.path
+    }
+
+    /// Scans that it sent.
+    pub fn scans(&self) -> u64 {
+        self.scans
+    }
+
+    /// Looks around from where it stands, and sends the scan.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn look(&mut self) -> Result<ScanAnswer, ClientError> {
+        let points = self.lidar.scan(&self.scene, &self.truth, &mut self.random);
+        let scan = ScanRequest {
+            session: self.session.clone(),
+            scan_id: Some(self.scans),
+            guess: Guess::Pose(self.believed),
+            at_guess: self.scans == 0,
+            ..ScanRequest::new(self.robot.clone(), points.into())
+        };
+        self.scans += 1;
+        let answer = self.client.insert_scan(&self.map, scan).await?;
+        if answer.accepted {
+            self.believed = answer.map_from_sensor;
+        }
+        Ok(answer)
+    }
+
+    /// Goes to the nearest frontier, with a scan every so often on the way and one at its end.
+    ///
+    /// # Errors
+    /// When the server refuses, or cannot be reached.
+    pub async fn step(&mut self) -> Result<Step, ClientError> {
+        let listed = self.frontiers().await?;
+        let ways = self.ways().await?;
+        let mut goals: Vec<_> = listed.iter().filter_map(|frontier| self.goal(frontier, &ways)).collect();
+        goals.sort_by(|one, other| one.way_m.total_cmp(&other.way_m));
+        for Goal { frontier, cell, way_m } in goals {
+            let way: Vec<[f64; 2]> = ways.way_to(cell);
+            if !self.is_free(&way).await? {
+                self.given_up.push(frontier.center_m);
+                continue;
+            }
+            let scan = Box::new(self.drive(&way).await?);
+            self.given_up.push(frontier.center_m);
+            let error_m = pose_difference(&self.truth, &self.believed).0;
+            return Ok(Step::Visited { frontier, way_m, listed: listed.len(), scan, error_m });
+        }
+        Ok(Step::Done { left: listed.len() })
+    }
+
+    /// The part of the map around the places where the robot was: the smallest and the largest x and y, meters.
+    fn around(&self) -> [[f64; 2]; 2] {
+        let ends = |axis: usize| {
+            let along = self.path.iter().map(|place| place[axis]);
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)))
+        };
+        let ((x_min, x_max), (y_min, y_max)) = (ends(0), ends(1));
+        [[x_min - AROUND_M, y_min - AROUND_M], [x_max + AROUND_M, y_max + AROUND_M]]
+    }
+
+    /// The frontiers that were not given up.
+    async fn frontiers(&self) -> Result<Vec<Frontier>, ClientError> {
+        let [[x_min, y_min], [x_max, y_max]] = self.around();
+        let [z_min, z_max] = FRONTIER_HEIGHTS_M;
+        let question = FrontierQuestion {
+            asked: Asked { level: FRONTIER_LEVEL, ..Asked::default() },
+            min_m: [x_min, y_min, z_min],
+            max_m: [x_max, y_max, z_max],
+            size_min: Some(FRONTIER_SIZE_MIN),
+            frontiers_max: None,
+            standoff_m: Some(1.5),
+        };
+        let told = self.client.list_frontiers(&self.map, question).await?.answer.frontiers;
+        let is_new = |frontier: &Frontier| {
+            self.given_up.iter().all(|place| distance(place, &frontier.center_m) > GIVEN_UP_M)
+        };
+        Ok(told.into_iter().filter(is_new).collect())
+    }
+
+    /// The shortest ways from where the robot is to all places where its body fits.
+    async fn ways(&self) -> Result<Ways, ClientError> {
+        let grid = ways::Grid::around(self.around());
+        let places: Vec<[f64; 2]> = grid.places().collect();
+        let check = PoseCheck {
+            asked: Asked { level: LEVEL, ..Asked::default() },
+            body: Arc::clone(&self.body),
+            configurations: configurations(&places),
+            surroundings: self.surroundings(),
+            answer: Default::default(),
+        };
+        let Collisions::Colliding { words, .. } = self.client.check_poses(&self.map, check).await?.answer
+        else {
+            return Ok(Ways::none(grid));
+        };
+        let fits = (0..places.len()).map(|i| words[i / 64] >> (i % 64) & 1 == 0).collect();
+        Ok(Ways::from(grid, fits, self.place()))
+    }
+
+    /// True where the body meets nothing along a way from where the robot is.
+    async fn is_free(&self, way: &[[f64; 2]]) -> Result<bool, ClientError> {
+        if way.len() < 2 {
+            return Ok(true);
+        }
+        let check = MotionCheck {
+            asked: Asked { level: LEVEL, ..Asked::default() },
+            body: Arc::clone(&self.body),
+            configurations: configurations(way),
+            lengths: vec![way.len() as u32],
+            step_m: None,
+            clearance_max_m: None,
+            surroundings: self.surroundings(),
+        };
+        let answers = self.client.check_motions(&self.map, check).await?.answer;
+        Ok(answers.iter().all(|answer| answer.first_hit.is_none()))
+    }
+
+    /// Drives along a way; the answer to the scan at its end.
+    async fn drive(&mut self, way: &[[f64; 2]]) -> Result<ScanAnswer, ClientError> {
+        let mut since_scan_m = 0.0;
+        for &place in way.iter().skip(1) {
+            // What it believes to have driven it has driven.
+            let [x, y] = self.place();
+            let motion = nalgebra::Translation3::new(place[0] - x, place[1] - y, 0.0);
+            (self.truth, self.believed) = (motion * self.truth, motion * self.believed);
+            self.path.push(self.truth.translation.vector.into());
+            since_scan_m += motion.vector.norm();
+            if since_scan_m >= SCAN_EVERY_M {
+                since_scan_m = 0.0;
+                self.look().await?;
+            }
+        }
+        self.look().await
+    }
+
+    /// Where a frontier is best seen from of all places that can be reached; none where it cannot be seen from any of them.
+    fn goal(&self, frontier: &Frontier, ways: &Ways) -> Option<Goal> {
+        let view: [f64; 3] = frontier.view?.map_from_view.translation.vector.into();
+        let (cell, way_m) = ways.nearest_to([view[0], view[1]], NEAR_VIEW_M)?;
+        Some(Goal { frontier: *frontier, cell, way_m })
+    }
+
+    fn place(&self) -> [f64; 2] {
+        let [x, y, _]: [f64; 3] = self.believed.translation.vector.into();
+        [x, y]
+    }
+
+    /// What is not known counts as occupied, but where the robot began.
+    fn surroundings(&self) -> Surroundings {
+        let [x, y, _] = self.path[0];
+        let own_place = Region::Box {
+            min_m: [x - OWN_PLACE_M, y - OWN_PLACE_M, 0.0],
+            max_m: [x + OWN_PLACE_M, y + OWN_PLACE_M, SENSOR_HEIGHT_M + OWN_PLACE_M],
+        };
+        Surroundings { ignored: vec![own_place], unknown: Unknown::Occupied }
+    }
+}
+
+/// Where the robot could go.
+struct Goal {
+    frontier: Frontier,
+    cell: Cell,
+    way_m: f64,
+}
+
+/// Poses of the body that stands at each place.
+fn configurations(places: &[[f64; 2]]) -> Vec<f32> {
+    places.iter().flat_map(|&[x, y]| [x as f32, y as f32, 0.0, 0.0, 0.0, 0.0, 1.0]).collect()
+}
+
+fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
+}

@@ -1,0 +1,151 @@
+//! Shortest ways over the floor: a grid of places, and Dijkstra's algorithm from where the robot is.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Distance between two places of the grid, meters.
+const SPACING_M: f64 = 0.1;
+
+/// A place of the grid: column and row.
+pub(super) type Cell = [usize; 2];
+
+/// Places in a rectangle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    first_m: [f64; 2],
+    count: [usize; 2],
+}
+
+impl Grid {
+    /// The places between the smallest and the largest x and y.
+    pub(super) fn around([low, high]: [[f64; 2]; 2]) -> Self {
+        let count = [0, 1].map(|axis: usize| ((high[axis] - low[axis]) / SPACING_M) as usize + 1);
+        Self { first_m: low, count }
+    }
+
+    /// All places, row by row.
+    pub(super) fn places(self) -> impl Iterator<Item = [f64; 2]> {
+        let [columns, rows] = self.count;
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| self.place([column, row])))
+    }
+
+    fn place(self, cell: Cell) -> [f64; 2] {
+        [0, 1].map(|axis: usize| self.first_m[axis] + cell[axis] as f64 * SPACING_M)
+    }
+
+    fn number(self, [column, row]: Cell) -> usize {
+        row * self.count[0] + column
+    }
+
+    /// The places beside a cell, straight and askew, each with its distance in spacings.
+    fn beside(self, [column, row]: Cell) -> impl Iterator<Item = (Cell, f64)> {
+        let steps = (-1..=1).flat_map(|dy: isize| (-1..=1).map(move |dx: isize| (dx, dy)));
+        steps.filter(|step| *step != (0, 0)).filter_map(move |(dx, dy)| {
+            let cell = [column.checked_add_signed(dx)?, row.checked_add_signed(dy)?];
+            let is_in = cell[0] < self.count[0] && cell[1] < self.count[1];
+            is_in.then_some((cell, ((dx * dx + dy * dy) as f64).sqrt()))
+        })
+    }
+}
+
+/// The shortest ways from one place to all others where the robot fits.
+#[derive(Debug)]
+pub(super) struct Ways {
+    grid: Grid,
+    /// The way to each place, meters; infinite to those that cannot be reached.
+    way_m: Vec<f64>,
+    /// From where each is reached.
+    from: Vec<Option<Cell>>,
+    start: Option<[f64; 2]>,
+}
+
+impl Ways {
+    /// No way to anywhere.
+    pub(super) fn none(grid: Grid) -> Self {
+        let places = grid.count[0] * grid.count[1];
+        Self { grid, way_m: vec![f64::INFINITY; places], from: vec![None; places], start: None }
+    }
+
+    /// The ways from `start` over places where the robot `fits`, a truth value a place of the grid.
+    pub(super) fn from(grid: Grid, fits: Vec<bool>, start: [f64; 2]) -> Self {
+        let mut ways = Self { start: Some(start), ..Self::none(grid) };
+        let nearest =
+            [0, 1].map(|axis: usize| ((start[axis] - grid.first_m[axis]) / SPACING_M).round() as usize);
+        let mut open = BinaryHeap::new();
+        ways.way_m[grid.number(nearest)] = 0.0;
+        open.push((Reverse(0), nearest));
+        while let Some((Reverse(_), cell)) = open.pop() {
+            let here_m = ways.way_m[grid.number(cell)];
+            for (next, spacings) in grid.beside(cell) {
+                let number = grid.number(next);
+                let way_m = here_m + spacings * SPACING_M;
+                if fits[number] && way_m < ways.way_m[number] - 1e-9 {
+                    (ways.way_m[number], ways.from[number]) = (way_m, Some(cell));
+                    open.push((Reverse((way_m * 1e6) as u64), next));
+                }
+            }
+        }
+        ways
+    }
+
+    /// Of the places at most `near_m` from `place` that can be reached, the one with the shortest way.
+    pub(super) fn nearest_to(&self, place: [f64; 2], near_m: f64) -> Option<(Cell, f64)> {
+        let [columns, rows] = self.grid.count;
+        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row]));
+        let near = cells.filter(|&cell| {
+            let [x, y] = self.grid.place(cell);
+            (x - place[0]).hypot(y - place[1]) <= near_m
+        });
+        let reached =
+            near.map(|cell| (cell, self.way_m[self.grid.number(cell)])).filter(|(_, m)| m.is_finite());
+        reached.min_by(|one, other| one.1.total_cmp(&other.1))
+    }
+
+    /// Places that can be reached, one of `every` along each axis.
+    pub(super) fn reached(&self, every: usize) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let [columns, rows] = self.grid.count;
+        let cells =
+            (0..rows).step_by(every).flat_map(move |row| (0..columns).step_by(every).map(move |x| [x, row]));
+        cells.filter(|&cell| self.way_m[self.grid.number(cell)].is_finite()).map(|cell| self.grid.place(cell))
+    }
+
+    /// The places along the way to a cell, from the start on.
+    pub(super) fn way_to(&self, cell: Cell) -> Vec<[f64; 2]> {
+        let mut way = vec![self.grid.place(cell)];
+        let mut at = cell;
+        while let Some(from) = self.from[self.grid.number(at)] {
+            at = from;
+            way.push(self.grid.place(at));
+        }
+        // The robot stands beside the place of the grid that is nearest to it.
+        way.extend(self.start);
+        way.reverse();
+        way
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_lead_around_what_does_not_fit_and_are_the_shortest() {
+        let grid = Grid::around([[0.0, 0.0], [1.0, 1.0]]);
+        // A wall with a gap at its end.
+        let fits: Vec<bool> = grid.places().map(|[x, y]| !(0.45..0.55).contains(&x) || y > 0.85).collect();
+        let ways = Ways::from(grid, fits, [0.1, 0.1]);
+        let (cell, way_m) = ways.nearest_to([0.9, 0.1], 0.01).unwrap();
+        let way = ways.way_to(cell);
+        assert_eq!((way[0], way.len()), ([0.1, 0.1], 18));
+        assert!(way.iter().all(|[x, y]| !(0.45..0.55).contains(x) || *y > 0.85));
+        // Eight steps up and eight down, all but none of them askew.
+        assert!((1.6..2.0).contains(&way_m), "{way_m}");
+    }
+
+    #[test]
+    fn what_is_walled_in_cannot_be_reached() {
+        let grid = Grid::around([[0.0, 0.0], [1.0, 1.0]]);
+        let fits: Vec<bool> = grid.places().map(|[x, _]| !(0.45..0.55).contains(&x)).collect();
+        assert!(Ways::from(grid, fits, [0.1, 0.1]).nearest_to([0.9, 0.1], 0.2).is_none());
+    }
+}
