@@ -214,8 +214,8 @@ impl CarvingMapper {
         })
     }
 
-    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the first. True of
-    /// one that fits.
+    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the first.
+    /// True of one that fits.
     ///
     /// # Errors
     /// When it cannot be mapped.
