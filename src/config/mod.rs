@@ -288,7 +288,7 @@ mod tests {
         assert!(error("[tls]\ncertificate = \"a\"").contains("tls.key is missing"));
         assert!(error("[tls]\nclient_ca = \"a\"").contains("tls.client_ca is of no use"));
         let margin = error("[robots.r]\ncarve = true\ncarve_margin_voxels = 9");
-        assert!(margin.contains("robots.r: carve_margin_voxels must be at most 8, got 9"), "{margin}");
+        assert!(margin.contains("robots.r: carve_margin_voxels must be 1 to 8, got 9"), "{margin}");
         let threads = error("[threads]\nmapping = 1025");
         assert!(threads.contains("threads.mapping must be 0 to 1024, got 1025"), "{threads}");
         assert!(

@@ -52,8 +52,8 @@ impl Default for CarvingSettings {
 /// Why settings of carving are not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CarvingSettingsError {
-    /// The margin is too wide.
-    #[error("carve_margin_voxels must be at most {CARVING_MARGIN_MAX}, got {0}")]
+    /// The margin is out of range: without one, noise and the poses' errors take walls away.
+    #[error("carve_margin_voxels must be 1 to {CARVING_MARGIN_MAX}, got {0}")]
     Margin(u32),
     /// The grazing angle is out of range.
     #[error(
@@ -72,7 +72,7 @@ impl CarvingSettings {
     /// Names what is out of range.
     pub fn checked(self) -> Result<Self, CarvingSettingsError> {
         let Self { margin_voxels, grazing_deg, range_max_m } = self;
-        if margin_voxels > CARVING_MARGIN_MAX {
+        if !(1..=CARVING_MARGIN_MAX).contains(&margin_voxels) {
             return Err(CarvingSettingsError::Margin(margin_voxels));
         }
         if !(CARVING_GRAZING_MIN_DEG..=CARVING_GRAZING_MAX_DEG).contains(&grazing_deg) {

@@ -16,9 +16,9 @@ const GAP_PIXELS_MAX: usize = 8;
 const SAMPLES_MAX: f32 = 32.0;
 /// Balls nearer than so many of their radii are not seen through: they would be looked at in too many directions.
 const NEAREST: f32 = 4.0;
-/// How often pixels between two that are seen are filled: once for rows or columns between those with points, and once for where
-/// both meet.
-const FILLINGS: usize = 2;
+/// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both meet, and
+/// for where pixels are smallest, at the corners of the cube.
+const FILLINGS: usize = 3;
 /// Number of a pixel in which nothing was seen.
 const NOT_SEEN: u32 = u32::MAX;
 
@@ -253,11 +253,11 @@ impl ScanSurface {
         if distance_m <= NEAREST * radius_m || pixel_m > 2.0 * radius_m {
             return false;
         }
-        let reach_m = radius_m + pixel_m;
+        let window_m = radius_m + pixel_m;
         // Where faces meet pixels are half as wide as in their middle.
-        let steps = (2.0 * reach_m / (0.5 * pixel_m)).ceil();
+        let steps = (2.0 * window_m / (0.5 * pixel_m)).ceil();
         let [right, up] = across(offset);
-        let along = |i: usize| i as f32 / steps * 2.0 * reach_m - reach_m;
+        let along = |i: usize| i as f32 / steps * 2.0 * window_m - window_m;
         (0..=steps as usize).all(|row| {
             (0..=steps as usize).all(|column| {
                 let (a, b) = (along(column), along(row));

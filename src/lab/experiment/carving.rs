@@ -214,8 +214,8 @@ impl CarvingMapper {
         })
     }
 
-    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the first. True of
-    /// one that fits.
+    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the first.
+    /// True of one that fits.
     ///
     /// # Errors
     /// When it cannot be mapped.
@@ -253,10 +253,10 @@ mod tests {
 
     #[test]
     fn what_goes_is_lost_and_what_stands_is_kept() {
-        let lidar = SpinningLidar { rings: 48, azimuths: 400, ..SpinningLidar::default() };
+        let lidar = SpinningLidar { rings: 64, azimuths: 1024, ..SpinningLidar::default() };
         let trial = CarvingTrial {
-            scans: 14,
-            scans_a_round: 35,
+            scans: 12,
+            scans_a_round: 50,
             resolution_m: 0.1,
             lidar,
             carving: CarvingSettings::default(),
@@ -264,8 +264,8 @@ mod tests {
             seed: 1,
         };
         let CarvingFigures { box_voxels, trail_voxels, still_voxels, .. } = trial.run(|| ()).unwrap();
-        // Of 10 cm voxels the lowest layer, which the margin keeps, is one in fifteen.
-        assert!(box_voxels.0 > 100 && box_voxels.1 * 10 <= box_voxels.0, "{box_voxels:?}");
+        // Of voxels of 10 cm more lies within the margin of the floor than of those of 5 cm, which the experiment has.
+        assert!(box_voxels.0 > 100 && box_voxels.1 * 4 <= box_voxels.0, "{box_voxels:?}");
         assert!(trail_voxels.0 > 100 && trail_voxels.1 * 5 <= trail_voxels.0, "{trail_voxels:?}");
         assert!(still_voxels.1 as f64 >= 0.999 * still_voxels.0 as f64, "{still_voxels:?}");
     }
