@@ -70,7 +70,7 @@ impl CubeMap {
     /// The direction of the middle of a pixel, of depth 1.
     pub(super) fn direction(self, face: usize, pixel: [usize; 2]) -> [f32; 3] {
         let [u, v] = pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0);
-        let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
         match face / 2 {
             0 => [sign, u, v],
             1 => [v, sign, u],
