@@ -25,8 +25,12 @@ const MIB: u64 = 1 << 20;
 const MEMORY_MAX: u64 = 128 * MIB;
 /// What the decompressor has for itself, and what an allocator rounds up.
 const BESIDES: u64 = 24 * MIB;
-const LIMITS: MapFileLimits =
-    MapFileLimits { body_bytes_max: 1 << 30, voxels_max: 200_000_000, scans_max: 20_000_000 };
+const LIMITS: MapFileLimits = MapFileLimits {
+    body_bytes_max: 1 << 30,
+    voxels_max: 200_000_000,
+    scans_max: 20_000_000,
+    viewpoint_bytes_max: 256 << 20,
+};
 
 /// A map as a server writes it: surfaces, and a long ride.
 fn honest_file() -> Vec<u8> {

@@ -299,10 +299,14 @@ fn readable(files: &Arc<dyn FileSystem>, path: &Path) -> Result<MultiResolutionM
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Point, Pose};
     use crate::map::{
         Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapSettings, Region,
+        RobotName, ScanRecord, ViewpointRecord,
     };
     use crate::store::{Record, StoreSettings};
+    use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
+    use crate::voxel::VoxelSet;
 
     fn put(name: &str) -> Change {
         let shape = KeepOutShape::of_region(Region::ball([0.0; 3], 1.0).unwrap()).unwrap();
@@ -352,5 +356,54 @@ mod tests {
         snapshot.write(&**data_dir.files(), &file).unwrap();
         let problems = diagnose(&data_dir, &name).unwrap().problems;
         assert_eq!(problems, ["the snapshot of revision 1 is not what the journal makes"]);
+    }
+
+    /// A scan that leaves a viewpoint.
+    fn seen(distance_m: f32) -> Change {
+        let points: Vec<_> = (0..9).map(|i| Point::new(distance_m, 0.1 * i as f32, 0.1)).collect();
+        let range = SeenRange { min_m: 0.01, max_m: 90.0 };
+        let image = RangeImage::of_points(&points, range, IMAGE_BYTES_MAX).unwrap();
+        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
+        let viewpoint = Some(ViewpointRecord { image, displaced: Vec::new() });
+        Change::Insertion(ScanRecord { viewpoint, ..ScanRecord::of_voxels(pose, VoxelSet::default()) })
+    }
+
+    #[test]
+    fn viewpoints_that_cannot_be_read_are_named_and_all_others_are_kept() {
+        let data = tempfile::tempdir().unwrap();
+        // Both snapshots that are kept name the part.
+        let settings = StoreSettings { undo_revisions: 0, ..StoreSettings::default() };
+        let data_dir = DataDir::open(data.path(), settings).unwrap();
+        let (name, uuid) = (MapName::new("office").unwrap(), Uuid::from_u128(7));
+        let map = MultiResolutionMap::new(MapSettings::new(0.1, 4)).unwrap();
+        let folder = data_dir.create(&name, &Snapshot::of(&map, uuid)).unwrap();
+        let commit = |distance_m: f32| {
+            let change = seen(distance_m);
+            folder.append(&[&Record::of(&change).unwrap()]).unwrap();
+            folder.sync().unwrap();
+            map.committer().apply(&change);
+        };
+        (1..9).for_each(|i| commit(i as f32));
+        folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+        (9..12).for_each(|i| commit(i as f32));
+        folder.save(&Snapshot::of(&map, uuid), u64::MAX).unwrap();
+        commit(12.0);
+        let well = diagnose(&data_dir, &name).unwrap();
+        assert_eq!((well.problems, well.viewpoints), (Vec::new(), 12));
+
+        let files = ["part", "copy"].map(|it| folder.path().join(format!("viewpoints-{:020}.{it}", 1)));
+        drop(folder);
+        std::fs::write(&files[1], b"no part any more").unwrap();
+        let problems = diagnose(&data_dir, &name).unwrap().problems;
+        assert!(problems.iter().all(|problem| problem.contains("1.copy: 16 bytes")), "{problems:?}");
+        assert!(data_dir.map(&name, &OpeningProgress::default()).is_ok());
+        std::fs::write(&files[0], b"nor this").unwrap();
+        let problems = diagnose(&data_dir, &name).unwrap().problems;
+        assert!(problems.iter().any(|problem| problem.contains("1.part: 8 bytes")), "{problems:?}");
+        let refused = data_dir.map(&name, &OpeningProgress::default()).unwrap_err().to_string();
+        assert!(refused.contains("1.part: 8 bytes"), "{refused}");
+        let SetAside { revision, viewpoints, .. } = set_aside(&data_dir, &name).unwrap().unwrap();
+        assert_eq!((revision, viewpoints), (12, 4));
+        assert!(data_dir.map(&name, &OpeningProgress::default()).is_ok());
     }
 }

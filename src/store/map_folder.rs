@@ -54,6 +54,15 @@ pub struct MapFolder {
     facts: Facts,
 }
 
+/// What a folder has when it is opened.
+struct Found {
+    /// Revisions of the snapshots, ascending.
+    snapshots: Vec<u64>,
+    parts: ViewpointParts,
+    /// Bytes of journal after the newest snapshot.
+    journal_bytes: u64,
+}
+
 impl MapFolder {
     fn with(
         files: Arc<dyn FileSystem>,
@@ -61,17 +70,16 @@ impl MapFolder {
         path: FolderPath,
         settings: StoreSettings,
         journal: SegmentedJournal,
-        snapshots: Vec<u64>,
-        parts: ViewpointParts,
-        found: u64,
+        found: Found,
     ) -> Self {
+        let Found { snapshots, parts, journal_bytes } = found;
         let folder = Self {
             files,
             uuid,
             path,
             settings,
             place: journal.place().clone(),
-            facts: Facts::new(&journal, snapshots, found),
+            facts: Facts::new(&journal, snapshots, journal_bytes),
             journal: Mutex::new(Rank::Journal, journal),
             snapshots: Mutex::new(Rank::Snapshots, parts),
             is_gone: AtomicBool::default(),

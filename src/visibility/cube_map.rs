@@ -74,7 +74,7 @@ impl CubeMap {
 
     /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on others).
     pub(super) fn on_face(self, face: usize, [u, v]: [f32; 2]) -> [f32; 3] {
-        let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
         match face / 2 {
             0 => [sign, u, v],
             1 => [v, sign, u],

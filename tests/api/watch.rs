@@ -9,7 +9,7 @@ use mrol::map::{Lookup, MapName, Region};
 use mrol::service::{
     BlockBytes, Cause, PointQuery, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedSince,
 };
-use mrol::store::Durability;
+use mrol::store::{Durability, Snapshot};
 use mrol::wire::pb;
 use prost::Message;
 use serde_json::{Value, json};
@@ -298,6 +298,7 @@ async fn a_watch_over_http_is_the_same_messages_behind_their_lengths() {
         ("since_revision=3&map_uuid=x", "bad_uuid"),
         ("min=0,0,0", "half_a_box"),
         ("level=1", "bad_query"),
+        ("viewpoints=perhaps", "bad_query"),
     ] {
         let refused = json_of(daemon.get(&format!("/v1/maps/a/watch?{query}")).await).await;
         assert_eq!(refused["reason"], reason, "{query}: {refused}");
@@ -400,6 +401,8 @@ async fn a_replica_answers_as_the_server_does_at_the_same_revision() {
                 assert_eq!((own.occupied, own.version.content_hash), (theirs.occupied, None));
             }
         }
+        let file = daemon.get("/v1/maps/a/snapshot").await.bytes().await.unwrap();
+        assert!(*replica.map().viewpoints() == *Snapshot::decode(&file).unwrap().contents.viewpoints);
         let status = replica.status();
         assert_eq!((status.version.revision, status.resets, status.is_connected), (revision, 1, true));
     }

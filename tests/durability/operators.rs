@@ -1,12 +1,18 @@
 //! What operators put into the data folder, and maps that take the place of others.
 
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
+use mrol::client::{Client, Replica, ReplicaOptions};
+use mrol::config::Config;
 use mrol::geometry::Pose;
 use mrol::map::{
-    CompletedRequest, MapContents, MapSettings, MappedScan, RequestId, RequestKind, RobotName, Trajectory,
+    CompletedRequest, MapContents, MapName, MapSettings, MappedScan, RequestId, RequestKind, RobotName,
+    Trajectory,
 };
 use mrol::store::{Durability, Snapshot};
+use mrol::visibility::{Viewpoint, ViewpointSet};
 use mrol::voxel::{VoxelKey, VoxelSet};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -15,6 +21,7 @@ use uuid::Uuid;
 use super::data_folders::put_file;
 use crate::support::daemon::{Daemon, json_of, row};
 use crate::support::map_folders::folder_of;
+use crate::support::range_images::through_a_window;
 
 #[tokio::test]
 async fn a_backup_beside_its_map_stays_and_the_map_is_served() {
@@ -79,9 +86,76 @@ fn pose(robot: &str, revision: u64, overlaps: usize) -> MappedScan {
     MappedScan { revision, scan_id: Some(revision), level_overlaps: vec![0.5; overlaps], ..pose }
 }
 
+fn viewpoints(revisions: &[u64]) -> ViewpointSet {
+    let mut viewpoints = ViewpointSet::default();
+    for &revision in revisions {
+        let pose = Pose::translation(revision as f64, 0.0, 0.0);
+        viewpoints.insert(revision, Arc::new(Viewpoint::new(pose, through_a_window(revision as f32))));
+    }
+    viewpoints
+}
+
+/// Names of the files in a map's folder that end so.
+fn files_of(data: &Path, map: &str, end: &str) -> Vec<String> {
+    let names = std::fs::read_dir(folder_of(data, map)).unwrap();
+    let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(end)).collect();
+    names.sort();
+    names
+}
+
+#[tokio::test]
+async fn viewpoints_of_a_restored_map_are_described_copied_kept_and_given_out_again() {
+    let daemon = Daemon::start().await;
+    let all = viewpoints(&[1, 4, 9]);
+    let file = file_with(|contents| contents.viewpoints = Arc::new(all.clone()));
+    let put = put_file(&daemon, "/v1/maps/a/snapshot", file).send().await.unwrap();
+    assert_eq!(put.status(), StatusCode::CREATED);
+    let described = async |daemon: &Daemon| {
+        let map = json_of(daemon.get("/v1/maps/a").await).await;
+        assert_eq!((&map["viewpoints"], &map["viewpoint_bytes"]), (&json!(3), &json!(all.memory_bytes())));
+        let client = Client::connect(&format!("http://{}", daemon.grpc)).await.unwrap();
+        let name = MapName::new("a").unwrap();
+        let info = client.map_info(&name).await.unwrap();
+        assert_eq!((info.viewpoints, info.viewpoint_bytes), (3, all.memory_bytes()));
+        assert_eq!(daemon.metric("mrol_map_viewpoints{map=\"a\"}").await, Some(3.0));
+        let replica = Replica::open(client, name, ReplicaOptions::default()).await.unwrap();
+        assert!(*replica.map().viewpoints() == all);
+        let file = daemon.get("/v1/maps/a/snapshot").await.bytes().await.unwrap();
+        assert!(*Snapshot::decode(&file).unwrap().contents.viewpoints == all);
+    };
+    described(&daemon).await;
+    daemon.put_in("a", &row(3)).await;
+    let mut data = daemon.stop().await;
+    // The snapshot at the server's end has them in a part, which the next ones name.
+    let first = [files_of(data.path(), "a", ".part"), files_of(data.path(), "a", ".copy")];
+    assert_eq!(first.each_ref().map(Vec::len), [1, 1]);
+    for points in 4..7 {
+        let daemon = Daemon::start_in(data, |_| {}).await;
+        described(&daemon).await;
+        daemon.put_in("a", &row(points)).await;
+        data = daemon.stop().await;
+        assert_eq!([files_of(data.path(), "a", ".part"), files_of(data.path(), "a", ".copy")], first);
+    }
+    // One of the two is damaged: the other is read, and the next snapshot writes both again.
+    let part = folder_of(data.path(), "a").join(&first[0][0]);
+    let mut bytes = std::fs::read(&part).unwrap();
+    bytes[50] ^= 1;
+    std::fs::write(&part, bytes).unwrap();
+    let daemon = Daemon::start_in(data, |_| {}).await;
+    described(&daemon).await;
+    daemon.put_in("a", &row(9)).await;
+    let data = daemon.stop().await;
+    assert!(files_of(data.path(), "a", ".part").last() > first[0].last());
+    described(&Daemon::start_in(data, |_| {}).await).await;
+}
+
 #[tokio::test]
 async fn a_map_file_is_held_to_the_limits_of_a_map() {
-    let daemon = Daemon::start_with(|config| config.limits.robots_per_map_max = 2).await;
+    let small = |config: &mut Config| {
+        (config.limits.robots_per_map_max, config.limits.viewpoint_bytes_max) = (2, 5000);
+    };
+    let daemon = Daemon::start_with(small).await;
     let restore = async |name: &str, file: Vec<u8>| {
         let put = put_file(&daemon, &format!("/v1/maps/{name}/snapshot"), file).send().await.unwrap();
         (put.status(), put.text().await.unwrap())
@@ -115,6 +189,12 @@ async fn a_map_file_is_held_to_the_limits_of_a_map() {
         };
         file_with(|contents| contents.requests = of.iter().map(request).collect())
     };
+    let of_viewpoints =
+        file_with(|contents| contents.viewpoints = Arc::new(viewpoints(&[1, 2, 3, 4, 5, 6, 7])));
+    let (status, said) = restore("viewpoints", of_viewpoints).await;
+    assert_eq!(status, StatusCode::TOO_MANY_REQUESTS, "{said}");
+    assert!(said.contains("map_full") && said.contains("viewpoint_bytes_max is 5000"), "{said}");
+
     // An undo and a deletion may have one id.
     assert_eq!(restore("kinds", requests(&[("x", 2, 0), ("x", 3, 1)])).await.0, StatusCode::CREATED);
 }

@@ -380,3 +380,20 @@ proptest! {
         prop_assert!(model.has_viewpoints_of(&kept.map));
     }
 }
+
+#[test]
+fn viewpoints_stay_when_the_poses_of_their_scans_are_thinned() {
+    let settings = StoreSettings { undo_revisions: 0, ..StoreSettings::default() };
+    let (mut kept, mut model) = (Kept::new(MapSettings::new(1.0, 3), settings), Model::default());
+    for distance in 1..9 {
+        let viewpoint = Some(SeenSpace { distance, displaced: Vec::new() });
+        let step = Step::Insert { robot: 0, indices: vec![[1, 2, 3]], carved: Vec::new(), viewpoint };
+        kept.step(&step, &mut model);
+    }
+    assert!(kept.map.committer().thin(kept.map.revision(), &kept.settings.trajectory_spacing) > 3);
+    assert!(model.has_viewpoints_of(&kept.map));
+    kept.step(&Step::Snapshot, &mut model);
+    kept.restart(1);
+    assert!(kept.map.trajectory().len() < 5);
+    assert!(model.has_viewpoints_of(&kept.map));
+}

@@ -40,6 +40,20 @@ fn voxels(blocks: u64) -> Vec<u8> {
     field(0x52, &[field(0x0a, &gaps), field(0x12, &[1; 3].repeat(blocks as usize))].concat())
 }
 
+/// Viewpoints of one revision after another, whose images have as many tiles as there may be, and none of them seen.
+fn viewpoints(count: u64) -> Vec<u8> {
+    const TILES: u8 = 100;
+    let mut image = vec![0; 5 + (6 * usize::from(TILES) * usize::from(TILES)).div_ceil(8)];
+    image[0] = TILES;
+    image[1..5].copy_from_slice(&1f32.to_le_bytes());
+    let numbers = [0.0f64, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].map(f64::to_le_bytes).concat();
+    let rest = [field(0x12, &numbers), field(0x1a, &image)].concat();
+    let viewpoint = |revision| [&[0x08][..], &varint(revision), &rest].concat();
+    // The tag of field 18 takes two bytes.
+    let of_map = |revision| [&[0x92][..], &field(0x01, &viewpoint(revision))].concat();
+    (1..=count).flat_map(of_map).collect()
+}
+
 /// A map file of version 3 around a body.
 fn file(body: &[u8]) -> Vec<u8> {
     let compressed = zstd::bulk::compress(body, 3).unwrap();
@@ -71,6 +85,10 @@ pub(crate) fn hostile_files() -> Vec<(&'static str, Vec<u8>)> {
         ("forms and points of no voxel", {
             let copied = [field(0x1a, &vec![0; 24 << 20]), field(0x22, &vec![0; 24 << 20])].concat();
             file(&[&map[..], &field(0x6a, &copied)].concat())
+        }),
+        ("empty viewpoints", repeated(&[0x92, 0x01, 0])),
+        ("viewpoints that saw nothing", {
+            file(&[&map[..], &[0x30], &varint(1 << 20), &viewpoints(10_000)].concat())
         }),
         ("unknown fields", repeated(&[0x7a, 0])),
         ("blocks of one voxel", file(&[&map[..], &voxels(1_000_000)].concat())),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use uuid::Uuid;
 
-use super::{FolderPath, MapFolder};
+use super::{FolderPath, Found, MapFolder};
 use crate::map::{Change, KEEP_OUTS_MAX, KeepOutRecord, MultiResolutionMap};
 use crate::store::journal::{Known, Recovered, SegmentedJournal};
 use crate::store::snapshot_files::{
@@ -56,8 +56,8 @@ impl MapFolder {
             &progress,
             |_, _| Ok(()),
         )?;
-        let parts = ViewpointParts::default();
-        Ok(Self::with(files, first.uuid, path, settings, journal, vec![revision], parts, 0))
+        let found = Found { snapshots: vec![revision], parts: ViewpointParts::default(), journal_bytes: 0 };
+        Ok(Self::with(files, first.uuid, path, settings, journal, found))
     }
 
     /// Opens the folder of the map `uuid`: the newest good snapshot, and every change of the journal after it.
@@ -121,7 +121,8 @@ impl MapFolder {
         let last_part = viewpoint_parts::numbers_in(&*files, &path)?.last().copied().unwrap_or_default();
         let damaged_parts = parts.damaged.iter().map(ToString::to_string).collect();
         let parts = ViewpointParts::new(parts.known, last_part);
-        let folder = Self::with(files, uuid, at, settings, journal, revisions, parts, recovered.bytes);
+        let found = Found { snapshots: revisions, parts, journal_bytes: recovered.bytes };
+        let folder = Self::with(files, uuid, at, settings, journal, found);
         Ok(OpenedMap {
             folder,
             uuid,

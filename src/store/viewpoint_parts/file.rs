@@ -4,11 +4,14 @@
 //! offset  bytes
 //!      0  8      magic "MROL-VPT"
 //!      8  4      format version, u32 little-endian: 1
-//!     12  4      CRC-32C of the version and of everything from offset 16, u32 little-endian
+//!     12  4      CRC-32C of the version and of bytes 16 to 44, u32 little-endian: by this a snapshot knows the part
 //!     16  16     uuid of the map
 //!     32  8      bytes of the body before compression, u64 little-endian
-//!     40  rest   the body: a zstd frame of the message `ViewpointPart` of proto/mrol/store/v1/snapshot.proto
+//!     40  4      CRC-32C of the body from offset 44 on, u32 little-endian
+//!     44  rest   the body: a zstd frame of the message `ViewpointPart` of proto/mrol/store/v1/snapshot.proto
 //! ```
+//!
+//! The header has a checksum of its own, so that what it says of the map is believed or not without the body.
 
 use std::io;
 use std::sync::Arc;
@@ -26,7 +29,8 @@ use crate::visibility::Viewpoint;
 const VERSION: u32 = 1;
 const MAGIC: &[u8; 8] = b"MROL-VPT";
 const CHECKED_FROM: usize = 16;
-pub(in crate::store) const PART_HEADER_BYTES: usize = 40;
+const BODY_CHECKSUM_AT: usize = 40;
+pub(in crate::store) const PART_HEADER_BYTES: usize = 44;
 /// Most bytes of a part before compression. No memory is taken beyond it.
 const PART_BYTES_MAX: u64 = 8 << 30;
 
@@ -49,6 +53,9 @@ pub(in crate::store) fn part_number(name: &str) -> Option<u64> {
 /// The map that the part with this header belongs to; none where the header is damaged.
 pub(in crate::store) fn owner_of_part(header: &[u8]) -> Option<Uuid> {
     let header = header.get(..PART_HEADER_BYTES).filter(|header| &header[..8] == MAGIC)?;
+    if checksum_of(header) != u32_at(header, 12) {
+        return None;
+    }
     Uuid::from_slice(&header[CHECKED_FROM..32]).ok()
 }
 
@@ -57,7 +64,7 @@ pub(in crate::store) fn owner_of_part(header: &[u8]) -> Option<Uuid> {
 pub(in crate::store) struct ViewpointPart {
     /// By the revisions of their scans, ascending.
     pub(in crate::store) viewpoints: Vec<(u64, Arc<Viewpoint>)>,
-    /// Checksum of the file; 0 before it is encoded.
+    /// Checksum of the header, and so of all that it has checksums of; 0 before it is encoded.
     pub(in crate::store) checksum: u32,
 }
 
@@ -79,8 +86,11 @@ impl ViewpointPart {
         bytes.extend_from_slice(&[0; 4]);
         bytes.extend_from_slice(uuid.as_bytes());
         bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&[0; 4]);
         let mut bytes = compress_onto(bytes, &body, StopSignal::NEVER)?;
-        let checksum = checksum_of(&bytes, StopSignal::NEVER);
+        let of_body = checksum_after(0, &bytes[PART_HEADER_BYTES..], StopSignal::NEVER);
+        bytes[BODY_CHECKSUM_AT..PART_HEADER_BYTES].copy_from_slice(&of_body.to_le_bytes());
+        let checksum = checksum_of(&bytes);
         bytes[12..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
         Ok((Self { checksum, ..self }, bytes))
     }
@@ -93,21 +103,24 @@ impl ViewpointPart {
         let Some((header, frame)) = bytes.split_at_checked(PART_HEADER_BYTES) else {
             return Err(format!("{} bytes are too few for the header of a part", bytes.len()));
         };
-        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| header[at + i]));
         if &header[..8] != MAGIC {
             return Err("not a part of a map's viewpoints: it does not begin with MROL-VPT".into());
         }
-        let version = u32_at(8);
+        let version = u32_at(header, 8);
         if version != VERSION {
             return Err(format!("format version {version}, this build reads {VERSION}: use a newer one"));
         }
-        let (stored, checksum) = (u32_at(12), checksum_of(bytes, stop));
+        let (stored, checksum) = (u32_at(header, 12), checksum_of(header));
         if stored != checksum {
+            return Err(format!("checksum {checksum:08x} of the header, {stored:08x} expected"));
+        }
+        let (stored, of_body) = (u32_at(header, BODY_CHECKSUM_AT), checksum_after(0, frame, stop));
+        if stored != of_body {
             return Err(format!(
-                "checksum {checksum:08x} from offset {CHECKED_FROM} on, {stored:08x} expected"
+                "checksum {of_body:08x} from offset {PART_HEADER_BYTES} on, {stored:08x} expected"
             ));
         }
-        let length = u64::from(u32_at(32)) | u64::from(u32_at(36)) << 32;
+        let length = u64::from(u32_at(header, 32)) | u64::from(u32_at(header, 36)) << 32;
         if length > PART_BYTES_MAX {
             return Err(format!("a body of {length} bytes, at most {PART_BYTES_MAX} are read"));
         }
@@ -124,6 +137,11 @@ impl ViewpointPart {
     }
 }
 
-fn checksum_of(bytes: &[u8], stop: StopSignal<'_>) -> u32 {
-    checksum_after(crc32c::crc32c(&bytes[8..12]), &bytes[CHECKED_FROM..], stop)
+/// The checksum of the header that `bytes` begin with.
+fn checksum_of(bytes: &[u8]) -> u32 {
+    crc32c::crc32c_append(crc32c::crc32c(&bytes[8..12]), &bytes[CHECKED_FROM..PART_HEADER_BYTES])
+}
+
+fn u32_at(bytes: &[u8], offset: usize) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|i| bytes[offset + i]))
 }

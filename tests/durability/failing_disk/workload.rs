@@ -137,7 +137,7 @@ fn change(model: &MultiResolutionMap, rng: &mut ChaCha8Rng) -> Change {
         level_overlaps: vec![rng.random(), rng.random()],
         ..MappedScan::new(robot, Pose::translation(rng.random(), 0.0, 1.0 / 3.0))
     };
-    let viewpoint = rng.random_bool(0.6).then(|| viewpoint(model, rng));
+    let viewpoint = rng.random_bool(0.2).then(|| viewpoint(model, rng));
     Change::Insertion(ScanRecord { viewpoint, ..ScanRecord::of_voxels(pose, voxels) })
 }
 

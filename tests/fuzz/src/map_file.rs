@@ -5,7 +5,12 @@ use mrol::store::{MapFileLimits, Snapshot};
 use super::{frames, map_state};
 
 /// So small that reaching them costs little.
-const LIMITS: MapFileLimits = MapFileLimits { body_bytes_max: 1 << 16, voxels_max: 1 << 20, scans_max: 100 };
+const LIMITS: MapFileLimits = MapFileLimits {
+    body_bytes_max: 1 << 16,
+    voxels_max: 1 << 20,
+    scans_max: 100,
+    viewpoint_bytes_max: 1 << 20,
+};
 /// Memory that reading a file may ask for: what it asks for is what it takes, and the address sanitizer sees when it is
 /// not.
 const MEMORY_MAX: u64 = 16 << 20;
