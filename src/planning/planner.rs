@@ -9,7 +9,7 @@ use super::look::Look;
 use super::simd::{self, Work};
 use super::surroundings::Surroundings;
 use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
-use crate::sync::{Rank, RwLock};
+use crate::sync::{Rank, RwLock, RwLockReadGuard};
 use crate::util::StopSignal;
 use crate::voxel::Lattice;
 
@@ -72,6 +72,7 @@ impl<A: Answerer> Work for Chunk<'_, '_, A> {
 pub struct PlanningView<'a> {
     planner: &'a Planner,
     view: MapView<'a>,
+    may_wait: bool,
     _changes_wait: LongRead<'a>,
 }
 
@@ -104,7 +105,17 @@ impl Planner {
         let changes_wait = self.map.long_read();
         let view = self.map.view();
         self.catch_up(&view);
-        PlanningView { planner: self, view, _changes_wait: changes_wait }
+        PlanningView { planner: self, view, may_wait: true, _changes_wait: changes_wait }
+    }
+
+    /// [`Planner::view`] for threads that may not wait: none where a lock has to be waited for, or the fields are to be mended
+    /// after a change. A question that needs a part of the fields which is not made yet then has no answer, as if it had
+    /// been stopped.
+    pub fn try_view(&self) -> Option<PlanningView<'_>> {
+        let changes_wait = self.map.try_long_read()?;
+        let view = self.map.try_view()?;
+        let is_ready = self.follower.is_up_to_date();
+        is_ready.then_some(PlanningView { planner: self, view, may_wait: false, _changes_wait: changes_wait })
     }
 
     /// Forgets what is not true any more.
@@ -139,6 +150,11 @@ impl PlanningView<'_> {
         Self { view: self.view.with_keep_outs(), ..self }
     }
 
+    /// [`PlanningView::with_keep_outs`] where no lock has to be waited for; none elsewhere.
+    pub fn try_with_keep_outs(self) -> Option<Self> {
+        Some(Self { view: self.view.try_with_keep_outs()?, ..self })
+    }
+
     /// The keep-outs that count; none where none do.
     pub(super) fn shapes(&self) -> Option<Shapes<'_>> {
         Shapes::of(&self.view)
@@ -157,7 +173,8 @@ impl PlanningView<'_> {
         Ok(1.0 / lattice.resolution_m(level))
     }
 
-    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped.
+    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped, or where
+    /// it may not wait and would have to.
     pub(super) fn each<A: Answerer>(
         &self,
         level: u32,
@@ -175,7 +192,7 @@ impl PlanningView<'_> {
                     return None;
                 }
                 let is_last = rounds + 1 >= ROUNDS_MAX || full_rounds >= FULL_ROUNDS_MAX;
-                let fields = self.planner.fields.read();
+                let fields = self.fields()?;
                 let mut look = Look::new(&self.view, surroundings, level, &fields, is_last, stop);
                 let (answerer, look_at) = (&mut answerer, &mut look);
                 simd::run(Chunk { answerer, look: look_at, first: chunk * per_look, answers });
@@ -185,10 +202,18 @@ impl PlanningView<'_> {
                 *(if look.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
                 let unmade = look.into_unmade();
                 drop(fields);
+                if !self.may_wait && !unmade.is_empty() {
+                    return None;
+                }
                 self.make(unmade);
             }
         }
         answers.into_iter().collect()
+    }
+
+    /// The fields; none where they have to be waited for and this view may not.
+    fn fields(&self) -> Option<RwLockReadGuard<'_, Fields>> {
+        if self.may_wait { Some(self.planner.fields.read()) } else { self.planner.fields.try_read() }
     }
 
     /// Makes blocks of the field.

@@ -20,13 +20,15 @@ pub use spheres::SphereCheck;
 
 use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
 use super::time_limit::TimeLimit;
-use super::{Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early};
+use super::{
+    Inner, Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early,
+};
 use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap};
 use crate::planning::{Planner, PlanningView};
 use crate::util::StopSignal;
@@ -63,6 +65,9 @@ pub trait Question: Debug + Send + Sync + 'static {
         0
     }
 
+    /// How long finding the answer takes, roughly, nanoseconds.
+    fn work_ns(&self) -> usize;
+
     /// Checks it against the server's limits.
     ///
     /// # Errors
@@ -72,7 +77,8 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// The answer from one view of `map`, with the version that it is of.
     ///
     /// # Errors
-    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was.
+    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was; that the
+    /// time is up, where `map` must not be waited for and would have to be.
     fn answer_from(
         &self,
         map: &QuestionedMap<'_>,
@@ -93,6 +99,7 @@ pub struct QuestionedMap<'a> {
     map: &'a Arc<MultiResolutionMap>,
     planner: &'a OnceLock<Planner>,
     field_bytes_max: usize,
+    may_wait: bool,
 }
 
 impl<'a> QuestionedMap<'a> {
@@ -102,7 +109,12 @@ impl<'a> QuestionedMap<'a> {
         planner: &'a OnceLock<Planner>,
         field_bytes_max: usize,
     ) -> Self {
-        Self { map, planner, field_bytes_max }
+        Self { map, planner, field_bytes_max, may_wait: true }
+    }
+
+    /// The map for threads that may not wait: where a view of it has to be waited for, there is none.
+    fn at_once(self) -> Self {
+        Self { may_wait: false, ..self }
     }
 
     /// The planner, which keeps what makes checks of bodies fast.
@@ -111,9 +123,35 @@ impl<'a> QuestionedMap<'a> {
     }
 
     /// A view of the whole map for checks of bodies.
-    pub(super) fn planning_view(&self, asked: &Asked) -> PlanningView<'a> {
-        let view = self.planner().view();
-        if asked.ignore_keep_outs { view } else { view.with_keep_outs() }
+    ///
+    /// # Errors
+    /// How the question was stopped: also where the view has to be waited for and must not be.
+    pub(super) fn planning_view(
+        &self,
+        asked: &Asked,
+        stop: StopSignal<'_>,
+    ) -> Result<PlanningView<'a>, ServiceError> {
+        let view = match self.may_wait {
+            true if asked.ignore_keep_outs => Some(self.planner().view()),
+            true => Some(self.planner().view().with_keep_outs()),
+            false => {
+                self.planner.get().and_then(Planner::try_view).and_then(|view| match asked.ignore_keep_outs {
+                    true => Some(view),
+                    false => view.try_with_keep_outs(),
+                })
+            }
+        };
+        view.ok_or_else(|| ended_early(stop))
+    }
+
+    /// A view of the whole map; none where it has to be waited for and must not be.
+    fn view(&self, asked: &Asked) -> Option<MapView<'a>> {
+        match (self.may_wait, asked.ignore_keep_outs) {
+            (true, true) => Some(self.map.view()),
+            (true, false) => Some(self.map.view().with_keep_outs()),
+            (false, true) => self.map.try_view(),
+            (false, false) => self.map.try_view()?.try_with_keep_outs(),
+        }
     }
 
     /// The answer that `f` makes of a view of the whole map, with the view's version. Where there are many `elements`, changes
@@ -125,9 +163,8 @@ impl<'a> QuestionedMap<'a> {
         stop: StopSignal<'_>,
         f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
     ) -> Result<(A, ContentVersion), ServiceError> {
-        let _long_read = (elements > SHORT_ELEMENTS).then(|| self.map.long_read());
-        let view = self.map.view();
-        let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
+        let _long_read = (elements > SHORT_ELEMENTS && self.may_wait).then(|| self.map.long_read());
+        let view = self.view(asked).ok_or_else(|| ended_early(stop))?;
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))
@@ -146,6 +183,12 @@ pub struct Answered<A> {
 /// Elements up to which a question is answered without keeping changes from beginning meanwhile: some milliseconds.
 const SHORT_ELEMENTS: usize = 4096;
 
+/// A question that is answered in about so long, nanoseconds, is answered where it arrives: handing it over takes two changes of
+/// thread, some 70 us, and as many times as long as threads wait for a core.
+const INLINE_NS: usize = 500_000;
+/// How long that may take before the question is handed over after all.
+const INLINE_TIME_MAX: Duration = Duration::from_millis(1);
+
 /// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
 const CHECKED_INLINE_BYTES: usize = 64 << 10;
 
@@ -153,7 +196,7 @@ const CHECKED_INLINE_BYTES: usize = 64 << 10;
 const ANSWER: &str = "the answer to a question";
 
 impl MapService {
-    /// Answers a question of a planner at one revision, on a thread for planners.
+    /// Answers a question of a planner at one revision: a small one where it arrives, others on a thread for planners.
     ///
     /// # Errors
     /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when `min_revision`
@@ -174,15 +217,14 @@ impl MapService {
                 let wait_max = Duration::from_secs_f64(self.limits().min_revision_wait_max_s);
                 map.wait_for_revision(revision, wait_max).await?;
             }
+            if let Some(answer) = self.inner.answer_at_once(&map, &question) {
+                return answer;
+            }
             let inner = Arc::clone(&self.inner);
             let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
             let answer = move |stop: StopSignal<'_>| {
-                let limits = &inner.settings.limits;
-                let bytes = question.answer_bytes(limits).saturating_add(question.work_bytes());
-                let _lent = inner.budget.reserve_transient(bytes as u64, ANSWER)?;
-                let (answer, version) =
-                    limit.run(stop, |stop| question.answer_from(&map.questioned(limits), limits, stop))?;
-                Ok(Answered { answer, version: map.version(version) })
+                let questioned = map.questioned(&inner.settings.limits);
+                limit.run(stop, |stop| inner.answer(&map, questioned, &question, stop))
             };
             self.inner.pools.planning.run(answer).await?
         };
@@ -197,6 +239,38 @@ impl MapService {
         let inner = Arc::clone(&self.inner);
         let check = move |_: StopSignal<'_>| question.check(&inner.settings.limits).map(|()| question);
         self.inner.pools.planning.run(check).await?
+    }
+}
+
+impl Inner {
+    /// The answer to a small question, where nothing has to be waited for and nobody waits for a thread; none elsewhere.
+    fn answer_at_once<Q: Question>(
+        &self,
+        map: &HostedMap,
+        question: &Q,
+    ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
+        if question.work_ns() > INLINE_NS || self.pools.planning.is_wanted() {
+            return None;
+        }
+        let questioned = map.questioned(&self.settings.limits).at_once();
+        let stop = StopSignal::NEVER.by(Instant::now() + INLINE_TIME_MAX);
+        let answer = self.answer(map, questioned, question, stop);
+        let has_no_time = matches!(&answer, Err(error) if error.reason == Reason::TimeLimit);
+        (!has_no_time).then_some(answer)
+    }
+
+    fn answer<Q: Question>(
+        &self,
+        map: &HostedMap,
+        questioned: QuestionedMap<'_>,
+        question: &Q,
+        stop: StopSignal<'_>,
+    ) -> Result<Answered<Q::Answer>, ServiceError> {
+        let limits = &self.settings.limits;
+        let bytes = question.answer_bytes(limits).saturating_add(question.work_bytes());
+        let _lent = self.budget.reserve_transient(bytes as u64, ANSWER)?;
+        let (answer, version) = question.answer_from(&questioned, limits, stop)?;
+        Ok(Answered { answer, version: map.version(version) })
     }
 }
 
