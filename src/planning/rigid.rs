@@ -95,6 +95,8 @@ impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
         let one_by_one = self.near.count_ones() as usize * self.link.groups.len();
         self.is_by_sphere = (1..one_by_one).contains(&self.singles.len());
         if self.is_by_sphere {
+            // Where the ball is clear, nothing need be made.
+            self.transforms.leave(self.near);
             for single in self.singles {
                 self.aim.add_single(look, single, &self.transforms);
             }

@@ -188,6 +188,9 @@ const SHORT_ELEMENTS: usize = 4096;
 const INLINE_NS: usize = 500_000;
 /// How long that may take before the question is handed over after all.
 const INLINE_TIME_MAX: Duration = Duration::from_millis(1);
+/// Bytes that such a question takes at most: so little, once for each thread of the runtime, is not worth a look at the files in
+/// which the system says how much memory there is.
+const INLINE_BYTES: usize = 1 << 20;
 
 /// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
 const CHECKED_INLINE_BYTES: usize = 64 << 10;
@@ -223,8 +226,9 @@ impl MapService {
             let inner = Arc::clone(&self.inner);
             let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
             let answer = move |stop: StopSignal<'_>| {
-                let questioned = map.questioned(&inner.settings.limits);
-                limit.run(stop, |stop| inner.answer(&map, questioned, &question, stop))
+                let limits = &inner.settings.limits;
+                let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
+                limit.run(stop, |stop| map.answer_question(&map.questioned(limits), &question, limits, stop))
             };
             self.inner.pools.planning.run(answer).await?
         };
@@ -249,34 +253,37 @@ impl Inner {
         map: &HostedMap,
         question: &Q,
     ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
-        if question.work_ns() > INLINE_NS || self.pools.planning.is_wanted() {
+        let limits = &self.settings.limits;
+        let is_small = question.work_ns() <= INLINE_NS && bytes_of(question, limits) <= INLINE_BYTES;
+        if !is_small || self.pools.planning.is_wanted() {
             return None;
         }
-        let questioned = map.questioned(&self.settings.limits).at_once();
         let stop = StopSignal::NEVER.by(Instant::now() + INLINE_TIME_MAX);
-        let answer = self.answer(map, questioned, question, stop);
+        let answer = map.answer_question(&map.questioned(limits).at_once(), question, limits, stop);
         let has_no_time = matches!(&answer, Err(error) if error.reason == Reason::TimeLimit);
         (!has_no_time).then_some(answer)
     }
+}
 
-    fn answer<Q: Question>(
-        &self,
-        map: &HostedMap,
-        questioned: QuestionedMap<'_>,
-        question: &Q,
-        stop: StopSignal<'_>,
-    ) -> Result<Answered<Q::Answer>, ServiceError> {
-        let limits = &self.settings.limits;
-        let bytes = question.answer_bytes(limits).saturating_add(question.work_bytes());
-        let _lent = self.budget.reserve_transient(bytes as u64, ANSWER)?;
-        let (answer, version) = question.answer_from(&questioned, limits, stop)?;
-        Ok(Answered { answer, version: map.version(version) })
-    }
+/// Bytes of memory that a question takes, at most.
+fn bytes_of<Q: Question>(question: &Q, limits: &Limits) -> usize {
+    question.answer_bytes(limits).saturating_add(question.work_bytes())
 }
 
 impl HostedMap {
     fn questioned(&self, limits: &Limits) -> QuestionedMap<'_> {
         QuestionedMap::new(&self.map, &self.planner, limits.planning_field_bytes_max)
+    }
+
+    fn answer_question<Q: Question>(
+        &self,
+        questioned: &QuestionedMap<'_>,
+        question: &Q,
+        limits: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<Answered<Q::Answer>, ServiceError> {
+        let (answer, version) = question.answer_from(questioned, limits, stop)?;
+        Ok(Answered { answer, version: self.version(version) })
     }
 }
 
@@ -303,27 +310,76 @@ fn check_elements(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point;
     use crate::map::{MapContents, MapSettings};
     use crate::planning::{Body, Link, Sphere, Surroundings};
-    use crate::voxel::VoxelKey;
+    use crate::service::{PointCloud, ServiceSettings};
+    use crate::store::OpeningProgress;
+    use crate::voxel::{VoxelKey, VoxelSet};
 
-    /// Bytes that the fields of a map hold after a check where a voxel is near, when they may hold so many.
-    fn field_bytes(field_bytes_max: usize) -> usize {
-        let voxels = VoxelKey::new([3, 0, 0]).into_iter().collect();
-        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), MapContents::at(1, voxels)).unwrap();
+    /// Does a ball fit at the origin?
+    fn pose_check() -> PoseCheck {
         let spheres = vec![Sphere { center_m: [0.0; 3], radius_m: 0.1 }];
-        let check = PoseCheck {
+        PoseCheck {
             asked: Asked::default(),
             body: Arc::new(Body::new(vec![Link { spheres, ..Link::default() }]).unwrap()),
             configurations: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
             surroundings: Surroundings::ALL_VOXELS,
             answer: CheckAs::Colliding,
-        };
+        }
+    }
+
+    /// Bytes that the fields of a map hold after a check where a voxel is near, when they may hold so many.
+    fn field_bytes(field_bytes_max: usize) -> usize {
+        let voxels = VoxelKey::new([3, 0, 0]).into_iter().collect();
+        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), MapContents::at(1, voxels)).unwrap();
+        let check = pose_check();
         let (map, planner) = (Arc::new(map), OnceLock::new());
         let map = QuestionedMap::new(&map, &planner, field_bytes_max);
         let (answer, _) = check.answer_from(&map, &Limits::default(), StopSignal::NEVER).unwrap();
         assert_eq!(answer.words(), [0]);
         map.planner().field_bytes()
+    }
+
+    /// Rays that meet nothing.
+    fn rays(count: usize) -> RayQuestion {
+        let toward = RaysToward::Ends(PointCloud::from(vec![Point::new(1.0, 0.0, 5.0); count]));
+        RayQuestion { asked: Asked::default(), origins: vec![Point::new(0.0, 0.0, 5.0)].into(), toward }
+    }
+
+    #[tokio::test]
+    async fn a_small_question_is_answered_where_it_arrives_once_nothing_has_to_be_waited_for() {
+        let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let name = MapName::new("a").unwrap();
+        service.create_map(name.clone(), MapSettings::new(0.1, 1)).await.unwrap();
+        let map = Arc::clone(&service.map(&name).unwrap().map);
+        let put = |index| {
+            map.committer().exchange(&VoxelSet::default(), &VoxelKey::new(index).into_iter().collect());
+        };
+        let handed_over =
+            || service.pools().iter().find(|pool| pool.name == "planning").map_or(0, |pool| pool.begun);
+        let ask = async || service.ask(&name, pose_check()).await.unwrap().answer.words();
+        for (index, expected) in [([3, 0, 0], 0), ([1, 0, 0], 1)] {
+            put(index);
+            // The fields are to be made, or mended; what an answer did not wait for is made for the next one.
+            let before = handed_over();
+            assert_eq!(ask().await, [expected]);
+            assert!(handed_over() > before);
+            for _ in 0..8 {
+                ask().await;
+            }
+            let made = handed_over();
+            assert_eq!((ask().await, handed_over()), (vec![expected], made));
+        }
+        let before = handed_over();
+        service.ask(&name, rays(1)).await.unwrap();
+        assert_eq!(handed_over(), before);
+        service.ask(&name, rays(100_000)).await.unwrap();
+        // A large one is checked there too.
+        assert_eq!(handed_over(), before + 2);
+        let mut wrong = pose_check();
+        wrong.asked.level = 7;
+        assert_eq!(service.ask(&name, wrong).await.unwrap_err().reason, Reason::LevelOutOfRange);
     }
 
     #[test]
