@@ -6,7 +6,6 @@ use super::eight::{self, Centers, LANES};
 use super::in_cells::Group;
 use super::look::{FoundGroup, Judgment, Look};
 use super::placement::{CellsFromLink, EightTransforms};
-use crate::util::bits::for_each_bit;
 
 /// Groups of spheres where they are, found in the field and not read yet.
 #[derive(Debug, Default)]
@@ -40,9 +39,11 @@ impl OpenSpheres {
     /// Notes those of a group with these centers that were judged to be open.
     #[inline(always)]
     pub(super) fn note(&mut self, judged: &Judgment, group: &Group, centers: &Centers) {
-        for_each_bit(u64::from(judged.is_open), |lane| {
-            self.0.push((eight::lane_of(centers, lane as usize), group.radius[lane as usize]));
-        });
+        for lane in 0..LANES {
+            if judged.is_open >> lane & 1 == 1 {
+                self.0.push((eight::lane_of(centers, lane), group.radius[lane]));
+            }
+        }
     }
 
     /// True where one of them meets a voxel.
@@ -107,11 +108,13 @@ impl<'a, 'f> Aim<'a, 'f> {
         }
         let waits = if look.waits_for(unmade) { unmade & !meets } else { 0 };
         for aimed in &self.groups[..self.count] {
-            for_each_bit(u64::from(aimed.is_open & !meets & !waits), |place| {
-                let place = place as usize;
-                let center = eight::lane_of(&aimed.centers, place);
-                meets |= u8::from(look.meets(center, aimed.group.radius[place])) << place;
-            });
+            let is_open = aimed.is_open & !meets & !waits;
+            for place in 0..LANES {
+                if is_open >> place & 1 == 1 {
+                    let center = eight::lane_of(&aimed.centers, place);
+                    meets |= u8::from(look.meets(center, aimed.group.radius[place])) << place;
+                }
+            }
         }
         (meets, waits)
     }

@@ -8,7 +8,6 @@ use super::look::{FoundGroup, Look};
 use super::placement::{EightTransforms, LinkPose};
 use super::points;
 use super::steps::{InSteps, Unanswered};
-use crate::util::bits::for_each_bit;
 
 /// A link at eight places.
 #[derive(Debug)]
@@ -102,12 +101,15 @@ impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
             }
             return;
         }
-        for_each_bit(self.near.into(), |lane| {
-            let cells_from_link = self.transforms.lane(lane as usize);
-            for group in &self.link.groups {
-                self.aim.add(look, group, &cells_from_link);
+        // A closure for each bit would be compiled by itself, without the wide instructions.
+        for lane in 0..LANES {
+            if self.near >> lane & 1 == 1 {
+                let cells_from_link = self.transforms.lane(lane);
+                for group in &self.link.groups {
+                    self.aim.add(look, group, &cells_from_link);
+                }
             }
-        });
+        }
     }
 
     #[inline(always)]

@@ -190,7 +190,7 @@ const INLINE_NS: usize = 500_000;
 const INLINE_TIME_MAX: Duration = Duration::from_millis(1);
 /// Bytes that such a question takes at most: so little, once for each thread of the runtime, is not worth a look at the files in
 /// which the system says how much memory there is.
-const INLINE_BYTES: usize = 1 << 20;
+const INLINE_BYTES: usize = 2 << 20;
 
 /// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
 const CHECKED_INLINE_BYTES: usize = 64 << 10;
@@ -235,9 +235,9 @@ impl MapService {
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
 
-    /// A question within the limits: a large one is looked through on a thread for planners.
+    /// A question within the limits: one that is neither small nor has a small answer is looked through on a thread for planners.
     async fn checked<Q: Question>(&self, question: Q) -> Result<Q, ServiceError> {
-        if question.answer_bytes(self.limits()) <= CHECKED_INLINE_BYTES {
+        if question.work_ns() <= INLINE_NS || question.answer_bytes(self.limits()) <= CHECKED_INLINE_BYTES {
             return question.check(self.limits()).map(|()| question);
         }
         let inner = Arc::clone(&self.inner);
