@@ -6,6 +6,7 @@ use super::eight::{self, Centers, LANES};
 use super::in_cells::Group;
 use super::look::{FoundGroup, Judgment, Look};
 use super::placement::{CellsFromLink, EightTransforms};
+use crate::util::bits::for_each_bit;
 
 /// Groups of spheres where they are, found in the field and not read yet.
 #[derive(Debug, Default)]
@@ -39,11 +40,9 @@ impl OpenSpheres {
     /// Notes those of a group with these centers that were judged to be open.
     #[inline(always)]
     pub(super) fn note(&mut self, judged: &Judgment, group: &Group, centers: &Centers) {
-        for lane in 0..LANES {
-            if judged.is_open >> lane & 1 == 1 {
-                self.0.push((eight::lane_of(centers, lane), group.radius[lane]));
-            }
-        }
+        for_each_bit(u64::from(judged.is_open), |lane| {
+            self.0.push((eight::lane_of(centers, lane as usize), group.radius[lane as usize]));
+        });
     }
 
     /// True where one of them meets a voxel.

@@ -114,7 +114,7 @@ fn block_count(of: &CellBounds) -> usize {
 
 /// A cell of each block in which a box has cells.
 fn block_cells(of: &CellBounds) -> impl Iterator<Item = [i32; 3]> + use<> {
-    let along = |axis: usize| of.first[axis] >> BLOCK_LEVELS..(of.end[axis] - 1 >> BLOCK_LEVELS) + 1;
+    let along = |axis: usize| of.first[axis] >> BLOCK_LEVELS..((of.end[axis] - 1) >> BLOCK_LEVELS) + 1;
     let [xs, ys, zs] = [0, 1, 2].map(along);
     let blocks = zs.flat_map(move |z| {
         let xs = xs.clone();

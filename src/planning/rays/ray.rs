@@ -84,13 +84,10 @@ impl Ray {
     /// Where the ray leaves a box that holds a place; none where it does not.
     #[inline(always)]
     pub(super) fn out_of(&self, place: &Place, clear: &CellBounds) -> Option<Place> {
-        let (mut is_inside, mut border) = (true, [i32::MAX; LANES]);
-        for axis in 0..3 {
-            let (first, end) = self.turned_range(clear, axis);
-            is_inside &= (first..end).contains(&place.cell[axis]);
-            border[axis] = end;
-        }
-        is_inside.then(|| self.beyond_borders(border))
+        let [x, y, z] = [0, 1, 2].map(|axis| self.turned_range(clear, axis));
+        let is_within = |(first, end): (i32, i32), axis: usize| (first..end).contains(&place.cell[axis]);
+        let is_inside = is_within(x, 0) & is_within(y, 1) & is_within(z, 2);
+        is_inside.then(|| self.beyond_borders([x.1, y.1, z.1, i32::MAX]))
     }
 
     /// The cells of a box along an axis, turned as the ray is: the first, and the one past the last.
