@@ -235,6 +235,16 @@ impl MultiResolutionMap {
         LongRead { _changes_wait: self.long_reads.read(), map: self }
     }
 
+    /// [`MultiResolutionMap::long_read`] where no change has to be waited for; none elsewhere. For threads that may not wait.
+    pub fn try_long_read(&self) -> Option<LongRead<'_>> {
+        Some(LongRead { _changes_wait: self.long_reads.try_read()?, map: self })
+    }
+
+    /// [`MultiResolutionMap::view`] where no lock has to be waited for; none elsewhere. For threads that may not wait.
+    pub fn try_view(&self) -> Option<MapView<'_>> {
+        MapView::try_lock(self, ShardsTouched::all())
+    }
+
     /// Locks what `points`, placed at `map_from_points`, can fall in.
     pub fn view_of(&self, points: &[Point], map_from_points: &Pose) -> MapView<'_> {
         MapView::lock(self, self.sharding.touched_by(points, map_from_points, &self.lattice))

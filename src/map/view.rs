@@ -102,6 +102,19 @@ impl<'a> MapView<'a> {
         Self { keep_outs, viewpoints, version, ..self }
     }
 
+    /// [`MapView::with_viewpoints`] where no lock has to be waited for; none elsewhere.
+    pub fn try_with_viewpoints(self) -> Option<Self> {
+        let keep_outs = match &self.keep_outs {
+            Some(_) => Some(self.map.keep_outs.try_read()?),
+            None => None,
+        };
+        let viewpoints = self.map.viewpoints.try_read()?;
+        let version = self.map.content_version();
+        let keep_outs = keep_outs.as_deref().map(Arc::clone);
+        let viewpoints = Some(Arc::clone(&viewpoints));
+        Some(Self { keep_outs, viewpoints, version, ..self })
+    }
+
     /// Where scans saw through, where the view was asked for that.
     pub fn viewpoints(&self) -> Option<&Arc<ViewpointSet>> {
         self.viewpoints.as_ref()

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::eight::{self, Centers, LANES};
 use super::in_cells::Group;
 use super::look::{FoundGroup, Judgment, Look};
-use super::placement::CellsFromLink;
+use super::placement::{CellsFromLink, EightTransforms};
 use crate::util::bits::for_each_bit;
 
 /// Groups of spheres where they are, found in the field and not read yet.
@@ -22,6 +22,8 @@ struct AimedGroup<'a, 'f> {
     group: &'a Group,
     centers: Centers,
     found: FoundGroup<'f>,
+    /// The lanes of which the field did not say, once it was read.
+    is_open: u8,
 }
 
 /// Spheres of which the field does not say whether they meet a voxel: the center and the radius of each, cells.
@@ -71,15 +73,49 @@ impl<'a, 'f> Aim<'a, 'f> {
     /// Finds one more group of a link in the field.
     #[inline(always)]
     pub(super) fn add(&mut self, look: &mut Look<'f>, group: &'a Group, cells_from_link: &CellsFromLink) {
+        self.add_at(look, group, group.centers(cells_from_link));
+    }
+
+    /// Finds one more sphere of a link at eight places in the field.
+    #[inline(always)]
+    pub(super) fn add_single(&mut self, look: &mut Look<'f>, single: &'a Group, places: &EightTransforms) {
+        self.add_at(look, single, single.centers_of_each(places));
+    }
+
+    #[inline(always)]
+    fn add_at(&mut self, look: &mut Look<'f>, group: &'a Group, centers: Centers) {
         if self.count == self.groups.len() {
             let (centers, found) = ([[0.0; LANES]; 3], FoundGroup::NOTHING);
-            self.groups.push(AimedGroup { group, centers, found });
+            self.groups.push(AimedGroup { group, centers, found, is_open: 0 });
         }
         let aimed = &mut self.groups[self.count];
-        aimed.group = group;
-        aimed.centers = group.centers(cells_from_link);
+        (aimed.group, aimed.centers) = (group, centers);
         look.find(group, &aimed.centers, &mut aimed.found);
         self.count += 1;
+    }
+
+    /// Of spheres at eight places, added one by one: those of `places` where a sphere meets a voxel, and those where a part of
+    /// the field is waited for.
+    #[inline(always)]
+    pub(super) fn singles_meet(&mut self, look: &mut Look<'_>, places: u8) -> (u8, u8) {
+        let (mut meets, mut unmade) = (0, 0);
+        for aimed in &mut self.groups[..self.count] {
+            let judged = look.judge_found(aimed.group, &aimed.found);
+            meets |= judged.meets & places;
+            unmade |= judged.unmade & places;
+            aimed.is_open = judged.is_open & places;
+        }
+        let waits = if look.waits_for(unmade) { unmade & !meets } else { 0 };
+        for aimed in &self.groups[..self.count] {
+            let is_open = aimed.is_open & !meets & !waits;
+            for place in 0..LANES {
+                if is_open >> place & 1 == 1 {
+                    let center = eight::lane_of(&aimed.centers, place);
+                    meets |= u8::from(look.meets(center, aimed.group.radius[place])) << place;
+                }
+            }
+        }
+        (meets, waits)
     }
 
     /// True where a sphere of some of the groups meets a voxel; none where a part of the field is waited for.
@@ -87,7 +123,7 @@ impl<'a, 'f> Aim<'a, 'f> {
     pub(super) fn meets(&mut self, look: &mut Look<'_>, groups: Range<usize>) -> Option<bool> {
         self.open.clear();
         let mut unmade = 0;
-        for AimedGroup { group, centers, found } in &self.groups[groups] {
+        for AimedGroup { group, centers, found, .. } in &self.groups[groups] {
             let judged = look.judge_found(group, found);
             if judged.meets != 0 {
                 return Some(true);

@@ -139,6 +139,16 @@ impl LinkInCells {
         Self::of_parts(balls, &[], number, cells_per_m)
     }
 
+    /// Each sphere eight times.
+    fn singles(&self) -> Vec<Group> {
+        let single = |sphere: usize| {
+            let (group, lane) = (&self.groups[sphere / LANES], sphere % LANES);
+            let center_m = std::array::from_fn(|axis| group.centers_m[axis][lane]);
+            Group::of_one(&Ball { center_m, radius: group.radius[lane] })
+        };
+        (0..self.spheres).map(single).collect()
+    }
+
     fn of_parts(
         balls_m: Vec<([f64; 3], f64)>,
         points_m: &[[f64; 3]],
@@ -215,14 +225,23 @@ pub(super) struct BodyInCells {
     pub(super) links: Vec<LinkInCells>,
     /// The balls around the links, eight at a time.
     pub(super) balls: Vec<Group>,
+    /// Of a body of one link with few spheres, each sphere eight times: for eight places at once.
+    pub(super) singles: Vec<Group>,
 }
+
+/// Spheres of a link, at most, that are looked up one by one at eight places.
+const SINGLES_MAX: usize = 4 * LANES;
 
 impl BodyInCells {
     pub(super) fn of(links: &[Link], cells_per_m: f64) -> Result<Self, PlanningError> {
         let links = links.iter().enumerate();
         let links = links.map(|(number, link)| LinkInCells::of(link, number, cells_per_m));
         let links = links.collect::<Result<Vec<_>, _>>()?;
-        Ok(Self::of_links(links))
+        let singles = match &links[..] {
+            [link] if link.spheres <= SINGLES_MAX => link.singles(),
+            _ => Vec::new(),
+        };
+        Ok(Self { singles, ..Self::of_links(links) })
     }
 
     /// A body of one link.
@@ -232,7 +251,7 @@ impl BodyInCells {
 
     fn of_links(links: Vec<LinkInCells>) -> Self {
         let balls: Vec<_> = links.iter().map(|link| (link.ball.center_m, link.ball.radius)).collect();
-        Self { balls: Group::all(&balls), links }
+        Self { balls: Group::all(&balls), links, singles: Vec::new() }
     }
 }
 

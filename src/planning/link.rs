@@ -105,18 +105,21 @@ pub(super) enum LinkState {
     Waits,
 }
 
-/// What is known of the link at a pose. `open` is a place for spheres.
+/// What is known of the link at a pose: by the ball around it, unless that is not to be asked (`is_near`), and by its spheres
+/// where that is not clear. `open` is a place for spheres.
 #[inline(always)]
 pub(super) fn state(
     look: &mut Look<'_>,
     link: &LinkInCells,
-    pose: &LinkPose,
-    cells_from_link: &CellsFromLink,
+    (pose, cells_from_link): (&LinkPose, &CellsFromLink),
+    is_near: bool,
     open: &mut OpenSpheres,
 ) -> LinkState {
-    let ball = look.judge(&link.ball_group, &link.ball_group.centers(cells_from_link));
-    if ball.lower[0] > 0.0 {
-        return LinkState::IsClear(ball.lower[0].into());
+    if !is_near {
+        let ball = look.judge(&link.ball_group, &link.ball_group.centers(cells_from_link));
+        if ball.lower[0] > 0.0 {
+            return LinkState::IsClear(ball.lower[0].into());
+        }
     }
     let (mut unmade, mut lower) = (0, f32::INFINITY);
     open.clear();

@@ -28,6 +28,8 @@ const PER_LOOK: usize = 16;
 const STEPS_MAX: u64 = 100_000;
 /// The least step, meters.
 const STEP_MIN_M: f64 = 1e-5;
+/// A link that is clear by less is not asked for by its ball at the next look, cells.
+const NEAR_CELLS: f64 = 2.0;
 /// What is taken off a clearance before steps are skipped by it, cells.
 const ROUNDING_CELLS: f64 = 1e-6;
 
@@ -267,16 +269,20 @@ impl BodyMotion<'_> {
         let (mut end, mut waits) = (segment.steps + 1, false);
         for (link, motion) in self.body.links.iter().zip(&segment.links) {
             let per_step = motion.length_m(link.center_extent_m) * self.cells_per_m / segment.steps as f64;
-            let mut step = first;
+            // What was near a voxel a step ago is so now: its ball would say nothing.
+            let (mut step, mut is_near) = (first, false);
             while step < end {
                 if look.is_over() {
                     return None;
                 }
                 let pose = motion.at(step as f64 / segment.steps as f64);
                 let cells_from_link = CellsFromLink::of(&pose, self.cells_per_m);
-                match link::state(look, link, &pose, &cells_from_link, open) {
+                match link::state(look, link, (&pose, &cells_from_link), is_near, open) {
                     LinkState::Meets => end = step,
-                    LinkState::IsClear(by) => step += steps_without(by, per_step),
+                    LinkState::IsClear(by) => {
+                        is_near = by < NEAR_CELLS;
+                        step += steps_without(by, per_step);
+                    }
                     LinkState::Waits => {
                         // What else is on the way will be asked for too.
                         waits = true;

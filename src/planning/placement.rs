@@ -112,6 +112,19 @@ impl EightTransforms {
         }
     }
 
+    /// Leaves some of the lanes, one at least; the others repeat the first of them.
+    #[inline(always)]
+    pub(super) fn leave(&mut self, lanes: u8) {
+        let first = lanes.trailing_zeros() as usize % LANES;
+        let numbers = self.rotation.as_flattened_mut().iter_mut().chain(&mut self.translation);
+        for number in numbers {
+            let repeated = number[first];
+            for (lane, number) in number.iter_mut().enumerate() {
+                *number = if lanes >> lane & 1 == 1 { *number } else { repeated };
+            }
+        }
+    }
+
     /// The transform in one lane.
     #[inline(always)]
     pub(super) fn lane(&self, lane: usize) -> CellsFromLink {

@@ -10,7 +10,7 @@ use super::obstacles::Obstacles;
 use super::simd::{self, Work};
 use super::surroundings::{Surroundings, Unknown};
 use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
-use crate::sync::{Rank, RwLock};
+use crate::sync::{Rank, RwLock, RwLockReadGuard};
 use crate::util::StopSignal;
 use crate::visibility::ViewpointSet;
 use crate::voxel::Lattice;
@@ -77,6 +77,7 @@ impl<A: Answerer> Work for Chunk<'_, '_, A> {
 pub struct PlanningView<'a> {
     planner: &'a Planner,
     view: MapView<'a>,
+    may_wait: bool,
     _changes_wait: LongRead<'a>,
 }
 
@@ -109,7 +110,17 @@ impl Planner {
         let changes_wait = self.map.long_read();
         let view = self.map.view();
         self.catch_up(&view);
-        PlanningView { planner: self, view, _changes_wait: changes_wait }
+        PlanningView { planner: self, view, may_wait: true, _changes_wait: changes_wait }
+    }
+
+    /// [`Planner::view`] for threads that may not wait: none where a lock has to be waited for, or the fields are to be mended
+    /// after a change. A question that needs a part of the fields which is not made yet then has no answer, as if it had
+    /// been stopped.
+    pub fn try_view(&self) -> Option<PlanningView<'_>> {
+        let changes_wait = self.map.try_long_read()?;
+        let view = self.map.try_view()?;
+        let is_ready = self.follower.is_up_to_date();
+        is_ready.then_some(PlanningView { planner: self, view, may_wait: false, _changes_wait: changes_wait })
     }
 
     /// Forgets what is not true any more.
@@ -154,6 +165,11 @@ impl PlanningView<'_> {
         Self { view: self.view.with_keep_outs(), ..self }
     }
 
+    /// [`PlanningView::with_keep_outs`] where no lock has to be waited for; none elsewhere.
+    pub fn try_with_keep_outs(self) -> Option<Self> {
+        Some(Self { view: self.view.try_with_keep_outs()?, ..self })
+    }
+
     /// This view with where scans saw through, without which all that is not occupied is unknown.
     #[must_use]
     pub fn with_viewpoints(self) -> Self {
@@ -182,7 +198,8 @@ impl PlanningView<'_> {
         Ok(1.0 / lattice.resolution_m(level))
     }
 
-    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped.
+    /// Answers `count` items, `per_look` of them at a time, between two looks at the stop signal; none once stopped, or where
+    /// it may not wait and would have to.
     pub(super) fn each<A: Answerer>(
         &self,
         level: u32,
@@ -199,7 +216,7 @@ impl PlanningView<'_> {
                 if stop.is_stopped() {
                     return None;
                 }
-                let fields = self.planner.fields.read();
+                let fields = self.fields()?;
                 // The viewpoints may have changed since this view took them, by a change that touched no voxel.
                 let is_of_view = self.holds(&fields, surroundings.unknown);
                 let own = (!is_of_view).then(|| Fields::new(self.planner.map.block_levels_end() + 1, 0));
@@ -214,10 +231,18 @@ impl PlanningView<'_> {
                 *(if look.is_full() { &mut full_rounds } else { &mut rounds }) += 1;
                 let unmade = look.into_unmade();
                 drop(fields);
+                if !self.may_wait && !unmade.is_empty() {
+                    return None;
+                }
                 self.make(unmade, surroundings.unknown, stop);
             }
         }
         answers.into_iter().collect()
+    }
+
+    /// The fields; none where they have to be waited for and this view may not.
+    fn fields(&self) -> Option<RwLockReadGuard<'_, Fields>> {
+        if self.may_wait { Some(self.planner.fields.read()) } else { self.planner.fields.try_read() }
     }
 
     /// True where fields are those of what this view shows.

@@ -158,7 +158,7 @@ impl Answerer for Meeting<'_> {
         let unanswered = Unanswered { configurations: self.configurations, first, items: &items };
         match &self.body.links[..] {
             [link] => {
-                let new = || EightPlaces::new(link, self.cells_per_m, unanswered);
+                let new = || EightPlaces::new((link, &self.body.singles), self.cells_per_m, unanswered);
                 answer_in_steps(look, items.len().div_ceil(LANES), new, answers);
             }
             _ => {

@@ -8,12 +8,13 @@ use super::look::{FoundGroup, Look};
 use super::placement::{EightTransforms, LinkPose};
 use super::points;
 use super::steps::{InSteps, Unanswered};
-use crate::util::bits::for_each_bit;
 
 /// A link at eight places.
 #[derive(Debug)]
 pub(super) struct EightPlaces<'a, 'o, 'f> {
     link: &'a LinkInCells,
+    /// Each of its spheres eight times, where they are few.
+    singles: &'a [Group],
     cells_per_m: f64,
     unanswered: Unanswered<'a, 'o>,
     /// The ball around the link, eight times.
@@ -23,15 +24,23 @@ pub(super) struct EightPlaces<'a, 'o, 'f> {
     count: usize,
     transforms: EightTransforms,
     around: FoundGroup<'f>,
-    /// The places where the ball is not clear, with the spheres there, one place after the other.
+    /// The places where the ball is not clear, with the spheres there: one place after the other, or, where that is less to
+    /// look for, one sphere after the other at all places.
     near: u8,
+    is_by_sphere: bool,
     aim: Aim<'a, 'f>,
 }
 
 impl<'a, 'o> EightPlaces<'a, 'o, '_> {
-    pub(super) fn new(link: &'a LinkInCells, cells_per_m: f64, unanswered: Unanswered<'a, 'o>) -> Self {
+    /// A link, and each of its spheres eight times, if there is to be a choice.
+    pub(super) fn new(
+        (link, singles): (&'a LinkInCells, &'a [Group]),
+        cells_per_m: f64,
+        unanswered: Unanswered<'a, 'o>,
+    ) -> Self {
         Self {
             link,
+            singles,
             cells_per_m,
             unanswered,
             balls: Group::of_one(&link.ball),
@@ -40,6 +49,7 @@ impl<'a, 'o> EightPlaces<'a, 'o, '_> {
             transforms: EightTransforms::NOTHING,
             around: FoundGroup::NOTHING,
             near: 0,
+            is_by_sphere: false,
             aim: Aim::default(),
         }
     }
@@ -52,13 +62,16 @@ impl<'a, 'o> EightPlaces<'a, 'o, '_> {
     #[inline(always)]
     fn meets(&mut self, look: &mut Look<'_>, lane: usize, groups: std::ops::Range<usize>) -> Option<bool> {
         let do_spheres = self.aim.meets(look, groups)?;
-        Some(
-            do_spheres
-                || !self.link.points.is_empty() && {
-                    let pose = LinkPose::of(self.pose(lane));
-                    points::meet(look, self.link, &pose, &self.transforms.lane(lane))
-                },
-        )
+        Some(do_spheres || self.points_meet(look, lane))
+    }
+
+    /// True where a point of the link meets a voxel at one of the places.
+    #[inline(always)]
+    fn points_meet(&self, look: &mut Look<'_>, lane: usize) -> bool {
+        !self.link.points.is_empty() && {
+            let pose = LinkPose::of(self.pose(lane));
+            points::meet(look, self.link, &pose, &self.transforms.lane(lane))
+        }
     }
 }
 
@@ -78,16 +91,41 @@ impl<'f> InSteps<'f> for EightPlaces<'_, '_, 'f> {
         let judged = look.judge_found(&self.balls, &self.around);
         self.near = (judged.meets | judged.is_open) & (u8::MAX >> (LANES - self.count));
         self.aim.clear();
-        for_each_bit(self.near.into(), |lane| {
-            let cells_from_link = self.transforms.lane(lane as usize);
-            for group in &self.link.groups {
-                self.aim.add(look, group, &cells_from_link);
+        let one_by_one = self.near.count_ones() as usize * self.link.groups.len();
+        self.is_by_sphere = (1..one_by_one).contains(&self.singles.len());
+        if self.is_by_sphere {
+            // Where the ball is clear, nothing need be made.
+            self.transforms.leave(self.near);
+            for single in self.singles {
+                self.aim.add_single(look, single, &self.transforms);
             }
-        });
+            return;
+        }
+        // A closure for each bit would be compiled by itself, without the wide instructions.
+        for lane in 0..LANES {
+            if self.near >> lane & 1 == 1 {
+                let cells_from_link = self.transforms.lane(lane);
+                for group in &self.link.groups {
+                    self.aim.add(look, group, &cells_from_link);
+                }
+            }
+        }
     }
 
     #[inline(always)]
     fn end(&mut self, look: &mut Look<'f>, answers: &mut [Option<bool>]) {
+        if self.is_by_sphere {
+            let (meets, waits) = self.aim.singles_meet(look, self.near);
+            for lane in 0..self.count {
+                let item = self.unanswered.items[self.first + lane];
+                let is = |places: u8| places >> lane & 1 == 1;
+                answers[item] = match is(waits) {
+                    true => None,
+                    false => Some(is(meets) || is(self.near) && self.points_meet(look, lane)),
+                };
+            }
+            return;
+        }
         let (groups, mut begin) = (self.link.groups.len(), 0);
         for lane in 0..self.count {
             let item = self.unanswered.items[self.first + lane];

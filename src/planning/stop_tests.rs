@@ -97,6 +97,26 @@ fn one_sphere_that_ignores_what_it_meets_looks_at_the_signal() {
     assert!(looks(|stop| planner.view().first_hits(&question, stop).unwrap()) >= 8);
 }
 
+#[test]
+fn a_view_that_may_not_wait_answers_from_what_is_made_and_makes_nothing() {
+    let (planner, body) = (floor(), ball(0.2));
+    let numbers = at(&[[5.0, 5.0, 0.25], [5.0, 5.0, 0.35]]);
+    let configurations = Configurations::new(&numbers, 1).unwrap();
+    let question =
+        PoseQuestion { body: &body, configurations, level: 0, surroundings: &Surroundings::ALL_VOXELS };
+    let ask = |view: PlanningView<'_>| view.bodies_meet(&question, StopSignal::NEVER).unwrap();
+    let at_once = || planner.try_view().map(ask);
+    // What an answer did not wait for is made for the next one.
+    let make_all = || (0..8).for_each(|_| assert_eq!(ask(planner.view()), Some(vec![0b01])));
+    assert_eq!((at_once(), planner.field_bytes()), (Some(None), 0));
+    make_all();
+    assert_eq!(at_once(), Some(Some(vec![0b01])));
+    planner.map().committer().remove(&VoxelKey::new([50, 50, 0]).into_iter().collect());
+    assert_eq!(at_once(), None, "the fields are to be mended");
+    make_all();
+    assert_eq!(at_once(), Some(Some(vec![0b01])));
+}
+
 /// What a motion waits for was noted at every step again: gigabytes of it.
 #[test]
 fn a_motion_far_beyond_what_is_made_is_answered_in_rounds_of_so_much() {

@@ -227,7 +227,7 @@ impl Explorer {
         else {
             return Ok(Ways::none(grid));
         };
-        let fits = (0..places.len()).map(|i| words[i / 64] >> (i % 64) & 1 == 0).collect();
+        let fits = |number: usize, _| words[number / 64] >> (number % 64) & 1 == 0;
         Ok(Ways::from(grid, fits, self.place()))
     }
 

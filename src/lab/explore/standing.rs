@@ -33,10 +33,10 @@ pub(super) fn stands_free(scene: &Scene, [x, y]: [f64; 2]) -> bool {
     })
 }
 
-/// Directions all around, some 5 degrees from each other.
+/// Directions all around, some 10 degrees from each other.
 fn directions() -> impl Iterator<Item = Vector3<f64>> {
     // Points of a spiral from pole to pole lie evenly on the ball.
-    const COUNT: usize = 1200;
+    const COUNT: usize = 400;
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..COUNT).map(move |i| {
         let z = 1.0 - (2.0 * i as f64 + 1.0) / COUNT as f64;

@@ -27,8 +27,7 @@ impl Visible {
     pub fn of(scene: &Scene, lidar: &SpinningLidar, start: [f64; 2], lattice: &Lattice, level: u32) -> Self {
         const REACH_M: f64 = 16.0;
         let grid = Grid::around([start.map(|c| c - REACH_M), start.map(|c| c + REACH_M)]);
-        let fits = grid.places().map(|place| stands_free(scene, place)).collect();
-        let ways = Ways::from(grid, fits, start);
+        let ways = Ways::from(grid, |_, place| stands_free(scene, place), start);
         let places: Vec<[f64; 2]> = ways.reached(LOOK_EVERY).collect();
         let lidar = SpinningLidar { noise_m: 0.0, dropout: 0.0, ..lidar.clone() };
         let mut random = ChaCha8Rng::seed_from_u64(0);

@@ -66,8 +66,9 @@ impl Ways {
         Self { grid, way_m: vec![f64::INFINITY; places], from: vec![None; places], start: None }
     }
 
-    /// The ways from `start` over places where the robot `fits`, a truth value a place of the grid.
-    pub(super) fn from(grid: Grid, fits: Vec<bool>, start: [f64; 2]) -> Self {
+    /// The ways from `start` over places where the robot fits, which is asked of each once it is reached.
+    pub(super) fn from(grid: Grid, mut fits: impl FnMut(usize, [f64; 2]) -> bool, start: [f64; 2]) -> Self {
+        let mut asked = vec![None; grid.count[0] * grid.count[1]];
         let mut ways = Self { start: Some(start), ..Self::none(grid) };
         let nearest =
             [0, 1].map(|axis: usize| ((start[axis] - grid.first_m[axis]) / SPACING_M).round() as usize);
@@ -79,7 +80,8 @@ impl Ways {
             for (next, spacings) in grid.beside(cell) {
                 let number = grid.number(next);
                 let way_m = here_m + spacings * SPACING_M;
-                if fits[number] && way_m < ways.way_m[number] - 1e-9 {
+                let fits = *asked[number].get_or_insert_with(|| fits(number, grid.place(next)));
+                if fits && way_m < ways.way_m[number] - 1e-9 {
                     (ways.way_m[number], ways.from[number]) = (way_m, Some(cell));
                     open.push((Reverse((way_m * 1e6) as u64), next));
                 }
@@ -132,7 +134,7 @@ mod tests {
     fn ways_lead_around_what_does_not_fit_and_are_the_shortest() {
         let grid = Grid::around([[0.0, 0.0], [1.0, 1.0]]);
         // A wall with a gap at its end.
-        let fits: Vec<bool> = grid.places().map(|[x, y]| !(0.45..0.55).contains(&x) || y > 0.85).collect();
+        let fits = |_, [x, y]: [f64; 2]| !(0.45..0.55).contains(&x) || y > 0.85;
         let ways = Ways::from(grid, fits, [0.1, 0.1]);
         let (cell, way_m) = ways.nearest_to([0.9, 0.1], 0.01).unwrap();
         let way = ways.way_to(cell);
@@ -145,7 +147,7 @@ mod tests {
     #[test]
     fn what_is_walled_in_cannot_be_reached() {
         let grid = Grid::around([[0.0, 0.0], [1.0, 1.0]]);
-        let fits: Vec<bool> = grid.places().map(|[x, _]| !(0.45..0.55).contains(&x)).collect();
+        let fits = |_, [x, _]: [f64; 2]| !(0.45..0.55).contains(&x);
         assert!(Ways::from(grid, fits, [0.1, 0.1]).nearest_to([0.9, 0.1], 0.2).is_none());
     }
 }

@@ -1,5 +1,6 @@
 //! Rays: what each meets first, and how far away.
 
+mod clear_box;
 mod in_sight;
 mod keep_outs;
 mod ray;
@@ -210,6 +211,20 @@ struct Request<'a> {
 }
 
 impl Request<'_> {
+    /// Where ray `number` begins, cells, and with how many that follow it; none where that was said of one before it.
+    #[inline(always)]
+    fn common_origin(&self, number: usize) -> Option<([f64; 3], usize)> {
+        let (origins, rays) = (self.rays.origins, self.rays.len());
+        let origin = if origins.len() == 1 { origins[0] } else { origins[number] };
+        let is_known = number > 0 && (origins.len() == 1 || origins[number - 1].xyz() == origin.xyz());
+        if is_known {
+            return None;
+        }
+        let here = || origins[number..].iter().take_while(|other| other.xyz() == origin.xyz()).count();
+        let count = if origins.len() == 1 { rays } else { here() };
+        Some((origin.xyz().map(|c| f64::from(c) / self.cell_m), count))
+    }
+
     /// Ray `number`, and its length in meters.
     #[inline(always)]
     fn ray(&self, number: usize) -> Result<(Ray, f64), RayError> {

@@ -66,10 +66,7 @@ impl Ray {
     pub(super) fn clipped(&self, bounds: &CellBounds, range_m: f64) -> Option<(Place, f64)> {
         let (mut at_m, mut end_m) = (0.0, range_m);
         for axis in 0..3 {
-            let (first, end) = match self.turned[axis] {
-                0 => (bounds.first[axis], bounds.end[axis]),
-                _ => (-bounds.end[axis], -bounds.first[axis]),
-            };
+            let (first, end) = self.turned_range(bounds, axis);
             // NaN, on a border along which the ray runs, bounds nothing.
             at_m = f64::max(at_m, self.border_m(axis, first));
             end_m = f64::min(end_m, self.border_m(axis, end));
@@ -81,7 +78,30 @@ impl Ray {
     /// Where the ray leaves the cube of 2^`levels` cells' side, aligned as voxels of coarser levels are, that holds a place.
     #[inline(always)]
     pub(super) fn beyond(&self, place: &Place, levels: u32) -> Place {
-        let border = place.cell.map(|i| (i | ((1 << levels) - 1)) + 1);
+        self.beyond_borders(place.cell.map(|i| (i | ((1 << levels) - 1)) + 1))
+    }
+
+    /// Where the ray leaves a box that holds a place; none where it does not.
+    #[inline(always)]
+    pub(super) fn out_of(&self, place: &Place, clear: &CellBounds) -> Option<Place> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.turned_range(clear, axis));
+        let is_within = |(first, end): (i32, i32), axis: usize| (first..end).contains(&place.cell[axis]);
+        let is_inside = is_within(x, 0) & is_within(y, 1) & is_within(z, 2);
+        is_inside.then(|| self.beyond_borders([x.1, y.1, z.1, i32::MAX]))
+    }
+
+    /// The cells of a box along an axis, turned as the ray is: the first, and the one past the last.
+    #[inline(always)]
+    fn turned_range(&self, of: &CellBounds, axis: usize) -> (i32, i32) {
+        match self.turned[axis] {
+            0 => (of.first[axis], of.end[axis]),
+            _ => (-of.end[axis], -of.first[axis]),
+        }
+    }
+
+    /// Where the ray first passes one of these borders, each that below a cell of an axis; all lie before it.
+    #[inline(always)]
+    fn beyond_borders(&self, border: [i32; LANES]) -> Place {
         let passes_m: [f64; LANES] = std::array::from_fn(|axis| self.border_m(axis, border[axis]));
         let at_m = smaller(smaller(passes_m[0], passes_m[1]), smaller(passes_m[2], passes_m[3]));
         let (mut cell, mut is_near) = ([0; LANES], false);

@@ -1,15 +1,18 @@
 //! Space as a ray sees it: occupied, or empty up to some size.
 
+use super::clear_box::{Blocks, clear_box};
 use super::ray::{Place, Ray};
 use crate::map::{CellBounds, TierView};
 use crate::planning::free_space::FreeSpace;
 use crate::planning::remembered::Remembered;
-use crate::voxel::{BlockInCluster, Cell, Cluster, VoxelKey};
+use crate::voxel::{BLOCK_LEVELS, BlockInCluster, BlockMask, Cell, Cluster, VoxelKey};
 
 /// The voxels of one level.
 pub(super) struct Space<'a> {
     clusters: Remembered<'a>,
     bounds: CellBounds,
+    /// The empty box around the place where the rays begin whose turn it is.
+    clear: Option<CellBounds>,
     up: u32,
     piece_levels: u32,
 }
@@ -47,14 +50,28 @@ impl<'a> Space<'a> {
     /// Space without a voxel beyond `bounds`; `nothing` is a cluster without a block.
     pub(super) fn new(view: TierView<'a>, bounds: CellBounds, nothing: &'a Cluster) -> Self {
         let (up, piece_levels) = (view.up(), view.piece_levels());
-        Self { clusters: Remembered::new(view, nothing), bounds, up, piece_levels }
+        Self { clusters: Remembered::new(view, nothing), bounds, clear: None, up, piece_levels }
+    }
+
+    /// Looks at what is around `origin` (cells), where the next so many rays begin.
+    pub(super) fn look_around(&mut self, origin: [f64; 3], rays: usize) {
+        let cell = origin.map(|c| c.floor() as i32);
+        // One cluster must hold all of a block.
+        self.clear = if self.piece_levels < BLOCK_LEVELS {
+            None
+        } else {
+            clear_box(&mut self.clusters, cell, &self.bounds, (rays, self.up))
+        };
     }
 
     /// The walk of a ray of length `range_m`; none where it misses all.
     #[inline(always)]
     pub(super) fn walk(&self, number: usize, ray: Ray, range_m: f64) -> Option<Walk> {
-        let (place, end_m) = ray.clipped(&self.bounds, range_m)?;
-        Some(Walk { ray, place, end_m, number })
+        let (mut place, end_m) = ray.clipped(&self.bounds, range_m)?;
+        if let Some(clear) = &self.clear {
+            place = ray.out_of(&place, clear).unwrap_or(place);
+        }
+        (place.at_m < end_m).then_some(Walk { ray, place, end_m, number })
     }
 
     /// Leaps over the empty space around the place of a walk, where it is empty.
@@ -91,5 +108,12 @@ impl<'a> Space<'a> {
         let (place, in_block) = (BlockInCluster::of_voxel(cell), Cell::of(cell).1);
         let levels = self.clusters.around(cell).empty_levels(place, in_block, self.up)?;
         Some(levels.min(self.piece_levels))
+    }
+}
+
+impl Blocks for Remembered<'_> {
+    #[inline(always)]
+    fn around(&mut self, cell: [i32; 3]) -> &BlockMask {
+        Remembered::around(self, cell).get(BlockInCluster::of_voxel(cell))
     }
 }

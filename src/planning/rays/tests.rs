@@ -102,6 +102,35 @@ proptest! {
     }
 
     #[test]
+    fn rays_that_begin_at_one_place_meet_what_a_look_at_every_voxel_finds(
+        (history, level) in history_and_level(),
+        bunches in prop::collection::vec((point(), prop::collection::vec(direction(), 1..12), 1usize..40), 1..3),
+        range_m in prop_oneof![Just(f64::INFINITY), 0.1f64..60.0],
+    ) {
+        let map = history.map();
+        // Each direction some times: the more rays begin at a place, the larger is the box that is looked for.
+        let rays = bunches.iter().flat_map(|(origin, directions, times)| {
+            directions.iter().flat_map(move |&direction| std::iter::repeat_n((*origin, Point::from(direction)), *times))
+        });
+        let (origins, directions): (Vec<Point>, Vec<Point>) = rays.unzip();
+        let toward = Toward::Directions { directions: &directions, range_m };
+        let hits = cast(&map, &Rays { origins: &origins, toward }, level).unwrap();
+        let mut expected = None;
+        for (at, &origin) in origins.iter().enumerate() {
+            let is_new = at == 0 || (origins[at - 1].xyz(), directions[at - 1].xyz()) != (origin.xyz(), directions[at].xyz());
+            if is_new {
+                expected = first_of_all(&map, level, origin, toward.from(at, origin).unwrap());
+            }
+            let found = (hits.hit[at / 64] >> (at % 64) & 1 == 1).then(|| (hits.distances_m[at], hits.voxels[at]));
+            prop_assert_eq!(found, expected, "ray {} from {:?} along {:?}", at, origin, directions[at]);
+        }
+        if let [(origin, ..)] = &bunches[..] {
+            let one = cast(&map, &Rays { origins: &[*origin], toward }, level).unwrap();
+            prop_assert_eq!(one, hits);
+        }
+    }
+
+    #[test]
     fn a_ray_to_a_point_meets_what_a_look_at_every_voxel_finds(
         (history, level) in history_and_level(),
         rays in prop::collection::vec((point(), point()), 1..40),

@@ -102,6 +102,9 @@ impl<'a> Turns<'a> {
             let number = self.next;
             self.next += 1;
             let (ray, range_m) = self.request.ray(number)?;
+            if let Some((origin, rays)) = self.request.common_origin(number) {
+                self.space.look_around(origin, rays);
+            }
             if let Some(walk) = self.space.walk(number, ray, range_m) {
                 return Ok(Some(walk));
             }

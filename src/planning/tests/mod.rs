@@ -75,6 +75,24 @@ proptest! {
     }
 
     #[test]
+    fn many_places_of_one_link_are_answered_as_by_brute_force(
+        indices in indices(),
+        levels in 1u32..=3,
+        link in link(),
+        poses in prop::collection::vec(near_pose(), 1..20),
+        surroundings in surroundings(),
+        field_bytes_max in prop::sample::select(vec![0, 1 << 20]),
+    ) {
+        let map = Arc::new(MultiResolutionMap::new(MapSettings::new(RESOLUTION_M, levels)).unwrap());
+        exchange(&map, &(Vec::new(), indices));
+        let planner = Planner::with_field_bytes(Arc::clone(&map), field_bytes_max);
+        let body = Body::new(vec![link]).unwrap();
+        for level in 0..levels {
+            check_poses(&planner, &body, &poses.concat(), level, &surroundings)?;
+        }
+    }
+
+    #[test]
     fn groups_of_spheres_are_answered_as_bodies_at_the_origin(
         indices in indices(),
         level in 0u32..3,

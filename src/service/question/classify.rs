@@ -18,6 +18,9 @@ pub struct ClassifyQuestion {
 /// Points of which two bits each are a byte.
 const POINTS_A_BYTE: usize = 4;
 
+/// How long a point that many viewpoints are asked of takes, nanoseconds.
+const NS_EACH: usize = 1000;
+
 impl Question for ClassifyQuestion {
     type Answer = PointStates;
 
@@ -29,6 +32,10 @@ impl Question for ClassifyQuestion {
 
     fn answer_bytes(&self, _: &Limits) -> usize {
         self.points.len().div_ceil(POINTS_A_BYTE) + 2 * size_of::<u64>()
+    }
+
+    fn work_ns(&self) -> usize {
+        self.points.len().saturating_mul(NS_EACH)
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {

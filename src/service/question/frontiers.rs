@@ -50,6 +50,10 @@ impl Question for FrontierQuestion {
         limits.frontiers_max * size_of::<Frontier>() + limits.frontier_cells_max * WORK_BYTES_EACH
     }
 
+    fn work_ns(&self) -> usize {
+        usize::MAX
+    }
+
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
         let (asked, most) = (self.frontiers_max(limits), limits.frontiers_max);
         if asked <= most {

@@ -54,6 +54,11 @@ impl Question for GridQuestion {
         Self::cells_max(limits) * (BYTES_EACH + work)
     }
 
+    /// It walks all voxels of the area: never a short question.
+    fn work_ns(&self) -> usize {
+        usize::MAX
+    }
+
     fn check(&self, _: &Limits) -> Result<(), ServiceError> {
         Ok(())
     }
@@ -66,7 +71,6 @@ impl Question for GridQuestion {
     ) -> Result<(Grid, ContentVersion), ServiceError> {
         let GridScope { area, band_m, cell_m, tells_unknown } = self.scope;
         let level = self.asked.level;
-        // It walks all voxels of the area: never a short question.
         map.in_view(&self.asked, usize::MAX, stop, |view| {
             let cell_m = cell_m.unwrap_or_else(|| view.lattice().resolution_m(level));
             let cells_max = Self::cells_max(limits);

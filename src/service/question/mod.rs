@@ -24,13 +24,15 @@ pub use spheres::SphereCheck;
 
 use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use uuid::Uuid;
 
 use super::hosted_map::HostedMap;
 use super::time_limit::TimeLimit;
-use super::{Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early};
+use super::{
+    Inner, Limits, MapService, MapVersion, Outcome, Reason, ServiceError, check_not_stopped, ended_early,
+};
 use crate::map::{ContentVersion, MapName, MapView, MultiResolutionMap};
 use crate::planning::{Planner, PlanningView, Surroundings, Unknown};
 use crate::util::StopSignal;
@@ -67,6 +69,9 @@ pub trait Question: Debug + Send + Sync + 'static {
         0
     }
 
+    /// How long finding the answer takes, roughly, nanoseconds.
+    fn work_ns(&self) -> usize;
+
     /// Checks it against the server's limits.
     ///
     /// # Errors
@@ -76,7 +81,8 @@ pub trait Question: Debug + Send + Sync + 'static {
     /// The answer from one view of `map`, with the version that it is of.
     ///
     /// # Errors
-    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was.
+    /// `InvalidArgument` for what makes no question, naming the field and its place; how it was stopped, once it was; that the
+    /// time is up, where `map` must not be waited for and would have to be.
     fn answer_from(
         &self,
         map: &QuestionedMap<'_>,
@@ -97,6 +103,7 @@ pub struct QuestionedMap<'a> {
     map: &'a Arc<MultiResolutionMap>,
     planner: &'a OnceLock<Planner>,
     field_bytes_max: usize,
+    may_wait: bool,
 }
 
 impl<'a> QuestionedMap<'a> {
@@ -106,7 +113,12 @@ impl<'a> QuestionedMap<'a> {
         planner: &'a OnceLock<Planner>,
         field_bytes_max: usize,
     ) -> Self {
-        Self { map, planner, field_bytes_max }
+        Self { map, planner, field_bytes_max, may_wait: true }
+    }
+
+    /// The map for threads that may not wait: where a view of it has to be waited for, there is none.
+    fn at_once(self) -> Self {
+        Self { may_wait: false, ..self }
     }
 
     /// The planner, which keeps what makes checks of bodies fast.
@@ -115,12 +127,39 @@ impl<'a> QuestionedMap<'a> {
     }
 
     /// A view of the whole map for checks of bodies among what counts.
-    pub(super) fn planning_view(&self, asked: &Asked, surroundings: &Surroundings) -> PlanningView<'a> {
-        let view = self.planner().view();
-        let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
-        match surroundings.unknown {
-            Unknown::Free => view,
-            Unknown::Occupied => view.with_viewpoints(),
+    ///
+    /// # Errors
+    /// How the question was stopped: also where the view has to be waited for and must not be.
+    pub(super) fn planning_view(
+        &self,
+        asked: &Asked,
+        surroundings: &Surroundings,
+        stop: StopSignal<'_>,
+    ) -> Result<PlanningView<'a>, ServiceError> {
+        let counts_keep_outs = !asked.ignore_keep_outs;
+        let view = match (self.may_wait, surroundings.unknown) {
+            (true, unknown) => {
+                let view = self.planner().view();
+                let view = if counts_keep_outs { view.with_keep_outs() } else { view };
+                Some(if unknown == Unknown::Occupied { view.with_viewpoints() } else { view })
+            }
+            (false, Unknown::Free) => {
+                let view = self.planner.get().and_then(Planner::try_view);
+                view.and_then(|view| if counts_keep_outs { view.try_with_keep_outs() } else { Some(view) })
+            }
+            // Who takes viewpoints may have to mend the fields by them.
+            (false, Unknown::Occupied) => None,
+        };
+        view.ok_or_else(|| ended_early(stop))
+    }
+
+    /// A view of the whole map; none where it has to be waited for and must not be.
+    fn view(&self, asked: &Asked) -> Option<MapView<'a>> {
+        match (self.may_wait, asked.ignore_keep_outs) {
+            (true, true) => Some(self.map.view().with_viewpoints()),
+            (true, false) => Some(self.map.view().with_keep_outs().with_viewpoints()),
+            (false, true) => self.map.try_view()?.try_with_viewpoints(),
+            (false, false) => self.map.try_view()?.try_with_keep_outs()?.try_with_viewpoints(),
         }
     }
 
@@ -133,10 +172,8 @@ impl<'a> QuestionedMap<'a> {
         stop: StopSignal<'_>,
         f: impl FnOnce(&MapView<'_>) -> Result<A, ServiceError>,
     ) -> Result<(A, ContentVersion), ServiceError> {
-        let _long_read = (elements > SHORT_ELEMENTS).then(|| self.map.long_read());
-        let view = self.map.view();
-        let view = if asked.ignore_keep_outs { view } else { view.with_keep_outs() };
-        let view = view.with_viewpoints();
+        let _long_read = (elements > SHORT_ELEMENTS && self.may_wait).then(|| self.map.long_read());
+        let view = self.view(asked).ok_or_else(|| ended_early(stop))?;
         let answer = f(&view)?;
         check_not_stopped(stop)?;
         Ok((answer, view.version()))
@@ -155,6 +192,15 @@ pub struct Answered<A> {
 /// Elements up to which a question is answered without keeping changes from beginning meanwhile: some milliseconds.
 const SHORT_ELEMENTS: usize = 4096;
 
+/// A question that is answered in about so long, nanoseconds, is answered where it arrives: handing it over takes two changes of
+/// thread, some 70 us, and as many times as long as threads wait for a core.
+const INLINE_NS: usize = 500_000;
+/// How long that may take before the question is handed over after all.
+const INLINE_TIME_MAX: Duration = Duration::from_millis(1);
+/// Bytes that such a question takes at most: so little, once for each thread of the runtime, is not worth a look at the files in
+/// which the system says how much memory there is.
+const INLINE_BYTES: usize = 2 << 20;
+
 /// Bytes of an answer up to which its question is checked where it arrives: some microseconds.
 const CHECKED_INLINE_BYTES: usize = 64 << 10;
 
@@ -162,7 +208,7 @@ const CHECKED_INLINE_BYTES: usize = 64 << 10;
 const ANSWER: &str = "the answer to a question";
 
 impl MapService {
-    /// Answers a question of a planner at one revision, on a thread for planners.
+    /// Answers a question of a planner at one revision: a small one where it arrives, others on a thread for planners.
     ///
     /// # Errors
     /// `InvalidArgument` for what makes no question or is beyond a limit; `NotFound`; `DeadlineExceeded` when `min_revision`
@@ -183,24 +229,24 @@ impl MapService {
                 let wait_max = Duration::from_secs_f64(self.limits().min_revision_wait_max_s);
                 map.wait_for_revision(revision, wait_max).await?;
             }
+            if let Some(answer) = self.inner.answer_at_once(&map, &question) {
+                return answer;
+            }
             let inner = Arc::clone(&self.inner);
             let limit = TimeLimit::new("question_time_max", self.limits().question_time_max_s);
             let answer = move |stop: StopSignal<'_>| {
                 let limits = &inner.settings.limits;
-                let bytes = question.answer_bytes(limits).saturating_add(question.work_bytes());
-                let _lent = inner.budget.reserve_transient(bytes as u64, ANSWER)?;
-                let (answer, version) =
-                    limit.run(stop, |stop| question.answer_from(&map.questioned(limits), limits, stop))?;
-                Ok(Answered { answer, version: map.version(version) })
+                let _lent = inner.budget.reserve_transient(bytes_of(&question, limits) as u64, ANSWER)?;
+                limit.run(stop, |stop| map.answer_question(&map.questioned(limits), &question, limits, stop))
             };
             self.inner.pools.planning.run_for(&self.asker, answer).await?
         };
         self.observed(Q::OPERATION, Some(map), work, |_| Outcome::Read).await
     }
 
-    /// A question within the limits: a large one is looked through on a thread for planners.
+    /// A question within the limits: one that is neither small nor has a small answer is looked through on a thread for planners.
     async fn checked<Q: Question>(&self, question: Q) -> Result<Q, ServiceError> {
-        if question.answer_bytes(self.limits()) <= CHECKED_INLINE_BYTES {
+        if question.work_ns() <= INLINE_NS || question.answer_bytes(self.limits()) <= CHECKED_INLINE_BYTES {
             return question.check(self.limits()).map(|()| question);
         }
         let inner = Arc::clone(&self.inner);
@@ -209,9 +255,44 @@ impl MapService {
     }
 }
 
+impl Inner {
+    /// The answer to a small question, where nothing has to be waited for and nobody waits for a thread; none elsewhere.
+    fn answer_at_once<Q: Question>(
+        &self,
+        map: &HostedMap,
+        question: &Q,
+    ) -> Option<Result<Answered<Q::Answer>, ServiceError>> {
+        let limits = &self.settings.limits;
+        let is_small = question.work_ns() <= INLINE_NS && bytes_of(question, limits) <= INLINE_BYTES;
+        if !is_small || self.pools.planning.is_wanted() {
+            return None;
+        }
+        let stop = StopSignal::NEVER.by(Instant::now() + INLINE_TIME_MAX);
+        let answer = map.answer_question(&map.questioned(limits).at_once(), question, limits, stop);
+        let has_no_time = matches!(&answer, Err(error) if error.reason == Reason::TimeLimit);
+        (!has_no_time).then_some(answer)
+    }
+}
+
+/// Bytes of memory that a question takes, at most.
+fn bytes_of<Q: Question>(question: &Q, limits: &Limits) -> usize {
+    question.answer_bytes(limits).saturating_add(question.work_bytes())
+}
+
 impl HostedMap {
     fn questioned(&self, limits: &Limits) -> QuestionedMap<'_> {
         QuestionedMap::new(&self.map, &self.planner, limits.planning_field_bytes_max)
+    }
+
+    fn answer_question<Q: Question>(
+        &self,
+        questioned: &QuestionedMap<'_>,
+        question: &Q,
+        limits: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<Answered<Q::Answer>, ServiceError> {
+        let (answer, version) = question.answer_from(questioned, limits, stop)?;
+        Ok(Answered { answer, version: self.version(version) })
     }
 }
 
@@ -238,27 +319,76 @@ fn check_elements(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point;
     use crate::map::{MapContents, MapSettings};
     use crate::planning::{Body, Link, Sphere};
-    use crate::voxel::VoxelKey;
+    use crate::service::{PointCloud, ServiceSettings};
+    use crate::store::OpeningProgress;
+    use crate::voxel::{VoxelKey, VoxelSet};
 
-    /// Bytes that the fields of a map hold after a check where a voxel is near, when they may hold so many.
-    fn field_bytes(field_bytes_max: usize) -> usize {
-        let voxels = VoxelKey::new([3, 0, 0]).into_iter().collect();
-        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), MapContents::at(1, voxels)).unwrap();
+    /// Does a ball fit at the origin?
+    fn pose_check() -> PoseCheck {
         let spheres = vec![Sphere { center_m: [0.0; 3], radius_m: 0.1 }];
-        let check = PoseCheck {
+        PoseCheck {
             asked: Asked::default(),
             body: Arc::new(Body::new(vec![Link { spheres, ..Link::default() }]).unwrap()),
             configurations: vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
             surroundings: Surroundings::ALL_VOXELS,
             answer: CheckAs::Colliding,
-        };
+        }
+    }
+
+    /// Bytes that the fields of a map hold after a check where a voxel is near, when they may hold so many.
+    fn field_bytes(field_bytes_max: usize) -> usize {
+        let voxels = VoxelKey::new([3, 0, 0]).into_iter().collect();
+        let map = MultiResolutionMap::restore(MapSettings::new(0.1, 1), MapContents::at(1, voxels)).unwrap();
+        let check = pose_check();
         let (map, planner) = (Arc::new(map), OnceLock::new());
         let map = QuestionedMap::new(&map, &planner, field_bytes_max);
         let (answer, _) = check.answer_from(&map, &Limits::default(), StopSignal::NEVER).unwrap();
         assert_eq!(answer.words(), [0]);
         map.planner().field_bytes()
+    }
+
+    /// Rays that meet nothing.
+    fn rays(count: usize) -> RayQuestion {
+        let toward = RaysToward::Ends(PointCloud::from(vec![Point::new(1.0, 0.0, 5.0); count]));
+        RayQuestion { asked: Asked::default(), origins: vec![Point::new(0.0, 0.0, 5.0)].into(), toward }
+    }
+
+    #[tokio::test]
+    async fn a_small_question_is_answered_where_it_arrives_once_nothing_has_to_be_waited_for() {
+        let service = MapService::open(ServiceSettings::default(), &OpeningProgress::default()).unwrap();
+        let name = MapName::new("a").unwrap();
+        service.create_map(name.clone(), MapSettings::new(0.1, 1)).await.unwrap();
+        let map = Arc::clone(&service.map(&name).unwrap().map);
+        let put = |index| {
+            map.committer().exchange(&VoxelSet::default(), &VoxelKey::new(index).into_iter().collect());
+        };
+        let handed_over =
+            || service.pools().iter().find(|pool| pool.name == "planning").map_or(0, |pool| pool.begun);
+        let ask = async || service.ask(&name, pose_check()).await.unwrap().answer.words();
+        for (index, expected) in [([3, 0, 0], 0), ([1, 0, 0], 1)] {
+            put(index);
+            // The fields are to be made, or mended; what an answer did not wait for is made for the next one.
+            let before = handed_over();
+            assert_eq!(ask().await, [expected]);
+            assert!(handed_over() > before);
+            for _ in 0..8 {
+                ask().await;
+            }
+            let made = handed_over();
+            assert_eq!((ask().await, handed_over()), (vec![expected], made));
+        }
+        let before = handed_over();
+        service.ask(&name, rays(1)).await.unwrap();
+        assert_eq!(handed_over(), before);
+        service.ask(&name, rays(5000)).await.unwrap();
+        // A large one is checked there too.
+        assert_eq!(handed_over(), before + 2);
+        let mut wrong = pose_check();
+        wrong.asked.level = 7;
+        assert_eq!(service.ask(&name, wrong).await.unwrap_err().reason, Reason::LevelOutOfRange);
     }
 
     #[test]

@@ -32,6 +32,9 @@ pub struct MotionCheck {
 
 /// Bytes of a motion in an answer: a share, a clearance, and a bit.
 const BYTES_EACH: usize = 9;
+/// How long a part of the body takes at the ends of a motion and between them, for each configuration, nanoseconds: where it
+/// moves some ten voxels.
+const NS_EACH: usize = 30;
 
 impl Question for MotionCheck {
     type Answer = Vec<MotionAnswer>;
@@ -49,6 +52,11 @@ impl Question for MotionCheck {
     fn work_bytes(&self) -> usize {
         let (links, poses) = (self.body.links().len(), self.configurations.len() / NUMBERS_PER_POSE);
         prepared_bytes(self.lengths.len(), poses / links, links)
+    }
+
+    fn work_ns(&self) -> usize {
+        let configurations = self.configurations.len() / (NUMBERS_PER_POSE * self.body.links().len());
+        configurations.saturating_mul(self.body.parts()).saturating_mul(NS_EACH)
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
@@ -75,7 +83,7 @@ impl Question for MotionCheck {
             level: self.asked.level,
             surroundings: &self.surroundings,
         };
-        let view = map.planning_view(&self.asked, &self.surroundings);
+        let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
         let answers = view.check_motions(&question, stop)?;
         check_not_stopped(stop)?;
         answers.map(|answers| (answers, view.version())).ok_or_else(|| super::ended_early(stop))

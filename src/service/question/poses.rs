@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::check::{BYTES_EACH, CheckAs, Collisions, check_ignored, clearance_most_m};
 use super::{Asked, KnownPart, Question, QuestionedMap, check_elements};
 use crate::map::ContentVersion;
-use crate::planning::{Body, Configurations, PoseQuestion, Surroundings};
+use crate::planning::{Body, Configurations, NUMBERS_PER_POSE, PoseQuestion, Surroundings};
 use crate::service::{Limits, ServiceError, check_not_stopped};
 use crate::util::StopSignal;
 
@@ -23,6 +23,8 @@ pub struct PoseCheck {
     /// How it is answered.
     pub answer: CheckAs,
 }
+/// How long a part of the body takes in a configuration, nanoseconds; a bit more than where it is asked for a bit.
+const NS_EACH: usize = 5;
 
 impl Question for PoseCheck {
     type Answer = Collisions;
@@ -35,6 +37,11 @@ impl Question for PoseCheck {
 
     fn answer_bytes(&self, _: &Limits) -> usize {
         self.configurations.len() * BYTES_EACH
+    }
+
+    fn work_ns(&self) -> usize {
+        let configurations = self.configurations.len() / (NUMBERS_PER_POSE * self.body.links().len());
+        configurations.saturating_mul(self.body.parts()).saturating_mul(NS_EACH)
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
@@ -54,7 +61,7 @@ impl Question for PoseCheck {
         let level = self.asked.level;
         let question =
             PoseQuestion { body: &self.body, configurations, level, surroundings: &self.surroundings };
-        let view = map.planning_view(&self.asked, &self.surroundings);
+        let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
         let collisions = match self.answer {
             CheckAs::Colliding => view
                 .bodies_meet(&question, stop)?

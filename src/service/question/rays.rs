@@ -37,6 +37,8 @@ pub enum RaysToward {
 
 /// Bytes of a ray in an answer: a distance, a voxel, the number of a keep-out, and a bit.
 const BYTES_EACH: usize = 17;
+/// How long a ray takes, nanoseconds.
+const NS_EACH: usize = 300;
 
 impl RayQuestion {
     fn rays(&self) -> Rays<'_> {
@@ -65,6 +67,14 @@ impl Question for RayQuestion {
 
     fn answer_bytes(&self, _: &Limits) -> usize {
         self.elements() * BYTES_EACH
+    }
+
+    fn work_ns(&self) -> usize {
+        // Where unknown voxels are met rays go voxel by voxel.
+        match self.unknown {
+            Unknown::Free => self.elements().saturating_mul(NS_EACH),
+            Unknown::Occupied => usize::MAX,
+        }
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {

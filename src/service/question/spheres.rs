@@ -23,6 +23,8 @@ pub struct SphereCheck {
     /// How it is answered.
     pub answer: CheckAs,
 }
+/// How long a sphere takes, nanoseconds.
+const NS_EACH: usize = 30;
 
 impl Question for SphereCheck {
     type Answer = Collisions;
@@ -35,6 +37,10 @@ impl Question for SphereCheck {
 
     fn answer_bytes(&self, _: &Limits) -> usize {
         self.sizes.len() * BYTES_EACH
+    }
+
+    fn work_ns(&self) -> usize {
+        self.spheres.len().saturating_mul(NS_EACH)
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {
@@ -55,7 +61,7 @@ impl Question for SphereCheck {
         let groups = SphereGroups::new(&self.spheres, &self.sizes)?;
         let (level, padding_m) = (self.asked.level, self.padding_m);
         let question = SphereQuestion { groups, padding_m, level, surroundings: &self.surroundings };
-        let view = map.planning_view(&self.asked, &self.surroundings);
+        let view = map.planning_view(&self.asked, &self.surroundings, stop)?;
         let collisions = match self.answer {
             CheckAs::Colliding => view
                 .spheres_meet(&question, stop)?
