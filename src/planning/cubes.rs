@@ -7,6 +7,7 @@
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, BlockMask, Cell, VoxelKey};
 
+use super::clearance::FieldLevel;
 use super::effort::Effort;
 use super::free_space::{ALL, FreeSpace};
 use super::surroundings::Surroundings;
@@ -35,6 +36,8 @@ pub(super) struct CubeSearch<'a, 'e> {
     surroundings: &'a Surroundings,
     /// Where unknown voxels count: what was seen through.
     free_space: Option<FreeSpace<'a>>,
+    /// The field of the level, which knows what counts where it is made.
+    field: &'a FieldLevel,
     level: u32,
     center: [f64; 3],
     /// Squared distance beyond which nothing counts.
@@ -60,13 +63,13 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
     pub(super) fn new(
         view: &'a MapView<'a>,
         surroundings: &'a Surroundings,
-        level: u32,
+        (level, field): (u32, &'a FieldLevel),
         center: [f64; 3],
         effort: &'a Effort<'e>,
     ) -> Self {
         let free_space = surroundings.unknown_counts().then(|| FreeSpace::of(view));
         let (squared_max, found, is_any) = (0.0, None, false);
-        Self { view, surroundings, free_space, level, center, squared_max, found, is_any, effort }
+        Self { view, surroundings, free_space, field, level, center, squared_max, found, is_any, effort }
     }
 
     /// True where a voxel is at most `radius` cells away.
@@ -134,8 +137,7 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
         if !self.is_near(key.index(), side * BLOCK_SIDE) {
             return;
         }
-        let occupied = self.view.level_block(level, key);
-        let candidates = if self.free_space.is_some() { ALL } else { occupied };
+        let (candidates, occupied) = self.candidates(level, key);
         for cell in candidates.cells(2) {
             if self.is_near(cell.voxel(key).ancestor(2).index(), side * 4) {
                 self.search_part((level, side), key, candidates.part(cell), &occupied);
@@ -143,6 +145,18 @@ impl<'a, 'e> CubeSearch<'a, 'e> {
             if self.is_done() {
                 return;
             }
+        }
+    }
+
+    /// The voxels of a block that may count, and those of them that count without a look at what was seen through.
+    fn candidates(&self, level: u32, key: VoxelKey) -> (BlockMask, BlockMask) {
+        if self.free_space.is_none() {
+            let occupied = self.view.level_block(level, key);
+            return (occupied, occupied);
+        }
+        match self.field.obstacles(key).filter(|_| level == self.level) {
+            Some(obstacles) => (obstacles, obstacles),
+            None => (ALL, self.view.level_block(level, key)),
         }
     }
 

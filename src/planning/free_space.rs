@@ -16,14 +16,15 @@ pub(super) const ALL: BlockMask = BlockMask([u64::MAX; 8]);
 pub(super) struct FreeSpace<'a> {
     lattice: &'a Lattice,
     /// None where the view has no viewpoints: nothing was seen through.
+    viewpoints: Option<&'a ViewpointSet>,
     gaze: Option<Gaze<'a>>,
 }
 
 impl<'a> FreeSpace<'a> {
     /// What the scans of a view's map saw through.
     pub(super) fn of(view: &'a MapView<'_>) -> Self {
-        let viewpoints = view.viewpoints().filter(|viewpoints| !viewpoints.is_empty());
-        Self { lattice: view.lattice(), gaze: viewpoints.map(|viewpoints| ViewpointSet::gaze(viewpoints)) }
+        let viewpoints = view.viewpoints().map(|viewpoints| &**viewpoints).filter(|all| !all.is_empty());
+        Self { lattice: view.lattice(), viewpoints, gaze: viewpoints.map(ViewpointSet::gaze) }
     }
 
     /// True where a scan saw through the center of `voxel` of `level`.
@@ -33,19 +34,27 @@ impl<'a> FreeSpace<'a> {
         self.gaze.as_mut().is_some_and(|gaze| gaze.sees_through(center_m))
     }
 
-    /// The voxels of `level` in `block` that are not free, where those of `occupied` are occupied.
-    pub(super) fn not_free(&mut self, level: u32, block: VoxelKey, occupied: &BlockMask) -> BlockMask {
-        ALL.difference(&self.seen_through(level, block, occupied))
-    }
-
     /// The voxels of `level` in `block` that were seen through, but for those of `but`.
-    pub(super) fn seen_through(&mut self, level: u32, block: VoxelKey, but: &BlockMask) -> BlockMask {
+    pub(super) fn seen_through(&self, level: u32, block: VoxelKey, but: &BlockMask) -> BlockMask {
         let mut seen = BlockMask::EMPTY;
-        if self.gaze.is_some() {
-            for cell in (0..CELLS).map(Cell::from_bits).filter(|cell| !but.contains(*cell, 0)) {
-                if self.is_seen_through(cell.voxel(block), level) {
-                    seen.insert(cell);
+        let Some(viewpoints) = self.viewpoints else { return seen };
+        let mut left: Vec<(Cell, [f64; 3])> = (0..CELLS)
+            .map(Cell::from_bits)
+            .filter(|cell| !but.contains(*cell, 0))
+            .map(|cell| (cell, self.lattice.center_m(cell.voxel(block), level)))
+            .collect();
+        // One viewpoint after the other, so that its image stays near at hand.
+        let of_cell = |n: u16| self.lattice.center_m(Cell::from_bits(n).voxel(block), level);
+        for viewpoint in viewpoints.within(of_cell(0), of_cell(CELLS - 1)) {
+            left.retain(|(cell, center_m)| {
+                let is_seen = viewpoint.sees_through(*center_m);
+                if is_seen {
+                    seen.insert(*cell);
                 }
+                !is_seen
+            });
+            if left.is_empty() {
+                break;
             }
         }
         seen

@@ -219,8 +219,7 @@ impl<'a> Look<'a> {
                 }
             }
         }
-        let Self { view, surroundings, level, effort, .. } = self;
-        CubeSearch::new(view, surroundings, *level, center, effort).meets(radius)
+        self.search(center).meets(radius)
     }
 
     /// True where `voxel` counts.
@@ -233,8 +232,13 @@ impl<'a> Look<'a> {
 
     /// The nearest voxel that is at most `radius` cells away.
     pub(super) fn nearest(&mut self, center: [f64; 3], radius: f64) -> Option<NearestCube> {
-        let Self { view, surroundings, level, effort, .. } = self;
-        CubeSearch::new(view, surroundings, *level, center, effort).nearest(radius)
+        self.search(center).nearest(radius)
+    }
+
+    fn search(&mut self, center: [f64; 3]) -> CubeSearch<'_, 'a> {
+        let Self { view, surroundings, level, fields, effort, .. } = self;
+        let field = fields.level(surroundings.unknown, *level);
+        CubeSearch::new(view, surroundings, (*level, field), center, effort)
     }
 
     /// A lower bound of the distance from a point to the nearest voxel, cells, by fields of ever coarser levels until one

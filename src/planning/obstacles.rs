@@ -2,35 +2,45 @@
 
 use hashbrown::HashMap;
 
-use super::free_space::FreeSpace;
+use super::free_space::{ALL, FreeSpace};
 use super::surroundings::Unknown;
 use crate::map::MapView;
 use crate::voxel::{BLOCK_LEVELS, BlockMask, INDEX_MAX, INDEX_MIN, VoxelKey};
+
+/// What was seen through, by level and block.
+pub(super) type SeenBlocks = HashMap<(u32, VoxelKey), BlockMask>;
 
 /// The obstacles of a view, as the clearance field is made of them.
 #[derive(Debug)]
 pub(super) struct Obstacles<'a> {
     view: &'a MapView<'a>,
-    /// Where unknown voxels count: what was seen through, and the blocks that were looked at, since the blocks around ask for
-    /// each of them again.
-    careful: Option<(FreeSpace<'a>, HashMap<(u32, VoxelKey), BlockMask>)>,
+    /// Where unknown voxels count.
+    free_space: Option<FreeSpace<'a>>,
+    /// The blocks that were looked at: each is asked for again by those around it.
+    seen: SeenBlocks,
 }
 
 impl<'a> Obstacles<'a> {
-    pub(super) fn of(view: &'a MapView<'a>, unknown: Unknown) -> Self {
-        let careful = (unknown == Unknown::Occupied).then(|| (FreeSpace::of(view), HashMap::new()));
-        Self { view, careful }
+    /// The obstacles of a view, of which it is known what was seen through in some blocks.
+    pub(super) fn of(view: &'a MapView<'a>, unknown: Unknown, seen: SeenBlocks) -> Self {
+        let free_space = (unknown == Unknown::Occupied).then(|| FreeSpace::of(view));
+        Self { view, free_space, seen }
     }
 
     /// The voxels of `level` in `block` that count.
     pub(super) fn block(&mut self, level: u32, block: VoxelKey) -> BlockMask {
         let occupied = self.view.level_block(level, block);
-        match &mut self.careful {
-            Some((free_space, known)) if is_in_lattice(level, block) => {
-                *known.entry((level, block)).or_insert_with(|| free_space.not_free(level, block, &occupied))
-            }
-            _ => occupied,
-        }
+        let Some(free_space) = self.free_space.as_ref().filter(|_| is_in_lattice(level, block)) else {
+            return occupied;
+        };
+        let look = || free_space.seen_through(level, block, &BlockMask::EMPTY);
+        let seen = self.seen.entry((level, block)).or_insert_with(look);
+        ALL.difference(&seen.difference(&occupied))
+    }
+
+    /// What was seen through in the blocks that were looked at.
+    pub(super) fn into_seen(self) -> SeenBlocks {
+        self.seen
     }
 }
 

@@ -6,7 +6,7 @@ use super::PlanningError;
 use super::clearance::{FIELD_BYTES_MAX_DEFAULT, FieldBlockKey, Fields};
 use super::keep_outs::Shapes;
 use super::look::Look;
-use super::obstacles::Obstacles;
+use super::obstacles::{Obstacles, SeenBlocks};
 use super::simd::{self, Work};
 use super::surroundings::{Surroundings, Unknown};
 use crate::map::{BlockFollower, ContentVersion, LongRead, MapView, MultiResolutionMap};
@@ -255,11 +255,18 @@ impl PlanningView<'_> {
         if unmade.is_empty() {
             return;
         }
-        let mut obstacles = Obstacles::of(&self.view, unknown);
+        let fields = self.planner.fields.read();
+        let is_known = unknown == Unknown::Occupied && self.holds(&fields, unknown);
+        let seen = if is_known { fields.seen_around(&unmade) } else { SeenBlocks::new() };
+        drop(fields);
+        let mut obstacles = Obstacles::of(&self.view, unknown, seen);
         let made = stop.paced(unmade, MADE_PER_LOOK).map(|key| (key, key.make(&mut obstacles)));
         let blocks = made.collect();
         let mut fields = self.planner.fields.write();
         if self.holds(&fields, unknown) {
+            if unknown == Unknown::Occupied {
+                fields.keep_seen(obstacles.into_seen());
+            }
             fields.keep(blocks);
             self.planner.follower.set_bytes(fields.bytes());
         }

@@ -186,7 +186,7 @@ impl SeenMap {
 const SOLID_M: f64 = 9.0;
 const SOLID_CELLS: i32 = 7;
 
-/// Around what scans see: small scenes, so that few voxels are looked at one by one.
+/// A scan of a small scene, so that few voxels are looked at one by one.
 fn scan() -> impl Strategy<Value = SeenScan> {
     let origin = prop::array::uniform3(-3.0f64..3.0);
     let turned = prop::array::uniform3(-3.0f64..3.0);

@@ -117,6 +117,33 @@ impl ReachIndex {
         }
     }
 
+    /// The viewpoints that may have looked at a point between two corners of the map, each once.
+    pub(super) fn within(&self, low_m: [f64; 3], high_m: [f64; 3]) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        for (&exponent, grid) in &self.grids {
+            let [low, high] =
+                [low_m, high_m].map(|at_m| at_m.map(|c| (c / 2f64.powi(exponent)).floor() as i32));
+            let mut take =
+                |entries: &[Entry]| slots.extend(entries.iter().map(|entry| (entry.weight, entry.slot)));
+            let count: f64 = (0..3).map(|axis| f64::from(high[axis]) - f64::from(low[axis]) + 1.0).product();
+            if count > grid.len() as f64 {
+                let is_inside =
+                    |cell: &CellIndex| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&cell[axis]));
+                grid.iter().filter(|(cell, _)| is_inside(cell)).for_each(|(_, entries)| take(entries));
+                continue;
+            }
+            let cells = (low[2]..=high[2]).flat_map(|z| (low[1]..=high[1]).map(move |y| (y, z)));
+            for (y, z) in cells {
+                (low[0]..=high[0]).filter_map(|x| grid.get(&[x, y, z])).for_each(|entries| take(entries));
+            }
+        }
+        // Each once, and first those that saw most.
+        slots.sort_unstable_by_key(|&(weight, slot)| (slot, std::cmp::Reverse(weight)));
+        slots.dedup_by_key(|(_, slot)| *slot);
+        slots.sort_unstable_by_key(|&(weight, slot)| (std::cmp::Reverse(weight), slot));
+        slots.into_iter().map(|(_, slot)| slot).collect()
+    }
+
     /// The cells that a viewpoint looked into, each once.
     pub(super) fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         self.grids.iter().flat_map(|(&exponent, grid)| grid.keys().map(move |cell| box_m(exponent, *cell)))

@@ -94,8 +94,15 @@ impl ViewpointSet {
 
     /// The parts of space that a viewpoint may have seen a point of, each once: boxes of the map frame, as the smallest and the largest
     /// coordinates, meters. Boxes of viewpoints that reach further are larger, and may hold others.
-    pub fn reach_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+    pub fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         self.index.boxes_m()
+    }
+
+    /// The viewpoints that may have seen beyond a point between two corners (map frame, meters), first those that saw most there.
+    ///
+    /// Takes longer the further apart the corners are, against how far viewpoints see.
+    pub fn within(&self, low_m: [f64; 3], high_m: [f64; 3]) -> impl Iterator<Item = &Viewpoint> {
+        self.index.within(low_m, high_m).into_iter().filter_map(|slot| self.at(slot).map(Arc::as_ref))
     }
 
     /// Looks at many points that lie near each other, one after the other.

@@ -108,6 +108,24 @@ impl FieldBlock {
     }
 }
 
+impl FieldBlock {
+    /// The cells that are obstacles: those at no distance.
+    pub(super) fn obstacles(&self) -> BlockMask {
+        let word = |line: &[u8]| {
+            let zeros = (0..).zip(line).fold(0, |word, (place, byte)| word | u64::from(*byte == 0) << place);
+            in_morton_order(zeros)
+        };
+        BlockMask(std::array::from_fn(|line| word(&self.0[line * LINE_BYTES..(line + 1) * LINE_BYTES])))
+    }
+}
+
+/// The inverse of [`row_by_row`].
+fn in_morton_order(word: u64) -> u64 {
+    let word = exchange(word, 0x0000_ff00_0000_ff00, 8);
+    let word = exchange(word, 0x00f0_00f0_00f0_00f0, 4);
+    exchange(word, 0x00cc_00cc_00cc_00cc, 6)
+}
+
 /// Lowers each cell to `from` and the steps between, where that is less.
 #[inline(always)]
 fn lower(cells: &mut [u8], from: &[u8], squared: u8) {
@@ -175,6 +193,7 @@ mod tests {
                 let nearest = voxels.iter().map(|&voxel| squared(cell, voxel)).min().unwrap_or(u32::MAX);
                 prop_assert_eq!(u32::from(field.0[cell_place(cell) as usize]), nearest.min(u32::from(FAR)), "{:?}", cell);
             }
+            prop_assert_eq!(field.obstacles(), around[13]);
         }
     }
 

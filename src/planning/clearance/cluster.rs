@@ -1,7 +1,7 @@
 //! Clusters of 8 x 8 x 8 blocks of the field: which are made, and where they are.
 
 use super::block::{BLOCK_BYTES, FieldBlock, LINE_BYTES};
-use crate::voxel::VoxelKey;
+use crate::voxel::{BlockMask, VoxelKey};
 
 /// Levels from a block up to its cluster.
 pub(super) const CLUSTER_LEVELS: u32 = 3;
@@ -46,6 +46,14 @@ impl FieldCluster {
         let number = self.numbers[block as usize % BLOCKS];
         let lines = self.blocks.get(usize::from(number))?.0.as_chunks().0;
         lines.get(cell as usize / LINE_BYTES)
+    }
+
+    /// The obstacles in the block at `place`; none where it is not made.
+    pub(super) fn obstacles(&self, place: usize) -> Option<BlockMask> {
+        match self.numbers[place] {
+            NOTHING_NEAR => Some(BlockMask::EMPTY),
+            number => self.blocks.get(usize::from(number)).map(FieldBlock::obstacles),
+        }
     }
 
     /// Keeps the block at `place`; none is one with nothing near.

@@ -7,7 +7,7 @@ use super::block::FieldBlock;
 use super::cluster::{CLUSTER_LEVELS, FieldCluster};
 use super::level::FieldLevel;
 use crate::map::{MapView, TouchedBlocks};
-use crate::planning::obstacles::Obstacles;
+use crate::planning::obstacles::{Obstacles, SeenBlocks};
 use crate::planning::surroundings::Unknown;
 use crate::util::Keyword;
 use crate::visibility::{Viewpoint, ViewpointSet};
@@ -18,6 +18,11 @@ pub const FIELD_BYTES_MAX_DEFAULT: usize = 128 << 20;
 
 /// Blocks that are forgotten one by one where viewpoints change; where there are more, all go that depend on viewpoints.
 const FORGOTTEN_BLOCKS_MAX: f64 = 200_000.0;
+
+/// Bytes of memory of a block of which it is kept what was seen through.
+const SEEN_BYTES: usize = 2 * size_of::<((u32, VoxelKey), BlockMask)>();
+/// The share of the bytes that fields may hold that such blocks take at most, one in so many.
+const SEEN_SHARE: usize = 4;
 
 /// Cells beyond a change in which distances may change with it.
 const NEAR_CELLS: i32 = 8;
@@ -37,6 +42,8 @@ pub(in crate::planning) struct Fields {
     levels: [Vec<FieldLevel>; Unknown::ALL.len()],
     /// What the fields depend on in which unknown voxels are occupied.
     viewpoints: Arc<ViewpointSet>,
+    /// What these saw through, of blocks from which fields were made.
+    seen: SeenBlocks,
     /// The clusters by age, the oldest first: that is the first to go.
     by_age: VecDeque<FieldBlockKey>,
     bytes: usize,
@@ -50,6 +57,7 @@ impl Fields {
         Self {
             levels: [fields(), fields()],
             viewpoints: Arc::default(),
+            seen: SeenBlocks::new(),
             by_age: VecDeque::new(),
             bytes: 0,
             bytes_max,
@@ -58,7 +66,7 @@ impl Fields {
 
     /// Bytes of memory held.
     pub(in crate::planning) fn bytes(&self) -> usize {
-        self.bytes
+        self.bytes + self.seen.len() * SEEN_BYTES
     }
 
     /// The field of `level`.
@@ -98,9 +106,33 @@ impl Fields {
         self.make_room();
     }
 
+    /// What is known of what was seen through around blocks that are to be made.
+    pub(in crate::planning) fn seen_around(&self, blocks: &[FieldBlockKey]) -> SeenBlocks {
+        let mut around = SeenBlocks::new();
+        for key in blocks {
+            for block in key.around().into_iter().flatten() {
+                if let Some(seen) = self.seen.get(&(key.level, block)) {
+                    around.insert((key.level, block), *seen);
+                }
+            }
+        }
+        around
+    }
+
+    /// Keeps what was seen through; where there is no room, forgets what was known before.
+    pub(in crate::planning) fn keep_seen(&mut self, seen: SeenBlocks) {
+        let most = self.bytes_max / SEEN_SHARE / SEEN_BYTES;
+        if self.seen.len() + seen.len() > most {
+            self.seen.clear();
+        }
+        if seen.len() <= most {
+            self.seen.extend(seen);
+        }
+    }
+
     /// Drops the oldest clusters beyond the bound.
     fn make_room(&mut self) {
-        while self.bytes > self.bytes_max
+        while self.bytes() > self.bytes_max
             && let Some(FieldBlockKey { unknown, level, block }) = self.by_age.pop_front()
         {
             self.bytes -= self.level_mut(unknown, level).remove_cluster(block);
@@ -113,6 +145,7 @@ impl Fields {
         let fields = &self.levels[Unknown::Occupied as usize];
         let levels: Vec<u32> =
             (0..).zip(fields).filter(|(_, of)| !of.is_empty()).map(|(level, _)| level).collect();
+        self.seen.retain(|(level, _), _| levels.contains(level));
         if levels.is_empty() {
             return;
         }
@@ -128,12 +161,18 @@ impl Fields {
             return self.forget_seen();
         }
         for &level in &levels {
-            boxes(level).for_each(|[low, high]| self.forget_box_of(Unknown::Occupied, level, low, high));
+            for [low, high] in boxes(level) {
+                self.forget_box_of(Unknown::Occupied, level, low, high);
+                for block in blocks_within(low, high, 0) {
+                    self.seen.remove(&(level, block));
+                }
+            }
         }
     }
 
     /// Forgets all that depends on viewpoints.
     fn forget_seen(&mut self) {
+        self.seen.clear();
         let (gone, kept) = self.by_age.drain(..).partition(|key| key.unknown == Unknown::Occupied);
         self.by_age = kept;
         for FieldBlockKey { unknown, level, block } in gone {
@@ -194,20 +233,17 @@ impl Fields {
         if field.is_empty() {
             return;
         }
-        let range = |axis: usize| {
-            low[axis].saturating_sub(NEAR_CELLS) >> BLOCK_LEVELS
-                ..=high[axis].saturating_add(NEAR_CELLS) >> BLOCK_LEVELS
-        };
-        for z in range(2) {
-            for y in range(1) {
-                for x in range(0) {
-                    if let Some(block) = VoxelKey::new([x, y, z]) {
-                        field.forget(block);
-                    }
-                }
-            }
-        }
+        blocks_within(low, high, NEAR_CELLS).for_each(|block| field.forget(block));
     }
+}
+
+/// The blocks within `more` cells of the cells from `low` to `high`.
+fn blocks_within(low: [i32; 3], high: [i32; 3], more: i32) -> impl Iterator<Item = VoxelKey> {
+    let range = move |axis: usize| {
+        low[axis].saturating_sub(more) >> BLOCK_LEVELS..=high[axis].saturating_add(more) >> BLOCK_LEVELS
+    };
+    let rows = range(2).flat_map(move |z| range(1).map(move |y| (y, z)));
+    rows.flat_map(move |(y, z)| range(0).filter_map(move |x| VoxelKey::new([x, y, z])))
 }
 
 /// The viewpoints that are in one of two sets alone.
@@ -233,14 +269,19 @@ fn blocks_near([low, high]: [[i32; 3]; 2]) -> f64 {
 impl FieldBlockKey {
     /// Computes the block, of the obstacles around it.
     pub(in crate::planning) fn make(self, obstacles: &mut Obstacles<'_>) -> Option<FieldBlock> {
-        let [x, y, z] = self.block.index();
         let mut around = [BlockMask::EMPTY; 27];
-        for (n, mask) in (0..).zip(&mut around) {
-            let neighbor = VoxelKey::new([x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
-            if let Some(neighbor) = neighbor {
-                *mask = obstacles.block(self.level, neighbor);
-            }
+        for (block, mask) in self.around().into_iter().zip(&mut around) {
+            *mask = block.map_or(BlockMask::EMPTY, |block| obstacles.block(self.level, block));
         }
         around.iter().any(|mask| !mask.is_empty()).then(|| FieldBlock::of(&around)).flatten()
+    }
+
+    /// The blocks around it and itself, x fastest; none beyond all keys.
+    fn around(self) -> [Option<VoxelKey>; 27] {
+        let [x, y, z] = self.block.index();
+        std::array::from_fn(|n| {
+            let n = n as i32;
+            VoxelKey::new([x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1])
+        })
     }
 }

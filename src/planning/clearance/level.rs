@@ -2,7 +2,7 @@
 
 use super::block::cell_place;
 use super::cluster::{CLUSTER_LEVELS, FieldCluster};
-use crate::voxel::{BLOCK_LEVELS, VoxelKey};
+use crate::voxel::{BLOCK_LEVELS, BlockMask, VoxelKey};
 
 /// Marks a vacant slot; no key sets bit 63.
 const VACANT: u64 = u64::MAX;
@@ -84,6 +84,11 @@ impl FieldLevel {
     #[inline(always)]
     fn hash(key: u64) -> usize {
         (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as usize
+    }
+
+    /// The obstacles in a block, as they were when it was made; none where it is not made.
+    pub(in crate::planning) fn obstacles(&self, block: VoxelKey) -> Option<BlockMask> {
+        self.cluster(block.ancestor(CLUSTER_LEVELS).to_bits())?.obstacles(FieldCluster::place(block))
     }
 
     /// The cluster of a block, where there is one.

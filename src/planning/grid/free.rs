@@ -72,7 +72,7 @@ impl Projection<'_> {
         };
         let bounds = [area(0), area(1), self.band.map(|z| block(z.into()))];
         let mut blocks = Vec::new();
-        for [low_m, high_m] in stop.paced(viewpoints.reach_m(), BLOCKS_PER_LOOK) {
+        for [low_m, high_m] in stop.paced(viewpoints.boxes_m(), BLOCKS_PER_LOOK) {
             let range = |axis: usize| {
                 // A conversion keeps to what a number can hold.
                 let index = |c: f64| block((c / self.voxel_m).floor() as i64);
