@@ -53,13 +53,13 @@ impl Reach {
         let ends: Vec<[f64; 3]> = image.seen().map(|offset| in_map(offset).into()).collect();
         let distance =
             |end: &[f64; 3]| (0..3).map(|axis| (end[axis] - origin[axis]).powi(2)).sum::<f64>().sqrt();
-        let reach_m = ends.iter().map(distance).fold(0.0, f64::max).max(f64::from(f32::MIN_POSITIVE));
+        let extent_m = ends.iter().map(distance).fold(0.0, f64::max).max(f64::from(f32::MIN_POSITIVE));
         // Indices of cells are of 32 bits, however far away and however small a thing was seen.
-        let far_m = origin.iter().fold(reach_m, |far, c| far.max(c.abs()));
-        let side_m = (reach_m / CELLS_OF_REACH).max(far_m / CELL_INDEX_MAX);
+        let far_m = origin.iter().fold(extent_m, |far, c| far.max(c.abs()));
+        let side_m = (extent_m / CELLS_OF_REACH).max(far_m / CELL_INDEX_MAX);
         let exponent = side_m.log2().ceil() as i32;
         let side_m = 2f64.powi(exponent);
-        let mut grid = LocalGrid::around(origin, reach_m, side_m);
+        let mut grid = LocalGrid::around(origin, extent_m, side_m);
         let half_pixel = f64::from(image.pitch()) * std::f64::consts::FRAC_1_SQRT_2;
         for end in &ends {
             let steps = (distance(end) / side_m * STEPS_A_CELL).ceil().max(1.0);
@@ -169,11 +169,11 @@ struct LocalGrid {
 }
 
 impl LocalGrid {
-    fn around(origin: [f64; 3], reach_m: f64, side_m: f64) -> Self {
+    fn around(origin: [f64; 3], extent_m: f64, side_m: f64) -> Self {
         // Balls around rays reach beyond their ends.
-        let reach_m = reach_m + 2.0 * side_m;
-        let first = origin.map(|c| ((c - reach_m) / side_m).floor() as i32);
-        let end = origin.map(|c| ((c + reach_m) / side_m).floor() as i32 + 1);
+        let extent_m = extent_m + 2.0 * side_m;
+        let first = origin.map(|c| ((c - extent_m) / side_m).floor() as i32);
+        let end = origin.map(|c| ((c + extent_m) / side_m).floor() as i32 + 1);
         let count: [usize; 3] = std::array::from_fn(|axis| (end[axis] - first[axis]) as usize);
         Self { side_m, first, count, marks: vec![0; count.iter().product()] }
     }

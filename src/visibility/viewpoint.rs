@@ -54,7 +54,7 @@ impl Viewpoint {
 
     /// The part of space that it can have seen a point of: boxes of the map frame, each as the smallest and the largest
     /// coordinates, meters.
-    pub fn reach_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+    pub fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         self.reach.boxes_m()
     }
 

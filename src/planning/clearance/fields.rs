@@ -149,7 +149,7 @@ impl Fields {
         if levels.is_empty() {
             return;
         }
-        let reaches: Vec<_> = changed(&before, viewpoints).flat_map(Viewpoint::reach_m).collect();
+        let reaches: Vec<_> = changed(&before, viewpoints).flat_map(Viewpoint::boxes_m).collect();
         let boxes = |level: u32| {
             let cells_per_m = 1.0 / lattice.resolution_m(level);
             // One cell more, whatever the rounding; a conversion keeps to what a number can hold.

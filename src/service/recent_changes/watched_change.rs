@@ -175,7 +175,7 @@ impl ToldViewpoint {
 
 /// True where a viewpoint may have seen a point of a region, or one near it.
 pub(in crate::service) fn has_looked_into(viewpoint: &Viewpoint, region: &Region) -> bool {
-    viewpoint.reach_m().any(|[min_m, max_m]| {
+    viewpoint.boxes_m().any(|[min_m, max_m]| {
         let center_m = std::array::from_fn(|axis| (min_m[axis] + max_m[axis]) / 2.0);
         let half_m = (0..3).map(|axis| ((max_m[axis] - min_m[axis]) / 2.0).powi(2)).sum::<f64>().sqrt();
         region.distance_m(center_m) <= half_m
