@@ -17,12 +17,15 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::client::{Client, ClientError, new_session};
-use crate::geometry::{Pose, pose_difference};
+use crate::geometry::{Point, Pose, pose_difference};
 use crate::lab::simulate::{Scene, SpinningLidar};
 use crate::map::{MapName, Region, RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::planning::{Body, Frontier, Surroundings, Unknown};
-use crate::service::{Asked, Collisions, FrontierQuestion, MotionCheck, PoseCheck, ScanAnswer, ScanRequest};
+use crate::service::{
+    Asked, Collisions, FrontierQuestion, MotionCheck, PoseCheck, RayQuestion, RaysToward, ScanAnswer,
+    ScanRequest,
+};
 use standing::{body, pose_at};
 use ways::{Cell, Ways};
 
@@ -37,11 +40,16 @@ const FRONTIER_HEIGHTS_M: [f64; 2] = [0.2, 2.2];
 /// How far around the places where the robot was it looks for ways and frontiers, meters.
 const AROUND_M: f64 = 8.0;
 /// How far from the place from which a frontier can be seen the robot may stop, meters.
-const NEAR_VIEW_M: f64 = 1.2;
+const NEAR_VIEW_M: f64 = 0.4;
 /// How far it drives between two scans, meters.
 const SCAN_EVERY_M: f64 = 0.6;
-/// A frontier that is still there within this of one that was visited is given up, meters.
+/// A frontier within this of as many visited ones as there may be visits is given up, meters: it stays, whatever the robot does.
 const GIVEN_UP_M: f64 = 0.5;
+const VISITS_MAX: usize = 2;
+/// From how far away a frontier is looked at where the robot cannot get to the place that the server names, meters.
+const LOOK_M: [f64; 2] = [0.7, 3.0];
+/// One of so many places along each axis is tried for that.
+const LOOK_EVERY: usize = 3;
 /// Half the side of the place where the robot begins, which it knows to be free since it stands there, meters.
 const OWN_PLACE_M: f64 = 0.6;
 
@@ -59,8 +67,8 @@ pub struct Explorer {
     truth: Pose,
     believed: Pose,
     scans: u64,
-    /// Where frontiers stay whatever the robot does.
-    given_up: Vec<[f64; 3]>,
+    /// The middles of the frontiers that it went to see.
+    visited: Vec<[f64; 3]>,
     /// Places of the sensor as they really were, one after the other.
     path: Vec<[f64; 3]>,
 }
@@ -113,7 +121,7 @@ impl Explorer {
             truth: start,
             believed: start,
             scans: 0,
-            given_up: Vec::new(),
+            visited: Vec::new(),
             path: vec![start.translation.vector.into()],
         })
     }
@@ -167,16 +175,13 @@ impl Explorer {
     pub async fn step(&mut self) -> Result<Step, ClientError> {
         let listed = self.frontiers().await?;
         let ways = self.ways().await?;
-        let mut goals: Vec<_> = listed.iter().filter_map(|frontier| self.goal(frontier, &ways)).collect();
-        goals.sort_by(|one, other| one.way_m.total_cmp(&other.way_m));
-        for Goal { frontier, cell, way_m } in goals {
+        for Goal { frontier, cell, way_m } in self.goals(&listed, &ways).await? {
             let way: Vec<[f64; 2]> = ways.way_to(cell);
             if !self.is_free(&way).await? {
-                self.given_up.push(frontier.center_m);
                 continue;
             }
             let scan = Box::new(self.drive(&way).await?);
-            self.given_up.push(frontier.center_m);
+            self.visited.push(frontier.center_m);
             let error_m = pose_difference(&self.truth, &self.believed).0;
             return Ok(Step::Visited { frontier, way_m, listed: listed.len(), scan, error_m });
         }
@@ -207,7 +212,8 @@ impl Explorer {
         };
         let told = self.client.list_frontiers(&self.map, question).await?.answer.frontiers;
         let is_new = |frontier: &Frontier| {
-            self.given_up.iter().all(|place| distance(place, &frontier.center_m) > GIVEN_UP_M)
+            let near = self.visited.iter().filter(|place| distance(place, &frontier.center_m) <= GIVEN_UP_M);
+            near.count() < VISITS_MAX
         };
         Ok(told.into_iter().filter(is_new).collect())
     }
@@ -267,11 +273,38 @@ impl Explorer {
         self.look().await
     }
 
-    /// Where a frontier is best seen from of all places that can be reached; none where it cannot be seen from any of them.
-    fn goal(&self, frontier: &Frontier, ways: &Ways) -> Option<Goal> {
-        let view: [f64; 3] = frontier.view?.map_from_view.translation.vector.into();
-        let (cell, way_m) = ways.nearest_to([view[0], view[1]], NEAR_VIEW_M)?;
-        Some(Goal { frontier: *frontier, cell, way_m })
+    /// Where frontiers can be seen from of all places that can be reached, the nearest first: where the server says, or else from where
+    /// a ray to the frontier meets nothing.
+    async fn goals(&self, frontiers: &[Frontier], ways: &Ways) -> Result<Vec<Goal>, ClientError> {
+        let (mut goals, mut looks) = (Vec::new(), Vec::new());
+        for &frontier in frontiers {
+            let target_m = frontier.view.map_or(frontier.center_m, |view| view.target_m);
+            let view = frontier.view.map(|view| view.map_from_view.translation.vector);
+            match view.and_then(|view| ways.nearest_to([view.x, view.y], NEAR_VIEW_M)) {
+                Some((cell, way_m)) => goals.push(Goal { frontier, cell, way_m }),
+                None => looks.extend(looks_at(target_m, ways).map(|look| (frontier, target_m, look))),
+            }
+        }
+        let toward = looks.iter().map(|(_, target_m, _)| point(*target_m)).collect::<Vec<_>>();
+        let origins = looks.iter().map(|(_, _, look)| point(look.origin_m)).collect::<Vec<_>>();
+        if !looks.is_empty() {
+            let question = RayQuestion {
+                asked: Asked::default(),
+                origins: origins.into(),
+                toward: RaysToward::Ends(toward.into()),
+                unknown: Unknown::Free,
+            };
+            let hits = self.client.cast_rays(&self.map, question).await?.answer;
+            let clear =
+                looks.iter().zip(&hits.distances_m).filter(|(_, distance_m)| distance_m.is_infinite());
+            goals.extend(clear.map(|((frontier, _, look), _)| Goal {
+                frontier: *frontier,
+                cell: look.cell,
+                way_m: look.way_m,
+            }));
+        }
+        goals.sort_by(|one, other| one.way_m.total_cmp(&other.way_m));
+        Ok(goals)
     }
 
     fn place(&self) -> [f64; 2] {
@@ -288,6 +321,29 @@ impl Explorer {
         };
         Surroundings { ignored: vec![own_place], unknown: Unknown::Occupied }
     }
+}
+
+/// A place from which something could be seen.
+struct Look {
+    cell: Cell,
+    way_m: f64,
+    /// Where the sensor would be.
+    origin_m: [f64; 3],
+}
+
+/// The places that can be reached from which the sensor looks at a target neither from too near nor too steeply.
+fn looks_at([x, y, z]: [f64; 3], ways: &Ways) -> impl Iterator<Item = Look> + '_ {
+    const STEEPEST: f64 = 1.1;
+    ways.reached(LOOK_EVERY).filter_map(move |(cell, way_m, place)| {
+        let distance_m = (place[0] - x).hypot(place[1] - y);
+        let is_seen = (LOOK_M[0]..LOOK_M[1]).contains(&distance_m)
+            && (z - SENSOR_HEIGHT_M).abs() <= STEEPEST * distance_m;
+        is_seen.then_some(Look { cell, way_m, origin_m: [place[0], place[1], SENSOR_HEIGHT_M] })
+    })
+}
+
+fn point(place_m: [f64; 3]) -> Point {
+    Point::from(place_m.map(|c| c as f32))
 }
 
 /// Where the robot could go.

@@ -28,7 +28,7 @@ impl Visible {
         const REACH_M: f64 = 16.0;
         let grid = Grid::around([start.map(|c| c - REACH_M), start.map(|c| c + REACH_M)]);
         let ways = Ways::from(grid, |_, place| stands_free(scene, place), start);
-        let places: Vec<[f64; 2]> = ways.reached(LOOK_EVERY).collect();
+        let places: Vec<[f64; 2]> = ways.reached(LOOK_EVERY).map(|(_, _, place)| place).collect();
         let lidar = SpinningLidar { noise_m: 0.0, dropout: 0.0, ..lidar.clone() };
         let mut random = ChaCha8Rng::seed_from_u64(0);
         let (mut once, mut voxels) = (BTreeSet::new(), BTreeSet::new());

@@ -90,25 +90,21 @@ impl Ways {
         ways
     }
 
-    /// Of the places at most `near_m` from `place` that can be reached, the one with the shortest way.
+    /// Of the places at most `near_m` from `place` that can be reached, the nearest, with the way to it.
     pub(super) fn nearest_to(&self, place: [f64; 2], near_m: f64) -> Option<(Cell, f64)> {
-        let [columns, rows] = self.grid.count;
-        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row]));
-        let near = cells.filter(|&cell| {
-            let [x, y] = self.grid.place(cell);
-            (x - place[0]).hypot(y - place[1]) <= near_m
-        });
-        let reached =
-            near.map(|cell| (cell, self.way_m[self.grid.number(cell)])).filter(|(_, m)| m.is_finite());
-        reached.min_by(|one, other| one.1.total_cmp(&other.1))
+        let off = |cell: [f64; 2]| (cell[0] - place[0]).hypot(cell[1] - place[1]);
+        let near = self.reached(1).filter(|(_, _, at)| off(*at) <= near_m);
+        let (cell, way_m, _) = near.min_by(|one, other| off(one.2).total_cmp(&off(other.2)))?;
+        Some((cell, way_m))
     }
 
-    /// Places that can be reached, one of `every` along each axis.
-    pub(super) fn reached(&self, every: usize) -> impl Iterator<Item = [f64; 2]> + '_ {
+    /// Places that can be reached, one of `every` along each axis, each with the way to it, meters.
+    pub(super) fn reached(&self, every: usize) -> impl Iterator<Item = (Cell, f64, [f64; 2])> + '_ {
         let [columns, rows] = self.grid.count;
         let cells =
             (0..rows).step_by(every).flat_map(move |row| (0..columns).step_by(every).map(move |x| [x, row]));
-        cells.filter(|&cell| self.way_m[self.grid.number(cell)].is_finite()).map(|cell| self.grid.place(cell))
+        let reached = cells.map(|cell| (cell, self.way_m[self.grid.number(cell)], self.grid.place(cell)));
+        reached.filter(|(_, way_m, _)| way_m.is_finite())
     }
 
     /// The places along the way to a cell, from the start on.

@@ -14,7 +14,9 @@ use crate::planning::placement::LinkPose;
 use crate::planning::*;
 use crate::util::StopSignal;
 use brute_force::{BruteForce, every_step};
-use made::{Exchange, body_and_poses, exchange, exchanges, indices, number, radius_m, surroundings};
+use made::{
+    Exchange, body_and_poses, exchange, exchanges, indices, link, near_pose, number, radius_m, surroundings,
+};
 
 const RESOLUTION_M: f64 = 0.5;
 

@@ -353,7 +353,12 @@ mod tests {
     /// Rays that meet nothing.
     fn rays(count: usize) -> RayQuestion {
         let toward = RaysToward::Ends(PointCloud::from(vec![Point::new(1.0, 0.0, 5.0); count]));
-        RayQuestion { asked: Asked::default(), origins: vec![Point::new(0.0, 0.0, 5.0)].into(), toward }
+        RayQuestion {
+            asked: Asked::default(),
+            origins: vec![Point::new(0.0, 0.0, 5.0)].into(),
+            toward,
+            unknown: Unknown::Free,
+        }
     }
 
     #[tokio::test]
