@@ -8,6 +8,8 @@ use crate::voxel::VoxelKey;
 
 /// Points between two looks at the stop signal. A multiple of the bits in a word.
 const POINTS_PER_LOOK: usize = 4096;
+/// Points that viewpoints are asked of between two looks at it: where thousands looked, one takes up to a millisecond.
+const ASKED_PER_LOOK: usize = 16;
 
 /// What is known of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -106,9 +108,10 @@ pub fn classify_points(
     let mut free_space = FreeSpace::of(view);
     // Points that come one after the other are often in one voxel.
     let mut last: Option<(VoxelKey, bool)> = None;
+    let mut asked = 0;
     let words =
         states.occupied.chunks_mut(POINTS_PER_LOOK / 64).zip(states.free.chunks_mut(POINTS_PER_LOOK / 64));
-    for (looked_up, (some, (occupied, free))) in
+    'all: for (looked_up, (some, (occupied, free))) in
         stop.paced(points.chunks(POINTS_PER_LOOK).zip(words).enumerate(), 1)
     {
         if !view.query(some, &from_map, level, Lookup::Exact, occupied) {
@@ -121,6 +124,10 @@ pub fn classify_points(
         }
         for (i, &point) in some.iter().enumerate().filter(|(i, _)| occupied[i / 64] >> (i % 64) & 1 == 0) {
             let Some(voxel) = from_map.key(point).map(|finest| finest.ancestor(level)) else { continue };
+            asked += 1;
+            if asked % ASKED_PER_LOOK == 0 && stop.is_stopped() {
+                break 'all;
+            }
             let is_free = match last {
                 Some((before, is_free)) if before == voxel => is_free,
                 _ => free_space.is_seen_through(voxel, level),

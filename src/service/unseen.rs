@@ -11,6 +11,8 @@ use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 
 /// Whom memory is lent to, in refusals.
 const UNSEEN: &str = "a deletion of what was not seen";
+/// How far behind a voxel a scan has to have seen, in finest voxels: noise puts surfaces two voxels off.
+const MARGIN_VOXELS: f64 = 3.0;
 /// Blocks that are looked at between two looks at the stop signal.
 const BLOCKS_PER_LOOK: usize = 64;
 
@@ -62,11 +64,12 @@ impl HostedMap {
         drop(view);
         drop(long_read);
         let lattice = self.map.lattice();
+        let margin_m = (MARGIN_VOXELS * lattice.resolution_m(0)) as f32;
         let seen_through = stop.paced(there.blocks(), BLOCKS_PER_LOOK).map(|(block, mask)| {
             let mut seen_through = BlockMask::EMPTY;
             for cell in mask.cells(0) {
                 let center_m = lattice.center_m(cell.voxel(*block), 0);
-                if viewpoints.since_saw_through(center_m, target.revision) {
+                if viewpoints.since_saw_well_beyond(center_m, margin_m, target.revision) {
                     seen_through.insert(cell);
                 }
             }
@@ -214,8 +217,8 @@ mod tests {
         insert(&service, 2, 0.6, false).await;
         let behind = service.map_info(&map()).await.unwrap().levels[0].voxels - before;
         let deleted = service.delete_voxels(&map(), not_seen_since(with_plate)).await.unwrap();
-        // The plate is 12 x 7 voxels or a row more; nothing else goes.
-        assert!((84..=120).contains(&deleted.removed), "{} went, {behind} had come", deleted.removed);
+        // The plate is 12 x 7 voxels or a row more; nothing else goes, and a rim of it may stay.
+        assert!((70..=120).contains(&deleted.removed), "{} went, {behind} had come", deleted.removed);
         let again = service.delete_voxels(&map(), not_seen_since(with_plate)).await.unwrap();
         assert_eq!((again.removed, again.version.revision), (0, deleted.version.revision));
         let undo = Undo { target: UndoTarget::Revision(deleted.version.revision), request_id: None };
@@ -226,6 +229,41 @@ mod tests {
         let undo = Undo { target: UndoTarget::Revision(2), request_id: None };
         service.undo(&map(), undo).await.unwrap();
         assert_eq!(service.delete_voxels(&map(), not_seen_since(with_plate)).await.unwrap().removed, 0);
+    }
+
+    /// A wall of 3 cm along x at y = 1 m, as 16 rings see it in part, from `x_m`.
+    async fn pass_along_a_wall(service: &MapService, scan_id: u64, [x_m, y_m]: [f32; 2]) -> u64 {
+        let point = |i: usize| {
+            let (azimuth, elevation) = ((i / 16) as f32 * 0.4, (i % 16) as f32 * 2.0 - 15.0);
+            let ((sin, cos), slope) = (azimuth.to_radians().sin_cos(), elevation.to_radians().tan());
+            let r = (1.0 - y_m) / sin;
+            (sin > 0.05 && r < 25.0).then(|| Point::new(r * cos, r * sin, r * slope))
+        };
+        let points: Vec<_> = (0..900 * 16).filter_map(point).collect();
+        let scan = ScanRequest {
+            scan_id: Some(scan_id),
+            guess: Guess::Pose(Pose::translation(f64::from(x_m), f64::from(y_m), 0.0)),
+            at_guess: true,
+            ..ScanRequest::new(RobotName::new("r").unwrap(), points.into())
+        };
+        service.insert_scan(&map(), scan).await.unwrap().version.revision
+    }
+
+    #[tokio::test]
+    async fn a_wall_that_stands_stays_though_later_scans_see_it_askew_and_in_part() {
+        let data = TempDir::new().unwrap();
+        let service = service(&data).await;
+        let mut near = 0;
+        for k in 0..12 {
+            near = pass_along_a_wall(&service, k, [k as f32 * 0.4, 0.4]).await;
+        }
+        for k in 12..24 {
+            pass_along_a_wall(&service, k, [(k - 12) as f32 * 0.4, -2.0]).await;
+        }
+        let region = Region::Box { min_m: [-30.0; 3], max_m: [30.0; 3] };
+        let target = DeletionTarget::NotSeenSince(NotSeenSince { region, revision: near });
+        let deletion = Deletion { target, level: 0, request_id: None };
+        assert_eq!(service.delete_voxels(&map(), deletion).await.unwrap().removed, 0);
     }
 
     #[tokio::test]

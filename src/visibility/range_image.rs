@@ -12,8 +12,9 @@ const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
 const HEAD_BYTES: usize = 1 + 4;
 /// Depths in the image's unit are at most this.
 const DEPTH_MAX: f32 = u16::MAX as f32;
-/// Points a pixel below which pixels are too fine for a scan, so that it would be seen through a sieve.
-const POINTS_A_PIXEL_MIN: f64 = 1.0;
+/// How far from each other the points of a pixel may lie for it to count as seen, as the side of a pixel at depth 1: 1.4 degrees. What lies
+/// between them is not looked at.
+const SPACING_MAX: f32 = 0.025;
 
 /// How far a scan saw in each direction from its sensor: on the six faces of a cube around it, the depth along the face's
 /// axis up to which nothing was in the way (paper III-B: free space is generated from the recorded poses and the sensor).
@@ -64,21 +65,15 @@ pub enum RangeImageError {
 impl RangeImage {
     /// The image of at most `bytes_max` bytes of a scan of `points` (sensor frame, finite); none where nothing is seen in `range`.
     ///
-    /// Pixels are as fine as that allows, and no finer than the points lie.
+    /// Pixels are as fine as that allows. Those in which the points lie far from each other are not seen.
     pub fn of_points(points: &[Point], range: SeenRange, bytes_max: usize) -> Option<Self> {
         let offsets: Vec<_> = points.iter().filter_map(|point| range.limited(point.xyz())).collect();
         if offsets.is_empty() {
             return None;
         }
-        let fitting = TILES.iter().find_map(|&tiles| {
-            let map = CubeMap::new(tiles);
-            let depths = NearestDepths::of(map, &offsets);
-            let fits = depths.touched_tiles() <= tiles_max(map, bytes_max);
-            let is_dense =
-                offsets.len() as f64 >= POINTS_A_PIXEL_MIN * (depths.touched_tiles() * TILE_PIXELS) as f64;
-            (fits && (is_dense || tiles == TILES[TILES.len() - 1])).then_some(depths)
-        });
-        fitting.map(|depths| Self::of_depths(&depths))
+        let depths = TILES.iter().map(|&tiles| NearestDepths::of(CubeMap::new(tiles), &offsets));
+        let mut fitting = depths.filter(|depths| depths.touched_tiles() <= tiles_max(depths.map, bytes_max));
+        fitting.next().map(|depths| Self::of_depths(&depths)).filter(|image| !image.tiles.is_empty())
     }
 
     fn of_depths(depths: &NearestDepths) -> Self {
@@ -103,6 +98,23 @@ impl RangeImage {
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
             self.depth_m(face, pixel).is_some_and(|seen_m| depth_m < seen_m)
         })
+    }
+
+    /// True where the scan saw further than `margin_m` beyond the point at `offset` in its own pixel and in all that lie around it: no
+    /// surface that is seen askew or in part is seen through so, nor what lies beside a rim.
+    pub fn sees_well_beyond(&self, offset: [f32; 3], margin_m: f32) -> bool {
+        let Some(Projection { face, pixel: [column, row], depth_m }) = self.map.project(offset) else {
+            return false;
+        };
+        let last = self.map.pixels() - 1;
+        // What lies across the edge of a face is not looked at: there nothing is seen well.
+        let is_inside = (1..last).contains(&column) && (1..last).contains(&row);
+        is_inside
+            && (row - 1..=row + 1).all(|row| {
+                (column - 1..=column + 1).all(|column| {
+                    self.depth_m(face, [column, row]).is_some_and(|seen_m| depth_m + margin_m < seen_m)
+                })
+            })
     }
 
     /// How deep a pixel was seen, meters; none where it was not.
@@ -222,19 +234,24 @@ struct NearestDepths {
     map: CubeMap,
     /// Tile by tile; infinite where no point is.
     depths_m: Vec<f32>,
+    /// How many points lie in each, up to the largest number of the type.
+    points: Vec<u8>,
 }
 
 impl NearestDepths {
     fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
-        let mut depths_m = vec![f32::INFINITY; map.tiles_of_all_faces() * TILE_PIXELS];
+        let pixels = map.tiles_of_all_faces() * TILE_PIXELS;
+        let (mut depths_m, mut points) = (vec![f32::INFINITY; pixels], vec![0u8; pixels]);
         for offset in offsets {
             if let Some(Projection { face, pixel, depth_m }) = map.project(*offset) {
                 let (tile, pixel) = map.place(face, pixel);
-                let nearest = &mut depths_m[tile * TILE_PIXELS + pixel];
+                let (nearest, points) =
+                    (&mut depths_m[tile * TILE_PIXELS + pixel], &mut points[tile * TILE_PIXELS + pixel]);
                 *nearest = nearest.min(depth_m);
+                *points = points.saturating_add(1);
             }
         }
-        Self { map, depths_m }
+        Self { map, depths_m, points }
     }
 
     fn touched_tiles(&self) -> usize {
@@ -265,13 +282,19 @@ impl NearestDepths {
         })
     }
 
-    /// The depth of a pixel that a point is in.
+    /// Points of which one more lies in a pixel that counts as seen.
+    fn points_before(&self) -> u8 {
+        ((self.map.pitch() / SPACING_MAX).powi(2).ceil() as u8).saturating_sub(1)
+    }
+
+    /// The depth of a pixel that enough points are in.
     fn at(&self, face: usize, [column, row]: [Option<usize>; 2]) -> Option<f32> {
         let pixel = [column?, row?];
         if pixel.iter().any(|&i| i >= self.map.pixels()) {
             return None;
         }
         let (tile, pixel) = self.map.place(face, pixel);
-        Some(self.depths_m[tile * TILE_PIXELS + pixel]).filter(|depth| depth.is_finite())
+        let pixel = tile * TILE_PIXELS + pixel;
+        (self.points[pixel] > self.points_before()).then(|| self.depths_m[pixel])
     }
 }

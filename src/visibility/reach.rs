@@ -11,6 +11,8 @@ use crate::geometry::Pose;
 const CELLS_OF_REACH: f64 = 8.0;
 /// Largest index of a cell that a viewpoint is in, and some more.
 const CELL_INDEX_MAX: f64 = (1 << 30) as f64;
+/// Bytes of a cell in the index of which one viewpoint alone takes care: a list in a table that is half full, with room for four.
+const INDEX_BYTES: usize = 112;
 /// Steps along a ray within a cell.
 const STEPS_A_CELL: f64 = 2.0;
 
@@ -77,7 +79,7 @@ impl Reach {
 
     /// Bytes of memory, with those of the index.
     pub(super) fn memory_bytes(&self) -> usize {
-        self.cells.len() * (size_of::<(CellIndex, u32)>() + size_of::<Entry>())
+        self.cells.len() * (size_of::<(CellIndex, u32)>() + INDEX_BYTES)
     }
 
     /// The cells, as boxes of the map frame: the smallest and the largest coordinates, meters.
@@ -147,6 +149,20 @@ impl ReachIndex {
     /// The cells that a viewpoint looked into, each once.
     pub(super) fn boxes_m(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         self.grids.iter().flat_map(|(&exponent, grid)| grid.keys().map(move |cell| box_m(exponent, *cell)))
+    }
+
+    /// True where a viewpoint may have looked into a box; of one that is large against the cells this is always said.
+    pub(super) fn may_look_into(&self, low_m: [f64; 3], high_m: [f64; 3]) -> bool {
+        const CELLS_MAX: i64 = 64;
+        self.grids.iter().any(|(&exponent, grid)| {
+            let cell = |c: f64| (c / 2f64.powi(exponent)).floor() as i32;
+            let [low, high] = [low_m.map(cell), high_m.map(cell)];
+            let count: i64 = (0..3).map(|axis| i64::from(high[axis]) - i64::from(low[axis]) + 1).product();
+            count > CELLS_MAX
+                || (low[2]..=high[2]).any(|z| {
+                    (low[1]..=high[1]).any(|y| (low[0]..=high[0]).any(|x| grid.contains_key(&[x, y, z])))
+                })
+        })
     }
 
     /// The viewpoints that may have looked at a point of the map, first those that saw most of what is around it.

@@ -110,6 +110,11 @@ impl ViewpointSet {
         Gaze { set: self, last: None }
     }
 
+    /// True where a viewpoint may have looked into a box of the map: the smallest and the largest coordinates, meters.
+    pub fn may_look_into(&self, low_m: [f64; 3], high_m: [f64; 3]) -> bool {
+        self.index.may_look_into(low_m, high_m)
+    }
+
     /// True where one of the viewpoints but that of `revision` saw beyond `point_m`.
     pub fn others_see_through(&self, point_m: [f64; 3], revision: u64) -> bool {
         let own = self.by_revision.get(&revision);
@@ -117,11 +122,15 @@ impl ViewpointSet {
         others.filter_map(|slot| self.at(slot)).any(|viewpoint| viewpoint.sees_through(point_m))
     }
 
-    /// True where a viewpoint of a scan after `revision` saw beyond `point_m`.
-    pub fn since_saw_through(&self, point_m: [f64; 3], revision: u64) -> bool {
+    /// True where a viewpoint of a scan after `revision` saw well beyond `point_m`, see [`RangeImage::sees_well_beyond`].
+    ///
+    /// [`RangeImage::sees_well_beyond`]: super::RangeImage::sees_well_beyond
+    pub fn since_saw_well_beyond(&self, point_m: [f64; 3], margin_m: f32, revision: u64) -> bool {
         let candidates =
             self.index.around(point_m).filter_map(|slot| self.slots.get(slot as usize)?.as_ref());
-        candidates.filter(|(made, _)| *made > revision).any(|(_, viewpoint)| viewpoint.sees_through(point_m))
+        candidates
+            .filter(|(made, _)| *made > revision)
+            .any(|(_, viewpoint)| viewpoint.image().sees_well_beyond(viewpoint.offset(point_m), margin_m))
     }
 
     /// True where a viewpoint is at most `distance_m` from `map_from_sensor` and turned by at most `rotation_deg` against it.

@@ -60,7 +60,7 @@ async fn a_scan_in_json_is_answered_in_full() {
         "accepted": true, "verdict": "accepted", "reason": "the first scan of the map",
         "map_from_sensor": pose_json([1.0, 0.0, 0.0]), "overlap": 0.0, "level_overlaps": vec![0.0; 4],
         "inliers": 0.0, "fitness": 0.0, "information": vec![vec![0.0; 6]; 6], "undetermined": [], "iterations": 0,
-        "new_voxels": 2, "points_skipped": 1, "replayed": false, "stationary": false, "recovered": null, "revision": 1,
+        "new_voxels": 2, "carved_voxels": 0, "points_skipped": 1, "replayed": false, "stationary": false, "recovered": null, "revision": 1,
         "map_uuid": uuid, "content_hash": hash,
     });
     assert!(answer["align_ms"].as_f64().unwrap() >= 0.0);
@@ -76,7 +76,7 @@ async fn a_scan_in_json_is_answered_in_full() {
     let trajectory = json_of(daemon.get("/v1/maps/a/trajectory?robot=r1").await).await;
     let pose = json!({
         "robot": "r1", "session": "", "scan_id": 7, "timestamp_ns": 5, "map_from_sensor": pose_json([1.0, 0.0, 0.0]),
-        "revision": 1, "overlap": 0.0, "new_voxels": 2,
+        "revision": 1, "overlap": 0.0, "new_voxels": 2, "carved_voxels": 0,
     });
     assert_eq!(trajectory, json!({"poses": [pose], "revision": 1, "map_uuid": uuid, "content_hash": hash}));
     let nobody = json_of(daemon.get("/v1/maps/a/trajectory?robot=r2").await).await;

@@ -36,7 +36,7 @@ fn region() -> Region {
 /// What a scan saw of a wall ahead.
 fn image(distance_m: f32) -> RangeImage {
     let points: Vec<_> = (0..9).map(|i| Point::new(distance_m, 0.2 * i as f32, 0.1)).collect();
-    RangeImage::of_points(&points, SeenRange { min_m: 0.01, max_m: 90.0 }, 200).unwrap()
+    RangeImage::of_points(&points, SeenRange { min_m: 0.01, max_m: 90.0 }, 8192).unwrap()
 }
 
 /// Somebody who has a copy, and comes back now and then.

@@ -23,11 +23,11 @@ use crate::map::{MapName, Region, RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::planning::{Body, Frontier, Surroundings, Unknown};
 use crate::service::{
-    Asked, Collisions, FrontierQuestion, MotionCheck, PoseCheck, RayQuestion, RaysToward, ScanAnswer,
+    Asked, CheckAs, FrontierQuestion, MotionCheck, PoseCheck, RayQuestion, RaysToward, ScanAnswer,
     ScanRequest,
 };
-use standing::{body, pose_at};
-use ways::{Cell, Ways};
+use standing::{body, own_place, pose_at};
+use ways::{Cell, Grid, Ways};
 
 /// Level of the voxels that are asked about: 10 cm in a map of 5 cm.
 const LEVEL: u32 = 1;
@@ -45,13 +45,21 @@ const NEAR_VIEW_M: f64 = 0.4;
 const SCAN_EVERY_M: f64 = 0.6;
 /// A frontier within this of as many visited ones as there may be visits is given up, meters: it stays, whatever the robot does.
 const GIVEN_UP_M: f64 = 0.5;
-const VISITS_MAX: usize = 2;
+const VISITS_MAX: usize = 6;
+/// A place is new that is so far from all where it looked around, meters.
+const NEW_PLACE_M: f64 = 0.45;
+/// Ways that are tried before it is said that there is none.
+const WAYS_TRIED: usize = 150;
 /// From how far away a frontier is looked at where the robot cannot get to the place that the server names, meters.
 const LOOK_M: [f64; 2] = [0.7, 3.0];
 /// One of so many places along each axis is tried for that.
 const LOOK_EVERY: usize = 3;
 /// Half the side of the place where the robot begins, which it knows to be free since it stands there, meters.
-const OWN_PLACE_M: f64 = 0.6;
+const OWN_PLACE_M: f64 = 0.8;
+/// What a way costs where it cannot keep its room, against others.
+const COST_WITHOUT_ROOM: f64 = 4.0;
+/// How far from what it knows to be there it keeps, meters.
+const ROOM_M: f32 = 0.1;
 
 /// A robot that explores.
 pub struct Explorer {
@@ -63,10 +71,14 @@ pub struct Explorer {
     lidar: SpinningLidar,
     random: ChaCha8Rng,
     body: Arc<Body>,
+    /// The body with the room that it keeps.
+    wide_body: Arc<Body>,
     /// Where the sensor is, and where the server found it.
     truth: Pose,
     believed: Pose,
     scans: u64,
+    /// Where it looked around.
+    looked: Vec<[f64; 2]>,
     /// The middles of the frontiers that it went to see.
     visited: Vec<[f64; 3]>,
     /// Places of the sensor as they really were, one after the other.
@@ -117,11 +129,13 @@ impl Explorer {
             scene,
             lidar: Self::lidar(),
             random: ChaCha8Rng::seed_from_u64(seed),
-            body: Arc::new(body()),
+            body: Arc::new(body(0.0)),
+            wide_body: Arc::new(body(ROOM_M)),
             truth: start,
             believed: start,
             scans: 0,
             visited: Vec::new(),
+            looked: Vec::new(),
             path: vec![start.translation.vector.into()],
         })
     }
@@ -161,6 +175,7 @@ impl Explorer {
             ..ScanRequest::new(self.robot.clone(), points.into())
         };
         self.scans += 1;
+        self.looked.push(self.place());
         let answer = self.client.insert_scan(&self.map, scan).await?;
         if answer.accepted {
             self.believed = answer.map_from_sensor;
@@ -174,12 +189,21 @@ impl Explorer {
     /// When the server refuses, or cannot be reached.
     pub async fn step(&mut self) -> Result<Step, ClientError> {
         let listed = self.frontiers().await?;
-        let ways = self.ways().await?;
-        for Goal { frontier, cell, way_m } in self.goals(&listed, &ways).await? {
+        let mut fits = self.places_that_fit().await?;
+        for _ in 0..WAYS_TRIED {
+            let ways = Ways::from(fits.grid, |number, _| fits.costs[number], self.place());
+            let Some(Goal { frontier, cell, .. }) = self.nearest_goal(&listed, &ways).await? else {
+                break;
+            };
             let way: Vec<[f64; 2]> = ways.way_to(cell);
-            if !self.is_free(&way).await? {
+            if let Some(share) = self.first_hit(&way).await? {
+                // It fits at both places and not between them: the way leads around the second.
+                let after = (share * (way.len() - 1) as f64).ceil() as usize;
+                fits.take_out(way[after.clamp(1, way.len() - 1)]);
                 continue;
             }
+            let way_m =
+                way.windows(2).map(|pair| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1])).sum();
             let scan = Box::new(self.drive(&way).await?);
             self.visited.push(frontier.center_m);
             let error_m = pose_difference(&self.truth, &self.believed).0;
@@ -218,41 +242,55 @@ impl Explorer {
         Ok(told.into_iter().filter(is_new).collect())
     }
 
-    /// The shortest ways from where the robot is to all places where its body fits.
-    async fn ways(&self) -> Result<Ways, ClientError> {
-        let grid = ways::Grid::around(self.around());
+    /// The places where the robot's body fits.
+    async fn places_that_fit(&self) -> Result<Places, ClientError> {
+        let grid = Grid::around(self.around());
         let places: Vec<[f64; 2]> = grid.places().collect();
-        let check = PoseCheck {
-            asked: Asked { level: LEVEL, ..Asked::default() },
-            body: Arc::clone(&self.body),
-            configurations: configurations(&places),
-            surroundings: self.surroundings(),
-            answer: Default::default(),
-        };
-        let Collisions::Colliding { words, .. } = self.client.check_poses(&self.map, check).await?.answer
-        else {
-            return Ok(Ways::none(grid));
-        };
-        let fits = |number: usize, _| words[number / 64] >> (number % 64) & 1 == 0;
-        Ok(Ways::from(grid, fits, self.place()))
+        let mut costs = vec![1.0; places.len()];
+        let [known, unknown] = self.surroundings();
+        // It keeps away from what is known to be there where it can, since the next scan may find it a voxel nearer.
+        let checks = [
+            (known.clone(), &self.wide_body, COST_WITHOUT_ROOM),
+            (unknown.clone(), &self.wide_body, COST_WITHOUT_ROOM),
+            (known, &self.body, f64::INFINITY),
+            (unknown, &self.body, f64::INFINITY),
+        ];
+        for (surroundings, body, cost) in checks {
+            let check = PoseCheck {
+                asked: Asked { level: LEVEL, ..Asked::default() },
+                body: Arc::clone(body),
+                configurations: configurations(&places),
+                surroundings,
+                answer: CheckAs::Colliding,
+            };
+            let words = self.client.check_poses(&self.map, check).await?.answer.words();
+            let meets = |number: usize| words[number / 64] >> (number % 64) & 1 == 1;
+            (0..places.len()).filter(|&number| meets(number)).for_each(|number| costs[number] = cost);
+        }
+        Ok(Places { grid, costs })
     }
 
-    /// True where the body meets nothing along a way from where the robot is.
-    async fn is_free(&self, way: &[[f64; 2]]) -> Result<bool, ClientError> {
+    /// Where the body first meets something along a way from where the robot is, as a share of it; none on a free one.
+    async fn first_hit(&self, way: &[[f64; 2]]) -> Result<Option<f64>, ClientError> {
         if way.len() < 2 {
-            return Ok(true);
+            return Ok(None);
         }
-        let check = MotionCheck {
-            asked: Asked { level: LEVEL, ..Asked::default() },
-            body: Arc::clone(&self.body),
-            configurations: configurations(way),
-            lengths: vec![way.len() as u32],
-            step_m: None,
-            clearance_max_m: None,
-            surroundings: self.surroundings(),
-        };
-        let answers = self.client.check_motions(&self.map, check).await?.answer;
-        Ok(answers.iter().all(|answer| answer.first_hit.is_none()))
+        let mut first_hit: Option<f32> = None;
+        for surroundings in self.surroundings() {
+            let check = MotionCheck {
+                asked: Asked { level: LEVEL, ..Asked::default() },
+                body: Arc::clone(&self.body),
+                configurations: configurations(way),
+                lengths: vec![way.len() as u32],
+                step_m: None,
+                clearance_max_m: None,
+                surroundings,
+            };
+            let answers = self.client.check_motions(&self.map, check).await?.answer;
+            let hit = answers.first().and_then(|answer| answer.first_hit);
+            first_hit = first_hit.into_iter().chain(hit).reduce(f32::min);
+        }
+        Ok(first_hit.map(f64::from))
     }
 
     /// Drives along a way; the answer to the scan at its end.
@@ -273,16 +311,20 @@ impl Explorer {
         self.look().await
     }
 
-    /// Where frontiers can be seen from of all places that can be reached, the nearest first: where the server says, or else from where
-    /// a ray to the frontier meets nothing.
-    async fn goals(&self, frontiers: &[Frontier], ways: &Ways) -> Result<Vec<Goal>, ClientError> {
+    /// The nearest place from which a frontier can be seen: where the server says, or else from where a ray to it meets nothing.
+    async fn nearest_goal(&self, frontiers: &[Frontier], ways: &Ways) -> Result<Option<Goal>, ClientError> {
         let (mut goals, mut looks) = (Vec::new(), Vec::new());
         for &frontier in frontiers {
             let target_m = frontier.view.map_or(frontier.center_m, |view| view.target_m);
             let view = frontier.view.map(|view| view.map_from_view.translation.vector);
+            let view = view.filter(|view| self.is_new_place([view.x, view.y]));
             match view.and_then(|view| ways.nearest_to([view.x, view.y], NEAR_VIEW_M)) {
-                Some((cell, way_m)) => goals.push(Goal { frontier, cell, way_m }),
-                None => looks.extend(looks_at(target_m, ways).map(|look| (frontier, target_m, look))),
+                Some((cell, cost)) => goals.push(Goal { frontier, cell, cost }),
+                None => looks.extend(
+                    looks_at(target_m, ways)
+                        .filter(|look| self.is_new_place([look.origin_m[0], look.origin_m[1]]))
+                        .map(|look| (frontier, target_m, look)),
+                ),
             }
         }
         let toward = looks.iter().map(|(_, target_m, _)| point(*target_m)).collect::<Vec<_>>();
@@ -300,11 +342,15 @@ impl Explorer {
             goals.extend(clear.map(|((frontier, _, look), _)| Goal {
                 frontier: *frontier,
                 cell: look.cell,
-                way_m: look.way_m,
+                cost: look.cost,
             }));
         }
-        goals.sort_by(|one, other| one.way_m.total_cmp(&other.way_m));
-        Ok(goals)
+        Ok(goals.into_iter().min_by(|one, other| one.cost.total_cmp(&other.cost)))
+    }
+
+    /// True where it has not looked around yet: it would see the same again.
+    fn is_new_place(&self, [x, y]: [f64; 2]) -> bool {
+        self.looked.iter().all(|[looked_x, looked_y]| (x - looked_x).hypot(y - looked_y) >= NEW_PLACE_M)
     }
 
     fn place(&self) -> [f64; 2] {
@@ -312,21 +358,25 @@ impl Explorer {
         [x, y]
     }
 
-    /// What is not known counts as occupied, but where the robot began.
-    fn surroundings(&self) -> Surroundings {
+    /// What the body must not meet: what is known to be there; and what is not known, but where the robot began and where it stands now,
+    /// which it knows to be free since it stands there.
+    fn surroundings(&self) -> [Surroundings; 2] {
         let [x, y, _] = self.path[0];
-        let own_place = Region::Box {
+        let start = Region::Box {
             min_m: [x - OWN_PLACE_M, y - OWN_PLACE_M, 0.0],
             max_m: [x + OWN_PLACE_M, y + OWN_PLACE_M, SENSOR_HEIGHT_M + OWN_PLACE_M],
         };
-        Surroundings { ignored: vec![own_place], unknown: Unknown::Occupied }
+        let here = own_place(self.place());
+        let known = Surroundings { ignored: here.to_vec(), unknown: Unknown::Free };
+        let ignored = here.into_iter().chain([start]).collect();
+        [known, Surroundings { ignored, unknown: Unknown::Occupied }]
     }
 }
 
 /// A place from which something could be seen.
 struct Look {
     cell: Cell,
-    way_m: f64,
+    cost: f64,
     /// Where the sensor would be.
     origin_m: [f64; 3],
 }
@@ -334,11 +384,11 @@ struct Look {
 /// The places that can be reached from which the sensor looks at a target neither from too near nor too steeply.
 fn looks_at([x, y, z]: [f64; 3], ways: &Ways) -> impl Iterator<Item = Look> + '_ {
     const STEEPEST: f64 = 1.1;
-    ways.reached(LOOK_EVERY).filter_map(move |(cell, way_m, place)| {
+    ways.reached(LOOK_EVERY).filter_map(move |(cell, cost, place)| {
         let distance_m = (place[0] - x).hypot(place[1] - y);
         let is_seen = (LOOK_M[0]..LOOK_M[1]).contains(&distance_m)
             && (z - SENSOR_HEIGHT_M).abs() <= STEEPEST * distance_m;
-        is_seen.then_some(Look { cell, way_m, origin_m: [place[0], place[1], SENSOR_HEIGHT_M] })
+        is_seen.then_some(Look { cell, cost, origin_m: [place[0], place[1], SENSOR_HEIGHT_M] })
     })
 }
 
@@ -346,11 +396,24 @@ fn point(place_m: [f64; 3]) -> Point {
     Point::from(place_m.map(|c| c as f32))
 }
 
+/// The places of a grid, and what it costs to go there: infinite where the robot's body does not fit.
+struct Places {
+    grid: Grid,
+    costs: Vec<f64>,
+}
+
+impl Places {
+    fn take_out(&mut self, place: [f64; 2]) {
+        let number = self.grid.nearest(place);
+        self.costs[number] = f64::INFINITY;
+    }
+}
+
 /// Where the robot could go.
 struct Goal {
     frontier: Frontier,
     cell: Cell,
-    way_m: f64,
+    cost: f64,
 }
 
 /// Poses of the body that stands at each place.

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::geometry::Pose;
 use crate::lab::simulate::Scene;
+use crate::map::Region;
 use crate::planning::{Body, Link, Sphere};
 
 /// Radius of the body, meters.
@@ -13,11 +14,17 @@ pub const SENSOR_HEIGHT_M: f64 = 0.9;
 /// Heights of the middles of the body's spheres, meters: it is a column of 0.15 to 1.15 m.
 const HEIGHTS_M: [f64; 3] = [0.4, 0.65, 0.9];
 
-/// The body of a robot that stands at the origin.
-pub(super) fn body() -> Body {
+/// The body of a robot that stands at the origin, with some room around it.
+pub(super) fn body(room_m: f32) -> Body {
     let sphere = |z: f64| Sphere { center_m: [0.0, 0.0, z as f32], radius_m: BODY_RADIUS_M as f32 };
-    let link = Link { spheres: HEIGHTS_M.map(sphere).to_vec(), ..Link::default() };
+    let link = Link { spheres: HEIGHTS_M.map(sphere).to_vec(), padding_m: room_m, ..Link::default() };
     Body::new(vec![link]).unwrap_or_else(|_| unreachable!("its numbers are in range"))
+}
+
+/// The space that a robot at x and y takes itself, and a little more: what noise puts there is not there.
+pub(super) fn own_place([x, y]: [f64; 2]) -> [Region; 3] {
+    const MORE_M: f64 = 0.04;
+    HEIGHTS_M.map(|z| Region::Sphere { center_m: [x, y, z], radius_m: BODY_RADIUS_M + MORE_M })
 }
 
 /// Where the sensor is of a robot that stands at x and y, map_from_sensor.

@@ -27,7 +27,8 @@ impl Visible {
     pub fn of(scene: &Scene, lidar: &SpinningLidar, start: [f64; 2], lattice: &Lattice, level: u32) -> Self {
         const REACH_M: f64 = 16.0;
         let grid = Grid::around([start.map(|c| c - REACH_M), start.map(|c| c + REACH_M)]);
-        let ways = Ways::from(grid, |_, place| stands_free(scene, place), start);
+        let ways =
+            Ways::from(grid, |_, place| if stands_free(scene, place) { 1.0 } else { f64::INFINITY }, start);
         let places: Vec<[f64; 2]> = ways.reached(LOOK_EVERY).map(|(_, _, place)| place).collect();
         let lidar = SpinningLidar { noise_m: 0.0, dropout: 0.0, ..lidar.clone() };
         let mut random = ChaCha8Rng::seed_from_u64(0);

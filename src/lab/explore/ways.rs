@@ -33,6 +33,15 @@ impl Grid {
         [0, 1].map(|axis: usize| self.first_m[axis] + cell[axis] as f64 * SPACING_M)
     }
 
+    /// The number of the place that is nearest to one within the rectangle.
+    pub(super) fn nearest(self, place: [f64; 2]) -> usize {
+        self.number(self.cell(place))
+    }
+
+    fn cell(self, place: [f64; 2]) -> Cell {
+        [0, 1].map(|axis: usize| ((place[axis] - self.first_m[axis]) / SPACING_M).round() as usize)
+    }
+
     fn number(self, [column, row]: Cell) -> usize {
         row * self.count[0] + column
     }
@@ -52,59 +61,56 @@ impl Grid {
 #[derive(Debug)]
 pub(super) struct Ways {
     grid: Grid,
-    /// The way to each place, meters; infinite to those that cannot be reached.
-    way_m: Vec<f64>,
+    /// What the way to each place costs; infinite to those that cannot be reached.
+    costs: Vec<f64>,
     /// From where each is reached.
     from: Vec<Option<Cell>>,
-    start: Option<[f64; 2]>,
+    start: [f64; 2],
 }
 
 impl Ways {
-    /// No way to anywhere.
-    pub(super) fn none(grid: Grid) -> Self {
-        let places = grid.count[0] * grid.count[1];
-        Self { grid, way_m: vec![f64::INFINITY; places], from: vec![None; places], start: None }
-    }
-
-    /// The ways from `start` over places where the robot fits, which is asked of each once it is reached.
-    pub(super) fn from(grid: Grid, mut fits: impl FnMut(usize, [f64; 2]) -> bool, start: [f64; 2]) -> Self {
+    /// The ways from `start` over places that a meter `costs` so much, infinite where the robot does not fit; each is asked once, when
+    /// it is reached.
+    pub(super) fn from(grid: Grid, mut costs: impl FnMut(usize, [f64; 2]) -> f64, start: [f64; 2]) -> Self {
         let mut asked = vec![None; grid.count[0] * grid.count[1]];
-        let mut ways = Self { start: Some(start), ..Self::none(grid) };
-        let nearest =
-            [0, 1].map(|axis: usize| ((start[axis] - grid.first_m[axis]) / SPACING_M).round() as usize);
+        let mut ways =
+            Self { grid, costs: vec![f64::INFINITY; asked.len()], from: vec![None; asked.len()], start };
+        let nearest = grid.cell(start);
         let mut open = BinaryHeap::new();
-        ways.way_m[grid.number(nearest)] = 0.0;
+        ways.costs[grid.number(nearest)] = 0.0;
         open.push((Reverse(0), nearest));
         while let Some((Reverse(_), cell)) = open.pop() {
-            let here_m = ways.way_m[grid.number(cell)];
+            let here = ways.costs[grid.number(cell)];
             for (next, spacings) in grid.beside(cell) {
                 let number = grid.number(next);
-                let way_m = here_m + spacings * SPACING_M;
-                let fits = *asked[number].get_or_insert_with(|| fits(number, grid.place(next)));
-                if fits && way_m < ways.way_m[number] - 1e-9 {
-                    (ways.way_m[number], ways.from[number]) = (way_m, Some(cell));
-                    open.push((Reverse((way_m * 1e6) as u64), next));
+                let cost = here
+                    + spacings
+                        * SPACING_M
+                        * *asked[number].get_or_insert_with(|| costs(number, grid.place(next)));
+                if cost < ways.costs[number] - 1e-9 {
+                    (ways.costs[number], ways.from[number]) = (cost, Some(cell));
+                    open.push((Reverse((cost * 1e6) as u64), next));
                 }
             }
         }
         ways
     }
 
-    /// Of the places at most `near_m` from `place` that can be reached, the nearest, with the way to it.
+    /// Of the places at most `near_m` from `place` that can be reached, the nearest, with what the way to it costs.
     pub(super) fn nearest_to(&self, place: [f64; 2], near_m: f64) -> Option<(Cell, f64)> {
         let off = |cell: [f64; 2]| (cell[0] - place[0]).hypot(cell[1] - place[1]);
         let near = self.reached(1).filter(|(_, _, at)| off(*at) <= near_m);
-        let (cell, way_m, _) = near.min_by(|one, other| off(one.2).total_cmp(&off(other.2)))?;
-        Some((cell, way_m))
+        let (cell, cost, _) = near.min_by(|one, other| off(one.2).total_cmp(&off(other.2)))?;
+        Some((cell, cost))
     }
 
-    /// Places that can be reached, one of `every` along each axis, each with the way to it, meters.
+    /// Places that can be reached, one of `every` along each axis, each with what the way to it costs.
     pub(super) fn reached(&self, every: usize) -> impl Iterator<Item = (Cell, f64, [f64; 2])> + '_ {
         let [columns, rows] = self.grid.count;
         let cells =
             (0..rows).step_by(every).flat_map(move |row| (0..columns).step_by(every).map(move |x| [x, row]));
-        let reached = cells.map(|cell| (cell, self.way_m[self.grid.number(cell)], self.grid.place(cell)));
-        reached.filter(|(_, way_m, _)| way_m.is_finite())
+        let reached = cells.map(|cell| (cell, self.costs[self.grid.number(cell)], self.grid.place(cell)));
+        reached.filter(|(_, cost, _)| cost.is_finite())
     }
 
     /// The places along the way to a cell, from the start on.
@@ -115,8 +121,9 @@ impl Ways {
             at = from;
             way.push(self.grid.place(at));
         }
-        // The robot stands beside the place of the grid that is nearest to it.
-        way.extend(self.start);
+        // The robot stands beside the place of the grid that is nearest to it, where it need not fit.
+        way.pop();
+        way.push(self.start);
         way.reverse();
         way
     }
@@ -130,11 +137,12 @@ mod tests {
     fn ways_lead_around_what_does_not_fit_and_are_the_shortest() {
         let grid = Grid::around([[0.0, 0.0], [1.0, 1.0]]);
         // A wall with a gap at its end.
-        let fits = |_, [x, y]: [f64; 2]| !(0.45..0.55).contains(&x) || y > 0.85;
+        let fits =
+            |_, [x, y]: [f64; 2]| if !(0.45..0.55).contains(&x) || y > 0.85 { 1.0 } else { f64::INFINITY };
         let ways = Ways::from(grid, fits, [0.1, 0.1]);
         let (cell, way_m) = ways.nearest_to([0.9, 0.1], 0.01).unwrap();
         let way = ways.way_to(cell);
-        assert_eq!((way[0], way.len()), ([0.1, 0.1], 18));
+        assert_eq!((way[0], way.len()), ([0.1, 0.1], 17));
         assert!(way.iter().all(|[x, y]| !(0.45..0.55).contains(x) || *y > 0.85));
         // Eight steps up and eight down, all but none of them askew.
         assert!((1.6..2.0).contains(&way_m), "{way_m}");
@@ -143,7 +151,7 @@ mod tests {
     #[test]
     fn what_is_walled_in_cannot_be_reached() {
         let grid = Grid::around([[0.0, 0.0], [1.0, 1.0]]);
-        let fits = |_, [x, _]: [f64; 2]| !(0.45..0.55).contains(&x);
+        let fits = |_, [x, _]: [f64; 2]| if (0.45..0.55).contains(&x) { f64::INFINITY } else { 1.0 };
         assert!(Ways::from(grid, fits, [0.1, 0.1]).nearest_to([0.9, 0.1], 0.2).is_none());
     }
 }

@@ -1,12 +1,16 @@
 //! Which cells are free: something was seen through in each column of voxels.
 
+use std::ops::RangeInclusive;
+
 use super::{Cells, Grid, Projection};
 use crate::planning::free_space::{CELLS, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};
 
-/// Blocks between two looks at the stop signal.
-const BLOCKS_PER_LOOK: usize = 16;
+/// Blocks that nobody looked into between two looks at the stop signal.
+const BLOCKS_PER_LOOK: usize = 1024;
+/// Boxes that viewpoints looked into between two looks at the stop signal.
+const BOXES_PER_LOOK: usize = 4096;
 /// Columns of a block.
 const COLUMNS: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize;
 
@@ -15,24 +19,28 @@ impl Projection<'_> {
     pub(super) fn free_cells(&self, cells: &Cells, grid: &Grid, stop: StopSignal<'_>) -> Vec<u64> {
         let mut columns = vec![0u32; grid.cells()];
         let mut free_space = FreeSpace::of(self.view);
-        let blocks = self.blocks_in_reach(cells, stop);
-        let stacks = blocks.chunk_by(|a, b| a[..2] == b[..2]);
+        let [xs, ys, zs] = self.blocks_in_reach(cells, stop);
         let mut looked = 0;
-        'stacks: for stack in stacks {
+        'stacks: for (x, y) in xs.flat_map(|x| ys.clone().map(move |y| (x, y))) {
             let mut is_seen = [false; COLUMNS];
-            for &[x, y, z] in stack {
+            for z in zs.clone() {
                 looked += 1;
                 if looked % BLOCKS_PER_LOOK == 0 && stop.is_stopped() {
                     break 'stacks;
                 }
                 let Some(block) = VoxelKey::new([x, y, z]) else { continue };
-                self.look_at(block, &mut is_seen, &mut free_space);
+                if self.may_be_seen(block) {
+                    // A block that many looked into takes a while.
+                    if stop.is_stopped() {
+                        break 'stacks;
+                    }
+                    self.look_at(block, &mut is_seen, &mut free_space);
+                }
             }
             for (column, _) in is_seen.iter().enumerate().filter(|(_, is_seen)| **is_seen) {
                 let at = [column as i64 % i64::from(BLOCK_SIDE), column as i64 / i64::from(BLOCK_SIDE)];
                 let cell = |axis: usize| {
-                    (i64::from(stack[0][axis]) * i64::from(BLOCK_SIDE) + at[axis])
-                        .div_euclid(self.cell_voxels)
+                    (i64::from([x, y][axis]) * i64::from(BLOCK_SIDE) + at[axis]).div_euclid(self.cell_voxels)
                 };
                 if let Some(number) = cells.number([cell(0), cell(1)]) {
                     columns[number] += 1;
@@ -60,9 +68,17 @@ impl Projection<'_> {
         }
     }
 
-    /// The blocks in the area and the band that a viewpoint may have looked into, ascending by x, y and z.
-    fn blocks_in_reach(&self, cells: &Cells, stop: StopSignal<'_>) -> Vec<[i32; 3]> {
-        let Some(viewpoints) = self.view.viewpoints() else { return Vec::new() };
+    /// True where a viewpoint may have looked into a block.
+    fn may_be_seen(&self, block: VoxelKey) -> bool {
+        let side_m = self.voxel_m * f64::from(BLOCK_SIDE);
+        let low_m = block.index().map(|i| f64::from(i) * side_m);
+        self.view
+            .viewpoints()
+            .is_some_and(|viewpoints| viewpoints.may_look_into(low_m, low_m.map(|c| c + side_m)))
+    }
+
+    /// The blocks of the area and the band, as far as any viewpoint looked: their indices along each axis.
+    fn blocks_in_reach(&self, cells: &Cells, stop: StopSignal<'_>) -> [RangeInclusive<i32>; 3] {
         let block =
             |voxel: i64| (voxel >> BLOCK_LEVELS).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
         let area = |axis: usize| {
@@ -71,19 +87,16 @@ impl Projection<'_> {
             [block(first), block(end - 1)]
         };
         let bounds = [area(0), area(1), self.band.map(|z| block(z.into()))];
-        let mut blocks = Vec::new();
-        for [low_m, high_m] in stop.paced(viewpoints.boxes_m(), BLOCKS_PER_LOOK) {
-            let range = |axis: usize| {
-                // A conversion keeps to what a number can hold.
-                let index = |c: f64| block((c / self.voxel_m).floor() as i64);
-                index(low_m[axis]).max(bounds[axis][0])..=index(high_m[axis]).min(bounds[axis][1])
-            };
-            for (x, y) in range(0).flat_map(|x| range(1).map(move |y| (x, y))) {
-                blocks.extend(range(2).map(|z| [x, y, z]));
-            }
+        let (mut low_m, mut high_m) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let boxes_m = self.view.viewpoints().into_iter().flat_map(|viewpoints| viewpoints.boxes_m());
+        for [low, high] in stop.paced(boxes_m, BOXES_PER_LOOK) {
+            low_m = std::array::from_fn(|axis| low_m[axis].min(low[axis]));
+            high_m = std::array::from_fn(|axis| high_m[axis].max(high[axis]));
         }
-        blocks.sort_unstable();
-        blocks.dedup();
-        blocks
+        std::array::from_fn(|axis| {
+            // A conversion keeps to what a number can hold; without any viewpoint nothing is left.
+            let index = |c: f64| block((c / self.voxel_m).floor() as i64);
+            index(low_m[axis]).max(bounds[axis][0])..=index(high_m[axis]).min(bounds[axis][1])
+        })
     }
 }

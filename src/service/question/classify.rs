@@ -18,9 +18,6 @@ pub struct ClassifyQuestion {
 /// Points of which two bits each are a byte.
 const POINTS_A_BYTE: usize = 4;
 
-/// How long a point that many viewpoints are asked of takes, nanoseconds.
-const NS_EACH: usize = 1000;
-
 impl Question for ClassifyQuestion {
     type Answer = PointStates;
 
@@ -35,7 +32,8 @@ impl Question for ClassifyQuestion {
     }
 
     fn work_ns(&self) -> usize {
-        self.points.len().saturating_mul(NS_EACH)
+        // How many viewpoints are asked of a point the question does not tell.
+        usize::MAX
     }
 
     fn check(&self, limits: &Limits) -> Result<(), ServiceError> {

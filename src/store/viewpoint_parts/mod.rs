@@ -190,7 +190,8 @@ pub(super) fn load(
     for used in uses {
         let [path, copy] = part_names(used.number).map(|name| folder.join(name));
         let part = match read(files, &path, uuid, used, stop) {
-            Err(error @ StoreError::Damaged { .. }) => {
+            // Whatever is wrong with one, its sectors or its bytes, the other may be well.
+            Err(error @ (StoreError::Damaged { .. } | StoreError::Io { .. })) => {
                 let Ok(part) = read(files, &copy, uuid, used, stop) else { return Err(error) };
                 loaded.damaged.push(error);
                 part
