@@ -15,6 +15,8 @@ const DEPTH_MAX: f32 = u16::MAX as f32;
 /// How far from each other the points of a pixel may lie for it to count as seen, as the side of a pixel at depth 1: 1.4 degrees. What lies
 /// between them is not looked at.
 const SPACING_MAX: f32 = 0.025;
+/// How much more coarser pixels have to tell, since they tell it less well.
+const WORTHWHILE: f32 = 1.03;
 
 /// How far a scan saw in each direction from its sensor: on the six faces of a cube around it, the depth along the face's
 /// axis up to which nothing was in the way (paper III-B: free space is generated from the recorded poses and the sensor).
@@ -65,7 +67,7 @@ pub enum RangeImageError {
 impl RangeImage {
     /// The image of at most `bytes_max` bytes of a scan of `points` (sensor frame, finite); none where nothing is seen in `range`.
     ///
-    /// Pixels are as fine as that allows. Those in which the points lie far from each other are not seen.
+    /// Pixels are as fine as that allows and as the points lie. Those in which the points lie far from each other are not seen.
     pub fn of_points(points: &[Point], range: SeenRange, bytes_max: usize) -> Option<Self> {
         let offsets: Vec<_> = points.iter().filter_map(|point| range.limited(point.xyz())).collect();
         if offsets.is_empty() {
@@ -73,7 +75,24 @@ impl RangeImage {
         }
         let depths = TILES.iter().map(|&tiles| NearestDepths::of(CubeMap::new(tiles), &offsets));
         let mut fitting = depths.filter(|depths| depths.touched_tiles() <= tiles_max(depths.map, bytes_max));
-        fitting.next().map(|depths| Self::of_depths(&depths)).filter(|image| !image.tiles.is_empty())
+        let first = Self::of_depths(&fitting.next()?);
+        // Coarser pixels tell more of a scan whose points lie further apart than the finest pixels.
+        let coarser =
+            fitting.take_while(|depths| depths.map.pitch() <= SPACING_MAX).map(|it| Self::of_depths(&it));
+        let best =
+            coarser.fold(
+                first,
+                |best, next| {
+                    if next.seen_area() > WORTHWHILE * best.seen_area() { next } else { best }
+                },
+            );
+        (!best.tiles.is_empty()).then_some(best)
+    }
+
+    /// The part of the cube around the sensor in which something was seen, in squares of side 1 at depth 1.
+    fn seen_area(&self) -> f32 {
+        let seen: usize = self.tiles.iter().map(Tile::seen_pixels).sum();
+        seen as f32 * self.map.pitch() * self.map.pitch()
     }
 
     fn of_depths(depths: &NearestDepths) -> Self {

@@ -38,6 +38,11 @@ impl Tile {
         (seen > 0).then(|| u32::from(self.base) + u32::from(self.step) * (seen - 1))
     }
 
+    /// How many pixels were seen.
+    pub(super) fn seen_pixels(&self) -> usize {
+        self.seen.iter().filter(|seen| **seen > 0).count()
+    }
+
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
         bytes.extend_from_slice(&self.base.to_le_bytes());
         bytes.extend_from_slice(&self.step.to_le_bytes());

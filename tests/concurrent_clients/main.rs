@@ -222,6 +222,7 @@ fn replay(map: &MultiResolutionMap, event: &Event) -> usize {
                 }
                 DeletionTarget::Keys(keys) => keys.clone(),
                 DeletionTarget::Region(region) => view.voxels_in(region, deletion.level),
+                DeletionTarget::NotSeenSince(_) => unreachable!("nobody deletes so here"),
             };
             let voxels = view.descendants_of(keys, deletion.level);
             drop(view);

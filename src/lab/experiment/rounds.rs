@@ -84,7 +84,7 @@ mod tests {
     #[test]
     fn the_third_round_leaves_no_viewpoint() {
         let map = MultiResolutionMap::new(MapSettings::new(0.2, 4)).unwrap();
-        let lidar = SpinningLidar { rings: 12, azimuths: 120, ..SpinningLidar::default() };
+        let lidar = SpinningLidar { rings: 32, azimuths: 450, ..SpinningLidar::default() };
         // The way of three rounds in long steps, not in those of 10 Hz.
         let mut rounds = Vec::new();
         let (scene, sightings) = (Scene::furnished(1), Sightings::default());

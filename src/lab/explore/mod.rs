@@ -91,7 +91,7 @@ pub enum Step {
     /// It drove to see a frontier.
     Visited {
         /// The frontier.
-        frontier: Frontier,
+        frontier: Box<Frontier>,
         /// Length of the way, meters.
         way_m: f64,
         /// Frontiers that were listed, and those that could be reached.
@@ -207,7 +207,13 @@ impl Explorer {
             let scan = Box::new(self.drive(&way).await?);
             self.visited.push(frontier.center_m);
             let error_m = pose_difference(&self.truth, &self.believed).0;
-            return Ok(Step::Visited { frontier, way_m, listed: listed.len(), scan, error_m });
+            return Ok(Step::Visited {
+                frontier: Box::new(frontier),
+                way_m,
+                listed: listed.len(),
+                scan,
+                error_m,
+            });
         }
         Ok(Step::Done { left: listed.len() })
     }

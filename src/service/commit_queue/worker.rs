@@ -350,17 +350,20 @@ mod tests {
         let first = scan(voxels(0..100), VoxelSet::default());
         let (gone, seen) = (deletion(voxels(0..10)), scan(voxels(90..120), voxels(80..90)));
         let nothing = [];
-        assert_eq!(cut(&worker(&[first.clone()], 1 << 20), &nothing), voxels(0..100));
+        assert_eq!(cut(&worker(std::slice::from_ref(&first), 1 << 20), &nothing), voxels(0..100));
         let all = [first.clone(), gone.clone(), seen.clone()];
         assert_eq!(cut(&worker(&all, 1 << 20), &nothing), voxels(10..80));
-        assert_eq!(cut(&worker(&[first.clone(), gone], 1 << 20), &[seen.clone()]), voxels(10..80));
+        assert_eq!(
+            cut(&worker(&[first.clone(), gone], 1 << 20), std::slice::from_ref(&seen)),
+            voxels(10..80)
+        );
         assert_eq!(cut(&worker(&[first], 1 << 20), &[seen]), voxels(0..80));
     }
 
     #[test]
     fn where_nobody_knows_what_came_between_nothing_is_carved() {
         let first = scan(voxels(0..100), VoxelSet::default());
-        assert_eq!(cut(&worker(&[first.clone()], 0), &[]), voxels(0..100));
+        assert_eq!(cut(&worker(std::slice::from_ref(&first), 0), &[]), voxels(0..100));
         assert!(cut(&worker(&[first, deletion(voxels(50..51))], 0), &[]).is_empty());
     }
 }

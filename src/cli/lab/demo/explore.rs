@@ -49,7 +49,7 @@ pub(super) async fn explore(
             Step::Visited { frontier, way_m, listed, scan, error_m } => {
                 let info = client.map_info(&name).await?;
                 let voxels = info.levels.first().map_or(0, |finest| finest.voxels);
-                let Frontier { voxels: size, center_m, .. } = frontier;
+                let Frontier { voxels: size, center_m, .. } = *frontier;
                 let accepted = scan.accepted;
                 output.print(&Line {
                     seconds: start.elapsed().as_secs_f64(),

@@ -69,14 +69,14 @@ impl FreeSpace {
         output.print(&Viewpoints::of(&map, scans.len()))?;
         let Some(file) = &self.peer_states else { return Ok(()) };
         let peer = PeerStates::read(file).map_err(CliError::failed)?;
-        output.note(&format!("the peer takes {} bytes", count(peer.memory_bytes as usize)));
+        output.note(format!("the peer takes {} bytes", count(peer.memory_bytes as usize)));
         output.say(Line::HEAD)?;
         let view = map.view().with_viewpoints();
         let free: Vec<VoxelKey> = peer.free.into_iter().filter(|&voxel| !view.contains(voxel, 0)).collect();
         output.print(&Line::of("free", &States::of(&view, &free)))?;
         output.print(&Line::of("occupied", &States::of(&view, &peer.occupied)))?;
         let [in_order, shuffled] = speeds(&view, &free, 1);
-        output.note(&format!("{in_order:.1} million voxels a second in order, {shuffled:.1} shuffled"));
+        output.note(format!("{in_order:.1} million voxels a second in order, {shuffled:.1} shuffled"));
         Ok(())
     }
 
