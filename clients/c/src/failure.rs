@@ -164,7 +164,7 @@ impl From<ReplicaError> for Failure {
             ReplicaError::Question(error) => return error.into(),
             ReplicaError::Damaged(_) => Code::Damaged,
             ReplicaError::Silent(_) => Code::Timeout,
-            ReplicaError::TooLarge(_) => Code::TooLarge,
+            ReplicaError::TooLarge(_) | ReplicaError::TooManyViewpoints(_) => Code::TooLarge,
         };
         Self::new(code, "", error.to_string())
     }

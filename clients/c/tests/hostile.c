@@ -244,7 +244,7 @@ static void bad_checks(mrol_replica replica, mrol_body body) {
     FAILS(CHECK(&check, &other), MROL_INVALID_ARGUMENT, "check.configurations: at most");
     check = good, check.level = 4;
     CHECK_FAILS("level must lie in 0..=3, got 4");
-    check = good, check.reserved[6] = 1;
+    check = good, check.reserved[5] = 1;
     CHECK_FAILS("check.reserved must be zero");
     check = good, check.ignore_keep_outs = 2;
     CHECK_FAILS("ignore_keep_outs must be 0 or 1, got 2");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mrol::client::Client;
 use mrol::map::{KeepOutName, KeepOutShape, Region};
-use mrol::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings};
+use mrol::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
 use mrol::service::{
     Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, MapVersion, MotionCheck, NearestQuestion,
     PoseCheck, PutKeepOut, RayQuestion, RaysToward, SphereCheck,
@@ -178,8 +178,10 @@ async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
     let both: Vec<f32> = origins.iter().zip(&directions).flat_map(|(a, b)| [*a, *b].concat()).collect();
     let points = |points: &[[f32; 3]]| points.iter().map(|xyz| (*xyz).into()).collect::<Vec<_>>().into();
     let toward = RaysToward::Directions { directions: points(&directions), range_m: 5.0 };
-    let told =
-        client.cast_rays(&map(), RayQuestion { asked, origins: points(&origins), toward }).await.unwrap();
+    let told = client
+        .cast_rays(&map(), RayQuestion { asked, origins: points(&origins), toward, unknown: Unknown::Free })
+        .await
+        .unwrap();
     assert!(told.answer.hits() > 0);
     let line = Line::of(told.version, 20, told.answer.hits())
         .bits(&told.answer.hit, 20)
@@ -203,7 +205,8 @@ async fn rays_and_points(driver: &mut Driver, client: &Client, asked: Asked) {
 }
 
 async fn grids(driver: &mut Driver, client: &Client, asked: Asked) {
-    let scope = GridScope { area: GridArea::Occupied, band_m: [-1.0, 2.0], cell_m: None };
+    let scope =
+        GridScope { area: GridArea::Occupied, band_m: [-1.0, 2.0], cell_m: None, tells_unknown: false };
     let told = client.project_grid(&map(), GridQuestion { asked, scope }).await.unwrap();
     let (grid, [x, y]) = (&told.answer, told.answer.size);
     assert!(grid.cells() > 0);
