@@ -90,7 +90,7 @@ fn a_damaged_journal_is_set_aside_and_the_map_opens_again() {
     assert_eq!(server.stop(), Some(0));
 
     let opens = &objects(&["doctor", &data, "--set-aside", "office"])[0];
-    assert_eq!(opens, &json!({"map": "office", "revision": 1, "keep_outs": 0}));
+    assert_eq!(opens, &json!({"map": "office", "revision": 1, "keep_outs": 0, "viewpoints": 1}));
     // The damaged folder is there as it was, under another name.
     let folder = damaged.parent().unwrap();
     let aside = format!("{}.damaged", folder.display());
