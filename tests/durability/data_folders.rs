@@ -391,7 +391,11 @@ async fn the_last_revision_is_refused_and_so_is_what_would_come_after_it() {
 
 #[tokio::test]
 async fn a_map_file_that_could_not_be_restored_is_not_handed_out() {
-    let daemon = Daemon::start_with(|config| config.limits.map_file_bytes_max = 300).await;
+    let daemon = Daemon::start_with(|config| {
+        config.limits.map_file_bytes_max = 300;
+        config.limits.viewpoint_bytes_max = 0;
+    })
+    .await;
     daemon.make_map("a").await;
     daemon.put_in("a", &row(2)).await;
     assert_eq!(daemon.get("/v1/maps/a/snapshot").await.status(), StatusCode::OK);
