@@ -217,6 +217,14 @@ mod tests {
         sides(corners).map(angle).sum::<f64>() / std::f64::consts::TAU
     }
 
+    /// True when the point is on a side, whose angles then tell nothing; exact for whole numbers.
+    fn is_on_a_side(corners: &[Point2], point: Point2) -> bool {
+        sides(corners).any(|(a, b)| {
+            let (a, b) = (minus(a, point), minus(b, point));
+            a[0] * b[1] == a[1] * b[0] && dot(a, b) <= 0.0
+        })
+    }
+
     /// The smallest distance of many points on the sides.
     fn sampled_distance(corners: &[Point2], point: Point2) -> f64 {
         let on_side = |(a, b): (Point2, Point2)| {
@@ -267,7 +275,7 @@ mod tests {
             polygon in prop_oneof![corners().prop_filter("simple", |corners| is_simple(corners)), star()],
             point in prop_oneof![prop::array::uniform2(-6.0..6.0f64), prop::array::uniform2(-6i8..=6).prop_map(|p| p.map(f64::from))],
         ) {
-            let border = sampled_distance(&polygon, point);
+            let border = if is_on_a_side(&polygon, point) { 0.0 } else { sampled_distance(&polygon, point) };
             let turns = windings(&polygon, point).abs();
             if border > 1e-9 {
                 prop_assert_eq!(contains(&polygon, point), turns > 0.5, "{} turns", turns);
