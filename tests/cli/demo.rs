@@ -25,3 +25,26 @@ fn the_demonstration_succeeds_and_tells_what_it_measured() {
     assert!(summary["planner"]["points"].as_u64().unwrap() > 0);
     assert_eq!(summary["robots"]["camera"]["accepted"], 4);
 }
+
+#[test]
+fn a_robot_explores_the_building_by_itself_and_meets_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("explored.svg");
+    // The command fails where less than 95 % of what can be seen is mapped.
+    let lines = objects(&[
+        "demo",
+        "--explore",
+        "--once",
+        "--picture",
+        picture.to_str().unwrap(),
+        "--http-listen",
+        "127.0.0.1:0",
+        "--grpc-listen",
+        "127.0.0.1:0",
+    ]);
+    let (explored, ways) = lines.split_last().unwrap();
+    assert_eq!(explored["collided"], false);
+    assert!(explored["mapped"].as_f64().unwrap() >= 0.95, "{explored}");
+    assert!(ways.len() > 10 && ways.iter().all(|way| way["error_m"].as_f64().unwrap() < 0.05));
+    assert!(std::fs::read_to_string(&picture).unwrap().contains(">path</text>"));
+}

@@ -4,6 +4,7 @@
 //! through counts as occupied. Its steps are those of any explorer: a scan; where does the body fit; which frontiers are there;
 //! the shortest way to the nearest; is the whole motion free.
 
+mod goal;
 mod standing;
 mod visible;
 mod ways;
@@ -17,17 +18,15 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::client::{Client, ClientError, new_session};
-use crate::geometry::{Point, Pose, pose_difference};
+use crate::geometry::{Pose, pose_difference};
 use crate::lab::simulate::{Scene, SpinningLidar};
 use crate::map::{MapName, Region, RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::planning::{Body, Frontier, Surroundings, Unknown};
-use crate::service::{
-    Asked, CheckAs, FrontierQuestion, MotionCheck, PoseCheck, RayQuestion, RaysToward, ScanAnswer,
-    ScanRequest,
-};
+use crate::service::{Asked, CheckAs, FrontierQuestion, MotionCheck, PoseCheck, ScanAnswer, ScanRequest};
+use goal::Goal;
 use standing::{body, own_place, pose_at};
-use ways::{Cell, Grid, Ways};
+use ways::{Grid, Places, Ways};
 
 /// Level of the voxels that are asked about: 10 cm in a map of 5 cm.
 const LEVEL: u32 = 1;
@@ -39,21 +38,13 @@ const FRONTIER_SIZE_MIN: u64 = 12;
 const FRONTIER_HEIGHTS_M: [f64; 2] = [0.2, 2.2];
 /// How far around the places where the robot was it looks for ways and frontiers, meters.
 const AROUND_M: f64 = 8.0;
-/// How far from the place from which a frontier can be seen the robot may stop, meters.
-const NEAR_VIEW_M: f64 = 0.4;
 /// How far it drives between two scans, meters.
 const SCAN_EVERY_M: f64 = 0.6;
 /// A frontier within this of as many visited ones as there may be visits is given up, meters: it stays, whatever the robot does.
 const GIVEN_UP_M: f64 = 0.5;
 const VISITS_MAX: usize = 6;
-/// A place is new that is so far from all where it looked around, meters.
-const NEW_PLACE_M: f64 = 0.45;
 /// Ways that are tried before it is said that there is none.
 const WAYS_TRIED: usize = 150;
-/// From how far away a frontier is looked at where the robot cannot get to the place that the server names, meters.
-const LOOK_M: [f64; 2] = [0.7, 3.0];
-/// One of so many places along each axis is tried for that.
-const LOOK_EVERY: usize = 3;
 /// Half the side of the place where the robot begins, which it knows to be free since it stands there, meters.
 const OWN_PLACE_M: f64 = 0.8;
 /// What a way costs where it cannot keep its room, against others.
@@ -94,7 +85,7 @@ pub enum Step {
         frontier: Box<Frontier>,
         /// Length of the way, meters.
         way_m: f64,
-        /// Frontiers that were listed, and those that could be reached.
+        /// Frontiers that were listed and not given up.
         listed: usize,
         /// Answer to its last scan.
         scan: Box<ScanAnswer>,
@@ -317,48 +308,6 @@ impl Explorer {
         self.look().await
     }
 
-    /// The nearest place from which a frontier can be seen: where the server says, or else from where a ray to it meets nothing.
-    async fn nearest_goal(&self, frontiers: &[Frontier], ways: &Ways) -> Result<Option<Goal>, ClientError> {
-        let (mut goals, mut looks) = (Vec::new(), Vec::new());
-        for &frontier in frontiers {
-            let target_m = frontier.view.map_or(frontier.center_m, |view| view.target_m);
-            let view = frontier.view.map(|view| view.map_from_view.translation.vector);
-            let view = view.filter(|view| self.is_new_place([view.x, view.y]));
-            match view.and_then(|view| ways.nearest_to([view.x, view.y], NEAR_VIEW_M)) {
-                Some((cell, cost)) => goals.push(Goal { frontier, cell, cost }),
-                None => looks.extend(
-                    looks_at(target_m, ways)
-                        .filter(|look| self.is_new_place([look.origin_m[0], look.origin_m[1]]))
-                        .map(|look| (frontier, target_m, look)),
-                ),
-            }
-        }
-        let toward = looks.iter().map(|(_, target_m, _)| point(*target_m)).collect::<Vec<_>>();
-        let origins = looks.iter().map(|(_, _, look)| point(look.origin_m)).collect::<Vec<_>>();
-        if !looks.is_empty() {
-            let question = RayQuestion {
-                asked: Asked::default(),
-                origins: origins.into(),
-                toward: RaysToward::Ends(toward.into()),
-                unknown: Unknown::Free,
-            };
-            let hits = self.client.cast_rays(&self.map, question).await?.answer;
-            let clear =
-                looks.iter().zip(&hits.distances_m).filter(|(_, distance_m)| distance_m.is_infinite());
-            goals.extend(clear.map(|((frontier, _, look), _)| Goal {
-                frontier: *frontier,
-                cell: look.cell,
-                cost: look.cost,
-            }));
-        }
-        Ok(goals.into_iter().min_by(|one, other| one.cost.total_cmp(&other.cost)))
-    }
-
-    /// True where it has not looked around yet: it would see the same again.
-    fn is_new_place(&self, [x, y]: [f64; 2]) -> bool {
-        self.looked.iter().all(|[looked_x, looked_y]| (x - looked_x).hypot(y - looked_y) >= NEW_PLACE_M)
-    }
-
     fn place(&self) -> [f64; 2] {
         let [x, y, _]: [f64; 3] = self.believed.translation.vector.into();
         [x, y]
@@ -377,49 +326,6 @@ impl Explorer {
         let ignored = here.into_iter().chain([start]).collect();
         [known, Surroundings { ignored, unknown: Unknown::Occupied }]
     }
-}
-
-/// A place from which something could be seen.
-struct Look {
-    cell: Cell,
-    cost: f64,
-    /// Where the sensor would be.
-    origin_m: [f64; 3],
-}
-
-/// The places that can be reached from which the sensor looks at a target neither from too near nor too steeply.
-fn looks_at([x, y, z]: [f64; 3], ways: &Ways) -> impl Iterator<Item = Look> + '_ {
-    const STEEPEST: f64 = 1.1;
-    ways.reached(LOOK_EVERY).filter_map(move |(cell, cost, place)| {
-        let distance_m = (place[0] - x).hypot(place[1] - y);
-        let is_seen = (LOOK_M[0]..LOOK_M[1]).contains(&distance_m)
-            && (z - SENSOR_HEIGHT_M).abs() <= STEEPEST * distance_m;
-        is_seen.then_some(Look { cell, cost, origin_m: [place[0], place[1], SENSOR_HEIGHT_M] })
-    })
-}
-
-fn point(place_m: [f64; 3]) -> Point {
-    Point::from(place_m.map(|c| c as f32))
-}
-
-/// The places of a grid, and what it costs to go there: infinite where the robot's body does not fit.
-struct Places {
-    grid: Grid,
-    costs: Vec<f64>,
-}
-
-impl Places {
-    fn take_out(&mut self, place: [f64; 2]) {
-        let number = self.grid.nearest(place);
-        self.costs[number] = f64::INFINITY;
-    }
-}
-
-/// Where the robot could go.
-struct Goal {
-    frontier: Frontier,
-    cell: Cell,
-    cost: f64,
 }
 
 /// Poses of the body that stands at each place.

@@ -34,7 +34,7 @@ impl Grid {
     }
 
     /// The number of the place that is nearest to one within the rectangle.
-    pub(super) fn nearest(self, place: [f64; 2]) -> usize {
+    fn nearest(self, place: [f64; 2]) -> usize {
         self.number(self.cell(place))
     }
 
@@ -54,6 +54,21 @@ impl Grid {
             let is_in = cell[0] < self.count[0] && cell[1] < self.count[1];
             is_in.then_some((cell, ((dx * dx + dy * dy) as f64).sqrt()))
         })
+    }
+}
+
+/// The places of a grid, and what it costs to go there: infinite where the robot's body does not fit.
+pub(super) struct Places {
+    pub(super) grid: Grid,
+    /// A number a place of the grid, row by row.
+    pub(super) costs: Vec<f64>,
+}
+
+impl Places {
+    /// The robot does not fit at a place after all.
+    pub(super) fn take_out(&mut self, place: [f64; 2]) {
+        let number = self.grid.nearest(place);
+        self.costs[number] = f64::INFINITY;
     }
 }
 

@@ -26,6 +26,8 @@ const START_M: [f64; 2] = [4.6, 6.9];
 const WAYS_MAX: usize = 400;
 /// Level at which what was mapped is compared with what there is to see.
 const COMPARED_LEVEL: u32 = 1;
+/// Share of what can be seen that has to be in the map.
+const MAPPED_MIN: f64 = 0.95;
 /// Heights of the voxels in the picture, meters: neither floor nor ceiling.
 const PICTURE_M: [f64; 2] = [0.2, 2.2];
 
@@ -139,10 +141,15 @@ pub(super) struct Explored {
 }
 
 impl Explored {
-    /// An error where the robot met something.
+    /// An error where too little was mapped, or the robot met something.
     pub(super) fn verdict(&self) -> Result<(), CliError> {
         if self.collided {
             return Err(CliError::failed("the robot met something on its way"));
+        }
+        if self.mapped < MAPPED_MIN {
+            let (mapped, least) = (percent(self.mapped), percent(MAPPED_MIN));
+            let message = format!("{mapped} of what can be seen was mapped, {least} is expected");
+            return Err(CliError::failed(message));
         }
         Ok(())
     }
