@@ -5,10 +5,13 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use super::*;
-use crate::geometry::Point;
-use crate::map::{MapContents, MapSettings, MultiResolutionMap, Region};
+use crate::geometry::{Point, Pose};
+use crate::map::{
+    MapContents, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord, ViewpointRecord,
+};
 use crate::util::StopSignal;
-use crate::voxel::VoxelKey;
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
+use crate::voxel::{VoxelKey, VoxelSet};
 
 const EVERYTHING: [f64; 3] = [1000.0; 3];
 static ALL_VOXELS: Surroundings = Surroundings::ALL_VOXELS;
@@ -131,4 +134,48 @@ fn a_motion_far_beyond_what_is_made_is_answered_in_rounds_of_so_much() {
     assert!(answer[0].is_free(), "{answer:?}");
     let blocks = planner.field_bytes() / 512;
     assert!(blocks > 2 * look::UNMADE_MAX, "{blocks} blocks");
+}
+
+/// A map of voxels of 1 mm that nothing is in, and that a scan looked into 20 m far.
+fn seen_from_afar() -> MultiResolutionMap {
+    let map = MultiResolutionMap::new(MapSettings::new(0.001, 4)).unwrap();
+    let points: Vec<Point> =
+        (0..40_000).map(|i| Point::new(20.0, (i % 200) as f32 * 0.05, (i / 200) as f32 * 0.05)).collect();
+    let image =
+        RangeImage::of_points(&points, SeenRange { min_m: 0.0, max_m: 60.0 }, IMAGE_BYTES_MAX).unwrap();
+    let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
+    let viewpoint = Some(ViewpointRecord { image, displaced: Vec::new() });
+    map.committer().insert_scan(ScanRecord { viewpoint, ..ScanRecord::of_voxels(pose, VoxelSet::default()) });
+    map
+}
+
+#[test]
+fn a_grid_of_what_was_seen_from_afar_ends_when_it_is_stopped_and_keeps_no_list_of_it() {
+    let map = seen_from_afar();
+    let view = map.view().with_viewpoints();
+    // Some 10^11 blocks were looked into: a list of them is no answer.
+    let area = GridArea::Rectangle { min_m: [0.0; 2], max_m: [20.0; 2] };
+    let request = GridRequest {
+        level: 0,
+        area,
+        band_m: [-20.0, 20.0],
+        cell_m: 0.1,
+        tells_unknown: true,
+        cells_max: 1 << 20,
+    };
+    let looks = Cell::new(0);
+    let stops = || looks.replace(looks.get() + 1) >= 40;
+    let _some = project_grid(&view, &request, StopSignal::when(&stops)).unwrap();
+    assert!((40..=60).contains(&looks.get()), "{} looks of which 40 let it go on", looks.get());
+}
+
+#[test]
+fn points_that_viewpoints_are_asked_of_look_at_the_signal_often() {
+    let map = seen_from_afar();
+    let view = map.view().with_viewpoints();
+    let points: Vec<Point> = (0..4096).map(|i| Point::new(5.0, 0.001 * i as f32, 1.0)).collect();
+    let looks = Cell::new(0);
+    let never = || looks.replace(looks.get() + 1) == usize::MAX;
+    assert!(classify_points(&view, &points, 0, StopSignal::when(&never)).unwrap().points_free() > 1000);
+    assert!(looks.get() >= 4096 / 16, "{} looks", looks.get());
 }

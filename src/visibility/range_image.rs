@@ -6,7 +6,7 @@ use crate::geometry::Point;
 
 /// Most bytes of a range image that is kept.
 pub const IMAGE_BYTES_MAX: usize = 8192;
-/// Tiles along the side of a face, finest first: pixels of 0.45 to 22 degrees. The first that fits is taken.
+/// Tiles along the side of a face, finest first: pixels of 0.6 to 7 degrees.
 const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
 /// Bytes of an image before its tiles: how many there are along a side, and the unit of depths.
 const HEAD_BYTES: usize = 1 + 4;
@@ -79,14 +79,13 @@ impl RangeImage {
         // Coarser pixels tell more of a scan whose points lie further apart than the finest pixels.
         let coarser =
             fitting.take_while(|depths| depths.map.pitch() <= SPACING_MAX).map(|it| Self::of_depths(&it));
-        let best =
-            coarser.fold(
-                first,
-                |best, next| {
-                    if next.seen_area() > WORTHWHILE * best.seen_area() { next } else { best }
-                },
-            );
+        let best = coarser.fold(first, Self::that_tells_more);
         (!best.tiles.is_empty()).then_some(best)
+    }
+
+    /// The coarser image where it tells so much more that this is worth it.
+    fn that_tells_more(finer: Self, coarser: Self) -> Self {
+        if coarser.seen_area() > WORTHWHILE * finer.seen_area() { coarser } else { finer }
     }
 
     /// The part of the cube around the sensor in which something was seen, in squares of side 1 at depth 1.

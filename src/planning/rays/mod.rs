@@ -12,7 +12,7 @@ mod turns;
 use super::free_space::FreeSpace;
 use super::keep_outs::Shapes;
 use crate::geometry::Point;
-use crate::map::{KeepOutName, MapView};
+use crate::map::{KeepOutName, MapView, TierView};
 use crate::util::StopSignal;
 use crate::voxel::{Cluster, VoxelKey};
 pub(super) use in_sight::clear_m;
@@ -274,15 +274,11 @@ pub fn cast_rays(
     level: u32,
     stop: StopSignal<'_>,
 ) -> Result<RayHits, RayError> {
-    rays.checked()?;
-    let mut hits = RayHits::none_of(rays.len());
-    let (nothing, tier) = (Cluster::default(), view.tier_view(level));
-    let request = Request { rays, range_m: view.lattice().range_m(), cell_m: tier.cell_m() };
-    match view.cell_bounds(level) {
-        Some(bounds) => Turns::new(Space::new(tier, bounds, &nothing), request).walk(&mut hits, stop)?,
-        None => (0..rays.len()).try_for_each(|number| request.ray(number).map(|_| ()))?,
-    }
-    end_at_keep_outs(view, rays, hits, stop)
+    let nothing = Cluster::default();
+    cast(view, rays, level, stop, |tier, request, hits| match view.cell_bounds(level) {
+        Some(bounds) => Turns::new(Space::new(tier, bounds, &nothing), request).walk(hits, stop),
+        None => (0..rays.len()).try_for_each(|number| request.ray(number).map(|_| ())),
+    })
 }
 
 /// What each ray meets first of the voxels of `level` that are not free: those that are occupied, and those that no scan saw
@@ -298,22 +294,26 @@ pub fn cast_rays_in_sight(
     level: u32,
     stop: StopSignal<'_>,
 ) -> Result<RayHits, RayError> {
-    rays.checked()?;
-    let mut hits = RayHits::none_of(rays.len());
-    let (nothing, tier) = (Cluster::default(), view.tier_view(level));
-    let request = Request { rays, range_m: view.lattice().range_m(), cell_m: tier.cell_m() };
-    let space = Space::new(tier, view.lattice_bounds(level), &nothing);
-    in_sight::walk(space, &request, (level, FreeSpace::of(view)), &mut hits, stop)?;
-    end_at_keep_outs(view, rays, hits, stop)
+    let nothing = Cluster::default();
+    cast(view, rays, level, stop, |tier, request, hits| {
+        let space = Space::new(tier, view.lattice_bounds(level), &nothing);
+        in_sight::walk(space, &request, (level, FreeSpace::of(view)), hits, stop)
+    })
 }
 
-/// The hits of rays that end where they enter a keep-out of the view.
-fn end_at_keep_outs(
-    view: &MapView<'_>,
-    rays: &Rays<'_>,
-    mut hits: RayHits,
+/// What rays meet first that `walk` through the voxels of `level`, and end where they enter a keep-out of the view.
+fn cast<'a>(
+    view: &'a MapView<'_>,
+    rays: &'a Rays<'_>,
+    level: u32,
     stop: StopSignal<'_>,
+    walk: impl FnOnce(TierView<'a>, Request<'a>, &mut RayHits) -> Result<(), RayError>,
 ) -> Result<RayHits, RayError> {
+    rays.checked()?;
+    let mut hits = RayHits::none_of(rays.len());
+    let tier = view.tier_view(level);
+    let request = Request { rays, range_m: view.lattice().range_m(), cell_m: tier.cell_m() };
+    walk(tier, request, &mut hits)?;
     if let Some(shapes) = Shapes::of(view) {
         keep_outs::end_at(&shapes, rays, &mut hits, stop)?;
     }

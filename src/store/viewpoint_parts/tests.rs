@@ -130,6 +130,12 @@ fn a_part_that_is_damaged_missing_or_another_is_told_by_name() {
     std::fs::write(&path, &bytes[..30]).unwrap();
     let LoadedParts { viewpoints: read, known, damaged } = folder.load_all().unwrap();
     assert!(read == viewpoints && known.is_empty() && damaged.len() == 1, "the copy stands in for it");
+    // As where a sector cannot be read: a folder cannot be.
+    std::fs::remove_file(&path).unwrap();
+    std::fs::create_dir(&path).unwrap();
+    assert!(folder.load().unwrap() == viewpoints, "the copy stands in for what cannot be read");
+    std::fs::remove_dir(&path).unwrap();
+    std::fs::write(&path, &bytes[..30]).unwrap();
     std::fs::remove_file(&copy).unwrap();
     assert!(refused(&folder).ends_with("000001.part: 30 bytes are too few for the header of a part"));
     std::fs::remove_file(&path).unwrap();
