@@ -228,7 +228,7 @@ impl<'a> ScanMapper<'a> {
             return Ok(ScanOutcome { located, committed: None, insert_time: Duration::ZERO });
         }
         let start = Instant::now();
-        let mut record = self.record(scan, &located)?;
+        let mut record = self.record(scan, &located, stop)?;
         let carving = self.carve(scan, &located, &record, stop)?;
         record.carved.clone_from(&carving.voxels);
         let is_new = !self.note_stationary(scan, &record);
@@ -321,8 +321,13 @@ impl<'a> ScanMapper<'a> {
     /// its pose, and its viewpoint where it sees something new.
     ///
     /// # Errors
-    /// No point lies within the map's range.
-    pub fn record(&self, scan: &Scan<'_>, located: &LocatedScan) -> Result<ScanRecord, MappingError> {
+    /// No point lies within the map's range, or `stop` said so.
+    pub fn record(
+        &self,
+        scan: &Scan<'_>,
+        located: &LocatedScan,
+        stop: StopSignal<'_>,
+    ) -> Result<ScanRecord, MappingError> {
         let alignment = &located.alignment;
         let pose = MappedScan {
             robot: scan.robot.clone(),
@@ -347,9 +352,11 @@ impl<'a> ScanMapper<'a> {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });
         }
-        let viewpoints = self.map.viewpoints();
-        record.viewpoint =
-            self.settings.viewpoints.viewpoint_of(&points, &alignment.map_from_sensor, &viewpoints);
+        let (viewpoints, settings) = (self.map.viewpoints(), &self.settings.viewpoints);
+        record.viewpoint = settings.viewpoint_of(&points, &alignment.map_from_sensor, &viewpoints, stop);
+        if stop.is_stopped() {
+            return Err(MappingError::Stopped);
+        }
         Ok(record)
     }
 

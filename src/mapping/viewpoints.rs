@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{Point, Pose};
 use crate::map::ViewpointRecord;
+use crate::util::StopSignal;
 use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange, Viewpoint, ViewpointSet};
 
 /// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
@@ -25,8 +26,8 @@ pub struct ViewpointSettings {
     /// A scan from a new pose is new if this share of what it sees was unknown. 0.002: who passes between two viewpoints that saw
     /// all of it already leaves none.
     pub unknown_from_new_pose: f64,
-    /// A scan from a known pose is new if this share of what it sees was unknown. 0.1: a door that was opened, a robot with
-    /// another sensor.
+    /// A scan from a known pose is new if this share of what it sees was unknown. 0.05: a door that was opened, a robot with
+    /// another sensor, what the first rays missed.
     pub unknown_from_known_pose: f64,
     /// Between which distances a scan is believed to see. 0 to 60 m.
     pub range: SeenRange,
@@ -39,7 +40,7 @@ impl Default for ViewpointSettings {
             distance_m: 0.5,
             rotation_deg: 15.0,
             unknown_from_new_pose: 0.002,
-            unknown_from_known_pose: 0.1,
+            unknown_from_known_pose: 0.05,
             range: SeenRange { min_m: 0.0, max_m: 60.0 },
         }
     }
@@ -47,19 +48,20 @@ impl Default for ViewpointSettings {
 
 /// Rays that are looked along for what is unknown.
 const RAYS: usize = 300;
-/// Where along each: its middle, and a quarter of it on both sides. At its end a ray grazes what it meets.
-const ALONG: [f64; 3] = [0.25, 0.5, 0.75];
+/// Where along each: before its middle others saw most, and at its end it grazes what it meets.
+const ALONG: [f64; 3] = [0.5, 0.75, 0.9];
 /// Viewpoints that are compared when one has to go.
 const COMPARED: usize = 24;
 
 impl ViewpointSettings {
     /// The viewpoint that a scan of `points` (sensor frame) from `map_from_sensor` leaves beside those that are there; none of a scan
-    /// that sees nothing new.
+    /// that sees nothing new, and none once `stop` says so.
     pub(super) fn viewpoint_of(
         &self,
         points: &[Point],
         map_from_sensor: &Pose,
         viewpoints: &ViewpointSet,
+        stop: StopSignal<'_>,
     ) -> Option<ViewpointRecord> {
         if self.bytes_max == 0 {
             return None;
@@ -76,7 +78,7 @@ impl ViewpointSettings {
         if unknown < least {
             return None;
         }
-        let displaced = self.displaced_by(&viewpoint, unknown, viewpoints)?;
+        let displaced = self.displaced_by(&viewpoint, unknown, viewpoints, stop)?;
         Some(ViewpointRecord { image: viewpoint.image().clone(), displaced })
     }
 
@@ -93,40 +95,47 @@ impl ViewpointSettings {
     }
 
     /// The revisions of the viewpoints that go so that `viewpoint` has room, ascending: of some that are compared those that add least.
-    /// None where it adds less than they do, `unknown` being the share of what it sees.
+    /// None where it adds less than they do, `unknown` being the share of what it sees, and once stopped.
     fn displaced_by(
         &self,
         viewpoint: &Viewpoint,
         unknown: f64,
         viewpoints: &ViewpointSet,
+        stop: StopSignal<'_>,
     ) -> Option<Vec<u64>> {
-        let over =
-            |freed: usize| viewpoints.memory_bytes() + viewpoint.memory_bytes() > self.bytes_max + freed;
-        if !over(0) {
-            return Some(Vec::new());
-        }
+        let needed = (viewpoints.memory_bytes() + viewpoint.memory_bytes()).saturating_sub(self.bytes_max);
         let mut left: Vec<_> = viewpoints.iter().map(|(revision, _)| revision).collect();
         let mut random = ChaCha8Rng::seed_from_u64(left.last().copied().unwrap_or(0));
         let (mut displaced, mut freed) = (Vec::new(), 0);
-        while over(freed) {
+        while freed < needed {
             let mut compared = Vec::new();
             while compared.len() < COMPARED && !left.is_empty() {
-                compared.push(left.swap_remove(random.random_range(0..left.len())));
-            }
-            let added = |revision: &u64| {
-                let kept = viewpoints.get(*revision)?;
+                let revision = left.swap_remove(random.random_range(0..left.len()));
+                let kept = viewpoints.get(revision)?;
                 let by_others =
-                    |point| viewpoint.sees_through(point) || viewpoints.others_see_through(point, *revision);
-                Some((share_unknown(&samples_of(kept), by_others), *revision, kept.memory_bytes()))
-            };
-            let (adds, revision, bytes) =
-                compared.iter().filter_map(added).min_by(|a, b| a.0.total_cmp(&b.0))?;
-            if adds > unknown {
+                    |point| viewpoint.sees_through(point) || viewpoints.others_see_through(point, revision);
+                compared.push((share_unknown(&samples_of(kept), by_others), revision, kept.memory_bytes()));
+                if stop.is_stopped() {
+                    return None;
+                }
+            }
+            compared.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // Mostly one goes. Where the limit was lowered, half of them at a time.
+            let stay = compared.split_off(compared.len().div_ceil(2));
+            left.extend(stay.into_iter().map(|(_, revision, _)| revision));
+            if compared.is_empty() {
                 return None;
             }
-            left.extend(compared.into_iter().filter(|&other| other != revision));
-            displaced.push(revision);
-            freed += bytes;
+            for (adds, revision, bytes) in compared {
+                if freed >= needed {
+                    left.push(revision);
+                } else if adds > unknown {
+                    return None;
+                } else {
+                    displaced.push(revision);
+                    freed += bytes;
+                }
+            }
         }
         displaced.sort_unstable();
         Some(displaced)
@@ -185,7 +194,8 @@ mod tests {
         let back = there.clone().rev();
         for (revision, x_m) in (0..rounds).flat_map(|_| there.clone().chain(back.clone())).enumerate() {
             let pose = Pose::translation(f64::from(x_m), 0.0, 0.0);
-            if let Some(ViewpointRecord { image, displaced }) = settings.viewpoint_of(&scan(x_m), &pose, &set)
+            if let Some(ViewpointRecord { image, displaced }) =
+                settings.viewpoint_of(&scan(x_m), &pose, &set, StopSignal::NEVER)
             {
                 displaced.iter().for_each(|&gone| assert!(set.remove(gone).is_some()));
                 set.insert(revision as u64, Arc::new(Viewpoint::new(pose, image)));
@@ -224,11 +234,11 @@ mod tests {
         let settings = ViewpointSettings::default();
         let near: Vec<_> = scan(0.0).iter().map(|p| Point::from(p.xyz().map(|c| c * 0.4))).collect();
         let mut set = ViewpointSet::default();
-        let first = settings.viewpoint_of(&near, &Pose::identity(), &set).unwrap();
+        let first = settings.viewpoint_of(&near, &Pose::identity(), &set, StopSignal::NEVER).unwrap();
         set.insert(1, Arc::new(Viewpoint::new(Pose::identity(), first.image)));
-        assert_eq!(settings.viewpoint_of(&near, &Pose::identity(), &set), None);
+        assert_eq!(settings.viewpoint_of(&near, &Pose::identity(), &set, StopSignal::NEVER), None);
         assert!(
-            settings.viewpoint_of(&scan(0.0), &Pose::identity(), &set).is_some(),
+            settings.viewpoint_of(&scan(0.0), &Pose::identity(), &set, StopSignal::NEVER).is_some(),
             "a curtain was drawn aside"
         );
     }

@@ -13,6 +13,7 @@
 //! A change whose content follows from the map (which voxels are there to be deleted) is decided when everything
 //! before it is applied and nothing after it has begun.
 
+mod scan_turn;
 mod worker;
 
 use std::sync::{Arc, OnceLock};
@@ -27,6 +28,7 @@ use crate::store::{MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use crate::sync::thread;
 use crate::util::{Durations, SharedDurations, StopSignal};
+pub(super) use scan_turn::TurnLimits;
 use worker::Worker;
 
 /// Changes that share one sync, and as many that wait meanwhile; one more is refused.
@@ -65,8 +67,8 @@ pub(super) struct Prepared {
     pub(super) record: Option<Record>,
     /// True of a change that was decided on an empty map, and holds for no other.
     pub(super) if_empty: bool,
-    /// The revision in which a scan that carves saw what it carves.
-    pub(super) carved_at: u64,
+    /// What a scan may still do when its turn comes.
+    pub(super) limits: TurnLimits,
     pub(super) turn: Turn,
     /// The memory that it takes.
     pub(super) reservation: Reservation,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::commit_queue::{Prepared, Step, Submission, Turn, record_of};
+use super::commit_queue::{Prepared, Step, Submission, Turn, TurnLimits, record_of};
 use super::deletion::removal_bytes;
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
@@ -71,8 +71,9 @@ impl HostedMap {
         if !answer.accepted && !request.force {
             return Ok(Step::Answered(Some(answer)));
         }
-        let mut scan_record = mapper.record(&scan.to_map(), &located)?;
+        let scan_record = mapper.record(&scan.to_map(), &located, stop);
         check_not_stopped(stop)?;
+        let mut scan_record = scan_record?;
         let carving = mapper.carve(&scan.to_map(), &located, &scan_record, stop);
         check_not_stopped(stop)?;
         let Carving { voxels: carved, revision: carved_at } = carving?;
@@ -90,7 +91,8 @@ impl HostedMap {
         let points_skipped = scan_record.pose.points_skipped;
         let change = Change::Insertion(scan_record);
         let record = self.folder.as_ref().map(|_| record_of(&change)).transpose()?;
-        let prepared = Prepared { change, record, if_empty: located.is_first, carved_at, turn, reservation };
+        let limits = TurnLimits { carved_at, viewpoint_bytes_max: settings.limits.viewpoint_bytes_max };
+        let prepared = Prepared { change, record, if_empty: located.is_first, limits, turn, reservation };
         let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
         let answer = ScanAnswer { points_skipped, ..answer };

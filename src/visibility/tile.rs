@@ -1,19 +1,24 @@
-//! Depths of 8 x 8 pixels: an integer for all of them, and a byte each.
+//! Depths of 8 x 8 pixels: two integers for all of them, and six bits each.
 
 use super::cube_map::TILE_SIDE;
 
 /// Pixels of a tile.
 pub(super) const TILE_PIXELS: usize = TILE_SIDE * TILE_SIDE;
+/// Bits of a pixel when it is stored. Eight would tell depths better, but of fewer pixels: coarser ones tell less of a scan all around
+/// than the rounding takes.
+const PIXEL_BITS: usize = 6;
 /// Bytes of a tile when it is stored.
-pub(super) const TILE_BYTES: usize = 4 + TILE_PIXELS;
-/// Steps that a byte tells apart: 0 says that the pixel was not seen.
-const STEPS: u32 = 254;
+pub(super) const TILE_BYTES: usize = 4 + TILE_PIXELS * PIXEL_BITS / 8;
+/// Steps that a pixel's bits tell apart: 0 says that it was not seen.
+const STEPS: u32 = (1 << PIXEL_BITS) - 2;
+/// Pixels whose bits make up whole bytes, and how many bytes.
+const PACKED_PIXELS: usize = 4;
+const PACKED_BYTES: usize = PACKED_PIXELS * PIXEL_BITS / 8;
 
 /// Depths of the pixels of a tile, in the image's unit: pixel i was seen up to `base + step * (seen[i] - 1)`, or not at all where
 /// `seen[i]` is 0.
 ///
-/// Depths beside each other are alike, so that a byte each mostly tells them to the unit; where they are not, they are
-/// rounded down: no more is said to be seen than was.
+/// Depths beside each other are alike, so that little is lost where they are rounded down: no more is said to be seen than was.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Tile {
     base: u16,
@@ -46,12 +51,21 @@ impl Tile {
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
         bytes.extend_from_slice(&self.base.to_le_bytes());
         bytes.extend_from_slice(&self.step.to_le_bytes());
-        bytes.extend_from_slice(&self.seen);
+        for pixels in self.seen.as_chunks::<PACKED_PIXELS>().0 {
+            let packed = pixels.iter().rev().fold(0, |packed, &seen| packed << PIXEL_BITS | u32::from(seen));
+            bytes.extend_from_slice(&packed.to_le_bytes()[..PACKED_BYTES]);
+        }
     }
 
     pub(super) fn read(bytes: &[u8; TILE_BYTES]) -> Self {
-        let [b0, b1, s0, s1, seen @ ..] = *bytes;
-        Self { base: u16::from_le_bytes([b0, b1]), step: u16::from_le_bytes([s0, s1]), seen }
+        let [b0, b1, s0, s1, packed @ ..] = bytes;
+        let packed = packed.as_chunks::<PACKED_BYTES>().0;
+        let seen = std::array::from_fn(|pixel| {
+            let [b0, b1, b2] = packed[pixel / PACKED_PIXELS];
+            let word = u32::from_le_bytes([b0, b1, b2, 0]);
+            (word >> (pixel % PACKED_PIXELS * PIXEL_BITS)) as u8 & ((1 << PIXEL_BITS) - 1)
+        });
+        Self { base: u16::from_le_bytes([*b0, *b1]), step: u16::from_le_bytes([*s0, *s1]), seen }
     }
 }
 
@@ -61,7 +75,7 @@ mod tests {
 
     #[test]
     fn depths_that_are_alike_are_told_to_the_unit() {
-        let depths = std::array::from_fn(|i| (i % 5 != 0).then_some(7000 + i as u16 * 4));
+        let depths = std::array::from_fn(|i| (i % 5 != 0).then_some(7000 + i as u16));
         let tile = Tile::new(&depths);
         for (pixel, depth) in depths.iter().enumerate() {
             assert_eq!(tile.depth(pixel), depth.map(u32::from));

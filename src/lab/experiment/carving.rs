@@ -231,7 +231,7 @@ impl CarvingMapper {
         if !located.is_accepted() {
             return Ok(false);
         }
-        let mut record = mapper.record(&scan, &located)?;
+        let mut record = mapper.record(&scan, &located, StopSignal::NEVER)?;
         let start = Instant::now();
         record.carved = mapper.carve(&scan, &located, &record, StopSignal::NEVER)?.voxels;
         self.carve_times.push(start.elapsed());

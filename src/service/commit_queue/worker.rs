@@ -5,19 +5,18 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
+use super::scan_turn::{ScanTurn, TurnLimits};
 use super::{
     Decided, Decision, GROUP_MAX, Outcome, Prepared, Refusal, Stop, Submission, Told, Turn, Waiting,
     outcome_unknown, record_of, revisions_used_up,
 };
 use crate::map::{Change, Committed, MapName, MultiResolutionMap, REVISION_MAX};
-use crate::mapping::Carving;
 use crate::service::ServiceError;
 use crate::service::recent_changes::WatchedChange;
 use crate::service::resource_budget::Reservation;
 use crate::store::{Durability, MapFolder, Pin, Record, StoreError, StoreSettings};
 use crate::sync::mpsc::{Receiver, RecvTimeoutError};
 use crate::util::{SharedDurations, StopSignal};
-use crate::voxel::VoxelSet;
 
 /// Revisions between two thinnings of the trajectory of a map in memory.
 const THINNED_EVERY: u64 = 4096;
@@ -93,8 +92,7 @@ impl Worker {
         for Waiting { submission, answer } in waiting {
             match submission {
                 Submission::Prepared(prepared) => {
-                    let Prepared { mut change, mut record, if_empty, carved_at, turn, reservation } =
-                        *prepared;
+                    let Prepared { mut change, mut record, if_empty, limits, turn, reservation } = *prepared;
                     if if_empty {
                         self.commit_group(&mut group);
                         if !self.map.is_empty() {
@@ -102,7 +100,7 @@ impl Worker {
                             continue;
                         }
                     }
-                    if let Err(error) = self.cut_carving(&mut change, &mut record, carved_at, &group) {
+                    if let Err(error) = self.settle(&mut change, &mut record, limits, &group) {
                         drop(answer.send(Err(Refusal::Failed(error))));
                         continue;
                     }
@@ -119,36 +117,18 @@ impl Worker {
         self.commit_group(&mut group);
     }
 
-    /// Cuts what a scan carves to what is there when its turn comes, and what no change since `carved_at` touched: another
-    /// scan that saw something there meanwhile is not contradicted. Of changes that are no longer kept nobody knows what they
-    /// touched: then the scan carves nothing.
-    fn cut_carving(
+    /// Cuts a scan to what it may still do now that its turn comes.
+    fn settle(
         &self,
         change: &mut Change,
         record: &mut Option<Record>,
-        carved_at: u64,
+        limits: TurnLimits,
         group: &[Pending],
     ) -> Result<(), ServiceError> {
         let Change::Insertion(scan) = &mut *change else { return Ok(()) };
-        if scan.carved.is_empty() {
-            return Ok(());
-        }
-        let mut carving = Carving { voxels: std::mem::take(&mut scan.carved), revision: carved_at };
-        let carved = carving.voxels.clone();
-        for revision in carved_at + 1..=self.map.revision() {
-            match self.told.recent.get(revision) {
-                Some(change) => change.touched().into_iter().for_each(|touched| carving.cut(touched)),
-                None => carving.voxels = VoxelSet::default(),
-            }
-            if carving.voxels.is_empty() {
-                break;
-            }
-        }
-        let before_it = group.iter().flat_map(|pending| pending.change.touched());
-        before_it.for_each(|touched| carving.cut(touched));
-        let is_cut = carving.voxels != carved;
-        scan.carved = carving.voxels;
-        if is_cut && record.is_some() {
+        let before = group.iter().map(|pending| &pending.change).collect();
+        let turn = ScanTurn { map: &self.map, recent: &self.told.recent, before };
+        if turn.cut(scan, limits) && record.is_some() {
             *record = Some(record_of(change)?);
         }
         Ok(())
@@ -291,79 +271,5 @@ impl Drop for Worker {
         if std::thread::panicking() {
             self.stopped.get_or_init(|| Stop::Failed("a defect of the server ended its thread".into()));
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Pose;
-    use crate::map::{DeletionRecord, MapSettings, MappedScan, RobotName, ScanRecord};
-    use crate::service::recent_changes::RecentChanges;
-    use crate::voxel::VoxelKey;
-
-    fn voxels(x: std::ops::Range<i32>) -> VoxelSet {
-        x.filter_map(|x| VoxelKey::new([x, 0, 0])).collect()
-    }
-
-    fn scan(seen: VoxelSet, carved: VoxelSet) -> Change {
-        let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
-        Change::Insertion(ScanRecord { carved, ..ScanRecord::of_voxels(pose, seen) })
-    }
-
-    fn deletion(voxels: VoxelSet) -> Change {
-        Change::Deletion(DeletionRecord { voxels, request: None })
-    }
-
-    /// A worker of a map to which these changes were made, and which remembers so many bytes of them.
-    fn worker(changes: &[Change], recent_bytes: usize) -> Worker {
-        let map = Arc::new(MultiResolutionMap::new(MapSettings::new(0.1, 2)).unwrap());
-        let recent = Arc::new(RecentChanges::new(0, recent_bytes));
-        for change in changes {
-            let committed = map.committer().apply(change);
-            recent.push(WatchedChange::of(committed.revision, None, change.clone(), Vec::new()));
-        }
-        let told = Told { announced: tokio::sync::watch::Sender::new(0), recent };
-        let settings = StoreSettings::default();
-        Worker::new(MapName::new("a").unwrap(), map, None, told, Arc::default(), Arc::default(), &settings)
-    }
-
-    /// What a scan carves that saw voxels 0 to 99 gone at revision 1, when its turn comes.
-    fn cut(worker: &Worker, group: &[Change]) -> VoxelSet {
-        let pending = |change: &Change| Pending {
-            change: change.clone(),
-            record: None,
-            answer: oneshot::channel().0,
-            _turn: None,
-            _memory: Vec::new(),
-            _pin: None,
-        };
-        let group: Vec<Pending> = group.iter().map(pending).collect();
-        let mut change = scan(voxels(200..210), voxels(0..100));
-        worker.cut_carving(&mut change, &mut None, 1, &group).unwrap();
-        let Change::Insertion(scan) = change else { panic!("a scan is a scan") };
-        scan.carved
-    }
-
-    #[test]
-    fn what_went_or_was_seen_since_is_not_carved() {
-        let first = scan(voxels(0..100), VoxelSet::default());
-        let (gone, seen) = (deletion(voxels(0..10)), scan(voxels(90..120), voxels(80..90)));
-        let nothing = [];
-        assert_eq!(cut(&worker(std::slice::from_ref(&first), 1 << 20), &nothing), voxels(0..100));
-        let all = [first.clone(), gone.clone(), seen.clone()];
-        assert_eq!(cut(&worker(&all, 1 << 20), &nothing), voxels(10..80));
-        assert_eq!(
-            cut(&worker(&[first.clone(), gone], 1 << 20), std::slice::from_ref(&seen)),
-            voxels(10..80)
-        );
-        assert_eq!(cut(&worker(&[first], 1 << 20), &[seen]), voxels(0..80));
-    }
-
-    #[test]
-    fn where_nobody_knows_what_came_between_nothing_is_carved() {
-        let first = scan(voxels(0..100), VoxelSet::default());
-        assert_eq!(cut(&worker(std::slice::from_ref(&first), 0), &[]), voxels(0..100));
-        assert!(cut(&worker(&[first, deletion(voxels(50..51))], 0), &[]).is_empty());
     }
 }
