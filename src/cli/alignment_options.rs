@@ -56,6 +56,12 @@ pub(super) struct PointOptions {
 impl PointOptions {
     pub(super) fn filter(&self) -> Result<PointFilter, PointFilterError> {
         let Self { range_min, range_max, body } = self;
-        PointFilter { range_min_m: *range_min, range_max_m: *range_max, body_m: *body }.checked()
+        let filter = PointFilter {
+            range_min_m: *range_min,
+            range_max_m: *range_max,
+            body_m: *body,
+            ..PointFilter::default()
+        };
+        filter.checked()
     }
 }

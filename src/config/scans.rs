@@ -24,6 +24,8 @@ pub struct RobotConfig {
     pub range_min_m: Option<f64>,
     /// Largest range: points farther from the sensor than this are skipped, meters.
     pub range_max_m: Option<f64>,
+    /// How far "no return" reaches: points at this distance and farther say that nothing was met up to here, and are skipped, meters.
+    pub no_return_m: Option<f64>,
     /// Box of the robot's own body in the sensor frame, meters: smallest and largest corner. Points within it are
     /// skipped.
     pub body_m: Option<[[f64; 3]; 2]>,
@@ -46,6 +48,7 @@ impl Default for RobotConfig {
         Self {
             range_min_m: None,
             range_max_m: None,
+            no_return_m: None,
             body_m: None,
             recover: false,
             carve: false,
@@ -76,6 +79,11 @@ impl RobotConfig {
 
     pub(super) fn filter(&self) -> PointFilter {
         let body_m = self.body_m.map(|[min_m, max_m]| (min_m, max_m));
-        PointFilter { range_min_m: self.range_min_m, range_max_m: self.range_max_m, body_m }
+        PointFilter {
+            range_min_m: self.range_min_m,
+            range_max_m: self.range_max_m,
+            no_return_m: self.no_return_m,
+            body_m,
+        }
     }
 }

@@ -148,6 +148,7 @@ impl TryFrom<ScanBody> for ScanRequest {
                 range_min_m: scan.range_min_m,
                 range_max_m: scan.range_max_m,
                 body_m: scan.body_m.map(|[min_m, max_m]| (min_m, max_m)),
+                ..PointFilter::default()
             },
             strict: scan.strict,
             ..Self::new(RobotName::new(&scan.robot)?, scan.points.into())
@@ -190,6 +191,7 @@ impl ScanParams {
                 range_min_m: self.range_min_m,
                 range_max_m: self.range_max_m,
                 body_m: self.body_m.map(|text| corners(&text)).transpose()?,
+                ..PointFilter::default()
             },
             strict: self.strict,
             ..ScanRequest::new(RobotName::new(&self.robot)?, points)

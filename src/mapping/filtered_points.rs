@@ -12,6 +12,10 @@ pub struct FilteredPoints {
     pub points: Vec<Point>,
     /// When each was measured, seconds from the scan's timestamp, where the scan tells.
     pub times_s: Option<Vec<f32>>,
+    /// Up to where points tell that nothing was met, see [`PointFilter::no_return_m`]: none of `points`.
+    pub no_returns: Vec<Point>,
+    /// When each of these was measured, where the scan tells.
+    pub no_return_times_s: Option<Vec<f32>>,
     /// How many points were left out.
     pub skipped: usize,
     filter: PointFilter,
@@ -45,14 +49,20 @@ impl FilteredPoints {
             let filter = format!("{filter:?}");
             return Err(MappingError::AllFiltered { points: all.len(), filter, robot: robot.clone() });
         }
-        let times_s = times_s.map(|times_s| {
+        let of_points = times_s.map(|times_s| {
             let timed = all.iter().zip(times_s);
             timed
                 .filter(|&(&point, _)| point.is_finite() && filter.keeps(point))
                 .map(|(_, &time)| time)
                 .collect()
         });
-        Ok(Self { skipped: all.len() - points.len(), points, times_s, filter })
+        let no_returns = all.iter().filter_map(|&point| filter.no_return(point)).collect();
+        let no_return_times_s = times_s.map(|times_s| {
+            let timed = all.iter().zip(times_s);
+            timed.filter(|&(&point, _)| filter.no_return(point).is_some()).map(|(_, &time)| time).collect()
+        });
+        let skipped = all.len() - points.len();
+        Ok(Self { points, times_s: of_points, no_returns, no_return_times_s, skipped, filter })
     }
 
     /// True of a point (sensor frame) that passes the filter.

@@ -101,6 +101,10 @@ pub struct Scan<'a> {
     /// When each of the points was measured, seconds from `timestamp_ns` (negative before it), where the sensor moved
     /// meanwhile: the scan is deskewed. As many as points; none where they were measured at once.
     pub times_s: Option<&'a [f32]>,
+    /// Up to where nothing was met in other directions (sensor frame, finite): they are seen through, and no voxels.
+    pub no_returns: &'a [Point],
+    /// When each of these was measured, as `times_s`.
+    pub no_return_times_s: Option<&'a [f32]>,
     /// Points that were left out before, see [`FilteredPoints`].
     pub points_skipped: usize,
     /// Direction of gravity, as an accelerometer tells.
@@ -120,10 +124,12 @@ pub struct Scan<'a> {
 impl<'a> Scan<'a> {
     /// The points in the sensor frame at the scan's timestamp, where the sensor moved with `velocity`.
     fn points_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
-        match self.times_s.zip(velocity) {
-            Some((times_s, velocity)) => deskewed(self.points, times_s, velocity).into(),
-            None => self.points.into(),
-        }
+        points_at(self.points, self.times_s, velocity)
+    }
+
+    /// [`Scan::points_at`] of the directions in which nothing was met.
+    fn no_returns_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
+        points_at(self.no_returns, self.no_return_times_s, velocity)
     }
 
     /// How far the sensor moved with `velocity` between the scan's timestamp and the point that is farthest from it in time,
@@ -150,6 +156,8 @@ impl<'a> Scan<'a> {
             timestamp_ns: None,
             points,
             times_s: None,
+            no_returns: &[],
+            no_return_times_s: None,
             points_skipped: 0,
             gravity: None,
             guess: Guess::Last,
@@ -158,6 +166,14 @@ impl<'a> Scan<'a> {
             force: false,
             digest: 0,
         }
+    }
+}
+
+/// Points where they were at the scan's timestamp, where the sensor moved with `velocity`.
+fn points_at<'a>(points: &'a [Point], times_s: Option<&[f32]>, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
+    match times_s.zip(velocity) {
+        Some((times_s, velocity)) => deskewed(points, times_s, velocity).into(),
+        None => points.into(),
     }
 }
 
@@ -353,7 +369,11 @@ impl<'a> ScanMapper<'a> {
             return Err(MappingError::OutOfRange { min_m, end_m });
         }
         let (viewpoints, settings) = (self.map.viewpoints(), &self.settings.viewpoints);
-        record.viewpoint = settings.viewpoint_of(&points, &alignment.map_from_sensor, &viewpoints, stop);
+        let mut seen = points;
+        if !scan.no_returns.is_empty() {
+            seen.to_mut().extend_from_slice(&scan.no_returns_at(located.velocity.as_ref()));
+        }
+        record.viewpoint = settings.viewpoint_of(&seen, &alignment.map_from_sensor, &viewpoints, stop);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
         }

@@ -9,6 +9,9 @@ pub struct PointFilter {
     pub range_min_m: Option<f64>,
     /// Distance from the sensor, meters; farther points are skipped. None: no such limit.
     pub range_max_m: Option<f64>,
+    /// Distance from the sensor, meters: from here on a point tells that nothing was met up to here, in a driver's way of saying "no
+    /// return" with a direction. It is skipped. None: every point was met.
+    pub no_return_m: Option<f64>,
     /// The robot's own body in the sensor frame, meters: smallest and largest corner; points within are skipped.
     pub body_m: Option<([f64; 3], [f64; 3])>,
 }
@@ -19,9 +22,9 @@ pub enum PointFilterError {
     /// A range that is negative or not finite; the payload is the field and its value.
     #[error("{0} must be finite and not negative, got {1}")]
     Range(&'static str, f64),
-    /// `range_min_m` is not below `range_max_m`, so that nothing would pass.
-    #[error("range_min_m {0} must be below range_max_m {1}")]
-    Empty(f64, f64),
+    /// `range_min_m` is not below the other limit, so that nothing would pass; the payload is that, the other's name, and its value.
+    #[error("range_min_m {0} must be below {1} {2}")]
+    Empty(f64, &'static str, f64),
     /// A box whose corners are not finite or not in order.
     #[error("body_m must have finite corners, the smaller first, got {0:?} and {1:?}")]
     Body([f64; 3], [f64; 3]),
@@ -33,15 +36,17 @@ impl PointFilter {
     /// # Errors
     /// Names what is out of range.
     pub fn checked(self) -> Result<Self, PointFilterError> {
-        for (name, range) in [("range_min_m", self.range_min_m), ("range_max_m", self.range_max_m)] {
+        let least_m = self.range_min_m.unwrap_or(0.0);
+        let upper = [("range_max_m", self.range_max_m), ("no_return_m", self.no_return_m)];
+        for (name, range) in [("range_min_m", self.range_min_m)].into_iter().chain(upper) {
             if let Some(range) = range.filter(|range| !(range.is_finite() && *range >= 0.0)) {
                 return Err(PointFilterError::Range(name, range));
             }
         }
-        if let (Some(min), Some(max)) = (self.range_min_m, self.range_max_m)
-            && min >= max
-        {
-            return Err(PointFilterError::Empty(min, max));
+        for (name, range) in upper {
+            if let Some(range) = range.filter(|range| least_m >= *range) {
+                return Err(PointFilterError::Empty(least_m, name, range));
+            }
         }
         match self.body_m {
             Some((min, max))
@@ -58,6 +63,7 @@ impl PointFilter {
         Self {
             range_min_m: self.range_min_m.or(fallback.range_min_m),
             range_max_m: self.range_max_m.or(fallback.range_max_m),
+            no_return_m: self.no_return_m.or(fallback.no_return_m),
             body_m: self.body_m.or(fallback.body_m),
         }
     }
@@ -70,7 +76,18 @@ impl PointFilter {
             self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])));
         self.range_min_m.is_none_or(|min| range_m >= min)
             && self.range_max_m.is_none_or(|max| range_m <= max)
+            && self.no_return_m.is_none_or(|max| range_m < max)
             && !in_body
+    }
+
+    /// Up to where a point (sensor frame) tells that nothing was met; none of one that was met itself, and of one without a
+    /// direction.
+    pub fn no_return(&self, point: Point) -> Option<Point> {
+        let no_return_m = self.no_return_m.filter(|_| point.is_finite())?;
+        let point = point.to_f64().coords;
+        let range_m = point.norm();
+        let to: [f64; 3] = (point * (no_return_m / range_m)).into();
+        (range_m >= no_return_m).then(|| Point::from(to.map(|c| c as f32)))
     }
 }
 
@@ -83,6 +100,7 @@ mod tests {
         let filter = PointFilter {
             range_min_m: Some(0.5),
             range_max_m: Some(10.0),
+            no_return_m: None,
             body_m: Some(([-1.0, -0.4, -0.8], [0.2, 0.4, 0.0])),
         };
         let keeps = |x, y, z| filter.keeps(Point::new(x, y, z));
@@ -92,12 +110,29 @@ mod tests {
     }
 
     #[test]
+    fn from_the_distance_of_no_return_on_points_tell_a_direction_alone() {
+        let filter = PointFilter { no_return_m: Some(30.0), ..PointFilter::default() };
+        let (met, far) = (Point::new(0.0, 29.9, 0.0), Point::new(0.0, -60.0, 80.0));
+        assert!(filter.keeps(met) && filter.no_return(met).is_none());
+        assert!(!filter.keeps(far));
+        assert_eq!(filter.no_return(far), Some(Point::new(0.0, -18.0, 24.0)));
+        assert_eq!(filter.no_return(Point::new(f32::INFINITY, 0.0, 0.0)), None);
+        assert_eq!(PointFilter::default().no_return(far), None);
+    }
+
+    #[test]
     fn numbers_that_make_no_filter_are_named() {
         let message = |filter: PointFilter| filter.checked().unwrap_err().to_string();
-        let range = |min, max| PointFilter { range_min_m: Some(min), range_max_m: Some(max), body_m: None };
+        let range = |min, max| PointFilter {
+            range_min_m: Some(min),
+            range_max_m: Some(max),
+            ..PointFilter::default()
+        };
         assert!(message(range(-1.0, 2.0)).contains("range_min_m"));
         assert!(message(range(1.0, f64::NAN)).contains("range_max_m"));
-        assert!(message(range(2.0, 2.0)).contains("must be below"));
+        assert_eq!(message(range(2.0, 2.0)), "range_min_m 2 must be below range_max_m 2");
+        let nothing = PointFilter { no_return_m: Some(0.0), ..PointFilter::default() };
+        assert_eq!(message(nothing), "range_min_m 0 must be below no_return_m 0");
         let body = PointFilter { body_m: Some(([0.0; 3], [1.0, -1.0, 1.0])), ..PointFilter::default() };
         assert!(message(body).contains("body_m"));
         assert!(range(0.5, 10.0).checked().is_ok());

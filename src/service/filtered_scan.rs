@@ -40,6 +40,8 @@ impl<'a> FilteredScan<'a> {
             timestamp_ns: *timestamp_ns,
             points: &self.filtered.points,
             times_s: self.filtered.times_s.as_deref(),
+            no_returns: &self.filtered.no_returns,
+            no_return_times_s: self.filtered.no_return_times_s.as_deref(),
             points_skipped: self.filtered.skipped,
             gravity: self.request.gravity,
             guess: self.request.guess,

@@ -87,6 +87,7 @@ fn filter_from(scan: &pb::Scan) -> Result<PointFilter, ServiceError> {
         range_min_m: scan.range_min_m,
         range_max_m: scan.range_max_m,
         body_m: scan.body.as_ref().map(body).transpose()?,
+        ..PointFilter::default()
     })
 }
 

@@ -82,6 +82,37 @@ async fn points_out_of_range_or_of_the_robots_body_do_not_count() {
 }
 
 #[tokio::test]
+async fn directions_without_a_return_are_free_up_to_where_the_settings_say() {
+    let daemon = Daemon::start_with(|config| {
+        let nothing = RobotConfig { no_return_m: Some(12.0), ..RobotConfig::default() };
+        config.robots.insert("knows".into(), nothing);
+    })
+    .await;
+    // A wall 5 m ahead, with a wide opening on one side in which nothing is met: the driver says 40 m.
+    let points: Vec<[f32; 3]> = (-40..40)
+        .flat_map(|y| (-20..20).map(move |z| [1.0, y as f32 * 0.01, z as f32 * 0.01]))
+        .map(|direction| direction.map(|c| c * if direction[1] < 0.0 { 5.0 } else { 40.0 }))
+        .collect();
+    let asked = json!({"points": [[10.0, 2.0, 0.0], [13.0, 2.6, 0.0], [3.0, -0.6, 0.0], [5.5, -1.0, 0.0]]});
+    for (robot, free, voxels_beyond) in
+        [("knows", [true, false, true, false], false), ("r", [true, true, true, false], true)]
+    {
+        daemon.make_map(robot).await;
+        let answer = json_of(
+            daemon.post_bytes(&format!("/v1/maps/{robot}/scans?robot={robot}"), bytes_of(&points)).await,
+        )
+        .await;
+        assert_eq!(answer["points_skipped"], if robot == "knows" { 1600 } else { 0 }, "{answer}");
+        let told =
+            json_of(daemon.post(&format!("/v1/maps/{robot}/classification"), asked.clone()).await).await;
+        assert_eq!(told["free"], json!(free), "{robot}: {told}");
+        let far = json!({"points": [points.last()]});
+        let found = json_of(daemon.post(&format!("/v1/maps/{robot}/occupancy"), far).await).await;
+        assert_eq!(found["occupied"], json!([voxels_beyond]), "{robot}: {found}");
+    }
+}
+
+#[tokio::test]
 async fn a_scan_that_is_not_accepted_is_added_by_force_alone() {
     let daemon = Daemon::start().await;
     daemon.make_map("a").await;
