@@ -2,18 +2,39 @@
 
 use crate::geometry::QUATERNION_NORM_TOLERANCE;
 
+/// Which sphere of a question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SpherePlace {
+    /// Of a link of a body.
+    InLink {
+        /// The link.
+        link: usize,
+        /// The sphere in it.
+        sphere: usize,
+    },
+    /// Of spheres in groups, by its number among all of them.
+    InGroups(usize),
+}
+
+impl std::fmt::Display for SpherePlace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::InLink { link, sphere } => write!(f, "links[{link}].spheres[{sphere}]"),
+            Self::InGroups(number) => write!(f, "spheres[{number}]"),
+        }
+    }
+}
+
 /// Why numbers are not a question.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanningError {
     /// A sphere that is none.
     #[error(
-        "links[{link}].spheres[{sphere}] must have a finite center and a radius in 0..={radius_max_m} m, got {center_m:?} and {radius_m}"
+        "{place} must have a finite center and a radius in 0..={radius_max_m} m, got {center_m:?} and {radius_m}"
     )]
     Sphere {
-        /// The link, or the group.
-        link: usize,
-        /// The sphere in it.
-        sphere: usize,
+        /// Which one.
+        place: SpherePlace,
         /// Its center, meters.
         center_m: [f32; 3],
         /// Its radius, meters.
@@ -23,13 +44,11 @@ pub enum PlanningError {
     },
     /// A sphere that is too large for the level.
     #[error(
-        "links[{link}].spheres[{sphere}] has a radius of {radius} voxels with its padding, at most {radius_max} are possible: ask a coarser level"
+        "{place} has a radius of {radius} voxels with its padding, at most {radius_max} are possible: ask a coarser level"
     )]
     RadiusInVoxels {
-        /// The link, or the group.
-        link: usize,
-        /// The sphere in it; points with padding come after the spheres.
-        sphere: usize,
+        /// Which one; points with padding come after the spheres.
+        place: SpherePlace,
         /// Its radius, voxels of the level.
         radius: f64,
         /// The largest radius, voxels of the level.
@@ -83,7 +102,7 @@ pub enum PlanningError {
         numbers: [f32; 7],
     },
     /// Groups whose sizes do not sum up to the spheres.
-    #[error("the groups have {expected} spheres in all, got {got}")]
+    #[error("sizes are of {expected} spheres in all, got {got} spheres")]
     Groups {
         /// The sum of the groups' sizes.
         expected: usize,

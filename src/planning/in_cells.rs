@@ -1,9 +1,9 @@
 //! Bodies as a level's field is asked for them: in groups of eight, with a ball around each link.
 
-use super::PlanningError;
 use super::eight::{Centers, LANES};
 use super::parts::{Link, Sphere};
 use super::placement::{CellsFromLink, EightTransforms};
+use super::{PlanningError, SpherePlace};
 use crate::geometry::Point;
 
 /// Largest radius with padding, in voxels of the level that is asked.
@@ -125,18 +125,18 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 impl LinkInCells {
     pub(super) fn of(link: &Link, number: usize, cells_per_m: f64) -> Result<Self, PlanningError> {
         let (balls, points) = link.balls_and_points();
-        Self::of_parts(balls, &points, number, cells_per_m)
+        Self::of_parts(balls, &points, |sphere| SpherePlace::InLink { link: number, sphere }, cells_per_m)
     }
 
-    /// A link of spheres alone.
+    /// A link of spheres alone: those of a group, after `before` others.
     pub(super) fn of_spheres(
         spheres: &[Sphere],
         padding_m: f32,
-        number: usize,
+        before: usize,
         cells_per_m: f64,
     ) -> Result<Self, PlanningError> {
         let balls = spheres.iter().map(|sphere| sphere.padded(padding_m)).collect();
-        Self::of_parts(balls, &[], number, cells_per_m)
+        Self::of_parts(balls, &[], |sphere| SpherePlace::InGroups(before + sphere), cells_per_m)
     }
 
     /// Each sphere eight times.
@@ -152,14 +152,14 @@ impl LinkInCells {
     fn of_parts(
         balls_m: Vec<([f64; 3], f64)>,
         points_m: &[[f64; 3]],
-        number: usize,
+        place_of: impl Fn(usize) -> SpherePlace,
         cells_per_m: f64,
     ) -> Result<Self, PlanningError> {
         let in_cells = |(center_m, radius_m): ([f64; 3], f64)| (center_m, radius_m * cells_per_m);
         let spheres: Vec<_> = balls_m.into_iter().map(in_cells).collect();
         if let Some(sphere) = spheres.iter().position(|(_, radius)| *radius > RADIUS_CELLS_MAX) {
             let (radius, radius_max) = (spheres[sphere].1, RADIUS_CELLS_MAX);
-            return Err(PlanningError::RadiusInVoxels { link: number, sphere, radius, radius_max });
+            return Err(PlanningError::RadiusInVoxels { place: place_of(sphere), radius, radius_max });
         }
         let (points, numbers, clumps) = clumps(points_m, cells_per_m);
         let of_points: Vec<_> = points.iter().map(|point| (point.xyz().map(f64::from), 0.0)).collect();

@@ -59,7 +59,7 @@ pub use classify::{OutOfRange, PointState, PointStates, classify_points};
 pub use clearance::FIELD_BYTES_MAX_DEFAULT;
 pub use configurations::{Configurations, NUMBERS_PER_POSE};
 pub use cover::{COVER_SPHERES_MAX, CoverError, cover_box, cover_capsule};
-pub use error::PlanningError;
+pub use error::{PlanningError, SpherePlace};
 pub use frontiers::{
     FRONTIER_SIZE_MIN_DEFAULT, Frontier, FrontierError, FrontierRequest, FrontierView, Frontiers,
     STANDOFF_VOXELS, STANDOFF_VOXELS_MAX, list_frontiers,

@@ -1,6 +1,6 @@
 //! What bodies are made of: rigid links of spheres and points.
 
-use super::PlanningError;
+use super::{PlanningError, SpherePlace};
 use crate::geometry::Point;
 
 /// Largest radius and padding, meters.
@@ -44,9 +44,9 @@ impl Sphere {
     }
 
     /// Why it is none.
-    pub(super) fn refused(&self, link: usize, sphere: usize) -> PlanningError {
+    pub(super) fn refused(&self, place: SpherePlace) -> PlanningError {
         let Self { center_m, radius_m } = *self;
-        PlanningError::Sphere { link, sphere, center_m, radius_m, radius_max_m: RADIUS_MAX_M }
+        PlanningError::Sphere { place, center_m, radius_m, radius_max_m: RADIUS_MAX_M }
     }
 }
 
@@ -72,7 +72,7 @@ impl Link {
             return Err(PlanningError::Padding { link, padding_m, padding_max_m: RADIUS_MAX_M });
         }
         if let Some(sphere) = self.spheres.iter().position(|sphere| !sphere.is_valid()) {
-            return Err(self.spheres[sphere].refused(link, sphere));
+            return Err(self.spheres[sphere].refused(SpherePlace::InLink { link, sphere }));
         }
         if let Some(point) = self.points.iter().position(|point| !point.is_finite()) {
             return Err(PlanningError::Point { link, point, xyz_m: self.points[point].xyz() });

@@ -1,6 +1,5 @@
 //! Do these spheres of the map frame meet voxels?
 
-use super::PlanningError;
 use super::configurations::MAP_FRAME;
 use super::in_cells::{BodyInCells, LinkInCells};
 use super::keep_outs::{Posed, Shapes, Solid};
@@ -11,6 +10,7 @@ use super::parts::{RADIUS_MAX_M, Sphere};
 use super::planner::{Answerer, PlanningView};
 use super::poses::words;
 use super::surroundings::Surroundings;
+use super::{PlanningError, SpherePlace};
 use crate::util::StopSignal;
 
 /// Groups between two looks at the stop signal.
@@ -46,13 +46,10 @@ impl<'a> SphereGroups<'a> {
         if expected != spheres.len() {
             return Err(PlanningError::Groups { expected, got: spheres.len() });
         }
-        let groups = Self { spheres, sizes };
-        for (number, group) in groups.iter().enumerate() {
-            if let Some(sphere) = group.iter().position(|sphere| !sphere.is_valid()) {
-                return Err(group[sphere].refused(number, sphere));
-            }
+        match spheres.iter().position(|sphere| !sphere.is_valid()) {
+            Some(number) => Err(spheres[number].refused(SpherePlace::InGroups(number))),
+            None => Ok(Self { spheres, sizes }),
         }
-        Ok(groups)
     }
 
     fn iter(&self) -> impl Iterator<Item = &'a [Sphere]> {
@@ -126,12 +123,15 @@ impl PlanningView<'_> {
         let SphereQuestion { groups, padding_m, level, surroundings } = *question;
         let cells_per_m = self.cells_per_m(level)?;
         check_padding(padding_m)?;
-        let in_cells = |(number, spheres): (usize, &[Sphere])| {
-            LinkInCells::of_spheres(spheres, padding_m, number, cells_per_m).map(BodyInCells::of_link)
+        let mut before = 0;
+        let mut in_cells = |spheres: &[Sphere]| {
+            let link = LinkInCells::of_spheres(spheres, padding_m, before, cells_per_m)?;
+            before += spheres.len();
+            Ok(BodyInCells::of_link(link))
         };
         let (mut answers, chunk) = (Vec::with_capacity(groups.sizes.len()), groups.sizes.len().min(PER_LOOK));
         let mut bodies = Vec::with_capacity(chunk);
-        let mut groups = groups.iter().enumerate().peekable();
+        let mut groups = groups.iter().peekable();
         while groups.peek().is_some() {
             bodies.clear();
             for group in groups.by_ref().take(PER_LOOK) {

@@ -324,7 +324,7 @@ static void bad_motions_and_spheres(mrol_replica replica, mrol_body body) {
     check.groups = 2;
     SPHERES_FAIL("check.sizes is NULL");
     check.sizes = sizes;
-    SPHERES_FAIL("the groups have 3 spheres in all, got 2");
+    SPHERES_FAIL("sizes are of 3 spheres in all, got 2");
     check.sizes = NULL, check.groups = 0, check.padding_m = NAN;
     SPHERES_FAIL("padding_m");
     check.padding_m = 0, spheres[3] = INFINITY;

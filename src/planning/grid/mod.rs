@@ -65,7 +65,7 @@ pub enum GridError {
         max_m: f64,
     },
     /// A band with NaN or in the wrong order.
-    #[error("band_m must not descend, got {0:?}")]
+    #[error("min_z_m must be at most max_z_m, got {} and {}", .0[0], .0[1])]
     Band([f64; 2]),
     /// A cell that is no whole number of voxels.
     #[error("cell_m must be a whole number of voxels of {voxel_m} m, got {cell_m}")]

@@ -82,6 +82,17 @@ fn questions_that_make_no_sense_are_refused_by_name() {
     assert!(motions(&[2], None, None).is_err());
     let groups = SphereGroups::new(&[sphere], &[2]).unwrap_err();
     assert!(groups.to_string().contains("2 spheres in all, got 1"));
+    // By its number among all of them, whatever its group.
+    let small = Sphere { center_m: [0.0; 3], radius_m: 0.1 };
+    let spheres = [small, sphere];
+    let groups = SphereGroups::new(&spheres, &[1, 1]).unwrap();
+    let question =
+        SphereQuestion { groups, padding_m: 0.0, level: 0, surroundings: &Surroundings::ALL_VOXELS };
+    let too_large = view.spheres_meet(&question, StopSignal::NEVER).unwrap_err();
+    assert!(too_large.to_string().starts_with("spheres[1] has a radius of "), "{too_large}");
+    let broken = Sphere { radius_m: -1.0, ..small };
+    let refused = SphereGroups::new(&[small, small, broken], &[1, 2]).unwrap_err();
+    assert!(refused.to_string().starts_with("spheres[2] must have "), "{refused}");
     let stop = || true;
     let question =
         PoseQuestion { body: &body, configurations, level: 1, surroundings: &Surroundings::ALL_VOXELS };
