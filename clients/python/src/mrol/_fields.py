@@ -1,6 +1,7 @@
 """Fields of an answer in JSON, each read as what it has to be."""
 
 import json
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -14,13 +15,25 @@ Read = TypeVar("Read")
 
 F64 = NDArray[np.float64]
 
+READING_FAILS = (
+    KeyError,
+    TypeError,
+    ValueError,
+    IndexError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+    struct.error,
+)
+"""What Python raises of what is not as it should be."""
+
 
 @contextmanager
 def reading(what: str) -> Iterator[None]:
     """Tells of what cannot be read as an answer, whatever goes wrong with it."""
     try:
         yield
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError) as error:
+    except READING_FAILS as error:
         raise BadAnswer(f"{what} cannot be read: {excerpt(error)}") from error
 
 

@@ -32,6 +32,9 @@ class Address:
             if not path or "\0" in path:
                 raise ArgumentError("address", excerpt(text), EXPECTED)
             return cls("localhost", 0, False, path)
+        # Parsing an address drops ends of lines silently.
+        if not text.isprintable() or " " in text:
+            raise ArgumentError("address", excerpt(text), EXPECTED)
         has_scheme = "://" in text
         scheme = "https" if prefer_tls else "http"
         try:
@@ -41,7 +44,7 @@ class Address:
             raise ArgumentError("address", excerpt(text), EXPECTED) from error
         is_whole = parts.path in ("", "/") and not parts.query and not parts.fragment and not parts.username
         host = parts.hostname
-        if parts.scheme not in ("http", "https") or not host or not is_whole or not _is_plain(host):
+        if parts.scheme not in ("http", "https") or not host or not is_whole:
             raise ArgumentError("address", excerpt(text), EXPECTED)
         return cls(host, PORT if port is None else port, parts.scheme == "https")
 
@@ -58,7 +61,3 @@ class Address:
             return f"unix:{self.socket_path}"
         return f"{'https' if self.is_tls else 'http'}://{self.authority}"
 
-
-def _is_plain(host: str) -> bool:
-    """Whether nothing of the name could end a line or a word of a request."""
-    return host.isprintable() and not any(character.isspace() for character in host)

@@ -41,6 +41,16 @@ class Connection:
         with suppress(OSError):
             self._socket.close()
 
+    def __del__(self) -> None:
+        # A client that is not closed by hand ends with the last map that uses it, without a word of an unclosed socket.
+        if hasattr(self, "_socket"):
+            self.close()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the server has closed its side."""
+        return self._stream.has_ended
+
     @property
     def is_reusable(self) -> bool:
         """Whether another request can be sent: all was read, and the server has neither closed it nor said what nobody asked."""
@@ -74,7 +84,11 @@ class Connection:
             except (BrokenPipeError, ConnectionResetError) as lost:
                 # A server that refuses a body by its length answers before it has read it.
                 return self._answer_in_spite_of(lost)
-            return self._client.getresponse()
+            response = self._client.getresponse()
+            if self._stream.has_ended:
+                # To http.client the end of a connection is the end of the headers, too.
+                raise IncompleteRead(b"")
+            return response
 
     def read(self, response: HTTPResponse, count: int, deadline: Deadline) -> bytes:
         """Reads up to so many bytes of a body that is read piece by piece; less than that at its end."""
@@ -128,8 +142,8 @@ class _said_by:
             return
         if isinstance(error, TimeoutError):
             raise TimedOut(str(error)) from error
-        # `RemoteDisconnected` is a ConnectionResetError, and a BadStatusLine besides.
-        if isinstance(error, IncompleteRead | OSError):
+        # `RemoteDisconnected` is a ConnectionResetError. A status that was cut off looks like a wrong one.
+        if self._connection.has_ended or isinstance(error, IncompleteRead | OSError):
             raise ConnectionLost(f"the connection broke before the answer was whole: {error}") from error
         if isinstance(error, HTTPException | ValueError | OverflowError | MemoryError | AttributeError):
             raise BadAnswer(f"this is no answer of an mrol server: {excerpt(error)}") from error

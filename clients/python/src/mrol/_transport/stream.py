@@ -30,6 +30,7 @@ class BoundedStream:
         self._unsent = bytearray()
         self._deadline: Deadline | None = None
         self._bytes_left: int | None = 0
+        self.has_ended = False
 
     def begin(self, deadline: Deadline, bytes_max: int | None) -> None:
         """Sets the bounds of the next request and its answer; without `bytes_max` any number of bytes is read."""
@@ -74,6 +75,8 @@ class BoundedStream:
             count = self._sock.recv_into(buffer)
         except TimeoutError as error:
             raise self._deadline.passed() from error
+        if count == 0:
+            self.has_ended = True
         if self._bytes_left is not None:
             self._bytes_left -= count
             if self._bytes_left < 0:
