@@ -4,8 +4,9 @@ import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
-import mrol
 import pytest
+
+import mrol
 
 from .support.scenes import room
 from .support.server import Server, serving

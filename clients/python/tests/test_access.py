@@ -4,8 +4,9 @@ import pickle
 import subprocess
 from pathlib import Path
 
-import mrol
 import pytest
+
+import mrol
 
 from .support.server import run, serving
 
@@ -111,18 +112,29 @@ def test_tls_is_checked_on_both_sides(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_unix_socket_is_as_good_as_a_port(tmp_path: Path) -> None:
     path = tmp_path / "http.sock"
-    with serving(tmp_path, "--http-socket", str(path)):
-        with mrol.connect(f"unix:{path}") as client:
-            m = client.map("m", resolution=0.1)
-            assert m.insert([[1, 0, 0]], align=False).accepted
-            assert m.query([[1, 0, 0]]).occupied.all()
-            assert client.address == f"unix:{path}"
-            assert isinstance(next(m.watch()), mrol.WatchedState)
+    with serving(tmp_path, "--http-socket", str(path)), mrol.connect(f"unix:{path}") as client:
+        m = client.map("m", resolution=0.1)
+        assert m.insert([[1, 0, 0]], align=False).accepted
+        assert m.query([[1, 0, 0]]).occupied.all()
+        assert client.address == f"unix:{path}"
+        assert isinstance(next(m.watch()), mrol.WatchedState)
 
 
 @pytest.mark.parametrize(
     "address",
-    ["", ":7333", "ftp://host", "host:port", "host:99999", "http://host/path", "http://user@host", "unix:", "a b:1", "host\r\n:1", 7],
+    [
+        "",
+        ":7333",
+        "ftp://host",
+        "host:port",
+        "host:99999",
+        "http://host/path",
+        "http://user@host",
+        "unix:",
+        "a b:1",
+        "host\r\n:1",
+        7,
+    ],
 )
 def test_addresses_that_are_none_are_refused(address: str) -> None:
     with pytest.raises(mrol.ArgumentError, match="address must be host:port"):

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 POINTS = np.random.default_rng(1).uniform(-5, 5, (1000, 3)).astype("<f4")
 
@@ -154,7 +155,7 @@ EYE = np.eye(4)
         ("gravity_in_map", lambda m: m.localize(POINTS, gravity_in_map=[0, 0, 1])),
         ("candidates", lambda m: m.localize(POINTS, candidates=0)),
         ("body.links[0].spheres", lambda m: m.check_poses([[1, 2, 3]], EYE)),
-        ("body.links[0]", lambda m: m.check_poses(mrol.Body(["arm"]), EYE)),  # type: ignore[list-item]
+        ("body.links[0]", lambda m: m.check_poses(mrol.Body(["arm"]), EYE)),
         ("configurations", lambda m: m.check_poses([[0, 0, 0, 1]], np.zeros((2, 5)))),
         ("configurations", lambda m: m.check_poses([[0, 0, 0, 1]], np.zeros((2, 4, 4)))),
         ("ignored[0]", lambda m: m.check_poses([[0, 0, 0, 1]], EYE, ignored=["wall"])),

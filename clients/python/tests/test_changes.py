@@ -4,9 +4,10 @@ import time
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 GRID = np.stack(np.meshgrid(*[np.arange(5) + 0.05] * 3), axis=-1).reshape(-1, 3)
 

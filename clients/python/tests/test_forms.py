@@ -3,9 +3,10 @@
 import pickle
 import struct
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 from mrol._bits import BLOCK, indices_of, voxels_of
 from mrol._protobuf import Message
 from mrol._transport.address import Address
@@ -60,7 +61,7 @@ def test_a_pose_is_the_same_in_every_form() -> None:
 )
 def test_what_is_no_pose_is_refused(bad: object) -> None:
     with pytest.raises(mrol.ArgumentError, match="pose must be"):
-        mrol.Pose.of(bad)  # type: ignore[arg-type]
+        mrol.Pose.of(bad)
 
 
 def test_packed_keys_are_three_signed_numbers() -> None:

@@ -5,12 +5,13 @@ import resource
 import struct
 import time
 from collections.abc import Callable
-from threading import Event
 from socket import socket
+from threading import Event
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 from .support.scripted import Script, ScriptedServer, answer, answering
 

@@ -6,9 +6,10 @@ import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 from .support.scripted import ScriptedServer, answer
 

@@ -1,8 +1,9 @@
 """Checks of bodies and motions, rays, nearest voxels, frontiers."""
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 BALL = [[0.0, 0.0, 0.0, 0.3]]
 IN_WALL = [3.9, -1.0, 0.0]

@@ -11,9 +11,10 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 from .support.scripted import ScriptedServer
 from .support.server import scan_ids

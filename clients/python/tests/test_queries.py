@@ -1,8 +1,9 @@
 """Occupancy, classification, listings and blocks."""
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 from .support.scenes import HALF_M, room
 

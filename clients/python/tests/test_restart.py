@@ -4,8 +4,9 @@ import time
 from pathlib import Path
 from threading import Thread
 
-import mrol
 import pytest
+
+import mrol
 
 from .support.server import run, scan_ids, serving
 

@@ -3,9 +3,10 @@
 import itertools
 from pathlib import Path
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 from .support.proxy import DroppingProxy
 from .support.scripted import ScriptedServer, answer
@@ -88,7 +89,9 @@ def test_what_has_no_id_is_not_sent_twice() -> None:
 @pytest.mark.parametrize("reason", ["overloaded", "starting", "draining", "catalog_busy"])
 def test_refusals_that_pass_are_waited_for(reason: str) -> None:
     refusal = b'{"code":"unavailable","reason":"%s","detail":"later"}' % reason.encode()
-    answers = itertools.chain([answer(refusal, b"retry-after: 0", status=b"503 Not Now")] * 3, itertools.repeat(answer(b'{"maps":[]}')))
+    answers = itertools.chain(
+        [answer(refusal, b"retry-after: 0", status=b"503 Not Now")] * 3, itertools.repeat(answer(b'{"maps":[]}'))
+    )
     with ScriptedServer(lambda sock, _: sock.sendall(next(answers))) as server:
         client = mrol.connect(server.address)
         assert client.maps().maps == ()

@@ -1,8 +1,9 @@
 """Scans: inserted, aligned, localized, undone; trajectories."""
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 from .support.scenes import room
 from .support.server import scan_ids

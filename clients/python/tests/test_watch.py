@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
-import mrol
 import numpy as np
 import pytest
+
+import mrol
 
 
 def following(m: mrol.Map, events: Iterator[mrol.WatchEvent]) -> mrol.WatchedChange:
@@ -109,4 +110,4 @@ def test_arguments_of_a_watch_are_refused_at_once(empty: mrol.Map) -> None:
     with pytest.raises(mrol.ArgumentError, match="silence_max_s must be a number of seconds"):
         empty.watch(silence_max_s=0)
     with pytest.raises(mrol.ArgumentError, match="viewpoints must be True or False"):
-        empty.watch(viewpoints=1)  # type: ignore[arg-type]
+        empty.watch(viewpoints=1)

@@ -67,7 +67,7 @@ def counts_of(value: ArrayLike, argument: str) -> U32:
     array = as_numbers(value, argument, expected)
     if array.ndim != 1 or array.dtype.kind not in "iu":
         raise ArgumentError(argument, f"an array of {array.dtype} of shape {array.shape}", expected)
-    if array.size > 0 and not (0 <= int(array.min()) and int(array.max()) < 1 << 32):
+    if array.size > 0 and not (int(array.min()) >= 0 and int(array.max()) < 1 << 32):
         raise ArgumentError(argument, excerpt(array), expected)
     return np.ascontiguousarray(array, np.dtype("<u4"))
 

@@ -1,7 +1,7 @@
 """Bitmaps, packed keys and blocks of voxels.
 
-A packed key has 21 bits an axis, x lowest, in two's complement. A block is 8 x 8 x 8 voxels: its key in units of blocks, and a bit a
-voxel in Morton order (bits z2 y2 x2 z1 y1 x1 z0 y0 x0 of the place in the block).
+A packed key has 21 bits an axis, x lowest, in two's complement. A block is 8 x 8 x 8 voxels: its key in units of blocks, and a
+bit a voxel in Morton order (bits z2 y2 x2 z1 y1 x1 z0 y0 x0 of the place in the block).
 """
 
 from typing import Any

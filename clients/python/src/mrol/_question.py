@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import Bools, F32, U32, raw
+from ._arrays import F32, U32, Bools, raw
 from ._bits import indices_of, unpacked
 from ._fields import Fields, fields_of, reading
 

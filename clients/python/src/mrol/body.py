@@ -36,7 +36,7 @@ class Body:
     links: Sequence[Link]
 
     @classmethod
-    def of(cls, value: "BodyLike", argument: str = "body") -> "Body":
+    def of(cls, value: "BodyLike") -> "Body":
         """A `Body`, a `Link`, or the spheres of one link: an array of shape (n, 4)."""
         if isinstance(value, Body):
             return value

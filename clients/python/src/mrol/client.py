@@ -86,8 +86,8 @@ class Client:
     ) -> Map:
         """A map: with a `resolution` (the side of a voxel, meters) it is made where it is not there; without, it has to be there.
 
-        `levels` (6) halve the resolution each; `filter="none"` and `moments=False` are for maps that are only queried. `robot` is the
-        name in which scans are sent: give each robot one of its own.
+        `levels` (6) halve the resolution each; `filter="none"` and `moments=False` are for maps that are only queried. `robot`
+        is the name in which scans are sent: give each robot one of its own.
 
         Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: it is there with other settings), `InvalidArgument`
         (`bad_settings`, `bad_name`).
@@ -199,8 +199,8 @@ def connect(
     scheme is https. `client_cert` and `client_key` are shown to a server that asks for them.
 
     Each call takes `timeout_s` at most, tries and waits included. It is tried again for `patience_s` where the server cannot be
-    reached, starts, drains or is overloaded, and where a connection broke; all changes have ids by which the server knows what it has
-    done already. Here alone nothing is tried again unless `wait_s` says how long to wait for the server to be there.
+    reached, starts, drains or is overloaded, and where a connection broke; all changes have ids by which the server knows what
+    it has done already. Here alone nothing is tried again unless `wait_s` says how long to wait for the server to be there.
 
     Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate.
     """
@@ -232,12 +232,13 @@ def _wait_for(caller: Caller, wait_s: float) -> None:
     while True:
         try:
             caller.call(Request("GET", "/livez"))
-            return
         except (MrolError, ConnectionError) as error:
             if time.monotonic() + FIRST_PAUSE_S > end:
                 if isinstance(error, ConnectFailed):
                     raise ConnectFailed(f"{error}; is `mrol serve` running there?") from error
                 raise
+        else:
+            return
         time.sleep(FIRST_PAUSE_S)
 
 

@@ -50,8 +50,9 @@ class Map(
     It holds no connection of its own and costs nothing. Threads may share it, and so may processes that fork: a child opens
     connections of its own, and sends scans in a session of its own.
 
-    All methods raise `ArgumentError` for arguments that cannot be sent, `ServerError` for refusals, and `TransportError` or `BadAnswer`
-    where there is no answer (`mrol.errors`). Lengths are meters; a pose `a_from_b` carries points of frame b into frame a.
+    All methods raise `ArgumentError` for arguments that cannot be sent, `ServerError` for refusals, and `TransportError` or
+    `BadAnswer` where there is no answer (`mrol.errors`). Lengths are meters; a pose `a_from_b` carries points of frame b into
+    frame a.
     """
 
     def with_timeout(self, timeout_s: float) -> "Map":

@@ -20,7 +20,8 @@ EXPECTED = "a Pose, a 4 x 4 matrix, (t, q) of x y z and qx qy qz qw, or seven nu
 class Pose:
     """A rigid transform. One named `a_from_b` carries points of frame b into frame a: `p_a = a_from_b.apply(p_b)`.
 
-    `translation_m` has shape (3,), meters; `rotation_xyzw` is a unit quaternion of shape (4,), the scalar last, as in ROS and scipy.
+    `translation_m` has shape (3,), meters; `rotation_xyzw` is a unit quaternion of shape (4,), the scalar last, as in ROS and
+    scipy.
     """
 
     translation_m: F64
@@ -53,7 +54,8 @@ class Pose:
     def apply(self, points: ArrayLike) -> F64:
         """Points of shape (..., 3), carried into the other frame."""
         given = np.asarray(points, np.float64)
-        return given @ _rotation_of(self.rotation_xyzw).T + self.translation_m
+        carried: F64 = given @ _rotation_of(self.rotation_xyzw).T + self.translation_m
+        return carried
 
     def inverse(self) -> "Pose":
         """The way back: of `a_from_b`, `b_from_a`."""
@@ -110,7 +112,7 @@ def _seven_of(value: Any, argument: str) -> F64:
         return sevens_of(array, argument)
     if array.shape != (7,):
         raise ArgumentError(argument, f"shape {array.shape}", EXPECTED)
-    seven = array.astype(np.float64)
+    seven: F64 = array.astype(np.float64)
     norm = float(np.linalg.norm(seven[3:]))
     if not np.isfinite(seven).all() or abs(norm - 1) > NORM_TOLERANCE:
         raise ArgumentError(argument, excerpt(seven.tolist()), "finite, with a unit quaternion x y z w")
@@ -145,7 +147,7 @@ def _quaternions_of(rotations: F64) -> F64:
     products[:, 3, 3] = 1 + trace
     quaternions = products[np.arange(len(m)), largest]
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    return quaternions.reshape(*rotations.shape[:-2], 4)
+    return np.asarray(quaternions.reshape(*rotations.shape[:-2], 4), np.float64)
 
 
 def _frozen(numbers: F64) -> F64:

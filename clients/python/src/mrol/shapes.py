@@ -41,6 +41,7 @@ class Box:
         return cls(array[0], array[1])
 
     def json(self, argument: str) -> dict[str, Any]:
+        """The shape as the server's JSON has it."""
         min_m, max_m = self.corners(argument)
         return {"min_m": [_bounded(x) for x in min_m], "max_m": [_bounded(x) for x in max_m]}
 
@@ -53,6 +54,7 @@ class Sphere:
     radius_m: float
 
     def json(self, argument: str) -> dict[str, Any]:
+        """The shape as the server's JSON has it."""
         center_m = vector_of(self.center_m, 3, f"{argument}.center_m")
         return {"center_m": center_m, "radius_m": number_of(self.radius_m, f"{argument}.radius_m")}
 
@@ -65,6 +67,7 @@ class OrientedBox:
     size_m: ArrayLike
 
     def json(self, argument: str) -> dict[str, Any]:
+        """The shape as the server's JSON has it."""
         pose = Pose.of(self.map_from_box, f"{argument}.map_from_box")
         return {"map_from_box": pose.json(), "size_m": vector_of(self.size_m, 3, f"{argument}.size_m")}
 
@@ -78,6 +81,7 @@ class Prism:
     z_to_m: float
 
     def json(self, argument: str) -> dict[str, Any]:
+        """The shape as the server's JSON has it."""
         expected = "corners of shape (n, 2)"
         corners: F64 = as_numbers(self.corners_m, f"{argument}.corners_m", expected).astype(np.float64)
         if corners.ndim != 2 or corners.shape[1] != 2 or not np.isfinite(corners).all():

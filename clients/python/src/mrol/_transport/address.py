@@ -27,8 +27,7 @@ class Address:
             raise ArgumentError("address", excerpt(text), EXPECTED)
         if text.startswith("unix:"):
             path = text.removeprefix("unix:")
-            if path.startswith("//"):
-                path = path[2:]
+            path = path.removeprefix("//")
             if not path or "\0" in path:
                 raise ArgumentError("address", excerpt(text), EXPECTED)
             return cls("localhost", 0, False, path)
@@ -60,4 +59,3 @@ class Address:
         if self.socket_path is not None:
             return f"unix:{self.socket_path}"
         return f"{'https' if self.is_tls else 'http'}://{self.authority}"
-

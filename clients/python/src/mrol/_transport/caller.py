@@ -1,4 +1,4 @@
-"""Requests to one server, each with what makes it come through: a key, a connection, a deadline and, where it is safe, another try."""
+"""Requests to one server: each with a key, a connection, a deadline and, where it is safe, another try."""
 
 import json
 from collections.abc import Iterator
@@ -66,13 +66,14 @@ class Caller:
                 finally:
                     self._pool.give_back(connection)
                 raise_for(answer)
-                return answer
             except Unauthenticated:
                 if not (may_renew and self._key.renew()):
                     raise
                 may_renew = False
             except (ServerError, TransportError) as error:
                 attempts.pause_after(error, request, was_kept)
+            else:
+                return answer
 
     @contextmanager
     def stream(self, request: Request) -> Iterator["Body"]:

@@ -69,7 +69,7 @@ class Connection:
         Raises `ConnectionLost`, `TimedOut` or `BadAnswer`; the connection is of no use then.
         """
         response = self.open(request, headers, deadline, answer_bytes_max + HEADER_BYTES)
-        with _said_by(self):
+        with _Failures(self):
             body = _whole_body(response, answer_bytes_max)
             response.close()
             self._is_broken = self._is_broken or response.will_close
@@ -77,7 +77,7 @@ class Connection:
 
     def open(self, request: Request, headers: dict[str, str], deadline: Deadline, bytes_max: int | None) -> HTTPResponse:
         """Sends a request, and reads its answer up to the body."""
-        with _said_by(self):
+        with _Failures(self):
             self._stream.begin(deadline, bytes_max)
             try:
                 self._send(request, headers)
@@ -92,7 +92,7 @@ class Connection:
 
     def read(self, response: HTTPResponse, count: int, deadline: Deadline) -> bytes:
         """Reads up to so many bytes of a body that is read piece by piece; less than that at its end."""
-        with _said_by(self):
+        with _Failures(self):
             self._stream.renew(deadline)
             return response.read(count)
 
@@ -124,7 +124,7 @@ class Connection:
             raise lost from None
 
 
-class _said_by:
+class _Failures:
     """Tells what goes wrong on a connection in this package's words, and marks the connection as one that cannot be used again."""
 
     def __init__(self, connection: Connection) -> None:

@@ -12,9 +12,7 @@ class Key:
         if secret is not None and file is not None:
             raise ArgumentError("key", "a key and a key_file", "one of the two")
         self._file = file
-        self._secret = _read(file) if file is not None else secret
-        if self._secret is not None and not (self._secret.isascii() and self._secret.isprintable() and self._secret):
-            raise ArgumentError("key", "something else", "a secret as `mrol key new` prints it, in one line")
+        self._secret = _checked(_read(file) if file is not None else secret)
 
     def headers(self) -> dict[str, str]:
         """The header that shows it."""
@@ -25,7 +23,7 @@ class Key:
         if self._file is None:
             return False
         try:
-            secret = Key(None, self._file)._secret
+            secret = _checked(_read(self._file))
         except ArgumentError:
             # It is about to be replaced: the server's own word says what is wrong.
             return False
@@ -34,6 +32,13 @@ class Key:
 
     def __repr__(self) -> str:
         return "Key(none)" if self._secret is None else "Key(...)"
+
+
+def _checked(secret: str | None) -> str | None:
+    """The secret, where it can stand in a header; an error does not show it."""
+    if secret is None or (isinstance(secret, str) and secret.isascii() and secret.isprintable() and secret):
+        return secret
+    raise ArgumentError("key", "something else", "a secret as `mrol key new` prints it, in one line")
 
 
 def _read(file: str | PathLike[str]) -> str:

@@ -58,7 +58,7 @@ def target_of(path: str, parameters: Mapping[str, Parameter]) -> str:
     return f"{path}?{urlencode(given, safe=',')}" if given else path
 
 
-def _text(value: str | int | float | bool) -> str:
+def _text(value: str | float | bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return value if isinstance(value, str) else repr(value)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Bools, F32, counts_of, number_of, rows_of
+from .._arrays import F32, Bools, counts_of, number_of, rows_of
 from .._question import I32, Arrays, Names, QuestionAnswer
 from ..body import Body, BodyLike, ConfigurationsLike, configurations_of
 from ..errors import ArgumentError, BadAnswer
@@ -83,11 +83,11 @@ class CheckOperations(MapHandle):
     ) -> Collisions:
         """Whether a body fits at each of many configurations.
 
-        `body` is a `Body`, or the spheres x y z r of one link, shape (n, 4). Configurations are poses of its links in the map frame:
-        shape (..., 4, 4), (..., 7) or, for a body that does not turn, (..., 3); with an axis for the links where there are several.
-        `answer="first_hit"` tells what is met, `"clearance"` how far the nearest obstacle is, up to `clearance_max_m` (64 voxels at
-        most). Voxels in `ignored` (`Box`, `Sphere`, `OrientedBox`) do not count. With `unknown="occupied"` voxels are met that no
-        scan saw through.
+        `body` is a `Body`, or the spheres x y z r of one link, shape (n, 4). Configurations are poses of its links in the map
+        frame: shape (..., 4, 4), (..., 7) or, for a body that does not turn, (..., 3); with an axis for the links where there
+        are several. `answer="first_hit"` tells what is met, `"clearance"` how far the nearest obstacle is, up to
+        `clearance_max_m` (64 voxels at most). Voxels in `ignored` (`Box`, `Sphere`, `OrientedBox`) do not count. With
+        `unknown="occupied"` voxels are met that no scan saw through.
 
         Raises `InvalidArgument` (`bad_check`, `batch_too_large`), naming which.
         """
@@ -120,8 +120,8 @@ class CheckOperations(MapHandle):
     ) -> Collisions:
         """Whether spheres meet anything: x y z r in the map frame, meters, shape (..., 4).
 
-        With `sizes` (shape (g,)) they are g groups of so many spheres each, and there is an answer for each group. The other arguments
-        are those of `check_poses`.
+        With `sizes` (shape (g,)) they are g groups of so many spheres each, and there is an answer for each group. The other
+        arguments are those of `check_poses`.
         """
         arrays = Arrays()
         rows, shape = rows_of(spheres, 4, "spheres", "spheres x y z r, shape (..., 4)", self._request_bytes_max)

@@ -44,11 +44,11 @@ class DeletionOperations(MapHandle):
         not_seen_since: int | None = None,
         request_id: str | None = None,
     ) -> Deletion:
-        """Takes voxels out of the map: those of points, of indices i j k, or with their centers in a box or sphere. Once, however often it
-        has to be sent.
+        """Takes voxels out of the map: once, however often it has to be sent.
 
-        Give one of `points` (shape (..., 3), map frame), `voxels` (shape (n, 3)), `box` (a `Box` or its corners, shape (2, 3)), `sphere`
-        (a `Sphere` or its center and radius) and `oriented_box`. With a `level` its voxels go, and all within them.
+        Give one of `points` (shape (..., 3), map frame), `voxels` (indices i j k, shape (n, 3)), `box` (a `Box` or its corners,
+        shape (2, 3)), `sphere` (a `Sphere` or its center and radius) and `oriented_box`. A region takes the voxels whose centers
+        lie inside. With a `level` its voxels go, and all within them.
         `not_seen_since` leaves of a region only what no scan after that revision touched although one saw through it.
 
         Undo it by `undo(deletion)`. After `ConnectionLost` or `TimedOut` it is not known whether it was done: repeat it with

@@ -15,8 +15,11 @@ from .handle import MapHandle, asked, flag_of
 
 @dataclass(frozen=True, eq=False)
 class Grid(Versioned):
-    """A 2-D grid. Arrays have shape (cells along y, cells along x): row 0 has the smallest y, so that matplotlib draws it upright
-    with `origin="lower"`."""
+    """A 2-D grid.
+
+    Arrays have shape (cells along y, cells along x): row 0 has the smallest y, so that matplotlib draws it upright with
+    `origin="lower"`.
+    """
 
     cell_m: float
     """The side of a cell."""

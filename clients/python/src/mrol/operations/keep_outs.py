@@ -58,8 +58,8 @@ class KeepOutOperations(MapHandle):
     ) -> KeepOutChange:
         """Puts a keep-out in the map, in the place of the one of its name.
 
-        Give one shape, in the map frame, meters. `expires_at` is a time with a zone, or nanoseconds since 1970, after which the server
-        ends it.
+        Give one shape, in the map frame, meters. `expires_at` is a time with a zone, or nanoseconds since 1970, after which the
+        server ends it.
 
         Raises `InvalidArgument` (`bad_keep_out`, `bad_expiry`), `ResourceExhausted` (`too_many_keep_outs`).
         """

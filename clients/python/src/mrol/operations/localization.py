@@ -72,9 +72,9 @@ class LocalizationOperations(MapHandle):
         """Searches all poses for the one from which a scan was taken. The map stays as it is.
 
         `points` has shape (..., 3), meters, in the sensor frame. `gravity_in_sensor` (shape (3,), the direction in which things
-        fall, good to 2 degrees) makes the search about ten times as fast; `gravity_in_map` is 0 0 -1 unless it is given. `search_box`
-        bounds where the sensor was. The server searches for 10 s unless `time_limit_s` says otherwise: give the call more than that
-        (`with_timeout`).
+        fall, good to 2 degrees) makes the search about ten times as fast; `gravity_in_map` is 0 0 -1 unless it is given.
+        `search_box` bounds where the sensor was. The server searches for 10 s unless `time_limit_s` says otherwise: give the
+        call more than that (`with_timeout`).
 
         Raises `FailedPrecondition` (`map_empty`), `InvalidArgument`, `ResourceExhausted` (`search_too_large`).
         """

@@ -52,9 +52,9 @@ class MotionOperations(MapHandle):
 
         Configurations are as of `check_poses`, and the last axis of their shape runs along each motion: an array of shape
         (m, 2, 7) is m edges of one link. Motions of unequal lengths are one array of all configurations with `lengths`, shape (m,).
-        Between two configurations a link moves along a line and turns the shorter way. The body is checked so often that no point of
-        it moves by more than half a voxel, or by `step_m`, from one check to the next. `clearance_max_m` asks for the least distance
-        to an obstacle as well. The other arguments are those of `check_poses`.
+        Between two configurations a link moves along a line and turns the shorter way. The body is checked so often that no
+        point of it moves by more than half a voxel, or by `step_m`, from one check to the next. `clearance_max_m` asks for the
+        least distance to an obstacle as well. The other arguments are those of `check_poses`.
         """
         arrays = Arrays()
         checked = Body.of(body)

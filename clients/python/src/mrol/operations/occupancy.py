@@ -45,10 +45,10 @@ class OccupancyOperations(MapHandle):
     ) -> Occupancy:
         """Whether points lie in occupied voxels, all of them at one revision.
 
-        `points` has shape (..., 3), meters, in the map frame, or in one that `map_from_points` carries into it. Contiguous float32 is
-        sent as it is; other numbers are converted. `level` 0 is the finest. `lookup="bloom"` asks the filter alone, which
-        says "occupied" of about 2 % of the free points near a surface and never "free" of an occupied one. With `keep_out` points in keep-outs
-        count as occupied. `min_revision` waits until the map is there.
+        `points` has shape (..., 3), meters, in the map frame, or in one that `map_from_points` carries into it. Contiguous
+        float32 is sent as it is; other numbers are converted. `level` 0 is the finest. `lookup="bloom"` asks the filter alone,
+        which says "occupied" of about 2 % of the free points near a surface and never "free" of an occupied one. With
+        `keep_out` points in keep-outs count as occupied. `min_revision` waits until the map is there.
 
         Raises `InvalidArgument` for points that are not finite (`point_not_finite`) or out of range, naming the first, and for
         more points than the server takes at once (`batch_too_large`, `body_too_large`).

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Bools, F64, as_floats, as_numbers, number_of, numbers_text, raw, rows_of, vector_of, whole_of
+from .._arrays import F64, Bools, as_floats, as_numbers, number_of, numbers_text, raw, rows_of, vector_of, whole_of
 from .._fields import Fields, fields_of, reading
 from .._transport.request import Answer, Parameter
 from ..errors import ArgumentError, TransportError
@@ -118,8 +118,9 @@ class ScanOperations(MapHandle):
         without either it is that pose. `align=False` adds the scan at its guess. `timestamp_ns` counts from 1970. `point_times`
         (shape (n,), seconds from `timestamp_ns`) undo the sensor's motion during its sweep. `guess_covariance` has shape (6, 6).
 
-        Without `scan_id` the scan gets the next id of this process' session, and of a `scan_id` without `session` ids go on. After `ConnectionLost`, `TimedOut` or Ctrl-C it is not
-        known whether the scan is in the map: send it again with `**error.repeat_with`.
+        Without `scan_id` the scan gets the next id of this process' session, and of a `scan_id` without `session` ids go on.
+        After `ConnectionLost`, `TimedOut` or Ctrl-C it is not known whether the scan is in the map: send it again with
+        `**error.repeat_with`.
 
         Raises `FailedPrecondition` (`guess_required`: the robot has no pose in a map that is not empty), `Conflict`
         (`scan_id_taken`), `InvalidArgument`.

@@ -69,14 +69,15 @@ class WatchOperations(MapHandle):
     ) -> Iterator[WatchEvent]:
         """Tells of the map's changes as they become durable, for as long as it is iterated.
 
-        First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each change
-        (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was; where that is
-        not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are the finest voxels as
-        they were recorded; with it, voxels of that level that really appeared and went. `box` leaves other voxels out. With
-        `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of the state.
+        First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
+        change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
+        where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
+        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. `box` leaves other
+        voxels out. With `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of
+        the state.
 
-        Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server does
-        not come back within `patience_s`.
+        Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
+        does not come back within `patience_s`.
         """
         parameters: dict[str, Parameter] = {
             "delta_level": None if delta_level is None else level_of(delta_level, "delta_level"),
