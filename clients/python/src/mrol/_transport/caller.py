@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from http.client import HTTPResponse
 
 from ..errors import BadAnswer, ServerError, TransportError, Unauthenticated, server_error
 from .attempts import Attempts
@@ -13,6 +12,7 @@ from .deadline import Deadline, seconds
 from .key import Key
 from .pool import Pool
 from .request import Answer, Request
+from .response import Response
 
 ERROR_BYTES_MAX = 1 << 20
 """Bytes of an answer that says what is wrong, of one that is read piece by piece otherwise."""
@@ -88,7 +88,7 @@ class Caller:
             if response.status >= 300:
                 with_bound = min(response.length or ERROR_BYTES_MAX, ERROR_BYTES_MAX)
                 said = memoryview(connection.read(response, with_bound, deadline))
-                raise_for(Answer(response.status, response.headers, said))
+                raise_for(Answer(response.status, response.plain_headers, said))
             yield Body(connection, response)
         finally:
             connection.close()
@@ -102,7 +102,7 @@ class Caller:
 class Body:
     """A body that is read piece by piece."""
 
-    def __init__(self, connection: Connection, response: HTTPResponse) -> None:
+    def __init__(self, connection: Connection, response: Response) -> None:
         self._connection = connection
         self._response = response
 
@@ -114,7 +114,7 @@ class Body:
     @property
     def answer(self) -> Answer:
         """Status and headers."""
-        return Answer(self._response.status, self._response.headers, memoryview(b""))
+        return Answer(self._response.status, self._response.plain_headers, memoryview(b""))
 
     def read(self, count: int, deadline: Deadline) -> bytes:
         """Up to so many bytes; less at the end."""

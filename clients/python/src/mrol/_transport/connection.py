@@ -4,7 +4,7 @@ import select
 import socket
 import ssl
 from contextlib import suppress
-from http.client import HTTPConnection, HTTPException, HTTPResponse, IncompleteRead
+from http.client import HTTPConnection, HTTPException, IncompleteRead
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..errors import BadAnswer, ConnectFailed, ConnectionLost, MrolError, TimedO
 from .address import Address
 from .deadline import Deadline
 from .request import Answer, Request
+from .response import Response
 from .stream import BoundedStream
 
 HEADER_BYTES = 128 << 10
@@ -32,6 +33,7 @@ class Connection:
         self._client = HTTPConnection(address.host)
         # It never connects by itself: what it opened would have no bounds.
         self._client.auto_open = 0
+        self._client.response_class = Response
         self._client.sock = cast(Any, self._stream)
         self._is_broken = False
 
@@ -73,9 +75,9 @@ class Connection:
             body = _whole_body(response, answer_bytes_max)
             response.close()
             self._is_broken = self._is_broken or response.will_close
-            return Answer(response.status, response.headers, body)
+            return Answer(response.status, response.plain_headers, body)
 
-    def open(self, request: Request, headers: dict[str, str], deadline: Deadline, bytes_max: int | None) -> HTTPResponse:
+    def open(self, request: Request, headers: dict[str, str], deadline: Deadline, bytes_max: int | None) -> Response:
         """Sends a request, and reads its answer up to the body."""
         with _Failures(self):
             self._stream.begin(deadline, bytes_max)
@@ -84,13 +86,13 @@ class Connection:
             except (BrokenPipeError, ConnectionResetError) as lost:
                 # A server that refuses a body by its length answers before it has read it.
                 return self._answer_in_spite_of(lost)
-            response = self._client.getresponse()
+            response = self._response()
             if self._stream.has_ended:
                 # To http.client the end of a connection is the end of the headers, too.
                 raise IncompleteRead(b"")
             return response
 
-    def read(self, response: HTTPResponse, count: int, deadline: Deadline) -> bytes:
+    def read(self, response: Response, count: int, deadline: Deadline) -> bytes:
         """Reads up to so many bytes of a body that is read piece by piece; less than that at its end."""
         with _Failures(self):
             self._stream.renew(deadline)
@@ -116,10 +118,15 @@ class Connection:
                 request.on_sent(sent)
         self._stream.flush()
 
-    def _answer_in_spite_of(self, lost: OSError) -> HTTPResponse:
+    def _response(self) -> Response:
+        response = self._client.getresponse()
+        assert isinstance(response, Response)
+        return response
+
+    def _answer_in_spite_of(self, lost: OSError) -> Response:
         self._is_broken = True
         try:
-            return self._client.getresponse()
+            return self._response()
         except (OSError, HTTPException):
             raise lost from None
 
@@ -149,7 +156,7 @@ class _Failures:
             raise BadAnswer(f"this is no answer of an mrol server: {excerpt(error)}") from error
 
 
-def _whole_body(response: HTTPResponse, most: int) -> memoryview:
+def _whole_body(response: Response, most: int) -> memoryview:
     """The body, of a length that the answer tells, or in chunks.
 
     One that ends where the connection does could have been cut off anywhere.
@@ -169,7 +176,7 @@ def _whole_body(response: HTTPResponse, most: int) -> memoryview:
     return memoryview(body)
 
 
-def _body_of(response: HTTPResponse, length: int) -> memoryview:
+def _body_of(response: Response, length: int) -> memoryview:
     # Memory that is not written to is none: a length that a server claims costs nothing until it is sent.
     body = np.empty(length, np.uint8).data
     filled = 0

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from email.message import Message
 from urllib.parse import quote, urlencode
 
 JSON = "application/json"
@@ -38,13 +37,12 @@ class Answer:
     """A whole answer."""
 
     status: int
-    headers: Message
+    headers: Mapping[str, str]
     body: memoryview = field(repr=False)
 
     def header(self, name: str) -> str | None:
-        """The value of a header."""
-        value = self.headers.get(name)
-        return None if value is None else str(value)
+        """The value of a header, whose name is in lower case."""
+        return self.headers.get(name)
 
 
 def path_of(*segments: str) -> str:

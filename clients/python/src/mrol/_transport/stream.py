@@ -5,6 +5,7 @@ read, however large. Here a deadline holds over all reads and writes, and what a
 """
 
 import socket
+import ssl
 from io import BufferedReader, RawIOBase
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,8 @@ class BoundedStream:
     def __init__(self, sock: socket.socket) -> None:
         self._sock = sock
         self._unsent = bytearray()
+        # TLS encrypts one piece after the other.
+        self._can_gather = not isinstance(sock, ssl.SSLSocket)
         self._deadline: Deadline | None = None
         self._bytes_left: int | None = 0
         self.has_ended = False
@@ -50,8 +53,11 @@ class BoundedStream:
             if len(self._unsent) > SMALL_BYTES:
                 self.flush()
             return
-        self.flush()
-        self._send(piece)
+        if self._unsent and self._can_gather:
+            self._send_behind(piece)
+        else:
+            self.flush()
+            self._send(piece)
 
     def flush(self) -> None:
         """Sends what was kept."""
@@ -60,12 +66,28 @@ class BoundedStream:
             self._unsent.clear()
 
     def _send(self, data: memoryview) -> None:
+        if not data.nbytes:
+            return
         assert self._deadline is not None
         self._sock.settimeout(self._deadline.remaining_s())
         try:
             self._sock.sendall(data)
         except TimeoutError as error:
             raise self._deadline.passed() from error
+
+    def _send_behind(self, data: memoryview) -> None:
+        """Sends what was kept and a piece behind it, by one call of the system."""
+        assert self._deadline is not None
+        self._sock.settimeout(self._deadline.remaining_s())
+        head = bytes(self._unsent)
+        self._unsent.clear()
+        try:
+            sent = self._sock.sendmsg([head, data])
+        except TimeoutError as error:
+            raise self._deadline.passed() from error
+        if sent < len(head):
+            self._send(memoryview(head)[sent:])
+        self._send(data.cast("B")[max(0, sent - len(head)) :])
 
     def receive_into(self, buffer: "Buffer") -> int:
         """Reads what is there, or waits for it."""

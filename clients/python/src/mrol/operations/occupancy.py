@@ -56,9 +56,10 @@ class OccupancyOperations(MapHandle):
         rows, shape = rows_of(points, 3, "points", POINTS, self._request_bytes_max)
         parameters: dict[str, Parameter] = {
             "pose": None if map_from_points is None else numbers_text(Pose.of(map_from_points, "map_from_points").seven()),
-            "level": level_of(level),
-            "lookup": word_of(lookup, "lookup"),
-            "keep_out": flag_of(keep_out, "keep_out"),
+            # What stands at its default is not sent: a short query is mostly its address.
+            "level": level_of(level) or None,
+            "lookup": word_of(lookup, "lookup") if lookup != "exact" else None,
+            "keep_out": flag_of(keep_out, "keep_out") or None,
             "min_revision": None if min_revision is None else whole_of(min_revision, "min_revision"),
             "map_uuid": None if map_uuid is None else word_of(map_uuid, "map_uuid"),
         }
