@@ -72,8 +72,8 @@ def room(rng: np.random.Generator) -> np.ndarray:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", help="the program, optimized")
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--seconds", type=float, default=1.0, help="of each measurement")
+    parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--seconds", type=float, default=0.5, help="of each measurement")
     chosen = parser.parse_args()
     rng = np.random.default_rng(1)
     asked = rng.uniform([-1, -1, -1], ROOM_M + 1, (max(LIMITS), 3)).astype(np.float32)
