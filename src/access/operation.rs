@@ -86,6 +86,8 @@ operations! {
     DeleteKeepOut:     Some(Write), grpc "/mrol.v1.Mapping/DeleteKeepOut",       http DELETE "/v1/maps/{map}/keep-outs/{name}";
     GetTrajectory:     Some(Read),  grpc "/mrol.v1.Mapping/GetTrajectory",       http GET "/v1/maps/{map}/trajectory";
     StreamTrajectory:  Some(Read),  grpc "/mrol.v1.Mapping/StreamTrajectory";
+    ListEvents:        Some(Read),  grpc "/mrol.v1.Mapping/ListEvents",          http GET "/v1/maps/{map}/events";
+    WatchEvents:       Some(Read),  grpc "/mrol.v1.Mapping/WatchEvents",         http GET "/v1/maps/{map}/events/watch";
     CreateMap:         Some(Admin), grpc "/mrol.v1.Maps/CreateMap",              http PUT "/v1/maps/{map}";
     GetMap:            Some(Read),  grpc "/mrol.v1.Maps/GetMap",                 http GET "/v1/maps/{map}";
     ListMaps:          Some(Read),  grpc "/mrol.v1.Maps/ListMaps",               http GET "/v1/maps";
@@ -144,14 +146,20 @@ impl Operation {
                 | Self::ClassifyPointsStream
                 | Self::InsertScanStream
                 | Self::Watch
+                | Self::WatchEvents
                 | Self::Reflect
                 | Self::HealthWatch
         )
     }
 
+    /// True for watches of a map.
+    pub fn is_watch(self) -> bool {
+        matches!(self, Self::Watch | Self::WatchEvents)
+    }
+
     /// True for streams whose messages are requests of their own, each counted when it is answered.
     pub fn is_stream_of_requests(self) -> bool {
-        self.is_stream() && !matches!(self, Self::Watch | Self::Reflect | Self::HealthWatch)
+        self.is_stream() && !self.is_watch() && !matches!(self, Self::Reflect | Self::HealthWatch)
     }
 
     /// The operation of a gRPC call.

@@ -119,7 +119,7 @@ impl Admission {
             return self.0.probes.answer(operation, request, endings, handle).await;
         }
         let place = match operation {
-            Operation::Watch => Some(self.0.watches.take()?),
+            watch if watch.is_watch() => Some(self.0.watches.take()?),
             _ => operation.is_stream().then(|| self.0.streams.take()).transpose()?,
         };
         let asking = RateLimitKey::of(request.extensions());

@@ -13,6 +13,7 @@ mod config;
 mod delete;
 mod doctor;
 mod error;
+mod events;
 mod frontiers;
 mod grid;
 mod health;
@@ -97,6 +98,7 @@ enum Command {
     Grid(grid::DrawGrid),
     Block(block::Block),
     Observers(observers::Observers),
+    Events(events::Events),
     Delete(delete::Delete),
     Undo(undo::Undo),
     Keepout(keepout::KeepOuts),
@@ -143,6 +145,7 @@ impl Command {
             Self::Grid(grid) => runtime::block_on(grid.run(output)),
             Self::Block(block) => runtime::block_on(block.run(output)),
             Self::Observers(observers) => runtime::block_on(observers.run(output)),
+            Self::Events(events) => runtime::block_on(events.run(output)),
             Self::Delete(delete) => runtime::block_on(delete.run(output)),
             Self::Undo(undo) => runtime::block_on(undo.run(output)),
             Self::Keepout(keepout) => runtime::block_on(keepout.run(output)),

@@ -29,6 +29,7 @@ mod answers;
 mod connection;
 mod credentials;
 mod error;
+mod events;
 mod keep_outs;
 mod new_map;
 mod question;

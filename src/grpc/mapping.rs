@@ -15,6 +15,7 @@ use pb::mapping_server::Mapping;
 #[tonic::async_trait]
 impl Mapping for Adapter {
     type InsertScanStreamStream = Answers<pb::InsertScanResponse>;
+    type WatchEventsStream = BoxStream<pb::WatchEventsResponse>;
     type StreamTrajectoryStream = BoxStream<pb::StreamTrajectoryResponse>;
 
     async fn insert_scan(
@@ -120,6 +121,29 @@ impl Mapping for Adapter {
             let _until_sent = &kept;
             Ok(piece?.into())
         }))))
+    }
+
+    async fn list_events(
+        &self,
+        request: Request<pb::ListEventsRequest>,
+    ) -> Result<Response<pb::ListEventsResponse>, Status> {
+        let service = service_of(&request)?;
+        let (map, query) = request.into_inner().try_into()?;
+        let events = service.list_events(&map, query).await?;
+        Ok(answered(pb::ListEventsResponse {
+            events: events.iter().map(|event| (&**event).into()).collect(),
+        }))
+    }
+
+    async fn watch_events(
+        &self,
+        request: Request<pb::WatchEventsRequest>,
+    ) -> Result<Response<Self::WatchEventsStream>, Status> {
+        let service = service_of(&request)?;
+        let (map, query) = request.into_inner().try_into()?;
+        let watch = service.watch_events(&map, query).await?;
+        let messages = watch.into_stream(self.admission.told_to_drain());
+        Ok(Response::new(Box::pin(messages.map(|message| Ok(message?.into())))))
     }
 }
 

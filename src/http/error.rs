@@ -7,7 +7,7 @@ use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::access::Operation;
 use crate::service::{ErrorCode, Reason, ServiceError};
@@ -51,16 +51,9 @@ impl From<ServiceError> for HttpError {
 
 impl IntoResponse for HttpError {
     fn into_response(self) -> Response {
-        let ServiceError { reason, message, retry_after } = self.error;
+        let (reason, retry_after) = (self.error.reason, self.error.retry_after);
         let code = reason.code();
-        let body = json!({
-            "title": self.status.canonical_reason().unwrap_or_default(),
-            "status": self.status.as_u16(),
-            "detail": message,
-            "code": code.as_str(),
-            "reason": reason.as_str(),
-        });
-        let mut response = (self.status, Json(body)).into_response();
+        let mut response = (self.status, Json(document(self.status, self.error))).into_response();
         response.headers_mut().insert(header::CONTENT_TYPE, PROBLEM_JSON);
         response.extensions_mut().insert(reason);
         let headers = response.headers_mut();
@@ -75,6 +68,23 @@ impl IntoResponse for HttpError {
         }
         response
     }
+}
+
+/// The problem document of a failure, for answers that have begun.
+pub(super) fn problem(error: ServiceError) -> Value {
+    let HttpError { status, error, .. } = error.into();
+    document(status, error)
+}
+
+fn document(status: StatusCode, error: ServiceError) -> Value {
+    let ServiceError { reason, message, .. } = error;
+    json!({
+        "title": status.canonical_reason().unwrap_or_default(),
+        "status": status.as_u16(),
+        "detail": message,
+        "code": reason.code().as_str(),
+        "reason": reason.as_str(),
+    })
 }
 
 /// Why the caller was not let in, where that is what `response` says.

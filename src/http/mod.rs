@@ -4,6 +4,7 @@ mod block;
 mod body;
 mod deletions;
 mod error;
+mod events;
 mod filter_choice;
 mod headers;
 mod json;

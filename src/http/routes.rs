@@ -5,7 +5,7 @@ use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
-    Adapter, block, deletions, keep_outs, localization, map_file, maps, observers, occupancy, probes,
+    Adapter, block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy, probes,
     question, scans, trajectory, undo, voxels, watch,
 };
 use crate::access::Operation;
@@ -50,6 +50,8 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::GetBlock => on(method, block::get),
         Operation::ListObservers => on(method, observers::list),
         Operation::Watch => on(method, watch::watch),
+        Operation::ListEvents => on(method, events::list),
+        Operation::WatchEvents => on(method, events::watch),
         Operation::ListKeepOuts => on(method, keep_outs::list),
         Operation::PutKeepOut => on(method, keep_outs::put),
         Operation::DeleteKeepOut => on(method, keep_outs::delete),

@@ -180,6 +180,8 @@ fn points_at<'a>(points: &'a [Point], times_s: Option<&[f32]>, velocity: Option<
 /// Where a scan was found to have been taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocatedScan {
+    /// The pose that its guess stood for.
+    pub guess: Pose,
     /// The pose, and how well the scan fits the map there.
     pub alignment: Alignment,
     /// How long it took to find it.
@@ -307,7 +309,7 @@ impl<'a> ScanMapper<'a> {
         }
         let is_first = map_is_empty && !scan.at_guess;
         let align_time = start.elapsed();
-        Ok(LocatedScan { alignment, align_time, is_first, velocity, recovered: None })
+        Ok(LocatedScan { guess, alignment, align_time, is_first, velocity, recovered: None })
     }
 
     /// Aligns a scan from `guess`, or judges it there, its points deskewed by `velocity`.

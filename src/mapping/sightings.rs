@@ -124,6 +124,7 @@ mod tests {
         let points = [Point::new(1.0, 0.0, 0.0)];
         let alignment = Alignment { verdict, ..Alignment::trusted(Pose::identity(), 1, &points) };
         let located = LocatedScan {
+            guess: Pose::identity(),
             alignment,
             align_time: Duration::ZERO,
             is_first: false,

@@ -9,6 +9,7 @@ use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
 use super::commit_queue::{CommitQueue, CommitThread, Stop, Told};
+use super::events::EventLog;
 use super::full_state::FullStates;
 use super::point_query::{POINTS_PER_STEP, point_without_voxel};
 use super::recent_changes::RecentChanges;
@@ -48,6 +49,8 @@ pub(super) struct HostedMap {
     announced: watch::Receiver<u64>,
     /// The last changes, for who watches the map.
     pub(super) recent: Arc<RecentChanges>,
+    /// What became of the last scans that robots sent.
+    pub(super) events: EventLog,
     /// Whole states that watchers are being told of.
     pub(super) full_states: FullStates,
     /// One robot's scans are taken in order.
@@ -115,6 +118,7 @@ impl HostedMap {
             commit_queue,
             announced,
             recent,
+            events: EventLog::default(),
             full_states: FullStates::default(),
             turns: Mutex::new(Rank::Brief, HashMap::new()),
             planner: OnceLock::new(),
@@ -189,6 +193,12 @@ impl HostedMap {
     /// Refuses changes that would be refused in the end, before any work is done for them.
     pub(super) fn check_writable(&self) -> Result<(), ServiceError> {
         self.commit_queue.stopped().map_or(Ok(()), |stop| Err(stop.refusal(&self.name)))
+    }
+
+    /// Why there is nothing more to tell of this map.
+    pub(super) fn ended(&self) -> ServiceError {
+        let gone = || ServiceError::new(Reason::MapNotFound, format!("map {} is gone", self.name));
+        self.commit_queue.stopped().map_or_else(gone, |stop| stop.refusal(&self.name))
     }
 
     pub(super) fn version(&self, ContentVersion { revision, hash }: ContentVersion) -> MapVersion {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::commit_queue::{Prepared, Step, Submission, Turn, TurnLimits, record_of};
 use super::deletion::removal_bytes;
+use super::events::sample_of;
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
@@ -14,13 +15,22 @@ use super::resource_budget::ResourceBudget;
 use super::trajectory::{scan_id_too_old, scan_name};
 use super::{Foreground, Reason, ScanAnswer, ScanRequest, ServiceError, ServiceSettings, check_not_stopped};
 use crate::align::{AlignmentSettings, Method, Verdict};
-use crate::geometry::Point;
+use crate::geometry::{Point, Pose};
 use crate::map::{Change, Committed, KnownScan, Lookup, MappedScan, ScanRecord};
 use crate::mapping::{
     Carving, LocatedScan, MappingError, MappingSettings, ScanMapper, ViewpointSettings, deskewed,
 };
 use crate::util::StopSignal;
 use crate::visibility::VIEWPOINT_MEMORY_MAX;
+
+/// A scan that was judged: the answer, and what is told of it besides.
+pub(super) struct Judged {
+    pub(super) answer: ScanAnswer,
+    /// The pose that its guess stood for; none of an answer that is given again.
+    pub(super) guess: Option<Pose>,
+    /// Some of the points, where it was refused.
+    pub(super) sample: Vec<Point>,
+}
 
 /// How far a scan is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,11 +52,11 @@ impl HostedMap {
         settings: &ServiceSettings,
         budget: &ResourceBudget,
         stop: StopSignal<'_>,
-    ) -> Result<Step<Option<ScanAnswer>>, ServiceError> {
+    ) -> Result<Step<Option<Judged>>, ServiceError> {
         self.check_writable()?;
         let scan = FilteredScan::of(request, settings)?;
         if let Some(answer) = self.replay(&scan)? {
-            return Ok(Step::Answered(Some(answer)));
+            return Ok(Step::Answered(Some(Judged { answer, guess: None, sample: Vec::new() })));
         }
         self.check_voxels(settings)?;
         self.check_robots(&request.robot, &settings.limits)?;
@@ -67,9 +77,9 @@ impl HostedMap {
             self.lost.found(&request.robot);
         }
         self.sightings.note(&scan.to_map(), &located);
-        let answer = self.answer(&scan, &located);
-        if !answer.accepted && !request.force {
-            return Ok(Step::Answered(Some(answer)));
+        let judged = self.judged(&scan, &located);
+        if !judged.answer.accepted && !request.force {
+            return Ok(Step::Answered(Some(judged)));
         }
         let scan_record = mapper.record(&scan.to_map(), &located, stop);
         check_not_stopped(stop)?;
@@ -79,8 +89,8 @@ impl HostedMap {
         let Carving { voxels: carved, revision: carved_at } = carving?;
         scan_record.carved = carved;
         if mapper.note_stationary(&scan.to_map(), &scan_record) {
-            let answer = ScanAnswer { accepted: true, stationary: true, ..answer };
-            return Ok(Step::Answered(Some(answer)));
+            let answer = ScanAnswer { accepted: true, stationary: true, ..judged.answer };
+            return Ok(Step::Answered(Some(Judged { answer, sample: Vec::new(), ..judged })));
         }
         let ScanRecord { voxels, carved, moments, viewpoint, .. } = &scan_record;
         let moments = moments.as_slice().len();
@@ -95,15 +105,23 @@ impl HostedMap {
         let prepared = Prepared { change, record, if_empty: located.is_first, limits, turn, reservation };
         let outcome = self.commit_queue.submit(Submission::Prepared(prepared.into()))?;
         let map = Arc::clone(self);
-        let answer = ScanAnswer { points_skipped, ..answer };
-        Ok(Step::Submitted(outcome, Box::new(move |committed| Some(map.committed(answer, committed)))))
+        let judged = Judged { answer: ScanAnswer { points_skipped, ..judged.answer }, ..judged };
+        Ok(Step::Submitted(outcome, Box::new(move |committed| Some(map.committed(judged, committed)))))
     }
 
     /// What to say of a scan that was committed.
-    fn committed(&self, answer: ScanAnswer, committed: Committed) -> ScanAnswer {
+    fn committed(&self, judged: Judged, committed: Committed) -> Judged {
         let version = self.version(committed.version());
         let (new_voxels, carved_voxels) = (committed.added, committed.removed);
-        ScanAnswer { accepted: true, new_voxels, carved_voxels, version, ..answer }
+        let answer = ScanAnswer { accepted: true, new_voxels, carved_voxels, version, ..judged.answer };
+        Judged { answer, sample: Vec::new(), ..judged }
+    }
+
+    /// What is told of a scan that was judged, and not added yet.
+    fn judged(&self, scan: &FilteredScan<'_>, located: &LocatedScan) -> Judged {
+        let (answer, guess) = (self.answer(scan, located), Some(located.guess));
+        let sample = if answer.accepted { Vec::new() } else { sample_of(scan.to_map().points) };
+        Judged { answer, guess, sample }
     }
 
     /// Says what [`HostedMap::submit_scan`] would; changes nothing.

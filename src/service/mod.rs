@@ -12,6 +12,7 @@ mod deletion;
 mod digest;
 mod error;
 mod error_code;
+mod events;
 mod filtered_scan;
 mod full_state;
 mod gauges;
@@ -32,6 +33,7 @@ mod maps;
 mod modeled;
 mod observer;
 mod observers;
+mod outbox;
 mod point_query;
 mod pool;
 mod pools;
@@ -41,6 +43,7 @@ mod recent_changes;
 mod recovery;
 mod request;
 mod resource_budget;
+mod scans;
 mod settings;
 mod shortage;
 mod thread_queue;
@@ -56,13 +59,14 @@ pub use allowed_scans::AllowedScans;
 pub use asker::Asker;
 pub use error::ServiceError;
 pub use error_code::ErrorCode;
+pub use events::EventWatch;
 pub use gauges::{Gauges, MemoryReading, Readings};
 pub use limits::{Limits, Marks};
 pub use localization::{
     CANDIDATES_DEFAULT, CandidateAnswer, LocalizationAnswer, LocalizationRequest, SEARCH_SHARE,
     TIME_LIMIT_DEFAULT,
 };
-pub use observer::{Change, End, Ended, Observer, Outcome};
+pub use observer::{Change, End, Ended, JudgedScan, Observer, Outcome};
 pub use pool::PoolUse;
 pub use question::{
     Answered, Asked, CheckAs, ClassifyQuestion, Collisions, FRONTIERS_MAX_DEFAULT, FrontierQuestion,
@@ -72,12 +76,13 @@ pub use question::{
 pub use reason::{Reason, ToldBy};
 pub use request::{
     BlockAnswer, BlockBytes, BlockForm, BlockRequest, BlockVoxels, Cause, ChangePart, DeleteKeepOut,
-    Deletion, DeletionAnswer, DeletionTarget, Foreground, KeepOutAnswer, KeepOutList, LeftViewpoint,
-    ListingRequest, MapFile, MapInfo, MapList, MapStorage, MapVersion, NotSeenSince, ObservedVoxel,
-    ObserversAnswer, ObserversRequest, ObservingScan, PointAnswer, PointCloud, PointQuery, PointTimes,
-    PutKeepOut, ScanAnswer, ScanRequest, StatePart, TimeReference, TrajectoryAnswer, TrajectoryQuery,
-    UnavailableMap, Undo, UndoAnswer, UndoTarget, VoxelListing, WatchEvent, WatchForm, WatchMessage,
-    WatchRequest, WatchedScan, WatchedSince, WatchedViewpoint,
+    Deletion, DeletionAnswer, DeletionTarget, EventMessage, EventsQuery, FailedScan, Foreground,
+    KeepOutAnswer, KeepOutList, LeftViewpoint, ListingRequest, MapFile, MapInfo, MapList, MapStorage,
+    MapVersion, NotSeenSince, ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan, PointAnswer,
+    PointCloud, PointQuery, PointTimes, PutKeepOut, ScanAnswer, ScanEvent, ScanRequest, StatePart,
+    TimeReference, TrajectoryAnswer, TrajectoryQuery, UnavailableMap, Undo, UndoAnswer, UndoTarget,
+    VoxelListing, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedScan, WatchedSince,
+    WatchedViewpoint,
 };
 pub use settings::{EVERY_ROBOT, RobotSettings, ServiceSettings};
 pub use shortage::Shortage;
@@ -93,7 +98,6 @@ use crate::util::StopSignal;
 use catalog::Catalog;
 use commit_queue::{Refusal, Step};
 use hosted_map::HostedMap;
-use mapping::Effort;
 use pool::{FreeThread, Pool};
 use pools::Pools;
 use resource_budget::ResourceBudget;
@@ -223,78 +227,6 @@ impl MapService {
             points: answer.points,
         })
         .await
-    }
-
-    /// Aligns a scan and, where it fits, adds it.
-    ///
-    /// # Errors
-    /// `FailedPrecondition` with `guess_required`; `Conflict` for another scan under an accepted id;
-    /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
-    /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
-    pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
-        let robot = scan.robot.clone();
-        let work = async {
-            self.scans.permit(&scan.robot)?;
-            let map = self.map(map)?;
-            scan.check_insertion()?;
-            scan.check_points(self.limits())?;
-            if map.is_new(&scan) {
-                self.inner.budget.check_to_grow()?;
-            }
-            let turn = Arc::new(self.inner.pools.mapping.in_turn(map.lock_robot(&scan.robot)).await?);
-            let scan = Arc::new(scan);
-            let limit = TimeLimit::new("insertion_time_max", self.limits().insertion_time_max_s);
-            let submit = |effort| {
-                let (inner, map, scan) = (Arc::clone(&self.inner), Arc::clone(&map), Arc::clone(&scan));
-                let (turn, limit) = (Arc::clone(&turn), limit.clone());
-                move |stop: StopSignal<'_>| {
-                    limit.run(stop, |stop| {
-                        let turn = Arc::clone(&turn);
-                        map.submit_scan(&scan, turn, effort, &inner.settings, &inner.budget, stop)
-                    })
-                }
-            };
-            let Pools { mapping, long_mapping, .. } = &self.inner.pools;
-            let (mut pool, mut thread, mut effort) = (mapping, None, Effort::OneStart);
-            let answer = loop {
-                if let Some(answer) = self.submit_and_wait(pool, thread.take(), submit(effort)).await? {
-                    break answer;
-                }
-                (pool, effort) = (long_mapping, Effort::Whole);
-                thread = Some(limit.wait(pool.thread()).await??);
-            };
-            if !answer.accepted {
-                self.search_for_robot_of(map, &scan);
-            }
-            Ok(answer)
-        };
-        self.observed("InsertScan", Some(map), work, |answer| Outcome::Scan {
-            robot,
-            verdict: answer.verdict,
-            replayed: answer.replayed,
-            recovered: answer.recovered,
-        })
-        .await
-    }
-
-    /// Aligns a scan and says what [`MapService::insert_scan`] would; changes nothing.
-    ///
-    /// # Errors
-    /// As for an insertion; the limit is `alignment_time_max`.
-    pub async fn align_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
-        let work = async {
-            self.scans.permit(&scan.robot)?;
-            let map = self.map(map)?;
-            scan.check_alignment()?;
-            scan.check_points(self.limits())?;
-            let inner = Arc::clone(&self.inner);
-            let limit = TimeLimit::new("alignment_time_max", self.limits().alignment_time_max_s);
-            let align = move |stop: StopSignal<'_>| {
-                limit.run(stop, |stop| map.align_scan(&scan, &inner.settings, stop))
-            };
-            self.inner.pools.alignment.run(align).await?
-        };
-        self.observed("AlignScan", Some(map), work, |_| Outcome::Read).await
     }
 
     /// Says where in the map a scan was taken, with no guess. The search stops as soon as nobody awaits its answer.

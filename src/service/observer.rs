@@ -1,6 +1,7 @@
 //! Observers of a service: who is told of each operation when it is over, for metrics and for the audit.
 
 use std::fmt::Debug;
+use std::time::Duration;
 
 use super::{DeletionAnswer, KeepOutAnswer, MapService, MapVersion, ServiceError, UndoAnswer};
 use crate::align::Verdict;
@@ -52,18 +53,26 @@ pub enum Outcome {
         points: usize,
     },
     /// A scan was judged, and inserted where the verdict or its sender said so.
-    Scan {
-        /// The robot that sent the scan.
-        robot: RobotName,
-        /// How it fits.
-        verdict: Verdict,
-        /// An answer that was given before.
-        replayed: bool,
-        /// How its robot, which was lost, was found again.
-        recovered: Option<Recovered>,
-    },
+    Scan(JudgedScan),
     /// The map, or which maps there are, was changed.
     Changed(Change),
+}
+
+/// A scan that was judged for insertion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedScan {
+    /// The robot that sent the scan.
+    pub robot: RobotName,
+    /// How it fits.
+    pub verdict: Verdict,
+    /// Fraction of its points in occupied voxels of level 0, before it was added.
+    pub overlap: f64,
+    /// Time that the alignment took.
+    pub align_time: Duration,
+    /// An answer that was given before.
+    pub replayed: bool,
+    /// How its robot, which was lost, was found again.
+    pub recovered: Option<Recovered>,
 }
 
 /// What a change by an operator did.

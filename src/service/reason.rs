@@ -45,6 +45,11 @@ macro_rules! reasons {
             /// All reasons, by code and then by name.
             pub const ALL: &[Self] = &[$($(Self::$name),+),+];
 
+            /// The reason with this word.
+            pub(crate) fn of_word(word: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|reason| reason.as_str() == word)
+            }
+
             fn row(self) -> Row {
                 match self {
                     $($(Self::$name => Row {

@@ -21,6 +21,8 @@ pub(super) const DISK_FREE_BYTES: &str = "mrol_disk_free_bytes";
 pub(super) const MEMORY_RESIDENT_BYTES: &str = "mrol_memory_resident_bytes";
 pub(super) const WRITES_REFUSED: &str = "mrol_writes_refused";
 pub(super) const ROBOT_SCANS: &str = "mrol_robot_scans_total";
+pub(super) const SCAN_OVERLAP: &str = "mrol_scan_overlap";
+pub(super) const ALIGN_SECONDS: &str = "mrol_scan_align_seconds";
 
 /// Tells the recorder in force what each of them says.
 pub(super) fn describe() {
@@ -57,5 +59,13 @@ pub(super) fn describe() {
     describe_counter!(
         ROBOT_SCANS,
         "Scans judged for insertion, by robot (those after the first hundred as other) and verdict"
+    );
+    describe_histogram!(
+        SCAN_OVERLAP,
+        "Fraction of the points of scans judged for insertion in occupied voxels of level 0, by verdict"
+    );
+    describe_histogram!(
+        ALIGN_SECONDS,
+        "Seconds that the alignment of scans judged for insertion took, by verdict"
     );
 }

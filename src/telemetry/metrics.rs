@@ -10,17 +10,17 @@ use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder
 use parking_lot::Mutex;
 
 use super::families::{
-    BODY_BYTES, BUILD_INFO, CERTIFICATE_EXPIRES, CONNECTIONS_ACCEPTED, CONNECTIONS_OPEN, CONNECTIONS_REFUSED,
-    DISK_FREE_BYTES, FILE_RELOAD_OK, HANDSHAKES_FAILED, KEY_REQUESTS, MEMORY_RESIDENT_BYTES, REQUEST_SECONDS,
-    REQUESTS, REQUESTS_DENIED, REQUESTS_IN_FLIGHT, ROBOT_SCANS, STREAMS_OPEN, WATCHES_OPEN, WRITES_REFUSED,
+    ALIGN_SECONDS, BODY_BYTES, BUILD_INFO, CERTIFICATE_EXPIRES, CONNECTIONS_ACCEPTED, CONNECTIONS_OPEN,
+    CONNECTIONS_REFUSED, DISK_FREE_BYTES, FILE_RELOAD_OK, HANDSHAKES_FAILED, KEY_REQUESTS,
+    MEMORY_RESIDENT_BYTES, REQUEST_SECONDS, REQUESTS, REQUESTS_DENIED, REQUESTS_IN_FLIGHT, ROBOT_SCANS,
+    SCAN_OVERLAP, STREAMS_OPEN, WATCHES_OPEN, WRITES_REFUSED,
 };
 use super::log::TelemetryError;
 use super::map_counters::{Family, MapCounters};
 use super::{exposition, families};
-use crate::align::Verdict;
 use crate::map::{MapName, RobotName};
 use crate::service::{
-    End, Ended, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
+    End, Ended, JudgedScan, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
 };
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
@@ -29,6 +29,9 @@ const SECONDS_BUCKETS: [f64; 17] = [
     0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0, 30.0,
     60.0,
 ];
+
+/// Upper bounds of the histogram of overlaps: a robot that fits lies between 0.6 and 1, one that is lost below 0.3.
+const OVERLAP_BUCKETS: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 /// Names of keys with a series of their own: those that came later are counted together. A file of keys may change as
 /// often as one likes, and what was counted once stays.
@@ -88,7 +91,12 @@ impl Metrics {
     /// When the recorder refuses the buckets.
     pub fn new() -> Result<Self, TelemetryError> {
         let latency = Matcher::Full(REQUEST_SECONDS.to_owned());
-        let builder = PrometheusBuilder::new().set_buckets_for_metric(latency, &SECONDS_BUCKETS)?;
+        let overlap = Matcher::Full(SCAN_OVERLAP.to_owned());
+        let alignment = Matcher::Full(ALIGN_SECONDS.to_owned());
+        let builder = PrometheusBuilder::new()
+            .set_buckets_for_metric(latency, &SECONDS_BUCKETS)?
+            .set_buckets_for_metric(overlap, &OVERLAP_BUCKETS)?
+            .set_buckets_for_metric(alignment, &SECONDS_BUCKETS)?;
         let recorder = builder.build_recorder();
         let kept =
             Kept { recorder, maps: MapCounters::default(), keys: Mutex::default(), robots: Mutex::default() };
@@ -187,12 +195,17 @@ impl Metrics {
         });
     }
 
-    /// Counts a scan of `robot` that was judged for insertion.
-    fn scan(&self, map: &MapName, robot: &RobotName, verdict: Verdict) {
-        self.0.maps.scan(map, verdict);
-        let robot = self.label_of_robot(robot);
+    /// Counts a scan that was judged for insertion.
+    fn scan(&self, map: &MapName, scan: &JudgedScan) {
+        self.0.maps.scan(map, scan.verdict);
+        if let Some(how) = scan.recovered {
+            self.0.maps.recovered(map, how);
+        }
+        let (robot, verdict) = (self.label_of_robot(&scan.robot), scan.verdict.as_str());
         self.record(|| {
-            counter!(ROBOT_SCANS, "robot" => robot, "verdict" => verdict.as_str()).increment(1);
+            counter!(ROBOT_SCANS, "robot" => robot, "verdict" => verdict).increment(1);
+            histogram!(SCAN_OVERLAP, "verdict" => verdict).record(scan.overlap);
+            histogram!(ALIGN_SECONDS, "verdict" => verdict).record(scan.align_time);
         });
     }
 
@@ -278,12 +291,7 @@ impl Observer for Metrics {
         let (Some(map), End::Done(outcome)) = (ended.map, &ended.end) else { return };
         match outcome {
             Outcome::Points { lookup, points } => self.0.maps.points_queried(map, *lookup, *points),
-            Outcome::Scan { robot, verdict, recovered, replayed: false } => {
-                self.scan(map, robot, *verdict);
-                if let Some(how) = recovered {
-                    self.0.maps.recovered(map, *how);
-                }
-            }
+            Outcome::Scan(scan) if !scan.replayed => self.scan(map, scan),
             Outcome::Changed(change) if !change.replayed => {
                 let counted = [
                     (Family::VoxelsRemoved, change.voxels_removed),
@@ -295,7 +303,7 @@ impl Observer for Metrics {
                     self.0.maps.count(map, (family, None), count);
                 }
             }
-            Outcome::Read | Outcome::Scan { .. } | Outcome::Changed(_) => {}
+            Outcome::Read | Outcome::Scan(_) | Outcome::Changed(_) => {}
         }
     }
 }
@@ -303,8 +311,15 @@ impl Observer for Metrics {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::align::Verdict;
     use crate::map::Lookup;
     use crate::service::Change;
+
+    /// A scan that was judged.
+    fn judged(robot: &str, verdict: Verdict) -> JudgedScan {
+        let (robot, align_time) = (RobotName::new(robot).unwrap(), Duration::from_millis(30));
+        JudgedScan { robot, verdict, overlap: 0.25, align_time, replayed: false, recovered: None }
+    }
 
     /// Tells `metrics` that something was done to `map`.
     fn tell(metrics: &Metrics, map: &MapName, outcome: Outcome) {
@@ -319,7 +334,7 @@ mod tests {
         metrics.request("grpc", "QueryPoints", "ok", Duration::from_millis(3));
         tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 7 });
         tell(&metrics, &map, Outcome::Points { lookup: Lookup::Bloom, points: 5 });
-        metrics.scan(&map, &RobotName::new("r").unwrap(), Verdict::LowOverlap);
+        metrics.scan(&map, &judged("r", Verdict::LowOverlap));
         let text = metrics.render(&[], &[map], &[], &[]);
         for line in [
             r#"mrol_requests_total{protocol="grpc",operation="QueryPoints",code="ok"} 1"#,
@@ -327,6 +342,9 @@ mod tests {
             r#"mrol_points_queried_total{map="a",lookup="bloom"} 12"#,
             r#"mrol_scans_total{map="a",verdict="low_overlap"} 1"#,
             r#"mrol_robot_scans_total{robot="r",verdict="low_overlap"} 1"#,
+            r#"mrol_scan_overlap_bucket{verdict="low_overlap",le="0.2"} 0"#,
+            r#"mrol_scan_overlap_bucket{verdict="low_overlap",le="0.3"} 1"#,
+            r#"mrol_scan_align_seconds_bucket{verdict="low_overlap",le="0.05"} 1"#,
             r#"le="60"} 1"#,
             concat!(r#"mrol_build_info{version=""#, env!("CARGO_PKG_VERSION"), "\""),
             "# TYPE mrol_request_seconds histogram",
@@ -342,7 +360,7 @@ mod tests {
         let [kept, gone] = ["kept", "gone"].map(|name| MapName::new(name).unwrap());
         for map in [&kept, &gone] {
             tell(&metrics, map, Outcome::Points { lookup: Lookup::Exact, points: 1 });
-            metrics.scan(map, &RobotName::new("r").unwrap(), Verdict::Accepted);
+            metrics.scan(map, &judged("r", Verdict::Accepted));
             let undone = Change { voxels_removed: 1, scans_undone: 1, ..Change::default() };
             tell(&metrics, map, Outcome::Changed(undone));
         }
@@ -369,8 +387,7 @@ mod tests {
     fn robots_beyond_the_bound_are_counted_together() {
         let (metrics, map) = (Metrics::new().unwrap(), MapName::new("a").unwrap());
         let scan = |robot: usize| {
-            let robot = RobotName::new(&format!("r{robot}")).unwrap();
-            metrics.scan(&map, &robot, Verdict::Accepted);
+            metrics.scan(&map, &judged(&format!("r{robot}"), Verdict::Accepted));
         };
         (0..Metrics::ROBOTS_MAX + 2).for_each(scan);
         scan(0);

@@ -8,6 +8,7 @@ mod array;
 mod block;
 pub mod codec;
 mod deletion;
+mod events;
 mod failure;
 mod field;
 #[cfg(feature = "server")]

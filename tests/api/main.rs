@@ -8,6 +8,7 @@ mod blocks;
 mod callers_gone;
 mod carving;
 mod deskewing;
+mod events;
 mod grpc;
 mod http;
 mod keep_outs;

@@ -17,6 +17,7 @@ const COMMANDS: [&str; 26] = [
     "grid",
     "block",
     "observers",
+    "events",
     "delete",
     "undo",
     "keepout",

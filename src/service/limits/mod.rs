@@ -70,6 +70,8 @@ pub struct Limits {
     pub watch_heartbeat_s: f64,
     /// How long a watch's client may take no message, until the watch ends. 30 s.
     pub watch_unread_max_s: f64,
+    /// Events that a map keeps in memory: what became of the last scans, and of the last of each of as many robots. 256.
+    pub events_per_map_max: usize,
     /// Points of one query, deletion or scan, or rays of one question. 2,000,000.
     pub points_per_request_max: usize,
     /// How far the time of a scan's point may lie from the scan's timestamp. 2 s.
@@ -182,6 +184,7 @@ impl Default for Limits {
             watches_max: 256,
             watch_heartbeat_s: 10.0,
             watch_unread_max_s: 30.0,
+            events_per_map_max: 256,
             points_per_request_max: 2_000_000,
             point_times_max_s: 2.0,
             keys_per_request_max: 2_000_000,

@@ -2,6 +2,7 @@
 
 mod block;
 mod deletion;
+mod event;
 mod keep_out;
 mod map;
 mod observers;
@@ -16,6 +17,7 @@ mod watch;
 
 pub use block::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
 pub use deletion::{Deletion, DeletionAnswer, DeletionTarget, NotSeenSince};
+pub use event::{EventMessage, EventsQuery, FailedScan, ScanEvent};
 pub use keep_out::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut};
 pub use map::{MapFile, MapInfo, MapList, MapStorage, UnavailableMap};
 pub use observers::{ObservedVoxel, ObserversAnswer, ObserversRequest, ObservingScan};

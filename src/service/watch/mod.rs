@@ -16,16 +16,15 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::{mpsc, watch};
-use tokio_stream::wrappers::ReceiverStream;
-use tokio_stream::{Stream, StreamExt};
+use tokio::sync::watch;
+use tokio_stream::Stream;
 
 use super::full_state::StateParts;
 use super::hosted_map::HostedMap;
+use super::outbox::{Teller, stream_of};
 use super::recent_changes::{BLOCKS_PER_PART, ChangeParts, Watched, WatchedChange, WatchedLevel};
-use super::{MapService, Outcome, Reason, ServiceError, WatchEvent, WatchForm, WatchMessage, WatchRequest};
+use super::{MapService, Outcome, ServiceError, WatchEvent, WatchForm, WatchMessage, WatchRequest};
 use crate::map::MapName;
-use crate::sync::polled_by_runtime;
 use crate::util::StopSignal;
 
 /// Changes that are read from the journal at once, and bytes of memory after which no other is added to them.
@@ -101,31 +100,6 @@ impl Watch {
         Self { service, map, watched, _level: level, durable, told, parts, read, is_greeted: false }
     }
 
-    /// The next message; it comes after `watch_heartbeat_s` at the latest, where the server is not busy.
-    ///
-    /// # Errors
-    /// `NotFound` or `FailedPrecondition` once the map is deleted or replaced; `ResourceExhausted` where there is no memory
-    /// for the whole state, or too many jobs wait. After an error comes no other message.
-    pub async fn next(&mut self) -> Result<WatchMessage, ServiceError> {
-        loop {
-            if let Some(event) = self.parts.next() {
-                return Ok(self.message(event));
-            }
-            self.parts = Parts::Nothing;
-            let head = *self.durable.borrow_and_update();
-            match self.told {
-                None => self.begin_state().await?,
-                Some(told) if told < head => self.begin_change(told + 1).await?,
-                Some(_) if !self.is_greeted => return Ok(self.message(WatchEvent::Heartbeat)),
-                Some(_) => {
-                    if !self.wait_for_change().await? {
-                        return Ok(self.message(WatchEvent::Heartbeat));
-                    }
-                }
-            }
-        }
-    }
-
     fn message(&mut self, event: WatchEvent) -> WatchMessage {
         self.is_greeted = true;
         // A heartbeat speaks of what was told, whatever has come this moment.
@@ -147,7 +121,7 @@ impl Watch {
             () = self.map.commit_queue.ended() => false,
         };
         if !is_durable {
-            return Err(self.ended());
+            return Err(self.map.ended());
         }
         (self.told, self.parts) =
             (Some(revision), Parts::State(StateParts::of(state, self.watched, self.map.map.lattice())));
@@ -210,45 +184,51 @@ impl Watch {
         tokio::select! {
             biased;
             _ = self.durable.changed() => Ok(true),
-            () = self.map.commit_queue.ended() => Err(self.ended()),
+            () = self.map.commit_queue.ended() => Err(self.map.ended()),
             () = tokio::time::sleep(heartbeat) => Ok(false),
         }
     }
 
-    fn ended(&self) -> ServiceError {
-        let gone = || ServiceError::new(Reason::MapNotFound, format!("map {} is gone", self.map.name));
-        self.map.commit_queue.stopped().map_or_else(gone, |stop| stop.refusal(&self.map.name))
+    /// The next message; it comes after `watch_heartbeat_s` at the latest, where the server is not busy.
+    ///
+    /// # Errors
+    /// `NotFound` or `FailedPrecondition` once the map is deleted or replaced; `ResourceExhausted` where there is no memory
+    /// for the whole state, or too many jobs wait. After an error comes no other message.
+    pub async fn next(&mut self) -> Result<WatchMessage, ServiceError> {
+        loop {
+            if let Some(event) = self.parts.next() {
+                return Ok(self.message(event));
+            }
+            self.parts = Parts::Nothing;
+            let head = *self.durable.borrow_and_update();
+            match self.told {
+                None => self.begin_state().await?,
+                Some(told) if told < head => self.begin_change(told + 1).await?,
+                Some(_) if !self.is_greeted => return Ok(self.message(WatchEvent::Heartbeat)),
+                Some(_) => {
+                    if !self.wait_for_change().await? {
+                        return Ok(self.message(WatchEvent::Heartbeat));
+                    }
+                }
+            }
+        }
     }
 
     /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where the
     /// client took no message for `watch_unread_max_s`.
     pub fn into_stream(
-        mut self,
+        self,
         end: impl Future<Output = ServiceError> + Send + 'static,
     ) -> impl Stream<Item = Result<WatchMessage, ServiceError>> + Send {
         let unread_max_s = self.service.limits().watch_unread_max_s;
-        let patience = Duration::from_secs_f64(unread_max_s);
-        let (outbox, messages) = mpsc::channel(1);
-        let telling = async move {
-            let mut end = std::pin::pin!(end);
-            loop {
-                let message = tokio::select! {
-                    biased;
-                    () = outbox.closed() => return,
-                    reason = &mut end => Err(reason),
-                    message = self.next() => message,
-                };
-                let is_last = message.is_err();
-                let sent = tokio::time::timeout(patience, outbox.send(message)).await;
-                if is_last || !matches!(sent, Ok(Ok(()))) {
-                    return;
-                }
-            }
-        };
-        tokio::spawn(polled_by_runtime(telling));
-        let message =
-            format!("watch_unread_max_s is {unread_max_s}: the client took no message for that long");
-        let stalled = ServiceError::new(Reason::WatchStalled, message);
-        ReceiverStream::new(messages).chain(tokio_stream::once(Err(stalled)))
+        stream_of(self, unread_max_s, end)
+    }
+}
+
+impl Teller for Watch {
+    type Message = WatchMessage;
+
+    async fn tell(&mut self) -> Result<WatchMessage, ServiceError> {
+        self.next().await
     }
 }

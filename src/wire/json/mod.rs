@@ -1,5 +1,6 @@
 //! JSON, written once for the HTTP interface, `--json` and the settings file.
 
+mod event;
 mod keep_out;
 mod keyword;
 mod localization;
@@ -9,6 +10,7 @@ mod pose;
 mod scan;
 mod version;
 
+pub use event::{JsonEvent, JsonFailure};
 pub use keep_out::{JsonKeepOut, JsonShape};
 pub use keyword::ByKeyword;
 pub use localization::{JsonCandidate, JsonLocalization};

@@ -57,6 +57,8 @@ fn body(operation: Operation) -> Body {
         | Operation::GetBlock
         | Operation::ListObservers
         | Operation::Watch
+        | Operation::ListEvents
+        | Operation::WatchEvents
         | Operation::GetTrajectory
         | Operation::StreamTrajectory
         | Operation::SnapshotMap

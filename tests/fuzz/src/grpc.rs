@@ -28,6 +28,8 @@ const METHODS: [&str; 31] = [
     "Maps/Explode",
     "Occupancy/GetBlock",
     "Occupancy/ListObservers",
+    "Mapping/ListEvents",
+    "Mapping/WatchEvents",
     "Mapping/PutKeepOut",
     "Mapping/DeleteKeepOut",
     "Occupancy/ListKeepOuts",

@@ -82,6 +82,8 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             pb::ListObserversRequest { map, voxel, ..Default::default() }.encode_to_vec()
         }
         Operation::Watch => pb::WatchRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::ListEvents => pb::ListEventsRequest { map, ..Default::default() }.encode_to_vec(),
+        Operation::WatchEvents => pb::WatchEventsRequest { map, ..Default::default() }.encode_to_vec(),
         Operation::InsertScan | Operation::InsertScanStream => scan_pb(&map, "r", &POINTS).encode_to_vec(),
         Operation::AlignScan => {
             let scan = Some(pb::Scan { robot: "r".into(), points: points_pb(&POINTS), ..Default::default() });
@@ -195,6 +197,8 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::GetBlock
         | Operation::ListObservers
         | Operation::Watch
+        | Operation::ListEvents
+        | Operation::WatchEvents
         | Operation::InsertScan
         | Operation::InsertScanStream
         | Operation::AlignScan

@@ -36,6 +36,8 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::GetBlock
         | Operation::ListObservers
         | Operation::Watch
+        | Operation::ListEvents
+        | Operation::WatchEvents
         | Operation::AlignScan
         | Operation::Localize
         | Operation::GetTrajectory

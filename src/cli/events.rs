@@ -1,0 +1,110 @@
+//! `mrol events`: tells what became of the scans that robots sent.
+
+use std::fmt::{self, Display};
+
+use serde::Serialize;
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
+
+use super::error::CliError;
+use super::map_report::count;
+use super::output::Output;
+use super::remote::MapOptions;
+use crate::map::RobotName;
+use crate::service::{EventMessage, EventsQuery, ScanEvent};
+use crate::wire::json::{JsonEvent, JsonScan};
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  mrol events --map office                     the last scans, the oldest first: accepted, refused, failed
+  mrol events --map office --robot r1 --not-accepted
+  mrol events --map office --follow            and each as it comes, until interrupted
+  mrol --json events --map office | jq -r 'select(.error) | .error.detail'
+
+The server keeps the last `limits.events_per_map_max` in memory, and of a robot that fell silent the last one; a
+restart forgets them. Times are UTC.";
+
+/// Tell what became of the last scans that robots sent to a map on a server
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Events {
+    #[command(flatten)]
+    map: MapOptions,
+    /// Of this robot alone
+    #[arg(long)]
+    robot: Option<String>,
+    /// Only scans that were refused, and requests that failed
+    #[arg(long)]
+    not_accepted: bool,
+    /// Go on with each event as it comes
+    #[arg(long)]
+    follow: bool,
+}
+
+impl Events {
+    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+        let robot = self.robot.as_deref().map(RobotName::new).transpose().map_err(CliError::failed)?;
+        let query = EventsQuery { since_number: 0, robot };
+        let client = self.map.server.connect().await?;
+        if !self.follow {
+            let events = client.list_events(&self.map.name, query).await?;
+            return events.iter().try_for_each(|event| self.print(&output, event));
+        }
+        let mut messages = client.watch_events(&self.map.name, query).await?;
+        while let Some(message) = messages.next().await {
+            if let EventMessage::Event(event) = message? {
+                self.print(&output, &event)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn print(&self, output: &Output, event: &ScanEvent) -> Result<(), CliError> {
+        let is_accepted = event.answer.as_ref().is_ok_and(|answer| answer.accepted);
+        if self.not_accepted && is_accepted {
+            return Ok(());
+        }
+        output.print(&Line(event.into()))
+    }
+}
+
+/// An event, to be printed.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Line(JsonEvent);
+
+impl Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let JsonEvent { time_ms, robot, scan_id, duration_ms, answer, error, .. } = &self.0;
+        write!(f, "{} {robot}", timestamp(*time_ms))?;
+        if let Some(scan_id) = scan_id {
+            write!(f, " scan {scan_id}")?;
+        }
+        match (answer, error) {
+            (Some(answer), _) => write_answer(f, answer)?,
+            (None, Some(error)) => write!(f, ": failed ({}): {}", error.reason, error.detail)?,
+            (None, None) => {}
+        }
+        write!(f, ", {duration_ms:.0} ms")
+    }
+}
+
+fn write_answer(f: &mut fmt::Formatter<'_>, answer: &JsonScan) -> fmt::Result {
+    let verdict = if answer.accepted { "accepted" } else { answer.verdict };
+    write!(f, ": {verdict}, overlap {:.2}", answer.overlap)?;
+    if let Some(how) = answer.recovered {
+        write!(f, ", found again by {how}")?;
+    }
+    match (answer.accepted, answer.replayed, answer.stationary) {
+        (true, true, _) => write!(f, ", was there already"),
+        (true, _, true) => write!(f, ", stands still"),
+        (true, ..) => write!(f, ", {} new voxels", count(answer.new_voxels)),
+        (false, ..) => write!(f, ", {}", answer.reason),
+    }
+}
+
+/// A time as RFC 3339 has it, in UTC, to the millisecond.
+fn timestamp(unix_ms: f64) -> String {
+    let time = OffsetDateTime::from_unix_timestamp_nanos(i128::from(unix_ms as i64) * 1_000_000);
+    time.ok().and_then(|time| time.format(&Rfc3339).ok()).unwrap_or_default()
+}

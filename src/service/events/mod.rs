@@ -1,0 +1,158 @@
+//! What became of the scans that robots sent: the last events of a map, and each as it comes.
+//!
+//! Events are for people who look after robots. They are kept in memory, in bounded number, and a restart forgets them: what
+//! is in the map is in its trajectory. Refused scans and failed requests are nowhere else.
+
+mod log;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio_stream::Stream;
+
+use super::hosted_map::HostedMap;
+use super::mapping::Judged;
+use super::outbox::{Teller, stream_of};
+use super::{EventMessage, EventsQuery, MapService, Outcome, ScanEvent, ScanRequest, ServiceError};
+use crate::geometry::Point;
+use crate::map::MapName;
+pub(super) use log::EventLog;
+
+/// Points that are kept of a refused scan.
+const SAMPLE_POINTS: usize = 300;
+
+impl MapService {
+    /// What became of the last scans that were sent to a map, and of the last of each robot, the oldest first.
+    ///
+    /// # Errors
+    /// `NotFound`.
+    pub async fn list_events(
+        &self,
+        map: &MapName,
+        query: EventsQuery,
+    ) -> Result<Vec<Arc<ScanEvent>>, ServiceError> {
+        let work = async { Ok(self.map(map)?.events.list(&query)) };
+        self.observed("ListEvents", Some(map), work, |_| Outcome::Read).await
+    }
+
+    /// Tells of the events that [`MapService::list_events`] would list, and then of each as it comes.
+    ///
+    /// # Errors
+    /// `NotFound`.
+    pub async fn watch_events(&self, map: &MapName, query: EventsQuery) -> Result<EventWatch, ServiceError> {
+        let work = async {
+            let map = self.map(map)?;
+            let limits = self.limits();
+            let heartbeat = Duration::from_secs_f64(limits.watch_heartbeat_s);
+            let unread_max_s = limits.watch_unread_max_s;
+            let (newest, waiting) = (map.events.newest(), Vec::new().into_iter());
+            Ok(EventWatch { map, query, newest, waiting, heartbeat, is_greeted: false, unread_max_s })
+        };
+        self.observed("WatchEvents", Some(map), work, |_| Outcome::Read).await
+    }
+}
+
+/// A watch of the events of a map. Who falls behind what is kept misses events, and is told of the next.
+#[derive(Debug)]
+pub struct EventWatch {
+    map: Arc<HostedMap>,
+    /// What comes next: those after the last that was told.
+    query: EventsQuery,
+    newest: watch::Receiver<u64>,
+    waiting: std::vec::IntoIter<Arc<ScanEvent>>,
+    heartbeat: Duration,
+    is_greeted: bool,
+    unread_max_s: f64,
+}
+
+impl EventWatch {
+    /// The messages as a stream, which ends with its first error: that of `end`, once it comes, or `watch_stalled` where the
+    /// client took no message for `watch_unread_max_s`.
+    pub fn into_stream(
+        self,
+        end: impl Future<Output = ServiceError> + Send + 'static,
+    ) -> impl Stream<Item = Result<EventMessage, ServiceError>> + Send {
+        let unread_max_s = self.unread_max_s;
+        stream_of(self, unread_max_s, end)
+    }
+}
+
+impl Teller for EventWatch {
+    type Message = EventMessage;
+
+    /// The next event, or a heartbeat where none comes in a while: at once where there is none yet.
+    async fn tell(&mut self) -> Result<EventMessage, ServiceError> {
+        loop {
+            if let Some(event) = self.waiting.next() {
+                self.query.since_number = event.number;
+                self.is_greeted = true;
+                return Ok(EventMessage::Event(ScanEvent::clone(&event)));
+            }
+            self.newest.borrow_and_update();
+            self.waiting = self.map.events.list(&self.query).into_iter();
+            if self.waiting.len() > 0 {
+                continue;
+            }
+            let patience = if self.is_greeted { self.heartbeat } else { Duration::ZERO };
+            tokio::select! {
+                biased;
+                () = self.map.commit_queue.ended() => return Err(self.map.ended()),
+                _ = self.newest.changed() => {}
+                () = tokio::time::sleep(patience) => {
+                    self.is_greeted = true;
+                    return Ok(EventMessage::Heartbeat);
+                }
+            }
+        }
+    }
+}
+
+impl ScanEvent {
+    /// What became of a scan that was answered just now. Number and time are given where it is kept.
+    pub(super) fn of(
+        request: &ScanRequest,
+        duration: Duration,
+        answer: &Result<Judged, ServiceError>,
+    ) -> Self {
+        let judged = answer.as_ref().ok();
+        let ScanRequest { robot, session, scan_id, points, .. } = request;
+        Self {
+            number: 0,
+            time_ns: 0,
+            robot: robot.clone(),
+            session: session.clone(),
+            scan_id: *scan_id,
+            points: points.len(),
+            duration,
+            guess: judged.and_then(|judged| judged.guess),
+            sample: judged.map(|judged| judged.sample.clone()).unwrap_or_default(),
+            answer: answer.as_ref().map(|judged| Box::new(judged.answer.clone())).map_err(Into::into),
+        }
+    }
+}
+
+/// Some of the points, evenly over their order.
+pub(super) fn sample_of(points: &[Point]) -> Vec<Point> {
+    points.iter().copied().step_by(points.len().div_ceil(SAMPLE_POINTS).max(1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::RobotName;
+    use crate::service::Reason;
+
+    /// An event of a scan whose request failed.
+    pub(super) fn event_of(robot: &str) -> ScanEvent {
+        let request = ScanRequest::new(RobotName::new(robot).unwrap(), Vec::new().into());
+        ScanEvent::of(&request, Duration::ZERO, &Err(ServiceError::new(Reason::NoReturns, "none")))
+    }
+
+    #[test]
+    fn a_sample_has_few_points_of_a_large_scan_and_all_of_a_small_one() {
+        for (points, sampled) in [(0, 0), (1, 1), (300, 300), (301, 151), (90_000, 300)] {
+            assert_eq!(sample_of(&vec![Point::new(0.0, 0.0, 0.0); points]).len(), sampled);
+        }
+    }
+}
