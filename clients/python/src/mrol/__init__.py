@@ -1,0 +1,149 @@
+"""mrol: the 3-D map of a robot fleet, from Python.
+
+    import mrol
+
+    m = mrol.connect("localhost:7333").map("floor1", resolution=0.05)
+    m.insert(points)                  # float32 of shape (n, 3), sensor frame, meters
+    m.query([[1, 2, 0.5]]).occupied   # array([ True])
+
+`mrol.connect` has keys, TLS and time-outs, `mrol.Map` all that can be asked of a map, `mrol.errors` what goes wrong.
+`python -m mrol` prints how to start.
+"""
+
+from . import errors
+from .body import Body, Link
+from .client import Client, Health, Maps, connect
+from .errors import (
+    ArgumentError,
+    BadAnswer,
+    Conflict,
+    ConnectFailed,
+    ConnectionLost,
+    DeadlineExceeded,
+    FailedPrecondition,
+    Internal,
+    InvalidArgument,
+    MrolError,
+    NotFound,
+    PermissionDenied,
+    ResourceExhausted,
+    ServerError,
+    TimedOut,
+    TransportError,
+    Unauthenticated,
+    Unavailable,
+)
+from .map import Map
+from .operations.blocks import DistanceField, VoxelBlocks
+from .operations.checks import Clearances, Collisions, FirstHits
+from .operations.classification import Classification
+from .operations.deletions import Deletion
+from .operations.description import FilterSettings, Level, MapInfo, Sighting, Storage
+from .operations.frontiers import Frontier, Frontiers, FrontierView
+from .operations.grid import Grid
+from .operations.keep_outs import KeepOut, KeepOutChange, KeepOuts
+from .operations.localization import Candidate, Localization
+from .operations.motions import Motions
+from .operations.nearest import Nearest
+from .operations.observers import Observers, ObservingScan
+from .operations.occupancy import Occupancy
+from .operations.rays import Rays
+from .operations.scans import OpenDirection, ScanAnswer
+from .operations.trajectory import MappedScan, Trajectory
+from .operations.undo import Undo
+from .operations.voxels import View, Voxels
+from .operations.watched import (
+    Heartbeat,
+    Viewpoint,
+    WatchedChange,
+    WatchedDeletion,
+    WatchedKeepOut,
+    WatchedScan,
+    WatchedState,
+    WatchedUndo,
+    WatchEvent,
+)
+from .pose import Pose
+from .shapes import Box, OrientedBox, Prism, Sphere
+from .version import Version, Versioned
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ArgumentError",
+    "BadAnswer",
+    "Body",
+    "Box",
+    "Candidate",
+    "Classification",
+    "Clearances",
+    "Client",
+    "Collisions",
+    "Conflict",
+    "ConnectFailed",
+    "ConnectionLost",
+    "DeadlineExceeded",
+    "Deletion",
+    "DistanceField",
+    "FailedPrecondition",
+    "FilterSettings",
+    "FirstHits",
+    "Frontier",
+    "FrontierView",
+    "Frontiers",
+    "Grid",
+    "Health",
+    "Heartbeat",
+    "Internal",
+    "InvalidArgument",
+    "KeepOut",
+    "KeepOutChange",
+    "KeepOuts",
+    "Level",
+    "Link",
+    "Localization",
+    "Map",
+    "MapInfo",
+    "MappedScan",
+    "Maps",
+    "Motions",
+    "MrolError",
+    "Nearest",
+    "NotFound",
+    "Observers",
+    "ObservingScan",
+    "Occupancy",
+    "OpenDirection",
+    "OrientedBox",
+    "PermissionDenied",
+    "Pose",
+    "Prism",
+    "Rays",
+    "ResourceExhausted",
+    "ScanAnswer",
+    "ServerError",
+    "Sighting",
+    "Sphere",
+    "Storage",
+    "TimedOut",
+    "Trajectory",
+    "TransportError",
+    "Unauthenticated",
+    "Unavailable",
+    "Undo",
+    "Version",
+    "Versioned",
+    "View",
+    "Viewpoint",
+    "VoxelBlocks",
+    "Voxels",
+    "WatchEvent",
+    "WatchedChange",
+    "WatchedDeletion",
+    "WatchedKeepOut",
+    "WatchedScan",
+    "WatchedState",
+    "WatchedUndo",
+    "connect",
+    "errors",
+]

@@ -1,0 +1,108 @@
+"""Planners' questions in the form for programs: a head in JSON, and arrays of bytes behind it.
+
+bytes      what
+4          length h of the head, little-endian
+h          the head, in which {"at": a, "bytes": n} stands for an array
+the rest   the arrays: this one is n bytes long and begins a bytes after the head
+"""
+
+import json
+import struct
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._arrays import F32, U32, Bools, raw
+from ._bits import indices_of, unpacked
+from ._fields import Fields, fields_of, reading
+
+NONE = 0xFFFF_FFFF
+"""The number that stands for none."""
+
+I32 = NDArray[np.int32]
+Names = NDArray[np.object_]
+
+Item = TypeVar("Item", bound=np.generic)
+
+
+class Arrays:
+    """The arrays of a question, where they are."""
+
+    def __init__(self) -> None:
+        self._pieces: list[memoryview] = []
+        self._bytes = 0
+
+    def add(self, array: NDArray[Any]) -> dict[str, int]:
+        """Puts an array behind the others; what stands for it in the head."""
+        piece = raw(array)
+        place = {"at": self._bytes, "bytes": piece.nbytes}
+        self._pieces.append(piece)
+        self._bytes += piece.nbytes
+        return place
+
+    def body_of(self, head: dict[str, Any]) -> list[bytes | memoryview]:
+        """The question's body, in pieces."""
+        text = json.dumps(head, allow_nan=False).encode()
+        return [struct.pack("<I", len(text)) + text, *self._pieces]
+
+
+class QuestionAnswer:
+    """An answer: its head, and the arrays that the head speaks of."""
+
+    def __init__(self, body: memoryview) -> None:
+        with reading("the answer's head"):
+            (length,) = struct.unpack_from("<I", body)
+            if length > body.nbytes - 4:
+                raise ValueError(f"a head of {length} bytes in an answer of {body.nbytes}")
+            self.head: Fields = fields_of(body[4 : 4 + length])
+            self._data = body[4 + length :]
+
+    def bits(self, name: str, count: int) -> Bools:
+        """An array of booleans."""
+        with reading(name):
+            return unpacked(self._bytes(name, (count + 7) // 8), count)
+
+    def floats(self, name: str, count: int, *columns: int) -> F32:
+        """An array of floats of shape (count, *columns)."""
+        with reading(name):
+            numbers = count * int(np.prod(columns, dtype=np.int64))
+            return np.frombuffer(self._bytes(name, 4 * numbers), "<f4").reshape(count, *columns)
+
+    def numbers(self, name: str, count: int) -> NDArray[np.int64]:
+        """An array of numbers, in which -1 stands for none."""
+        with reading(name):
+            numbers = self._unsigned(name, count).astype(np.int64)
+            numbers[numbers == NONE] = -1
+            return _frozen(numbers)
+
+    def voxels(self, name: str, count: int) -> I32:
+        """Indices i j k of voxels, shape (count, 3)."""
+        with reading(name):
+            return _frozen(indices_of(np.frombuffer(self._bytes(name, 8 * count), "<u8")))
+
+    def names(self, name: str, count: int) -> Names:
+        """An array of names and None; all of it None where the answer has no such array."""
+        found: Names = np.full(count, None, object)
+        if self.head.has(name):
+            with reading(name):
+                of_array = self.head.object(name)
+                numbers = self._unsigned(name, count)
+                for number, text in enumerate(of_array.texts("names")):
+                    found[numbers == number] = text
+        return _frozen(found)
+
+    def _unsigned(self, name: str, count: int) -> U32:
+        return np.frombuffer(self._bytes(name, 4 * count), "<u4")
+
+    def _bytes(self, name: str, expected: int) -> memoryview:
+        place = self.head.object(name)
+        at, length = place.whole("at"), place.whole("bytes")
+        if length != expected or at < 0 or at + length > self._data.nbytes:
+            raise ValueError(f"{length} bytes at {at} of {self._data.nbytes}, where {expected} are needed")
+        return self._data[at : at + length]
+
+
+def _frozen(array: NDArray[Item]) -> NDArray[Item]:
+    array.setflags(write=False)
+    return array

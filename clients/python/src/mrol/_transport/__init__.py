@@ -1,0 +1,1 @@
+"""Requests over HTTP: addresses, connections, deadlines, retries, keys. It knows nothing of maps."""

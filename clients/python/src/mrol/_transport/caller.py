@@ -1,0 +1,139 @@
+"""Requests to one server: each with a key, a connection, a deadline and, where it is safe, another try."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from ..errors import BadAnswer, ServerError, TransportError, Unauthenticated, server_error
+from .attempts import Attempts
+from .connection import Connection
+from .deadline import Deadline, seconds
+from .key import Key
+from .pool import Pool
+from .request import Answer, Request
+from .response import Response
+
+ERROR_BYTES_MAX = 1 << 20
+"""Bytes of an answer that says what is wrong, of one that is read piece by piece otherwise."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How long calls last and how large they are."""
+
+    timeout_s: float
+    patience_s: float
+    request_bytes_max: int
+    answer_bytes_max: int
+
+
+class Caller:
+    """Asks one server; threads and forked processes may share it."""
+
+    def __init__(self, pool: Pool, key: Key, bounds: Bounds) -> None:
+        self._pool = pool
+        self._key = key
+        self.bounds = bounds
+
+    def with_timeout(self, timeout_s: float) -> "Caller":
+        """The same caller, over the same connections, with another time for each call."""
+        return Caller(self._pool, self._key, replace(self.bounds, timeout_s=seconds(timeout_s, "timeout_s")))
+
+    @property
+    def address(self) -> str:
+        """The server's address."""
+        return str(self._pool.address)
+
+    def close(self) -> None:
+        """Closes the connections that are kept."""
+        self._pool.close()
+
+    def call(self, request: Request) -> Answer:
+        """The answer to a request, whole.
+
+        Raises `ServerError` for a refusal, and `TransportError` or `BadAnswer` where there is no answer.
+        """
+        deadline = Deadline(self.bounds.timeout_s)
+        attempts = Attempts(self.bounds.patience_s, deadline)
+        may_renew = True
+        while True:
+            was_kept = False
+            try:
+                connection, was_kept = self._pool.take(deadline, may_be_kept=request.is_repeatable)
+                try:
+                    answer = connection.ask(request, self._key.headers(), deadline, self.bounds.answer_bytes_max)
+                finally:
+                    self._pool.give_back(connection)
+                raise_for(answer)
+            except Unauthenticated:
+                if not (may_renew and self._key.renew()):
+                    raise
+                may_renew = False
+            except (ServerError, TransportError) as error:
+                attempts.pause_after(error, request, was_kept)
+            else:
+                return answer
+
+    @contextmanager
+    def stream(self, request: Request) -> Iterator["Body"]:
+        """An answer that is read piece by piece, over a connection of its own, which is closed at the end.
+
+        Nothing is tried again: who reads it knows where to go on.
+        """
+        deadline = Deadline(self.bounds.timeout_s)
+        connection, _ = self._pool.take(deadline)
+        try:
+            response = connection.open(request, self._key.headers(), deadline, None)
+            if response.status >= 300:
+                with_bound = min(response.length or ERROR_BYTES_MAX, ERROR_BYTES_MAX)
+                said = memoryview(connection.read(response, with_bound, deadline))
+                raise_for(Answer(response.status, response.plain_headers, said))
+            yield Body(connection, response)
+        finally:
+            connection.close()
+            self._pool.give_back(connection)
+
+    def renew_key(self) -> bool:
+        """Reads the file of the key again; whether it has another secret now."""
+        return self._key.renew()
+
+
+class Body:
+    """A body that is read piece by piece."""
+
+    def __init__(self, connection: Connection, response: Response) -> None:
+        self._connection = connection
+        self._response = response
+
+    @property
+    def length(self) -> int | None:
+        """Bytes that are left, where the server told."""
+        return self._response.length
+
+    @property
+    def answer(self) -> Answer:
+        """Status and headers."""
+        return Answer(self._response.status, self._response.plain_headers, memoryview(b""))
+
+    def read(self, count: int, deadline: Deadline) -> bytes:
+        """Up to so many bytes; less at the end."""
+        return self._connection.read(self._response, count, deadline)
+
+
+def raise_for(answer: Answer) -> None:
+    """Raises the error that an answer is, where it is one."""
+    if 200 <= answer.status < 300:
+        return
+    try:
+        problem = json.loads(bytes(answer.body))
+        words = [problem[name] for name in ("code", "reason", "detail")]
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        said = bytes(answer.body[:200])
+        raise BadAnswer(f"the server answers {answer.status}, and says {said!r}") from error
+    code, reason, detail = (str(word) for word in words)
+    raise server_error(answer.status, code, reason, detail, _seconds(answer.header("retry-after")))
+
+
+def _seconds(text: str | None) -> float | None:
+    return float(text) if text is not None and text.isascii() and text.isdigit() and len(text) < 10 else None

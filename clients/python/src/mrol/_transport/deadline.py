@@ -1,0 +1,40 @@
+"""Until when a call may last."""
+
+import math
+from time import monotonic
+
+from ..errors import ArgumentError, TimedOut, excerpt
+
+TIMEOUT_MAX_S = 10 * 365 * 86_400.0
+"""The longest time of a call: what is longer is more than the system's timers take."""
+
+
+def seconds(value: object, argument: str) -> float:
+    """A time in seconds that is a number above 0."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value) or value <= 0:
+        raise ArgumentError(argument, excerpt(value), "a number of seconds above 0")
+    return min(float(value), TIMEOUT_MAX_S)
+
+
+class Deadline:
+    """A moment after which a call does not go on."""
+
+    __slots__ = ("_end", "_timeout_s")
+
+    def __init__(self, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
+        self._end = monotonic() + timeout_s
+
+    def remaining_s(self) -> float:
+        """Seconds that are left.
+
+        Raises `TimedOut` where none are.
+        """
+        left = self._end - monotonic()
+        if left <= 0:
+            raise self.passed()
+        return left
+
+    def passed(self) -> TimedOut:
+        """The error that says that the time is up."""
+        return TimedOut(f"no answer within {self._timeout_s:g} s")

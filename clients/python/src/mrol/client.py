@@ -1,0 +1,251 @@
+"""A server, and how to reach it."""
+
+import json
+import os
+import time
+from dataclasses import dataclass
+from os import PathLike
+from types import TracebackType
+from typing import Any, Literal
+
+from ._arrays import number_of, whole_of
+from ._fields import Fields, fields_of
+from ._sessions import Sessions
+from ._transport.address import Address
+from ._transport.caller import Bounds, Caller
+from ._transport.deadline import seconds
+from ._transport.key import Key
+from ._transport.pool import Pool
+from ._transport.request import JSON, Request, path_of, target_of
+from ._transport.tls import tls_context
+from .errors import ArgumentError, ConnectFailed, MrolError, ServerError
+from .map import Map
+from .operations.description import FilterSettings, MapInfo, map_info
+from .operations.handle import flag_of, word_of
+from .operations.map_file import FILE_TIMEOUT_S, File, restore
+from .progress import Progress
+
+TIMEOUT_S = 30.0
+PATIENCE_S = 15.0
+REQUEST_BYTES_MAX = 1 << 30
+ANSWER_BYTES_MAX = 1 << 30
+ROBOT = "python"
+
+FIRST_PAUSE_S = 0.1
+
+
+@dataclass(frozen=True)
+class Maps:
+    """The maps of a server."""
+
+    maps: tuple[MapInfo, ...]
+    unavailable: dict[str, str]
+    """Maps that could not be opened, and why."""
+
+
+@dataclass(frozen=True)
+class Health:
+    """Whether a server takes requests."""
+
+    ready: bool
+    reason: str | None
+    """Why it does not: `starting` or `draining`."""
+    details: dict[str, Any]
+    """All that `/readyz` says."""
+
+
+class Client:
+    """A server: `mrol.connect` makes one. Threads may share it, and so may processes that fork.
+
+    Used as a context manager, or closed by `close`, it closes the connections that it keeps; it opens others if it is used again.
+    """
+
+    def __init__(self, caller: Caller) -> None:
+        self._caller = caller
+        self._sessions = Sessions()
+
+    @property
+    def address(self) -> str:
+        """The server's address."""
+        return self._caller.address
+
+    @property
+    def session(self) -> str:
+        """The name under which this process counts its scans."""
+        return self._sessions.current().name
+
+    def map(
+        self,
+        name: str,
+        resolution: float | None = None,
+        *,
+        levels: int | None = None,
+        filter: FilterSettings | Literal["none"] | None = None,
+        moments: bool | None = None,
+        robot: str = ROBOT,
+    ) -> Map:
+        """A map: with a `resolution` (the side of a voxel, meters) it is made where it is not there; without, it has to be there.
+
+        `levels` (6) halve the resolution each; `filter="none"` and `moments=False` are for maps that are only queried. `robot`
+        is the name in which scans are sent: give each robot one of its own.
+
+        Raises `NotFound` (`map_not_found`), `Conflict` (`map_exists`: it is there with other settings), `InvalidArgument`
+        (`bad_settings`, `bad_name`).
+        """
+        found = Map(self._caller, name, robot, self._sessions)
+        if resolution is None:
+            if levels is not None or filter is not None or moments is not None:
+                raise ArgumentError("resolution", "None with other settings", "given where a map is to be made")
+            found.describe()
+            return found
+        settings = {
+            "resolution_m": number_of(resolution, "resolution"),
+            "levels": None if levels is None else whole_of(levels, "levels", 0, (1 << 32) - 1),
+            "filter": _filter_json(filter),
+            "moments": None if moments is None else flag_of(moments, "moments"),
+        }
+        given = json.dumps({key: value for key, value in settings.items() if value is not None}).encode()
+        self._caller.call(Request("PUT", path_of("v1", "maps", found.name), JSON, [given]))
+        return found
+
+    def maps(self) -> Maps:
+        """All maps that the key may name."""
+        fields = fields_of(self._caller.call(Request("GET", "/v1/maps")).body)
+        unavailable = fields.objects("unavailable") if fields.has("unavailable") else []
+        return Maps(
+            tuple(map_info(of) for of in fields.objects("maps")),
+            {of.text("map"): of.text("reason") for of in unavailable},
+        )
+
+    def delete_map(self, name: str) -> None:
+        """Deletes a map: memory and files are gone.
+
+        It is not sent again where the connection breaks, since somebody may have made a map of that name meanwhile.
+
+        Raises `NotFound` (`map_not_found`).
+        """
+        target = path_of("v1", "maps", word_of(name, "name"))
+        self._caller.call(Request("DELETE", target, is_repeatable=False))
+
+    def restore(
+        self,
+        name: str,
+        source: File | bytes,
+        *,
+        replace: bool = False,
+        robot: str = ROBOT,
+        progress: Progress = None,
+        timeout_s: float = FILE_TIMEOUT_S,
+    ) -> Map:
+        """Makes a map of a map file, a path or the bytes of one; see `Map.restore`."""
+        made = Map(self._caller, name, robot, self._sessions)
+        target = target_of(path_of("v1", "maps", name, "snapshot"), {"replace": flag_of(replace, "replace")})
+        restore(self._caller, target, source, progress, timeout_s)
+        return made
+
+    def health(self) -> Health:
+        """Whether the server takes requests. It takes no key."""
+        try:
+            details = json.loads(bytes(self._caller.call(Request("GET", "/readyz")).body))
+        except ServerError as error:
+            if error.status != 503:
+                raise
+            return Health(False, error.reason, {"detail": error.message})
+        return Health(Fields(details).flag("ready"), None, details)
+
+    def metrics(self) -> str:
+        """The server's metrics, in Prometheus' text form."""
+        return str(self._caller.call(Request("GET", "/metrics")).body, "utf-8", "replace")
+
+    def with_timeout(self, timeout_s: float) -> "Client":
+        """The same server, of which each call may take so many seconds, tries and waits included."""
+        client = Client(self._caller.with_timeout(timeout_s))
+        client._sessions = self._sessions
+        return client
+
+    def close(self) -> None:
+        """Closes the connections that are kept."""
+        self._caller.close()
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<mrol server {self.address}>"
+
+
+def connect(
+    address: str = "localhost:7333",
+    *,
+    key: str | None = None,
+    key_file: str | PathLike[str] | None = None,
+    ca: str | PathLike[str] | None = None,
+    client_cert: str | PathLike[str] | None = None,
+    client_key: str | PathLike[str] | None = None,
+    timeout_s: float = TIMEOUT_S,
+    patience_s: float = PATIENCE_S,
+    wait_s: float = 0.0,
+    request_bytes_max: int = REQUEST_BYTES_MAX,
+    answer_bytes_max: int = ANSWER_BYTES_MAX,
+) -> Client:
+    """Connects to a server's HTTP: `host:port`, `https://host:port`, or `unix:/path` of a socket.
+
+    `key` is a secret, `key_file` a file with one, which is read again when the server refuses it: so a key may be rotated under a
+    running program. Without either the variables MROL_KEY and MROL_KEY_FILE count, if they are set. `ca` (or MROL_CA) is a file of
+    the authorities that may sign the server's certificate (PEM), those of the system without it; with `ca`, an address without a
+    scheme is https. `client_cert` and `client_key` are shown to a server that asks for them.
+
+    Each call takes `timeout_s` at most, tries and waits included. It is tried again for `patience_s` where the server cannot be
+    reached, starts, drains or is overloaded, and where a connection broke; all changes have ids by which the server knows what
+    it has done already. Here alone nothing is tried again unless `wait_s` says how long to wait for the server to be there.
+
+    Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate.
+    """
+    if key is None and key_file is None:
+        key, key_file = _from_environment()
+    ca = os.environ.get("MROL_CA") or None if ca is None else ca
+    place = Address.parse(address, prefer_tls=ca is not None or client_cert is not None)
+    bounds = Bounds(
+        timeout_s=seconds(timeout_s, "timeout_s"),
+        patience_s=number_of(patience_s, "patience_s"),
+        request_bytes_max=whole_of(request_bytes_max, "request_bytes_max"),
+        answer_bytes_max=whole_of(answer_bytes_max, "answer_bytes_max"),
+    )
+    tls = tls_context(ca, client_cert, client_key) if place.is_tls else None
+    pool, secret = Pool(place, tls), Key(key, key_file)
+    impatient = Caller(pool, secret, Bounds(bounds.timeout_s, 0.0, bounds.request_bytes_max, bounds.answer_bytes_max))
+    _wait_for(impatient, number_of(wait_s, "wait_s"))
+    return Client(Caller(pool, secret, bounds))
+
+
+def _from_environment() -> tuple[str | None, str | None]:
+    key = os.environ.get("MROL_KEY") or None
+    # As for the commands: the secret itself is nearer than the file.
+    return key, (os.environ.get("MROL_KEY_FILE") or None) if key is None else None
+
+
+def _wait_for(caller: Caller, wait_s: float) -> None:
+    end = time.monotonic() + wait_s
+    while True:
+        try:
+            caller.call(Request("GET", "/livez"))
+        except (MrolError, ConnectionError) as error:
+            if time.monotonic() + FIRST_PAUSE_S > end:
+                if isinstance(error, ConnectFailed):
+                    raise ConnectFailed(f"{error}; is `mrol serve` running there?") from error
+                raise
+        else:
+            return
+        time.sleep(FIRST_PAUSE_S)
+
+
+def _filter_json(filter: FilterSettings | str | None) -> dict[str, Any] | str | None:
+    if isinstance(filter, FilterSettings):
+        return {
+            "hashes": whole_of(filter.hashes, "filter.hashes"),
+            "bits_per_key": number_of(filter.bits_per_key, "filter.bits_per_key"),
+        }
+    return None if filter is None else word_of(filter, "filter")

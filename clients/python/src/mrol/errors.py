@@ -1,0 +1,154 @@
+"""What goes wrong, as exceptions: all of them are `MrolError`.
+
+MrolError
+  ArgumentError           an argument was refused before anything was sent (a ValueError)
+  ServerError             the server refused; it changed nothing, but for the reason `outcome_unknown`
+    InvalidArgument, Unauthenticated, PermissionDenied, NotFound, Conflict, FailedPrecondition,
+    ResourceExhausted, DeadlineExceeded, Unavailable, Internal
+  TransportError          there is no answer
+    ConnectFailed         no connection was made: nothing was sent (a ConnectionError)
+    ConnectionLost        it broke before the answer was there (a ConnectionError)
+    TimedOut              the call's own time was up (a TimeoutError)
+  BadAnswer               what came is no answer of an mrol server
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+EXCERPT_MAX = 200
+"""Characters of a value that a message shows."""
+
+
+def excerpt(value: object) -> str:
+    """A value as a message shows it: in one line, and cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= EXCERPT_MAX else f"{text[:EXCERPT_MAX]}..."
+
+
+class MrolError(Exception):
+    """The base of all errors of this package."""
+
+
+class ArgumentError(MrolError, ValueError):
+    """An argument that cannot be sent.
+
+    `argument` names it, `value` says what was given, `expected` what belongs there.
+    """
+
+    def __init__(self, argument: str, value: str, expected: str) -> None:
+        super().__init__(f"{argument} must be {expected}, got {value}")
+        self.argument = argument
+        self.value = value
+        self.expected = expected
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.argument, self.value, self.expected)
+
+
+class ServerError(MrolError):
+    """The server's refusal.
+
+    `reason` is a stable word for programs (`docs/guide/api.md` lists all with what to do), `code` the kind of failure, `status`
+    that of HTTP, `message` a sentence with field, value and limit, and `retry_after_s` how long to wait where the server can tell.
+    """
+
+    def __init__(self, status: int, code: str, reason: str, message: str, retry_after_s: float | None = None) -> None:
+        super().__init__(f"{message} ({reason})")
+        self.status = status
+        self.code = code
+        self.reason = reason
+        self.message = message
+        self.retry_after_s = retry_after_s
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.status, self.code, self.reason, self.message, self.retry_after_s)
+
+
+class InvalidArgument(ServerError):
+    """The request can never succeed as it is."""
+
+
+class Unauthenticated(ServerError):
+    """There is no key, or none that counts."""
+
+
+class PermissionDenied(ServerError):
+    """The key is for less."""
+
+
+class NotFound(ServerError):
+    """There is no such map, scan, keep-out or route."""
+
+
+class Conflict(ServerError):
+    """It is there already, and is not the same."""
+
+
+class FailedPrecondition(ServerError):
+    """The state of the map does not allow it."""
+
+
+class ResourceExhausted(ServerError):
+    """A limit was reached: come later, or ask for less."""
+
+
+class DeadlineExceeded(ServerError):
+    """The server's time for the request was up."""
+
+
+class Unavailable(ServerError):
+    """The server cannot do it now."""
+
+
+class Internal(ServerError):
+    """A defect or a disk error of the server; its log has it."""
+
+
+class TransportError(MrolError):
+    """There is no answer.
+
+    Of a change that may have reached the server, `repeat_with` has the arguments (`session` and `scan_id`, or `request_id`) with
+    which the same call can be made again: it is then done once, whether the first one was or not.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.repeat_with: Mapping[str, Any] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self.args, {"repeat_with": dict(self.repeat_with)}
+
+
+class ConnectFailed(TransportError, ConnectionError):
+    """No connection was made, so nothing was sent."""
+
+
+class ConnectionLost(TransportError, ConnectionError):
+    """The connection broke before the answer was there."""
+
+
+class TimedOut(TransportError, TimeoutError):
+    """The time of the call was up."""
+
+
+class BadAnswer(MrolError):
+    """What came is no answer of an mrol server, or not one that this version of the package understands."""
+
+
+_BY_CODE: dict[str, type[ServerError]] = {
+    "invalid_argument": InvalidArgument,
+    "unauthenticated": Unauthenticated,
+    "permission_denied": PermissionDenied,
+    "not_found": NotFound,
+    "conflict": Conflict,
+    "failed_precondition": FailedPrecondition,
+    "resource_exhausted": ResourceExhausted,
+    "deadline_exceeded": DeadlineExceeded,
+    "unavailable": Unavailable,
+    "internal": Internal,
+}
+
+
+def server_error(status: int, code: str, reason: str, message: str, retry_after_s: float | None = None) -> ServerError:
+    """The exception of a kind of failure."""
+    return _BY_CODE.get(code, ServerError)(status, code, reason, message, retry_after_s)

@@ -1,0 +1,117 @@
+"""Named parts of space where no robot may go."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from numpy.typing import ArrayLike
+
+from .._arrays import whole_of
+from .._fields import Fields, fields_of
+from .._sessions import new_request_id
+from .._transport.request import Request
+from ..errors import ArgumentError, TransportError, excerpt
+from ..shapes import Box, BoxLike, OrientedBox, Prism, Shape, Sphere, shape_in, shape_json
+from ..version import Version, Versioned
+from .handle import MapHandle, word_of
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOut:
+    """A named part of space that questions of planners count as occupied."""
+
+    name: str
+    shape: Shape
+    made_revision: int
+    made_by: str | None
+    """The name of the key that it was made with."""
+    expires_at_ns: int | None
+    """When the server ends it, nanoseconds since 1970."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOuts(Versioned):
+    """All keep-outs of a map, by name."""
+
+    keep_outs: tuple[KeepOut, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOutChange(Versioned):
+    """What putting or removing a keep-out made."""
+
+    replayed: bool
+
+
+class KeepOutOperations(MapHandle):
+    """Keep-outs."""
+
+    def keep_out(
+        self,
+        name: str,
+        *,
+        box: BoxLike | None = None,
+        sphere: Sphere | tuple[ArrayLike, float] | None = None,
+        oriented_box: OrientedBox | None = None,
+        prism: Prism | None = None,
+        expires_at: datetime | int | None = None,
+        request_id: str | None = None,
+    ) -> KeepOutChange:
+        """Puts a keep-out in the map, in the place of the one of its name.
+
+        Give one shape, in the map frame, meters. `expires_at` is a time with a zone, or nanoseconds since 1970, after which the
+        server ends it.
+
+        Raises `InvalidArgument` (`bad_keep_out`, `bad_expiry`), `ResourceExhausted` (`too_many_keep_outs`).
+        """
+        if sphere is not None and isinstance(sphere, tuple) and len(sphere) == 2:
+            sphere = Sphere(*sphere)
+        shapes = [None if box is None else Box.of(box), sphere, oriented_box, prism]
+        given = [shape for shape in shapes if shape is not None]
+        if len(given) != 1:
+            raise ArgumentError("the shape", f"{len(given)} shapes", "exactly one of box, sphere, oriented_box and prism")
+        shape = shape_json(given[0], "the shape", (Box, Sphere, OrientedBox, Prism))
+        identity = {"request_id": new_request_id() if request_id is None else word_of(request_id, "request_id")}
+        expiry = {"expires_at_ns": None if expires_at is None else _nanoseconds(expires_at)}
+        try:
+            fields = self._send_json("PUT", ("keep-outs", word_of(name, "name")), {**shape, **expiry, **identity})
+        except TransportError as error:
+            error.repeat_with = identity
+            raise
+        return KeepOutChange(Version.of(fields), fields.flag("replayed"))
+
+    def remove_keep_out(self, name: str, *, request_id: str | None = None) -> KeepOutChange:
+        """Removes a keep-out.
+
+        Raises `NotFound` (`keep_out_not_found`).
+        """
+        identity = {"request_id": new_request_id() if request_id is None else word_of(request_id, "request_id")}
+        target = self._target("keep-outs", word_of(name, "name"), **identity)
+        try:
+            fields = fields_of(self._caller.call(Request("DELETE", target)).body)
+        except TransportError as error:
+            error.repeat_with = identity
+            raise
+        return KeepOutChange(Version.of(fields), fields.flag("replayed"))
+
+    def keep_outs(self) -> KeepOuts:
+        """All keep-outs of the map."""
+        fields = self._get_fields("keep-outs")
+        return KeepOuts(Version.of(fields), tuple(_keep_out(of) for of in fields.objects("keep_outs")))
+
+
+def _keep_out(fields: Fields) -> KeepOut:
+    return KeepOut(
+        name=fields.text("name"),
+        shape=shape_in(fields),
+        made_revision=fields.whole("made_revision"),
+        made_by=fields.optional("made_by", fields.text),
+        expires_at_ns=fields.optional("expires_at_ns", fields.whole),
+    )
+
+
+def _nanoseconds(moment: datetime | int) -> int:
+    if isinstance(moment, datetime):
+        if moment.tzinfo is None:
+            raise ArgumentError("expires_at", excerpt(moment), "a time with a zone: datetime.now(timezone.utc) + ...")
+        return int(moment.timestamp()) * 1_000_000_000 + moment.microsecond * 1000
+    return whole_of(moment, "expires_at", -(1 << 63), (1 << 63) - 1)

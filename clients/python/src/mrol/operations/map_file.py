@@ -1,0 +1,118 @@
+"""A map as a file, and a map from one."""
+
+import mmap
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike, fspath
+from tempfile import NamedTemporaryFile
+from typing import IO, Union
+
+from .._fields import fields_of
+from .._transport.caller import Body, Caller
+from .._transport.deadline import Deadline
+from .._transport.request import BYTES, Request
+from ..errors import ArgumentError, ConnectionLost, excerpt
+from ..progress import Progress, Told, progress_of
+from ..version import Version
+from .description import MapInfo, map_info
+from .handle import MapHandle, flag_of
+
+FILE_TIMEOUT_S = 600.0
+"""How long a file may take."""
+
+PIECE_BYTES = 1 << 20
+"""Bytes that are read or sent at once."""
+
+File = Union[str, PathLike[str]]
+
+
+class MapFileOperations(MapHandle):
+    """Snapshots and restores."""
+
+    def snapshot(self, file: File | None = None, *, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S) -> Version:
+        """Writes the map, at one revision, to a map file. A file of that name is replaced once the new one is whole.
+
+        `progress` is told how many bytes of how many are there, or shows a bar (True, where tqdm is installed).
+        """
+        if file is None:
+            file = f"{self._name}.mrol"
+        folder, name = os.path.split(os.path.abspath(fspath(file)))
+        with NamedTemporaryFile(dir=folder, prefix=f".{name}.", delete=False) as written:
+            try:
+                version = self._write(written, progress, timeout_s)
+                written.flush()
+                os.replace(written.name, os.path.join(folder, name))
+            except BaseException:
+                os.unlink(written.name)
+                raise
+        return version
+
+    def restore(
+        self, source: File | bytes, *, replace: bool = True, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S
+    ) -> MapInfo:
+        """Makes this map what a map file holds: a path, or the bytes of one.
+
+        The map of that name is kept as NAME-replaced-REVISION; with `replace=False` there must be none. It is not sent again where
+        the connection breaks: ask the server what is there.
+
+        Raises `InvalidArgument` (`bad_map_file`), `Conflict` (`map_exists`), `PermissionDenied` (replacing takes a key for all
+        maps).
+        """
+        return restore(self._caller, self._target("snapshot", replace=flag_of(replace, "replace")), source, progress, timeout_s)
+
+    def _write(self, written: IO[bytes], progress: Progress, timeout_s: float) -> Version:
+        caller = self._caller
+        request = Request("GET", self._target("snapshot"))
+        with caller.stream(request) as body, progress_of(progress, self._name, body.length) as told:
+            _copy(body, written, told, timeout_s)
+            return Version.of_headers(body.answer)
+
+
+def restore(caller: Caller, target: str, source: File | bytes, progress: Progress, timeout_s: float) -> MapInfo:
+    """Sends a map file to where a map is made from it."""
+    with _pieces(source) as pieces:
+        total = sum(piece.nbytes for piece in pieces)
+        with progress_of(progress, "restore", total) as told:
+            request = Request("PUT", target, BYTES, pieces, is_repeatable=False, on_sent=lambda sent: told(sent, total))
+            answer = caller.with_timeout(timeout_s).call(request)
+    return map_info(fields_of(answer.body))
+
+
+def _copy(body: Body, written: IO[bytes], told: Told, timeout_s: float) -> None:
+    deadline = Deadline(timeout_s)
+    total, done = body.length, 0
+    while piece := body.read(PIECE_BYTES, deadline):
+        written.write(piece)
+        done += len(piece)
+        told(done, total)
+    if total is not None and done != total:
+        raise ConnectionLost(f"the map file broke off after {done} of {total} bytes")
+
+
+@contextmanager
+def _pieces(source: File | bytes) -> Iterator[list[memoryview]]:
+    if isinstance(source, bytes | bytearray | memoryview):
+        yield _cut(memoryview(source).cast("B"))
+        return
+    try:
+        opened = open(source, "rb")
+    except OSError as error:
+        raise ArgumentError("source", f"{excerpt(source)}: {error}", "a map file, or the bytes of one") from error
+    with opened:
+        if os.fstat(opened.fileno()).st_size == 0:
+            yield []
+            return
+        with mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
+            whole = memoryview(mapped)
+            pieces = _cut(whole)
+            try:
+                yield pieces
+            finally:
+                # Memory that something still refers to cannot be unmapped.
+                for piece in (*pieces, whole):
+                    piece.release()
+
+
+def _cut(whole: memoryview) -> list[memoryview]:
+    return [whole[at : at + PIECE_BYTES] for at in range(0, whole.nbytes, PIECE_BYTES)]

@@ -1,0 +1,67 @@
+"""Which scans touched a voxel."""
+
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from .._arrays import numbers_text, vector_of
+from .._fields import Fields, reading
+from ..errors import ArgumentError
+from ..pose import Pose, pose_in
+from ..version import Version, Versioned
+from .handle import MapHandle, level_of
+
+
+@dataclass(frozen=True, eq=False)
+class ObservingScan:
+    """A scan that put a point into a voxel."""
+
+    revision: int
+    robot: str
+    session: str
+    scan_id: int | None
+    timestamp_ns: int | None
+    map_from_sensor: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Observers(Versioned):
+    """The scans that touched a voxel, the newest first."""
+
+    voxel: tuple[int, int, int]
+    scans: tuple[ObservingScan, ...]
+    older_scans: bool
+    """Whether there are older ones, or may be."""
+
+
+class ObserverOperations(MapHandle):
+    """Observers of a voxel."""
+
+    def observers(self, point: ArrayLike | None = None, *, voxel: ArrayLike | None = None, level: int = 0) -> Observers:
+        """The scans that put a point into the voxel at `point` (x y z, meters), or into voxel i j k.
+
+        Raises `FailedPrecondition` (`no_journal`: the server keeps maps in memory only).
+        """
+        if (point is None) == (voxel is None):
+            raise ArgumentError("point", "both or neither of point and voxel", "the only one of them")
+        fields = self._get_fields(
+            "observers",
+            point=None if point is None else numbers_text(vector_of(point, 3, "point")),
+            voxel=None if voxel is None else numbers_text(vector_of(voxel, 3, "voxel")),
+            level=level_of(level),
+        )
+        with reading("voxel"):
+            i, j, k = (int(of) for of in fields.numbers("voxel", (3,)))
+        scans = tuple(_scan(of) for of in fields.objects("scans"))
+        return Observers(Version.of(fields), (i, j, k), scans, fields.flag("older_scans"))
+
+
+def _scan(fields: Fields) -> ObservingScan:
+    return ObservingScan(
+        revision=fields.whole("revision"),
+        robot=fields.text("robot"),
+        session=fields.text("session"),
+        scan_id=fields.optional("scan_id", fields.whole),
+        timestamp_ns=fields.optional("timestamp_ns", fields.whole),
+        map_from_sensor=pose_in(fields, "map_from_sensor"),
+    )

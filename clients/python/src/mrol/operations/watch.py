@@ -1,0 +1,189 @@
+"""The changes of a map, as they become durable."""
+
+import time
+from collections.abc import Generator, Iterator
+from contextlib import closing
+
+from .._arrays import whole_of
+from .._fields import reading
+from .._protobuf import Message
+from .._transport.attempts import PASSING
+from .._transport.caller import Body, Caller
+from .._transport.deadline import Deadline, seconds
+from .._transport.request import Parameter, Request
+from ..errors import (
+    BadAnswer,
+    ConnectionLost,
+    MrolError,
+    ServerError,
+    TransportError,
+    Unauthenticated,
+    excerpt,
+    server_error,
+)
+from ..progress import Progress, Told, progress_of
+from ..shapes import BoxLike, OrientedBox
+from ..version import Version, Versioned
+from .handle import MapHandle, flag_of, level_of
+from .region import region_parameters
+from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
+
+LENGTH_BYTES = 4
+
+PAUSE_S = 0.2
+"""How long a watch waits before it comes back."""
+
+SILENCE_MAX_S = 60.0
+"""A watch that is told nothing for so long, no heartbeat either, has lost its connection."""
+
+COMES_BACK = PASSING | {"watch_stalled"}
+
+KINDS = {
+    3: ("invalid_argument", 400),
+    4: ("deadline_exceeded", 504),
+    5: ("not_found", 404),
+    6: ("conflict", 409),
+    7: ("permission_denied", 403),
+    8: ("resource_exhausted", 429),
+    9: ("failed_precondition", 412),
+    13: ("internal", 500),
+    14: ("unavailable", 503),
+    16: ("unauthenticated", 401),
+}
+"""The code and the status of HTTP of each status of gRPC, which a message that ends a watch has."""
+
+
+class WatchOperations(MapHandle):
+    """Watches."""
+
+    def watch(
+        self,
+        since: Version | Versioned | None = None,
+        *,
+        delta_level: int | None = None,
+        box: BoxLike | OrientedBox | None = None,
+        viewpoints: bool = False,
+        heartbeats: bool = False,
+        progress: Progress = None,
+        silence_max_s: float = SILENCE_MAX_S,
+    ) -> Iterator[WatchEvent]:
+        """Tells of the map's changes as they become durable, for as long as it is iterated.
+
+        First comes the whole state (`WatchedState`), unless `since` names a version from which the server can go on; then each
+        change (`WatchedChange`), without a gap. After a lost connection or a restart of the server it goes on where it was;
+        where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
+        the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. `box` leaves other
+        voxels out. With `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of
+        the state.
+
+        Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
+        does not come back within `patience_s`.
+        """
+        parameters: dict[str, Parameter] = {
+            "delta_level": None if delta_level is None else level_of(delta_level, "delta_level"),
+            "viewpoints": flag_of(viewpoints, "viewpoints"),
+            **region_parameters(box),
+        }
+        version = since.version if isinstance(since, Versioned) else since
+        if version is not None:
+            whole_of(version.revision, "since.revision")
+        wants_heartbeats = flag_of(heartbeats, "heartbeats")
+        silent_s = seconds(silence_max_s, "silence_max_s")
+        # What is wrong with the arguments is said here, and not when the first event is waited for.
+        return self._events(parameters, version, wants_heartbeats, progress, silent_s)
+
+    def _events(
+        self,
+        parameters: dict[str, Parameter],
+        version: Version | None,
+        heartbeats: bool,
+        progress: Progress,
+        silent_s: float,
+    ) -> Iterator[WatchEvent]:
+        failing_since: float | None = None
+        may_renew = True
+        with progress_of(progress, self._name, None) as told:
+            while True:
+                since = _since(version)
+                request = Request("GET", self._target("watch", **parameters, **since))
+                try:
+                    with closing(_told(self._caller, request, silent_s, told)) as events:
+                        for event in events:
+                            failing_since, may_renew = None, True
+                            version = event.version
+                            if heartbeats or not isinstance(event, Heartbeat):
+                                yield event
+                except Unauthenticated:
+                    if not (may_renew and self._caller.renew_key()):
+                        raise
+                    may_renew = False
+                except (ServerError, TransportError) as error:
+                    now = time.monotonic()
+                    failing_since = now if failing_since is None else failing_since
+                    if now - failing_since > self._caller.bounds.patience_s or not _comes_back(error):
+                        raise
+                    time.sleep(PAUSE_S)
+
+
+def _since(version: Version | None) -> dict[str, Parameter]:
+    return {} if version is None else {"since_revision": version.revision, "map_uuid": version.map_uuid}
+
+
+def _comes_back(error: MrolError) -> bool:
+    return isinstance(error, TransportError) or (isinstance(error, ServerError) and error.reason in COMES_BACK)
+
+
+def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:
+    """The events of one connection, until it ends by an error."""
+    states, changes, state_bytes = StateParts(), ChangeParts(), 0
+    with caller.stream(request) as body:
+        while True:
+            data = _next_message(body, Deadline(silent_s), caller.bounds.answer_bytes_max)
+            with reading("a message of the watch"):
+                message = Message(data)
+                event: WatchEvent | None = None
+                map_uuid = message.text(1)
+                if message.has(3):
+                    part = message.message(3)
+                    if part.flag(1):
+                        states, state_bytes = StateParts(), 0
+                    state_bytes += data.nbytes
+                    if state_bytes > caller.bounds.answer_bytes_max:
+                        raise ValueError("the state has more bytes than answer_bytes_max allows")
+                    told(state_bytes, state_bytes if part.flag(2) else None)
+                    event = states.add(part, map_uuid)
+                elif message.has(4):
+                    event = changes.add(message.message(4), map_uuid)
+                elif message.has(5):
+                    event = Heartbeat(Version(message.whole(2), map_uuid))
+                elif message.has(6):
+                    raise _failure(message.message(6))
+            if isinstance(event, WatchedState):
+                states = StateParts()
+            elif isinstance(event, WatchedChange):
+                changes = ChangeParts()
+            if event is not None:
+                yield event
+
+
+def _next_message(body: Body, deadline: Deadline, most: int) -> memoryview:
+    length = int.from_bytes(_exactly(body, LENGTH_BYTES, deadline), "little")
+    if length > most:
+        raise BadAnswer(f"a message of {length} bytes, more than answer_bytes_max, {most}")
+    return memoryview(_exactly(body, length, deadline))
+
+
+def _exactly(body: Body, count: int, deadline: Deadline) -> bytes:
+    data = body.read(count, deadline)
+    while len(data) < count:
+        more = body.read(count - len(data), deadline)
+        if not more:
+            raise ConnectionLost("the watch broke off")
+        data += more
+    return data
+
+
+def _failure(of: Message) -> ServerError:
+    code, status = KINDS.get(of.whole(1), ("internal", 500))
+    retry_after_s = of.double(4) if of.has(4) else None
+    return server_error(status, code, of.text(2), excerpt(of.text(3)).strip("'\""), retry_after_s)

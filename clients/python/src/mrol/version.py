@@ -1,0 +1,66 @@
+"""Which state of which map an answer speaks of."""
+
+from dataclasses import dataclass
+
+from ._fields import Fields, reading
+from ._transport.request import Answer
+
+
+@dataclass(frozen=True)
+class Version:
+    """A map's revision, one more with each change, and the uuid of the map, another one where it was deleted and made again.
+
+    `content_hash` is a hash of the finest voxels: equal for maps with equal voxels. It is None in an answer that was given again
+    after the map has moved on.
+    """
+
+    revision: int
+    map_uuid: str
+    content_hash: int | None = None
+
+    @classmethod
+    def of(cls, fields: Fields) -> "Version":
+        """The version that an answer in JSON names."""
+        with reading("the version"):
+            hash_text = fields.optional("content_hash", fields.text)
+            return cls(fields.whole("revision"), fields.text("map_uuid"), _hash_of(hash_text))
+
+    @classmethod
+    def of_headers(cls, answer: Answer) -> "Version":
+        """The version that the headers of an answer name."""
+        with reading("the headers of the answer"):
+            uuid = answer.header("mrol-map-uuid")
+            if uuid is None:
+                raise KeyError("mrol-map-uuid")
+            revision = whole_header(answer, "mrol-revision")
+            return cls(revision, uuid, _hash_of(answer.header("mrol-content-hash")))
+
+
+@dataclass(frozen=True, eq=False)
+class Versioned:
+    """What all answers about a map have."""
+
+    version: Version
+    """The state of the map that was asked, or that a change made."""
+
+    @property
+    def revision(self) -> int:
+        """The map's revision."""
+        return self.version.revision
+
+    @property
+    def map_uuid(self) -> str:
+        """The map's uuid."""
+        return self.version.map_uuid
+
+
+def whole_header(answer: Answer, name: str) -> int:
+    """A header that is a whole number."""
+    value = answer.header(name)
+    if value is None or not value.isascii() or not value.isdigit() or len(value) > 20:
+        raise ValueError(f"{name}: {value!r}")
+    return int(value)
+
+
+def _hash_of(text: str | None) -> int | None:
+    return None if text is None else int(text, 16)

@@ -1,0 +1,1 @@
+"""What several tests use: a real server, scenes, and servers that misbehave."""

@@ -1,0 +1,146 @@
+"""Keys, TLS and Unix sockets."""
+
+import pickle
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import mrol
+
+from .support.server import run, serving
+
+
+def certificate(folder: Path, name: str) -> tuple[Path, Path]:
+    """A certificate of its own for a name, and its key."""
+    pem, key = folder / f"{name}.pem", folder / f"{name}.key"
+    subject = ["-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}"]
+    options = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", *subject]
+    files = ["-keyout", str(key), "-out", str(pem), "-addext", "basicConstraints=critical,CA:FALSE"]
+    subprocess.run(["openssl", "req", "-x509", *options, *files], check=True, capture_output=True)
+    return pem, key
+
+
+def test_keys_open_what_they_are_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keys = tmp_path / "keys.toml"
+    new = ["key", "new", "--file", str(keys)]
+    admin = run(*new, "--name", "admin", "--scope", "admin").strip()
+    reader = run(*new, "--name", "reader", "--scope", "read", "--maps", "a").strip()
+    robot = run(*new, "--name", "robot", "--scope", "insert", "--robots", "r1").strip()
+    with serving(tmp_path, "--keys-file", str(keys)) as server:
+        a = mrol.connect(server.address, key=admin).map("a", resolution=0.1)
+        mrol.connect(server.address, key=admin).map("b", resolution=0.1)
+        assert a.insert([[1, 0, 0]], align=False, robot="r1").accepted
+        anonymous = mrol.connect(server.address)
+        assert anonymous.health().ready
+        for refused, error, reason in (
+            (lambda: anonymous.map("a"), mrol.Unauthenticated, "key_missing"),
+            (lambda: mrol.connect(server.address, key="wrong").maps(), mrol.Unauthenticated, "key_unknown"),
+            (lambda: mrol.connect(server.address, key=reader).map("b"), mrol.PermissionDenied, "map_not_allowed"),
+            (lambda: mrol.connect(server.address, key=reader).map("a", 0.1), mrol.PermissionDenied, "scope_too_small"),
+            (
+                lambda: mrol.connect(server.address, key=robot).map("a").insert([[1, 0, 0]]),
+                mrol.PermissionDenied,
+                "robot_not_allowed",
+            ),
+        ):
+            with pytest.raises(error) as denied:
+                refused()
+            assert denied.value.reason == reason
+        assert [of.name for of in mrol.connect(server.address, key=reader).maps().maps] == ["a"]
+        made = a.keep_out("k", sphere=([0, 0, 0], 1))
+        assert a.keep_outs().keep_outs[0].made_by == "admin"
+        assert made.revision == 2
+        monkeypatch.setenv("MROL_KEY", reader)
+        assert mrol.connect(server.address).map("a").describe().scans == 1
+        monkeypatch.delenv("MROL_KEY")
+        (tmp_path / "reader.key").write_text(f"{reader}\n")
+        monkeypatch.setenv("MROL_KEY_FILE", str(tmp_path / "reader.key"))
+        assert mrol.connect(server.address).map("a").describe().scans == 1
+        # A large body is refused before it was read.
+        with pytest.raises(mrol.Unauthenticated):
+            mrol.connect(server.address, key="wrong").restore("x", bytes(100_000_000))
+
+
+def test_a_key_is_shown_to_the_server_alone(tmp_path: Path) -> None:
+    secret = "open-sesame"  # noqa: S105
+    with serving(tmp_path) as server:
+        client = mrol.connect(server.address, key=secret)
+        m = client.map("m", resolution=0.1)
+        for shown in (repr(client), repr(m), str(vars(client)), repr(client._caller._key)):  # noqa: SLF001
+            assert secret not in shown
+        with pytest.raises(mrol.ArgumentError):
+            pickle.dumps(m)
+    for bad in ("", "two\r\nlines", "ü", "tab\t"):
+        with pytest.raises(mrol.ArgumentError, match="key must be a secret") as refused:
+            mrol.connect(server.address, key=bad)
+        assert not bad or bad not in str(refused.value)
+    with pytest.raises(mrol.ArgumentError, match="key must be one of the two"):
+        mrol.connect(server.address, key=secret, key_file=tmp_path / "f")
+    with pytest.raises(mrol.ArgumentError, match="key_file must be a file with a secret"):
+        mrol.connect(server.address, key_file=tmp_path / "nowhere")
+
+
+def test_tls_is_checked_on_both_sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pem, key = certificate(tmp_path, "localhost")
+    client_pem, client_key = certificate(tmp_path, "client")
+    tls = ["--tls-certificate", str(pem), "--tls-key", str(key), "--tls-client-ca", str(client_pem)]
+    with serving(tmp_path, *tls) as server:
+        address = server.address.replace("127.0.0.1", "localhost")
+        shown = {"client_cert": client_pem, "client_key": client_key}
+        m = mrol.connect(address, ca=pem, **shown).map("m", resolution=0.1)
+        assert m.insert([[x * 0.1, 0, 0] for x in range(100_000)], align=False).new_voxels == 100_000
+        assert m.query([[x * 0.1 + 0.05, 0, 0] for x in range(100_000)]).count > 99_000
+        monkeypatch.setenv("MROL_CA", str(pem))
+        assert mrol.connect(f"https://{address}", **shown).map("m").describe().scans == 1
+        monkeypatch.delenv("MROL_CA")
+        with pytest.raises(mrol.ConnectFailed, match="CERTIFICATE_VERIFY_FAILED"):
+            mrol.connect(f"https://{address}", **shown)
+        with pytest.raises(mrol.ConnectFailed, match="not valid for '127.0.0.1'"):
+            mrol.connect(f"https://{server.address}", ca=pem, **shown)
+        with pytest.raises(mrol.TransportError):
+            mrol.connect(f"https://{address}", ca=pem)
+        with pytest.raises(mrol.MrolError):
+            mrol.connect(f"http://{address}")
+    with pytest.raises(mrol.ArgumentError, match="ca must be a file of certificates"):
+        mrol.connect("localhost:1", ca=tmp_path / "nowhere")
+    with pytest.raises(mrol.ArgumentError, match="client_key must be given with client_cert"):
+        mrol.connect("https://localhost:1", client_key=client_key)
+    with pytest.raises(mrol.ArgumentError, match="client_cert must be a certificate"):
+        mrol.connect("https://localhost:1", client_cert=key, client_key=key)
+
+
+def test_a_unix_socket_is_as_good_as_a_port(tmp_path: Path) -> None:
+    path = tmp_path / "http.sock"
+    with serving(tmp_path, "--http-socket", str(path)), mrol.connect(f"unix:{path}") as client:
+        m = client.map("m", resolution=0.1)
+        assert m.insert([[1, 0, 0]], align=False).accepted
+        assert m.query([[1, 0, 0]]).occupied.all()
+        assert client.address == f"unix:{path}"
+        assert isinstance(next(m.watch()), mrol.WatchedState)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "",
+        ":7333",
+        "ftp://host",
+        "host:port",
+        "host:99999",
+        "http://host/path",
+        "http://user@host",
+        "unix:",
+        "a b:1",
+        "host\r\n:1",
+        7,
+    ],
+)
+def test_addresses_that_are_none_are_refused(address: str) -> None:
+    with pytest.raises(mrol.ArgumentError, match="address must be host:port"):
+        mrol.connect(address)
+
+
+def test_an_ipv6_address_is_one(tmp_path: Path) -> None:
+    with pytest.raises(mrol.ConnectFailed, match=r"http://\[::1\]:1"):
+        mrol.connect("[::1]:1")

@@ -1,0 +1,113 @@
+"""Watches: every kind of change, levels and boxes, and what ends them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import mrol
+
+
+def following(m: mrol.Map, events: Iterator[mrol.WatchEvent]) -> mrol.WatchedChange:
+    """The next change."""
+    event = next(events)
+    assert isinstance(event, mrol.WatchedChange), m
+    return event
+
+
+def test_a_watch_tells_the_state_and_then_each_change(empty: mrol.Map) -> None:
+    empty.keep_out("k", prism=mrol.Prism([[0, 0], [1, 0], [0, 1]], 0, 1))
+    empty.insert([[1, 0, 0]], align=False)
+    told: list[int] = []
+    events = empty.watch(viewpoints=True, progress=lambda done, _: told.append(done))
+    state = next(events)
+    assert isinstance(state, mrol.WatchedState)
+    assert told
+    assert state.version == empty.describe().version
+    assert (state.resolution_m, state.levels, state.level) == (0.1, 4, 0)
+    assert state.indices().tolist() == empty.voxels().indices.tolist()
+    assert [of.name for of in state.keep_outs] == ["k"]
+
+    scan = empty.insert([[2, 0, 0]], align=False, guess=[0, 0, 1, 0, 0, 0, 1], timestamp_ns=-7, robot="r2")
+    change = following(empty, events)
+    assert change.version == scan.version
+    assert isinstance(change.cause, mrol.WatchedScan)
+    cause = change.cause
+    assert (cause.robot, cause.session, cause.scan_id, cause.timestamp_ns) == ("r2", scan.session, scan.scan_id, -7)
+    np.testing.assert_allclose(cause.map_from_sensor.translation_m, [0, 0, 1])
+    assert change.added().tolist() == [[20, 0, 10]]
+    assert change.removed().size == 0
+
+    deletion = empty.delete([[1, 0, 0]])
+    change = following(empty, events)
+    assert isinstance(change.cause, mrol.WatchedDeletion)
+    assert change.removed().tolist() == [[10, 0, 0]]
+
+    empty.undo(deletion)
+    change = following(empty, events)
+    assert change.cause == mrol.WatchedUndo((), (deletion.revision,))
+    assert change.added().tolist() == [[10, 0, 0]]
+
+    empty.keep_out("l", oriented_box=mrol.OrientedBox([1, 0, 0, 0, 0, 0, 1], [1, 1, 1]))
+    change = following(empty, events)
+    assert isinstance(change.cause, mrol.WatchedKeepOut)
+    assert change.cause.put is not None
+    assert isinstance(change.cause.put.shape, mrol.OrientedBox)
+    empty.remove_keep_out("l")
+    cause_of_removal = following(empty, events).cause
+    assert isinstance(cause_of_removal, mrol.WatchedKeepOut)
+    assert (cause_of_removal.name, cause_of_removal.put) == ("l", None)
+    assert following.__name__
+    events.close()  # type: ignore[attr-defined]
+
+
+def test_a_watch_goes_on_from_a_version(empty: mrol.Map) -> None:
+    first = empty.insert([[1, 0, 0]], align=False)
+    second = empty.insert([[2, 0, 0]], align=False, guess=np.eye(4))
+    event = next(empty.watch(since=first))
+    assert isinstance(event, mrol.WatchedChange)
+    assert event.revision == second.revision
+    assert event.map_uuid == second.map_uuid
+    beyond = mrol.Version(first.revision, "00000000-0000-0000-0000-000000000001")
+    assert isinstance(next(empty.watch(since=beyond)), mrol.WatchedState)
+
+
+def test_a_watch_of_a_level_and_a_box_tells_those_alone(empty: mrol.Map) -> None:
+    empty.insert([[1.05, 0.05, 0.05], [7.05, 0.05, 0.05]], align=False)
+    state = next(empty.watch(delta_level=1, box=[[0, -1, -1], [2, 1, 1]]))
+    assert isinstance(state, mrol.WatchedState)
+    assert (state.level, state.indices().tolist()) == (1, [[5, 0, 0]])
+
+
+def test_a_copy_by_a_watch_is_equal_to_the_map(hall: mrol.Map) -> None:
+    events = hall.watch()
+    state = next(events)
+    assert isinstance(state, mrol.WatchedState)
+    copy = {tuple(index) for index in state.indices().tolist()}
+    deletion = hall.delete(box=[[3, -9, -9], [9, 9, 9]])
+    hall.insert([[0.5, 0.5, 0.5]], guess=np.eye(4), align=False)
+    last = hall.undo(deletion)
+    while state.revision < last.revision:
+        state = following(hall, events)
+        copy -= {tuple(index) for index in state.removed().tolist()}
+        copy |= {tuple(index) for index in state.added().tolist()}
+    assert copy == {tuple(index) for index in hall.voxels().indices.tolist()}
+
+
+def test_a_watch_ends_when_its_map_is_deleted(client: mrol.Client) -> None:
+    m = client.map("watched", resolution=0.1)
+    events = m.watch()
+    next(events)
+    client.delete_map("watched")
+    with pytest.raises(mrol.NotFound) as gone:
+        next(events)
+    assert gone.value.reason == "map_not_found"
+    with pytest.raises(mrol.NotFound):
+        next(m.watch())
+
+
+def test_arguments_of_a_watch_are_refused_at_once(empty: mrol.Map) -> None:
+    with pytest.raises(mrol.ArgumentError, match="silence_max_s must be a number of seconds"):
+        empty.watch(silence_max_s=0)
+    with pytest.raises(mrol.ArgumentError, match="viewpoints must be True or False"):
+        empty.watch(viewpoints=1)
