@@ -9,7 +9,7 @@ use tokio::sync::{OwnedMutexGuard, watch};
 use uuid::Uuid;
 
 use super::commit_queue::{CommitQueue, CommitThread, Stop, Told};
-use super::events::EventLog;
+use super::event_log::EventLog;
 use super::full_state::FullStates;
 use super::point_query::{POINTS_PER_STEP, point_without_voxel};
 use super::recent_changes::RecentChanges;

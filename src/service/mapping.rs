@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use super::commit_queue::{Prepared, Step, Submission, Turn, TurnLimits, record_of};
 use super::deletion::removal_bytes;
-use super::events::sample_of;
 use super::filtered_scan::FilteredScan;
 use super::growth::growth_bytes;
 use super::hosted_map::HostedMap;
@@ -31,6 +30,9 @@ pub(super) struct Judged {
     /// Some of the points, where it was refused.
     pub(super) sample: Vec<Point>,
 }
+
+/// Points that are kept of a refused scan.
+const SAMPLE_POINTS: usize = 300;
 
 /// How far a scan is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -314,6 +316,23 @@ impl HostedMap {
             replayed: false,
             stationary: false,
             recovered: located.recovered,
+        }
+    }
+}
+
+/// Some of the points, evenly over their order.
+fn sample_of(points: &[Point]) -> Vec<Point> {
+    points.iter().copied().step_by(points.len().div_ceil(SAMPLE_POINTS).max(1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_has_few_points_of_a_large_scan_and_all_of_a_small_one() {
+        for (points, sampled) in [(0, 0), (1, 1), (300, 300), (301, 151), (90_000, 300)] {
+            assert_eq!(sample_of(&vec![Point::new(0.0, 0.0, 0.0); points]).len(), sampled);
         }
     }
 }

@@ -12,6 +12,7 @@ mod deletion;
 mod digest;
 mod error;
 mod error_code;
+mod event_log;
 mod events;
 mod filtered_scan;
 mod full_state;

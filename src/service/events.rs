@@ -3,8 +3,6 @@
 //! Events are for people who look after robots. They are kept in memory, in bounded number, and a restart forgets them: what
 //! is in the map is in its trajectory. Refused scans and failed requests are nowhere else.
 
-mod log;
-
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,12 +13,7 @@ use super::hosted_map::HostedMap;
 use super::mapping::Judged;
 use super::outbox::{Teller, stream_of};
 use super::{EventMessage, EventsQuery, MapService, Outcome, ScanEvent, ScanRequest, ServiceError};
-use crate::geometry::Point;
 use crate::map::MapName;
-pub(super) use log::EventLog;
-
-/// Points that are kept of a refused scan.
-const SAMPLE_POINTS: usize = 300;
 
 impl MapService {
     /// What became of the last scans that were sent to a map, and of the last of each robot, the oldest first.
@@ -128,31 +121,6 @@ impl ScanEvent {
             guess: judged.and_then(|judged| judged.guess),
             sample: judged.map(|judged| judged.sample.clone()).unwrap_or_default(),
             answer: answer.as_ref().map(|judged| Box::new(judged.answer.clone())).map_err(Into::into),
-        }
-    }
-}
-
-/// Some of the points, evenly over their order.
-pub(super) fn sample_of(points: &[Point]) -> Vec<Point> {
-    points.iter().copied().step_by(points.len().div_ceil(SAMPLE_POINTS).max(1)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::map::RobotName;
-    use crate::service::Reason;
-
-    /// An event of a scan whose request failed.
-    pub(super) fn event_of(robot: &str) -> ScanEvent {
-        let request = ScanRequest::new(RobotName::new(robot).unwrap(), Vec::new().into());
-        ScanEvent::of(&request, Duration::ZERO, &Err(ServiceError::new(Reason::NoReturns, "none")))
-    }
-
-    #[test]
-    fn a_sample_has_few_points_of_a_large_scan_and_all_of_a_small_one() {
-        for (points, sampled) in [(0, 0), (1, 1), (300, 300), (301, 151), (90_000, 300)] {
-            assert_eq!(sample_of(&vec![Point::new(0.0, 0.0, 0.0); points]).len(), sampled);
         }
     }
 }

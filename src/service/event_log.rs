@@ -14,7 +14,7 @@ use crate::util::unix_time_ns;
 ///
 /// Bounded by the number of events. Points are kept of a robot's last scan alone.
 #[derive(Debug)]
-pub(in crate::service) struct EventLog {
+pub(super) struct EventLog {
     kept: Mutex<Kept>,
     newest: watch::Sender<u64>,
 }
@@ -34,7 +34,7 @@ impl Default for EventLog {
 
 impl EventLog {
     /// Keeps an event as the newest one, and tells who watches. So many are kept at most, and of as many robots the last.
-    pub(in crate::service) fn note(&self, mut event: ScanEvent, most: usize) {
+    pub(super) fn note(&self, mut event: ScanEvent, most: usize) {
         event.time_ns = unix_time_ns();
         let micros = u64::try_from(event.time_ns / 1000).unwrap_or_default();
         let mut kept = self.kept.lock();
@@ -51,7 +51,7 @@ impl EventLog {
     }
 
     /// The events that are asked for, ascending by number.
-    pub(in crate::service) fn list(&self, query: &EventsQuery) -> Vec<Arc<ScanEvent>> {
+    pub(super) fn list(&self, query: &EventsQuery) -> Vec<Arc<ScanEvent>> {
         let kept = self.kept.lock();
         let since = if query.since_number > kept.last_number { 0 } else { query.since_number };
         let is_asked = |event: &Arc<ScanEvent>| {
@@ -66,7 +66,7 @@ impl EventLog {
     }
 
     /// The number of the newest event, as it changes.
-    pub(in crate::service) fn newest(&self) -> watch::Receiver<u64> {
+    pub(super) fn newest(&self) -> watch::Receiver<u64> {
         self.newest.subscribe()
     }
 }
@@ -100,7 +100,25 @@ impl Kept {
 mod tests {
     use super::*;
     use crate::geometry::Point;
-    use crate::service::events::tests::event_of;
+    use crate::map::SessionName;
+    use crate::service::{FailedScan, Reason};
+    use std::time::Duration;
+
+    fn event_of(robot: &str) -> ScanEvent {
+        let failed = FailedScan { reason: Reason::NoReturns.as_str().into(), message: "none".into() };
+        ScanEvent {
+            number: 0,
+            time_ns: 0,
+            robot: RobotName::new(robot).unwrap(),
+            session: SessionName::default(),
+            scan_id: None,
+            points: 1,
+            duration: Duration::ZERO,
+            guess: None,
+            sample: Vec::new(),
+            answer: Err(failed),
+        }
+    }
 
     fn numbers(events: &[Arc<ScanEvent>]) -> Vec<u64> {
         events.iter().map(|event| event.number).collect()
