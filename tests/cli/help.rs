@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 26] = [
+const COMMANDS: [&str; 27] = [
     "serve",
     "demo",
     "map",

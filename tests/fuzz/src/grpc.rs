@@ -6,7 +6,7 @@ use mrol::grpc::routes;
 
 use super::hosted::{Answer, Hosted, MESSAGE_BYTES_MAX};
 
-const METHODS: [&str; 31] = [
+const METHODS: [&str; 32] = [
     "Occupancy/QueryPoints",
     "Occupancy/QueryPointsStream",
     "Occupancy/ListVoxels",
@@ -28,8 +28,6 @@ const METHODS: [&str; 31] = [
     "Maps/Explode",
     "Occupancy/GetBlock",
     "Occupancy/ListObservers",
-    "Mapping/ListEvents",
-    "Mapping/WatchEvents",
     "Mapping/PutKeepOut",
     "Mapping/DeleteKeepOut",
     "Occupancy/ListKeepOuts",
@@ -41,6 +39,7 @@ const METHODS: [&str; 31] = [
     "Occupancy/ProjectGrid",
     "Occupancy/ClassifyPoints",
     "Occupancy/ListFrontiers",
+    "Mapping/ListEvents",
 ];
 /// Status codes of defects: unknown, internal, data loss.
 const DEFECTS: [&str; 3] = ["2", "13", "15"];
