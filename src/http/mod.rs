@@ -28,6 +28,7 @@ mod starting;
 mod trajectory;
 mod undo;
 mod unreadable;
+mod viewer;
 mod voxels;
 mod watch;
 
