@@ -76,8 +76,13 @@ export class Camera {
     this.target = add(this.target, add(scale(right, x * this.height()), scale(up, y * this.height())));
   }
 
-  zoom(by) {
-    this.distance = clamp(this.distance * by, DISTANCE_MIN, DISTANCE_MAX);
+  /** Comes nearer or goes farther; what is at `place`, -1 to 1 in the picture, stays there. */
+  zoom(by, place = [0, 0]) {
+    const before = this.distance;
+    this.distance = clamp(before * by, DISTANCE_MIN, DISTANCE_MAX);
+    const gone = (before - this.distance) * Math.tan(FIELD_OF_VIEW / 2);
+    const { right, up } = this.axes();
+    this.target = add(this.target, add(scale(right, place[0] * gone * this.aspect), scale(up, place[1] * gone)));
   }
 
   /** Looks at a box so that it fills the picture, or this share of its width. */

@@ -7,7 +7,7 @@ const KEY_TURN = 0.1;
 const KEY_PAN = 0.08;
 const KEY_ZOOM = 1.2;
 
-/** `heard` has `moved()`, `clicked(x, y)` and `hovered(x, y)`. */
+/** `heard` has `moved()` and `clicked(x, y)`. */
 export function control(canvas, camera, heard) {
   const pointers = new Map();
   let dragged = 0;
@@ -27,7 +27,7 @@ export function control(canvas, camera, heard) {
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (!pointers.has(event.pointerId)) return heard.hovered(event.clientX, event.clientY);
+    if (!pointers.has(event.pointerId)) return;
     const [before, apart] = [center(), spread()];
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
     const after = center();
@@ -54,7 +54,8 @@ export function control(canvas, camera, heard) {
     (event) => {
       event.preventDefault();
       const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1;
-      camera.zoom(ZOOM_A_NOTCH ** (event.deltaY * lines));
+      const place = [(event.offsetX / canvas.clientWidth) * 2 - 1, 1 - (event.offsetY / canvas.clientHeight) * 2];
+      camera.zoom(ZOOM_A_NOTCH ** (event.deltaY * lines), place);
       heard.moved();
     },
     { passive: false },

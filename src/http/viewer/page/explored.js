@@ -5,9 +5,10 @@ import { count } from "./format.js";
 import { rgba, theme } from "./palette.js";
 import { Shape } from "./shapes.js";
 
-/** Voxels of a box of frontiers, and cells of a grid, that the server looks at by default, with a margin. */
-const FRONTIER_CELLS_MAX = 3_500_000;
-const GRID_CELLS_MAX = 250_000;
+/** Voxels of a box of frontiers, and cells of a grid, that a server answers for within the time of a question. */
+const FRONTIER_CELLS_MAX = 400_000;
+const GRID_CELLS_MAX = 40_000;
+const TOO_LATE = 504;
 
 /** The finest level at which a box has at most so many cells. */
 function levelFor(forest, sides, cellsMax, from) {
@@ -17,12 +18,23 @@ function levelFor(forest, sides, cellsMax, from) {
   return forest.top;
 }
 
+/** The answer at this level, or where that takes the server too long, at a coarser one. */
+async function askCoarser(forest, level, ask) {
+  try {
+    return { level, answer: await ask(level) };
+  } catch (error) {
+    if (error.status !== TOO_LATE || level === forest.top) throw error;
+    return askCoarser(forest, level + 1, ask);
+  }
+}
+
 /** Frontiers in the bounds: a shape, and what there is to say. */
 export async function frontiers(session, bounds) {
   const sides = bounds.max.map((value, axis) => value - bounds.min[axis]);
-  const level = levelFor(session.forest, sides, FRONTIER_CELLS_MAX, 0);
-  const body = { box: { min_m: bounds.min, max_m: bounds.max }, level };
-  const answer = await send("POST", pathOf(session.name, "frontiers"), body);
+  const box = { min_m: bounds.min, max_m: bounds.max };
+  const finest = levelFor(session.forest, sides, FRONTIER_CELLS_MAX, 0);
+  const ask = (level) => send("POST", pathOf(session.name, "frontiers"), { box, level });
+  const { answer, level } = await askCoarser(session.forest, finest, ask);
   const shape = new Shape();
   const [edge, face] = [rgba(theme().accent), rgba(theme().accent, 0.2)];
   for (const { min_m, max_m, view } of answer.frontiers) {
@@ -36,10 +48,11 @@ export async function frontiers(session, bounds) {
 /** The map from above between two heights: cells that are free, and those of which nothing is known. */
 export async function freeSpace(session, bounds, [low, high]) {
   const sides = [0, 1].map((axis) => bounds.max[axis] - bounds.min[axis]);
-  const level = levelFor(session.forest, sides, GRID_CELLS_MAX, 1);
+  const finest = levelFor(session.forest, sides, GRID_CELLS_MAX, Math.min(1, session.forest.top));
   const area = { min_m: bounds.min.slice(0, 2), max_m: bounds.max.slice(0, 2) };
-  const body = { area, min_z_m: low, max_z_m: high, level, tell_unknown: true };
-  const { cell_m, origin_m, size, occupied, free } = await send("POST", pathOf(session.name, "grid"), body);
+  const ask = (level) => send("POST", pathOf(session.name, "grid"), { area, min_z_m: low, max_z_m: high, level, tell_unknown: true });
+  const { answer } = await askCoarser(session.forest, finest, ask);
+  const { cell_m, origin_m, size, occupied, free } = answer;
   const shape = new Shape();
   const colors = { free: rgba(theme().free, 0.5), unknown: rgba(theme().unknown, 0.35) };
   const kind = (i) => (occupied[i] ? "occupied" : free[i] ? "free" : "unknown");

@@ -18,6 +18,7 @@ export class Loader {
   #wanted = [];
   #pausedUntil = 0;
   #staleAt = 0;
+  #timer;
   #stop = new AbortController();
   bytes = 0;
   requests = 0;
@@ -34,6 +35,7 @@ export class Loader {
   }
 
   stop() {
+    clearTimeout(this.#timer);
     this.#stop.abort();
   }
 
@@ -76,14 +78,26 @@ export class Loader {
   /** What changes left uncertain; not at each of them. */
   #stale() {
     const now = performance.now();
-    if (now < this.#staleAt + STALE_EVERY_MS) return this.#wanted.filter((tile) => tile.isStale);
+    if (now < this.#staleAt + STALE_EVERY_MS) {
+      this.#lookAgainIn(STALE_EVERY_MS);
+      return this.#wanted.filter((tile) => tile.isStale);
+    }
     this.#staleAt = now;
     const stale = Array.from(this.#forest.tiles()).filter((tile) => tile.isStale);
     return stale.sort((a, b) => b.level - a.level || b.drawnAt - a.drawnAt);
   }
 
+  /** Has what is wanted looked at once more, after some milliseconds. */
+  #lookAgainIn(milliseconds) {
+    this.#timer ??= setTimeout(() => {
+      this.#timer = undefined;
+      this.#told.arrived();
+    }, milliseconds);
+  }
+
   #fetchNext() {
-    if (performance.now() < this.#pausedUntil) return;
+    const pause = this.#pausedUntil - performance.now();
+    if (pause > 0) return this.#lookAgainIn(pause);
     while (this.#asked.size < AT_ONCE_MAX && this.#wanted.length > 0) {
       const { level, index } = this.#wanted.shift();
       this.#fetch(level, index);

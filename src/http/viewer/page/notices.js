@@ -39,6 +39,8 @@ export function explained(problem) {
       return `A limit of the server is reached. ${problem.message}${wait}`;
     case 503:
       return `The server is not ready. ${problem.message}${wait}`;
+    case 504:
+      return `The server takes too long for this. ${problem.message}`;
     default:
       return problem.message;
   }

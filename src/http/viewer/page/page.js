@@ -53,7 +53,7 @@ export class Page {
       this.scene.moved();
       this.#writeLink();
     };
-    control(byId("picture"), this.scene.camera, { moved, clicked: (x, y) => this.#clicked(x, y), hovered: () => {} });
+    control(byId("picture"), this.scene.camera, { moved, clicked: (x, y) => this.#clicked(x, y) });
     this.#wire();
     this.useTool("pick");
     this.scene.whenDrawn(() => this.#drawn());
@@ -235,6 +235,7 @@ export class Page {
       const isClosed = byId("side").classList.toggle("is-closed");
       byId("open-side").setAttribute("aria-expanded", !isClosed);
     });
+    if (innerWidth <= NARROW_PIXELS) byId("open-side").click();
     addEventListener("hashchange", () => this.start());
   }
 

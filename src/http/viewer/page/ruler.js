@@ -32,7 +32,7 @@ export class Ruler {
     const apart = subtract(this.#points[1], this.#points[0]);
     const text = meters(length(apart));
     this.panel.append(
-      terms([["distance", text], ["x, y, z", apart.map((value) => value.toFixed(3)).join(", ")], ["level", meters(Math.hypot(apart[0], apart[1]))]]),
+      terms([["distance", text], ["x, y, z", apart.map((value) => value.toFixed(3)).join(", ")], ["across", meters(Math.hypot(apart[0], apart[1]))]]),
     );
     this.#page.label("ruler", this.#points[0].map((value, axis) => value + apart[axis] / 2), text);
   }

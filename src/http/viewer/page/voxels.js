@@ -92,7 +92,6 @@ export class Voxels {
   #listed = [];
   #generation = -1;
   #count = 0;
-  #voxels = 0;
 
   constructor(gl) {
     this.#gl = gl;
@@ -115,7 +114,7 @@ export class Voxels {
   /** Draws tiles; how many voxels they have. */
   draw(forest, tiles, { matrix, towardsEye, origin, cut, heights, coloring }) {
     const gl = this.#gl;
-    const { count, voxels } = this.#listPages(forest, tiles, origin);
+    const count = this.#listPages(forest, tiles, origin);
     if (count === 0) return 0;
     const { program, at } = this.#program;
     gl.useProgram(program);
@@ -135,17 +134,17 @@ export class Voxels {
     gl.uniform1f(at.u_resolution, forest.resolution);
     gl.uniform1i(at.u_coloring, coloring);
     gl.drawArrays(gl.TRIANGLES, 0, count * PAGE * VERTICES);
-    return voxels;
+    return tiles.reduce((voxels, tile) => voxels + tile.words.length, 0);
   }
 
+  /** Lists the pages that are drawn, where they are not listed yet; their number. */
   #listPages(forest, tiles, origin) {
     const isListed =
       this.#generation === this.pages.generation &&
       this.#listed.length === tiles.length &&
       tiles.every((tile, i) => tile === this.#listed[i]);
-    if (isListed) return { count: this.#count, voxels: this.#voxels };
+    if (isListed) return this.#count;
     let count = 0;
-    let voxels = 0;
     for (const tile of tiles) {
       const { min } = forest.boxOf(tile);
       for (const page of tile.pages) {
@@ -153,7 +152,6 @@ export class Voxels {
         for (let axis = 0; axis < 3; axis++) this.#entries[at + axis] = min[axis] - origin[axis];
         this.#entries[at + 3] = page + PAGES_MAX * tile.level;
       }
-      voxels += tile.words.length;
     }
     const gl = this.#gl;
     gl.activeTexture(gl.TEXTURE0 + LIST_UNIT);
@@ -162,7 +160,7 @@ export class Voxels {
     if (rows > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, LIST_WIDTH, rows, gl.RGBA, gl.FLOAT, this.#entries);
     this.#listed = tiles;
     this.#generation = this.pages.generation;
-    [this.#count, this.#voxels] = [count, voxels];
-    return { count, voxels };
+    this.#count = count;
+    return count;
   }
 }
