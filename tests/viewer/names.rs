@@ -47,6 +47,7 @@ async fn what_a_link_a_file_or_an_answer_names_runs_nothing() {
         json!(HOSTILE)
     );
     browser.eval(&stand_in).await;
+    browser.eval("document.getElementById('scans').parentElement.open = true").await;
     for list in ["#robots", "#scans", "#keep-outs", "#labels", "#notices"] {
         browser.wait(&format!("document.querySelector({list:?}).textContent.includes('<img src=x')")).await;
     }

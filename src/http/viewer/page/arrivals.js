@@ -6,6 +6,8 @@ import { rgba, robotColor, theme } from "./palette.js";
 
 const TAGS = 254;
 const SPAN_MS = 5_000;
+/** Bytes of blocks that are remembered, for tiles that are fetched only later. */
+const REMEMBERED_BYTES_MAX = 2 << 20;
 /** What is older than this has no color of its own by age. */
 const AGE_MAX_MS = 180_000;
 
@@ -13,6 +15,8 @@ export class Arrivals {
   #tags = new Map();
   #next = 1;
   #robots = [];
+  #brought = [];
+  #bytes = 0;
 
   /** The place of a robot among those that were seen, which chooses its color. */
   placeOf(robot) {
@@ -27,9 +31,26 @@ export class Arrivals {
     }
     const tag = this.#next;
     this.#next = (tag % TAGS) + 1;
-    if (this.#tags.has(tag)) forget(tag);
+    if (this.#tags.has(tag)) {
+      forget(tag);
+      this.#brought = this.#brought.filter((brought) => brought.tag !== tag);
+      this.#bytes = this.#brought.reduce((bytes, { blocks }) => bytes + blocks.length, 0);
+    }
     this.#tags.set(tag, { robot, begin: now });
     return tag;
+  }
+
+  /** Remembers which voxels came with a tag. */
+  remember(blocks, tag) {
+    if (tag === 0 || blocks.length === 0 || blocks.length > REMEMBERED_BYTES_MAX) return;
+    this.#brought.push({ blocks: blocks.slice(), tag });
+    this.#bytes += blocks.length;
+    while (this.#bytes > REMEMBERED_BYTES_MAX) this.#bytes -= this.#brought.shift().blocks.length;
+  }
+
+  /** Tags what is remembered of a tile that was just fetched. */
+  tagIn(forest, tile) {
+    for (const { blocks, tag } of this.#brought) forest.tagIn(tile, blocks, tag);
   }
 
   /** The color of a tag by robot or by age. */

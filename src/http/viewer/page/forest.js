@@ -1,6 +1,6 @@
 // The tiles of a map that are here: roots at its coarsest level, each tile over eight of the next finer one.
 
-import { eachBlock, eachVoxel } from "./blocks.js";
+import { eachBlock, eachCube, eachVoxel } from "./blocks.js";
 import { SIDE, Tile } from "./tile.js";
 
 const keyOf = (level, [x, y, z]) => `${level}:${x},${y},${z}`;
@@ -74,27 +74,34 @@ export class Forest {
     for (const root of planted) root.fill(bytes, revision);
   }
 
-  /** The box around all voxels, in meters, as exact as the coarsest level is. */
-  bounds() {
-    let bounds;
-    const side = this.side(this.top);
+  /**
+   * The box around the voxels, in meters, as exact as the coarsest level is; with a share, around what is left without so
+   * many at each end of each axis: a few stray voxels far away do not count then.
+   */
+  bounds(stray = 0) {
+    const counts = [new Map(), new Map(), new Map()];
+    const note = (axis, at, number) => counts[axis].set(at, (counts[axis].get(at) ?? 0) + number);
+    let total = 0;
     for (const root of this.#roots) {
       const base = root.index.map((i) => i * SIDE);
       for (let row = 0; row < SIDE * SIDE; row++) {
-        const [low, high] = [root.bits[row * 2], root.bits[row * 2 + 1]];
-        if ((low | high) === 0) continue;
-        const first = low !== 0 ? trailingZeros(low) : 32 + trailingZeros(high);
-        const last = high !== 0 ? 63 - Math.clz32(high) : 31 - Math.clz32(low);
-        const least = [base[0] + first, base[1] + (row & 63), base[2] + (row >> 6)];
-        const most = [base[0] + last + 1, least[1] + 1, least[2] + 1];
-        bounds ??= { min: least, max: most };
-        bounds = {
-          min: bounds.min.map((value, axis) => Math.min(value, least[axis])),
-          max: bounds.max.map((value, axis) => Math.max(value, most[axis])),
-        };
+        let number = 0;
+        for (let half = 0; half < 2; half++) {
+          for (let left = root.bits[row * 2 + half]; left !== 0; left &= left - 1) {
+            note(0, base[0] + half * 32 + trailingZeros(left), 1);
+            number += 1;
+          }
+        }
+        if (number === 0) continue;
+        note(1, base[1] + (row & 63), number);
+        note(2, base[2] + (row >> 6), number);
+        total += number;
       }
     }
-    return bounds && { min: bounds.min.map((i) => i * side), max: bounds.max.map((i) => i * side) };
+    if (total === 0) return undefined;
+    const side = this.side(this.top);
+    const ends = counts.map((numbers) => endsOf(numbers, Math.floor(total * stray)));
+    return { min: ends.map(([least]) => least * side), max: ends.map(([, most]) => (most + 1) * side) };
   }
 
   /** Takes up voxels of level 0 that came and went. What came gets a tag. */
@@ -115,6 +122,22 @@ export class Forest {
     });
     eachVoxel(added, (x, y, z) => {
       if (isIn(x, 0) && isIn(y, 1) && isIn(z, 2)) this.#insertAt(tile.level, x, y, z, revision, tag);
+    });
+  }
+
+  /** Tags the voxels of a tile that these blocks of level 0 brought. */
+  tagIn(tile, blocks, tag) {
+    const { level, index } = tile;
+    // A block lies in one cell of a coarse level, and in one tile of any.
+    const isIn = (block, axis) => block >> (level + 3) === index[axis];
+    eachBlock(blocks, (blockX, blockY, blockZ, masks) => {
+      if (!isIn(blockX, 0) || !isIn(blockY, 1) || !isIn(blockZ, 2)) return;
+      const cell = (block, within) => ((block * 8 + within) >> level) & 63;
+      eachCube(masks, (x, y, z, bits) => {
+        for (let i = 0; i < 8; i++) {
+          if ((bits >> i) & 1) tile.tag(cell(blockX, x + (i & 1)), cell(blockY, y + ((i >> 1) & 1)), cell(blockZ, z + (i >> 2)), tag);
+        }
+      });
     });
   }
 
@@ -154,3 +177,13 @@ export class Forest {
 }
 
 const trailingZeros = (word) => 31 - Math.clz32(word & -word);
+
+/** The least and the largest of numbers that are there so many times each, without so many at each end. */
+function endsOf(numbers, without) {
+  const end = (sorted) => {
+    let left = without;
+    return sorted.find(([, times]) => (left -= times) < 0)[0];
+  };
+  const sorted = Array.from(numbers).sort(([a], [b]) => a - b);
+  return [end(sorted), end(sorted.toReversed())];
+}

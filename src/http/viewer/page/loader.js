@@ -23,7 +23,7 @@ export class Loader {
   bytes = 0;
   requests = 0;
 
-  /** `told` has `arrived()` and `failed(problem)`. */
+  /** `told` has `fetched(tile)`, `arrived()` and `failed(problem)`. */
   constructor(map, forest, told) {
     this.#map = map;
     this.#forest = forest;
@@ -116,6 +116,7 @@ export class Loader {
       tile.fill(bytes, revision);
       this.#asked.delete(name);
       for (const [change, tag] of changes) this.#forest.applyTo(tile, change, tag);
+      this.#told.fetched(tile);
     } catch (error) {
       this.#asked.delete(name);
       if (error.name === "AbortError") return;

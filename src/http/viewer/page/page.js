@@ -17,7 +17,7 @@ import { robotColor, theme, whenThemeChanges } from "./palette.js";
 import { Picking, scanText } from "./picking.js";
 import { RegionTool, removeKeepOut } from "./region.js";
 import { Ruler } from "./ruler.js";
-import { Scene } from "./scene.js";
+import { Scene, STRAY } from "./scene.js";
 import { Session } from "./session.js";
 
 const SCANS_SHOWN = 100;
@@ -35,6 +35,8 @@ export class Page {
   #tool;
   #tools;
   #bounds;
+  /** The bounds of most of the map. */
+  #bulk;
   #following;
   #isFollowed = true;
   #opening = 0;
@@ -74,6 +76,7 @@ export class Page {
     if (named) return this.open(named, wanted);
     this.#close();
     this.chooser.show(undefined);
+    byId("create").parentElement.open = true;
     showEmpty("No map yet", "This server has no map. Make one with “New map”, drop a .mrol file here, or, in a terminal:", firstCommands());
   }
 
@@ -94,7 +97,7 @@ export class Page {
     this.session = session;
     const { scene } = this;
     scene.open(session.forest, session.loader, session.arrivals);
-    this.#bounds = session.forest.bounds();
+    this.#measure();
     this.#isFollowed = !placeCamera(scene.camera, link);
     if (this.#isFollowed) this.#frame();
     byId("top").setAttribute("aria-pressed", scene.camera.isTop);
@@ -236,6 +239,7 @@ export class Page {
       byId("open-side").setAttribute("aria-expanded", !isClosed);
     });
     if (innerWidth <= NARROW_PIXELS) byId("open-side").click();
+    byId("scans").parentElement.addEventListener("toggle", () => this.session && this.#showLists());
     addEventListener("hashchange", () => this.start());
   }
 
@@ -248,7 +252,7 @@ export class Page {
       return this.scene.show(name, undefined);
     }
     if (!this.#bounds) return;
-    const answer = await this.attempt(() => ask(this.#bounds));
+    const answer = await this.attempt(() => ask(this.#bulk));
     if (!answer) return;
     shown.setAttribute("aria-pressed", true);
     this.scene.show(name, answer.shape);
@@ -281,7 +285,7 @@ export class Page {
   /** Takes over what has changed, in the panel and in the layers. */
   #follow() {
     const { session, scene } = this;
-    this.#bounds = session.forest.bounds();
+    this.#measure();
     scene.measure();
     this.cuts.measure(this.#bounds);
     // Somebody who has not moved the camera sees the map grow as a whole.
@@ -293,11 +297,16 @@ export class Page {
     this.#showLayers();
   }
 
+  #measure() {
+    this.#bounds = this.session.forest.bounds();
+    this.#bulk = this.session.forest.bounds(STRAY);
+  }
+
   /** Looks at the whole map, beside the panel. */
   #frame() {
     const { clientWidth } = byId("picture");
     const share = Math.max(0.5, 1 - (2 * PANEL_PIXELS) / clientWidth);
-    if (this.#bounds) this.scene.camera.frame(this.#bounds, clientWidth > NARROW_PIXELS ? share : 1);
+    if (this.#bounds) this.scene.camera.frame(this.#bulk, clientWidth > NARROW_PIXELS ? share : 1);
   }
 
   #showLists() {
@@ -314,7 +323,8 @@ export class Page {
     };
     byId("robots").replaceChildren(...robots.names().map(item));
     if (robots.seen.size === 0) byId("robots").replaceChildren(element("li", { className: "soft" }, "no scan yet"));
-    byId("scans").replaceChildren(...robots.scans.slice(-SCANS_SHOWN).reverse().map((scan) => this.scanItem(scan)));
+    const isOpen = byId("scans").parentElement.open;
+    byId("scans").replaceChildren(...robots.scans.slice(isOpen ? -SCANS_SHOWN : Infinity).reverse().map((scan) => this.scanItem(scan)));
   }
 
   #showKeepOuts() {
@@ -329,7 +339,7 @@ export class Page {
     if (!session) return;
     const { robots, arrivals, keepOuts } = session;
     const [isOfPaths, isOfRobots, isOfKeepOuts, isOfGrid] = ["show-paths", "show-robots", "show-keep-outs", "show-grid"].map((id) => byId(id).checked);
-    scene.show("grid", isOfGrid && this.#bounds ? grid(this.#bounds).shape : undefined);
+    scene.show("grid", isOfGrid && this.#bounds ? grid(this.#bulk).shape : undefined);
     scene.show("paths", isOfPaths ? paths(robots, arrivals) : undefined, true);
     const size = Math.max(2.5 * session.forest.resolution, 0.06);
     scene.show("robots", isOfRobots ? robotMarkers(robots, arrivals, size) : undefined, true);

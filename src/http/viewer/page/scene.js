@@ -23,6 +23,8 @@ const VOXELS_MAX = 2_500_000;
 /** Tiles that are kept; each takes 32 KiB and its words. */
 const TILES_MAX = 2_000;
 const KEPT_MS = 3_000;
+/** Share of the coarsest voxels at each end of each axis that may be stray ones. */
+export const STRAY = 0.02;
 const COLORINGS = { height: 0, level: 1, robot: 2, age: 3 };
 const EVERYWHERE = { min: Array(3).fill(-Infinity), max: Array(3).fill(Infinity) };
 const FAR = 1e9;
@@ -93,7 +95,8 @@ export class Scene {
   measure() {
     const bounds = this.#forest?.bounds();
     if (!bounds) return;
-    this.#heights = [bounds.min[2], Math.max(bounds.max[2], bounds.min[2] + 0.1)];
+    const { min, max } = this.#forest.bounds(STRAY);
+    this.#heights = [min[2], Math.max(max[2], min[2] + 0.1)];
     this.camera.reach = 2 * Math.hypot(...bounds.max.map((value, axis) => value - bounds.min[axis])) + 20;
   }
 

@@ -23,7 +23,7 @@ export class Session {
     this.arrivals = new Arrivals();
     this.robots = new Robots(this.name);
     const failed = (problem) => this.#isClosed || told.failed(problem);
-    this.loader = new Loader(this.name, this.forest, { arrived: told.arrived, failed });
+    this.loader = new Loader(this.name, this.forest, { fetched: (tile) => this.arrivals.tagIn(this.forest, tile), arrived: told.arrived, failed });
   }
 
   static async open(name, told) {
@@ -57,6 +57,7 @@ export class Session {
     const { scan } = change;
     const forget = (tag) => Array.from(this.forest.tiles(), (tile) => tile.forget(tag));
     const tag = scan ? this.arrivals.tagOf(scan.robot, performance.now(), forget) : 0;
+    this.arrivals.remember(change.added, tag);
     this.loader.note(change, tag);
     this.forest.apply(change, tag);
     this.revision = Math.max(this.revision, change.revision);

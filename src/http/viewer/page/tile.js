@@ -44,6 +44,13 @@ export class Tile {
     this.isChanged = true;
   }
 
+  /** Says who brought a cell that is here. */
+  tag(x, y, z, tag) {
+    if (!this.has(x, y, z)) return;
+    this.fresh.set(x | (y << 6) | (z << 12), tag);
+    this.isChanged = true;
+  }
+
   remove(x, y, z) {
     if (!this.has(x, y, z)) return;
     this.bits[(z * SIDE + y) * 2 + (x >> 5)] &= ~(1 << (x & 31));
