@@ -97,6 +97,8 @@ operations! {
     Reflect:           Some(Read),  grpc "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
     HealthCheck:       None,        grpc "/grpc.health.v1.Health/Check";
     HealthWatch:       None,        grpc "/grpc.health.v1.Health/Watch";
+    ShowViewer:        None,        http GET "/";
+    GetViewerFile:     None,        http GET "/viewer/{file}";
     Live:              None,        http GET "/livez";
     Ready:             None,        http GET "/readyz";
     Metrics:           Some(Read),  http GET "/metrics";

@@ -29,6 +29,7 @@ mod starting;
 mod trajectory;
 mod undo;
 mod unreadable;
+mod viewer;
 mod voxels;
 mod watch;
 

@@ -6,7 +6,7 @@ use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
     Adapter, block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy, probes,
-    question, scans, trajectory, undo, voxels, watch,
+    question, scans, trajectory, undo, viewer, voxels, watch,
 };
 use crate::access::Operation;
 
@@ -57,6 +57,8 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::DeleteKeepOut => on(method, keep_outs::delete),
         Operation::SnapshotMap => on(method, map_file::take),
         Operation::RestoreMap => on(method, map_file::restore),
+        Operation::ShowViewer => on(method, viewer::index),
+        Operation::GetViewerFile => on(method, viewer::file),
         Operation::Live => on(method, probes::live),
         Operation::Ready => on(method, probes::ready),
         Operation::Metrics => on(method, probes::metrics),

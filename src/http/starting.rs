@@ -1,4 +1,5 @@
-//! What is answered while the maps are being opened: that the process lives, and how far that has come.
+//! What is answered while the maps are being opened: that the process lives, and how far that has come. The viewer's page is
+//! there too, and says the same.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use serde_json::json;
 
 use super::error::HttpError;
 use super::params::NoParams;
-use super::probes;
+use super::{probes, viewer};
 use crate::access::Access;
 use crate::service::{Reason, ServiceError};
 use crate::store::{Opened, OpeningProgress};
@@ -22,6 +23,8 @@ pub fn starting(progress: Arc<OpeningProgress>, access: Access) -> Router {
     Router::new()
         .route("/livez", get(probes::live))
         .route("/readyz", get(ready))
+        .route("/", get(viewer::index))
+        .route("/viewer/{file}", get(viewer::file))
         .fallback(refuse)
         .layer(from_fn_with_state(access, named))
         .with_state(progress)

@@ -73,6 +73,8 @@ fn body(operation: Operation) -> Body {
         | Operation::Reflect
         | Operation::HealthCheck
         | Operation::HealthWatch
+        | Operation::ShowViewer
+        | Operation::GetViewerFile
         | Operation::Live
         | Operation::Ready
         | Operation::Metrics => Body::None,
@@ -83,7 +85,8 @@ fn body(operation: Operation) -> Body {
 fn routes() -> impl Iterator<Item = (Operation, Method, String)> {
     Operation::ALL.iter().filter_map(|&operation| {
         let Route { method, path } = operation.route()?;
-        Some((operation, method.parse().unwrap(), path.replace("{map}", "a").replace("{name}", "dock")))
+        let path = path.replace("{map}", "a").replace("{name}", "dock").replace("{file}", "main.js");
+        Some((operation, method.parse().unwrap(), path))
     })
 }
 

@@ -63,7 +63,7 @@ async fn a_page_of_another_site_changes_nothing_with_keys_or_without() {
     let mut changing = 0;
     for &operation in Operation::ALL {
         let Some(route) = operation.route() else { continue };
-        let path = route.path.replace("{map}", "own").replace("{name}", "dock");
+        let path = route.path.replace("{map}", "own").replace("{name}", "dock").replace("{file}", "main.js");
         for foreign in
             [("origin", "http://evil.example"), ("origin", "null"), ("sec-fetch-site", "cross-site")]
         {

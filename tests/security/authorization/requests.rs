@@ -122,7 +122,11 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             ServerReflectionRequest { message_request, ..Default::default() }.encode_to_vec()
         }
         Operation::HealthCheck | Operation::HealthWatch => HealthCheckRequest::default().encode_to_vec(),
-        Operation::Live | Operation::Ready | Operation::Metrics => Vec::new(),
+        Operation::ShowViewer
+        | Operation::GetViewerFile
+        | Operation::Live
+        | Operation::Ready
+        | Operation::Metrics => Vec::new(),
     }
 }
 
@@ -216,6 +220,8 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::Reflect
         | Operation::HealthCheck
         | Operation::HealthWatch
+        | Operation::ShowViewer
+        | Operation::GetViewerFile
         | Operation::Live
         | Operation::Ready
         | Operation::Metrics => false,

@@ -14,7 +14,12 @@ use super::requests::names_a_map;
 /// here and does not compile.
 fn meant(operation: Operation) -> Option<Scope> {
     match operation {
-        Operation::HealthCheck | Operation::HealthWatch | Operation::Live | Operation::Ready => None,
+        Operation::HealthCheck
+        | Operation::HealthWatch
+        | Operation::Live
+        | Operation::Ready
+        | Operation::ShowViewer
+        | Operation::GetViewerFile => None,
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels

@@ -124,6 +124,7 @@ impl Demo {
         let resolution_m = self.resolution.unwrap_or(if self.explore { 0.05 } else { 0.03 });
         let new_map = NewMap { levels: Some(self.levels), ..NewMap::of(resolution_m) };
         let (info, _) = operator.create_map(&map, new_map).await?;
+        output.say(format!("See the map grow in a browser: {}\n", guide::page(&serving)))?;
         if !self.explore {
             return Ok(Shown::Built(self.show_building(serving, &operator, &info, output).await?));
         }

@@ -1,0 +1,102 @@
+//! `GET /` and `GET /viewer/{file}`: the page that draws a map in a browser.
+//!
+//! The page is the same for everybody and asks for no key; all that it shows comes from the other routes, which do. It names
+//! nothing but what it came from, by relative links, so that it works behind a proxy that puts a prefix before it.
+
+mod files;
+
+use axum::extract::Path;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+
+use super::error::HttpError;
+use super::params::NoParams;
+use crate::service::{Reason, ServiceError};
+use crate::util::excerpt;
+use files::{File, INDEX};
+
+/// What the page may load and do: scripts, styles, pictures and requests of this server alone, no inline script, no form
+/// that leaves it, no frame around it.
+const CONTENT_SECURITY_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
+     frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+);
+
+/// The page itself.
+pub(super) async fn index(NoParams: NoParams, headers: HeaderMap) -> Response {
+    respond(&INDEX, &headers)
+}
+
+/// One of the files that the page is made of.
+pub(super) async fn file(
+    Path(name): Path<String>,
+    NoParams: NoParams,
+    headers: HeaderMap,
+) -> Result<Response, HttpError> {
+    let found = files::find(&name).ok_or_else(|| {
+        ServiceError::new(Reason::RouteNotFound, format!("no route /viewer/{}", excerpt(&name)))
+    })?;
+    Ok(respond(found, &headers))
+}
+
+/// A file, or that the one the browser has is still the same.
+fn respond(file: &File, asked: &HeaderMap) -> Response {
+    let etag = files::etag();
+    let is_known = asked.get_all(header::IF_NONE_MATCH).iter().any(|known| known == etag);
+    let headers = [
+        (header::ETAG, etag.clone()),
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+        (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+        (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
+    ];
+    if is_known {
+        return (StatusCode::NOT_MODIFIED, headers).into_response();
+    }
+    let content_type = [(header::CONTENT_TYPE, HeaderValue::from_static(file.content_type()))];
+    (headers, content_type, file.text).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::body::to_bytes;
+
+    #[tokio::test]
+    async fn a_file_comes_once_and_then_only_word_that_it_is_the_same() {
+        let first = index(NoParams, HeaderMap::new()).await;
+        assert_eq!(first.status(), StatusCode::OK);
+        assert_eq!(first.headers()[header::CONTENT_TYPE], "text/html; charset=utf-8");
+        let etag = first.headers()[header::ETAG].clone();
+        let asked = HeaderMap::from_iter([(header::IF_NONE_MATCH, etag)]);
+        let again = index(NoParams, asked).await;
+        assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
+        assert!(to_bytes(again.into_body(), 1).await.unwrap().is_empty());
+        let other = HeaderMap::from_iter([(header::IF_NONE_MATCH, HeaderValue::from_static("\"other\""))]);
+        assert_eq!(index(NoParams, other).await.status(), StatusCode::OK);
+    }
+
+    #[tokio::test]
+    async fn every_answer_forbids_what_the_page_does_not_do() {
+        for answer in [
+            index(NoParams, HeaderMap::new()).await,
+            file(Path("main.js".to_owned()), NoParams, HeaderMap::new()).await.unwrap(),
+        ] {
+            let said = |name| answer.headers()[name].to_str().unwrap();
+            let policy = said("content-security-policy");
+            assert!(policy.starts_with("default-src 'none'; script-src 'self'; "), "{policy}");
+            assert!(!policy.contains("unsafe") && policy.contains("frame-ancestors 'none'"), "{policy}");
+            assert_eq!(said("x-content-type-options"), "nosniff");
+            assert_eq!(said("referrer-policy"), "no-referrer");
+            assert_eq!(said("cache-control"), "no-cache");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_name_that_is_none_of_the_files_is_no_route() {
+        for name in ["../Cargo.toml", "index.html", "main", "", "MAIN.JS"] {
+            let refused = file(Path(name.to_owned()), NoParams, HeaderMap::new()).await.unwrap_err();
+            assert_eq!(refused.into_response().status(), StatusCode::NOT_FOUND, "{name}");
+        }
+    }
+}
