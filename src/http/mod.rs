@@ -16,10 +16,13 @@ mod middleware;
 mod object;
 mod observers;
 mod occupancy;
+mod octets;
+mod openapi;
 mod params;
 mod pieces;
 mod probes;
 mod question;
+mod reader;
 mod routes;
 mod scans;
 mod scrapes;
@@ -31,6 +34,7 @@ mod unreadable;
 mod voxels;
 mod watch;
 
+pub use openapi::openapi_json;
 pub use starting::starting;
 
 use axum::Router;

@@ -73,7 +73,10 @@ fn body(operation: Operation) -> Body {
         | Operation::HealthWatch
         | Operation::Live
         | Operation::Ready
-        | Operation::Metrics => Body::None,
+        | Operation::Metrics
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => Body::None,
     }
 }
 
@@ -81,7 +84,8 @@ fn body(operation: Operation) -> Body {
 fn routes() -> impl Iterator<Item = (Operation, Method, String)> {
     Operation::ALL.iter().filter_map(|&operation| {
         let Route { method, path } = operation.route()?;
-        Some((operation, method.parse().unwrap(), path.replace("{map}", "a").replace("{name}", "dock")))
+        let path = path.replace("{map}", "a").replace("{name}", "dock").replace("{file}", "start.js");
+        Some((operation, method.parse().unwrap(), path))
     })
 }
 

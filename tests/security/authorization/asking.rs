@@ -35,8 +35,8 @@ pub(crate) async fn over_http(
     map: &str,
     key: Option<&Secret>,
 ) -> Outcome {
-    let (method, path) =
-        (route.method.parse().unwrap(), route.path.replace("{map}", map).replace("{name}", "dock"));
+    let path = route.path.replace("{map}", map).replace("{name}", "dock").replace("{file}", "start.js");
+    let method = route.method.parse().unwrap();
     let answer = server.http(method, &path, key, body(operation)).await;
     let status = answer.status();
     let challenge = answer.headers().get(WWW_AUTHENTICATE).map(|challenge| challenge.to_str().unwrap());

@@ -120,7 +120,12 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
             ServerReflectionRequest { message_request, ..Default::default() }.encode_to_vec()
         }
         Operation::HealthCheck | Operation::HealthWatch => HealthCheckRequest::default().encode_to_vec(),
-        Operation::Live | Operation::Ready | Operation::Metrics => Vec::new(),
+        Operation::Live
+        | Operation::Ready
+        | Operation::Metrics
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => Vec::new(),
     }
 }
 
@@ -214,6 +219,9 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::HealthWatch
         | Operation::Live
         | Operation::Ready
-        | Operation::Metrics => false,
+        | Operation::Metrics
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => false,
     }
 }

@@ -14,7 +14,13 @@ use super::requests::names_a_map;
 /// here and does not compile.
 fn meant(operation: Operation) -> Option<Scope> {
     match operation {
-        Operation::HealthCheck | Operation::HealthWatch | Operation::Live | Operation::Ready => None,
+        Operation::HealthCheck
+        | Operation::HealthWatch
+        | Operation::Live
+        | Operation::Ready
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => None,
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
