@@ -102,6 +102,9 @@ operations! {
     Live:              None,        http GET "/livez";
     Ready:             None,        http GET "/readyz";
     Metrics:           Some(Read),  http GET "/metrics";
+    DescribeApi:       None,        http GET "/openapi.json";
+    ReadApi:           None,        http GET "/docs";
+    ReadApiFile:       None,        http GET "/docs/{asset}";
 }
 
 impl Operation {

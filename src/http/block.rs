@@ -8,31 +8,48 @@ use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use super::Adapter;
 use super::error::HttpError;
 use super::headers;
 use super::middleware::Service;
-use super::params::{Map, Params, RegionParams};
+use super::octets::BlockBytes;
+use super::params::{Map, Numbers3, Numbers7, Params, RegionParams};
 use super::pieces::{self, Pieces};
 use crate::map::DistanceBlock;
 use crate::service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels, Reason, ServiceError};
 use crate::util::Keyword;
 use crate::voxel::{BlockMask, VoxelKey};
-use crate::wire::json::{ByKeyword, JsonVersion};
+use crate::wire::json::{ByKeyword, JsonVersion, VoxelIndex, described_by_words};
 use crate::wire::required;
 
-#[derive(Deserialize)]
+/// Which part of the map, in which form.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct BlockParams {
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// Occupied voxels by block, or how far each cell is from the nearest of them; `sparse` without.
+    #[param(value_type = Form, inline, required = false)]
     #[serde(default)]
     form: ByKeyword<Form>,
+    /// Smallest coordinates `x,y,z` of a box along the map's axes, meters; together with `max`.
+    #[param(value_type = Option<Numbers3>, inline)]
     min: Option<String>,
+    /// Largest coordinates `x,y,z`.
+    #[param(value_type = Option<Numbers3>, inline)]
     max: Option<String>,
+    /// Center and orientation `x,y,z,qx,qy,qz,qw` of a box with any orientation; together with `size`, in the
+    /// place of `min` and `max`.
+    #[param(value_type = Option<Numbers7>, inline)]
     map_from_box: Option<String>,
+    /// Its sides `x,y,z`, meters.
+    #[param(value_type = Option<Numbers3>, inline)]
     size: Option<String>,
+    /// Of a dense block: the least distance that is not told apart from larger ones, meters.
     cap_m: Option<f64>,
 }
 
@@ -55,25 +72,84 @@ impl Keyword for Form {
     }
 }
 
-/// What stands before the voxels.
-#[derive(Serialize)]
-struct Head {
+described_by_words!(Form);
+
+/// What stands before the voxels of a block.
+#[derive(Serialize, ToSchema)]
+struct BlockHead {
+    /// The level.
     level: u32,
+    /// Side of a voxel of the level, meters.
     resolution_m: f64,
     #[serde(flatten)]
     version: JsonVersion,
     #[serde(flatten)]
-    cells: Option<Cells>,
+    cells: Option<BlockCells>,
 }
 
 /// Which cells a dense block has.
-#[derive(Serialize)]
-struct Cells {
+#[derive(Serialize, ToSchema)]
+struct BlockCells {
+    /// Indices of the first cell.
+    #[schema(value_type = VoxelIndex)]
     origin: [i32; 3],
+    /// Numbers of cells along x, y and z.
+    #[schema(value_type = VoxelIndex)]
     size: [usize; 3],
+    /// The distance that stands for all that are as large or larger.
     cap: u8,
 }
 
+/// A part of a level.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "the answer is written in pieces; this describes it")]
+struct BlockResponse {
+    #[serde(flatten)]
+    head: BlockHead,
+    /// Of a sparse block: blocks of 8 x 8 x 8 voxels, without empty ones.
+    #[schema(nullable = false)]
+    blocks: Option<Vec<SparseBlock>>,
+    /// Of a dense block: how far each cell's center is from the nearest occupied cube, in quarters of a cell;
+    /// x fastest, then y.
+    #[schema(nullable = false)]
+    distances: Option<Vec<u8>>,
+}
+
+/// A block of 8 x 8 x 8 voxels.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "the answer is written in pieces; this describes it")]
+struct SparseBlock {
+    /// Its indices, in units of blocks.
+    #[schema(value_type = VoxelIndex)]
+    block: [i32; 3],
+    /// A bit a voxel, in Morton order: 64 bytes, two hexadecimal digits each.
+    #[schema(pattern = "^[0-9a-f]{128}$")]
+    mask: String,
+}
+
+/// Gives out a part of a level as it is stored.
+///
+/// Bytes where the request has `accept: application/octet-stream`. At most `limits.block_bytes_max`.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/block",
+    params(BlockParams),
+    responses((
+        status = 200,
+        description = "Answered",
+        content((BlockResponse = "application/json"), (BlockBytes = "application/octet-stream")),
+        headers(
+            ("mrol-level" = u32, description = "With bytes: the level."),
+            ("mrol-resolution-m" = f64, description = "With bytes: side of a voxel, meters."),
+            ("mrol-origin" = String, description = "With bytes: `i,j,k` of the first cell of a dense block."),
+            ("mrol-size" = String, description = "With bytes: numbers of its cells along each axis."),
+            ("mrol-cap" = u8, description = "With bytes: the distance that stands for all that are as large or larger."),
+            ("mrol-revision" = u64, description = "With bytes: the revision."),
+            ("mrol-map-uuid" = String, description = "With bytes: the uuid of the map."),
+            ("mrol-content-hash" = String, description = "With bytes: the hash of the finest voxels.")
+        )
+    ))
+)]
 pub(super) async fn get(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -122,7 +198,7 @@ const DISTANCES: Pieces = Pieces { field: "distances", items: 128 << 10, item_by
 
 fn as_json(answer: BlockAnswer, adapter: &Adapter) -> Result<Response, HttpError> {
     let BlockAnswer { level, resolution_m, voxels, version } = answer;
-    let mut head = Head { level, resolution_m, version: version.into(), cells: None };
+    let mut head = BlockHead { level, resolution_m, version: version.into(), cells: None };
     match voxels {
         BlockVoxels::Sparse(blocks) => {
             let count = blocks.len();
@@ -133,7 +209,7 @@ fn as_json(answer: BlockAnswer, adapter: &Adapter) -> Result<Response, HttpError
             Ok(pieces::response(BLOCKS.of(&head, count, write)?, kept))
         }
         BlockVoxels::Dense(DistanceBlock { origin, size, cap, distances }) => {
-            head.cells = Some(Cells { origin, size, cap: cap.get() });
+            head.cells = Some(BlockCells { origin, size, cap: cap.get() });
             let count = distances.len();
             let kept = adapter.admission.keep(count + DISTANCES.bytes(count))?;
             let write = move |text: &mut String, item: usize| text.push_str(&distances[item].to_string());

@@ -2,50 +2,87 @@
 
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
+use super::octets::PointBytes;
 use super::params::{Map, request_id_of};
 use super::shapes::{BoxBody, OrientedBoxBody, SphereBody};
+use crate::map::RequestId;
 use crate::service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
-use crate::wire::json::JsonVersion;
+use crate::wire::json::{JsonVersion, VoxelIndex};
 
-#[derive(Deserialize)]
+/// What is deleted: exactly one target.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"sphere": {"center_m": [50, 50, 50], "radius_m": 0.1}}))]
 pub(super) struct DeletionBody {
+    /// The voxels of these points.
+    #[schema(value_type = Option<JsonPoints>)]
     points: Option<JsonPoints>,
+    /// Voxels of the level by their indices.
+    #[schema(value_type = Option<Vec<VoxelIndex>>)]
     voxels: Option<Vec<[i32; 3]>>,
+    /// The voxels whose centers lie in a box along the map's axes.
+    #[schema(value_type = Option<BoxBody>)]
     r#box: Option<Object<BoxBody>>,
+    /// The voxels whose centers lie in a ball.
+    #[schema(value_type = Option<SphereBody>)]
     sphere: Option<Object<SphereBody>>,
+    /// The voxels whose centers lie in a box with any orientation.
+    #[schema(value_type = Option<OrientedBoxBody>)]
     oriented_box: Option<Object<OrientedBoxBody>>,
+    /// The level whose voxels are meant, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// The caller's own id of this change: sent again, it changes nothing.
+    #[schema(value_type = Option<RequestId>)]
     request_id: Option<String>,
+    /// Of a region, only what no scan after this revision touched although one saw well beyond.
     not_seen_since: Option<u64>,
 }
 
-#[derive(Deserialize)]
+/// With points as bytes: what else there is to a deletion.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct DeletionParams {
+    /// The level whose voxels are meant; 0 without.
     #[serde(default)]
     level: u32,
+    /// The caller's own id of this change.
+    #[param(value_type = Option<RequestId>, inline)]
     request_id: Option<String>,
 }
 
 type DeletionPoints = Points<DeletionBody, DeletionParams>;
 
-#[derive(Serialize)]
+/// What a deletion made.
+#[derive(Serialize, ToSchema)]
 pub(super) struct DeletionResponse {
+    /// Finest voxels that went.
     removed: usize,
+    /// True of a request that was answered before: this is that answer.
     replayed: bool,
     #[serde(flatten)]
     version: JsonVersion,
 }
 
+/// Deletes voxels.
+///
+/// Voxels that are not there are no error. Scans that were inserted stay known.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/deletions",
+    params(DeletionParams),
+    request_body(content((DeletionBody = "application/json"), (PointBytes = "application/octet-stream"))),
+    responses((status = 200, description = "Answered", body = DeletionResponse))
+)]
 pub(super) async fn delete(
     Service(service): Service,
     Map(map): Map,

@@ -7,7 +7,8 @@ use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde_json::{Value, json};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::access::Operation;
 use crate::service::{ErrorCode, Reason, ServiceError};
@@ -22,11 +23,51 @@ pub(super) struct HttpError {
     allow: Option<String>,
 }
 
+/// A failed request (RFC 9457).
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Problem {
+    /// The words of the status.
+    title: &'static str,
+    /// The status.
+    status: u16,
+    /// What was wrong, with field, value and limit.
+    detail: String,
+    /// The kind of failure.
+    code: &'static str,
+    /// Why it failed: a stable word for programs.
+    reason: &'static str,
+}
+
+impl Problem {
+    fn of(status: StatusCode, ServiceError { reason, message, .. }: ServiceError) -> Self {
+        Self {
+            title: status.canonical_reason().unwrap_or_default(),
+            status: status.as_u16(),
+            detail: message,
+            code: reason.code().as_str(),
+            reason: reason.as_str(),
+        }
+    }
+}
+
+/// The document by itself, for answers that have begun.
+impl From<ServiceError> for Problem {
+    fn from(error: ServiceError) -> Self {
+        Self::of(status_of(error.reason), error)
+    }
+}
+
 /// The media type of a problem document (RFC 9457).
-const PROBLEM_JSON: HeaderValue = HeaderValue::from_static("application/problem+json");
+pub(super) const PROBLEM_JSON: &str = "application/problem+json";
+
+/// The status of a failure for this reason.
+pub(super) fn status_of(reason: Reason) -> StatusCode {
+    let precise = reason.http_status().and_then(|status| StatusCode::from_u16(status).ok());
+    precise.unwrap_or_else(|| status_of_code(reason.code()))
+}
 
 /// The status of a kind of failure.
-fn status_of(code: ErrorCode) -> StatusCode {
+fn status_of_code(code: ErrorCode) -> StatusCode {
     match code {
         ErrorCode::InvalidArgument => StatusCode::BAD_REQUEST,
         ErrorCode::Unauthenticated => StatusCode::UNAUTHORIZED,
@@ -43,9 +84,7 @@ fn status_of(code: ErrorCode) -> StatusCode {
 
 impl From<ServiceError> for HttpError {
     fn from(error: ServiceError) -> Self {
-        let precise = error.reason.http_status().and_then(|status| StatusCode::from_u16(status).ok());
-        let status = precise.unwrap_or_else(|| status_of(error.code()));
-        Self { status, error, allow: None }
+        Self { status: status_of(error.reason), error, allow: None }
     }
 }
 
@@ -53,8 +92,8 @@ impl IntoResponse for HttpError {
     fn into_response(self) -> Response {
         let (reason, retry_after) = (self.error.reason, self.error.retry_after);
         let code = reason.code();
-        let mut response = (self.status, Json(document(self.status, self.error))).into_response();
-        response.headers_mut().insert(header::CONTENT_TYPE, PROBLEM_JSON);
+        let mut response = (self.status, Json(Problem::of(self.status, self.error))).into_response();
+        response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON));
         response.extensions_mut().insert(reason);
         let headers = response.headers_mut();
         if let Some(wait) = retry_after {
@@ -68,23 +107,6 @@ impl IntoResponse for HttpError {
         }
         response
     }
-}
-
-/// The problem document of a failure, for answers that have begun.
-pub(super) fn problem(error: ServiceError) -> Value {
-    let HttpError { status, error, .. } = error.into();
-    document(status, error)
-}
-
-fn document(status: StatusCode, error: ServiceError) -> Value {
-    let ServiceError { reason, message, .. } = error;
-    json!({
-        "title": status.canonical_reason().unwrap_or_default(),
-        "status": status.as_u16(),
-        "detail": message,
-        "code": reason.code().as_str(),
-        "reason": reason.as_str(),
-    })
 }
 
 /// Why the caller was not let in, where that is what `response` says.

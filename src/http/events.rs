@@ -1,7 +1,7 @@
 //! `GET /v1/maps/{map}/events?since_number=&robot=`: what became of the last scans; and `/events/watch`, each as it comes.
 //!
-//! A watch is a stream of lines, each a JSON document: an event, `{}` where there was none in a while, or at the end
-//! `{"error": ...}` with the problem document of what ended it.
+//! A watch is a stream of lines, each a JSON document: an event, `{"heartbeat":true}` where there was none in a while,
+//! or at the end `{"error": ...}` with the problem document of what ended it.
 
 use std::convert::Infallible;
 
@@ -10,40 +10,63 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use tokio_stream::StreamExt;
+use utoipa::{IntoParams, ToSchema};
 
 use super::Adapter;
-use super::error::{HttpError, problem};
+use super::error::{HttpError, Problem};
 use super::middleware::Service;
 use super::params::{Map, Params};
 use crate::map::RobotName;
 use crate::service::{EventMessage, EventsQuery, ServiceError};
 use crate::wire::json::JsonEvent;
 
-#[derive(Deserialize)]
+/// Which events.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct EventsParams {
+    /// Events after this number; all where it is 0, or greater than that of the last event.
+    #[param(required = false)]
     #[serde(default)]
     since_number: u64,
+    /// The robot; all of them without.
+    #[param(value_type = Option<RobotName>, inline)]
     robot: Option<String>,
 }
 
 /// The last events of a map.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 pub(super) struct EventsResponse {
+    /// The oldest first.
     events: Vec<JsonEvent>,
 }
 
 /// A line of a watch.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 #[serde(untagged)]
-enum Line {
+enum EventLine {
+    /// What became of a scan.
     Event(Box<JsonEvent>),
-    Heartbeat {},
-    Failed { error: Value },
+    /// There was no event in a while.
+    Heartbeat {
+        /// True.
+        heartbeat: bool,
+    },
+    /// Why the watch ends.
+    Failed {
+        /// As a failed request would be answered.
+        error: Problem,
+    },
 }
 
+/// Lists what became of the last scans that were sent for insertion.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/events",
+    params(EventsParams),
+    responses((status = 200, description = "Answered", body = EventsResponse))
+)]
 pub(super) async fn list(
     Service(service): Service,
     Map(map): Map,
@@ -53,6 +76,15 @@ pub(super) async fn list(
     Ok(Json(EventsResponse { events: events.iter().map(|event| JsonEvent::from(&**event)).collect() }))
 }
 
+/// Tells of the events that a list would have, then of each as it comes, for as long as the client reads.
+///
+/// Each line is a JSON document. A heartbeat says that there was no event in a while; the last line says why the watch ends.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/events/watch",
+    params(EventsParams),
+    responses((status = 200, description = "Lines", body = EventLine, content_type = "application/x-ndjson"))
+)]
 pub(super) async fn watch(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -68,9 +100,9 @@ pub(super) async fn watch(
         }
         has_failed = message.is_err();
         let line = match message {
-            Ok(EventMessage::Event(event)) => Line::Event(Box::new((&event).into())),
-            Ok(EventMessage::Heartbeat) => Line::Heartbeat {},
-            Err(error) => Line::Failed { error: problem(error) },
+            Ok(EventMessage::Event(event)) => EventLine::Event(Box::new((&event).into())),
+            Ok(EventMessage::Heartbeat) => EventLine::Heartbeat { heartbeat: true },
+            Err(error) => EventLine::Failed { error: error.into() },
         };
         serde_json::to_string(&line).ok().map(|line| Ok::<_, Infallible>(line + "\n"))
     });

@@ -5,9 +5,12 @@ use std::fmt::{Formatter, Result as FmtResult};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
+use utoipa::openapi::schema::OneOfBuilder;
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
 
 use crate::bloom::FilterSettings;
-use crate::wire::json::NO_FILTER;
+use crate::wire::json::{NO_FILTER, schema_of_words};
 
 /// An object with settings of filters, in which the server's default stands for what is left out; or `"none"`.
 #[derive(Debug)]
@@ -16,10 +19,13 @@ pub(super) enum FilterChoice {
     NoFilter,
 }
 
-#[derive(Debug, Default, Deserialize)]
+/// Settings of filters; what is left out is the server's default.
+#[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FilterBody {
+    /// Hash functions.
     hashes: Option<u32>,
+    /// Bits of a plane a voxel, just before growth.
     bits_per_key: Option<f64>,
 }
 
@@ -39,6 +45,14 @@ impl FilterChoice {
 impl Default for FilterChoice {
     fn default() -> Self {
         Self::Filter(FilterBody::default())
+    }
+}
+
+impl ToSchema for FilterChoice {}
+
+impl PartialSchema for FilterChoice {
+    fn schema() -> RefOr<Schema> {
+        OneOfBuilder::new().item(FilterBody::schema()).item(schema_of_words([NO_FILTER])).into()
     }
 }
 

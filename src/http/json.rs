@@ -1,7 +1,12 @@
 //! Points in JSON.
 
+use std::borrow::Cow;
+
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
 
 use crate::geometry::Point;
 use crate::service::PointCloud;
@@ -13,6 +18,23 @@ pub(super) struct JsonPoints(Vec<Point>);
 impl From<JsonPoints> for PointCloud {
     fn from(points: JsonPoints) -> Self {
         points.0.into()
+    }
+}
+
+impl ToSchema for JsonPoints {
+    fn name() -> Cow<'static, str> {
+        "Points".into()
+    }
+}
+
+impl PartialSchema for JsonPoints {
+    fn schema() -> RefOr<Schema> {
+        let coordinate = SchemaType::from_iter([Type::Number, Type::Null]);
+        let coordinates = ArrayBuilder::new().items(ObjectBuilder::new().schema_type(coordinate));
+        let points = ArrayBuilder::new().items(coordinates.min_items(Some(3)).max_items(Some(3)));
+        let description = "Points `[x, y, z]`, meters; null in a scan stands for \"no return\". At most \
+                           `limits.points_per_request_max`.";
+        points.description(Some(description)).into()
     }
 }
 

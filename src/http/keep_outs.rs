@@ -2,6 +2,7 @@
 
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use super::body;
 use super::error::HttpError;
@@ -9,41 +10,68 @@ use super::middleware::Service;
 use super::object::Object;
 use super::params::{KeepOutOfMap, Map, NoParams, Params, request_id_of};
 use super::shapes::{BoxBody, OrientedBoxBody, PrismBody, SphereBody};
-use crate::map::{KeepOutName, KeepOutShape, Region};
+use crate::map::{KeepOutName, KeepOutShape, Region, RequestId};
 use crate::service::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut, Reason, ServiceError};
 use crate::wire::json::{JsonKeepOut, JsonVersion};
 
-#[derive(Deserialize)]
+/// A keep-out: exactly one of its shapes.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"sphere": {"center_m": [1, 1, 0], "radius_m": 0.5}}))]
 pub(super) struct KeepOutBody {
+    /// A box along the map's axes.
+    #[schema(value_type = Option<BoxBody>)]
     r#box: Option<Object<BoxBody>>,
+    /// A ball.
+    #[schema(value_type = Option<SphereBody>)]
     sphere: Option<Object<SphereBody>>,
+    /// A box with any orientation.
+    #[schema(value_type = Option<OrientedBoxBody>)]
     oriented_box: Option<Object<OrientedBoxBody>>,
+    /// A polygon with a height.
+    #[schema(value_type = Option<PrismBody>)]
     prism: Option<Object<PrismBody>>,
+    /// When the server ends it, nanoseconds since the Unix epoch; never without.
     expires_at_ns: Option<i64>,
+    /// The caller's own id of this change: sent again, it changes nothing.
+    #[schema(value_type = Option<RequestId>)]
     request_id: Option<String>,
 }
 
-#[derive(Deserialize)]
+/// The parameters of the removal of a keep-out.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct RemovalParams {
+    /// The caller's own id of this change: sent again, it changes nothing.
+    #[param(value_type = Option<RequestId>, inline)]
     request_id: Option<String>,
 }
 
-#[derive(Serialize)]
+/// What a change of a keep-out made.
+#[derive(Serialize, ToSchema)]
 pub(super) struct KeepOutResponse {
+    /// True of a request that was answered before: this is that answer.
     replayed: bool,
     #[serde(flatten)]
     version: JsonVersion,
 }
 
-#[derive(Serialize)]
+/// The keep-outs of a map.
+#[derive(Serialize, ToSchema)]
 pub(super) struct KeepOutsResponse {
+    /// The keep-outs, by name.
     keep_outs: Vec<JsonKeepOut>,
     #[serde(flatten)]
     version: JsonVersion,
 }
 
+/// Lists the keep-outs of a map.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/keep-outs",
+    responses((status = 200, description = "Answered", body = KeepOutsResponse))
+)]
 pub(super) async fn list(
     Service(service): Service,
     Map(map): Map,
@@ -53,6 +81,15 @@ pub(super) async fn list(
     Ok(Json(listing.into()))
 }
 
+/// Puts a keep-out: a part of space where no robot may go, whatever the map holds there.
+///
+/// It takes the place of the one of its name.
+#[utoipa::path(
+    put,
+    path = "/v1/maps/{map}/keep-outs/{name}",
+    request_body = KeepOutBody,
+    responses((status = 200, description = "Answered", body = KeepOutResponse))
+)]
 pub(super) async fn put(
     Service(service): Service,
     KeepOutOfMap(map, name): KeepOutOfMap,
@@ -62,6 +99,13 @@ pub(super) async fn put(
     Ok(Json(answer.into()))
 }
 
+/// Removes a keep-out.
+#[utoipa::path(
+    delete,
+    path = "/v1/maps/{map}/keep-outs/{name}",
+    params(RemovalParams),
+    responses((status = 200, description = "Answered", body = KeepOutResponse))
+)]
 pub(super) async fn delete(
     Service(service): Service,
     KeepOutOfMap(map, name): KeepOutOfMap,

@@ -2,60 +2,102 @@
 
 use axum::response::Json;
 use serde::Deserialize;
+use utoipa::{IntoParams, ToSchema};
 
 use super::body::{Points, points_of};
 use super::error::HttpError;
 use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
-use super::params::{self, Map};
+use super::octets::PointBytes;
+use super::params::{self, Map, Numbers3, Numbers6};
 use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
 use crate::service::{LocalizationRequest, PointCloud, Reason, ServiceError};
-use crate::wire::json::JsonLocalization;
+use crate::wire::json::{JsonLocalization, Vector3};
 
-#[derive(Deserialize)]
+/// A scan, and what is known of where it was taken.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"points": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "gravity": {"in_sensor": [0, 0, -1]}}))]
 pub(super) struct LocalizationBody {
+    /// The scan, in the sensor frame.
     points: JsonPoints,
+    /// The direction in which things fall: makes the search about ten times as fast, and exhaustive.
+    #[schema(value_type = Option<GravityBody>)]
     gravity: Option<Object<GravityBody>>,
-    search_box: Option<Object<BoxBody>>,
+    /// Where the scan may have been taken; the bulk of the map and around its trajectory without.
+    #[schema(value_type = Option<SearchBoxBody>)]
+    search_box: Option<Object<SearchBoxBody>>,
+    /// Seconds that the search may take, at most `limits.localization_time_max_s`.
     time_limit_s: Option<f64>,
+    /// Places in the answer, at most `limits.localization_candidates_max`; 5 without.
     #[serde(default)]
     candidates: u32,
+    /// Seed of the sampling: the same one gives the same answer; 0 without.
     #[serde(default)]
     seed: u64,
 }
 
-#[derive(Deserialize)]
+/// The direction in which things fall.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 struct GravityBody {
+    /// In the sensor frame; any length.
+    #[schema(value_type = Vector3)]
     in_sensor: [f64; 3],
+    /// In the map frame; `[0, 0, -1]` without.
+    #[schema(value_type = Option<Vector3>)]
     in_map: Option<[f64; 3]>,
 }
 
-#[derive(Deserialize)]
+/// A box along the map's axes, meters.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-struct BoxBody {
+struct SearchBoxBody {
+    /// Smallest coordinates.
+    #[schema(value_type = Vector3)]
     min_m: [f64; 3],
+    /// Largest coordinates.
+    #[schema(value_type = Vector3)]
     max_m: [f64; 3],
 }
 
 /// The parameters of a localization beside points as bytes: `gravity=x,y,z&map_gravity=x,y,z&search_box=x,y,z,x,y,z`.
-#[derive(Deserialize)]
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct LocalizationParams {
+    /// The direction in which things fall, `x,y,z` in the sensor frame.
+    #[param(value_type = Option<Numbers3>, inline)]
     gravity: Option<String>,
+    /// The same in the map frame; `0,0,-1` without.
+    #[param(value_type = Option<Numbers3>, inline)]
     map_gravity: Option<String>,
+    /// Where the scan may have been taken: the smallest and the largest coordinates, `x,y,z,x,y,z`.
+    #[param(value_type = Option<Numbers6>, inline)]
     search_box: Option<String>,
+    /// Seconds that the search may take, at most `limits.localization_time_max_s`.
     time_limit_s: Option<f64>,
+    /// Places in the answer, at most `limits.localization_candidates_max`; 5 without.
     #[serde(default)]
     candidates: u32,
+    /// Seed of the sampling: the same one gives the same answer; 0 without.
     #[serde(default)]
     seed: u64,
 }
 
 type LocalizationPoints = Points<LocalizationBody, LocalizationParams>;
 
+/// Finds where a scan was taken, with no guess.
+///
+/// A scan that fits nowhere, or in several places, is an answer and not an error.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/localize",
+    params(LocalizationParams),
+    request_body(content((LocalizationBody = "application/json"), (PointBytes = "application/octet-stream"))),
+    responses((status = 200, description = "Answered", body = JsonLocalization))
+)]
 pub(super) async fn localize(
     Service(service): Service,
     Map(map): Map,

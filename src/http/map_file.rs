@@ -7,14 +7,32 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use super::error::HttpError;
 use super::middleware::Service;
+use super::octets::MapFileBytes;
 use super::params::{Map, NoParams, Params};
 use super::{Adapter, body, headers};
 use crate::wire::json::JsonMap;
 use crate::wire::snapshot_pieces;
 
+/// Gives out a map at one revision as a map file.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/snapshot",
+    responses((
+        status = 200,
+        description = "Answered",
+        body = MapFileBytes,
+        content_type = "application/octet-stream",
+        headers(
+            ("mrol-revision" = u64, description = "The revision."),
+            ("mrol-map-uuid" = String, description = "The uuid of the map."),
+            ("mrol-content-hash" = String, description = "The hash of the finest voxels.")
+        )
+    ))
+)]
 pub(super) async fn take(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -38,14 +56,23 @@ pub(super) async fn take(
 }
 
 /// The parameters of a restore.
-#[derive(Deserialize)]
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct RestoreParams {
-    /// Take the place of the map of that name.
+    /// Take the place of the map of that name, which is kept under another; false without.
     #[serde(default)]
     replace: bool,
 }
 
+/// Makes a map from a map file, of at most `limits.map_file_bytes_max` bytes.
+#[utoipa::path(
+    put,
+    path = "/v1/maps/{map}/snapshot",
+    params(RestoreParams),
+    request_body(content = MapFileBytes, content_type = "application/octet-stream"),
+    responses((status = 201, description = "Made", body = JsonMap))
+)]
 pub(super) async fn restore(
     Service(service): Service,
     Map(map): Map,

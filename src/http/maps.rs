@@ -3,6 +3,7 @@
 use axum::http::StatusCode;
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::body;
 use super::error::HttpError;
@@ -10,17 +11,25 @@ use super::filter_choice::FilterChoice;
 use super::middleware::Service;
 use super::params::{Map, NoParams};
 use crate::bloom::FilterSettings;
-use crate::map::{LEVELS_DEFAULT, MapSettings};
+use crate::map::{LEVELS_DEFAULT, MapName, MapSettings};
 use crate::service::UnavailableMap;
 use crate::wire::json::JsonMap;
 
-#[derive(Deserialize)]
+/// The settings of a new map.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"resolution_m": 0.03, "levels": 6}))]
 pub(super) struct SettingsBody {
+    /// Side of a finest voxel, meters.
+    #[schema(minimum = 0.001, maximum = 100)]
     resolution_m: f64,
+    /// The number of levels; 6 without.
+    #[schema(minimum = 1, maximum = 12)]
     levels: Option<u32>,
+    /// The Bloom filters, or `"none"`.
     #[serde(default)]
     filter: FilterChoice,
+    /// Whether the map keeps moments of its points, by which scans are refined; true without.
     moments: Option<bool>,
 }
 
@@ -35,20 +44,51 @@ impl SettingsBody {
     }
 }
 
-#[derive(Serialize)]
+/// The maps that the caller may name.
+#[derive(Serialize, ToSchema)]
 pub(super) struct MapsResponse {
+    /// The maps, by name.
     maps: Vec<JsonMap>,
     /// The maps that could not be opened.
+    #[schema(required = false)]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unavailable: Vec<UnavailableResponse>,
 }
 
-#[derive(Serialize)]
-struct UnavailableResponse {
+/// A map that is not served as it should be.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct UnavailableResponse {
+    /// The name of the map.
     map: String,
+    /// Why, and what helps.
     reason: String,
 }
 
+impl UnavailableResponse {
+    /// The map with its reason.
+    pub(super) fn new(map: &MapName, reason: String) -> Self {
+        Self { map: map.to_string(), reason }
+    }
+}
+
+impl From<UnavailableMap> for UnavailableResponse {
+    fn from(UnavailableMap { name, reason }: UnavailableMap) -> Self {
+        Self::new(&name, reason)
+    }
+}
+
+/// Makes a map.
+///
+/// The answer is 200 where the map was there with these settings; with others it is refused (`map_exists`).
+#[utoipa::path(
+    put,
+    path = "/v1/maps/{map}",
+    request_body = SettingsBody,
+    responses(
+        (status = 201, description = "Made", body = JsonMap),
+        (status = 200, description = "Was there, with these settings", body = JsonMap)
+    )
+)]
 pub(super) async fn create(
     Service(service): Service,
     Map(name): Map,
@@ -59,6 +99,12 @@ pub(super) async fn create(
     Ok((status, Json(info.into())))
 }
 
+/// Describes a map.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}",
+    responses((status = 200, description = "Answered", body = JsonMap))
+)]
 pub(super) async fn describe(
     Service(service): Service,
     Map(name): Map,
@@ -68,16 +114,27 @@ pub(super) async fn describe(
     Ok(Json(info.into()))
 }
 
+/// Lists the maps that the caller may name.
+#[utoipa::path(
+    get,
+    path = "/v1/maps",
+    responses((status = 200, description = "Answered", body = MapsResponse))
+)]
 pub(super) async fn list(
     Service(service): Service,
     NoParams: NoParams,
 ) -> Result<Json<MapsResponse>, HttpError> {
     let maps = service.list_maps().await?.into_iter().map(Into::into).collect();
-    let unavailable = service.unavailable_maps().into_iter();
-    let out = |UnavailableMap { name, reason }| UnavailableResponse { map: name.to_string(), reason };
-    Ok(Json(MapsResponse { maps, unavailable: unavailable.map(out).collect() }))
+    let unavailable = service.unavailable_maps().into_iter().map(Into::into).collect();
+    Ok(Json(MapsResponse { maps, unavailable }))
 }
 
+/// Deletes a map, its memory and its files.
+#[utoipa::path(
+    delete,
+    path = "/v1/maps/{map}",
+    responses((status = 204, description = "Gone"))
+)]
 pub(super) async fn delete(
     Service(service): Service,
     Map(name): Map,

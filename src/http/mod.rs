@@ -17,10 +17,13 @@ mod middleware;
 mod object;
 mod observers;
 mod occupancy;
+mod octets;
+mod openapi;
 mod params;
 mod pieces;
 mod probes;
 mod question;
+mod reader;
 mod routes;
 mod scans;
 mod scrapes;
@@ -33,6 +36,7 @@ mod viewer;
 mod voxels;
 mod watch;
 
+pub use openapi::openapi_json;
 pub use starting::starting;
 
 use axum::Router;

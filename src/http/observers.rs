@@ -2,24 +2,41 @@
 
 use axum::response::Json;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, numbers};
+use super::params::{Map, Numbers3, Params, numbers};
 use crate::geometry::Point;
 use crate::service::{ObservedVoxel, ObserversRequest, Reason, ServiceError};
 use crate::voxel::VoxelKey;
 use crate::wire::json::JsonObservers;
 
-#[derive(Deserialize)]
+/// Which voxel: exactly one of `point` and `voxel`.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct ObserversParams {
+    /// A point `x,y,z` in the voxel, meters.
+    #[param(value_type = Option<Numbers3>, inline, example = "1,1,0.5")]
     point: Option<String>,
+    /// The voxel `i,j,k`, in the place of `point`.
+    #[param(value_type = Option<Numbers3>, inline)]
     voxel: Option<String>,
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
 }
 
+/// Lists the scans that touched a voxel, the newest first.
+///
+/// It needs a data folder. At most `limits.observers_max` scans are told.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/observers",
+    params(ObserversParams),
+    responses((status = 200, description = "Answered", body = JsonObservers))
+)]
 pub(super) async fn list(
     Service(service): Service,
     Map(map): Map,

@@ -3,6 +3,7 @@
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use super::body::{Points, points_of};
 use super::error::HttpError;
@@ -10,52 +11,98 @@ use super::headers;
 use super::json::JsonPoints;
 use super::middleware::Service;
 use super::object::Object;
-use super::params::{self, Map};
+use super::octets::{BitmapBytes, PointBytes};
+use super::params::{self, Map, Numbers7};
 use crate::geometry::Pose;
 use crate::map::Lookup;
 use crate::service::{PointAnswer, PointCloud, PointQuery, ServiceError};
-use crate::wire::json::ByKeyword;
-use crate::wire::json::{JsonPose, JsonVersion};
+use crate::wire::json::{ByKeyword, JsonPose, JsonVersion};
 use crate::wire::{InField, uuid_from};
 
-#[derive(Deserialize)]
+/// Points, and where they are.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"points": [[0, 0, 0], [1, 1, 0.5]]}))]
 pub(super) struct QueryBody {
+    /// The points.
     points: JsonPoints,
+    /// What places the points in the map; the identity without.
+    #[schema(value_type = Option<JsonPose>)]
     map_from_points: Option<Object<JsonPose>>,
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// What is asked: the exact set, or the Bloom filter; `exact` without.
+    #[schema(value_type = Lookup, required = false)]
     #[serde(default)]
     lookup: ByKeyword<Lookup>,
+    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
     min_revision: Option<u64>,
+    /// The map that the answer must speak of: another one is refused (`map_replaced`).
+    #[schema(format = "uuid")]
     map_uuid: Option<String>,
+    /// Whether points in keep-outs count as occupied; false without.
     #[serde(default)]
     keep_out: bool,
 }
 
-#[derive(Deserialize)]
+/// With points as bytes: where they are.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct QueryParams {
+    /// What places the points in the map, `x,y,z,qx,qy,qz,qw`; the identity without.
+    #[param(value_type = Option<Numbers7>, inline)]
     pose: Option<String>,
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// What is asked: the exact set, or the Bloom filter; `exact` without.
+    #[param(value_type = Lookup, inline, required = false)]
     #[serde(default)]
     lookup: ByKeyword<Lookup>,
+    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
     min_revision: Option<u64>,
+    /// The map that the answer must speak of: another one is refused (`map_replaced`).
+    #[param(format = "uuid")]
     map_uuid: Option<String>,
+    /// Whether points in keep-outs count as occupied; false without.
     #[serde(default)]
     keep_out: bool,
 }
 
-#[derive(Serialize)]
+/// Which points are in occupied voxels.
+#[derive(Serialize, ToSchema)]
 struct QueryResponse {
+    /// Whether each point is in an occupied voxel.
     occupied: Vec<bool>,
+    /// How many are.
     points_occupied: usize,
     #[serde(flatten)]
     version: JsonVersion,
 }
 
-/// Answers in the form of the question: JSON, or a bitmap.
+/// Tells which points are in occupied voxels.
+///
+/// The answer has the form of the question: JSON, or a bitmap for points as bytes.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/occupancy",
+    params(QueryParams),
+    request_body(content((QueryBody = "application/json"), (PointBytes = "application/octet-stream"))),
+    responses((
+        status = 200,
+        description = "Answered",
+        content((QueryResponse = "application/json"), (BitmapBytes = "application/octet-stream")),
+        headers(
+            ("mrol-points" = u64, description = "With bytes: how many points were asked about."),
+            ("mrol-points-occupied" = u64, description = "With bytes: how many of them are occupied."),
+            ("mrol-revision" = u64, description = "With bytes: the revision."),
+            ("mrol-map-uuid" = String, description = "With bytes: the uuid of the map."),
+            ("mrol-content-hash" = String, description = "With bytes: the hash of the finest voxels.")
+        )
+    ))
+)]
 pub(super) async fn query(
     Service(service): Service,
     Map(map): Map,

@@ -6,6 +6,9 @@ use axum::extract::{FromRequestParts, Path, Query};
 use axum::http::Uri;
 use axum::http::request::Parts;
 use serde::de::DeserializeOwned;
+use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
 
 use super::Adapter;
 use super::error::HttpError;
@@ -141,6 +144,37 @@ pub(super) fn numbers<const N: usize>(text: &str, field: &str) -> Result<[f64; N
             format!("{field} must be {N} numbers with commas between them, got {:?}", excerpt(text));
         ServiceError::new(Reason::BadNumbers, message)
     })
+}
+
+/// Makes types that stand for so many numbers with commas between them in the description of the API.
+macro_rules! texts_of_numbers {
+    ($($name:ident: $count:literal;)+) => {$(
+        #[doc = concat!(stringify!($count), " numbers with commas between them.")]
+        pub(super) enum $name {}
+
+        impl ToSchema for $name {}
+
+        impl PartialSchema for $name {
+            fn schema() -> RefOr<Schema> {
+                text_of_numbers($count).into()
+            }
+        }
+    )+};
+}
+
+texts_of_numbers! {
+    Numbers2: 2;
+    Numbers3: 3;
+    Numbers6: 6;
+    Numbers7: 7;
+    Numbers36: 36;
+}
+
+/// The schema of what [`numbers`] reads; it reads a little more, such as spaces.
+fn text_of_numbers(count: usize) -> ObjectBuilder {
+    const NUMBER: &str = "[+-]?([0-9]+[.]?[0-9]*([eE][+-]?[0-9]+)?|inf)";
+    let pattern = format!("^{NUMBER}(,{NUMBER}){{{}}}$", count - 1);
+    ObjectBuilder::new().schema_type(Type::String).pattern(Some(pattern))
 }
 
 /// A pose as `x,y,z,qx,qy,qz,qw`.

@@ -4,55 +4,118 @@ use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
-use serde_json::{Value, json};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::Adapter;
-use super::error::HttpError;
+use super::error::{HttpError, Problem};
+use super::maps::UnavailableResponse;
 use super::middleware::Service;
 use super::params::NoParams;
 use crate::access::Authorized;
-use crate::map::MapName;
-use crate::service::{MapService, UnavailableMap};
+use crate::service::MapService;
 use crate::telemetry::Metrics;
 
-/// `GET /livez`: 200 while the process lives.
+/// Whether requests are taken.
+#[derive(Debug, Default, Serialize, ToSchema)]
+pub(super) struct ReadyResponse {
+    /// True where they are.
+    pub(super) ready: bool,
+    /// Why not: `starting` or `draining`.
+    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reason: Option<&'static str>,
+    /// How far the maps are opened, while the server starts.
+    #[serde(flatten)]
+    pub(super) opening: Option<OpeningResponse>,
+    /// Maps that take no changes.
+    #[schema(required = false)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) read_only: Vec<UnavailableResponse>,
+    /// Maps that could not be opened.
+    #[schema(required = false)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) unavailable: Vec<UnavailableResponse>,
+    /// Why changes of all maps are refused: `disk_full`, `memory_full`.
+    #[schema(required = false)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) writes_refused: Vec<&'static str>,
+}
+
+/// How far the maps are opened.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct OpeningResponse {
+    /// The number of maps.
+    pub(super) maps: u64,
+    /// How many are open.
+    pub(super) maps_open: u64,
+    /// Bytes of their files.
+    pub(super) bytes: u64,
+    /// How many were read.
+    pub(super) bytes_read: u64,
+}
+
+/// Tells that the process lives.
+#[utoipa::path(
+    get,
+    path = "/livez",
+    responses((status = 200, description = "It lives: `ok`", body = String, content_type = "text/plain; charset=utf-8"))
+)]
 pub(super) async fn live(NoParams: NoParams) -> &'static str {
     "ok"
 }
 
-/// `GET /readyz`: 200 while requests are taken, 503 with the reason while they are not. Maps that take no changes since
-/// their journal failed are named to whoever may name them; they answer queries all the same. So are maps that could not
-/// be opened (`unavailable`), with what helps: the others are served. A server whose disk
-/// or memory is nearly full stays ready, and `writes_refused` holds the reasons.
+/// Tells whether requests are taken.
+///
+/// Maps that take no changes since their journal failed are named to whoever may name them; they answer
+/// queries all the same. So are maps that could not be opened, with what helps: the others are served. A
+/// server whose disk or memory is nearly full stays ready.
+#[utoipa::path(
+    get,
+    path = "/readyz",
+    responses(
+        (status = 200, description = "Requests are taken", body = ReadyResponse),
+        (
+            status = 503,
+            description = "Requests are not taken, or too many ask",
+            content((ReadyResponse = "application/json"), (Problem = "application/problem+json"))
+        )
+    )
+)]
 pub(super) async fn ready(
     State(adapter): State<Adapter>,
     Service(service): Service,
     NoParams: NoParams,
-) -> (StatusCode, Json<Value>) {
+) -> (StatusCode, Json<ReadyResponse>) {
     if adapter.admission.lifecycle().is_leaving() {
-        (StatusCode::SERVICE_UNAVAILABLE, Json(json!({"ready": false, "reason": "draining"})))
+        let body = ReadyResponse { reason: Some("draining"), ..ReadyResponse::default() };
+        (StatusCode::SERVICE_UNAVAILABLE, Json(body))
     } else {
-        let maps = service.read_only_maps();
-        let named = |(map, reason): &(MapName, String)| json!({"map": map.as_str(), "reason": reason});
-        let read_only: Vec<Value> = maps.iter().map(named).collect();
-        let mut body = json!({"ready": true});
-        if !read_only.is_empty() {
-            body["read_only"] = read_only.into();
-        }
-        let maps = service.unavailable_maps();
-        if !maps.is_empty() {
-            let named = |map: &UnavailableMap| json!({"map": map.name.as_str(), "reason": map.reason});
-            body["unavailable"] = maps.iter().map(named).collect();
-        }
-        let shortages = service.shortages();
-        if !shortages.is_empty() {
-            body["writes_refused"] = shortages.iter().map(|shortage| shortage.reason().as_str()).collect();
-        }
+        let read_only = service.read_only_maps().into_iter();
+        let body = ReadyResponse {
+            ready: true,
+            read_only: read_only.map(|(map, reason)| UnavailableResponse::new(&map, reason)).collect(),
+            unavailable: service.unavailable_maps().into_iter().map(Into::into).collect(),
+            writes_refused: service.shortages().iter().map(|shortage| shortage.reason().as_str()).collect(),
+            ..ReadyResponse::default()
+        };
         (StatusCode::OK, Json(body))
     }
 }
 
-/// `GET /metrics`: Prometheus' text form. One text answers all scrapes of a second.
+/// Tells the metrics in Prometheus' text form.
+///
+/// One text answers all scrapes of `limits.scrape_kept_s`.
+#[utoipa::path(
+    get,
+    path = "/metrics",
+    responses((
+        status = 200,
+        description = "The metrics",
+        body = String,
+        content_type = "text/plain; version=0.0.4; charset=utf-8"
+    ))
+)]
 pub(super) async fn metrics(
     State(adapter): State<Adapter>,
     NoParams: NoParams,

@@ -5,8 +5,8 @@ use axum::http::Method;
 use axum::routing::{MethodFilter, MethodRouter, on};
 
 use super::{
-    Adapter, block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy, probes,
-    question, scans, trajectory, undo, viewer, voxels, watch,
+    Adapter, block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy,
+    openapi, probes, question, reader, scans, trajectory, undo, viewer, voxels, watch,
 };
 use crate::access::Operation;
 
@@ -35,14 +35,14 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::AlignScan => on(method, scans::align),
         Operation::Localize => on(method, localization::localize),
         Operation::QueryPoints => on(method, occupancy::query),
-        Operation::CheckPoses => on(method, question::check_poses),
-        Operation::CheckSpheres => on(method, question::check_spheres),
-        Operation::CheckMotions => on(method, question::check_motions),
-        Operation::CastRays => on(method, question::cast_rays),
-        Operation::FindNearest => on(method, question::find_nearest),
-        Operation::ClassifyPoints => on(method, question::classify_points),
-        Operation::ListFrontiers => on(method, question::list_frontiers),
-        Operation::ProjectGrid => on(method, question::project_grid),
+        Operation::CheckPoses => on(method, question::poses::check_poses),
+        Operation::CheckSpheres => on(method, question::spheres::check_spheres),
+        Operation::CheckMotions => on(method, question::motions::check_motions),
+        Operation::CastRays => on(method, question::rays::cast_rays),
+        Operation::FindNearest => on(method, question::nearest::find_nearest),
+        Operation::ClassifyPoints => on(method, question::classify::classify_points),
+        Operation::ListFrontiers => on(method, question::frontiers::list_frontiers),
+        Operation::ProjectGrid => on(method, question::grid::project_grid),
         Operation::DeleteVoxels => on(method, deletions::delete),
         Operation::Undo => on(method, undo::undo),
         Operation::GetTrajectory => on(method, trajectory::get),
@@ -62,6 +62,9 @@ fn handler(operation: Operation, method: MethodFilter) -> Option<MethodRouter<Ad
         Operation::Live => on(method, probes::live),
         Operation::Ready => on(method, probes::ready),
         Operation::Metrics => on(method, probes::metrics),
+        Operation::DescribeApi => on(method, openapi::describe),
+        Operation::ReadApi => on(method, reader::page),
+        Operation::ReadApiFile => on(method, reader::file),
         Operation::QueryPointsStream
         | Operation::CheckPosesStream
         | Operation::CheckSpheresStream

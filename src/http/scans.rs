@@ -3,6 +3,7 @@
 use axum::body::Bytes;
 use axum::response::Json;
 use serde::Deserialize;
+use utoipa::{IntoParams, ToSchema};
 
 use super::body::{Points, points_of};
 use super::error::HttpError;
@@ -10,89 +11,177 @@ use super::json::JsonPoints;
 use super::list::List;
 use super::middleware::Service;
 use super::object::Object;
-use super::params::{self, Map};
+use super::octets::ScanBytes;
+use super::params::{self, Map, Numbers3, Numbers6, Numbers7, Numbers36};
 use crate::align::{Method, PoseCovariance};
 use crate::geometry::{Point, Pose};
 use crate::map::{RobotName, SessionName};
 use crate::mapping::Guess;
 use crate::scan::PointFilter;
 use crate::service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference};
-use crate::wire::json::ByKeyword;
-use crate::wire::json::{JsonPose, JsonScan};
+use crate::wire::json::{ByKeyword, Corners3, JsonPose, JsonScan, Vector3};
 use crate::wire::{InField, gravity_in_sensor};
 
 /// Numbers of a covariance of a pose.
 const COVARIANCE_NUMBERS: usize = 36;
 
-#[derive(Deserialize)]
+/// A scan, and where it is thought to have been taken.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({
+    "robot": "example", "scan_id": 1, "points": [[1, 1, 0.5], [1, 1.05, 0.5]], "align": false,
+    "guess": {"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]}
+}))]
 pub(super) struct ScanBody {
+    /// The robot that sends it.
+    #[schema(value_type = RobotName)]
     robot: String,
+    /// The run of the robot's program; empty without.
+    #[schema(value_type = SessionName, required = false)]
     #[serde(default)]
     session: String,
+    /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
+    /// nothing.
     scan_id: Option<u64>,
+    /// The points, in the sensor frame.
     points: JsonPoints,
+    /// When it was taken, nanoseconds since the Unix epoch.
     timestamp_ns: Option<i64>,
+    /// Seconds from `timestamp_ns`, one for each point, of a sensor that moves during its sweep.
     point_times: Option<Vec<f32>>,
+    /// Whether the times count from the beginning of the sweep, and `timestamp_ns` is its end; false without.
     #[serde(default)]
     point_times_from_sweep_start: bool,
+    /// Where the scan is thought to have been taken, `map_from_sensor`; the robot's last accepted pose
+    /// without.
+    #[schema(value_type = Option<JsonPose>)]
     guess: Option<Object<JsonPose>>,
+    /// In the place of a guess: how far it is from the last accepted pose, `last_from_sensor`.
+    #[schema(value_type = Option<JsonPose>)]
     motion: Option<Object<JsonPose>>,
+    /// In the place of a guess: as far from the last accepted pose as that is from the one before; false
+    /// without.
     #[serde(default)]
     constant_velocity: bool,
+    /// How far off the guess may be: 6 x 6 numbers, row by row, x y z in meters and then turns about the
+    /// map's axes in radians.
+    #[schema(value_type = Option<Vec<f64>>, min_items = 36, max_items = 36)]
     guess_covariance: Option<List<f64, COVARIANCE_NUMBERS>>,
+    /// The direction in which things fall, in the sensor frame; any length.
+    #[schema(value_type = Option<Vector3>)]
     gravity_in_sensor: Option<[f64; 3]>,
+    /// Whether the scan is aligned; true without. False adds it at its guess.
     #[serde(default = "yes")]
     align: bool,
+    /// Whether it is added whatever its verdict; false without.
     #[serde(default)]
     force: bool,
+    /// Whether the robot is looked for where the scan is refused; the robot's setting without. For `/scans`
+    /// alone.
     recover: Option<bool>,
+    /// Whether what the scan saw through is taken out of the map; the robot's setting without. For `/scans`
+    /// alone.
     carve: Option<bool>,
+    /// How it is aligned; the server's setting without.
+    #[schema(value_type = Option<Method>)]
     method: Option<ByKeyword<Method>>,
+    /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
     foreground_level: Option<u32>,
+    /// Nearer points are skipped, meters; the robot's setting without.
     range_min_m: Option<f64>,
+    /// Farther points are skipped, meters; the robot's setting without.
     range_max_m: Option<f64>,
+    /// Points in this box are of the robot itself, and skipped: its smallest and its largest coordinates,
+    /// meters, in the sensor frame.
+    #[schema(value_type = Option<Corners3>)]
     body_m: Option<[[f64; 3]; 2]>,
+    /// Whether points that are not finite are an error; false without: they are skipped.
     #[serde(default)]
     strict: bool,
 }
 
-#[derive(Deserialize)]
+/// With points as bytes: what else there is to a scan.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct ScanParams {
+    /// The robot that sends it.
+    #[param(value_type = RobotName, inline)]
     robot: String,
+    /// The run of the robot's program; empty without.
+    #[param(value_type = SessionName, inline, required = false)]
     #[serde(default)]
     session: String,
+    /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
+    /// nothing.
     scan_id: Option<u64>,
+    /// When it was taken, nanoseconds since the Unix epoch.
     timestamp_ns: Option<i64>,
-    /// Behind the points come their times.
+    /// Whether times come behind the points; false without.
     #[serde(default)]
     point_times: bool,
+    /// Whether the times count from the beginning of the sweep, and `timestamp_ns` is its end; false without.
     #[serde(default)]
     point_times_from_sweep_start: bool,
+    /// Where the scan is thought to have been taken, `x,y,z,qx,qy,qz,qw`; the robot's last accepted pose
+    /// without.
+    #[param(value_type = Option<Numbers7>, inline)]
     guess: Option<String>,
+    /// In the place of a guess: how far it is from the last accepted pose, `x,y,z,qx,qy,qz,qw`.
+    #[param(value_type = Option<Numbers7>, inline)]
     motion: Option<String>,
+    /// In the place of a guess: as far from the last accepted pose as that is from the one before; false
+    /// without.
     #[serde(default)]
     constant_velocity: bool,
+    /// How far off the guess may be: 36 numbers, row by row.
+    #[param(value_type = Option<Numbers36>, inline)]
     guess_covariance: Option<String>,
+    /// The direction in which things fall, `x,y,z` in the sensor frame; any length.
+    #[param(value_type = Option<Numbers3>, inline)]
     gravity_in_sensor: Option<String>,
+    /// Whether the scan is aligned; true without. False adds it at its guess.
+    #[param(required = false)]
     #[serde(default = "yes")]
     align: bool,
+    /// Whether it is added whatever its verdict; false without.
     #[serde(default)]
     force: bool,
+    /// Whether the robot is looked for where the scan is refused; the robot's setting without. For `/scans`
+    /// alone.
     recover: Option<bool>,
+    /// Whether what the scan saw through is taken out of the map; the robot's setting without. For `/scans`
+    /// alone.
     carve: Option<bool>,
+    /// How it is aligned; the server's setting without.
+    #[param(value_type = Option<Method>, inline)]
     method: Option<ByKeyword<Method>>,
+    /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
     foreground_level: Option<u32>,
+    /// Nearer points are skipped, meters; the robot's setting without.
     range_min_m: Option<f64>,
+    /// Farther points are skipped, meters; the robot's setting without.
     range_max_m: Option<f64>,
+    /// Points in this box are of the robot itself, and skipped: `x,y,z,x,y,z`, meters, in the sensor frame.
+    #[param(value_type = Option<Numbers6>, inline)]
     body_m: Option<String>,
+    /// Whether points that are not finite are an error; false without: they are skipped.
     #[serde(default)]
     strict: bool,
 }
 
 type ScanPoints = Points<ScanBody, ScanParams>;
 
+/// Aligns a scan and, where its verdict is good, adds it to the map.
+///
+/// The first scan of an empty map goes in at its guess. A refused scan is an answer and not an error.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/scans",
+    params(ScanParams),
+    request_body(content((ScanBody = "application/json"), (ScanBytes = "application/octet-stream"))),
+    responses((status = 200, description = "Answered", body = JsonScan))
+)]
 pub(super) async fn insert(
     Service(service): Service,
     Map(map): Map,
@@ -102,6 +191,14 @@ pub(super) async fn insert(
     Ok(Json(answer.into()))
 }
 
+/// Says what became of a scan if it were inserted, and changes nothing.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/alignment",
+    params(ScanParams),
+    request_body(content((ScanBody = "application/json"), (ScanBytes = "application/octet-stream"))),
+    responses((status = 200, description = "Answered", body = JsonScan))
+)]
 pub(super) async fn align(
     Service(service): Service,
     Map(map): Map,

@@ -1,40 +1,61 @@
 //! Parts of space in JSON.
 
 use serde::Deserialize;
+use utoipa::ToSchema;
 
 use super::object::Object;
 use crate::geometry::Pose;
 use crate::map::{Prism, PrismError, Region, RegionError};
 use crate::service::ServiceError;
 use crate::wire::InField;
-use crate::wire::json::JsonPose;
+use crate::wire::json::{JsonPose, Vector2, Vector3};
 
-#[derive(Deserialize)]
+/// A box along the map's axes, meters.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BoxBody {
+    /// Smallest coordinates.
+    #[schema(value_type = Vector3)]
     min_m: [f64; 3],
+    /// Largest coordinates.
+    #[schema(value_type = Vector3)]
     max_m: [f64; 3],
 }
 
-#[derive(Deserialize)]
+/// A ball, meters.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SphereBody {
+    /// The center.
+    #[schema(value_type = Vector3)]
     center_m: [f64; 3],
+    /// The radius, 0 or more.
     radius_m: f64,
 }
 
-#[derive(Deserialize)]
+/// A box with any orientation, meters.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OrientedBoxBody {
+    /// Where its center is, and how it is turned.
+    #[schema(value_type = JsonPose)]
     map_from_box: Object<JsonPose>,
+    /// Its sides.
+    #[schema(value_type = Vector3)]
     size_m: [f64; 3],
 }
 
-#[derive(Deserialize)]
+/// A polygon with a height, meters.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PrismBody {
+    /// x and y of each corner: 3 to `limits.keep_out_corners_max` of a polygon that does not cross itself, in
+    /// either direction.
+    #[schema(value_type = Vec<Vector2>, min_items = 3)]
     corners_m: Vec<[f64; 2]>,
+    /// The smallest height.
     z_from_m: f64,
+    /// The largest height.
     z_to_m: f64,
 }
 

@@ -9,11 +9,11 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Json, Router};
-use serde_json::json;
 
 use super::error::HttpError;
 use super::params::NoParams;
-use super::{probes, viewer};
+use super::probes::{self, OpeningResponse, ReadyResponse};
+use super::viewer;
 use crate::access::Access;
 use crate::service::{Reason, ServiceError};
 use crate::store::{Opened, OpeningProgress};
@@ -41,10 +41,8 @@ async fn named(State(access): State<Access>, request: Request, next: Next) -> Re
 /// `GET /readyz`: 503 with `{"ready":false,"reason":"starting","maps":3,"maps_open":1,"bytes":...,"bytes_read":...}`.
 async fn ready(State(progress): State<Arc<OpeningProgress>>, NoParams: NoParams) -> Response {
     let Opened { bytes, bytes_read, maps, maps_open } = progress.opened();
-    let body = json!({
-        "ready": false, "reason": "starting",
-        "maps": maps, "maps_open": maps_open, "bytes": bytes, "bytes_read": bytes_read,
-    });
+    let opening = Some(OpeningResponse { maps, maps_open, bytes, bytes_read });
+    let body = ReadyResponse { reason: Some("starting"), opening, ..ReadyResponse::default() };
     (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], Json(body)).into_response()
 }
 

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc::{self, Sender};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::ReceiverStream;
+use utoipa::{IntoParams, ToSchema};
 
 use super::Adapter;
 use super::error::HttpError;
@@ -19,45 +20,73 @@ use crate::map::{MappedScan, RobotName};
 use crate::service::{Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 use crate::wire::json::{JsonPose, JsonVersion};
 
-#[derive(Deserialize)]
+/// Which poses.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct TrajectoryParams {
+    /// The robot; all of them without.
+    #[param(value_type = Option<RobotName>, inline)]
     robot: Option<String>,
+    /// Scans that made a revision after this one; 0 without.
+    #[param(required = false)]
     #[serde(default)]
     since_revision: u64,
+    /// Poses of one page, at most `limits.trajectory_page_max`; all poses without.
+    #[param(minimum = 1, example = 3)]
     limit: Option<usize>,
 }
 
 /// What stands behind the poses.
-#[derive(Serialize)]
-struct End {
+#[derive(Serialize, ToSchema)]
+struct TrajectoryEnd {
     #[serde(flatten)]
     version: JsonVersion,
+    /// Where the next page begins; absent of the last one.
+    #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     next_since_revision: Option<u64>,
 }
 
 /// A page, which is there as a whole.
-#[derive(Serialize)]
-struct Page {
+#[derive(Serialize, ToSchema)]
+struct TrajectoryPage {
+    /// The poses, by revision.
     poses: Vec<PoseResponse>,
     #[serde(flatten)]
-    end: End,
+    end: TrajectoryEnd,
 }
 
-#[derive(Serialize)]
+/// An accepted scan.
+#[derive(Serialize, ToSchema)]
 struct PoseResponse {
+    /// The robot that sent the scan.
     robot: String,
+    /// The run of the robot's software.
     session: String,
+    /// The robot's own number of the scan.
     scan_id: Option<u64>,
+    /// When it was taken, nanoseconds since the Unix epoch.
     timestamp_ns: Option<i64>,
+    /// Where it was taken.
     map_from_sensor: JsonPose,
+    /// The revision that it made.
     revision: u64,
+    /// Fraction of its points in voxels that were occupied before.
     overlap: f64,
+    /// Finest voxels that it added.
     new_voxels: usize,
+    /// Finest voxels that it carved.
     carved_voxels: usize,
 }
 
+/// Lists the poses of the accepted scans: all, or a page.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/trajectory",
+    params(TrajectoryParams),
+    responses((status = 200, description = "Answered", body = TrajectoryPage))
+)]
 pub(super) async fn get(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -70,9 +99,9 @@ pub(super) async fn get(
     if query.limit.is_some() {
         let TrajectoryAnswer { poses, next_since_revision, version } =
             service.trajectory(&map, query).await?;
-        let end = End { version: version.into(), next_since_revision };
+        let end = TrajectoryEnd { version: version.into(), next_since_revision };
         let poses = poses.iter().map(PoseResponse::from).collect();
-        return Ok(Json(Page { poses, end }).into_response());
+        return Ok(Json(TrajectoryPage { poses, end }).into_response());
     }
     let mut pieces = service.trajectory_pieces(&map, query).await?;
     let kept = adapter.admission.keep(pieces.memory_bytes())?;
@@ -111,7 +140,7 @@ async fn write(
         }
         piece = pieces.next().await;
     }
-    let end = json(&End { version: pieces.version().into(), next_since_revision });
+    let end = json(&TrajectoryEnd { version: pieces.version().into(), next_since_revision });
     let end = end.map(|end| format!("],{}", end.trim_start_matches('{')));
     drop(outbox.send(end).await);
 }

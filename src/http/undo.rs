@@ -2,38 +2,65 @@
 
 use axum::response::Json;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::body;
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, request_id_of};
-use crate::map::{RobotName, SessionName};
+use crate::map::{RequestId, RobotName, SessionName};
 use crate::service::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget};
 use crate::wire::json::JsonVersion;
 
-/// `{"robot", "scan_id"}`, to which `"session"` may be added, `{"robot", "since_revision"}` or `{"revision"}`.
-#[derive(Deserialize)]
+/// What is taken back: `robot` and `scan_id` (and `session`), `robot` and `since_revision`, or `revision`.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"robot": "example", "scan_id": 1}))]
 pub(super) struct UndoBody {
+    /// The robot whose scans are meant.
+    #[schema(value_type = Option<RobotName>)]
     robot: Option<String>,
+    /// The run of the robot's program; the empty one without.
+    #[schema(value_type = Option<SessionName>)]
     session: Option<String>,
+    /// One scan of the robot.
     scan_id: Option<u64>,
+    /// All scans of the robot that made a revision after this one.
     since_revision: Option<u64>,
+    /// The scan or the deletion that made this revision.
     revision: Option<u64>,
+    /// The caller's own id of this change: sent again, it changes nothing.
+    #[schema(value_type = Option<RequestId>)]
     request_id: Option<String>,
 }
 
-#[derive(Serialize)]
+/// What an undo made.
+#[derive(Serialize, ToSchema)]
 pub(super) struct UndoResponse {
+    /// Scans that were undone.
     scans: usize,
+    /// Deletions that were undone.
     deletions: usize,
+    /// Finest voxels that went.
     removed: usize,
+    /// Finest voxels that came back.
     restored: usize,
+    /// True of a request that was answered before: this is that answer.
     replayed: bool,
     #[serde(flatten)]
     version: JsonVersion,
 }
 
+/// Takes scans or a deletion back.
+///
+/// It needs a data folder, and reaches back to `storage.undo_from_revision`. Undo of a revision that may be
+/// another robot's takes the scope `write`.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/undo",
+    request_body = UndoBody,
+    responses((status = 200, description = "Answered", body = UndoResponse))
+)]
 pub(super) async fn undo(
     Service(service): Service,
     Map(map): Map,

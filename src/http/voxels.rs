@@ -6,49 +6,96 @@ use std::fmt::Write;
 use axum::extract::State;
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, RegionParams, numbers, pose};
+use super::params::{Map, Numbers2, Numbers3, Numbers7, Params, RegionParams, numbers, pose};
 use super::pieces::{self, Pieces};
 use crate::map::{Frustum, VoxelSelection};
 use crate::service::{ListingRequest, Reason, ServiceError};
 use crate::voxel::VoxelKey;
-use crate::wire::json::JsonVersion;
+use crate::wire::json::{JsonVersion, VoxelIndex};
 
 /// Voxels that are written to JSON at once, about half a MiB, and the bytes of one at most: three numbers of eight characters,
 /// and what stands between them.
 const VOXELS: Pieces = Pieces { field: "voxels", items: 32_768, item_bytes: 29 };
 
-#[derive(Deserialize)]
+/// Which voxels.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct VoxelsParams {
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// Smallest coordinates `x,y,z` of a box along the map's axes, meters; together with `max`.
+    #[param(value_type = Option<Numbers3>, inline)]
     min: Option<String>,
+    /// Largest coordinates `x,y,z`.
+    #[param(value_type = Option<Numbers3>, inline)]
     max: Option<String>,
+    /// Center and orientation `x,y,z,qx,qy,qz,qw` of a box with any orientation; together with `size`, in the
+    /// place of `min` and `max`.
+    #[param(value_type = Option<Numbers7>, inline)]
     map_from_box: Option<String>,
+    /// Its sides `x,y,z`, meters.
+    #[param(value_type = Option<Numbers3>, inline)]
     size: Option<String>,
+    /// Whether voxels whose centers lie in keep-outs count as occupied; false without.
     #[serde(default)]
     keep_out: bool,
+    /// Where a camera is, `x,y,z,qx,qy,qz,qw`, whose frame has z forward, x right and y down; together with
+    /// `fov` and `range`.
+    #[param(value_type = Option<Numbers7>, inline)]
     map_from_camera: Option<String>,
+    /// Its horizontal and vertical angle of view, radians from edge to edge.
+    #[param(value_type = Option<Numbers2>, inline)]
     fov: Option<String>,
+    /// How near and how far it sees, meters in front of it.
+    #[param(value_type = Option<Numbers2>, inline)]
     range: Option<String>,
+    /// Whether only the number of voxels is asked for; false without.
+    #[param(example = true)]
     #[serde(default)]
     count_only: bool,
 }
 
 /// What stands before the voxels.
-#[derive(Serialize)]
-struct Head {
+#[derive(Serialize, ToSchema)]
+struct VoxelsHead {
+    /// The level.
     level: u32,
+    /// Side of a voxel of the level, meters.
     resolution_m: f64,
+    /// The number of voxels.
     voxels_total: usize,
     #[serde(flatten)]
     version: JsonVersion,
 }
 
+/// Occupied voxels of a level.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "the answer is written in pieces; this describes it")]
+struct VoxelsResponse {
+    #[serde(flatten)]
+    head: VoxelsHead,
+    /// Their indices; absent where only their number is asked for.
+    #[schema(value_type = Option<Vec<VoxelIndex>>, nullable = false)]
+    voxels: Option<Vec<[i32; 3]>>,
+}
+
+/// Lists the occupied voxels of a level, those of a region, or those that a camera sees.
+///
+/// Voxel (i, j, k) spans `[i, i + 1) * resolution_m` in x, and so on. A listing has at most
+/// `limits.listed_voxels_max`.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/voxels",
+    params(VoxelsParams),
+    responses((status = 200, description = "Answered", body = VoxelsResponse))
+)]
 pub(super) async fn list(
     State(adapter): State<Adapter>,
     Service(service): Service,
@@ -59,7 +106,7 @@ pub(super) async fn list(
     let listing = service.list_voxels(&map, request).await?;
     let (resolution_m, voxels_total, version) =
         (listing.resolution_m, listing.voxels_total, listing.version.into());
-    let head = Head { level: request.level, resolution_m, voxels_total, version };
+    let head = VoxelsHead { level: request.level, resolution_m, voxels_total, version };
     if request.count_only {
         return Ok(Json(head).into_response());
     }

@@ -12,29 +12,57 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use tokio_stream::StreamExt;
+use utoipa::IntoParams;
 
 use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
-use super::params::{Map, Params, RegionParams};
+use super::octets::WatchBytes;
+use super::params::{Map, Numbers3, Numbers7, Params, RegionParams};
 use crate::map::MapName;
 use crate::service::{ServiceError, WatchRequest};
 use crate::wire::{framed, pb};
 
-#[derive(Deserialize)]
+/// From where on, and of which part.
+#[derive(Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
 pub(super) struct WatchParams {
+    /// The last revision that the client was told of; the whole state comes first without.
     since_revision: Option<u64>,
+    /// The map that this was a revision of.
+    #[param(format = "uuid")]
     map_uuid: Option<String>,
+    /// Tell of the voxels of this level that came and went; without, of the finest as they were recorded.
     delta_level: Option<u32>,
+    /// Smallest coordinates `x,y,z` of a box along the map's axes, meters; together with `max`.
+    #[param(value_type = Option<Numbers3>, inline)]
     min: Option<String>,
+    /// Largest coordinates `x,y,z`.
+    #[param(value_type = Option<Numbers3>, inline)]
     max: Option<String>,
+    /// Center and orientation `x,y,z,qx,qy,qz,qw` of a box with any orientation; together with `size`, in the
+    /// place of `min` and `max`.
+    #[param(value_type = Option<Numbers7>, inline)]
     map_from_box: Option<String>,
+    /// Its sides `x,y,z`, meters.
+    #[param(value_type = Option<Numbers3>, inline)]
     size: Option<String>,
+    /// Whether viewpoints of scans are told, too; false without.
     #[serde(default)]
     viewpoints: bool,
 }
 
+/// Tells of a map's changes as they become durable, for as long as the client reads.
+///
+/// The whole state comes first, unless the client names the last revision that it was told of. After
+/// `limits.watch_heartbeat_s` without a change comes a heartbeat; the last message says why the watch ends.
+#[utoipa::path(
+    get,
+    path = "/v1/maps/{map}/watch",
+    params(WatchParams),
+    responses((status = 200, description = "Messages", body = WatchBytes, content_type = "application/octet-stream"))
+)]
 pub(super) async fn watch(
     State(adapter): State<Adapter>,
     Service(service): Service,

@@ -5,10 +5,11 @@ use std::time::Duration;
 use mrol::client::{Answers, Client};
 use mrol::map::{MapName, RobotName};
 use mrol::service::{EventMessage, EventsQuery, ScanEvent};
-use reqwest::Response;
+use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
 
 use crate::support::daemon::{Daemon, PATIENCE, client, corner, identity_json, json_of, pose_json, row};
+use crate::support::description::check;
 
 async fn client_of(daemon: &Daemon) -> Client {
     Client::connect(&format!("http://{}", daemon.grpc)).await.unwrap()
@@ -141,6 +142,7 @@ async fn next_line(answer: &mut Response, rest: &mut String) -> Value {
     loop {
         if let Some((line, after)) = rest.split_once('\n') {
             let line = serde_json::from_str(line).unwrap();
+            check(&Method::GET, "/v1/maps/a/events/watch", StatusCode::OK, "application/x-ndjson", &line);
             *rest = after.to_owned();
             return line;
         }
@@ -156,7 +158,7 @@ async fn over_http_a_watch_is_lines_and_the_last_says_why_it_ends() {
     let mut answer = client().get(daemon.url("/v1/maps/a/events/watch")).send().await.unwrap();
     assert_eq!(answer.headers()["content-type"], "application/x-ndjson");
     let mut rest = String::new();
-    assert_eq!(next_line(&mut answer, &mut rest).await, json!({}), "it speaks at once");
+    assert_eq!(next_line(&mut answer, &mut rest).await, json!({"heartbeat": true}), "it speaks at once");
     let scan = json!({"robot": "r1", "points": row(20), "guess": identity_json(), "align": false});
     daemon.post("/v1/maps/a/scans", scan).await;
     let event = next_line(&mut answer, &mut rest).await;

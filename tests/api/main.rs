@@ -7,6 +7,7 @@ mod bad_input;
 mod blocks;
 mod callers_gone;
 mod carving;
+mod description;
 mod deskewing;
 mod events;
 mod grpc;

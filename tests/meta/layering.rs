@@ -32,7 +32,7 @@ const LAYERS: [&[&str]; 16] = [
 const CORE: usize = 5;
 
 /// Crates that the core must not know.
-const NOT_IN_THE_CORE: [&str; 7] = ["tokio", "tonic", "axum", "prost", "serde", "hyper", "tower"];
+const NOT_IN_THE_CORE: [&str; 8] = ["tokio", "tonic", "axum", "prost", "serde", "hyper", "tower", "utoipa"];
 
 /// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart, planners' questions, rays;
 /// and the prefetch.

@@ -11,12 +11,14 @@ use mrol::wire::pb;
 use pb::mapping_client::MappingClient;
 use pb::maps_client::MapsClient;
 use pb::occupancy_client::OccupancyClient;
-use reqwest::{Response, StatusCode};
+use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tonic::transport::Channel;
+
+use super::description::as_described;
 
 /// How long anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(20);
@@ -126,7 +128,8 @@ impl Daemon {
     }
 
     pub async fn get(&self, path: &str) -> Response {
-        client().get(self.url(path)).send().await.expect("an answer")
+        let answer = client().get(self.url(path)).send().await.expect("an answer");
+        as_described(Method::GET, path, answer).await
     }
 
     /// What `/metrics` says of `series`, a name with its labels; none before it is first recorded.
@@ -137,20 +140,24 @@ impl Daemon {
     }
 
     pub async fn delete(&self, path: &str) -> Response {
-        client().delete(self.url(path)).send().await.expect("an answer")
+        let answer = client().delete(self.url(path)).send().await.expect("an answer");
+        as_described(Method::DELETE, path, answer).await
     }
 
     pub async fn put(&self, path: &str, body: Value) -> Response {
-        client().put(self.url(path)).json(&body).send().await.expect("an answer")
+        let answer = client().put(self.url(path)).json(&body).send().await.expect("an answer");
+        as_described(Method::PUT, path, answer).await
     }
 
     pub async fn post(&self, path: &str, body: Value) -> Response {
-        client().post(self.url(path)).json(&body).send().await.expect("an answer")
+        let answer = client().post(self.url(path)).json(&body).send().await.expect("an answer");
+        as_described(Method::POST, path, answer).await
     }
 
     pub async fn post_bytes(&self, path: &str, body: Vec<u8>) -> Response {
         let post = client().post(self.url(path)).header("content-type", "application/octet-stream");
-        post.body(body).send().await.expect("an answer")
+        let answer = post.body(body).send().await.expect("an answer");
+        as_described(Method::POST, path, answer).await
     }
 }
 

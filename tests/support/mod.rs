@@ -6,6 +6,8 @@
 
 #[cfg(feature = "server")]
 pub mod daemon;
+#[cfg(feature = "server")]
+pub mod description;
 pub mod disk;
 pub mod hall;
 pub mod hostile_files;

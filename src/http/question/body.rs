@@ -2,29 +2,40 @@
 
 use axum::body::Bytes;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::answer::Array;
 use super::form::{NumbersField, PointsField};
+use crate::http::json::JsonPoints;
 use crate::http::list::List;
 use crate::http::object::Object;
 use crate::http::shapes::{BoxBody, OrientedBoxBody, SphereBody};
 use crate::map::Region;
 use crate::service::{CheckAs, ServiceError};
 use crate::util::Keyword;
+use crate::wire::json::{JsonVersion, Sphere, VoxelIndex, described_by_words};
 use crate::wire::{IGNORED_MAX, InField, LINKS_MAX, pb};
 
 /// A body: its links.
-#[derive(Deserialize)]
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BodyField {
+    /// Its links; with their spheres and points at most `limits.body_parts_max`.
+    #[schema(value_type = Vec<LinkField>)]
     links: List<Object<LinkField>, LINKS_MAX>,
 }
 
-#[derive(Deserialize)]
+/// A link of a body: spheres, points, or both.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 struct LinkField {
+    /// Spheres `[x, y, z, radius]` in the frame of the link, meters.
+    #[schema(value_type = Option<Vec<Sphere>>)]
     spheres: Option<NumbersField<4>>,
+    /// Points in the frame of the link, meters.
+    #[schema(value_type = Option<JsonPoints>)]
     points: Option<PointsField>,
+    /// What every radius grows by, meters; 0 without.
     #[serde(default)]
     padding_m: f32,
 }
@@ -39,6 +50,20 @@ pub(super) enum IgnoredField {
     Box(Object<BoxBody>),
     Sphere(Object<SphereBody>),
     OrientedBox(Object<OrientedBoxBody>),
+}
+
+/// A region in which voxels do not count.
+#[derive(ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = IgnoredRegion)]
+#[expect(dead_code, reason = "this describes `IgnoredField`, of which the macro cannot see through `Object`")]
+pub(super) enum DescribedIgnored {
+    /// A box along the map's axes.
+    Box(BoxBody),
+    /// A ball.
+    Sphere(SphereBody),
+    /// A box with any orientation.
+    OrientedBox(OrientedBoxBody),
 }
 
 /// How a check is answered.
@@ -61,6 +86,8 @@ impl Keyword for AnswerWord {
         }
     }
 }
+
+described_by_words!(AnswerWord);
 
 impl From<AnswerWord> for pb::CheckAnswer {
     fn from(word: AnswerWord) -> Self {
@@ -102,10 +129,42 @@ pub(super) fn ignored_of(List(ignored): IgnoredList) -> Result<Vec<pb::Region>, 
 }
 
 /// What of an answer to a check is no array.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 pub(super) struct CheckedHead {
+    /// How many were checked.
     checked: u64,
+    /// How many of them collide.
     colliding_count: u64,
+}
+
+/// What is met by what was checked; which arrays there are depends on `answer`.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "the answer is put together of its arrays; this describes it")]
+pub(super) struct CheckedResponse {
+    #[serde(flatten)]
+    head: CheckedHead,
+    /// Whether each collides.
+    colliding: Vec<bool>,
+    /// Of the first hit: the link; null where nothing is met.
+    #[schema(nullable = false)]
+    hit_links: Option<Vec<Option<u32>>>,
+    /// Of the first hit: the sphere, or after all spheres the point.
+    #[schema(nullable = false)]
+    hit_parts: Option<Vec<Option<u32>>>,
+    /// Of the first hit: the voxel.
+    #[schema(value_type = Option<Vec<Option<VoxelIndex>>>, nullable = false)]
+    hit_voxels: Option<Vec<Option<[i32; 3]>>>,
+    /// The keep-outs that were met instead of a voxel, null where none was; absent where none was at all.
+    #[schema(nullable = false)]
+    hit_keep_outs: Option<Vec<Option<String>>>,
+    /// The distance to the nearest voxel, at most what was asked for, meters.
+    #[schema(nullable = false)]
+    clearances_m: Option<Vec<Option<f32>>>,
+    /// The link that is nearest; null where nothing is as near as was asked for.
+    #[schema(nullable = false)]
+    nearest_links: Option<Vec<Option<u32>>>,
+    #[serde(flatten)]
+    version: JsonVersion,
 }
 
 /// The head and the arrays of an answer to a check.

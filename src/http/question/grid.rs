@@ -3,6 +3,7 @@
 use axum::body::Bytes;
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::answer::{Answer, Array};
 use super::asked;
@@ -10,44 +11,101 @@ use super::form::QuestionBody;
 use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::object::Object;
+use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
 use crate::service::GridQuestion;
+use crate::wire::json::{JsonVersion, Sizes2, Vector2};
 use crate::wire::pb;
 
-#[derive(Deserialize)]
+/// Which part of the map is seen from above.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"min_z_m": 0.2, "max_z_m": 1.5, "tell_unknown": true}))]
 pub(in crate::http) struct GridBody {
+    /// The rectangle; that of the map without.
+    #[schema(value_type = Option<AreaBody>)]
     area: Option<Object<AreaBody>>,
+    /// Lower voxels do not count, meters.
     min_z_m: Option<f64>,
+    /// Higher voxels do not count, meters.
     max_z_m: Option<f64>,
+    /// Side of a cell, meters: a whole number of voxels; one without.
     cell_m: Option<f64>,
+    /// Whether free cells are told from unknown ones; false without.
     #[serde(default)]
     tell_unknown: bool,
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
     min_revision: Option<u64>,
+    /// The map that the answer must speak of: another one is refused (`map_replaced`).
+    #[schema(format = "uuid")]
     map_uuid: Option<String>,
+    /// Whether keep-outs count for nothing; false without: they count as occupied.
     #[serde(default)]
     ignore_keep_outs: bool,
 }
 
-#[derive(Deserialize)]
+/// A rectangle of the map frame, meters.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 struct AreaBody {
+    /// Smallest x and y.
+    #[schema(value_type = Vector2)]
     min_m: [f64; 2],
+    /// Largest x and y.
+    #[schema(value_type = Vector2)]
     max_m: [f64; 2],
 }
 
-#[derive(Serialize)]
+/// The map from above.
+#[derive(Serialize, ToSchema)]
 struct GridHead {
+    /// Side of a cell, meters.
     cell_m: f64,
+    /// The corner of the first cell.
+    #[schema(value_type = Vector2)]
     origin_m: [f64; 2],
+    /// Numbers of cells along x and y.
+    #[schema(value_type = Sizes2)]
     size: [u64; 2],
+    /// How many cells are occupied.
     cells_occupied: u64,
+    /// How many cells are free, where that is asked for.
+    #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     cells_free: Option<u64>,
 }
 
+/// The map from above, row by row from the smallest y.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "the answer is put together of its arrays; this describes it")]
+struct GridResponse {
+    #[serde(flatten)]
+    head: GridHead,
+    /// Whether each cell is occupied.
+    occupied: Vec<bool>,
+    /// The height of each cell's highest voxel; null of a cell without one.
+    tops_m: Vec<Option<f32>>,
+    /// Whether each cell is free, where that is asked for.
+    #[schema(nullable = false)]
+    free: Option<Vec<bool>>,
+    #[serde(flatten)]
+    version: JsonVersion,
+}
+
+/// Projects the map from above to a 2-D grid.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/grid",
+    request_body(content((GridBody = "application/json"), (QuestionBytes = "application/octet-stream"))),
+    responses((
+        status = 200,
+        description = "Answered",
+        content((GridResponse = "application/json"), (AnswerBytes = "application/octet-stream"))
+    ))
+)]
 pub(in crate::http) async fn project_grid(
     Service(service): Service,
     Map(map): Map,

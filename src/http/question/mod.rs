@@ -2,24 +2,15 @@
 
 mod answer;
 mod body;
-mod classify;
+pub(super) mod classify;
 mod form;
-mod frontiers;
-mod grid;
-mod motions;
-mod nearest;
-mod poses;
-mod rays;
-mod spheres;
-
-pub(super) use classify::classify_points;
-pub(super) use frontiers::list_frontiers;
-pub(super) use grid::project_grid;
-pub(super) use motions::check_motions;
-pub(super) use nearest::find_nearest;
-pub(super) use poses::check_poses;
-pub(super) use rays::cast_rays;
-pub(super) use spheres::check_spheres;
+pub(super) mod frontiers;
+pub(super) mod grid;
+pub(super) mod motions;
+pub(super) mod nearest;
+pub(super) mod poses;
+pub(super) mod rays;
+pub(super) mod spheres;
 
 use crate::map::MapName;
 use crate::wire::pb;

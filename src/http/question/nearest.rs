@@ -3,38 +3,89 @@
 use axum::body::Bytes;
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::answer::{Answer, Array};
 use super::asked;
 use super::form::{PointsField, QuestionBody};
 use crate::http::error::HttpError;
+use crate::http::json::JsonPoints;
 use crate::http::middleware::Service;
+use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
 use crate::planning::MeasuredTo;
 use crate::service::NearestQuestion;
-use crate::wire::json::ByKeyword;
+use crate::wire::json::{ByKeyword, JsonVersion, Vector3, VoxelIndex};
 use crate::wire::pb;
 
-#[derive(Deserialize)]
+/// Points, and how far to look.
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(example = json!({"points": [[1, 1, 0.5]], "radius_m": 0.5}))]
 pub(in crate::http) struct NearestBody {
+    /// The points.
+    #[schema(value_type = JsonPoints)]
     points: PointsField,
+    /// How far a voxel may be, meters: more than 0, at most 64 voxels of the level.
     radius_m: f64,
+    /// Whether distances are to cubes or to their centers; `cubes` without.
+    #[schema(value_type = MeasuredTo, required = false)]
     #[serde(default)]
     to: ByKeyword<MeasuredTo>,
+    /// The level, 0 the finest; 0 without.
     #[serde(default)]
     level: u32,
+    /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
     min_revision: Option<u64>,
+    /// The map that the answer must speak of: another one is refused (`map_replaced`).
+    #[schema(format = "uuid")]
     map_uuid: Option<String>,
+    /// Whether keep-outs count for nothing; false without: they count as occupied.
     #[serde(default)]
     ignore_keep_outs: bool,
 }
 
-#[derive(Serialize)]
+/// What is told of nearest voxels as numbers.
+#[derive(Serialize, ToSchema)]
 struct NearestHead {
+    /// How many points were asked about.
     points: u64,
 }
 
+/// The occupied voxel that is nearest to each point.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "the answer is put together of its arrays; this describes it")]
+struct NearestResponse {
+    #[serde(flatten)]
+    head: NearestHead,
+    /// Whether there is one within the radius.
+    found: Vec<bool>,
+    /// How far away it is, meters; null where there is none.
+    distances_m: Vec<Option<f32>>,
+    /// The voxel; null where there is none.
+    #[schema(value_type = Vec<Option<VoxelIndex>>)]
+    voxels: Vec<Option<[i32; 3]>>,
+    /// The unit vector away from it; zero where the point is in it, or there is none.
+    #[schema(value_type = Vec<Vector3>)]
+    away: Vec<[f32; 3]>,
+    /// The keep-outs that were met instead of a voxel, null where none was; absent where none was at all.
+    #[schema(nullable = false)]
+    keep_outs: Option<Vec<Option<String>>>,
+    #[serde(flatten)]
+    version: JsonVersion,
+}
+
+/// Finds the occupied voxel that is nearest to each point.
+#[utoipa::path(
+    post,
+    path = "/v1/maps/{map}/nearest",
+    request_body(content((NearestBody = "application/json"), (QuestionBytes = "application/octet-stream"))),
+    responses((
+        status = 200,
+        description = "Answered",
+        content((NearestResponse = "application/json"), (AnswerBytes = "application/octet-stream"))
+    ))
+)]
 pub(in crate::http) async fn find_nearest(
     Service(service): Service,
     Map(map): Map,

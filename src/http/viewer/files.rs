@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 /// A file of the page.
 pub(super) struct File {
-    name: &'static str,
+    pub(super) name: &'static str,
     /// What it holds: all of them are text.
     pub(super) text: &'static str,
 }
@@ -35,7 +35,7 @@ macro_rules! files {
 pub(super) const INDEX: File = File { name: "index.html", text: include_str!("page/index.html") };
 
 /// What the page loads.
-const FILES: &[File] = files! {
+pub(super) const FILES: &[File] = files! {
     "api.js",
     "arrivals.js",
     "blocks.js",

@@ -22,12 +22,37 @@ const CONTENT_SECURITY_POLICY: HeaderValue = HeaderValue::from_static(
      frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
 );
 
-/// The page itself.
+/// The names of its files.
+pub(super) fn files() -> impl Iterator<Item = &'static str> {
+    files::FILES.iter().map(|file| file.name)
+}
+
+/// Shows the page that draws a map.
+#[utoipa::path(
+    get,
+    path = "/",
+    responses(
+        (status = 200, description = "The page", body = String, content_type = "text/html; charset=utf-8"),
+        (status = 304, description = "The browser has it already")
+    )
+)]
 pub(super) async fn index(NoParams: NoParams, headers: HeaderMap) -> Response {
     respond(&INDEX, &headers)
 }
 
-/// One of the files that the page is made of.
+/// Gives out one of the files that the page is made of.
+#[utoipa::path(
+    get,
+    path = "/viewer/{file}",
+    responses(
+        (status = 200, description = "The file", content(
+            (String = "text/javascript; charset=utf-8"),
+            (String = "text/css; charset=utf-8"),
+            (String = "image/svg+xml")
+        )),
+        (status = 304, description = "The browser has it already")
+    )
+)]
 pub(super) async fn file(
     Path(name): Path<String>,
     NoParams: NoParams,

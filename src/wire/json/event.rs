@@ -1,13 +1,16 @@
 //! What became of a scan in JSON.
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::pose::JsonPose;
 use super::scan::JsonScan;
+use super::vectors::Vector3;
 use crate::service::{FailedScan, ScanAnswer, ScanEvent};
 
 /// What became of a scan that was sent for insertion.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = ScanEvent)]
 pub struct JsonEvent {
     /// Greater than that of every event of the map before it.
     pub number: u64,
@@ -26,6 +29,7 @@ pub struct JsonEvent {
     /// The pose that its guess stood for; null of a request that failed, and of an answer that is given again.
     pub guess: Option<JsonPose>,
     /// Of a robot's last scan, where it was refused: some of its points, in the sensor frame.
+    #[schema(value_type = Vec<Vector3>, required = false)]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sample: Vec<[f32; 3]>,
     /// What was answered; null of a request that failed.
@@ -35,7 +39,8 @@ pub struct JsonEvent {
 }
 
 /// Why a request failed.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = FailedScan)]
 pub struct JsonFailure {
     /// The stable word for programs.
     pub reason: String,

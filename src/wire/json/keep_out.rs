@@ -1,12 +1,15 @@
 //! Keep-outs in JSON.
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::pose::JsonPose;
+use super::vectors::{Vector2, Vector3};
 use crate::map::{KeepOut, KeepOutShape, Region};
 
 /// A keep-out: its name, its shape under the word for it, and who made it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = KeepOut)]
 pub struct JsonKeepOut {
     /// Its name.
     pub name: String,
@@ -14,29 +17,35 @@ pub struct JsonKeepOut {
     #[serde(flatten)]
     pub shape: JsonShape,
     /// The name of the key that it was made with.
+    #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub made_by: Option<String>,
     /// The revision that it made.
     pub made_revision: u64,
     /// When the server ends it, nanoseconds since the Unix epoch.
+    #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expires_at_ns: Option<i64>,
 }
 
 /// A bounded part of space, meters.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = Shape)]
 pub enum JsonShape {
     /// A box along the map's axes.
     Box {
         /// Smallest coordinates.
+        #[schema(value_type = Vector3)]
         min_m: [f64; 3],
         /// Largest coordinates.
+        #[schema(value_type = Vector3)]
         max_m: [f64; 3],
     },
     /// A ball.
     Sphere {
         /// The center.
+        #[schema(value_type = Vector3)]
         center_m: [f64; 3],
         /// The radius.
         radius_m: f64,
@@ -46,11 +55,13 @@ pub enum JsonShape {
         /// Where its center is, and how it is turned.
         map_from_box: JsonPose,
         /// Its sides.
+        #[schema(value_type = Vector3)]
         size_m: [f64; 3],
     },
     /// A polygon with a height.
     Prism {
         /// x and y of each corner.
+        #[schema(value_type = Vec<Vector2>)]
         corners_m: Vec<[f64; 2]>,
         /// The smallest height.
         z_from_m: f64,

@@ -2,7 +2,13 @@
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::{RefOr, Schema};
 
+use crate::align::{Method, Verdict};
+use crate::map::Lookup;
+use crate::mapping::Recovered;
+use crate::planning::{MeasuredTo, Unknown};
 use crate::util::{Keyword, excerpt, words};
 
 /// A [`Keyword`] as JSON, query strings and settings write it: its word, a string.
@@ -23,3 +29,25 @@ impl<T: Keyword> Serialize for ByKeyword<T> {
         serializer.serialize_str(self.0.as_str())
     }
 }
+
+/// The schema of a string that is one of these words.
+pub fn schema_of_words<'a>(words: impl IntoIterator<Item = &'a str>) -> RefOr<Schema> {
+    ObjectBuilder::new().schema_type(Type::String).enum_values(Some(words)).into()
+}
+
+/// Describes types that have words: the core says nothing of itself in terms of JSON.
+macro_rules! described_by_words {
+    ($($of:ty),+) => {$(
+        impl utoipa::ToSchema for $of {}
+
+        impl utoipa::PartialSchema for $of {
+            fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::Schema> {
+                $crate::wire::json::schema_of_words(Self::ALL.iter().map(|value| value.as_str()))
+            }
+        }
+    )+};
+}
+
+pub(crate) use described_by_words;
+
+described_by_words!(Lookup, MeasuredTo, Method, Recovered, Unknown, Verdict);

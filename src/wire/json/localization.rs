@@ -1,17 +1,21 @@
 //! The answer to a localization in JSON.
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::pose::JsonPose;
 use super::version::JsonVersion;
+use crate::align::Verdict;
 use crate::service::{CandidateAnswer, LocalizationAnswer};
 
 /// Where a scan was found.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Localization)]
 pub struct JsonLocalization {
     /// True where the scan was found.
     pub accepted: bool,
     /// The search's verdict.
+    #[schema(value_type = Verdict)]
     pub verdict: &'static str,
     /// Why, in a sentence.
     pub reason: String,
@@ -31,7 +35,8 @@ pub struct JsonLocalization {
 }
 
 /// A place where a scan may have been taken.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Candidate)]
 pub struct JsonCandidate {
     /// The pose of the sensor in the map.
     pub map_from_sensor: JsonPose,

@@ -1,9 +1,16 @@
 //! The description of a map in JSON.
 
-use serde::{Serialize, Serializer};
+use std::borrow::Cow;
 
+use serde::{Serialize, Serializer};
+use utoipa::openapi::schema::OneOfBuilder;
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
+
+use super::keyword::schema_of_words;
 use super::pose::JsonPose;
 use super::version::JsonVersion;
+use crate::align::Verdict;
 use crate::bloom::FilterSettings;
 use crate::map::{FilterInfo, LevelInfo, MapSettings};
 use crate::mapping::Sighting;
@@ -11,7 +18,8 @@ use crate::service::{MapInfo, MapStorage};
 use crate::wire::maps::nanoseconds;
 
 /// A map's description.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Map)]
 pub struct JsonMap {
     /// The name.
     pub map: String,
@@ -44,7 +52,8 @@ pub struct JsonMap {
 }
 
 /// A robot as its last scan showed it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Sighting)]
 pub struct JsonSighting {
     /// The robot.
     pub robot: String,
@@ -55,6 +64,7 @@ pub struct JsonSighting {
     /// Where it was found; of one that was refused, where its alignment ended.
     pub map_from_sensor: JsonPose,
     /// Whether it fits there.
+    #[schema(value_type = Verdict)]
     pub verdict: &'static str,
     /// The robot stood where its last stored scan was taken, and saw nothing new.
     pub stationary: bool,
@@ -74,7 +84,8 @@ impl From<&Sighting> for JsonSighting {
 }
 
 /// What of a map lies on disk.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Storage)]
 pub struct JsonStorage {
     /// Changes up to this revision survive the loss of power.
     pub durable_revision: u64,
@@ -87,13 +98,15 @@ pub struct JsonStorage {
 }
 
 /// The settings of a map.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Settings)]
 pub struct JsonSettings {
     /// Side of a voxel, meters.
     pub resolution_m: f64,
     /// The number of levels.
     pub levels: u32,
     /// The filters; `"none"` where there are none.
+    #[schema(value_type = JsonFilterOrNone)]
     #[serde(serialize_with = "filter_or_word")]
     pub filter: Option<JsonFilter>,
     /// False of a map that keeps no moments of its points.
@@ -110,8 +123,24 @@ fn filter_or_word<S: Serializer>(filter: &Option<JsonFilter>, to: S) -> Result<S
     }
 }
 
+/// The settings of filters, or the word for none: how the description of the API knows [`filter_or_word`].
+struct JsonFilterOrNone;
+
+impl ToSchema for JsonFilterOrNone {
+    fn name() -> Cow<'static, str> {
+        "FilterOrNone".into()
+    }
+}
+
+impl PartialSchema for JsonFilterOrNone {
+    fn schema() -> RefOr<Schema> {
+        OneOfBuilder::new().item(JsonFilter::schema()).item(schema_of_words([NO_FILTER])).into()
+    }
+}
+
 /// The settings of filters.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Filter)]
 pub struct JsonFilter {
     /// Hash functions.
     pub hashes: u32,
@@ -120,7 +149,8 @@ pub struct JsonFilter {
 }
 
 /// One level of a map.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Level)]
 pub struct JsonLevel {
     /// The level, 0 the finest.
     pub level: u32,
@@ -134,7 +164,8 @@ pub struct JsonLevel {
 }
 
 /// The filters of one level of a map.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = FilterInfo)]
 pub struct JsonFilterInfo {
     /// Bytes of the bit planes.
     pub plane_bytes: usize,

@@ -5,14 +5,17 @@ mod keep_out;
 mod keyword;
 mod localization;
 mod map;
+mod names;
 mod observers;
 mod pose;
 mod scan;
+mod vectors;
 mod version;
 
 pub use event::{JsonEvent, JsonFailure};
 pub use keep_out::{JsonKeepOut, JsonShape};
-pub use keyword::ByKeyword;
+pub(crate) use keyword::described_by_words;
+pub use keyword::{ByKeyword, schema_of_words};
 pub use localization::{JsonCandidate, JsonLocalization};
 pub use map::{
     JsonFilter, JsonFilterInfo, JsonLevel, JsonMap, JsonSettings, JsonSighting, JsonStorage, NO_FILTER,
@@ -20,4 +23,7 @@ pub use map::{
 pub use observers::{JsonObservers, JsonObservingScan};
 pub use pose::JsonPose;
 pub use scan::{JsonDirection, JsonScan};
+pub use vectors::{
+    Corners3, PoseMatrix, PoseNumbers, PoseVector, Quaternion, Sizes2, Sphere, Vector2, Vector3, VoxelIndex,
+};
 pub use version::JsonVersion;

@@ -1,15 +1,19 @@
 //! The scans that touched a voxel in JSON.
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::pose::JsonPose;
+use super::vectors::VoxelIndex;
 use super::version::JsonVersion;
 use crate::service::{ObserversAnswer, ObservingScan, WatchedScan};
 
 /// The scans that touched a voxel.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Observers)]
 pub struct JsonObservers {
     /// The voxel's indices.
+    #[schema(value_type = VoxelIndex)]
     pub voxel: [i32; 3],
     /// The scans, newest first.
     pub scans: Vec<JsonObservingScan>,
@@ -21,7 +25,8 @@ pub struct JsonObservers {
 }
 
 /// A scan that touched a voxel.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = ObservingScan)]
 pub struct JsonObservingScan {
     /// The revision that it made.
     pub revision: u64,

@@ -1,16 +1,21 @@
 //! Poses in JSON.
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
+use super::vectors::{Quaternion, Vector3};
 use crate::geometry::{self, Pose, PoseError};
 
 /// A pose: translation in meters, rotation as a unit quaternion x y z w.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = Pose)]
 pub struct JsonPose {
     /// The translation \[x, y, z\], meters.
+    #[schema(value_type = Vector3)]
     pub translation_m: [f64; 3],
     /// The rotation, a unit quaternion \[x, y, z, w\].
+    #[schema(value_type = Quaternion)]
     pub rotation_xyzw: [f64; 4],
 }
 

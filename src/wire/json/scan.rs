@@ -1,19 +1,24 @@
 //! The answer to a scan in JSON.
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::pose::JsonPose;
+use super::vectors::{PoseMatrix, PoseVector};
 use super::version::JsonVersion;
-use crate::align::Direction;
+use crate::align::{Direction, Verdict};
+use crate::mapping::Recovered;
 use crate::service::ScanAnswer;
 use crate::util::Keyword;
 
 /// What became of a scan.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Scan)]
 pub struct JsonScan {
     /// True where the map took the scan, or would.
     pub accepted: bool,
     /// The alignment's verdict.
+    #[schema(value_type = Verdict)]
     pub verdict: &'static str,
     /// Why, in a sentence.
     pub reason: String,
@@ -28,6 +33,7 @@ pub struct JsonScan {
     /// How closely they do, 0 to 1.
     pub fitness: f64,
     /// Rows of the information matrix; null of an answer that is given again.
+    #[schema(value_type = Option<PoseMatrix>)]
     pub information: Option<[[f64; 6]; 6]>,
     /// Directions of the pose that the map's surfaces leave open.
     pub undetermined: Vec<JsonDirection>,
@@ -46,8 +52,10 @@ pub struct JsonScan {
     /// True of a robot that stands where its last scan was taken and sees nothing new.
     pub stationary: bool,
     /// How the robot, which was lost, was found again; null of a scan that fits from its own guess, or nowhere.
+    #[schema(value_type = Option<Recovered>)]
     pub recovered: Option<&'static str>,
     /// Places in the scan of the points that the map does not show.
+    #[schema(nullable = false)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub foreground: Option<Vec<usize>>,
     /// The map's version: after the scan, or where it was refused, before.
@@ -61,10 +69,12 @@ fn places(bitmap: &[u8]) -> Vec<usize> {
 }
 
 /// A direction of a pose that the map leaves open.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Direction)]
 pub struct JsonDirection {
     /// A unit vector: x y z along the axes of the map, then rotations about them through the sensor, each times the
     /// root mean square range of the scan, so that both are lengths.
+    #[schema(value_type = PoseVector)]
     pub direction: [f64; 6],
     /// Standard deviation along it, meters; null where nothing holds the pose.
     pub std_m: Option<f64>,

@@ -77,7 +77,10 @@ fn body(operation: Operation) -> Body {
         | Operation::GetViewerFile
         | Operation::Live
         | Operation::Ready
-        | Operation::Metrics => Body::None,
+        | Operation::Metrics
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => Body::None,
     }
 }
 
@@ -85,7 +88,11 @@ fn body(operation: Operation) -> Body {
 fn routes() -> impl Iterator<Item = (Operation, Method, String)> {
     Operation::ALL.iter().filter_map(|&operation| {
         let Route { method, path } = operation.route()?;
-        let path = path.replace("{map}", "a").replace("{name}", "dock").replace("{file}", "main.js");
+        let path = path
+            .replace("{map}", "a")
+            .replace("{name}", "dock")
+            .replace("{file}", "main.js")
+            .replace("{asset}", "start.js");
         Some((operation, method.parse().unwrap(), path))
     })
 }

@@ -35,7 +35,12 @@ pub(crate) async fn over_http(
     map: &str,
     key: Option<&Secret>,
 ) -> Outcome {
-    let path = route.path.replace("{map}", map).replace("{name}", "dock").replace("{file}", "main.js");
+    let path = route
+        .path
+        .replace("{map}", map)
+        .replace("{name}", "dock")
+        .replace("{file}", "main.js")
+        .replace("{asset}", "start.js");
     let method = route.method.parse().unwrap();
     let answer = server.http(method, &path, key, body(operation)).await;
     let status = answer.status();

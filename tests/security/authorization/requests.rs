@@ -126,7 +126,10 @@ pub(crate) fn message(operation: Operation, map: &str) -> Vec<u8> {
         | Operation::GetViewerFile
         | Operation::Live
         | Operation::Ready
-        | Operation::Metrics => Vec::new(),
+        | Operation::Metrics
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => Vec::new(),
     }
 }
 
@@ -224,6 +227,9 @@ pub(crate) fn names_a_map(operation: Operation) -> bool {
         | Operation::GetViewerFile
         | Operation::Live
         | Operation::Ready
-        | Operation::Metrics => false,
+        | Operation::Metrics
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => false,
     }
 }

@@ -19,7 +19,10 @@ fn meant(operation: Operation) -> Option<Scope> {
         | Operation::Live
         | Operation::Ready
         | Operation::ShowViewer
-        | Operation::GetViewerFile => None,
+        | Operation::GetViewerFile
+        | Operation::DescribeApi
+        | Operation::ReadApi
+        | Operation::ReadApiFile => None,
         Operation::QueryPoints
         | Operation::QueryPointsStream
         | Operation::ListVoxels
