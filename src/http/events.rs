@@ -27,7 +27,7 @@ use crate::wire::json::JsonEvent;
 #[into_params(parameter_in = Query)]
 pub(super) struct EventsParams {
     /// Events after this number; all where it is 0, or greater than that of the last event.
-    #[param(required = false)]
+    #[param(required = false, maximum = 18446744073709551615_u64)]
     #[serde(default)]
     since_number: u64,
     /// The robot; all of them without.

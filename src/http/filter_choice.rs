@@ -24,8 +24,10 @@ pub(super) enum FilterChoice {
 #[serde(deny_unknown_fields)]
 pub(super) struct FilterBody {
     /// Hash functions.
+    #[schema(minimum = 1, maximum = 10)]
     hashes: Option<u32>,
     /// Bits of a plane a voxel, just before growth.
+    #[schema(minimum = 1, maximum = 4096)]
     bits_per_key: Option<f64>,
 }
 
