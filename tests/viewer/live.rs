@@ -1,8 +1,10 @@
 //! A map that changes while it is looked at, and a server that goes away.
 
+use serde_json::json;
+
 use crate::browser::Browser;
-use crate::support::daemon::Daemon;
-use crate::{DRAWN, assert_clean, link, shown, turn, wall};
+use crate::support::daemon::{Daemon, identity_json, json_of, pose_json};
+use crate::{DRAWN, assert_clean, link, middle_color, shown, text, turn, wall};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_map_grows_in_the_picture_and_a_lost_connection_is_said_and_resumed() {
@@ -27,5 +29,41 @@ async fn a_map_grows_in_the_picture_and_a_lost_connection_is_said_and_resumed() 
     daemon.put_in("a", &[[0.05, 0.55, 0.05], [0.05, 0.65, 0.05]]).await;
     browser.wait("document.getElementById('connection').dataset.state === 'live'").await;
     browser.wait(&format!("{DRAWN} && scene.drawn.voxels === 443")).await;
+    assert_clean(&browser.told(), &daemon);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_whose_scan_is_refused_comes_first_and_its_scan_is_drawn_where_its_guess_was() {
+    let _turn = turn().await;
+    let Some(browser) = Browser::start().await else { return };
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &wall()).await;
+    browser.open(&link(&daemon, "a")).await;
+    browser.wait(DRAWN).await;
+    browser.wait("document.querySelector('#robots .soft') && document.getElementById('attention').textContent === ''").await;
+
+    // A name that would come last, a guess where nothing is.
+    let lost = json!({"robot": "zz", "points": wall(), "guess": pose_json([0.0, 9.0, 0.0])});
+    let answer = json_of(daemon.post("/v1/maps/a/scans", lost).await).await;
+    assert_eq!(answer["accepted"], false, "{answer}");
+    browser.wait("document.getElementById('attention').textContent === '1 of 2 need attention'").await;
+    let first = text(&browser, "#robots li").await;
+    assert!(first.starts_with("zz") && first.contains(answer["verdict"].as_str().unwrap()), "{first}");
+    browser.eval("document.getElementById('answers').parentElement.open = true").await;
+    browser.wait("document.getElementById('answers').textContent.includes('zz')").await;
+
+    // Its points fill the middle of the picture where its guess put them, unless they are not to be shown.
+    browser.press("#robots li button").await;
+    browser.eval("scene.camera.distance = 2").await;
+    let refused = middle_color(&browser).await;
+    browser.press("#show-refused").await;
+    let without = middle_color(&browser).await;
+    assert_ne!(refused, without);
+
+    // Once it fits, nothing needs attention.
+    let fits = json!({"robot": "zz", "points": wall(), "guess": identity_json(), "align": false});
+    assert_eq!(json_of(daemon.post("/v1/maps/a/scans", fits).await).await["accepted"], true);
+    browser.wait("document.getElementById('attention').textContent === ''").await;
     assert_clean(&browser.told(), &daemon);
 }

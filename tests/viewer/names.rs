@@ -38,6 +38,9 @@ async fn what_a_link_a_file_or_an_answer_names_runs_nothing() {
                 for (const map of said.maps ?? []) said.unavailable = [{{ map: hostile, reason: hostile }}];
                 if (said.poses) said.poses = said.poses.map((of) => ({{ ...of, robot: hostile, session: hostile }}));
                 if (said.keep_outs) said.keep_outs = [{{ name: hostile, made_by: hostile, sphere: {{ center_m: [0, 0, 0], radius_m: 1 }} }}];
+                const failed = {{ number: 1, time_ms: 0, robot: hostile, session: hostile, points: 1, duration_ms: 1, answer: null,
+                                  error: {{ reason: hostile, detail: hostile }} }};
+                if (said.events) said.events = [failed];
                 if (said.settings) said.sightings = [{{ robot: hostile, verdict: hostile, seen_at_ns: 0, map_from_sensor: pose }}];
                 return new Response(JSON.stringify(said), {{ status: answer.status, headers: answer.headers }});
             }};
@@ -47,8 +50,10 @@ async fn what_a_link_a_file_or_an_answer_names_runs_nothing() {
         json!(HOSTILE)
     );
     browser.eval(&stand_in).await;
-    browser.eval("document.getElementById('scans').parentElement.open = true").await;
-    for list in ["#robots", "#scans", "#keep-outs", "#labels", "#notices"] {
+    for list in ["scans", "answers"] {
+        browser.eval(&format!("document.getElementById('{list}').parentElement.open = true")).await;
+    }
+    for list in ["#robots", "#answers", "#scans", "#keep-outs", "#labels", "#notices"] {
         browser.wait(&format!("document.querySelector({list:?}).textContent.includes('<img src=x')")).await;
     }
     assert_eq!(browser.eval("document.querySelectorAll('img').length").await, 0);

@@ -36,6 +36,7 @@ pub(super) const INDEX: File = File { name: "index.html", text: include_str!("pa
 
 /// What the page loads.
 pub(super) const FILES: &[File] = files! {
+    "answers.js",
     "api.js",
     "arrivals.js",
     "blocks.js",
@@ -47,6 +48,7 @@ pub(super) const FILES: &[File] = files! {
     "cuts.js",
     "detail.js",
     "dom.js",
+    "events.js",
     "explored.js",
     "forest.js",
     "format.js",

@@ -22,3 +22,12 @@ export function roundDown(value) {
 export function clock(milliseconds) {
   return new Date(milliseconds).toLocaleTimeString();
 }
+
+/** How long ago something was. */
+export function ago(milliseconds) {
+  const seconds = Math.max(0, Math.round(milliseconds / 1000));
+  if (seconds < 2) return "now";
+  if (seconds < 120) return `${seconds} s ago`;
+  if (seconds < 7200) return `${Math.round(seconds / 60)} min ago`;
+  return `${Math.round(seconds / 3600)} h ago`;
+}

@@ -21,6 +21,19 @@ export function paths(robots, arrivals) {
   return shape;
 }
 
+/** The last scans of robots that were refused, where their guesses put them. */
+export function refusedScans(events, size) {
+  const shape = new Shape();
+  const color = rgba(theme().refused);
+  for (const { guess, sample = [] } of events.last.values()) {
+    // Only what was refused has points.
+    if (!guess || sample.length === 0) continue;
+    shape.marker(guess.translation_m, 1.5 * size, color);
+    for (const point of sample) shape.marker(add(guess.translation_m, rotate(guess.rotation_xyzw, point)), size / 2, color);
+  }
+  return shape;
+}
+
 export function robotMarkers(robots, arrivals, size) {
   const shape = new Shape();
   for (const [robot, { position, rotation }] of robots.seen) {

@@ -1,6 +1,7 @@
 // The page: one map that is open, the tools, and the panel beside the picture.
 
 import { pathOf, requestId, send } from "./api.js";
+import { showAnswers } from "./answers.js";
 import { BodyTool } from "./body.js";
 import { Chooser, firstCommands, showEmpty } from "./chooser.js";
 import * as connection from "./connection.js";
@@ -10,7 +11,7 @@ import { button, byId, dot, element } from "./dom.js";
 import { freeSpace, frontiers } from "./explored.js";
 import { count, meters } from "./format.js";
 import { Labels } from "./labels.js";
-import { grid, keepOutShapes, paths, robotMarkers, scaleBar, topOf } from "./layers.js";
+import { grid, keepOutShapes, paths, refusedScans, robotMarkers, scaleBar, topOf } from "./layers.js";
 import { cameraParts, placeCamera, readLink, writeLink } from "./link.js";
 import { failed, notice } from "./notices.js";
 import { robotColor, theme, whenThemeChanges } from "./palette.js";
@@ -23,7 +24,7 @@ import { Session } from "./session.js";
 const SCANS_SHOWN = 100;
 /** Lists and layers follow changes at most this often. */
 const FOLLOW_MS = 300;
-const AGE_REPAINT_MS = 1000;
+const SECOND_MS = 1000;
 const LOOK_FOR_ROBOTS_MS = 5000;
 /** Heights above the lowest voxel between which free space is shown, meters. */
 const BAND_M = [0.2, 1.6];
@@ -60,8 +61,9 @@ export class Page {
     this.useTool("pick");
     this.scene.whenDrawn(() => this.#drawn());
     whenThemeChanges(() => this.#showLayers());
-    setInterval(() => this.scene.coloring === "age" && this.scene.repaint(), AGE_REPAINT_MS);
+    setInterval(() => this.scene.coloring === "age" && this.scene.repaint(), SECOND_MS);
     setInterval(() => this.session && !document.hidden && this.session.lookForRobots(), LOOK_FOR_ROBOTS_MS);
+    setInterval(() => document.hidden || this.#askForAnswers(), SECOND_MS);
   }
 
   /** Reads the maps, and opens the one that the link names, or the first. */
@@ -107,6 +109,7 @@ export class Page {
     this.#setFinest(Math.min(Number(link.level) || 0, levels.length - 1));
     if (link.color) this.#setColoring(link.color);
     session.follow();
+    this.#askForAnswers();
     this.#follow();
     this.#writeLink();
   }
@@ -118,8 +121,8 @@ export class Page {
     this.scene.open(undefined);
     this.labels.clear("");
     this.#tool?.closed();
-    for (const id of ["robots", "scans", "keep-outs"]) byId(id).replaceChildren();
-    for (const id of ["count", "layers-said"]) byId(id).textContent = "";
+    for (const id of ["robots", "answers", "scans", "keep-outs"]) byId(id).replaceChildren();
+    for (const id of ["count", "layers-said", "attention"]) byId(id).textContent = "";
     connection.none();
     showEmpty(undefined);
   }
@@ -231,7 +234,7 @@ export class Page {
     });
     byId("coloring").addEventListener("change", (event) => (this.#setColoring(event.target.value), this.#writeLink()));
     byId("finest").addEventListener("input", (event) => (this.#setFinest(event.target.valueAsNumber), this.#writeLink()));
-    for (const id of ["show-paths", "show-robots", "show-keep-outs", "show-grid"]) byId(id).addEventListener("change", () => this.#showLayers());
+    for (const id of ["show-paths", "show-robots", "show-refused", "show-keep-outs", "show-grid"]) byId(id).addEventListener("change", () => this.#showLayers());
     byId("ask-frontiers").addEventListener("click", () => this.#askFor("frontiers", (bounds) => frontiers(this.session, bounds)));
     byId("ask-free").addEventListener("click", () => this.#askFor("free", (bounds) => freeSpace(this.session, bounds, BAND_M.map((height) => bounds.min[2] + height))));
     byId("open-side").addEventListener("click", () => {
@@ -239,6 +242,7 @@ export class Page {
       byId("open-side").setAttribute("aria-expanded", !isClosed);
     });
     if (innerWidth <= NARROW_PIXELS) byId("open-side").click();
+    byId("answers").parentElement.addEventListener("toggle", () => this.#showAnswers());
     byId("scans").parentElement.addEventListener("toggle", () => this.session && this.#showLists());
     addEventListener("hashchange", () => this.start());
   }
@@ -310,21 +314,28 @@ export class Page {
   }
 
   #showLists() {
-    const { robots, arrivals } = this.session;
-    const item = (name) => {
-      const { verdict, position } = robots.seen.get(name);
-      const go = () => {
-        this.scene.camera.target = position;
-        this.#isFollowed = false;
-        this.scene.moved();
-      };
-      const isGood = verdict === "accepted";
-      return element("li", {}, dot(robotColor(arrivals.placeOf(name))), button(name, go, { className: "place" }), element("span", { className: isGood ? "soft" : "bad" }, isGood ? "" : verdict));
-    };
-    byId("robots").replaceChildren(...robots.names().map(item));
-    if (robots.seen.size === 0) byId("robots").replaceChildren(element("li", { className: "soft" }, "no scan yet"));
+    const { robots } = this.session;
     const isOpen = byId("scans").parentElement.open;
     byId("scans").replaceChildren(...robots.scans.slice(isOpen ? -SCANS_SHOWN : Infinity).reverse().map((scan) => this.scanItem(scan)));
+  }
+
+  async #askForAnswers() {
+    await this.session?.events.look();
+    // A list that somebody points at stays as it is.
+    if (!byId("robots").matches(":hover") && !byId("answers").matches(":hover")) this.#showAnswers();
+  }
+
+  #showAnswers() {
+    const { session } = this;
+    if (!session) return;
+    const goTo = (position) => {
+      this.scene.camera.target = position;
+      this.#isFollowed = false;
+      this.scene.moved();
+    };
+    showAnswers(session, goTo);
+    const size = Math.max(2 * session.forest.resolution, 0.05);
+    this.scene.show("refused", byId("show-refused").checked ? refusedScans(session.events, size) : undefined, true);
   }
 
   #showKeepOuts() {
@@ -337,6 +348,7 @@ export class Page {
   #showLayers() {
     const { session, scene } = this;
     if (!session) return;
+    this.#showAnswers();
     const { robots, arrivals, keepOuts } = session;
     const [isOfPaths, isOfRobots, isOfKeepOuts, isOfGrid] = ["show-paths", "show-robots", "show-keep-outs", "show-grid"].map((id) => byId(id).checked);
     scene.show("grid", isOfGrid && this.#bounds ? grid(this.#bulk).shape : undefined);

@@ -2,6 +2,7 @@
 
 import { pathOf, read } from "./api.js";
 import { Arrivals } from "./arrivals.js";
+import { Events } from "./events.js";
 import { Forest } from "./forest.js";
 import { Loader } from "./loader.js";
 import { Robots } from "./robots.js";
@@ -22,6 +23,7 @@ export class Session {
     this.forest = new Forest(info.settings.resolution_m, info.settings.levels);
     this.arrivals = new Arrivals();
     this.robots = new Robots(this.name);
+    this.events = new Events(this.name);
     const failed = (problem) => this.#isClosed || told.failed(problem);
     this.loader = new Loader(this.name, this.forest, { fetched: (tile) => this.arrivals.tagIn(this.forest, tile), arrived: told.arrived, failed });
   }
