@@ -4,7 +4,7 @@
 //! is in the map is in its trajectory. Refused scans and failed requests are nowhere else.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 use tokio_stream::Stream;
@@ -12,8 +12,15 @@ use tokio_stream::Stream;
 use super::hosted_map::HostedMap;
 use super::mapping::Judged;
 use super::outbox::{Teller, stream_of};
-use super::{EventMessage, EventsQuery, MapService, Outcome, ScanEvent, ScanRequest, ServiceError};
+use super::{
+    EventMessage, EventsQuery, FailedScan, MapService, Outcome, ScanAnswer, ScanEvent, ScanRequest,
+    ServiceError,
+};
+use crate::geometry::{Point, Pose};
 use crate::map::MapName;
+
+/// The word for a scan whose caller went away: no caller is ever told it.
+const CALLER_GONE: &str = "caller_gone";
 
 impl MapService {
     /// What became of the last scans that were sent to a map, and of the last of each robot, the oldest first.
@@ -101,26 +108,54 @@ impl Teller for EventWatch {
     }
 }
 
-impl ScanEvent {
-    /// What became of a scan that was answered just now. Number and time are given where it is kept.
-    pub(super) fn of(
-        request: &ScanRequest,
-        duration: Duration,
-        answer: &Result<Judged, ServiceError>,
-    ) -> Self {
-        let judged = answer.as_ref().ok();
-        let ScanRequest { robot, session, scan_id, points, .. } = request;
-        Self {
+/// A scan that is not answered yet: dropped, its caller has gone, which is an event as well.
+pub(super) struct PendingEvent<'a> {
+    map: &'a HostedMap,
+    scan: &'a ScanRequest,
+    start: Instant,
+    most: usize,
+}
+
+impl<'a> PendingEvent<'a> {
+    /// A scan that has just come; so many events are kept.
+    pub(super) fn begin(map: &'a HostedMap, scan: &'a ScanRequest, most: usize) -> Self {
+        Self { map, scan, start: Instant::now(), most }
+    }
+
+    /// Keeps what became of the scan.
+    pub(super) fn end(self, answer: &Result<Judged, ServiceError>) {
+        match answer {
+            Ok(Judged { answer, guess, sample }) => {
+                self.note(*guess, sample.clone(), Ok(answer.clone().into()));
+            }
+            Err(error) => self.note(None, Vec::new(), Err(error.into())),
+        }
+        std::mem::forget(self);
+    }
+
+    fn note(&self, guess: Option<Pose>, sample: Vec<Point>, answer: Result<Box<ScanAnswer>, FailedScan>) {
+        let ScanRequest { robot, session, scan_id, points, .. } = self.scan;
+        let event = ScanEvent {
+            // Number and time are given where it is kept.
             number: 0,
             time_ns: 0,
             robot: robot.clone(),
             session: session.clone(),
             scan_id: *scan_id,
             points: points.len(),
-            duration,
-            guess: judged.and_then(|judged| judged.guess),
-            sample: judged.map(|judged| judged.sample.clone()).unwrap_or_default(),
-            answer: answer.as_ref().map(|judged| Box::new(judged.answer.clone())).map_err(Into::into),
-        }
+            duration: self.start.elapsed(),
+            guess,
+            sample,
+            answer,
+        };
+        self.map.events.note(event, self.most);
+    }
+}
+
+impl Drop for PendingEvent<'_> {
+    fn drop(&mut self) {
+        let message =
+            "the caller went away before the answer; what was decided by then is in the map all the same";
+        self.note(None, Vec::new(), Err(FailedScan { reason: CALLER_GONE.into(), message: message.into() }));
     }
 }

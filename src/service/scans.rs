@@ -1,13 +1,13 @@
 //! Inserting and aligning scans: whose turn it is, on which threads, and for how long.
 
 use std::sync::Arc;
-use std::time::Instant;
 
+use super::events::PendingEvent;
 use super::hosted_map::HostedMap;
 use super::mapping::{Effort, Judged};
 use super::pools::Pools;
 use super::time_limit::TimeLimit;
-use super::{JudgedScan, MapService, Outcome, ScanAnswer, ScanEvent, ScanRequest, ServiceError};
+use super::{JudgedScan, MapService, Outcome, ScanAnswer, ScanRequest, ServiceError};
 use crate::map::MapName;
 use crate::util::StopSignal;
 
@@ -19,12 +19,13 @@ impl MapService {
     /// `InvalidArgument` for a scan without a usable point or with too many; `ResourceExhausted` while disk or memory
     /// is nearly full; `DeadlineExceeded` with `time_limit` beyond `insertion_time_max`.
     pub async fn insert_scan(&self, map: &MapName, scan: ScanRequest) -> Result<ScanAnswer, ServiceError> {
-        let (start, robot) = (Instant::now(), scan.robot.clone());
+        let robot = scan.robot.clone();
         let work = async {
             self.scans.permit(&scan.robot)?;
             let (map, scan) = (self.map(map)?, Arc::new(scan));
+            let pending = PendingEvent::begin(&map, &scan, self.limits().events_per_map_max);
             let judged = self.judge(&map, &scan).await;
-            map.events.note(ScanEvent::of(&scan, start.elapsed(), &judged), self.limits().events_per_map_max);
+            pending.end(&judged);
             let Judged { answer, .. } = judged?;
             if !answer.accepted {
                 self.search_for_robot_of(map, &scan);

@@ -104,6 +104,20 @@ async fn an_http_client_that_disconnects_takes_its_work_along() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_robot_that_does_not_wait_for_its_answer_is_told_of() {
+    let daemon = daemon().await;
+    let points = bytes_of(&corner().into_iter().cycle().take(POINTS).collect::<Vec<_>>());
+    let url = daemon.url("/v1/maps/a/scans?robot=hasty&method=overlap&guess=0.11,0.12,0.13,0,0,0,1");
+    let post = client().post(url).header("content-type", "application/octet-stream").body(points);
+    let gone = tokio::spawn(post.send());
+    until(&daemon, "running", 1).await;
+    gone.abort();
+    until(&daemon, "cancelled_total", 1).await;
+    let told = json_of(daemon.get("/v1/maps/a/events?robot=hasty").await).await;
+    assert_eq!(told["events"][0]["error"]["reason"], "caller_gone", "{told}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_deadline_ends_a_call_and_its_work() {
     let daemon = daemon().await;
     let mut request = Request::new(endless());

@@ -38,7 +38,8 @@ pub struct ScanEvent {
 /// Why the request for a scan failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FailedScan {
-    /// The stable word for programs, of a [`Reason`](crate::service::Reason) that this program may not know yet.
+    /// The stable word for programs: that of a [`Reason`](crate::service::Reason), which this program may not know yet, or
+    /// `caller_gone`.
     pub reason: Cow<'static, str>,
     /// A sentence for people.
     pub message: String,
