@@ -47,7 +47,7 @@ async fn a_robot_whose_scan_is_refused_comes_first_and_its_scan_is_drawn_where_i
     let lost = json!({"robot": "zz", "points": wall(), "guess": pose_json([0.0, 9.0, 0.0])});
     let answer = json_of(daemon.post("/v1/maps/a/scans", lost).await).await;
     assert_eq!(answer["accepted"], false, "{answer}");
-    browser.wait("document.getElementById('attention').textContent === '1 of 2 need attention'").await;
+    browser.wait("document.getElementById('attention').textContent === '1 of 2 needs attention'").await;
     let first = text(&browser, "#robots li").await;
     assert!(first.starts_with("zz") && first.contains(answer["verdict"].as_str().unwrap()), "{first}");
     browser.eval("document.getElementById('answers').parentElement.open = true").await;

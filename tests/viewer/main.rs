@@ -9,6 +9,7 @@ mod live;
 mod looking;
 mod names;
 mod nothing_yet;
+mod pictures;
 #[path = "../support/mod.rs"]
 mod support;
 

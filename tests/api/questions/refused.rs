@@ -74,7 +74,7 @@ async fn what_is_no_question_is_refused_by_name() {
             "area.min_m must lie within -104857.6 m and 104857.6 m",
         ),
         ("poses", json!({"body": {"links": [{"points": []}]}, "configurations": pose}), "at least one point"),
-        ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "groups"),
+        ("spheres", json!({"spheres": [[0, 0, 0, 1]], "sizes": [2]}), "sizes are of 2 spheres in all, got 1"),
         ("spheres", json!({"spheres": [[0, 0, 0, 1]], "level": 9}), "level"),
     ] {
         let answer = daemon.post(&format!("/v1/maps/a/{route}"), asked.clone()).await;

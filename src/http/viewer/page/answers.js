@@ -12,7 +12,7 @@ export function showAnswers({ robots, events, arrivals }, goTo) {
   const names = Array.from(new Set([...robots.names(), ...events.last.keys()])).sort();
   const of = names.map((name) => ({ name, event: events.last.get(name), seen: robots.seen.get(name), color: robotColor(arrivals.placeOf(name)) }));
   const bad = of.filter(needsAttention);
-  byId("attention").textContent = bad.length > 0 ? `${bad.length} of ${of.length} ${of.length === 1 ? "needs" : "need"} attention` : "";
+  byId("attention").textContent = bad.length > 0 ? `${bad.length} of ${of.length} ${bad.length === 1 ? "needs" : "need"} attention` : "";
   const now = Date.now();
   const items = [...bad, ...of.filter((robot) => !needsAttention(robot))].map((robot) => robotItem(robot, now, goTo));
   byId("robots").replaceChildren(...items);
