@@ -51,7 +51,9 @@ pub(crate) async fn over_http(
         r#"Bearer realm="mrol""#
     };
     assert_eq!(challenge, (status == StatusCode::UNAUTHORIZED).then_some(expected), "{operation:?}");
-    let error: Value = answer.json().await.unwrap_or_default();
+    // What was let in may answer for as long as somebody reads.
+    let error: Value =
+        if status.is_success() { Value::Null } else { answer.json().await.unwrap_or_default() };
     let text = |field: &str| error[field].as_str().unwrap_or_default().to_owned();
     match status {
         StatusCode::UNAUTHORIZED => Outcome::Unknown { reason: text("reason") },

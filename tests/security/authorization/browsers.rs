@@ -28,8 +28,11 @@ async fn asked(
         request = request.json(&body);
     }
     let answer = request.send().await.unwrap();
-    let status = answer.status().as_u16();
-    let error: Value = answer.json().await.unwrap_or_default();
+    let status = answer.status();
+    // What was let in may answer for as long as somebody reads.
+    let error: Value =
+        if status.is_success() { Value::Null } else { answer.json().await.unwrap_or_default() };
+    let status = status.as_u16();
     let text = |field: &str| error[field].as_str().unwrap_or_default().to_owned();
     (status, text("reason"), text("detail"))
 }
