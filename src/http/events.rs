@@ -100,7 +100,7 @@ pub(super) async fn watch(
         }
         has_failed = message.is_err();
         let line = match message {
-            Ok(EventMessage::Event(event)) => EventLine::Event(Box::new((&event).into())),
+            Ok(EventMessage::Event(event)) => EventLine::Event(Box::new((&*event).into())),
             Ok(EventMessage::Heartbeat) => EventLine::Heartbeat { heartbeat: true },
             Err(error) => EventLine::Failed { error: error.into() },
         };

@@ -87,7 +87,7 @@ impl Teller for EventWatch {
             if let Some(event) = self.waiting.next() {
                 self.query.since_number = event.number;
                 self.is_greeted = true;
-                return Ok(EventMessage::Event(ScanEvent::clone(&event)));
+                return Ok(EventMessage::Event(event));
             }
             self.newest.borrow_and_update();
             self.waiting = self.map.events.list(&self.query).into_iter();

@@ -1,5 +1,6 @@
 //! What became of scans (`mapping.proto`).
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::types::count_from;
@@ -110,7 +111,7 @@ impl From<EventMessage> for pb::WatchEventsResponse {
     fn from(message: EventMessage) -> Self {
         Self {
             event: match message {
-                EventMessage::Event(event) => Some((&event).into()),
+                EventMessage::Event(event) => Some((&*event).into()),
                 EventMessage::Heartbeat => None,
             },
         }
@@ -121,7 +122,7 @@ impl TryFrom<pb::WatchEventsResponse> for EventMessage {
     type Error = ServiceError;
 
     fn try_from(message: pb::WatchEventsResponse) -> Result<Self, ServiceError> {
-        message.event.map_or(Ok(Self::Heartbeat), |event| Ok(Self::Event(event.try_into()?)))
+        message.event.map_or(Ok(Self::Heartbeat), |event| Ok(Self::Event(Arc::new(event.try_into()?))))
     }
 }
 

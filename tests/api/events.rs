@@ -1,5 +1,6 @@
 //! What became of the scans that robots sent: kept, listed, and told as it comes, over both protocols.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use mrol::client::{Answers, Client};
@@ -101,7 +102,7 @@ async fn a_list_begins_after_a_number_and_is_of_one_robot_where_asked() {
     assert_eq!(refused["reason"], "map_not_found");
 }
 
-async fn next_event(messages: &mut Answers<EventMessage>) -> ScanEvent {
+async fn next_event(messages: &mut Answers<EventMessage>) -> Arc<ScanEvent> {
     loop {
         let next = tokio::time::timeout(PATIENCE, messages.next()).await.expect("a message in time");
         if let EventMessage::Event(event) = next.expect("another message").unwrap() {

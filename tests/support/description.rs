@@ -60,8 +60,7 @@ pub fn check(method: &Method, path: &str, status: StatusCode, media_type: &str, 
         Arc::clone(VALIDATORS.lock().expect("no panic").entry(key.clone()).or_insert(made.into()))
     });
     if let Some(error) = validator.iter_errors(answer).next() {
-        let mut answer = answer.to_string();
-        answer.truncate(answer.floor_char_boundary(1000));
+        let answer: String = answer.to_string().chars().take(1000).collect();
         panic!("{key}: {error} at {:?} in {answer}", error.instance_path().to_string());
     }
 }
@@ -74,8 +73,8 @@ fn operation_at(method: &Method, path: &str) -> Option<Operation> {
         let is_same = |(asked, described): (&str, &str)| asked == described || described.starts_with('{');
         asked.clone().count() == described.clone().count() && asked.zip(described).all(is_same)
     };
-    let routes = Operation::ALL.iter().filter_map(|operation| Some(operation.route()?.path));
-    Operation::of_request(method.as_str(), routes.filter(|route| is_at(route)).next()?)
+    let mut routes = Operation::ALL.iter().filter_map(|operation| Some(operation.route()?.path));
+    Operation::of_request(method.as_str(), routes.find(|route| is_at(route))?)
 }
 
 /// The schema of an answer; of what is no operation, that of its status.

@@ -9,7 +9,7 @@ use utoipa::openapi::header::{Header, HeaderBuilder};
 use utoipa::openapi::schema::{AllOfBuilder, ObjectBuilder, Type};
 use utoipa::openapi::{ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
 
-use super::from_table::request_id;
+use super::request_id::request_id;
 use crate::access::Operation;
 use crate::http::error::{PROBLEM_JSON, Problem, status_of};
 use crate::service::{Reason, ToldBy};

@@ -3,14 +3,13 @@
 use axum::http::Method;
 use utoipa::PartialSchema;
 use utoipa::openapi::extensions::ExtensionsBuilder;
-use utoipa::openapi::header::HeaderBuilder;
 use utoipa::openapi::path::{
     Operation as Described, Parameter, ParameterBuilder, ParameterIn, PathItem, Paths,
 };
-use utoipa::openapi::schema::{ObjectBuilder, Type};
 use utoipa::openapi::security::SecurityRequirement;
-use utoipa::openapi::{Ref, RefOr, Required, Schema};
+use utoipa::openapi::{Ref, RefOr, Required};
 
+use super::request_id::request_id;
 use super::{KEY, failures};
 use crate::access::Operation;
 use crate::http::{reader, viewer};
@@ -106,10 +105,4 @@ fn example_map(operation: Operation) -> &'static str {
         Operation::CreateMap | Operation::DeleteMap | Operation::RestoreMap => "example",
         _ => "demo",
     }
-}
-
-/// The header by which a request is found in the log.
-pub(super) fn request_id() -> utoipa::openapi::header::Header {
-    let text: RefOr<Schema> = ObjectBuilder::new().schema_type(Type::String).into();
-    HeaderBuilder::new().schema(Some(text)).description(Some("The id of the request, in the log too")).build()
 }

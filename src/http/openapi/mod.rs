@@ -8,6 +8,7 @@
 mod failures;
 mod from_table;
 mod optional_parts;
+mod request_id;
 
 use std::sync::LazyLock;
 

@@ -1,6 +1,7 @@
 //! What became of the scans that robots sent, for the people who look after them.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::scan::ScanAnswer;
@@ -64,7 +65,7 @@ pub struct EventsQuery {
 #[derive(Debug, Clone, PartialEq)]
 pub enum EventMessage {
     /// What became of a scan.
-    Event(ScanEvent),
+    Event(Arc<ScanEvent>),
     /// There was none in a while.
     Heartbeat,
 }
