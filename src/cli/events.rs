@@ -4,12 +4,13 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 use time::OffsetDateTime;
-use time::format_description::well_known::Rfc3339;
+use time::format_description;
 
 use super::error::CliError;
 use super::map_report::count;
 use super::output::Output;
 use super::remote::MapOptions;
+use crate::align::Verdict;
 use crate::map::RobotName;
 use crate::service::{EventMessage, EventsQuery, ScanEvent};
 use crate::wire::json::{JsonEvent, JsonScan};
@@ -33,7 +34,7 @@ pub(super) struct Events {
     /// Of this robot alone
     #[arg(long)]
     robot: Option<String>,
-    /// Only scans that were refused, and requests that failed
+    /// Only scans that do not fit, taken by force or not, and requests that failed
     #[arg(long)]
     not_accepted: bool,
     /// Go on with each event as it comes
@@ -60,8 +61,9 @@ impl Events {
     }
 
     fn print(&self, output: &Output, event: &ScanEvent) -> Result<(), CliError> {
-        let is_accepted = event.answer.as_ref().is_ok_and(|answer| answer.accepted);
-        if self.not_accepted && is_accepted {
+        let fits =
+            event.answer.as_ref().is_ok_and(|answer| answer.accepted && answer.verdict == Verdict::Accepted);
+        if self.not_accepted && fits {
             return Ok(());
         }
         output.print(&Line(event.into()))
@@ -90,8 +92,9 @@ impl Display for Line {
 }
 
 fn write_answer(f: &mut fmt::Formatter<'_>, answer: &JsonScan) -> fmt::Result {
-    let verdict = if answer.accepted { "accepted" } else { answer.verdict };
-    write!(f, ": {verdict}, overlap {:.2}", answer.overlap)?;
+    let forced =
+        if answer.accepted && answer.verdict != Verdict::Accepted.as_str() { "forced, " } else { "" };
+    write!(f, ": {forced}{}, overlap {:.2}", answer.verdict, answer.overlap)?;
     if let Some(how) = answer.recovered {
         write!(f, ", found again by {how}")?;
     }
@@ -103,8 +106,20 @@ fn write_answer(f: &mut fmt::Formatter<'_>, answer: &JsonScan) -> fmt::Result {
     }
 }
 
-/// A time as RFC 3339 has it, in UTC, to the millisecond.
+/// A time as RFC 3339 has it, in UTC, with all its milliseconds.
 fn timestamp(unix_ms: f64) -> String {
+    const FORM: &str = "[year]-[month]-[day]T[hour]:[minute]:[second].[subsecond digits:3]Z";
     let time = OffsetDateTime::from_unix_timestamp_nanos(i128::from(unix_ms as i64) * 1_000_000);
-    time.ok().and_then(|time| time.format(&Rfc3339).ok()).unwrap_or_default()
+    let form = format_description::parse_borrowed::<2>(FORM);
+    time.ok().zip(form.ok()).and_then(|(time, form)| time.format(&form).ok()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_timestamp_has_all_its_digits() {
+        assert_eq!(timestamp(1_764_086_399_100.0), "2025-11-25T15:59:59.100Z");
+    }
 }

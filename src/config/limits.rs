@@ -2,7 +2,7 @@
 
 use super::ConfigError;
 use crate::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
-use crate::service::Limits;
+use crate::service::{EVENTS_MAX, Limits};
 
 /// Refuses limits that would keep the server from working at all.
 pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
@@ -21,12 +21,14 @@ pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {
         ("limits.scrapes_max", limits.scrapes_max, 1, "1 to 1048576"),
         ("limits.health_watches_max", limits.health_watches_max, 0, "0 to 1048576"),
         ("limits.watches_max", limits.watches_max, 0, "0 to 1048576"),
-        ("limits.events_per_map_max", limits.events_per_map_max, 0, "0 to 1048576"),
         ("limits.connections_reserved", limits.connections_reserved, 0, "0 to 1048576"),
     ] {
         if !(least..=1 << 20).contains(&value) {
             return range(key, allowed, value.to_string());
         }
+    }
+    if limits.events_per_map_max > EVENTS_MAX {
+        return range("limits.events_per_map_max", "0 to 4096", limits.events_per_map_max.to_string());
     }
     if limits.keep_outs_max > KEEP_OUTS_MAX {
         return range("limits.keep_outs_max", "0 to 256", limits.keep_outs_max.to_string());

@@ -24,7 +24,7 @@ pub enum MappingError {
     #[error(transparent)]
     BadFilter(#[from] PointFilterError),
     /// The filter leaves no point.
-    #[error("none of the scan's {points} points passes {filter} of robot {robot}")]
+    #[error("none of the scan's {points} points passes the filter of robot {robot}: {filter}")]
     AllFiltered {
         /// Number of points of the scan.
         points: usize,

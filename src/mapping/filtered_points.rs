@@ -46,7 +46,7 @@ impl FilteredPoints {
         let filter = filter.checked()?;
         let points: Vec<Point> = points.into_iter().filter(|&point| filter.keeps(point)).collect();
         if points.is_empty() {
-            let filter = format!("{filter:?}");
+            let filter = filter.to_string();
             return Err(MappingError::AllFiltered { points: all.len(), filter, robot: robot.clone() });
         }
         let of_points = times_s.map(|times_s| {

@@ -1,6 +1,11 @@
 //! Point filters: which points of a scan are used.
 
+use std::fmt::{Display, Formatter, Result as FmtResult};
+
 use crate::geometry::Point;
+
+/// How far the range of a point at a limit may lie from it, relative to it, once its coordinates are rounded to f32.
+const ROUNDING: f64 = 1e-6;
 
 /// A filter for the points of a robot's scans: skips those that are too near, too far, or on the robot itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -14,6 +19,24 @@ pub struct PointFilter {
     pub no_return_m: Option<f64>,
     /// The robot's own body in the sensor frame, meters: smallest and largest corner; points within are skipped.
     pub body_m: Option<([f64; 3], [f64; 3])>,
+}
+
+/// What it skips, by the names of its fields.
+impl Display for PointFilter {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        let numbers = [
+            ("range_min_m", self.range_min_m),
+            ("range_max_m", self.range_max_m),
+            ("no_return_m", self.no_return_m),
+        ];
+        let mut comma = "";
+        for (name, number) in numbers {
+            if let Some(number) = number {
+                write!(f, "{}{name} {number}", std::mem::replace(&mut comma, ", "))?;
+            }
+        }
+        self.body_m.map_or(Ok(()), |(min, max)| write!(f, "{comma}body_m {min:?} to {max:?}"))
+    }
 }
 
 /// Why a filter is not valid.
@@ -76,7 +99,7 @@ impl PointFilter {
             self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])));
         self.range_min_m.is_none_or(|min| range_m >= min)
             && self.range_max_m.is_none_or(|max| range_m <= max)
-            && self.no_return_m.is_none_or(|max| range_m < max)
+            && self.no_return_m.is_none_or(|max| range_m < max * (1.0 - ROUNDING))
             && !in_body
     }
 
@@ -86,14 +109,26 @@ impl PointFilter {
         let no_return_m = self.no_return_m.filter(|_| point.is_finite())?;
         let point = point.to_f64().coords;
         let range_m = point.norm();
+        // Points at the limit itself were rounded to f32, some of them to nearer than it.
+        let is_no_return = range_m >= no_return_m * (1.0 - ROUNDING);
         let to: [f64; 3] = (point * (no_return_m / range_m)).into();
-        (range_m >= no_return_m).then(|| Point::from(to.map(|c| c as f32)))
+        is_no_return.then(|| Point::from(to.map(|c| c as f32)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_filter_is_said_by_its_fields() {
+        let filter =
+            PointFilter { range_min_m: Some(0.5), no_return_m: Some(30.0), ..PointFilter::default() };
+        assert_eq!(filter.to_string(), "range_min_m 0.5, no_return_m 30");
+        let body_m = Some(([-1.0; 3], [1.0; 3]));
+        let filter = PointFilter { body_m, ..PointFilter::default() };
+        assert_eq!(filter.to_string(), "body_m [-1.0, -1.0, -1.0] to [1.0, 1.0, 1.0]");
+    }
 
     #[test]
     fn points_too_near_too_far_or_of_the_robot_are_skipped() {
@@ -112,6 +147,11 @@ mod tests {
     #[test]
     fn from_the_distance_of_no_return_on_points_tell_a_direction_alone() {
         let filter = PointFilter { no_return_m: Some(30.0), ..PointFilter::default() };
+        for turn in 0..1000 {
+            let (sin, cos) = (f64::from(turn) * 0.01).sin_cos();
+            let at_limit = Point::new((30.0 * cos) as f32, (30.0 * sin) as f32, 0.0);
+            assert!(!filter.keeps(at_limit) && filter.no_return(at_limit).is_some(), "{at_limit:?}");
+        }
         let (met, far) = (Point::new(0.0, 29.9, 0.0), Point::new(0.0, -60.0, 80.0));
         assert!(filter.keeps(met) && filter.no_return(met).is_none());
         assert!(!filter.keeps(far));

@@ -10,9 +10,13 @@ use crate::map::RobotName;
 use crate::sync::{Mutex, Rank};
 use crate::util::unix_time_ns;
 
+/// The most events of a map that the server can be set to keep.
+pub const EVENTS_MAX: usize = 4096;
+
 /// The last events of a map, and the last of each robot: a robot that fell silent is still there to be seen.
 ///
-/// Bounded by the number of events. Points are kept of a robot's last scan alone.
+/// Bounded by the number of events: for a new one, the oldest goes of the robot that has most, so that no robot crowds out
+/// the others. Points are kept of a robot's last scan alone.
 #[derive(Debug)]
 pub(super) struct EventLog {
     kept: Mutex<Kept>,
@@ -85,7 +89,22 @@ impl Kept {
             }
         }
         self.recent.push_back(event);
-        self.recent.drain(..self.recent.len().saturating_sub(most));
+        while self.recent.len() > most {
+            self.drop_oldest_of_busiest();
+        }
+    }
+
+    fn drop_oldest_of_busiest(&mut self) {
+        let mut counts = BTreeMap::<&RobotName, usize>::new();
+        for event in &self.recent {
+            *counts.entry(&event.robot).or_default() += 1;
+        }
+        let most = counts.values().copied().max().unwrap_or_default();
+        // Of several such, that whose event is the oldest.
+        let oldest = self.recent.iter().position(|event| counts[&event.robot] == most);
+        if let Some(oldest) = oldest {
+            self.recent.remove(oldest);
+        }
     }
 
     /// Keeps no more points of what is not the robot's last scan from now on.
@@ -138,7 +157,7 @@ mod tests {
         let kept = all(&log);
         assert_eq!(
             kept.iter().map(|event| event.robot.as_str()).collect::<Vec<_>>(),
-            ["silent", "busy", "busy", "busy"]
+            ["silent", "busy", "busy"]
         );
         assert!(numbers(&kept).is_sorted_by(|a, b| a < b));
         let robot = Some(kept[0].robot.clone());
@@ -154,6 +173,17 @@ mod tests {
         assert_eq!(since(told[1]), told[2..]);
         assert!(since(told[3]).is_empty());
         assert_eq!(since(told[3] + 1), told);
+    }
+
+    #[test]
+    fn a_robot_that_sends_much_crowds_out_no_other() {
+        let log = EventLog::default();
+        (0..3).for_each(|_| log.note(event_of("quiet"), 10));
+        (0..100).for_each(|_| log.note(event_of("busy"), 10));
+        let kept = all(&log);
+        assert_eq!(kept.iter().filter(|event| event.robot.as_str() == "quiet").count(), 3);
+        assert_eq!(kept.len(), 10);
+        assert!(numbers(&kept).is_sorted_by(|a, b| a < b));
     }
 
     #[test]

@@ -83,6 +83,9 @@ impl Teller for EventWatch {
 
     /// The next event, or a heartbeat where none comes in a while: at once where there is none yet.
     async fn tell(&mut self) -> Result<EventMessage, ServiceError> {
+        let patience = if self.is_greeted { self.heartbeat } else { Duration::ZERO };
+        // Events of other robots put it off no longer.
+        let quiet_until = Instant::now() + patience;
         loop {
             if let Some(event) = self.waiting.next() {
                 self.query.since_number = event.number;
@@ -94,12 +97,11 @@ impl Teller for EventWatch {
             if self.waiting.len() > 0 {
                 continue;
             }
-            let patience = if self.is_greeted { self.heartbeat } else { Duration::ZERO };
             tokio::select! {
                 biased;
                 () = self.map.commit_queue.ended() => return Err(self.map.ended()),
                 _ = self.newest.changed() => {}
-                () = tokio::time::sleep(patience) => {
+                () = tokio::time::sleep_until(quiet_until.into()) => {
                     self.is_greeted = true;
                     return Ok(EventMessage::Heartbeat);
                 }

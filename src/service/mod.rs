@@ -60,6 +60,7 @@ pub use allowed_scans::AllowedScans;
 pub use asker::Asker;
 pub use error::ServiceError;
 pub use error_code::ErrorCode;
+pub use event_log::EVENTS_MAX;
 pub use events::EventWatch;
 pub use gauges::{Gauges, MemoryReading, Readings};
 pub use limits::{Limits, Marks};

@@ -187,3 +187,26 @@ async fn watches_of_events_count_among_the_watches() {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
+
+#[tokio::test]
+async fn a_watch_of_one_robot_has_its_heartbeats_while_others_send() {
+    let daemon = Daemon::start_with(|config| config.limits.watch_heartbeat_s = 0.5).await;
+    daemon.make_map("a").await;
+    let robot = Some(RobotName::new("quiet").unwrap());
+    let query = EventsQuery { robot, since_number: 0 };
+    let mut messages = client_of(&daemon).await.watch_events(&map_a(), query).await.unwrap();
+    assert_eq!(messages.next().await.unwrap().unwrap(), EventMessage::Heartbeat, "it speaks at once");
+    let busy = async {
+        loop {
+            let failing = json!({"robot": "busy", "points": [[null, 0, 0]]});
+            daemon.post("/v1/maps/a/scans", failing).await;
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let next = tokio::time::timeout(PATIENCE, messages.next());
+    let heard = tokio::select! {
+        next = next => next,
+        () = busy => unreachable!(),
+    };
+    assert_eq!(heard.expect("a heartbeat in time").unwrap().unwrap(), EventMessage::Heartbeat);
+}

@@ -67,3 +67,29 @@ async fn a_robot_whose_scan_is_refused_comes_first_and_its_scan_is_drawn_where_i
     browser.wait("document.getElementById('attention').textContent === ''").await;
     assert_clean(&browser.told(), &daemon);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scan_that_is_spread_far_and_robots_without_number_leave_the_page_answering() {
+    let _turn = turn().await;
+    let Some(browser) = Browser::start().await else { return };
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &wall()).await;
+    browser.open(&link(&daemon, "a")).await;
+    browser.wait(DRAWN).await;
+    // More places, tens of kilometers apart, than the page keeps.
+    let scattered: Vec<[f32; 3]> = (0..3000u32)
+        .map(|i| [7919, 104_729, 611].map(|step| (i * step % 90_001) as f32 - 45_000.0))
+        .collect();
+    daemon.put_in("a", &scattered).await;
+    browser.wait("document.getElementById('notices').textContent.includes('some are not shown')").await;
+    assert!(browser.eval("session.forest.size").await.as_u64().unwrap() <= 3000);
+    for robot in 0..400 {
+        let failing = json!({"robot": format!("r{robot}"), "points": [[null, 0, 0]]});
+        daemon.post("/v1/maps/a/scans", failing).await;
+    }
+    browser.wait("session.events.last.has('r399')").await;
+    assert!(browser.eval("session.events.last.size").await.as_u64().unwrap() <= 256);
+    browser.wait("document.querySelectorAll('#robots li').length === 100").await;
+    assert_clean(&browser.told(), &daemon);
+}

@@ -103,7 +103,7 @@ fn described() -> utoipa::openapi::OpenApi {
     components.schemas.values_mut().for_each(optional_parts::mend);
     let mut bearer = Http::new(HttpAuthScheme::Bearer);
     bearer.description =
-        Some("A key of the server, where it asks for keys: `mrol keys add` makes one.".into());
+        Some("A key of the server, where it asks for keys: `mrol key new` makes one.".into());
     components.security_schemes.insert(KEY.into(), SecurityScheme::Http(bearer).into());
     described
 }

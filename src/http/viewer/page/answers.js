@@ -6,6 +6,7 @@ import { ago, clock } from "./format.js";
 import { robotColor } from "./palette.js";
 
 const SHOWN = 50;
+const ROBOTS_SHOWN = 100;
 
 /** Shows what a session knows of its robots; `goTo(position)` leads there. */
 export function showAnswers({ robots, events, arrivals }, goTo) {
@@ -13,8 +14,9 @@ export function showAnswers({ robots, events, arrivals }, goTo) {
   const of = names.map((name) => ({ name, event: events.last.get(name), seen: robots.seen.get(name), color: robotColor(arrivals.placeOf(name)) }));
   const bad = of.filter(needsAttention);
   byId("attention").textContent = bad.length > 0 ? `${bad.length} of ${of.length} ${bad.length === 1 ? "needs" : "need"} attention` : "";
-  const now = Date.now();
-  const items = [...bad, ...of.filter((robot) => !needsAttention(robot))].map((robot) => robotItem(robot, now, goTo));
+  const now = events.now();
+  const inOrder = [...bad, ...of.filter((robot) => !needsAttention(robot))];
+  const items = inOrder.slice(0, ROBOTS_SHOWN).map((robot) => robotItem(robot, now, goTo));
   byId("robots").replaceChildren(...items);
   if (of.length === 0) byId("robots").replaceChildren(element("li", { className: "soft" }, "no scan yet"));
   if (!byId("answers").parentElement.open) return;

@@ -14,14 +14,14 @@ const AGE_MAX_MS = 180_000;
 export class Arrivals {
   #tags = new Map();
   #next = 1;
-  #robots = [];
+  #robots = new Map();
   #brought = [];
   #bytes = 0;
 
   /** The place of a robot among those that were seen, which chooses its color. */
   placeOf(robot) {
-    const known = this.#robots.indexOf(robot);
-    return known >= 0 ? known : this.#robots.push(robot) - 1;
+    if (!this.#robots.has(robot)) this.#robots.set(robot, this.#robots.size);
+    return this.#robots.get(robot);
   }
 
   /** The tag of what `robot` brings now; `forget(tag)` is called of a tag that is taken anew. */

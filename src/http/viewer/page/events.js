@@ -3,21 +3,33 @@
 // They are asked for once a second. A second stream beside that of changes would be a second of the six connections that a
 // browser has to a server, for all its windows.
 
-import { pathOf, read } from "./api.js";
+import { ask, pathOf } from "./api.js";
 
 const KEPT = 100;
+const ROBOTS_MAX = 256;
 
 export class Events {
-  /** By robot: what became of its last scan. */
+  /** By robot: what became of its last scan; the robot that was heard of last is the last one. */
   last = new Map();
   /** Of all robots, the newest last. */
   newest = [];
   #map;
   #number = 0;
   #isAsking = false;
+  /** How far the server's clock is ahead of this machine's. */
+  #ahead = 0;
 
   constructor(map) {
     this.#map = map;
+  }
+
+  get number() {
+    return this.#number;
+  }
+
+  /** The time by the server's clock. */
+  now() {
+    return Date.now() + this.#ahead;
   }
 
   /** Asks for what came since. That a server cannot be reached, the watch of the map says. */
@@ -25,7 +37,9 @@ export class Events {
     if (this.#isAsking) return;
     this.#isAsking = true;
     try {
-      const { events } = await read(pathOf(this.#map, "events"), { since_number: this.#number });
+      const response = await ask(pathOf(this.#map, "events"), { query: { since_number: this.#number } });
+      this.#ahead = (Date.parse(response.headers.get("date")) || Date.now()) - Date.now();
+      const { events } = await response.json();
       events.forEach((event) => this.#take(event));
     } catch (error) {
       if (error.status === undefined) throw error;
@@ -36,20 +50,24 @@ export class Events {
 
   #take(event) {
     this.#number = event.number;
+    this.last.delete(event.robot);
     this.last.set(event.robot, event);
+    if (this.last.size > ROBOTS_MAX) this.last.delete(this.last.keys().next().value);
     this.newest.push(event);
     this.newest.splice(0, this.newest.length - KEPT);
   }
 }
 
-/** True of an answer that somebody has to look at: the scan was refused, or its request failed. */
-export const isBad = ({ answer }) => !answer?.accepted;
+/** True of an answer that somebody has to look at: the scan does not fit, taken or not, or its request failed. */
+export const isBad = ({ answer }) => !answer?.accepted || answer.verdict !== "accepted";
 
 /** The answer in a few words. */
 export function wordsOf({ answer, error }) {
   if (!answer) return error?.reason ?? "failed";
   const overlap = `${Math.round(answer.overlap * 100)} %`;
   if (!answer.accepted) return `${answer.verdict}, ${overlap}`;
+  if (answer.verdict !== "accepted") return `forced: ${answer.verdict}, ${overlap}`;
+  if (answer.replayed) return `sent again, ${overlap}`;
   if (answer.recovered) return `found again, ${overlap}`;
   return answer.stationary ? `stands still, ${overlap}` : overlap;
 }

@@ -3,11 +3,17 @@
 import { eachBlock, eachCube, eachVoxel } from "./blocks.js";
 import { SIDE, Tile } from "./tile.js";
 
+/** Tiles that are kept; those of the coarsest level among them are never given up. */
+export const TILES_MAX = 2_000;
+const ROOTS_MAX = 1_000;
+
 const keyOf = (level, [x, y, z]) => `${level}:${x},${y},${z}`;
 
 export class Forest {
   #tiles = new Map();
   #roots = new Set();
+  /** The map is spread over more places than are kept: some are not shown. */
+  isPartial = false;
 
   /** @param resolution side of a voxel of level 0, meters */
   constructor(resolution, levels) {
@@ -66,12 +72,13 @@ export class Forest {
 
   /** Makes the roots that blocks of the coarsest level lie in. */
   plantRoots(bytes, revision) {
-    const planted = [];
-    eachBlock(bytes, (x, y, z) => {
+    const planted = new Set();
+    eachBlock(bytes, (x, y, z, masks) => {
       const index = [x >> 3, y >> 3, z >> 3];
-      if (!this.at(this.top, index)) planted.push(this.plant(this.top, index, revision));
+      let root = this.at(this.top, index);
+      if (!root && this.#hasRoomAt(this.top)) planted.add((root = this.plant(this.top, index, revision)));
+      if (planted.has(root)) root.fillBlock(x, y, z, masks);
     });
-    for (const root of planted) root.fill(bytes, revision);
   }
 
   /**
@@ -152,13 +159,20 @@ export class Forest {
   #insertAt(level, x, y, z, revision, tag) {
     let tile = this.#holding(level, x, y, z);
     const index = [x >> (level + 6), y >> (level + 6), z >> (level + 6)];
-    if (!tile && this.#isKnownEmpty(level, index)) {
+    if (!tile && this.#isKnownEmpty(level, index) && this.#hasRoomAt(level)) {
       tile = this.plant(level, index, revision - 1);
       // Nothing is missing from the picture until its first voxels are drawn.
       tile.isDrawable = true;
     }
     if (!tile || revision <= tile.revision) return;
     tile.insert((x >> level) & 63, (y >> level) & 63, (z >> level) & 63, tag);
+  }
+
+  #hasRoomAt(level) {
+    const hasRoom = level === this.top ? this.#roots.size < ROOTS_MAX : this.#tiles.size < TILES_MAX;
+    // What is finer is fetched when it is looked at.
+    if (!hasRoom && level === this.top) this.isPartial = true;
+    return hasRoom;
   }
 
   #holding(level, x, y, z) {

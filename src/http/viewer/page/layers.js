@@ -21,13 +21,15 @@ export function paths(robots, arrivals) {
   return shape;
 }
 
-/** The last scans of robots that were refused, where their guesses put them. */
+const REFUSED_SHOWN = 30;
+
+/** The last scans of robots that were refused, the newest of them, where their guesses put them. */
 export function refusedScans(events, size) {
   const shape = new Shape();
   const color = rgba(theme().refused);
-  for (const { guess, sample = [] } of events.last.values()) {
-    // Only what was refused has points.
-    if (!guess || sample.length === 0) continue;
+  // Only what was refused has points.
+  const refused = Array.from(events.last.values()).filter(({ guess, sample }) => guess && sample?.length > 0);
+  for (const { guess, sample } of refused.slice(-REFUSED_SHOWN)) {
     shape.marker(guess.translation_m, 1.5 * size, color);
     for (const point of sample) shape.marker(add(guess.translation_m, rotate(guess.rotation_xyzw, point)), size / 2, color);
   }

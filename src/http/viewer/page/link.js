@@ -4,7 +4,10 @@ const SECONDS_BETWEEN = 0.4;
 let timer;
 
 export function readLink() {
-  return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+  const said = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+  // A path that has these as names leads elsewhere, however they are quoted.
+  if ([".", ".."].includes(said.map)) delete said.map;
+  return said;
 }
 
 /** Keeps the link up to date, not at each step of a motion. */

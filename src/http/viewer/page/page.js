@@ -39,6 +39,8 @@ export class Page {
   /** The bounds of most of the map. */
   #bulk;
   #following;
+  /** Which refused scans are drawn. */
+  #refused;
   #isFollowed = true;
   #opening = 0;
 
@@ -106,7 +108,7 @@ export class Page {
     this.cuts.reset(this.#bounds);
     const { levels } = session.info;
     byId("finest").max = levels.length - 1;
-    this.#setFinest(Math.min(Number(link.level) || 0, levels.length - 1));
+    this.#setFinest(Math.max(0, Math.min(Math.round(Number(link.level)) || 0, levels.length - 1)));
     if (link.color) this.#setColoring(link.color);
     session.follow();
     this.#askForAnswers();
@@ -118,6 +120,7 @@ export class Page {
     this.session?.close();
     this.session = undefined;
     this.#bounds = undefined;
+    this.#refused = undefined;
     this.scene.open(undefined);
     this.labels.clear("");
     this.#tool?.closed();
@@ -294,6 +297,10 @@ export class Page {
     this.cuts.measure(this.#bounds);
     // Somebody who has not moved the camera sees the map grow as a whole.
     if (this.#isFollowed) this.#frame();
+    if (session.forest.isPartial && !session.isSaidPartial) {
+      session.isSaidPartial = true;
+      notice("This map is spread over more places than this page keeps: some are not shown.", { isBad: true });
+    }
     const isEmpty = !this.#bounds;
     const isDone = "The map is here, and there is nothing in it. Scans appear as they are inserted. For example:";
     showEmpty(isEmpty ? `${session.name} is empty` : undefined, isDone, isEmpty ? firstCommands(session.name) : undefined);
@@ -335,7 +342,11 @@ export class Page {
     };
     showAnswers(session, goTo);
     const size = Math.max(2 * session.forest.resolution, 0.05);
-    this.scene.show("refused", byId("show-refused").checked ? refusedScans(session.events, size) : undefined, true);
+    const isShown = byId("show-refused").checked;
+    const refused = `${session.name} ${session.events.number} ${isShown}`;
+    if (refused === this.#refused) return;
+    this.#refused = refused;
+    this.scene.show("refused", isShown ? refusedScans(session.events, size) : undefined, true);
   }
 
   #showKeepOuts() {

@@ -65,7 +65,11 @@ export class Robots {
   }
 }
 
+/** Names are the same for many scans, and kept once. */
+const names = new Map();
+const once = (name) => names.get(name) ?? (names.size < 1_000 && names.set(name, name), name);
+
 /** What is kept of a scan, since there may be many. */
 function kept({ robot, session, scan_id, revision, timestamp_ns }, position) {
-  return { robot, session, scan_id, revision, timestamp_ns, position };
+  return { robot: once(robot), session: once(session), scan_id, revision, timestamp_ns, position };
 }

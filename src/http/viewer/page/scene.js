@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import { choose } from "./detail.js";
+import { TILES_MAX } from "./forest.js";
 import { rgba, theme, voxelColors, whenThemeChanges } from "./palette.js";
 import { pick } from "./pick.js";
 import { Shapes } from "./shapes.js";
@@ -21,7 +22,6 @@ const BUILD_MS = 2.5;
 const BUILD_SHOWN_MS = 200;
 const VOXELS_MAX = 2_500_000;
 /** Tiles that are kept; each takes 32 KiB and its words. */
-const TILES_MAX = 2_000;
 const KEPT_MS = 3_000;
 /** Share of the coarsest voxels at each end of each axis that may be stray ones. */
 export const STRAY = 0.02;

@@ -60,18 +60,21 @@ export class Tile {
 
   /** Holds these blocks and nothing else. Tags stay with the cells that stay. */
   fill(bytes, revision) {
-    const [tileX, tileY, tileZ] = this.index;
     this.bits.fill(0);
     this.octants = 0;
-    eachBlock(bytes, (blockX, blockY, blockZ, masks) => {
-      const [x0, y0, z0] = [blockX - tileX * 8, blockY - tileY * 8, blockZ - tileZ * 8];
-      if ((x0 | y0 | z0) & ~7) return;
-      this.octants |= 1 << ((x0 >> 2) | ((y0 >> 2) << 1) | ((z0 >> 2) << 2));
-      eachCube(masks, (x, y, z, bits) => this.#fillCube(x0 * 8 + x, y0 * 8 + y, z0 * 8 + z, bits));
-    });
+    eachBlock(bytes, (x, y, z, masks) => this.fillBlock(x, y, z, masks));
     this.revision = revision;
     this.isChanged = true;
     this.isStale = false;
+  }
+
+  /** Takes up a block of voxels, if it lies in the tile. */
+  fillBlock(blockX, blockY, blockZ, masks) {
+    const [tileX, tileY, tileZ] = this.index;
+    const [x0, y0, z0] = [blockX - tileX * 8, blockY - tileY * 8, blockZ - tileZ * 8];
+    if ((x0 | y0 | z0) & ~7) return;
+    this.octants |= 1 << ((x0 >> 2) | ((y0 >> 2) << 1) | ((z0 >> 2) << 2));
+    eachCube(masks, (x, y, z, bits) => this.#fillCube(x0 * 8 + x, y0 * 8 + y, z0 * 8 + z, bits));
   }
 
   #fillCube(x, y, z, bits) {
