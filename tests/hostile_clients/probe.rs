@@ -27,8 +27,12 @@ impl Probe {
         let told = Arc::clone(&enough);
         let thread = std::thread::spawn(move || {
             let mut times = Vec::new();
-            while !told.load(Ordering::Relaxed) {
+            // One at the least, however soon it is enough.
+            loop {
                 times.push(answer_time(server));
+                if told.load(Ordering::Relaxed) {
+                    break;
+                }
                 sleep(INTERVAL);
             }
             times.sort_unstable();
