@@ -54,7 +54,7 @@ fn insert_three(map: &Arc<HostedMap>, budget: &Arc<ResourceBudget>, robot: &str,
         let turn = Arc::new(block_on(map.lock_robot(&request.robot)));
         let settings = ServiceSettings::default();
         let step = map.submit_scan(&request, turn, Effort::Whole, &settings, budget, StopSignal::NEVER);
-        newest = outcome(step).unwrap().expect("a scan at its guess").version.revision;
+        newest = outcome(step).unwrap().expect("a scan at its guess").answer.version.revision;
     }
     newest
 }
