@@ -93,12 +93,7 @@ pub(super) async fn watch(
 ) -> Result<Response, HttpError> {
     let watch = service.watch_events(&map, params.try_into()?).await?;
     let messages = watch.into_stream(adapter.admission.told_to_drain());
-    let mut has_failed = false;
-    let lines = messages.map_while(move |message| {
-        if has_failed {
-            return None;
-        }
-        has_failed = message.is_err();
+    let lines = messages.map_while(|message| {
         let line = match message {
             Ok(EventMessage::Event(event)) => EventLine::Event(Box::new((&*event).into())),
             Ok(EventMessage::Heartbeat) => EventLine::Heartbeat { heartbeat: true },

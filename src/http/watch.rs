@@ -71,15 +71,10 @@ pub(super) async fn watch(
 ) -> Result<Response, HttpError> {
     let request = params.request(&map)?;
     let messages = service.watch(&map, request).await?.into_stream(adapter.admission.told_to_drain());
-    let mut has_failed = false;
-    let messages = messages.map_while(move |message| {
-        if has_failed {
-            return None;
-        }
-        has_failed = message.is_err();
+    let messages = messages.map(|message| {
         let failure = |error: ServiceError| pb::WatchResponse::from(pb::Failure::from(error));
         let message = message.map_or_else(failure, Into::into);
-        Some(Ok::<_, Infallible>(framed(&message)))
+        Ok::<_, Infallible>(framed(&message))
     });
     let content_type = [(header::CONTENT_TYPE, "application/octet-stream")];
     Ok((content_type, Body::from_stream(messages)).into_response())

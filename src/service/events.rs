@@ -84,7 +84,7 @@ impl Teller for EventWatch {
     /// The next event, or a heartbeat where none comes in a while: at once where there is none yet.
     async fn tell(&mut self) -> Result<EventMessage, ServiceError> {
         let patience = if self.is_greeted { self.heartbeat } else { Duration::ZERO };
-        // Events of other robots put it off no longer.
+        // Events of other robots do not put it off.
         let quiet_until = Instant::now() + patience;
         loop {
             if let Some(event) = self.waiting.next() {

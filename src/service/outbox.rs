@@ -48,5 +48,10 @@ pub(super) fn stream_of<T: Teller>(
     tokio::spawn(polled_by_runtime(telling));
     let message = format!("watch_unread_max_s is {unread_max_s}: the client took no message for that long");
     let stalled = ServiceError::new(Reason::WatchStalled, message);
-    ReceiverStream::new(messages).chain(tokio_stream::once(Err(stalled)))
+    let mut has_ended = false;
+    ReceiverStream::new(messages).chain(tokio_stream::once(Err(stalled))).map_while(move |message| {
+        let message = (!has_ended).then_some(message)?;
+        has_ended = message.is_err();
+        Some(message)
+    })
 }

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::browser::Browser;
 use crate::support::daemon::{Daemon, identity_json, json_of, pose_json};
-use crate::{DRAWN, assert_clean, link, middle_color, shown, text, turn, wall};
+use crate::{DRAWN, assert_clean, before_wall, link, middle_color, shown, text, turn, wall};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_map_grows_in_the_picture_and_a_lost_connection_is_said_and_resumed() {
@@ -34,13 +34,7 @@ async fn a_map_grows_in_the_picture_and_a_lost_connection_is_said_and_resumed() 
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_whose_scan_is_refused_comes_first_and_its_scan_is_drawn_where_its_guess_was() {
-    let _turn = turn().await;
-    let Some(browser) = Browser::start().await else { return };
-    let daemon = Daemon::start().await;
-    daemon.make_map("a").await;
-    daemon.put_in("a", &wall()).await;
-    browser.open(&link(&daemon, "a")).await;
-    browser.wait(DRAWN).await;
+    let Some((_turn, browser, daemon)) = before_wall().await else { return };
     browser.wait("document.querySelector('#robots .soft') && document.getElementById('attention').textContent === ''").await;
 
     // A name that would come last, a guess where nothing is.
@@ -70,13 +64,7 @@ async fn a_robot_whose_scan_is_refused_comes_first_and_its_scan_is_drawn_where_i
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_scan_that_is_spread_far_and_robots_without_number_leave_the_page_answering() {
-    let _turn = turn().await;
-    let Some(browser) = Browser::start().await else { return };
-    let daemon = Daemon::start().await;
-    daemon.make_map("a").await;
-    daemon.put_in("a", &wall()).await;
-    browser.open(&link(&daemon, "a")).await;
-    browser.wait(DRAWN).await;
+    let Some((_turn, browser, daemon)) = before_wall().await else { return };
     // More places, tens of kilometers apart, than the page keeps.
     let scattered: Vec<[f32; 3]> = (0..3000u32)
         .map(|i| [7919, 104_729, 611].map(|step| (i * step % 90_001) as f32 - 45_000.0))

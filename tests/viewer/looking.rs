@@ -4,17 +4,11 @@ use serde_json::json;
 
 use crate::browser::Browser;
 use crate::support::daemon::Daemon;
-use crate::{DRAWN, MIDDLE, assert_clean, link, middle_color, shown, text, turn, wall};
+use crate::{DRAWN, MIDDLE, assert_clean, before_wall, link, middle_color, shown, text, turn, wall};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_map_is_turned_picked_cut_deleted_from_and_undone() {
-    let _turn = turn().await;
-    let Some(browser) = Browser::start().await else { return };
-    let daemon = Daemon::start().await;
-    daemon.make_map("a").await;
-    daemon.put_in("a", &wall()).await;
-    browser.open(&link(&daemon, "a")).await;
-    browser.wait(DRAWN).await;
+    let Some((_turn, browser, daemon)) = before_wall().await else { return };
     assert_eq!(shown(&browser).await, 441);
     assert!(browser.eval("scene.drawn.calls").await.as_u64().unwrap() <= 64);
     // The robot stands in the middle.

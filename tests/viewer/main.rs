@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod browser;
+mod figures;
 mod keys;
 mod live;
 mod looking;
@@ -63,6 +64,18 @@ fn wall() -> Vec<[f32; 3]> {
 /// Looks at the wall from before it, so that it fills the middle of the picture.
 fn link(daemon: &Daemon, map: &str) -> String {
     daemon.url(&format!("/#map={map}&at=0.05,0.05,0.05&distance=4&yaw=-1.5&pitch=0.2"))
+}
+
+/// A browser before the wall of a map `a`; none where there is no browser.
+async fn before_wall() -> Option<(MutexGuard<'static, ()>, Browser, Daemon)> {
+    let turn = turn().await;
+    let browser = Browser::start().await?;
+    let daemon = Daemon::start().await;
+    daemon.make_map("a").await;
+    daemon.put_in("a", &wall()).await;
+    browser.open(&link(&daemon, "a")).await;
+    browser.wait(DRAWN).await;
+    Some((turn, browser, daemon))
 }
 
 /// No error, and no request to another place than the server.

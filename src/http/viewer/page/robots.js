@@ -71,5 +71,7 @@ const once = (name) => names.get(name) ?? (names.size < 1_000 && names.set(name,
 
 /** What is kept of a scan, since there may be many. */
 function kept({ robot, session, scan_id, revision, timestamp_ns }, position) {
-  return { robot: once(robot), session: once(session), scan_id, revision, timestamp_ns, position };
+  // An array of three numbers as it stands takes a quarter of one that was made first and filled then.
+  const [x, y, z] = position;
+  return { robot: once(robot), session: once(session), scan_id, revision, timestamp_ns, position: [x, y, z] };
 }
