@@ -17,7 +17,7 @@ use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 use crate::support::skipped::skipped;
 
 /// Set where a browser has to be there: the tests fail without one then.
-const REQUIRED: &str = "MROL_BROWSER_REQUIRED";
+const REQUIRED: &str = "BROWSER_REQUIRED";
 const PROGRAMS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// How long anything in the browser may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(40);

@@ -107,7 +107,8 @@ export class Scene {
 
   /** Shows a shape as the layer of that name; none takes the layer away. */
   show(name, shape, isOnTop = false) {
-    if (shape) this.#layers.set(name, { shape, isOnTop });
+    // Kept for when the browser takes the GPU's memory away.
+    if (shape) this.#layers.set(name, { shape: shape.sealed(), isOnTop });
     else this.#layers.delete(name);
     this.#shapes.show(name, shape, this.origin, isOnTop);
     this.invalidate();

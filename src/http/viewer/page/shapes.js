@@ -83,6 +83,13 @@ export class Shape {
     }
   }
 
+  /** This shape, which is whole: its numbers take no more room than they need. */
+  sealed() {
+    this.lines = Float64Array.from(this.lines);
+    this.triangles = Float64Array.from(this.triangles);
+    return this;
+  }
+
   /** A small solid that marks a place. */
   marker([x, y, z], size, color) {
     const shade = (by) => [color[0] * by, color[1] * by, color[2] * by, color[3]];
