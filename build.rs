@@ -1,4 +1,4 @@
-//! Compiles `proto/` without protoc: protox parses, prost and tonic generate.
+//! Compiles `proto/` without protoc (protox parses, prost and tonic generate), and tells the program what was built.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -7,10 +7,51 @@ use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
 
 fn main() {
+    println!("cargo::rustc-env=MROL_FEATURES={}", features());
+    println!("cargo::rustc-env=MROL_COMMIT={}", commit().as_deref().unwrap_or("unknown"));
     #[expect(clippy::expect_used, reason = "a build script has nobody else to tell")]
     if std::env::var_os("CARGO_FEATURE_CLIENT").is_some() {
         generate().expect("proto/mrol/v1 does not compile");
     }
+}
+
+/// The features of the crate that are built, in their order of the alphabet.
+fn features() -> String {
+    let names =
+        std::env::vars().filter_map(|(name, _)| Some(name.strip_prefix("CARGO_FEATURE_")?.to_lowercase()));
+    let mut names: Vec<String> = names.filter(|name| name != "default").collect();
+    names.sort();
+    names.join(", ")
+}
+
+/// The commit that is built: what MROL_COMMIT says, and else git of a build for use.
+///
+/// A developer's build names none. To be true it would be told anew after every commit, and the crate be built anew for it.
+fn commit() -> Option<String> {
+    println!("cargo::rerun-if-env-changed=MROL_COMMIT");
+    if let Some(commit) = std::env::var("MROL_COMMIT").ok().filter(|commit| !commit.is_empty()) {
+        return Some(commit);
+    }
+    if std::env::var("PROFILE").ok()? != "release" {
+        return None;
+    }
+    let git = |arguments: &[&str]| {
+        let output = std::process::Command::new("git").args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    // A crate that lies in the folder of another project is no commit of that.
+    let (top, here) = (git(&["rev-parse", "--show-toplevel"])?, std::env::current_dir().ok()?);
+    if std::fs::canonicalize(top).ok()? != here.canonicalize().ok()? {
+        return None;
+    }
+    // The journal of HEAD grows with every commit and checkout; what else is named here makes a clean tree one with changes.
+    let journal = git(&["rev-parse", "--git-path", "logs/HEAD"])?;
+    for path in [&journal, "src", "Cargo.toml", "Cargo.lock", "build.rs"] {
+        if std::path::Path::new(path).exists() {
+            println!("cargo::rerun-if-changed={path}");
+        }
+    }
+    git(&["describe", "--always", "--abbrev=12", "--dirty=+changes", "--exclude=*"])
 }
 
 fn generate() -> Result<(), Box<dyn std::error::Error>> {

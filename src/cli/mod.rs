@@ -9,6 +9,7 @@ mod asked;
 mod block;
 mod check;
 mod classify;
+mod completions;
 mod config;
 mod delete;
 mod doctor;
@@ -53,6 +54,8 @@ use clap::{Parser, Subcommand};
 use error::CliError;
 use output::Output;
 
+use crate::util::build;
+
 const EXAMPLES: &str = "\
 EXAMPLES:
   mrol demo                     see it work: two simulated robots, a planner, the real daemon
@@ -72,7 +75,7 @@ EXIT CODES:
 
 /// A networked multi-resolution voxel map: robots send scans, planners ask about points
 #[derive(Debug, Parser)]
-#[command(name = "mrol", version, after_help = EXAMPLES)]
+#[command(name = "mrol", version, long_version = build::DESCRIPTION, after_help = EXAMPLES)]
 struct CommandLine {
     /// Print results as JSON, an object a line, for programs
     #[arg(long, global = true)]
@@ -110,6 +113,7 @@ enum Command {
     Restore(snapshot::Restore),
     Doctor(doctor::Doctor),
     Config(config::Settings),
+    Completions(completions::Completions),
 }
 
 /// Runs the command line of this process and returns its exit code.
@@ -157,6 +161,7 @@ impl Command {
             Self::Restore(restore) => runtime::block_on(restore.run(output)),
             Self::Doctor(doctor) => doctor.run(output),
             Self::Config(config) => config.run(&output),
+            Self::Completions(completions) => completions.run(&output),
         }
     }
 }

@@ -22,6 +22,7 @@ use crate::map::{MapName, RobotName};
 use crate::service::{
     End, Ended, JudgedScan, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
 };
+use crate::util::build;
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
 /// beside a disk that hangs as long as that.
@@ -41,12 +42,6 @@ const OTHER_KEYS: &str = "(others)";
 
 /// The robot of all scans that came after those of [`Metrics::ROBOTS_MAX`] others.
 const OTHER_ROBOTS: &str = "other";
-
-/// The commit that was built, where whoever built it said so.
-const COMMIT: &str = match option_env!("MROL_COMMIT") {
-    Some(commit) if !commit.is_empty() => commit,
-    _ => "unknown",
-};
 
 /// How much of what admission limits is in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -103,7 +98,7 @@ impl Metrics {
         let metrics = Self(Arc::new(kept));
         metrics.record(families::describe);
         metrics.record(|| {
-            gauge!(BUILD_INFO, "version" => env!("CARGO_PKG_VERSION"), "commit" => COMMIT, "features" => features())
+            gauge!(BUILD_INFO, "version" => build::VERSION, "commit" => build::COMMIT, "features" => build::FEATURES)
                 .set(1.0);
         });
         Ok(metrics)
@@ -276,13 +271,6 @@ impl Drop for OpenConnection {
     fn drop(&mut self) {
         self.metrics.record(|| gauge!(CONNECTIONS_OPEN, "listener" => self.listener).decrement(1.0));
     }
-}
-
-/// The features of the crate that were compiled in.
-fn features() -> String {
-    let features = [("client", cfg!(feature = "client")), ("server", cfg!(feature = "server"))];
-    let compiled = features.into_iter().filter(|(_, compiled)| *compiled).map(|(name, _)| name);
-    compiled.collect::<Vec<_>>().join(",")
 }
 
 /// Counts what was done by map. Answers that were given before are not counted again.

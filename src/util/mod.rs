@@ -1,7 +1,9 @@
 //! Small tools that know nothing of maps: bits of a word, a prefetch, how long things take, the
-//! stop signal of long work.
+//! stop signal of long work, what was built.
 
 pub(crate) mod bits;
+#[cfg(feature = "server")]
+pub(crate) mod build;
 #[cfg(feature = "client")]
 mod clock;
 #[cfg(target_arch = "x86_64")]

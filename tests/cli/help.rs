@@ -2,7 +2,7 @@
 
 use super::mrol;
 
-const COMMANDS: [&str; 27] = [
+const COMMANDS: [&str; 29] = [
     "serve",
     "demo",
     "map",
@@ -30,6 +30,8 @@ const COMMANDS: [&str; 27] = [
     "restore",
     "doctor",
     "config",
+    "watch",
+    "completions",
 ];
 
 #[test]
@@ -52,4 +54,40 @@ fn the_program_lists_its_commands() {
 fn no_command_or_an_unknown_one_is_a_usage_error() {
     mrol(&[]).assert().code(2);
     mrol(&["fly"]).assert().code(2);
+}
+
+#[test]
+fn the_version_tells_commit_and_features() {
+    let said = mrol(&["--version"]).assert().success().get_output().stdout.clone();
+    let said = String::from_utf8(said).unwrap();
+    let lines: Vec<&str> = said.lines().collect();
+    assert_eq!(lines[0], concat!("mrol ", env!("CARGO_PKG_VERSION")));
+    assert!(lines[1].strip_prefix("commit: ").is_some_and(|commit| !commit.is_empty()), "{said}");
+    assert!(lines[2].starts_with("features: client, lab, server"), "{said}");
+    let short = mrol(&["-V"]).assert().success().get_output().stdout.clone();
+    assert_eq!(String::from_utf8(short).unwrap().trim_end(), lines[0]);
+}
+
+#[test]
+fn shells_complete_commands_and_options() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = mrol(&["completions", shell]).assert().success().get_output().stdout.clone();
+        let script = String::from_utf8(script).unwrap();
+        assert!(script.contains("snapshot") && script.contains("min-revision"), "{shell}: {script}");
+    }
+    mrol(&["completions", "cmd"]).assert().code(2);
+}
+
+/// What bash itself completes with the script, where there is a bash.
+#[test]
+fn bash_completes_a_command() {
+    let script = mrol(&["completions", "bash"]).assert().success().get_output().stdout.clone();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), script).unwrap();
+    let asked =
+        "source \"$0\"; COMP_WORDS=(mrol snap); COMP_CWORD=1; _mrol mrol snap mrol; echo \"${COMPREPLY[@]}\"";
+    match std::process::Command::new("bash").args(["-c", asked]).arg(file.path()).output() {
+        Ok(output) => assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), "snapshot"),
+        Err(error) => eprintln!("SKIPPED: no bash ({error})"),
+    }
 }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::journal::new_folder;
 use super::workload::{MapOptions, WorkloadOptions, times};
+use crate::bloom::FilterSettings;
 use crate::cli::error::CliError;
 use crate::cli::map_report::count;
 use crate::cli::output::Output;
@@ -59,7 +60,7 @@ impl ReplicaBench {
         let settings = self.map.settings(workload.resolution_m())?;
         let target = Target::make(server.grpc(), None, workload, settings).await?;
         output.say(format!("{}: {} voxels", self.workload, count(target.voxels)))?;
-        let (replica, copied) = copy(&server, &target).await?;
+        let (replica, copied) = copy(&server, &target, settings.filter).await?;
         output.print(&copied)?;
         let mut c_client = self.c_client(&server, &target, folder.path(), &output).await?;
         output.say(Line::HEAD)?;
@@ -125,9 +126,15 @@ impl ReplicaBench {
 }
 
 /// Copies the map: a replica, and what it took.
-async fn copy(server: &ServerProcess, target: &Target) -> Result<(Replica, Copied), FleetError> {
+async fn copy(
+    server: &ServerProcess,
+    target: &Target,
+    filter: Option<FilterSettings>,
+) -> Result<(Replica, Copied), FleetError> {
     let open = async |client| {
-        let opened = Replica::open(client, target.map.clone(), ReplicaOptions::default()).await;
+        // The lookups that are timed ask the filters, too.
+        let options = ReplicaOptions { filter, ..ReplicaOptions::default() };
+        let opened = Replica::open(client, target.map.clone(), options).await;
         opened.map_err(|error| FleetError::Failed(error.to_string()))
     };
     let own = std::process::id();

@@ -1,0 +1,45 @@
+//! `mrol completions`: what a shell completes on the command line.
+
+use std::fmt;
+
+use clap::CommandFactory;
+use clap_complete::Shell;
+use serde::Serialize;
+
+use super::CommandLine;
+use super::error::CliError;
+use super::output::Output;
+
+const EXAMPLES: &str = "\
+EXAMPLES:
+  source <(mrol completions bash)                                            this shell alone
+  mrol completions bash > ~/.local/share/bash-completion/completions/mrol    every bash from now on
+  mrol completions zsh > ~/.zfunc/_mrol                                      with fpath+=~/.zfunc before compinit
+  mrol completions fish > ~/.config/fish/completions/mrol.fish";
+
+/// Print the script by which a shell completes commands and options
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Completions {
+    /// The shell
+    shell: Shell,
+}
+
+impl Completions {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut CommandLine::command(), "mrol", &mut script);
+        output.print(&Script { script: String::from_utf8_lossy(&script).trim_end() })
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Script<'a> {
+    script: &'a str,
+}
+
+impl fmt::Display for Script<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.script)
+    }
+}
