@@ -72,6 +72,7 @@ pub(super) const FILES: &[File] = files! {
     "scene.js",
     "session.js",
     "shapes.js",
+    "steps.js",
     "style.css",
     "tile.js",
     "vector.js",

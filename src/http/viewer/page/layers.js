@@ -11,7 +11,7 @@ const GAP_M = 25;
 export function paths(robots, arrivals) {
   const shape = new Shape();
   const last = new Map();
-  for (const { robot, position } of robots.scans) {
+  for (const { robot, position } of robots.steps) {
     const before = last.get(robot);
     if (before && Math.hypot(...before.map((value, axis) => value - position[axis])) < GAP_M) {
       shape.line(before, position, rgba(robotColor(arrivals.placeOf(robot))));

@@ -323,7 +323,7 @@ export class Page {
   #showLists() {
     const { robots } = this.session;
     const isOpen = byId("scans").parentElement.open;
-    byId("scans").replaceChildren(...robots.scans.slice(isOpen ? -SCANS_SHOWN : Infinity).reverse().map((scan) => this.scanItem(scan)));
+    byId("scans").replaceChildren(...robots.newest.slice(isOpen ? -SCANS_SHOWN : Infinity).reverse().map((scan) => this.scanItem(scan)));
   }
 
   async #askForAnswers() {

@@ -1,15 +1,20 @@
 // The scans that made a map, robot by robot, and where each robot is now.
 
 import { pathOf, read } from "./api.js";
+import { Steps } from "./steps.js";
 
 const PAGE = 5_000;
 /** The newest poses that are kept, of all robots. */
-const SCANS_MAX = 200_000;
+const STEPS_MAX = 200_000;
+/** The newest scans of which all is kept, so that they can be listed and undone. */
+const NEWEST_MAX = 200;
 
 export class Robots {
   #map;
-  /** Scans in the order of their revisions. */
-  scans = [];
+  /** Where scans were taken, in the order of their revisions. */
+  steps = new Steps();
+  /** The newest of these scans. */
+  newest = [];
   /** By name: where the robot is, and what became of its last scan. */
   seen = new Map();
 
@@ -19,22 +24,22 @@ export class Robots {
 
   /** Reads the trajectory and the last sightings anew. */
   async load() {
-    const scans = [];
+    const before = this.newest.at(-1)?.revision ?? 0;
+    const [steps, newest] = [new Steps(), []];
     this.seen.clear();
     let since = 0;
     while (since !== undefined) {
       const page = await read(pathOf(this.#map, "trajectory"), { since_revision: since, limit: PAGE });
       for (const { map_from_sensor: pose, ...scan } of page.poses) {
-        scans.push(kept(scan, pose.translation_m));
+        keep(steps, newest, scan, pose.translation_m);
         this.#see(scan.robot, pose.translation_m, pose.rotation_xyzw);
       }
-      scans.splice(0, scans.length - SCANS_MAX);
       since = page.next_since_revision;
     }
-    const last = this.scans.at(-1)?.revision ?? 0;
-    // What a watch told in the meantime is not lost.
-    const newer = this.scans.filter((scan) => scan.revision > (scans.at(-1)?.revision ?? 0) && scan.revision <= last);
-    this.scans = scans.concat(newer);
+    // What a watch told in the meantime is not lost; what was there before and is not any more was undone.
+    const last = Math.max(before, newest.at(-1)?.revision ?? 0);
+    for (const scan of this.newest) if (scan.revision > last) keep(steps, newest, scan, scan.position);
+    [this.steps, this.newest] = [steps, newest];
     await this.look();
   }
 
@@ -48,9 +53,8 @@ export class Robots {
 
   /** Takes up a scan that was just inserted. */
   add(scan, revision) {
-    if (revision <= (this.scans.at(-1)?.revision ?? 0)) return;
-    this.scans.push(kept({ ...scan, revision }, scan.position));
-    if (this.scans.length > SCANS_MAX * 1.1) this.scans.splice(0, this.scans.length - SCANS_MAX);
+    if (revision <= (this.newest.at(-1)?.revision ?? 0)) return;
+    keep(this.steps, this.newest, { ...scan, revision }, scan.position);
     this.#see(scan.robot, scan.position, scan.rotation);
   }
 
@@ -69,9 +73,11 @@ export class Robots {
 const names = new Map();
 const once = (name) => names.get(name) ?? (names.size < 1_000 && names.set(name, name), name);
 
-/** What is kept of a scan, since there may be many. */
-function kept({ robot, session, scan_id, revision, timestamp_ns }, position) {
-  // An array of three numbers as it stands takes a quarter of one that was made first and filled then.
+/** Keeps a scan, and of older ones where they were taken. */
+function keep(steps, newest, { robot, session, scan_id, revision, timestamp_ns }, position) {
+  steps.push(once(robot), position);
+  if (steps.length > STEPS_MAX * 1.1) steps.keepNewest(STEPS_MAX);
   const [x, y, z] = position;
-  return { robot: once(robot), session: once(session), scan_id, revision, timestamp_ns, position: [x, y, z] };
+  newest.push({ robot: once(robot), session: once(session), scan_id, revision, timestamp_ns, position: [x, y, z] });
+  if (newest.length > NEWEST_MAX) newest.shift();
 }
