@@ -1,4 +1,5 @@
-/* A replica of an mrol map, in this process: a copy that follows the server's map and answers without a call.
+/* A replica of an mrol map, in this process: a copy that follows the server's map and answers without a call. And a client: scans
+ * that go to the server, and questions that it answers (mrol_client_open and its like).
  *
  *     mrol_replica_options options = mrol_replica_options_default();
  *     options.address = "http://127.0.0.1:7334";
@@ -40,6 +41,8 @@
  *
  * FORK. Replicas and bodies stay with the process that made them. A child of fork() gets MROL_FORKED from each function that
  * takes or makes one; it may exec. Fork before the first mrol_replica_open and mrol_body_new if a child is to make some of its own.
+ *
+ * CLIENTS. What is said of replicas here holds of connections, mrol_client, too.
  *
  * SIGNALS. No function is safe in a signal handler.
  */
@@ -586,6 +589,126 @@ typedef struct mrol_replica_status {
     char last_error[MROL_MESSAGE_BYTES];
 } mrol_replica_status;
 
+/* A connection to a server. {0} is none. */
+typedef struct mrol_client {
+    uint64_t number;
+} mrol_client;
+
+/* What a server wants to see, and what it is trusted by; NULL: nothing, or what the system trusts. */
+typedef struct mrol_credentials {
+    /* Secret of the caller's key. */
+    const char *key;
+    /* Path of a PEM file: the server's certificate must be signed by one of these. */
+    const char *ca_file;
+    /* Paths of PEM files: the certificate that the client shows with its signers, and its private key; both or neither. */
+    const char *certificate_file;
+    const char *private_key_file;
+} mrol_credentials;
+
+/* Whom to ask. Take it from mrol_client_options_default() and set the address at least. Nothing in it is kept after
+ * mrol_client_open returns. */
+typedef struct mrol_client_options {
+    size_t struct_size;
+    /* gRPC address of the server, as in mrol_replica_options. */
+    const char *address;
+    mrol_credentials credentials;
+    /* Longest time of a call, milliseconds; 0: 30,000. */
+    uint64_t timeout_ms;
+} mrol_client_options;
+
+/* A scan, as a robot sends it. Take it from mrol_scan_default(). */
+typedef struct mrol_scan {
+    size_t struct_size;
+    /* Name of the robot: each has one of its own. */
+    const char *robot;
+    /* Name of this run of the robot's software, in which scan ids are unique; NULL: the empty one. */
+    const char *session;
+    /* With has_scan_id: the robot's own number of the scan. A scan that is sent again under it is in the map once, so that a call
+     * which ended with MROL_TIMEOUT or MROL_UNREACHABLE may be repeated. */
+    uint64_t scan_id;
+    /* `count` points in the sensor frame: x y z each, meters; NaN and infinity mean "no return". */
+    const float *xyz;
+    size_t count;
+    /* Where it is thought to have been taken (7 numbers, map_from_sensor), or how far from the robot's last accepted pose
+     * (last_from_sensor). Both NULL: at that pose. */
+    const double *guess;
+    const double *motion;
+    /* The direction in which things fall, in the sensor frame: 3 numbers of any length; NULL: not known. */
+    const double *gravity;
+    /* With has_timestamp: when it was taken, nanoseconds since 1970. */
+    int64_t timestamp_ns;
+    /* When each point was measured, seconds from the timestamp, `count` of them: the scan is deskewed. NULL: all at once. */
+    const float *point_times_s;
+    uint8_t has_scan_id;
+    uint8_t has_timestamp;
+    /* 1: it is added at its guess, not aligned. */
+    uint8_t at_guess;
+    /* 1: it is added where it was found even if it does not fit. */
+    uint8_t force;
+    /* Not used: zero. */
+    uint8_t reserved[4];
+} mrol_scan;
+
+/* What became of a scan, or would have. One that does not fit is an answer, and the map is as it was. */
+typedef struct mrol_scan_answer {
+    mrol_map_version version;
+    /* Where it was found: x y z qx qy qz qw. */
+    double map_from_sensor[7];
+    /* The share of its points in occupied voxels of level 0, before it is added. */
+    double overlap;
+    /* With has_information: the inverse covariance of the pose, row by row: x y z in meters, then turns in radians. */
+    double information[36];
+    uint64_t new_voxels;
+    uint64_t carved_voxels;
+    uint64_t points_skipped;
+    /* 1: it fits, and was added or would be. */
+    uint8_t is_accepted;
+    /* 1: it was accepted before under its id, and this is that answer. */
+    uint8_t is_replayed;
+    /* 1: the robot stands and sees nothing new: accepted, and not kept. */
+    uint8_t is_stationary;
+    uint8_t has_information;
+    /* Not used: zero. */
+    uint8_t reserved[4];
+    /* accepted, low_overlap, undetermined, ambiguous or contradicted. */
+    char verdict[MROL_REASON_BYTES];
+    /* Why, in a sentence with figures, UTF-8. */
+    char reason[MROL_MESSAGE_BYTES];
+} mrol_scan_answer;
+
+/* A question: where was this scan taken? Take it from mrol_localization_default(). */
+typedef struct mrol_localization {
+    size_t struct_size;
+    /* `count` points in the sensor frame: x y z each, meters. */
+    const float *xyz;
+    size_t count;
+    /* As in mrol_scan, good to 2 degrees: with it the search is about ten times as fast. */
+    const double *gravity;
+    /* When to answer with the best so far, milliseconds; 0: 10,000. Open the client with a longer timeout_ms. */
+    uint64_t time_limit_ms;
+    /* The same seed gives the same answer. */
+    uint64_t seed;
+} mrol_localization;
+
+/* Where a scan was taken. One that fits nowhere, or in several places, is an answer. */
+typedef struct mrol_localization_answer {
+    /* The best place: x y z qx qy qz qw; the identity where there is none. */
+    double map_from_sensor[7];
+    double overlap;
+    /* Overlap times the share of rays that the map does not block: by what places are ranked. */
+    double fit;
+    /* How many places were found. */
+    uint64_t candidates;
+    /* 1: the best place fits, and no other is as good. */
+    uint8_t is_accepted;
+    /* 1: the time was up. */
+    uint8_t is_cut_short;
+    /* Not used: zero. */
+    uint8_t reserved[6];
+    char verdict[MROL_REASON_BYTES];
+    char reason[MROL_MESSAGE_BYTES];
+} mrol_localization_answer;
+
 /* Version of the library, "0.1.0", and of the interface that it has: MROL_ABI_VERSION of its own header. */
 const char *mrol_library_version(void);
 uint32_t mrol_abi_version(void);
@@ -625,6 +748,38 @@ mrol_code mrol_replica_wait_for_revision(mrol_replica replica, uint64_t revision
  * place of a point in no voxel or outside of the region that is copied. */
 mrol_code mrol_replica_query_points(mrol_replica replica, const mrol_point_query *query, uint8_t *occupied,
                                     size_t occupied_bytes, mrol_answer *answer, mrol_error *error);
+
+/* Connects to a server, for calls that go there. Errors: MROL_INVALID_ARGUMENT, MROL_UNREACHABLE, MROL_TIMEOUT.
+ *
+ * Threads may share a client: calls go beside each other over one connection, which is made again where it broke. A call returns
+ * within timeout_ms (but for the system's look-up of a host's name). After MROL_TIMEOUT, and MROL_UNREACHABLE of a connection that
+ * broke, it is not known whether a change was made: repeat the call, with the same scan_id. */
+mrol_code mrol_client_open(const mrol_client_options *options, mrol_client *client, mrol_error *error);
+
+/* Ends a connection, once calls under way are answered. Errors: MROL_CLOSED where it is closed already, which does no harm. */
+mrol_code mrol_client_close(mrol_client client, mrol_error *error);
+
+/* Makes a map whose finest voxels have sides of `resolution_m` meters, with so many `levels` (0: 6), or finds it with just these
+ * settings. Errors: MROL_REFUSED (map_exists: with others; bad_settings, ...). */
+mrol_code mrol_client_create_map(mrol_client client, const char *map, double resolution_m, uint32_t levels, mrol_error *error);
+
+/* mrol_replica_query_points of the server's map. */
+mrol_code mrol_client_query_points(mrol_client client, const char *map, const mrol_point_query *query, uint8_t *occupied,
+                                   size_t occupied_bytes, mrol_answer *answer, mrol_error *error);
+
+/* Aligns a scan to the map and, where it fits, adds it. When the call returns MROL_OK and is_accepted is 1 the scan is durable.
+ * Errors: MROL_REFUSED (guess_required: the robot has no pose in a map that is not empty; scan_id_taken; map_not_found; ...). */
+mrol_code mrol_client_insert_scan(mrol_client client, const char *map, const mrol_scan *scan, mrol_scan_answer *answer,
+                                  mrol_error *error);
+
+/* What inserting a scan would do; the map stays as it is. */
+mrol_code mrol_client_align_scan(mrol_client client, const char *map, const mrol_scan *scan, mrol_scan_answer *answer,
+                                 mrol_error *error);
+
+/* Searches all poses for the one from which a scan was taken; the map stays as it is. Errors: MROL_REFUSED (map_empty,
+ * search_too_large, ...). */
+mrol_code mrol_client_localize(mrol_client client, const char *map, const mrol_localization *localization,
+                               mrol_localization_answer *answer, mrol_error *error);
 
 /* Makes a body of `links_count` links, at most MROL_LINKS_MAX; nothing of them is kept where it is. `body` is set to none on
  * failure. Errors: MROL_INVALID_ARGUMENT, which names the link and the number. */
@@ -815,6 +970,30 @@ static inline mrol_grid_answers mrol_grid_answers_default(void) {
     memset(&answers, 0, sizeof answers);
     answers.struct_size = sizeof answers;
     return answers;
+}
+
+/* Options with every default. */
+static inline mrol_client_options mrol_client_options_default(void) {
+    mrol_client_options options;
+    memset(&options, 0, sizeof options);
+    options.struct_size = sizeof options;
+    return options;
+}
+
+/* A scan without points at its robot's last pose. */
+static inline mrol_scan mrol_scan_default(void) {
+    mrol_scan scan;
+    memset(&scan, 0, sizeof scan);
+    scan.struct_size = sizeof scan;
+    return scan;
+}
+
+/* A question about no points, with every default. */
+static inline mrol_localization mrol_localization_default(void) {
+    mrol_localization localization;
+    memset(&localization, 0, sizeof localization);
+    localization.struct_size = sizeof localization;
+    return localization;
 }
 
 #ifdef __cplusplus

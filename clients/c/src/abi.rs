@@ -13,8 +13,8 @@ use crate::memory::{self, Question};
 /// Version of the interface: `MROL_ABI_VERSION`.
 pub(crate) const VERSION: u32 = 2;
 /// Bytes of a reason and of a message, with their zero: `MROL_REASON_BYTES`, `MROL_MESSAGE_BYTES`.
-const REASON_BYTES: usize = 48;
-const MESSAGE_BYTES: usize = 464;
+pub(crate) const REASON_BYTES: usize = 48;
+pub(crate) const MESSAGE_BYTES: usize = 464;
 
 /// `mrol_error`.
 #[derive(Debug, Clone, Copy)]
@@ -212,7 +212,7 @@ impl Status {
 }
 
 /// The text with a zero behind it: cut off between two characters where it is too long, and at a zero.
-fn terminated<const BYTES: usize>(text: &str) -> [u8; BYTES] {
+pub(crate) fn terminated<const BYTES: usize>(text: &str) -> [u8; BYTES] {
     let text = text.split('\0').next().unwrap_or_default();
     let end = (0..BYTES).rev().find(|&end| text.is_char_boundary(end)).unwrap_or_default();
     let kept = &text.as_bytes()[..end];
@@ -225,6 +225,8 @@ fn terminated<const BYTES: usize>(text: &str) -> [u8; BYTES] {
 mod tests {
     use super::*;
     use crate::bodies::{BodyHandle, LinkParts};
+    use crate::clients::ClientHandle;
+    use crate::options::{ClientOptions, CredentialFiles};
     use crate::questions::frontiers::FrontierNumbers;
     use crate::questions::grid::GridShape;
     use crate::questions::regions::RegionNumbers;
@@ -233,6 +235,7 @@ mod tests {
         GridQuestion, MotionCheck, MotionPlaces, NearestPlaces, NearestQuestion, PoseCheck, RayPlaces,
         RayQuestion, SphereCheck,
     };
+    use crate::scans::{Localization, Localized, Scan, ScanOutcome};
 
     #[test]
     fn long_texts_are_cut_off_between_characters() {
@@ -263,6 +266,13 @@ mod tests {
             "mrol_point_query" PointQuery { struct_size xyz count map_from_points level lookup keep_out reserved }
             "mrol_answer" Answer { version asked positive reserved }
             "mrol_replica_status" Status { version head_revision resets is_connected reserved last_error }
+            "mrol_client" ClientHandle { number }
+            "mrol_credentials" CredentialFiles { key ca_file certificate_file private_key_file }
+            "mrol_client_options" ClientOptions { struct_size address credentials timeout_ms }
+            "mrol_scan" Scan { struct_size robot session scan_id xyz count guess motion gravity timestamp_ns point_times_s has_scan_id has_timestamp at_guess force reserved }
+            "mrol_scan_answer" ScanOutcome { version map_from_sensor overlap information new_voxels carved_voxels points_skipped is_accepted is_replayed is_stationary has_information reserved verdict reason }
+            "mrol_localization" Localization { struct_size xyz count gravity time_limit_ms seed }
+            "mrol_localization_answer" Localized { map_from_sensor overlap fit candidates is_accepted is_cut_short reserved verdict reason }
             "mrol_body" BodyHandle { number }
             "mrol_link" LinkParts { spheres spheres_count points points_count padding_m reserved }
             "mrol_region" RegionNumbers { kind reserved numbers }

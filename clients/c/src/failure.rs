@@ -99,6 +99,17 @@ impl Failure {
         Self::new(Code::Closed, "", "the replica is not open: it never was, or it is closed")
     }
 
+    /// The connection is not open.
+    pub(crate) fn client_closed() -> Self {
+        Self::new(Code::Closed, "", "the client is not open: it never was, or it is closed")
+    }
+
+    /// The server did not answer in time.
+    pub(crate) fn no_answer(timeout: std::time::Duration) -> Self {
+        let message = format!("timeout_ms is {}: the server had not answered by then", timeout.as_millis());
+        Self::new(Code::Timeout, "", message)
+    }
+
     /// The body is none.
     pub(crate) fn no_body() -> Self {
         Self::argument("body is none: it was never made, or it was freed")

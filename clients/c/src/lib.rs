@@ -3,6 +3,9 @@
 //! ```text
 //! lib.rs       the functions: read the arguments, ask, write the answer
 //! planning.rs  those of planners' questions
+//! remote.rs    those that ask a server
+//! scans.rs     scans and what becomes of them, as structs of mrol.h
+//! clients.rs   the connections by their numbers
 //! abi.rs       the structs of mrol.h, field by field
 //! questions/   those of planners' questions, and what each asks and writes
 //! bodies.rs    the bodies by their numbers
@@ -18,13 +21,16 @@
 
 mod abi;
 mod bodies;
+mod clients;
 mod failure;
 mod memory;
 mod options;
 pub mod planning;
 mod process;
 mod questions;
+pub mod remote;
 mod replicas;
+mod scans;
 
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};

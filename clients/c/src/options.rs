@@ -35,7 +35,12 @@ impl Opening {
         Ok(Self {
             address: required(options.address, "options.address")?,
             map: MapName::new(&map).map_err(ServiceError::from)?,
-            credentials: credentials(&options)?,
+            credentials: credentials_of(&CredentialFiles {
+                key: options.key,
+                ca_file: options.ca_file,
+                certificate_file: options.certificate_file,
+                private_key_file: options.private_key_file,
+            })?,
             replica: replica_options(&options)?,
             timeout,
         })
@@ -63,16 +68,43 @@ fn replica_options(options: &Options) -> Result<ReplicaOptions, Failure> {
     })
 }
 
-fn credentials(options: &Options) -> Result<Credentials, Failure> {
+/// `mrol_credentials`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(crate) struct CredentialFiles {
+    pub(crate) key: *const std::ffi::c_char,
+    pub(crate) ca_file: *const std::ffi::c_char,
+    pub(crate) certificate_file: *const std::ffi::c_char,
+    pub(crate) private_key_file: *const std::ffi::c_char,
+}
+
+/// `mrol_client_options`.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct ClientOptions {
+    pub(crate) struct_size: usize,
+    pub(crate) address: *const std::ffi::c_char,
+    pub(crate) credentials: CredentialFiles,
+    pub(crate) timeout_ms: u64,
+}
+
+// SAFETY: it begins with its size, and any bytes are one.
+unsafe impl memory::Question for ClientOptions {
+    const NAME: &'static str = "options";
+    const BYTES_MIN: usize = size_of::<Self>();
+}
+
+/// The credentials that files and a key are.
+pub(crate) fn credentials_of(files: &CredentialFiles) -> Result<Credentials, Failure> {
     let mut credentials = Credentials::default();
-    if let Some(key) = text(options.key, "options.key")? {
+    if let Some(key) = text(files.key, "options.key")? {
         credentials = credentials.with_key(&key)?;
     }
-    if let Some(ca) = file(options.ca_file, "options.ca_file")? {
+    if let Some(ca) = file(files.ca_file, "options.ca_file")? {
         credentials = credentials.with_server_ca(&ca)?;
     }
-    let certificate = file(options.certificate_file, "options.certificate_file")?;
-    match (certificate, file(options.private_key_file, "options.private_key_file")?) {
+    let certificate = file(files.certificate_file, "options.certificate_file")?;
+    match (certificate, file(files.private_key_file, "options.private_key_file")?) {
         (None, None) => Ok(credentials),
         (Some(certificate), Some(key)) => Ok(credentials.with_identity(&certificate, &key)?),
         _ => Err(Failure::argument("options has one of certificate_file and private_key_file, not both")),
@@ -84,7 +116,7 @@ fn text(text: *const std::ffi::c_char, name: &str) -> Result<Option<String>, Fai
     unsafe { memory::text(text, name) }
 }
 
-fn required(pointer: *const std::ffi::c_char, name: &str) -> Result<String, Failure> {
+pub(crate) fn required(pointer: *const std::ffi::c_char, name: &str) -> Result<String, Failure> {
     text(pointer, name)?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
 }
 

@@ -71,7 +71,7 @@ impl Replicas {
     }
 
     /// The threads: those that there are, or new ones.
-    fn runtime(&self) -> Result<Arc<Runtime>, Failure> {
+    pub(crate) fn runtime(&self) -> Result<Arc<Runtime>, Failure> {
         let mut runtime = self.runtime.lock();
         if let Some(running) = runtime.upgrade() {
             return Ok(running);

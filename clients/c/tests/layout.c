@@ -65,6 +65,74 @@ int main(void) {
     FIELD(mrol_replica_status, last_error);
     SIZE(mrol_replica_status);
 
+    FIELD(mrol_client, number);
+    SIZE(mrol_client);
+
+    FIELD(mrol_credentials, key);
+    FIELD(mrol_credentials, ca_file);
+    FIELD(mrol_credentials, certificate_file);
+    FIELD(mrol_credentials, private_key_file);
+    SIZE(mrol_credentials);
+
+    FIELD(mrol_client_options, struct_size);
+    FIELD(mrol_client_options, address);
+    FIELD(mrol_client_options, credentials);
+    FIELD(mrol_client_options, timeout_ms);
+    SIZE(mrol_client_options);
+
+    FIELD(mrol_scan, struct_size);
+    FIELD(mrol_scan, robot);
+    FIELD(mrol_scan, session);
+    FIELD(mrol_scan, scan_id);
+    FIELD(mrol_scan, xyz);
+    FIELD(mrol_scan, count);
+    FIELD(mrol_scan, guess);
+    FIELD(mrol_scan, motion);
+    FIELD(mrol_scan, gravity);
+    FIELD(mrol_scan, timestamp_ns);
+    FIELD(mrol_scan, point_times_s);
+    FIELD(mrol_scan, has_scan_id);
+    FIELD(mrol_scan, has_timestamp);
+    FIELD(mrol_scan, at_guess);
+    FIELD(mrol_scan, force);
+    FIELD(mrol_scan, reserved);
+    SIZE(mrol_scan);
+
+    FIELD(mrol_scan_answer, version);
+    FIELD(mrol_scan_answer, map_from_sensor);
+    FIELD(mrol_scan_answer, overlap);
+    FIELD(mrol_scan_answer, information);
+    FIELD(mrol_scan_answer, new_voxels);
+    FIELD(mrol_scan_answer, carved_voxels);
+    FIELD(mrol_scan_answer, points_skipped);
+    FIELD(mrol_scan_answer, is_accepted);
+    FIELD(mrol_scan_answer, is_replayed);
+    FIELD(mrol_scan_answer, is_stationary);
+    FIELD(mrol_scan_answer, has_information);
+    FIELD(mrol_scan_answer, reserved);
+    FIELD(mrol_scan_answer, verdict);
+    FIELD(mrol_scan_answer, reason);
+    SIZE(mrol_scan_answer);
+
+    FIELD(mrol_localization, struct_size);
+    FIELD(mrol_localization, xyz);
+    FIELD(mrol_localization, count);
+    FIELD(mrol_localization, gravity);
+    FIELD(mrol_localization, time_limit_ms);
+    FIELD(mrol_localization, seed);
+    SIZE(mrol_localization);
+
+    FIELD(mrol_localization_answer, map_from_sensor);
+    FIELD(mrol_localization_answer, overlap);
+    FIELD(mrol_localization_answer, fit);
+    FIELD(mrol_localization_answer, candidates);
+    FIELD(mrol_localization_answer, is_accepted);
+    FIELD(mrol_localization_answer, is_cut_short);
+    FIELD(mrol_localization_answer, reserved);
+    FIELD(mrol_localization_answer, verdict);
+    FIELD(mrol_localization_answer, reason);
+    SIZE(mrol_localization_answer);
+
     FIELD(mrol_body, number);
     SIZE(mrol_body);
 

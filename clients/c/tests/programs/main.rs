@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "all of it is a test")]
 
+mod cpp;
 mod planning;
 
 use std::collections::BTreeSet;

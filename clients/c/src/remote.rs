@@ -1,0 +1,190 @@
+//! The functions that ask a server.
+
+use std::ffi::c_char;
+use std::time::Duration;
+
+use mrol::client::NewMap;
+use mrol::map::MapName;
+use mrol::service::ServiceError;
+
+use crate::abi::{Answer, Error, PointQuery};
+use crate::clients::{CLIENTS, ClientHandle};
+use crate::failure::Failure;
+use crate::guarded;
+use crate::memory::{self, Bitmap, Out};
+use crate::options::{ClientOptions, credentials_of, required};
+use crate::scans::{Localization, Localized, Scan, ScanOutcome, copied};
+
+/// Longest time that a call takes, where nobody says.
+const TIMEOUT_DEFAULT: Duration = Duration::from_secs(30);
+
+/// Connects to a server: `mrol_client_open` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_open(
+    options: *const ClientOptions,
+    client: *mut ClientHandle,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let (out, error) = unsafe { (Out::of(client, "client"), Out::of(error, "error")) };
+    guarded(error, || {
+        let out = out.required()?;
+        out.write(ClientHandle::NONE);
+        // SAFETY: as the caller promises.
+        let options = unsafe { memory::read_question(options) }?;
+        let address = required(options.address, "options.address")?;
+        let credentials = credentials_of(&options.credentials)?;
+        let timeout = match options.timeout_ms {
+            0 => TIMEOUT_DEFAULT,
+            milliseconds => Duration::from_millis(milliseconds),
+        };
+        out.write(CLIENTS.open(&address, &credentials, timeout)?);
+        Ok(())
+    })
+}
+
+/// Closes a connection: `mrol_client_close` of mrol.h.
+///
+/// # Safety
+/// `error` is NULL or points to what mrol.h says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_close(client: ClientHandle, error: *mut Error) -> i32 {
+    // SAFETY: as the caller promises.
+    let error = unsafe { Out::of(error, "error") };
+    guarded(error, || CLIENTS.close(client))
+}
+
+/// Makes a map where it is not there: `mrol_client_create_map` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_create_map(
+    client: ClientHandle,
+    map: *const c_char,
+    resolution_m: f64,
+    levels: u32,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let error = unsafe { Out::of(error, "error") };
+    guarded(error, || {
+        let (client, map) = (CLIENTS.get(client)?, name_of(map)?);
+        let new = NewMap { levels: (levels > 0).then_some(levels), ..NewMap::of(resolution_m) };
+        client.call(|client| client.create_map(&map, new)).map(drop)
+    })
+}
+
+/// Asks a server about points: `mrol_client_query_points` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says, and the memory is not written during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_query_points(
+    client: ClientHandle,
+    map: *const c_char,
+    query: *const PointQuery,
+    occupied: *mut u8,
+    occupied_bytes: usize,
+    answer: *mut Answer,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
+    guarded(error, || {
+        let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.optional()?);
+        // SAFETY: as the caller promises; the points outlive the call, and the query does not.
+        let (given, query) = unsafe {
+            let given = memory::read_question(query)?;
+            (given, given.parse()?)
+        };
+        // SAFETY: as the caller promises.
+        let bitmap =
+            unsafe { Bitmap::of(occupied, occupied_bytes, "occupied") }.for_answers_about(&query.points)?;
+        // SAFETY: as the caller promises. What is sent may outlive a call that runs out of time.
+        let points = unsafe { copied(given.xyz, given.count, "query.xyz") }?;
+        let query = mrol::service::PointQuery { points, ..query };
+        let asked = client.call(|client| client.query_points(&map, query))?;
+        bitmap.write(&asked.occupied);
+        if let Some(out) = out {
+            out.write(Answer::to_points(&asked));
+        }
+        Ok(())
+    })
+}
+
+/// Aligns a scan and adds it where it fits: `mrol_client_insert_scan` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says, and the memory is not written during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_insert_scan(
+    client: ClientHandle,
+    map: *const c_char,
+    scan: *const Scan,
+    answer: *mut ScanOutcome,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
+    guarded(error, || {
+        let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.required()?);
+        // SAFETY: as the caller promises.
+        let scan = unsafe { memory::read_question(scan)?.parse() }?;
+        out.write(ScanOutcome::of(&client.call(|client| client.insert_scan(&map, scan))?));
+        Ok(())
+    })
+}
+
+/// Says what inserting a scan would do: `mrol_client_align_scan` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says, and the memory is not written during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_align_scan(
+    client: ClientHandle,
+    map: *const c_char,
+    scan: *const Scan,
+    answer: *mut ScanOutcome,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
+    guarded(error, || {
+        let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.required()?);
+        // SAFETY: as the caller promises.
+        let scan = unsafe { memory::read_question(scan)?.parse() }?;
+        out.write(ScanOutcome::of(&client.call(|client| client.align_scan(&map, scan))?));
+        Ok(())
+    })
+}
+
+/// Finds where a scan was taken: `mrol_client_localize` of mrol.h.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says, and the memory is not written during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrol_client_localize(
+    client: ClientHandle,
+    map: *const c_char,
+    localization: *const Localization,
+    answer: *mut Localized,
+    error: *mut Error,
+) -> i32 {
+    // SAFETY: as the caller promises.
+    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
+    guarded(error, || {
+        let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.required()?);
+        // SAFETY: as the caller promises.
+        let request = unsafe { memory::read_question(localization)?.parse() }?;
+        out.write(Localized::of(&client.call(|client| client.localize(&map, request))?));
+        Ok(())
+    })
+}
+
+fn name_of(map: *const c_char) -> Result<MapName, Failure> {
+    Ok(MapName::new(&required(map, "map")?).map_err(ServiceError::from)?)
+}
