@@ -39,6 +39,7 @@ from .operations.checks import Clearances, Collisions, FirstHits
 from .operations.classification import Classification
 from .operations.deletions import Deletion
 from .operations.description import FilterSettings, Level, MapInfo, Sighting, Storage
+from .operations.events import FailedScan, ScanEvent
 from .operations.frontiers import Frontier, Frontiers, FrontierView
 from .operations.grid import Grid
 from .operations.keep_outs import KeepOut, KeepOutChange, KeepOuts
@@ -86,6 +87,7 @@ __all__ = [
     "Deletion",
     "DistanceField",
     "FailedPrecondition",
+    "FailedScan",
     "FilterSettings",
     "FirstHits",
     "Frontier",
@@ -121,6 +123,7 @@ __all__ = [
     "Rays",
     "ResourceExhausted",
     "ScanAnswer",
+    "ScanEvent",
     "ServerError",
     "Sighting",
     "Sphere",

@@ -6,6 +6,7 @@ from .operations.checks import CheckOperations
 from .operations.classification import ClassificationOperations
 from .operations.deletions import DeletionOperations
 from .operations.description import DescriptionOperations
+from .operations.events import EventOperations
 from .operations.frontiers import FrontierOperations
 from .operations.grid import GridOperations
 from .operations.keep_outs import KeepOutOperations
@@ -39,6 +40,7 @@ class Map(
     ObserverOperations,
     TrajectoryOperations,
     WatchOperations,
+    EventOperations,
     KeepOutOperations,
     DeletionOperations,
     UndoOperations,

@@ -67,7 +67,7 @@ class Pose:
 
     def seven(self) -> list[float]:
         """The numbers x y z qx qy qz qw."""
-        return [float(number) for number in (*self.translation_m, *self.rotation_xyzw)]
+        return [*self.translation_m.tolist(), *self.rotation_xyzw.tolist()]
 
     def json(self) -> dict[str, list[float]]:
         """The pose as the server's JSON has it."""

@@ -29,11 +29,12 @@ class Server:
         self._folder = folder
         self._process: subprocess.Popen[str] | None = None
         self.address = "127.0.0.1:0"
+        self.grpc = "127.0.0.1:0"
 
     def start(self) -> None:
         """Starts it, and waits until it takes requests."""
         command = [binary(), "serve", "--json", "--log-level", "warn", "--data-dir", str(self._folder / "data")]
-        listen = ["--http-listen", self.address, "--grpc-listen", "127.0.0.1:0"]
+        listen = ["--http-listen", self.address, "--grpc-listen", self.grpc]
         environment = {name: value for name, value in os.environ.items() if not name.startswith("MROL_")}
         with (self._folder / "log").open("a") as log:
             self._process = subprocess.Popen(
@@ -43,7 +44,8 @@ class Server:
         line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(f"the server did not start:\n{(self._folder / 'log').read_text()}")
-        self.address = json.loads(line)["http"]
+        addresses = json.loads(line)
+        self.address, self.grpc = addresses["http"], addresses["grpc"]
 
     def kill(self) -> None:
         """Ends it as the loss of power would."""

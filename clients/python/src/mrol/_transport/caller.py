@@ -120,6 +120,10 @@ class Body:
         """Up to so many bytes; less at the end."""
         return self._connection.read(self._response, count, deadline)
 
+    def read_some(self, most: int, deadline: Deadline) -> bytes:
+        """What has come, once something has, so many bytes at most; nothing at the end."""
+        return self._connection.read_some(self._response, most, deadline)
+
 
 def raise_for(answer: Answer) -> None:
     """Raises the error that an answer is, where it is one."""

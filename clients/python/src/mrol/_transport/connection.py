@@ -98,6 +98,12 @@ class Connection:
             self._stream.renew(deadline)
             return response.read(count)
 
+    def read_some(self, response: Response, most: int, deadline: Deadline) -> bytes:
+        """What has come of such a body, once something has, so many bytes at most; nothing at its end."""
+        with _Failures(self):
+            self._stream.renew(deadline)
+            return response.read1(most)
+
     def _send(self, request: Request, headers: dict[str, str]) -> None:
         client = self._client
         client.putrequest(request.method, request.target, skip_host=True, skip_accept_encoding=True)

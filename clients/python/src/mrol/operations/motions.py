@@ -59,7 +59,7 @@ class MotionOperations(MapHandle):
         arrays = Arrays()
         checked = Body.of(body)
         rows, lead = configurations_of(configurations, len(checked.links), "configurations", self._request_bytes_max)
-        counts, shape = _lengths(lead, lengths)
+        counts, shape = lengths_of(lead, lengths)
         head: dict[str, Any] = {
             "body": checked.json(arrays, self._request_bytes_max),
             "configurations": arrays.add(rows),
@@ -84,7 +84,7 @@ class MotionOperations(MapHandle):
         )
 
 
-def _lengths(lead: tuple[int, ...], lengths: ArrayLike | None) -> tuple[Any, tuple[int, ...]]:
+def lengths_of(lead: tuple[int, ...], lengths: ArrayLike | None) -> tuple[Any, tuple[int, ...]]:
     """How many configurations each motion has, and the shape of the motions."""
     if lengths is not None:
         counts = counts_of(lengths, "lengths")

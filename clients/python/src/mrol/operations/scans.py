@@ -251,7 +251,11 @@ def _treatment(
 
 
 def _scan_answer(answer: Answer, shape: tuple[int, ...], robot: str, session: str, scan_id: int | None) -> ScanAnswer:
-    fields = fields_of(answer.body)
+    return answer_in(fields_of(answer.body), shape, robot, session, scan_id)
+
+
+def answer_in(fields: Fields, shape: tuple[int, ...], robot: str, session: str, scan_id: int | None) -> ScanAnswer:
+    """The answer to a scan that fields tell."""
     return ScanAnswer(
         version=Version.of(fields),
         accepted=fields.flag("accepted"),

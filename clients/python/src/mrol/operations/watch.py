@@ -1,42 +1,24 @@
 """The changes of a map, as they become durable."""
 
-import time
 from collections.abc import Generator, Iterator
 from contextlib import closing
 
 from .._arrays import whole_of
 from .._fields import reading
 from .._protobuf import Message
-from .._transport.attempts import PASSING
 from .._transport.caller import Body, Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
-from ..errors import (
-    BadAnswer,
-    ConnectionLost,
-    MrolError,
-    ServerError,
-    TransportError,
-    Unauthenticated,
-    excerpt,
-    server_error,
-)
+from ..errors import BadAnswer, ServerError, excerpt, server_error
 from ..progress import Progress, Told, progress_of
 from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
+from .following import SILENCE_MAX_S, exactly, following
 from .handle import MapHandle, flag_of, level_of
 from .region import region_parameters
 from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
 
 LENGTH_BYTES = 4
-
-PAUSE_S = 0.2
-"""How long a watch waits before it comes back."""
-
-SILENCE_MAX_S = 60.0
-"""A watch that is told nothing for so long, no heartbeat either, has lost its connection."""
-
-COMES_BACK = PASSING | {"watch_stalled"}
 
 KINDS = {
     3: ("invalid_argument", 400),
@@ -100,37 +82,19 @@ class WatchOperations(MapHandle):
         progress: Progress,
         silent_s: float,
     ) -> Iterator[WatchEvent]:
-        failing_since: float | None = None
-        may_renew = True
-        with progress_of(progress, self._name, None) as told:
-            while True:
-                since = _since(version)
-                request = Request("GET", self._target("watch", **parameters, **since))
-                try:
-                    with closing(_told(self._caller, request, silent_s, told)) as events:
-                        for event in events:
-                            failing_since, may_renew = None, True
-                            version = event.version
-                            if heartbeats or not isinstance(event, Heartbeat):
-                                yield event
-                except Unauthenticated:
-                    if not (may_renew and self._caller.renew_key()):
-                        raise
-                    may_renew = False
-                except (ServerError, TransportError) as error:
-                    now = time.monotonic()
-                    failing_since = now if failing_since is None else failing_since
-                    if now - failing_since > self._caller.bounds.patience_s or not _comes_back(error):
-                        raise
-                    time.sleep(PAUSE_S)
+        def connect() -> Generator[WatchEvent, None, None]:
+            request = Request("GET", self._target("watch", **parameters, **_since(version)))
+            return _told(self._caller, request, silent_s, told)
+
+        with progress_of(progress, self._name, None) as told, closing(following(self._caller, connect)) as events:
+            for event in events:
+                version = event.version
+                if heartbeats or not isinstance(event, Heartbeat):
+                    yield event
 
 
 def _since(version: Version | None) -> dict[str, Parameter]:
     return {} if version is None else {"since_revision": version.revision, "map_uuid": version.map_uuid}
-
-
-def _comes_back(error: MrolError) -> bool:
-    return isinstance(error, TransportError) or (isinstance(error, ServerError) and error.reason in COMES_BACK)
 
 
 def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:
@@ -167,20 +131,10 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
 
 
 def _next_message(body: Body, deadline: Deadline, most: int) -> memoryview:
-    length = int.from_bytes(_exactly(body, LENGTH_BYTES, deadline), "little")
+    length = int.from_bytes(exactly(body, LENGTH_BYTES, deadline), "little")
     if length > most:
         raise BadAnswer(f"a message of {length} bytes, more than answer_bytes_max, {most}")
-    return memoryview(_exactly(body, length, deadline))
-
-
-def _exactly(body: Body, count: int, deadline: Deadline) -> bytes:
-    data = body.read(count, deadline)
-    while len(data) < count:
-        more = body.read(count - len(data), deadline)
-        if not more:
-            raise ConnectionLost("the watch broke off")
-        data += more
-    return data
+    return memoryview(exactly(body, length, deadline))
 
 
 def _failure(of: Message) -> ServerError:

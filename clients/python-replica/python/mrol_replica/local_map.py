@@ -1,0 +1,213 @@
+"""A map without a server."""
+
+from pathlib import Path
+from typing import Any, Union
+
+import numpy as np
+from mrol import Box, Candidate, Deletion, Localization, OpenDirection, Pose, ScanAnswer, Voxels
+from mrol._arrays import as_floats, as_numbers, number_of, rows_of, vector_of, whole_of
+from mrol.errors import ArgumentError
+from mrol.operations.occupancy import POINTS
+from mrol.operations.scans import Method
+from mrol.pose import PoseLike
+from mrol.shapes import BoxLike, OrientedBox, Shape
+from numpy.typing import ArrayLike
+
+from . import _native
+from ._questions import BYTES_MAX, Questions, region_of, version_of
+
+ROBOT = "python"
+"""The robot of scans whose robot is not given."""
+
+LEVELS = 6
+TIMES = "one time in seconds for each point, shape (n,)"
+
+File = Union[str, Path]
+
+
+class LocalMap(Questions):
+    """A map in this process, without any server: what a server does with a scan or a question, this does, by the same code.
+
+    `resolution` is the side of a voxel, meters; `levels` halve it each. Maps that are only asked need no `bloom` (the filter in
+    front of each level) and no `moments` (which alignments are refined on). It lives in memory; `save` and `load` keep it as a
+    map file, which a server restores and downloads.
+
+        m = LocalMap(resolution=0.05)
+        for points in scans:
+            answer = m.insert(points)          # aligned from the last pose, and added where it fits
+            print(answer.accepted, answer.map_from_sensor.translation_m)
+        m.save("floor1.mrol")
+    """
+
+    def __init__(self, resolution: float, *, levels: int = LEVELS, bloom: bool = True, moments: bool = True) -> None:
+        side_m, count = number_of(resolution, "resolution"), whole_of(levels, "levels", 0, (1 << 32) - 1)
+        self._take(_native.NativeLocalMap(side_m, count, bool(bloom), bool(moments)))
+
+    @classmethod
+    def load(cls, file: File) -> "LocalMap":
+        """The map of a map file.
+
+        Raises `InvalidArgument` for what is none.
+        """
+        loaded = cls.__new__(cls)
+        loaded._take(_native.NativeLocalMap.of_file(Path(file).read_bytes()))  # noqa: SLF001
+        return loaded
+
+    def save(self, file: File) -> None:
+        """Writes the map as a map file, whole or not at all; a file that is there is replaced."""
+        path = Path(file)
+        part = path.with_name(f".{path.name}.part")
+        try:
+            part.write_bytes(self._made.to_file())
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+
+    def _take(self, made: _native.NativeLocalMap) -> None:
+        Questions.__init__(self, made)
+        self._made = made
+
+    def insert(
+        self,
+        points: ArrayLike,
+        *,
+        guess: "PoseLike | None" = None,
+        motion: "PoseLike | None" = None,
+        constant_velocity: bool = False,
+        align: bool = True,
+        robot: str = ROBOT,
+        timestamp_ns: "int | None" = None,
+        point_times: "ArrayLike | None" = None,
+        point_times_from_sweep_start: bool = False,
+        gravity_in_sensor: "ArrayLike | None" = None,
+        guess_covariance: "ArrayLike | None" = None,
+        recover: "bool | None" = None,
+        carve: "bool | None" = None,
+        force: bool = False,
+        method: "Method | None" = None,
+        range_min_m: "float | None" = None,
+        range_max_m: "float | None" = None,
+        body_m: "BoxLike | None" = None,
+        strict: bool = False,
+    ) -> ScanAnswer:
+        """Aligns a scan and adds it where it fits: see `mrol.Map.insert`. A scan that does not fit is an answer."""
+        fields = _fields(locals(), foreground_level=None)
+        return self._map_scan(points, fields, is_inserted=True)
+
+    def align(
+        self,
+        points: ArrayLike,
+        *,
+        guess: "PoseLike | None" = None,
+        motion: "PoseLike | None" = None,
+        constant_velocity: bool = False,
+        robot: str = ROBOT,
+        timestamp_ns: "int | None" = None,
+        point_times: "ArrayLike | None" = None,
+        point_times_from_sweep_start: bool = False,
+        gravity_in_sensor: "ArrayLike | None" = None,
+        guess_covariance: "ArrayLike | None" = None,
+        method: "Method | None" = None,
+        range_min_m: "float | None" = None,
+        range_max_m: "float | None" = None,
+        body_m: "BoxLike | None" = None,
+        strict: bool = False,
+        foreground_level: "int | None" = None,
+    ) -> ScanAnswer:
+        """What inserting a scan would do; the map stays as it is: see `mrol.Map.align`."""
+        fields = _fields(locals(), align=True, recover=None, carve=None, force=False)
+        return self._map_scan(points, fields, is_inserted=False)
+
+    def localize(
+        self,
+        points: ArrayLike,
+        *,
+        gravity_in_sensor: "ArrayLike | None" = None,
+        gravity_in_map: "ArrayLike | None" = None,
+        search_box: "BoxLike | None" = None,
+        time_limit_s: "float | None" = None,
+        candidates: "int | None" = None,
+        seed: int = 0,
+    ) -> Localization:
+        """Searches all poses for the one from which a scan was taken: see `mrol.Map.localize`."""
+        rows, _ = rows_of(points, 3, "points", POINTS, BYTES_MAX)
+        if gravity_in_map is not None and gravity_in_sensor is None:
+            raise ArgumentError("gravity_in_map", "no gravity_in_sensor", "given with gravity_in_sensor")
+        found = self._made.localize(
+            rows,
+            None if gravity_in_sensor is None else vector_of(gravity_in_sensor, 3, "gravity_in_sensor"),
+            None if gravity_in_map is None else vector_of(gravity_in_map, 3, "gravity_in_map"),
+            None if search_box is None else Box.of(search_box, "search_box").corners("search_box"),
+            None if time_limit_s is None else number_of(time_limit_s, "time_limit_s"),
+            0 if candidates is None else whole_of(candidates, "candidates", 1, (1 << 32) - 1),
+            whole_of(seed, "seed"),
+        )
+        of_place = [Candidate(Pose.of(pose), *figures) for pose, *figures in found.pop("candidates")]
+        accepted = found["verdict"] == "accepted"
+        version = version_of(found.pop("version"))
+        return Localization(version=version, accepted=accepted, candidates=tuple(of_place), **found)
+
+    def voxels(self, level: int = 0, *, box: "BoxLike | OrientedBox | None" = None) -> Voxels:
+        """The occupied voxels of a level: all, or those with their centers in a box: see `mrol.Map.voxels`."""
+        number = whole_of(level, "level", 0, (1 << 32) - 1)
+        region = None
+        if box is not None:
+            region = region_of(box if isinstance(box, OrientedBox) else Box.of(box, "box"), "box")
+        indices, resolution_m, version = self._made.voxels(number, region)
+        return Voxels(version_of(version), indices, number, resolution_m)
+
+    def delete(self, shape: Shape, *, level: int = 0) -> Deletion:
+        """Deletes the voxels of a level whose centers lie in a `Box`, a `Sphere` or an `OrientedBox`, with all below them."""
+        removed, version = self._made.delete(region_of(shape, "shape"), whole_of(level, "level", 0, (1 << 32) - 1))
+        return Deletion(version_of(version), removed, False)
+
+    def _map_scan(self, points: ArrayLike, fields: "dict[str, Any]", *, is_inserted: bool) -> ScanAnswer:
+        rows, shape = rows_of(points, 3, "points", POINTS, BYTES_MAX)
+        robot = fields["robot"]
+        told = self._made.map_scan(rows, fields, is_inserted)
+        information, foreground = told["information"], told["foreground"]
+        told |= {
+            "version": version_of(told["version"]),
+            "map_from_sensor": Pose.of(told["map_from_sensor"]),
+            "level_overlaps": np.array(told["level_overlaps"]),
+            "information": None if information is None else np.array(information),
+            "undetermined": tuple(OpenDirection(np.array(direction), std_m) for direction, std_m in told["undetermined"]),
+            "foreground": None if foreground is None else foreground.reshape(shape),
+        }
+        return ScanAnswer(replayed=False, robot=robot, session="", scan_id=None, **told)
+
+    def __repr__(self) -> str:
+        return "<mrol map of this process>"
+
+
+def _fields(given: "dict[str, Any]", **fixed: Any) -> "dict[str, Any]":
+    """The arguments of a scan as the extension takes them."""
+    given = {name: value for name, value in given.items() if name not in ("self", "points")} | fixed
+    guesses = [given["guess"] is not None, given["motion"] is not None, bool(given["constant_velocity"])]
+    if sum(guesses) > 1:
+        raise ArgumentError("guess", "several of guess, motion and constant_velocity", "the only one of them")
+    for name in ("guess", "motion"):
+        if given[name] is not None:
+            given[name] = Pose.of(given[name], name).seven()
+    for name in ("range_min_m", "range_max_m"):
+        if given[name] is not None:
+            given[name] = number_of(given[name], name)
+    if given["timestamp_ns"] is not None:
+        given["timestamp_ns"] = whole_of(given["timestamp_ns"], "timestamp_ns", -(1 << 63), (1 << 63) - 1)
+    if given["point_times"] is not None:
+        times = as_floats(as_numbers(given["point_times"], "point_times", TIMES), "point_times", TIMES, BYTES_MAX)
+        given["point_times"] = times.reshape(-1)
+    if given["gravity_in_sensor"] is not None:
+        given["gravity_in_sensor"] = vector_of(given["gravity_in_sensor"], 3, "gravity_in_sensor")
+    if given["guess_covariance"] is not None:
+        expected = "numbers of shape (6, 6): x y z in meters, then turns in radians"
+        covariance = as_numbers(given["guess_covariance"], "guess_covariance", expected)
+        if covariance.shape not in ((6, 6), (36,)):
+            raise ArgumentError("guess_covariance", f"shape {covariance.shape}", expected)
+        given["guess_covariance"] = vector_of(covariance.reshape(36), 36, "guess_covariance")
+    if given["body_m"] is not None:
+        given["body_m"] = Box.of(given["body_m"], "body_m").corners("body_m")
+    method = given.pop("method")
+    if method not in (None, "refined", "overlap"):
+        raise ArgumentError("method", repr(method), "'refined' or 'overlap'")
+    return {**given, "overlap_alone": None if method is None else method == "overlap"}

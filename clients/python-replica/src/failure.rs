@@ -1,0 +1,111 @@
+//! Failures, as exceptions of the package `mrol`.
+
+use mrol::client::{ClientError, ReplicaError};
+use mrol::service::ServiceError;
+use pyo3::prelude::*;
+
+/// Why a call fails. `kind` is a word of `mrol_replica/_failures.py`, which makes the exception.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    kind: &'static str,
+    code: String,
+    reason: String,
+    message: String,
+}
+
+impl Failure {
+    fn new(kind: &'static str, message: impl Into<String>) -> Self {
+        Self { kind, code: String::new(), reason: String::new(), message: message.into() }
+    }
+
+    /// An argument is wrong: the message names it, its value and its limit.
+    pub(crate) fn argument(message: impl Into<String>) -> Self {
+        Self::new("argument", message)
+    }
+
+    /// The replica or the map was closed.
+    pub(crate) fn closed() -> Self {
+        Self::new("closed", "it is closed")
+    }
+
+    /// It belongs to the process that forked this one.
+    pub(crate) fn forked() -> Self {
+        Self::new(
+            "forked",
+            "it belongs to the process that forked this one: open one of its own in each process",
+        )
+    }
+
+    /// A time was up.
+    pub(crate) fn timed_out(message: impl Into<String>) -> Self {
+        Self::new("timed_out", message)
+    }
+
+    /// What cannot be.
+    pub(crate) fn defect(message: impl Into<String>) -> Self {
+        Self::new("internal", message)
+    }
+
+    /// The system does not give what is needed.
+    pub(crate) fn no_threads(error: &std::io::Error) -> Self {
+        Self::new("internal", format!("no thread can be started: {error}"))
+    }
+}
+
+impl From<ServiceError> for Failure {
+    fn from(error: ServiceError) -> Self {
+        let code = error.code().as_str().to_owned();
+        Self { kind: "refused", code, reason: error.reason.as_str().to_owned(), message: error.message }
+    }
+}
+
+impl From<ClientError> for Failure {
+    fn from(error: ClientError) -> Self {
+        let message = error.to_string();
+        match error {
+            ClientError::Url { .. } | ClientError::Credentials(_) => Self::argument(message),
+            ClientError::Unreachable { .. } | ClientError::Untrusted { .. } => {
+                Self::new("unreachable", message)
+            }
+            ClientError::Lost { .. } => Self::new("lost", message),
+            ClientError::Foreign { .. } | ClientError::Answer(_) => Self::new("damaged", message),
+            ClientError::Refused { code, reason, message, .. } => {
+                // gRPC's name of the code in words: "PermissionDenied" is permission_denied.
+                let word = format!("{code:?}").chars().fold(String::new(), |mut word, letter| {
+                    if letter.is_uppercase() && !word.is_empty() {
+                        word.push('_');
+                    }
+                    word.extend(letter.to_lowercase());
+                    word
+                });
+                Self { kind: "refused", code: word, reason: reason.unwrap_or_default(), message }
+            }
+        }
+    }
+}
+
+impl From<ReplicaError> for Failure {
+    fn from(error: ReplicaError) -> Self {
+        let message = error.to_string();
+        match error {
+            ReplicaError::Client(error) => error.into(),
+            ReplicaError::Question(error) => error.into(),
+            ReplicaError::Damaged(_) => Self::new("damaged", message),
+            ReplicaError::Silent(_) => Self::timed_out(message),
+            ReplicaError::TooLarge(_) | ReplicaError::TooManyViewpoints(_) => Self::new("too_large", message),
+        }
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        let Failure { kind, code, reason, message } = failure;
+        Python::attach(|py| {
+            let made = py
+                .import("mrol_replica._failures")
+                .and_then(|module| module.getattr("exception"))
+                .and_then(|exception| exception.call1((kind, code, reason, message)));
+            made.map_or_else(|error| error, PyErr::from_value)
+        })
+    }
+}

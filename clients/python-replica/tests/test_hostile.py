@@ -1,0 +1,174 @@
+"""What no array should be, and ten thousand calls."""
+
+import gc
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mrol
+import numpy as np
+import pytest
+
+import mrol_replica
+
+POINTS = np.random.default_rng(1).uniform(-4, 4, (2000, 3)).astype(np.float32)
+
+
+def test_arrays_of_any_kind_are_converted_or_refused(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
+    expected = hall.query(POINTS).occupied
+    wide = np.zeros((2000, 6), np.float32)
+    wide[:, ::2] = POINTS
+    frozen = POINTS.copy()
+    frozen.setflags(write=False)
+    for same in (wide[:, ::2], np.asfortranarray(POINTS), POINTS.astype(">f4"), POINTS.tolist(), frozen, POINTS[::-1][::-1]):
+        np.testing.assert_array_equal(replica.query(same).occupied, expected)
+    np.testing.assert_array_equal(replica.query(POINTS[::-1]).occupied, expected[::-1])
+    refused: list[Any] = [
+        [[1, 2]],
+        [["a", "b", "c"]],
+        [[1, 2, 3], [1, 2]],
+        np.zeros((2, 3), complex),
+        np.zeros((2, 3), bool),
+        np.ma.masked_equal(np.zeros((2, 3)), 0),
+        None,
+        1.0,
+        np.full((1, 3), 1e300),
+    ]
+    for value in refused:
+        with pytest.raises(mrol.ArgumentError, match="points"):
+            replica.query(value)
+    for value in ([[np.nan, 0, 0]], [[np.inf, 0, 0]]):
+        with pytest.raises(mrol.InvalidArgument, match="point_not_finite"):
+            replica.query(value)
+
+
+def test_arguments_are_named(replica: mrol_replica.Replica) -> None:
+    body = [[0, 0, 0, 0.2]]
+    asked: list[tuple[str, Callable[[], object]]] = [
+        ("level", lambda: replica.query(POINTS, level=-1)),
+        ("level", lambda: replica.query(POINTS, level=1 << 40)),
+        ("lookup", lambda: replica.query(POINTS, lookup="maybe")),
+        ("keep_out", lambda: replica.query(POINTS, keep_out="yes")),
+        ("map_from_points", lambda: replica.query(POINTS, map_from_points=np.diag([2, 2, 2, 1]))),
+        ("answer", lambda: replica.check_poses(body, POINTS, answer="all")),
+        ("configurations", lambda: replica.check_poses(body, POINTS[:, :2])),
+        ("ignored", lambda: replica.check_poses(body, POINTS, ignored=["box"])),
+        ("body", lambda: replica.check_poses([[0, 0]], POINTS)),
+        ("lengths", lambda: replica.check_motions(body, POINTS, lengths=[1, 2])),
+        ("sizes", lambda: replica.check_spheres(np.zeros((3, 4)), sizes=[4])),
+        ("origins", lambda: replica.cast_rays(POINTS[:5], ends=POINTS)),
+        ("directions", lambda: replica.cast_rays([0, 0, 0])),
+        ("radius_m", lambda: replica.nearest(POINTS, float("nan"))),
+        ("bad_radius", lambda: replica.nearest(POINTS, -1.0)),
+        ("radius", lambda: replica.check_poses([[0, 0, 0, -0.2]], POINTS)),
+        ("bad_ray", lambda: replica.cast_rays([0, 0, 0], POINTS)),
+    ]
+    for name, ask in asked:
+        with pytest.raises(mrol.MrolError, match=name):
+            ask()
+
+
+def test_the_way_for_planners_takes_what_it_says(replica: mrol_replica.Replica) -> None:
+    body = mrol_replica.PreparedBody([[0, 0, 0, 0.2]])
+    edge = np.array([[0, 0, 0, 0, 0, 0, 1], [0.5, 0, 0, 0, 0, 0, 1]], np.float32)
+    assert replica.motion_is_free(body, edge) is True
+    with pytest.raises(TypeError):
+        replica.motion_is_free(body, edge.astype(np.float64))  # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        replica.motion_is_free([[0, 0, 0, 0.2]], edge)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="contiguous"):
+        replica.motion_is_free(body, np.repeat(edge, 2, axis=1)[:, ::2])
+    with pytest.raises(ValueError, match="configurations"):
+        replica.motion_is_free(body, edge[:1])
+    with pytest.raises(mrol.InvalidArgument):
+        replica.motion_is_free(body, np.full_like(edge, np.nan))
+
+
+def test_an_array_that_changes_meanwhile_changes_nothing_of_the_question(replica: mrol_replica.Replica) -> None:
+    points = np.tile(POINTS, (50, 1))
+    over = threading.Event()
+
+    def change() -> None:
+        while not over.is_set():
+            points[:] = np.nan
+            points[:] = 0.25
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    try:
+        for _ in range(50):
+            try:
+                replica.query(points)
+            except mrol.InvalidArgument as error:
+                assert error.reason == "point_not_finite"
+    finally:
+        over.set()
+        thread.join()
+
+
+def resident_bytes() -> int:
+    """Memory of this process."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_ten_thousand_calls_leave_nothing(replica: mrol_replica.Replica) -> None:
+    body = mrol_replica.PreparedBody([[0, 0, 0, 0.2]])
+    edge = np.array([[0, 0, 0, 0, 0, 0, 1], [0.5, 0, 0, 0, 0, 0, 1]], np.float32)
+    calls: list[Callable[[], object]] = [
+        lambda: replica.query(POINTS),
+        lambda: replica.motion_is_free(body, edge),
+        lambda: replica.check_motions([[0, 0, 0, 0.2]], edge),
+        lambda: replica.check_poses(body, POINTS[:50], answer="first_hit"),
+        lambda: replica.nearest(POINTS[:50], 0.5),
+        lambda: replica.cast_rays([0, 0, 0], ends=POINTS[:50]),
+        lambda: replica.status,
+    ]
+
+    def refused() -> None:
+        with pytest.raises(mrol.InvalidArgument):
+            replica.query([[np.nan, 0, 0]])
+
+    for call in [*calls, refused]:
+        for _ in range(500):
+            call()
+        gc.collect()
+        before = resident_bytes()
+        for _ in range(10_000 // len(calls)):
+            call()
+        gc.collect()
+        assert resident_bytes() - before < 8_000_000
+
+
+def test_replicas_that_are_opened_and_closed_leave_nothing(replica: mrol_replica.Replica, hall: mrol.Map, server: Any) -> None:
+    def opened() -> None:
+        with mrol_replica.Replica(server.grpc, hall.name) as another:
+            another.query(POINTS)
+
+    for _ in range(10):
+        opened()
+    gc.collect()
+    before, files = resident_bytes(), len(os.listdir("/proc/self/fd"))
+    for _ in range(50):
+        opened()
+    gc.collect()
+    assert resident_bytes() - before < 30_000_000
+    assert len(os.listdir("/proc/self/fd")) < files + 10
+
+
+def test_maps_without_a_server_that_are_dropped_leave_nothing() -> None:
+    def made() -> None:
+        m = mrol_replica.LocalMap(0.1, levels=3)
+        m.insert(POINTS, align=False)
+        m.query(POINTS)
+
+    for _ in range(5):
+        made()
+    gc.collect()
+    before, threads = resident_bytes(), len(os.listdir("/proc/self/task"))
+    for _ in range(40):
+        made()
+    gc.collect()
+    assert resident_bytes() - before < 40_000_000
+    assert len(os.listdir("/proc/self/task")) < threads + 10

@@ -1,0 +1,269 @@
+"""A replica answers what the server answers, and follows it."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import mrol
+import numpy as np
+import pytest
+from support.scenes import room
+from support.server import Server, serving
+
+import mrol_replica
+from mrol_replica._failures import Closed, Forked
+
+RNG = np.random.default_rng(7)
+POINTS = RNG.uniform([-4.5, -3.5, -2], [4.5, 3.5, 2], (4000, 3)).astype(np.float32)
+POSES = np.concatenate([POINTS[:500], np.tile([0, 0, 0, 1], (500, 1))], axis=1).astype(np.float32)
+BODY = mrol.Body([mrol.Link(spheres=[[0, 0, 0, 0.3]]), mrol.Link(points=[[0, 0, 0.1]], padding_m=0.05)])
+TWO = np.repeat(POSES[:, None], 2, axis=1)
+
+
+def equal(ours: Any, theirs: Any) -> None:
+    """All arrays of two answers, and their versions."""
+    assert type(ours) is type(theirs)
+    for name, value in vars(theirs).items():
+        other = vars(ours)[name]
+        if isinstance(value, np.ndarray):
+            assert other.dtype == value.dtype or value.dtype.kind in "iu", name
+            np.testing.assert_array_equal(other, value, err_msg=name)
+        elif hasattr(value, "__dict__"):
+            equal(other, value)
+        else:
+            assert other == value, name
+
+
+def test_points(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
+    pose = mrol.Pose.of([0.3, -0.2, 0.1, 0, 0, np.sin(0.3), np.cos(0.3)])
+    for options in [{}, {"level": 2}, {"keep_out": True}, {"map_from_points": pose}]:
+        equal(replica.query(POINTS, **options), hall.query(POINTS, **options))
+    assert 0 < replica.query(POINTS).count < len(POINTS)
+    # A filter says "occupied" of more, and of all that is.
+    bloom, exact = replica.query(POINTS, lookup="bloom").occupied, replica.query(POINTS).occupied
+    assert (bloom | ~exact).all()
+
+
+def test_shapes_are_kept(replica: mrol_replica.Replica) -> None:
+    assert replica.query(POINTS.reshape(40, 100, 3)).occupied.shape == (40, 100)
+    assert replica.query(POINTS[0]).occupied.shape == ()
+    assert replica.nearest(POINTS[:12].reshape(3, 4, 3), 1.0).away.shape == (3, 4, 3)
+    assert replica.query(np.zeros((0, 3))).occupied.shape == (0,)
+
+
+def test_bodies(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
+    prepared = mrol_replica.PreparedBody(BODY)
+    ignored = [mrol.Sphere([1.5, 1, 0], 0.8), mrol.OrientedBox([3, 0, 0, 0, 0, 0, 1], [1, 1, 1])]
+    several: list[dict[str, Any]] = [
+        {},
+        {"answer": "first_hit"},
+        {"answer": "clearance", "clearance_max_m": 0.5},
+        {"unknown": "occupied", "level": 1},
+        {"ignored": ignored, "ignore_keep_outs": True},
+    ]
+    for options in several:
+        theirs = hall.check_poses(BODY, TWO, **options)
+        equal(replica.check_poses(BODY, TWO, **options), theirs)
+        equal(replica.check_poses(prepared, TWO, **options), theirs)
+    spheres = np.concatenate([POINTS, np.full((len(POINTS), 1), 0.2)], axis=1)
+    equal(replica.check_spheres(spheres, answer="first_hit"), hall.check_spheres(spheres, answer="first_hit"))
+    sizes = np.full(len(POINTS) // 4, 4)
+    equal(replica.check_spheres(spheres, sizes=sizes), hall.check_spheres(spheres, sizes=sizes))
+
+
+def test_motions(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
+    ball = [[0.0, 0.0, 0.0, 0.25]]
+    edges = POSES.reshape(250, 2, 7)
+    theirs = hall.check_motions(ball, edges, clearance_max_m=0.4)
+    equal(replica.check_motions(ball, edges, clearance_max_m=0.4), theirs)
+    lengths = [2, 3, 5, 490]
+    equal(replica.check_motions(ball, POSES, lengths=lengths), hall.check_motions(ball, POSES, lengths=lengths))
+    body = mrol_replica.PreparedBody(ball)
+    one_by_one = [replica.motion_is_free(body, edge) for edge in edges]
+    np.testing.assert_array_equal(one_by_one, theirs.free)
+    assert 0 < theirs.count < 250
+
+
+def test_rays_distances_and_states(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
+    directions = POINTS / np.linalg.norm(POINTS, axis=1, keepdims=True)
+    for options in [{}, {"unknown": "occupied"}, {"range_m": 2.0, "ignore_keep_outs": True}, {"level": 1}]:
+        equal(replica.cast_rays([0, 0, 0], directions, **options), hall.cast_rays([0, 0, 0], directions, **options))
+    equal(replica.cast_rays(POINTS, ends=-POINTS), hall.cast_rays(POINTS, ends=-POINTS))
+    equal(replica.nearest(POINTS, 1.0), hall.nearest(POINTS, 1.0))
+    equal(replica.nearest(POINTS, 1.0, to="centers", level=1), hall.nearest(POINTS, 1.0, to="centers", level=1))
+    states = replica.classify(POINTS)
+    equal(states, hall.classify(POINTS))
+    assert states.free.any()
+    assert states.unknown.any()
+
+
+def test_it_follows_and_comes_back(tmp_path: Path) -> None:
+    with serving(tmp_path) as server:
+        m = mrol.connect(server.address).map("a", resolution=0.1, levels=2)
+        m.insert([[1, 0, 0]], align=False)
+        with mrol_replica.Replica(server.grpc, "a") as replica:
+            assert replica.query([[1, 0, 0], [2, 0, 0]]).occupied.tolist() == [True, False]
+            second = m.insert([[2, 0, 0]], align=False, guess=np.eye(4), force=True)
+            replica.wait_for_revision(second.revision)
+            assert replica.query([[1, 0, 0], [2, 0, 0]]).occupied.all()
+            with pytest.raises(mrol.DeadlineExceeded, match="revision_not_reached"):
+                replica.wait_for_revision(second.revision + 1, timeout_s=0.1)
+            server.kill()
+            assert replica.query([[1, 0, 0]]).occupied.all()
+            server.start()
+            third = m.insert([[3, 0, 0]], align=False, guess=np.eye(4), force=True)
+            replica.wait_for_revision(third.revision, timeout_s=30)
+            assert replica.query([[3, 0, 0]]).version == third.version
+            status = replica.status
+            assert (status.is_connected, status.resets, status.version) == (True, 1, third.version)
+
+
+def test_what_cannot_be_opened(server: Server, hall: mrol.Map) -> None:
+    with pytest.raises(mrol.NotFound, match="map_not_found"):
+        mrol_replica.Replica(server.grpc, "nowhere")
+    with pytest.raises(mrol.ConnectFailed):
+        mrol_replica.Replica("127.0.0.1:9", "a")
+    with pytest.raises(mrol.InvalidArgument, match="bad_name"):
+        mrol_replica.Replica(server.grpc, "../a")
+    with pytest.raises(ValueError, match="address"):
+        mrol_replica.Replica("http://", "a")
+    with pytest.raises(mrol.MrolError):
+        mrol_replica.Replica(server.address, hall.name, timeout_s=5)
+    with pytest.raises(mrol.ArgumentError, match="timeout_s"):
+        mrol_replica.Replica(server.grpc, hall.name, timeout_s=float("nan"))
+    with pytest.raises(FileNotFoundError):
+        mrol_replica.Replica(server.grpc, hall.name, ca="/nowhere.pem")
+
+
+def test_a_region_answers_what_it_knows(server: Server, hall: mrol.Map) -> None:
+    with mrol_replica.Replica(server.grpc, hall.name, region=[[-5, -4, -2], [0, 4, 2]]) as part:
+        inside = POINTS[POINTS[:, 0] < -0.5]
+        np.testing.assert_array_equal(part.query(inside).occupied, hall.query(inside).occupied)
+        assert part.query(inside).version.content_hash is None
+        with pytest.raises(mrol.InvalidArgument, match="point_out_of_range"):
+            part.query([[1, 0, 0]])
+
+
+def test_keys(tmp_path: Path) -> None:
+    keys = tmp_path / "keys.toml"
+    from support.server import run
+
+    secret = run("key", "new", "--name", "p", "--scope", "read", "--file", str(keys)).splitlines()[0]
+    with serving(tmp_path, "--keys-file", str(keys)) as server:
+        with pytest.raises(mrol.Unauthenticated):
+            mrol_replica.Replica(server.grpc, "a")
+        with pytest.raises(mrol.NotFound):
+            mrol_replica.Replica(server.grpc, "a", key=secret)
+        try:
+            mrol_replica.Replica(server.grpc, "a", key=secret + "x")
+        except mrol.Unauthenticated as error:
+            assert secret not in repr(error)
+
+
+def test_threads_ask_beside_each_other(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
+    expected = hall.query(POINTS).count
+    with ThreadPoolExecutor(8) as threads:
+        counts = list(threads.map(lambda _: replica.query(POINTS).count, range(200)))
+    assert set(counts) == {expected}
+
+
+def test_other_threads_of_python_go_on(replica: mrol_replica.Replica) -> None:
+    many = np.tile(POINTS, (20, 1))
+    turns = 0
+    over = threading.Event()
+
+    def count() -> None:
+        nonlocal turns
+        while not over.is_set():
+            turns += 1
+            time.sleep(0.0005)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = turns
+    for _ in range(3):
+        replica.nearest(many, 1.0)
+    during = turns - before
+    over.set()
+    thread.join()
+    assert during > 5
+
+
+def test_a_child_gets_an_error_and_the_parent_goes_on(replica: mrol_replica.Replica) -> None:
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            try:
+                replica.query([[0, 0, 0]])
+            except Forked:
+                code = 0
+            replica.close()
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 0
+    replica.query([[0, 0, 0]])
+
+
+def test_closed_is_closed(server: Server, hall: mrol.Map) -> None:
+    replica = mrol_replica.Replica(server.grpc, hall.name)
+    replica.close()
+    replica.close()
+    for ask in (lambda: replica.query([[0, 0, 0]]), lambda: replica.status, lambda: replica.wait_for_revision(0)):
+        with pytest.raises(Closed):
+            ask()
+
+
+def test_ctrl_c_ends_what_waits(tmp_path: Path) -> None:
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        program = tmp_path / "opens.py"
+        program.write_text(
+            textwrap.dedent(
+                f"""
+                import mrol_replica
+                print("begins", flush=True)
+                try:
+                    mrol_replica.Replica("127.0.0.1:{silent.getsockname()[1]}", "a")
+                except KeyboardInterrupt:
+                    print("interrupted")
+                """
+            )
+        )
+        process = subprocess.Popen([sys.executable, str(program)], stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=10)
+        assert said == "interrupted\n"
+
+
+def test_a_silent_server_is_given_up(tmp_path: Path) -> None:
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        begin = time.monotonic()
+        with pytest.raises(mrol.TimedOut, match="timeout_s"):
+            mrol_replica.Replica(f"127.0.0.1:{silent.getsockname()[1]}", "a", timeout_s=0.5)
+        assert time.monotonic() - begin < 5
+
+
+def test_a_scan_of_the_room_is_all_there(server: Server) -> None:
+    m = mrol.connect(server.address).map("whole", resolution=0.1, levels=4)
+    scan = room(seed=9)
+    answer = m.insert(scan, align=False)
+    with mrol_replica.Replica(server.grpc, "whole") as replica:
+        found = replica.query(scan)
+        assert found.occupied.all()
+        assert found.version == answer.version

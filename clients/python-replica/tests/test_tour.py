@@ -1,0 +1,14 @@
+"""The tour of `docs/guide/python-replica.md`: its blocks run in order, and print what stands behind them."""
+
+from pathlib import Path
+
+import pytest
+from support.server import serving
+from support.tours import GUIDE, run_tour
+
+
+def test_the_tour_does_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with serving(tmp_path) as server:
+        monkeypatch.chdir(tmp_path)
+        addresses = {"localhost:7333": server.address, "localhost:7334": server.grpc}
+        assert run_tour(GUIDE / "python-replica.md", addresses) > 8
