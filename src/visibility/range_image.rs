@@ -282,7 +282,7 @@ impl NearestDepths {
     }
 
     /// The depths of a tile's pixels. A pixel between two that were seen, beside or above each other, was seen as far as the nearer
-    /// of them: points are not where pixels are.
+    /// of them, and no farther than points of its own: points are not where pixels are.
     fn tile(&self, tile: usize) -> [Option<f32>; TILE_PIXELS] {
         let side = self.map.tiles();
         let (face, first) = (tile / (side * side), [tile % side * TILE_SIDE, tile / side % side * TILE_SIDE]);
@@ -293,9 +293,10 @@ impl NearestDepths {
             let [before, after] = [column.checked_sub(1), column.checked_add(1)];
             let [below, above] = [row.checked_sub(1), row.checked_add(1)];
             self.at(face, [Some(column), Some(row)]).or_else(|| {
+                let own_m = self.depths_m[tile * TILE_PIXELS + i];
                 let beside = between([before, Some(row)], [after, Some(row)]);
                 let over = between([Some(column), below], [Some(column), above]);
-                beside.into_iter().chain(over).reduce(f32::min)
+                beside.into_iter().chain(over).reduce(f32::min).map(|seen_m| seen_m.min(own_m))
             })
         })
     }

@@ -209,3 +209,42 @@ fn a_scan_of_points_far_from_each_other_says_little_and_nothing_far_from_its_ray
     let seen = RangeImage::of_points(&sparse, RANGE, IMAGE_BYTES_MAX).map_or(0, |image| image.seen().count());
     assert!(seen < 150, "{seen} pixels were seen by {} points", sparse.len());
 }
+
+#[test]
+fn nothing_is_seen_behind_points_that_are_too_few_to_tell_more() {
+    // Six points for each pixel of a scan all around at 8 m: coarse pixels, of which each needs some points to count as seen.
+    let pixels = 40;
+    let at = |i: usize, aside: f32| (i as f32 + 0.5 + aside) / pixels as f32 * 2.0 - 1.0;
+    let aside = [-0.4f32, 0.0, 0.4].map(|u| [[u, -0.3], [u, 0.3]]);
+    let mut points = Vec::new();
+    for (face, sign) in (0..3).flat_map(|face| [(face, 1.0f32), (face, -1.0)]) {
+        for (i, j) in (0..pixels * pixels).map(|n| (n / pixels, n % pixels)) {
+            for [u, v] in aside.iter().flatten() {
+                let mut offset = [0.0; 3];
+                offset[face] = sign;
+                offset[(face + 1) % 3] = at(i, *u);
+                offset[(face + 2) % 3] = at(j, *v);
+                let scale = 8.0 / offset.iter().map(|c| c * c).sum::<f32>().sqrt();
+                points.push(Point::from(offset.map(|c| c * scale)));
+            }
+        }
+    }
+    // The pixel beside the middle of the face +x.
+    let is_there = |point: &Point| {
+        let [x, y, z] = point.xyz();
+        x > 0.0 && (0.0..0.05).contains(&(y / x)) && (0.0..0.05).contains(&(z / x))
+    };
+    let (there, elsewhere): (Vec<Point>, Vec<Point>) = points.into_iter().partition(is_there);
+    assert_eq!(there.len(), 6);
+    for few in 1..=6 {
+        // They met a pole at 2 m; the others of the pixel met nothing.
+        let near = there.iter().take(few).map(|point| Point::from(point.xyz().map(|c| c / 4.0)));
+        let scan: Vec<Point> = elsewhere.iter().copied().chain(near).collect();
+        let image = RangeImage::of_points(&scan, RANGE, IMAGE_BYTES_MAX).unwrap();
+        assert!(!image.sees_through([4.0, 0.1, 0.1]), "{few} points");
+        assert!(
+            image.sees_through([1.5, 0.0375, 0.0375]) && image.sees_through([4.0, 0.3, 0.1]),
+            "{few} points"
+        );
+    }
+}

@@ -108,6 +108,28 @@ async fn figures_of_sites() {
     }
 }
 
+/// The page's way of drawing beside the usual one, in the same run.
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "prints figures, in a minute or two"]
+async fn figures_of_two_ways() {
+    let _turn = turn().await;
+    let Some(browser) = Browser::start().await else { return };
+    let size = json!({"width": 1280, "height": 800, "deviceScaleFactor": 1, "mobile": false});
+    browser.call("Emulation.setDeviceMetricsOverride", size).await;
+    let daemon = Daemon::start().await;
+    for (map, side_m, buildings) in [("small", 24.0, 4), ("middle", 72.0, 14)] {
+        put_site(&daemon, map, &site(side_m, buildings)).await;
+        browser.open("about:blank").await;
+        browser.open(&daemon.url(&format!("/#map={map}"))).await;
+        browser.wait("scene.drawn.is_complete && scene.drawn.tiles > 0").await;
+        let told =
+            browser.eval(&format!("await (async () => {{ {} }})()", include_str!("two_ways.js"))).await;
+        let pixels = ["pulled", "instanced"].map(|way| told[way]["pixels"].as_f64().unwrap());
+        assert!(pixels[0] > 1e4 && (pixels[0] / pixels[1] - 1.0).abs() < 0.01, "{told}");
+        println!("{map}: {told}");
+    }
+}
+
 /// The heap after a collection: the median of six within a minute, bytes.
 async fn heap_of_a_minute(browser: &Browser) -> f64 {
     let mut sizes = Vec::new();
@@ -163,7 +185,7 @@ async fn figures_of_the_heap() {
         let start = Instant::now();
         for minute in 1..=10 {
             let heap = heap_of_a_minute(&browser).await;
-            let [voxels, scans] = ["scene.drawn.voxels", "session.robots.scans.length"];
+            let [voxels, scans] = ["scene.drawn.voxels", "session.robots.steps.length"];
             let (voxels, scans) = (browser.eval(voxels).await, browser.eval(scans).await);
             println!(
                 "minute {minute} ({:.0?}): {heap} bytes; {voxels} voxels, {scans} scans",

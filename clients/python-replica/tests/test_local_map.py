@@ -1,6 +1,7 @@
 """A map without a server is the map that a server would have."""
 
 from pathlib import Path
+from typing import Any
 
 import mrol
 import numpy as np
@@ -118,3 +119,10 @@ def test_guesses_exclude_each_other(mapped: mrol_replica.LocalMap) -> None:
         mapped.align(room(), guess=START, motion=START)
     with pytest.raises(mrol.FailedPrecondition, match="guess_required"):
         mapped.insert(room(), robot="unheard-of")
+
+
+def test_arguments_of_scans_are_named(mapped: mrol_replica.LocalMap) -> None:
+    for name, value in [("robot", None), ("align", "no"), ("carve", 1), ("method", "best"), ("timestamp_ns", 1 << 70)]:
+        given: dict[str, Any] = {name: value}
+        with pytest.raises(mrol.ArgumentError, match=name):
+            mapped.insert(room(), **given)

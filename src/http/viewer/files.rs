@@ -41,6 +41,7 @@ pub(super) const FILES: &[File] = files! {
     "arrivals.js",
     "blocks.js",
     "body.js",
+    "brought.js",
     "camera.js",
     "chooser.js",
     "connection.js",

@@ -26,6 +26,7 @@ from mrol._question import Names
 from mrol.body import BodyLike, ConfigurationsLike, configurations_of
 from mrol.errors import ArgumentError, excerpt
 from mrol.operations.checks import Told, Unknown
+from mrol.operations.handle import flag_of
 from mrol.operations.motions import lengths_of
 from mrol.operations.nearest import MeasuredTo
 from mrol.operations.occupancy import POINTS, Lookup
@@ -120,7 +121,7 @@ class Questions:
         rows, shape = _points_of(points)
         pose = None if map_from_points is None else Pose.of(map_from_points, "map_from_points").seven()
         bloom = _word(lookup, "lookup") == "bloom"
-        occupied, count, version = self._inside.query(rows, pose, _level(level), bloom, _flag(keep_out, "keep_out"))
+        occupied, count, version = self._inside.query(rows, pose, _level(level), bloom, flag_of(keep_out, "keep_out"))
         return Occupancy(_version(version), occupied.reshape(shape), count)
 
     def check_poses(
@@ -146,7 +147,7 @@ class Questions:
             _regions(ignored, "ignored"),
             _word(unknown, "unknown") == "occupied",
             _level(level),
-            _flag(ignore_keep_outs, "ignore_keep_outs"),
+            flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         return _collisions(told, shape)
 
@@ -180,7 +181,7 @@ class Questions:
             _regions(ignored, "ignored"),
             _word(unknown, "unknown") == "occupied",
             _level(level),
-            _flag(ignore_keep_outs, "ignore_keep_outs"),
+            flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         return _collisions(told, shape)
 
@@ -210,7 +211,7 @@ class Questions:
             _regions(ignored, "ignored"),
             _word(unknown, "unknown") == "occupied",
             _level(level),
-            _flag(ignore_keep_outs, "ignore_keep_outs"),
+            flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         clearances = None if clearances_m is None else clearances_m.reshape(shape)
         return Motions(_version(version), free.reshape(shape), count, first_hits.reshape(shape), clearances)
@@ -243,7 +244,7 @@ class Questions:
             None if range_m is None else number_of(range_m, "range_m"),
             _word(unknown, "unknown") == "occupied",
             _level(level),
-            _flag(ignore_keep_outs, "ignore_keep_outs"),
+            flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         names = _names(keep_outs, len(rows)).reshape(shape)
         met = voxels.reshape(*shape, 3)
@@ -265,7 +266,7 @@ class Questions:
             number_of(radius_m, "radius_m"),
             _word(to, "to") == "centers",
             _level(level),
-            _flag(ignore_keep_outs, "ignore_keep_outs"),
+            flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         return Nearest(
             _version(version),
@@ -279,7 +280,7 @@ class Questions:
     def classify(self, points: ArrayLike, *, level: int = 0, ignore_keep_outs: bool = False) -> Classification:
         """Whether points are occupied, free or unknown: see `mrol.Map.classify`."""
         rows, shape = rows_of(points, 3, "points", POINTS, BYTES_MAX)
-        ignores = _flag(ignore_keep_outs, "ignore_keep_outs")
+        ignores = flag_of(ignore_keep_outs, "ignore_keep_outs")
         occupied, free, version = self._inside.classify(rows, _level(level), ignores)
         return Classification(_version(version), occupied.reshape(shape), free.reshape(shape))
 
@@ -308,8 +309,10 @@ _version = version_of
 
 
 def _points_of(points: ArrayLike) -> tuple[NDArray[np.float32], tuple[int, ...]]:
-    """Points as rows, and the shape in which they were given; what is that already goes a short way: `rows_of` takes as long as
-    some hundred look-ups."""
+    """Points as rows, and the shape in which they were given.
+
+    What is that already goes a short way: `rows_of` takes as long as some hundred look-ups.
+    """
     if type(points) is np.ndarray and points.dtype == _F32 and points.ndim == 2 and points.shape[1] == 3:
         return points, points.shape[:1]
     return rows_of(points, 3, "points", POINTS, BYTES_MAX)
@@ -333,12 +336,6 @@ def _word(word: str, argument: str) -> str:
     if word not in WORDS[argument]:
         raise ArgumentError(argument, excerpt(word), " or ".join(map(repr, WORDS[argument])))
     return word
-
-
-def _flag(value: bool, argument: str) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise ArgumentError(argument, excerpt(value), "True or False")
-    return bool(value)
 
 
 def _names(names: "list[str | None] | None", count: int) -> Names:

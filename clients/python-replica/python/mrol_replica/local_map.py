@@ -1,17 +1,19 @@
 """A map without a server."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Union
 
 import numpy as np
 from mrol import Box, Candidate, Deletion, Localization, OpenDirection, Pose, ScanAnswer, Voxels
 from mrol._arrays import as_floats, as_numbers, number_of, rows_of, vector_of, whole_of
-from mrol.errors import ArgumentError
+from mrol.errors import ArgumentError, excerpt
+from mrol.operations.handle import flag_of
 from mrol.operations.occupancy import POINTS
 from mrol.operations.scans import Method
 from mrol.pose import PoseLike
 from mrol.shapes import BoxLike, OrientedBox, Shape
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._questions import BYTES_MAX, Questions, region_of, version_of
@@ -183,31 +185,61 @@ class LocalMap(Questions):
 def _fields(given: "dict[str, Any]", **fixed: Any) -> "dict[str, Any]":
     """The arguments of a scan as the extension takes them."""
     given = {name: value for name, value in given.items() if name not in ("self", "points")} | fixed
-    guesses = [given["guess"] is not None, given["motion"] is not None, bool(given["constant_velocity"])]
-    if sum(guesses) > 1:
+    for name, value in given.items():
+        if value is not None or name in REQUIRED:
+            given[name] = TAKEN_AS[name](value, name)
+    if sum((given["guess"] is not None, given["motion"] is not None, given["constant_velocity"])) > 1:
         raise ArgumentError("guess", "several of guess, motion and constant_velocity", "the only one of them")
-    for name in ("guess", "motion"):
-        if given[name] is not None:
-            given[name] = Pose.of(given[name], name).seven()
-    for name in ("range_min_m", "range_max_m"):
-        if given[name] is not None:
-            given[name] = number_of(given[name], name)
-    if given["timestamp_ns"] is not None:
-        given["timestamp_ns"] = whole_of(given["timestamp_ns"], "timestamp_ns", -(1 << 63), (1 << 63) - 1)
-    if given["point_times"] is not None:
-        times = as_floats(as_numbers(given["point_times"], "point_times", TIMES), "point_times", TIMES, BYTES_MAX)
-        given["point_times"] = times.reshape(-1)
-    if given["gravity_in_sensor"] is not None:
-        given["gravity_in_sensor"] = vector_of(given["gravity_in_sensor"], 3, "gravity_in_sensor")
-    if given["guess_covariance"] is not None:
-        expected = "numbers of shape (6, 6): x y z in meters, then turns in radians"
-        covariance = as_numbers(given["guess_covariance"], "guess_covariance", expected)
-        if covariance.shape not in ((6, 6), (36,)):
-            raise ArgumentError("guess_covariance", f"shape {covariance.shape}", expected)
-        given["guess_covariance"] = vector_of(covariance.reshape(36), 36, "guess_covariance")
-    if given["body_m"] is not None:
-        given["body_m"] = Box.of(given["body_m"], "body_m").corners("body_m")
     method = given.pop("method")
-    if method not in (None, "refined", "overlap"):
-        raise ArgumentError("method", repr(method), "'refined' or 'overlap'")
     return {**given, "overlap_alone": None if method is None else method == "overlap"}
+
+
+def _text(value: object, argument: str) -> str:
+    if not isinstance(value, str):
+        raise ArgumentError(argument, excerpt(value), "text")
+    return value
+
+
+def _method(value: object, argument: str) -> str:
+    if value not in ("refined", "overlap"):
+        raise ArgumentError(argument, excerpt(value), "'refined' or 'overlap'")
+    return str(value)
+
+
+def _times(value: ArrayLike, argument: str) -> "NDArray[np.float32]":
+    return as_floats(as_numbers(value, argument, TIMES), argument, TIMES, BYTES_MAX).reshape(-1)
+
+
+def _covariance(value: ArrayLike, argument: str) -> "list[float]":
+    expected = "numbers of shape (6, 6): x y z in meters, then turns in radians"
+    covariance = as_numbers(value, argument, expected)
+    if covariance.shape not in ((6, 6), (36,)):
+        raise ArgumentError(argument, f"shape {covariance.shape}", expected)
+    return vector_of(covariance.reshape(36), 36, argument)
+
+
+REQUIRED = {"robot", "constant_velocity", "align", "point_times_from_sweep_start", "force", "strict"}
+"""What has no value that stands for none."""
+
+TAKEN_AS: "dict[str, Callable[[Any, str], Any]]" = {
+    "robot": _text,
+    "guess": lambda value, name: Pose.of(value, name).seven(),
+    "motion": lambda value, name: Pose.of(value, name).seven(),
+    "constant_velocity": flag_of,
+    "align": flag_of,
+    "timestamp_ns": lambda value, name: whole_of(value, name, -(1 << 63), (1 << 63) - 1),
+    "point_times": _times,
+    "point_times_from_sweep_start": flag_of,
+    "gravity_in_sensor": lambda value, name: vector_of(value, 3, name),
+    "guess_covariance": _covariance,
+    "recover": flag_of,
+    "carve": flag_of,
+    "force": flag_of,
+    "method": _method,
+    "range_min_m": number_of,
+    "range_max_m": number_of,
+    "body_m": lambda value, name: Box.of(value, name).corners(name),
+    "strict": flag_of,
+    "foreground_level": lambda value, name: whole_of(value, name, 0, (1 << 32) - 1),
+}
+"""How each argument of a scan is taken, by its name."""

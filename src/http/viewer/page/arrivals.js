@@ -2,6 +2,7 @@
 //
 // A tag is one robot in one span of time. There are 254 of them; the oldest is forgotten for a new one.
 
+import { Brought } from "./brought.js";
 import { rgba, robotColor, theme } from "./palette.js";
 
 const TAGS = 254;
@@ -15,8 +16,7 @@ export class Arrivals {
   #tags = new Map();
   #next = 1;
   #robots = new Map();
-  #brought = [];
-  #bytes = 0;
+  #brought = new Brought(REMEMBERED_BYTES_MAX);
 
   /** The place of a robot among those that were seen, which chooses its color. */
   placeOf(robot) {
@@ -33,8 +33,7 @@ export class Arrivals {
     this.#next = (tag % TAGS) + 1;
     if (this.#tags.has(tag)) {
       forget(tag);
-      this.#brought = this.#brought.filter((brought) => brought.tag !== tag);
-      this.#bytes = this.#brought.reduce((bytes, { blocks }) => bytes + blocks.length, 0);
+      this.#brought.forget(tag);
     }
     this.#tags.set(tag, { robot, begin: now });
     return tag;
@@ -42,10 +41,7 @@ export class Arrivals {
 
   /** Remembers which voxels came with a tag. */
   remember(blocks, tag) {
-    if (tag === 0 || blocks.length === 0 || blocks.length > REMEMBERED_BYTES_MAX) return;
-    this.#brought.push({ blocks: blocks.slice(), tag });
-    this.#bytes += blocks.length;
-    while (this.#bytes > REMEMBERED_BYTES_MAX) this.#bytes -= this.#brought.shift().blocks.length;
+    if (tag !== 0 && blocks.length > 0) this.#brought.push(blocks, tag);
   }
 
   /** Tags what is remembered of a tile that was just fetched. */
