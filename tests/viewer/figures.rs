@@ -122,11 +122,22 @@ async fn figures_of_two_ways() {
         browser.open("about:blank").await;
         browser.open(&daemon.url(&format!("/#map={map}"))).await;
         browser.wait("scene.drawn.is_complete && scene.drawn.tiles > 0").await;
-        let told =
+        let drawn =
             browser.eval(&format!("await (async () => {{ {} }})()", include_str!("two_ways.js"))).await;
-        let pixels = ["pulled", "instanced"].map(|way| told[way]["pixels"].as_f64().unwrap());
-        assert!(pixels[0] > 1e4 && (pixels[0] / pixels[1] - 1.0).abs() < 0.01, "{told}");
-        println!("{map}: {told}");
+        let mut times = [Vec::new(), Vec::new()];
+        for _ in 0..7 {
+            let mut pixels = [0.0; 2];
+            for (way, times) in times.iter_mut().enumerate() {
+                let frame = browser.eval(&format!("globalThis.frameOf({way})")).await;
+                times.push(frame["took"].as_f64().unwrap());
+                pixels[way] = frame["colored"].as_f64().unwrap();
+            }
+            assert!(pixels[0] > 1e4 && (pixels[0] / pixels[1] - 1.0).abs() < 0.01, "{pixels:?}");
+        }
+        let [pulled, instanced] = times.map(|times| median_and_most(times).0);
+        println!(
+            "{map}: {drawn}; a frame {pulled:.0} ms by the page, {instanced:.0} ms by instances of a box"
+        );
     }
 }
 

@@ -1,9 +1,9 @@
 // Draws the tiles of the page twice, each in a context of its own: as the page does, and as instances of a box, which is the usual
-// way. The same voxels, camera and size; frames in turn. For `figures_of_two_ways` in figures.rs.
+// way. The same voxels, camera and size. For `figures_of_two_ways` in figures.rs, which asks for frames in turn.
 const load = (name) => import(new URL(`viewer/${name}`, document.baseURI));
 const [{ page }, { Voxels }, { programOf }] = await Promise.all(["main.js", "voxels.js", "gpu.js"].map(load));
 const { scene, session } = page;
-const [WIDTH, HEIGHT, FRAMES] = [1280, 800, 15];
+const [WIDTH, HEIGHT] = [1280, 800];
 const forest = session.forest;
 // The finest that the page has: of a larger site those are not the finest of the map.
 const level = Math.min(...Array.from(forest.tiles(), (tile) => tile.level));
@@ -103,15 +103,5 @@ function frame({ gl, draw }) {
 }
 
 const ways = [ofThePage(), ofInstances()];
-const times = [[], []];
-let colored;
-for (let i = 0; i < FRAMES; i++) {
-  colored = ways.map((way, k) => {
-    const done = frame(way);
-    times[k].push(done.took);
-    return done.colored;
-  });
-}
-const median = (numbers) => numbers.slice().sort((a, b) => a - b)[numbers.length >> 1];
-const [pulled, instanced] = ways.map((way, k) => ({ ms: median(times[k]), bytes_a_voxel: way.bytes / voxels, pixels: colored[k] }));
-return { level, voxels, pulled, instanced };
+globalThis.frameOf = (way) => frame(ways[way]);
+return { level, voxels, bytes_a_voxel: ways.map(({ bytes }) => bytes / voxels) };
