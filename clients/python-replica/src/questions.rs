@@ -9,7 +9,10 @@ use mrol::service::{
     Asked, CheckAs, ClassifyQuestion, MotionCheck, NearestQuestion, PointCloud, PointQuery, PoseCheck,
     RayQuestion, RaysToward, ServiceError, SphereCheck,
 };
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::answers::{
@@ -36,9 +39,10 @@ pub(crate) struct Questions {
 
 /// The points of an array of shape (n, 3), copied: who changes the array meanwhile changes nothing of the question.
 pub(crate) fn points_of(rows: &PyReadonlyArray2<'_, f32>) -> PointCloud {
-    let points: Vec<Point> = match rows.as_slice() {
-        Ok(numbers) => bytemuck::cast_slice(numbers).to_vec(),
-        Err(_) => rows.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]].into()).collect(),
+    // A slice there is of an array whose columns lie together, too.
+    let points: Vec<Point> = match rows.as_slice().ok().filter(|_| rows.is_c_contiguous()) {
+        Some(numbers) => bytemuck::cast_slice(numbers).to_vec(),
+        None => rows.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]].into()).collect(),
     };
     points.into()
 }
@@ -89,11 +93,12 @@ fn check_as(answer: &str, most_m: Option<f32>) -> CheckAs {
     }
 }
 
-/// The numbers of an array, copied.
+/// The numbers of an array whose rows lie together, copied.
 fn numbers_of(rows: &PyReadonlyArrayDyn<'_, f32>, name: &str) -> Result<Vec<f32>, Failure> {
-    let contiguous =
-        |_| Failure::argument(format!("{name} must be contiguous: numpy.ascontiguousarray makes it so"));
-    Ok(rows.as_slice().map_err(contiguous)?.to_vec())
+    let numbers = rows.as_slice().ok().filter(|_| rows.is_c_contiguous());
+    let not_so =
+        || Failure::argument(format!("{name} must be contiguous: numpy.ascontiguousarray makes it so"));
+    numbers.map(<[f32]>::to_vec).ok_or_else(not_so)
 }
 
 #[pymethods]

@@ -44,6 +44,24 @@ def test_arrays_of_any_kind_are_converted_or_refused(hall: mrol.Map, replica: mr
             replica.query(value)
 
 
+def test_every_question_takes_columns_that_lie_together(replica: mrol_replica.Replica) -> None:
+    columns, body = np.asfortranarray(POINTS), [[0, 0, 0, 0.2]]
+    spheres = np.concatenate([POINTS, np.full((len(POINTS), 1), 0.2, np.float32)], axis=1)
+    asked: list[Callable[[Any, Any], Any]] = [
+        lambda points, _: replica.query(points).occupied,
+        lambda points, _: replica.classify(points).free,
+        lambda points, _: replica.nearest(points, 1.0).distances_m,
+        lambda points, _: replica.cast_rays([0, 0, 0], ends=points).distances_m,
+        lambda points, _: replica.cast_rays(points, ends=points[::-1]).distances_m,
+        lambda points, _: replica.check_poses(body, points).colliding,
+        lambda points, _: replica.check_motions(body, points.reshape(-1, 2, 3)).free,
+        lambda _, balls: replica.check_spheres(balls).colliding,
+        lambda _, balls: replica.check_poses(balls[:3], POINTS).colliding,
+    ]
+    for ask in asked:
+        np.testing.assert_array_equal(ask(columns, np.asfortranarray(spheres)), ask(POINTS, spheres))
+
+
 def test_arguments_are_named(replica: mrol_replica.Replica) -> None:
     body = [[0, 0, 0, 0.2]]
     asked: list[tuple[str, Callable[[], object]]] = [
@@ -80,6 +98,8 @@ def test_the_way_for_planners_takes_what_it_says(replica: mrol_replica.Replica) 
         replica.motion_is_free([[0, 0, 0, 0.2]], edge)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="contiguous"):
         replica.motion_is_free(body, np.repeat(edge, 2, axis=1)[:, ::2])
+    with pytest.raises(ValueError, match="contiguous"):
+        replica.motion_is_free(body, np.asfortranarray(edge))
     with pytest.raises(ValueError, match="configurations"):
         replica.motion_is_free(body, edge[:1])
     with pytest.raises(mrol.InvalidArgument):
