@@ -26,7 +26,7 @@ const BITS: [[bool; 8]; 256] = {
     let mut bits = [[false; 8]; 256];
     let mut i = 0;
     while i < 8 * bits.len() {
-        bits[i / 8][i % 8] = i / 8 >> (i % 8) & 1 == 1;
+        bits[i / 8][i % 8] = ((i / 8) >> (i % 8)) & 1 == 1;
         i += 1;
     }
     bits

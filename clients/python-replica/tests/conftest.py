@@ -1,5 +1,6 @@
 """Fixtures: a server, a map in it, and a replica of that. The server and the scenes are those of the tests of `mrol`."""
 
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "python" / "tests"))
 
 from support.scenes import room
 from support.server import Server, serving
+
+# A shell lets what it runs in the background ignore Ctrl-C, and so would the programs that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

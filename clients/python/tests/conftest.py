@@ -1,6 +1,7 @@
 """Fixtures: a server for all tests, a client of it, and maps in it."""
 
 import itertools
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from .support.scenes import room
 from .support.server import Server, serving
 
 _numbers = itertools.count()
+
+# A shell lets what it runs in the background ignore Ctrl-C, and so would the programs that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
