@@ -8,7 +8,7 @@ use mrol::map::MapName;
 use mrol::service::ServiceError;
 
 use crate::abi::{Answer, Error, PointQuery};
-use crate::clients::{CLIENTS, ClientHandle};
+use crate::clients::{CLIENTS, ClientHandle, OpenClient};
 use crate::failure::Failure;
 use crate::guarded;
 use crate::memory::{self, Bitmap, Out};
@@ -128,15 +128,13 @@ pub unsafe extern "C" fn mrol_client_insert_scan(
     answer: *mut ScanOutcome,
     error: *mut Error,
 ) -> i32 {
-    // SAFETY: as the caller promises.
-    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
-    guarded(error, || {
-        let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.required()?);
+    let insert = |client: &OpenClient, map: &MapName, scan: Scan| {
         // SAFETY: as the caller promises.
-        let scan = unsafe { memory::read_question(scan)?.parse() }?;
-        out.write(ScanOutcome::of(&client.call(|client| client.insert_scan(&map, scan))?));
-        Ok(())
-    })
+        let scan = unsafe { scan.parse() }?;
+        Ok(ScanOutcome::of(&client.call(|client| client.insert_scan(map, scan))?))
+    };
+    // SAFETY: as the caller promises.
+    unsafe { answered(client, map, scan, answer, error, insert) }
 }
 
 /// Says what inserting a scan would do: `mrol_client_align_scan` of mrol.h.
@@ -151,15 +149,13 @@ pub unsafe extern "C" fn mrol_client_align_scan(
     answer: *mut ScanOutcome,
     error: *mut Error,
 ) -> i32 {
-    // SAFETY: as the caller promises.
-    let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
-    guarded(error, || {
-        let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.required()?);
+    let align = |client: &OpenClient, map: &MapName, scan: Scan| {
         // SAFETY: as the caller promises.
-        let scan = unsafe { memory::read_question(scan)?.parse() }?;
-        out.write(ScanOutcome::of(&client.call(|client| client.align_scan(&map, scan))?));
-        Ok(())
-    })
+        let scan = unsafe { scan.parse() }?;
+        Ok(ScanOutcome::of(&client.call(|client| client.align_scan(map, scan))?))
+    };
+    // SAFETY: as the caller promises.
+    unsafe { answered(client, map, scan, answer, error, align) }
 }
 
 /// Finds where a scan was taken: `mrol_client_localize` of mrol.h.
@@ -174,13 +170,34 @@ pub unsafe extern "C" fn mrol_client_localize(
     answer: *mut Localized,
     error: *mut Error,
 ) -> i32 {
+    let localize = |client: &OpenClient, map: &MapName, localization: Localization| {
+        // SAFETY: as the caller promises.
+        let request = unsafe { localization.parse() }?;
+        Ok(Localized::of(&client.call(|client| client.localize(map, request))?))
+    };
+    // SAFETY: as the caller promises.
+    unsafe { answered(client, map, localization, answer, error, localize) }
+}
+
+/// Writes what a call to a server answers to a question.
+///
+/// # Safety
+/// Pointers are NULL or point to what mrol.h says.
+unsafe fn answered<Q: memory::Question, A: Copy>(
+    client: ClientHandle,
+    map: *const c_char,
+    question: *const Q,
+    answer: *mut A,
+    error: *mut Error,
+    call: impl FnOnce(&OpenClient, &MapName, Q) -> Result<A, Failure>,
+) -> i32 {
     // SAFETY: as the caller promises.
     let (out, error) = unsafe { (Out::of(answer, "answer"), Out::of(error, "error")) };
     guarded(error, || {
         let (client, map, out) = (CLIENTS.get(client)?, name_of(map)?, out.required()?);
         // SAFETY: as the caller promises.
-        let request = unsafe { memory::read_question(localization)?.parse() }?;
-        out.write(Localized::of(&client.call(|client| client.localize(&map, request))?));
+        let question = unsafe { memory::read_question(question) }?;
+        out.write(call(&client, &map, question)?);
         Ok(())
     })
 }

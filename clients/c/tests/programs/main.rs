@@ -59,20 +59,20 @@ fn compile(source: &str, linked: Linked) -> Command {
 }
 
 fn compile_to(source: &str, linked: Linked, program: &Path) {
-    let (compiler, standard) = if source.ends_with(".c") { ("cc", "c99") } else { ("c++", "c++17") };
+    compile_file(&Path::new("tests").join(source), linked, program);
+}
+
+/// Compiles a file of C or C++, warnings being errors.
+fn compile_file(source: &Path, linked: Linked, program: &Path) {
+    let is_c = source.extension().is_some_and(|extension| extension == "c");
+    let (compiler, standard) = if is_c { ("cc", "c99") } else { ("c++", "c++17") };
     let mut command = Command::new(compiler);
-    command.arg(format!("-std={standard}")).args([
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-pedantic",
-        "-g",
-        "-Iinclude",
-    ]);
+    command.arg(format!("-std={standard}"));
+    command.args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-g", "-Iinclude", "-I../cpp/include"]);
     if linked == Linked::Sanitized {
         command.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]);
     }
-    command.arg(Path::new("tests").join(source)).arg("-o").arg(program);
+    command.arg(source).arg("-o").arg(program);
     let libraries = built();
     match linked {
         Linked::Statically | Linked::Sanitized => {
