@@ -428,6 +428,80 @@ static void bad_replicas(mrol_replica replica) {
     MUST(mrol_replica_wait_for_revision(replica, 1, UINT64_MAX, NULL) == MROL_OK);
 }
 
+/* Damaged calls to a server change nothing, and a call that runs out of time ends. */
+static void bad_calls(const char *address, const char *map) {
+    const float point[3] = {1, 2, 3}, times[1] = {0};
+    const double bad_pose[7] = {0, 0, 0, 0, 0, 0, 2}, nowhere[3] = {0, 0, 0}, pose[7] = {0, 0, 0, 0, 0, 0, 1};
+    mrol_client client = {99}, none = {0};
+    mrol_client_options good = mrol_client_options_default(), options;
+    mrol_scan scan = mrol_scan_default(), wrong;
+    mrol_scan_answer answer;
+    mrol_localization localization = mrol_localization_default();
+    mrol_localization_answer localized;
+    mrol_point_query query = mrol_point_query_default();
+    uint8_t bits = 0;
+    good.address = address;
+    FAILS(mrol_client_open(NULL, &client, &error), MROL_INVALID_ARGUMENT, "options is NULL");
+    MUST(client.number == 0);
+    FAILS(mrol_client_open(&good, NULL, &error), MROL_INVALID_ARGUMENT, "client is NULL");
+    options = good, options.address = NULL;
+    FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "options.address is NULL");
+    options = good, options.struct_size = 8;
+    FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "struct_size must lie in");
+    options = good, options.credentials.ca_file = "/nowhere";
+    FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "options.ca_file");
+    options = good, options.credentials.private_key_file = "/dev/null";
+    FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "not both");
+    MUST(mrol_client_open(&good, &client, NULL) == MROL_OK);
+
+    scan.robot = "r", scan.xyz = point, scan.count = 1, scan.guess = pose, scan.at_guess = 1;
+#define SCAN_FAILS(code, words) FAILS(mrol_client_align_scan(client, map, &wrong, &answer, &error), code, words)
+    FAILS(mrol_client_insert_scan(none, map, &scan, &answer, &error), MROL_CLOSED, "not open");
+    FAILS(mrol_client_insert_scan(client, NULL, &scan, &answer, &error), MROL_INVALID_ARGUMENT, "map is NULL");
+    FAILS(mrol_client_insert_scan(client, "a b", &scan, &answer, &error), MROL_INVALID_ARGUMENT, "a b");
+    FAILS(mrol_client_insert_scan(client, map, NULL, &answer, &error), MROL_INVALID_ARGUMENT, "scan is NULL");
+    FAILS(mrol_client_insert_scan(client, map, &scan, NULL, &error), MROL_INVALID_ARGUMENT, "answer is NULL");
+    FAILS(mrol_client_insert_scan(client, map, misaligned(&scan), &answer, &error), MROL_INVALID_ARGUMENT, "scan is at");
+    wrong = scan, wrong.robot = NULL;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.robot is NULL");
+    wrong = scan, wrong.robot = "r 1";
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "r 1");
+    wrong = scan, wrong.session = "\n";
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "session");
+    wrong = scan, wrong.xyz = NULL;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.xyz");
+    wrong = scan, wrong.count = SIZE_MAX;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.xyz");
+    wrong = scan, wrong.guess = bad_pose;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.guess");
+    wrong = scan, wrong.motion = pose;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "a guess and a motion");
+    wrong = scan, wrong.gravity = nowhere;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.gravity");
+    wrong = scan, wrong.at_guess = 2;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.at_guess");
+    wrong = scan, wrong.reserved[3] = 1;
+    SCAN_FAILS(MROL_INVALID_ARGUMENT, "scan.reserved");
+    wrong = scan, wrong.count = 0;
+    SCAN_FAILS(MROL_REFUSED, "");
+    wrong = scan, wrong.point_times_s = times;
+    SCAN_FAILS(MROL_REFUSED, "timestamp");
+    FAILS(mrol_client_align_scan(client, "nowhere", &scan, &answer, &error), MROL_REFUSED, "nowhere");
+
+    FAILS(mrol_client_localize(client, map, &localization, &localized, &error), MROL_REFUSED, "");
+    localization.xyz = point, localization.count = 1, localization.gravity = nowhere;
+    FAILS(mrol_client_localize(client, map, &localization, &localized, &error), MROL_INVALID_ARGUMENT, "localization.gravity");
+    query.xyz = point, query.count = 1;
+    FAILS(mrol_client_query_points(client, map, &query, NULL, 1, NULL, &error), MROL_INVALID_ARGUMENT, "occupied");
+    FAILS(mrol_client_query_points(client, map, &query, &bits, 0, NULL, &error), MROL_INVALID_ARGUMENT, "occupied");
+    MUST(mrol_client_query_points(client, map, &query, &bits, 1, NULL, NULL) == MROL_OK);
+    FAILS(mrol_client_create_map(client, "m", NAN, 3, &error), MROL_REFUSED, "resolution_m");
+    FAILS(mrol_client_create_map(client, "m", 0.1, UINT32_MAX, &error), MROL_REFUSED, "levels");
+    MUST(mrol_client_close(client, NULL) == MROL_OK);
+    FAILS(mrol_client_close(client, &error), MROL_CLOSED, "not open");
+    FAILS(mrol_client_align_scan(client, map, &scan, &answer, &error), MROL_CLOSED, "not open");
+}
+
 /* In a child nothing hangs, and nothing is answered. */
 static void a_child_is_refused(const mrol_replica_options *options, mrol_replica replica) {
     int status = 0;
@@ -443,6 +517,14 @@ static void a_child_is_refused(const mrol_replica_options *options, mrol_replica
         FAILS(mrol_body_new(NULL, 0, &body, &error), MROL_FORKED, "forked");
         FAILS(mrol_body_free(body, &error), MROL_FORKED, "forked");
         FAILS(mrol_replica_close(replica, &error), MROL_FORKED, "forked");
+        {
+            mrol_client client = {1};
+            mrol_client_options calling = mrol_client_options_default();
+            calling.address = options->address;
+            FAILS(mrol_client_open(&calling, &client, &error), MROL_FORKED, "forked");
+            client.number = 1;
+            FAILS(mrol_client_close(client, &error), MROL_FORKED, "forked");
+        }
         _exit(0);
     }
     MUST(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
@@ -461,6 +543,7 @@ int main(int count, char **words) {
     bad_queries(replica);
     bad_questions(replica);
     bad_replicas(replica);
+    bad_calls(words[1], words[2]);
     a_child_is_refused(&options, replica);
     MUST(mrol_replica_revision(replica) == 1);
     MUST(mrol_replica_close(replica, NULL) == MROL_OK);
