@@ -191,6 +191,13 @@ public:
         return made;
     }
 
+    body(body &&other) noexcept : owned(std::move(other)), links_(std::exchange(other.links_, 0)) {}
+    body &operator=(body &&other) noexcept {
+        owned::operator=(std::move(other));
+        std::swap(links_, other.links_);
+        return *this;
+    }
+
     std::size_t links() const noexcept { return links_; }
 
 private:

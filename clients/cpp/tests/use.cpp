@@ -102,6 +102,12 @@ int main(int count, char **words) {
     const mrol::body two = mrol::body::of_links({{{0, 0, 0, 0.1f}}, {{0, 0, 0.5f, 0.1f}}});
     EXPECT(two.links() == 2 && replica.collide(two, {mrol::pose(), mrol::pose(2, 0, 0)})[0]);
     EXPECT(mrol::body(std::vector<mrol::sphere>(3)).links() == 1);
+    mrol::body one({{0, 0, 0, 0.1f}}), moved_to = std::move(one);
+    EXPECT(moved_to.links() == 1 && one.links() == 0);
+    EXPECT(thrown([&] { replica.collide(one, {mrol::pose()}); }) == "invalid_argument");
+    one = mrol::body::of_links({{{0, 0, 0, 0.1f}}, {{0, 0, 0.5f, 0.1f}}});
+    std::swap(one, moved_to);
+    EXPECT(one.links() == 1 && moved_to.links() == 2);
     EXPECT(thrown([&] { replica.collide(two, {mrol::pose()}); }) == "invalid_argument");
     EXPECT(thrown([&] { mrol::body({{0, 0, 0, -1}}); }) == "MROL_INVALID_ARGUMENT");
     EXPECT(thrown([&] { replica.is_free(ball, {mrol::pose()}); }) != "nothing");

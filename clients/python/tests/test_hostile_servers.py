@@ -5,6 +5,7 @@ import resource
 import struct
 import time
 from collections.abc import Callable
+from pathlib import Path
 from socket import socket
 from threading import Event
 
@@ -238,3 +239,12 @@ def test_what_nobody_asked_for_is_not_taken_as_the_next_answer() -> None:
         client = mrol.connect(server.address)
         assert client.maps().maps == ()
         assert client.maps().maps == ()
+
+
+def test_a_file_whose_length_nobody_told_replaces_none(tmp_path: Path) -> None:
+    file = tmp_path / "map.mrol"
+    file.write_bytes(b"GOOD")
+    headers = b"HTTP/1.0 200 OK\r\nmrol-revision: 1\r\nmrol-map-uuid: 0ddf1407-a74f-4727-a1c6-6c3ad8c953ba\r\n\r\n"
+    with ScriptedServer(answering(headers + b"HALF")) as server, pytest.raises(mrol.BadAnswer):
+        map_of(server).snapshot(file)
+    assert file.read_bytes() == b"GOOD"

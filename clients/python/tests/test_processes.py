@@ -146,3 +146,44 @@ def test_a_client_is_closed_and_used_again(client: mrol.Client, empty: mrol.Map)
     with client:
         assert empty.describe().scans == 0
     assert empty.describe().scans == 0
+
+
+def test_a_child_that_goes_on_with_a_watch_takes_nothing_from_its_parent(empty: mrol.Map) -> None:
+    empty.insert([[1, 0, 0]], align=False)
+    events = empty.watch()
+    next(events)
+    last = 12
+
+    def told() -> list[int]:
+        revisions = []
+        for event in events:
+            revisions.append(event.revision)
+            if event.revision == last:
+                return revisions
+        return revisions
+
+    def work() -> None:
+        assert told() == list(range(2, last + 1))
+
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            work()
+            code = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(code)
+    for number in range(2, last + 1):
+        empty.insert([[number, 0, 0]], align=False, guess=np.eye(4), force=True)
+    work()
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 0
+
+
+def test_a_key_does_not_go_in_the_clear_where_files_of_tls_were_given(client: mrol.Client, tmp_path: Path) -> None:
+    for name in ("ca", "client_cert", "client_key"):
+        files: dict[str, Path] = {name: tmp_path / "nowhere.pem"}
+        with pytest.raises(mrol.ArgumentError, match=name):
+            mrol.connect(client.address, key="mrol_secret", **files)  # type: ignore[arg-type]

@@ -1,5 +1,7 @@
 """A map without a server."""
 
+import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Union
@@ -58,12 +60,16 @@ class LocalMap(Questions):
     def save(self, file: File) -> None:
         """Writes the map as a map file, whole or not at all; a file that is there is replaced."""
         path = Path(file)
-        part = path.with_name(f".{path.name}.part")
-        try:
-            part.write_bytes(self._made.to_file())
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
+        whole = self._made.to_file()
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
+            try:
+                part.write(whole)
+                part.flush()
+                os.fsync(part.fileno())
+                Path(part.name).replace(path)
+            except BaseException:
+                Path(part.name).unlink(missing_ok=True)
+                raise
 
     def _take(self, made: _native.NativeLocalMap) -> None:
         Questions.__init__(self, made)

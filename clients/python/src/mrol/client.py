@@ -18,7 +18,7 @@ from ._transport.key import Key
 from ._transport.pool import Pool
 from ._transport.request import JSON, Request, path_of, target_of
 from ._transport.tls import tls_context
-from .errors import ArgumentError, ConnectFailed, MrolError, ServerError
+from .errors import ArgumentError, ConnectFailed, MrolError, ServerError, excerpt
 from .map import Map
 from .operations.description import FilterSettings, MapInfo, map_info
 from .operations.handle import flag_of, word_of
@@ -206,6 +206,7 @@ def connect(
     """
     if key is None and key_file is None:
         key, key_file = _from_environment()
+    own_ca = ca
     ca = os.environ.get("MROL_CA") or None if ca is None else ca
     place = Address.parse(address, prefer_tls=ca is not None or client_cert is not None)
     bounds = Bounds(
@@ -214,6 +215,11 @@ def connect(
         request_bytes_max=whole_of(request_bytes_max, "request_bytes_max"),
         answer_bytes_max=whole_of(answer_bytes_max, "answer_bytes_max"),
     )
+    if not place.is_tls:
+        for name, file in (("ca", own_ca), ("client_cert", client_cert), ("client_key", client_key)):
+            if file is not None:
+                # A key would travel in the clear although its owner thinks that it does not.
+                raise ArgumentError(name, f"a file for {excerpt(address)}", "given with an https:// address alone")
     tls = tls_context(ca, client_cert, client_key) if place.is_tls else None
     pool, secret = Pool(place, tls), Key(key, key_file)
     impatient = Caller(pool, secret, Bounds(bounds.timeout_s, 0.0, bounds.request_bytes_max, bounds.answer_bytes_max))

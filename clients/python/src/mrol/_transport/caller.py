@@ -1,11 +1,12 @@
 """Requests to one server: each with a key, a connection, a deadline and, where it is safe, another try."""
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from ..errors import BadAnswer, ServerError, TransportError, Unauthenticated, server_error
+from ..errors import BadAnswer, ConnectionLost, ServerError, TransportError, Unauthenticated, server_error
 from .attempts import Attempts
 from .connection import Connection
 from .deadline import Deadline, seconds
@@ -89,6 +90,8 @@ class Caller:
                 with_bound = min(response.length or ERROR_BYTES_MAX, ERROR_BYTES_MAX)
                 said = memoryview(connection.read(response, with_bound, deadline))
                 raise_for(Answer(response.status, response.plain_headers, said))
+            if response.length is None and not response.chunked:
+                raise BadAnswer("the answer's length is not told, so one that was cut off would look whole")
             yield Body(connection, response)
         finally:
             connection.close()
@@ -105,6 +108,7 @@ class Body:
     def __init__(self, connection: Connection, response: Response) -> None:
         self._connection = connection
         self._response = response
+        self._owner = os.getpid()
 
     @property
     def length(self) -> int | None:
@@ -118,11 +122,18 @@ class Body:
 
     def read(self, count: int, deadline: Deadline) -> bytes:
         """Up to so many bytes; less at the end."""
+        self._check_owner()
         return self._connection.read(self._response, count, deadline)
 
     def read_some(self, most: int, deadline: Deadline) -> bytes:
         """What has come, once something has, so many bytes at most; nothing at the end."""
+        self._check_owner()
         return self._connection.read_some(self._response, most, deadline)
+
+    def _check_owner(self) -> None:
+        # What a child reads its parent would miss.
+        if os.getpid() != self._owner:
+            raise ConnectionLost("the connection belongs to the process that forked this one")
 
 
 def raise_for(answer: Answer) -> None:

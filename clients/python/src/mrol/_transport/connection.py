@@ -36,6 +36,8 @@ class Connection:
         self._client.response_class = Response
         self._client.sock = cast(Any, self._stream)
         self._is_broken = False
+        # The server has closed its side: it answers once more, at most.
+        self._is_lost = False
 
     def close(self) -> None:
         """Closes the connection; what is read from it fails."""
@@ -74,11 +76,13 @@ class Connection:
         with _Failures(self):
             body = _whole_body(response, answer_bytes_max)
             response.close()
-            self._is_broken = self._is_broken or response.will_close
+            self._is_broken = response.will_close or self._is_lost
             return Answer(response.status, response.plain_headers, body)
 
     def open(self, request: Request, headers: dict[str, str], deadline: Deadline, bytes_max: int | None) -> Response:
         """Sends a request, and reads its answer up to the body."""
+        # Until an answer was read to its end, wherever Ctrl-C may come.
+        self._is_broken = True
         with _Failures(self):
             self._stream.begin(deadline, bytes_max)
             try:
@@ -130,7 +134,7 @@ class Connection:
         return response
 
     def _answer_in_spite_of(self, lost: OSError) -> Response:
-        self._is_broken = True
+        self._is_lost = True
         try:
             return self._response()
         except (OSError, HTTPException):

@@ -99,7 +99,7 @@ def _since(version: Version | None) -> dict[str, Parameter]:
 
 def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Generator[WatchEvent, None, None]:
     """The events of one connection, until it ends by an error."""
-    states, changes, state_bytes = StateParts(), ChangeParts(), 0
+    states, changes, state_bytes, change_bytes = StateParts(), ChangeParts(), 0, 0
     with caller.stream(request) as body:
         while True:
             data = _next_message(body, Deadline(silent_s), caller.bounds.answer_bytes_max)
@@ -117,6 +117,9 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
                     told(state_bytes, state_bytes if part.flag(2) else None)
                     event = states.add(part, map_uuid)
                 elif message.has(4):
+                    change_bytes += data.nbytes
+                    if change_bytes > caller.bounds.answer_bytes_max:
+                        raise ValueError("a change has more bytes than answer_bytes_max allows")
                     event = changes.add(message.message(4), map_uuid)
                 elif message.has(5):
                     event = Heartbeat(Version(message.whole(2), map_uuid))
@@ -125,7 +128,7 @@ def _told(caller: Caller, request: Request, silent_s: float, told: Told) -> Gene
             if isinstance(event, WatchedState):
                 states = StateParts()
             elif isinstance(event, WatchedChange):
-                changes = ChangeParts()
+                changes, change_bytes = ChangeParts(), 0
             if event is not None:
                 yield event
 
