@@ -9,8 +9,9 @@ import pytest
 import mrol
 
 from .support.proxy import DroppingProxy
-from .support.scripted import ScriptedServer, answer
+from .support.scripted import ScriptedServer, answer, answering
 from .support.server import scan_ids, serving
+from .test_hostile_servers import map_of
 
 DROPS = 1000
 SCAN_POINTS = 200
@@ -119,3 +120,21 @@ def test_no_server_is_told_at_once_and_waited_for_on_request(tmp_path: Path) -> 
         mrol.connect(address, wait_s=0.3)
     with pytest.raises(mrol.ConnectFailed):
         mrol.connect(f"unix:{tmp_path}/nothing.sock")
+
+
+def test_what_may_have_been_done_can_be_repeated() -> None:
+    problem = b'{"code": "deadline_exceeded", "reason": "time_limit", "detail": "too slow"}'
+    said = [
+        answer(problem, b"content-type: application/problem+json", status=b"504 Gateway Timeout"),
+        answer(b"{", status=b"502 Bad"),
+    ]
+    for data in said:
+        with ScriptedServer(answering(data)) as server:
+            m = map_of(server)
+            with pytest.raises(mrol.MrolError) as failed:
+                m.insert([[0, 0, 0]])
+            assert set(failed.value.repeat_with) == {"session", "scan_id"}
+    refused = answer(b'{"code": "invalid_argument", "reason": "bad_query", "detail": "no"}', status=b"400 Bad Request")
+    with ScriptedServer(answering(refused)) as server, pytest.raises(mrol.InvalidArgument) as failed:
+        map_of(server).insert([[0, 0, 0]])
+    assert not failed.value.repeat_with

@@ -13,6 +13,7 @@ MrolError
 """
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 EXCERPT_MAX = 200
@@ -26,7 +27,24 @@ def excerpt(value: object) -> str:
 
 
 class MrolError(Exception):
-    """The base of all errors of this package."""
+    """The base of all errors of this package.
+
+    Of a change whose outcome is not known, `repeat_with` has the arguments (`session` and `scan_id`, or `request_id`) with which
+    the same call does it once; it is empty of everything else.
+    """
+
+    repeat_with: Mapping[str, Any] = MappingProxyType({})
+
+
+OUTCOME_UNKNOWN = ("outcome_unknown", "deadline_exceeded")
+"""Reasons and codes of refusals after which a change may have been made."""
+
+
+def is_outcome_unknown(error: MrolError) -> bool:
+    """Whether the change that failed so may have been made."""
+    if isinstance(error, ServerError):
+        return error.reason in OUTCOME_UNKNOWN or error.code in OUTCOME_UNKNOWN
+    return isinstance(error, TransportError | BadAnswer)
 
 
 class ArgumentError(MrolError, ValueError):

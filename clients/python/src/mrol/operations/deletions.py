@@ -10,7 +10,7 @@ from .._arrays import as_numbers, raw, rows_of, whole_of
 from .._fields import Fields, fields_of
 from .._sessions import new_request_id
 from .._transport.request import Parameter
-from ..errors import ArgumentError, TransportError
+from ..errors import ArgumentError, MrolError, is_outcome_unknown
 from ..shapes import Box, BoxLike, OrientedBox, Sphere
 from ..version import Version, Versioned
 from .handle import MapHandle, level_of, word_of
@@ -68,8 +68,9 @@ class DeletionOperations(MapHandle):
                 return _deletion(self._delete_points(points, common))
             target = {"voxels": _indices(voxels)} if voxels is not None else _region(box, sphere, oriented_box)
             return _deletion(self._send_json("POST", ("deletions",), {**target, **common}))
-        except TransportError as error:
-            error.repeat_with = identity
+        except MrolError as error:
+            if is_outcome_unknown(error):
+                error.repeat_with = identity
             raise
 
     def _delete_points(self, points: ArrayLike, common: dict[str, Parameter]) -> Fields:

@@ -9,7 +9,7 @@ from .._arrays import whole_of
 from .._fields import Fields, fields_of
 from .._sessions import new_request_id
 from .._transport.request import Request
-from ..errors import ArgumentError, TransportError, excerpt
+from ..errors import ArgumentError, MrolError, excerpt, is_outcome_unknown
 from ..shapes import Box, BoxLike, OrientedBox, Prism, Shape, Sphere, shape_in, shape_json
 from ..version import Version, Versioned
 from .handle import MapHandle, word_of
@@ -74,8 +74,9 @@ class KeepOutOperations(MapHandle):
         expiry = {"expires_at_ns": None if expires_at is None else _nanoseconds(expires_at)}
         try:
             fields = self._send_json("PUT", ("keep-outs", word_of(name, "name")), {**shape, **expiry, **identity})
-        except TransportError as error:
-            error.repeat_with = identity
+        except MrolError as error:
+            if is_outcome_unknown(error):
+                error.repeat_with = identity
             raise
         return KeepOutChange(Version.of(fields), fields.flag("replayed"))
 
@@ -88,8 +89,9 @@ class KeepOutOperations(MapHandle):
         target = self._target("keep-outs", word_of(name, "name"), **identity)
         try:
             fields = fields_of(self._caller.call(Request("DELETE", target)).body)
-        except TransportError as error:
-            error.repeat_with = identity
+        except MrolError as error:
+            if is_outcome_unknown(error):
+                error.repeat_with = identity
             raise
         return KeepOutChange(Version.of(fields), fields.flag("replayed"))
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from .._arrays import F64, Bools, as_floats, as_numbers, number_of, numbers_text, raw, rows_of, vector_of, whole_of
 from .._fields import Fields, fields_of, reading
 from .._transport.request import Answer, Parameter
-from ..errors import ArgumentError, TransportError
+from ..errors import ArgumentError, MrolError, is_outcome_unknown
 from ..pose import Pose, PoseLike, pose_in
 from ..shapes import Box, BoxLike
 from ..version import Version, Versioned
@@ -141,8 +141,9 @@ class ScanOperations(MapHandle):
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
         try:
             answer = self._send_bytes("scans", pieces, parameters)
-        except TransportError as error:
-            error.repeat_with = {"session": of_session, "scan_id": number}
+        except MrolError as error:
+            if is_outcome_unknown(error):
+                error.repeat_with = {"session": of_session, "scan_id": number}
             raise
         return _scan_answer(answer, shape, of_robot, of_session, number)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from .._arrays import whole_of
 from .._sessions import new_request_id
-from ..errors import ArgumentError, TransportError, excerpt
+from ..errors import ArgumentError, MrolError, excerpt, is_outcome_unknown
 from ..version import Version, Versioned
 from .deletions import Deletion
 from .handle import MapHandle, word_of
@@ -61,8 +61,9 @@ class UndoOperations(MapHandle):
         identity = {"request_id": new_request_id() if request_id is None else word_of(request_id, "request_id")}
         try:
             fields = self._send_json("POST", ("undo",), {**target, **identity})
-        except TransportError as error:
-            error.repeat_with = identity
+        except MrolError as error:
+            if is_outcome_unknown(error):
+                error.repeat_with = identity
             raise
         return Undo(
             Version.of(fields),
