@@ -23,7 +23,7 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::answers::{Indices, Version, indices, of_bytes, told};
 use crate::failure::Failure;
-use crate::questions::{Questions, Seven, points_of, pose_of, single_region};
+use crate::questions::{Questions, Seven, points_of, pose_of, region_of};
 use crate::source::{OpenSource, Source};
 use crate::waiting::{threads, wait_for};
 
@@ -271,7 +271,7 @@ impl NativeLocalMap {
     ) -> PyResult<(Indices<'py>, f64, Version)> {
         let source = slf.as_super().source.get()?;
         let (service, name) = source.local()?;
-        let region = region.as_ref().map(single_region).transpose()?;
+        let region = region.as_ref().map(region_of).transpose()?;
         let listing = wait_for(py, service.list_voxels(name, ListingRequest::of(level, region)))?;
         Ok((indices(py, listing.keys.into_iter())?, listing.resolution_m, told(&listing.version)))
     }
@@ -285,7 +285,7 @@ impl NativeLocalMap {
     ) -> PyResult<(usize, Version)> {
         let source = slf.as_super().source.get()?;
         let (service, name) = source.local()?;
-        let target = DeletionTarget::Region(single_region(&region)?);
+        let target = DeletionTarget::Region(region_of(&region)?);
         let deletion = Deletion { target, level, request_id: None };
         let deleted = wait_for(py, service.delete_voxels(name, deletion))?;
         Ok((deleted.removed, told(&deleted.version)))

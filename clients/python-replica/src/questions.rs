@@ -52,7 +52,8 @@ pub(crate) fn pose_of([x, y, z, i, j, k, w]: Seven) -> Result<Pose, Failure> {
     Ok(pose([x, y, z], [i, j, k, w]).map_err(ServiceError::from)?)
 }
 
-fn region_of((kind, numbers): &(String, Vec<f64>)) -> Result<Region, Failure> {
+/// The region that a word for its kind and its numbers mean.
+pub(crate) fn region_of((kind, numbers): &(String, Vec<f64>)) -> Result<Region, Failure> {
     let three = |from: usize| -> [f64; 3] {
         std::array::from_fn(|i| numbers.get(from + i).copied().unwrap_or(f64::NAN))
     };
@@ -65,11 +66,6 @@ fn region_of((kind, numbers): &(String, Vec<f64>)) -> Result<Region, Failure> {
         }
     };
     Ok(region.map_err(ServiceError::from)?)
-}
-
-/// A region of a deletion.
-pub(crate) fn single_region(region: &(String, Vec<f64>)) -> Result<Region, Failure> {
-    region_of(region)
 }
 
 fn surroundings(ignored: &Regions, unknown_is_occupied: bool) -> Result<Surroundings, Failure> {

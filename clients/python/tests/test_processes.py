@@ -22,6 +22,11 @@ from .support.server import scan_ids
 
 def forked(work: Callable[[], None]) -> None:
     """Does work in a child, which must end well."""
+    must_end_well(child_of(work))
+
+
+def child_of(work: Callable[[], None]) -> int:
+    """A child that does work."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -32,6 +37,11 @@ def forked(work: Callable[[], None]) -> None:
             traceback.print_exc()
         finally:
             os._exit(code)
+    return child
+
+
+def must_end_well(child: int) -> None:
+    """Waits for a child."""
     _, status = os.waitpid(child, 0)
     assert os.waitstatus_to_exitcode(status) == 0
 
@@ -165,21 +175,11 @@ def test_a_child_that_goes_on_with_a_watch_takes_nothing_from_its_parent(empty: 
     def work() -> None:
         assert told() == list(range(2, last + 1))
 
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            work()
-            code = 0
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            os._exit(code)
+    child = child_of(work)
     for number in range(2, last + 1):
         empty.insert([[number, 0, 0]], align=False, guess=np.eye(4), force=True)
     work()
-    _, status = os.waitpid(child, 0)
-    assert os.waitstatus_to_exitcode(status) == 0
+    must_end_well(child)
 
 
 def test_a_key_does_not_go_in_the_clear_where_files_of_tls_were_given(client: mrol.Client, tmp_path: Path) -> None:

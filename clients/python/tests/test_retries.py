@@ -1,5 +1,6 @@
 """Connections that break: nothing is done twice, and nothing is lost."""
 
+import copy
 import itertools
 from pathlib import Path
 
@@ -134,6 +135,7 @@ def test_what_may_have_been_done_can_be_repeated() -> None:
             with pytest.raises(mrol.MrolError) as failed:
                 m.insert([[0, 0, 0]])
             assert set(failed.value.repeat_with) == {"session", "scan_id"}
+            assert copy.copy(failed.value).repeat_with == failed.value.repeat_with
     refused = answer(b'{"code": "invalid_argument", "reason": "bad_query", "detail": "no"}', status=b"400 Bad Request")
     with ScriptedServer(answering(refused)) as server, pytest.raises(mrol.InvalidArgument) as failed:
         map_of(server).insert([[0, 0, 0]])

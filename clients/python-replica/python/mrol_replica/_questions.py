@@ -122,7 +122,7 @@ class Questions:
         pose = None if map_from_points is None else Pose.of(map_from_points, "map_from_points").seven()
         bloom = _word(lookup, "lookup") == "bloom"
         occupied, count, version = self._inside.query(rows, pose, _level(level), bloom, flag_of(keep_out, "keep_out"))
-        return Occupancy(_version(version), occupied.reshape(shape), count)
+        return Occupancy(version_of(version), occupied.reshape(shape), count)
 
     def check_poses(
         self,
@@ -214,7 +214,7 @@ class Questions:
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         clearances = None if clearances_m is None else clearances_m.reshape(shape)
-        return Motions(_version(version), free.reshape(shape), count, first_hits.reshape(shape), clearances)
+        return Motions(version_of(version), free.reshape(shape), count, first_hits.reshape(shape), clearances)
 
     def cast_rays(
         self,
@@ -248,7 +248,7 @@ class Questions:
         )
         names = _names(keep_outs, len(rows)).reshape(shape)
         met = voxels.reshape(*shape, 3)
-        return Rays(_version(version), hit.reshape(shape), count, distances_m.reshape(shape), met, names)
+        return Rays(version_of(version), hit.reshape(shape), count, distances_m.reshape(shape), met, names)
 
     def nearest(
         self,
@@ -269,7 +269,7 @@ class Questions:
             flag_of(ignore_keep_outs, "ignore_keep_outs"),
         )
         return Nearest(
-            _version(version),
+            version_of(version),
             found.reshape(shape),
             distances_m.reshape(shape),
             voxels.reshape(*shape, 3),
@@ -282,7 +282,7 @@ class Questions:
         rows, shape = rows_of(points, 3, "points", POINTS, BYTES_MAX)
         ignores = flag_of(ignore_keep_outs, "ignore_keep_outs")
         occupied, free, version = self._inside.classify(rows, _level(level), ignores)
-        return Classification(_version(version), occupied.reshape(shape), free.reshape(shape))
+        return Classification(version_of(version), occupied.reshape(shape), free.reshape(shape))
 
 
 def region_of(shape: Shape, argument: str) -> tuple[str, list[float]]:
@@ -303,9 +303,6 @@ def version_of(version: "_native.Told") -> Version:
     """A version as `mrol` has it."""
     revision, uuid, content_hash = version
     return Version(revision, uuid, None if content_hash is None else int(content_hash, 16))
-
-
-_version = version_of
 
 
 def _points_of(points: ArrayLike) -> tuple[NDArray[np.float32], tuple[int, ...]]:
@@ -355,4 +352,4 @@ def _collisions(told: "_native.Checked", shape: tuple[int, ...]) -> Collisions:
     if room is not None:
         clearances_m, nearest_links = room
         clearances = Clearances(clearances_m.reshape(shape), nearest_links.reshape(shape))
-    return Collisions(_version(version), colliding.reshape(shape), count, first_hits, clearances)
+    return Collisions(version_of(version), colliding.reshape(shape), count, first_hits, clearances)

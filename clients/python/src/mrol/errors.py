@@ -79,7 +79,8 @@ class ServerError(MrolError):
         self.retry_after_s = retry_after_s
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.status, self.code, self.reason, self.message, self.retry_after_s)
+        of_init = (self.status, self.code, self.reason, self.message, self.retry_after_s)
+        return type(self), of_init, vars(self).copy()
 
 
 class InvalidArgument(ServerError):
@@ -123,18 +124,7 @@ class Internal(ServerError):
 
 
 class TransportError(MrolError):
-    """There is no answer.
-
-    Of a change that may have reached the server, `repeat_with` has the arguments (`session` and `scan_id`, or `request_id`) with
-    which the same call can be made again: it is then done once, whether the first one was or not.
-    """
-
-    def __init__(self, message: str) -> None:
-        super().__init__(message)
-        self.repeat_with: Mapping[str, Any] = {}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), self.args, {"repeat_with": dict(self.repeat_with)}
+    """There is no answer."""
 
 
 class ConnectFailed(TransportError, ConnectionError):

@@ -51,7 +51,7 @@ class DeletionOperations(MapHandle):
         lie inside. With a `level` its voxels go, and all within them.
         `not_seen_since` leaves of a region only what no scan after that revision touched although one saw through it.
 
-        Undo it by `undo(deletion)`. After `ConnectionLost` or `TimedOut` it is not known whether it was done: repeat it with
+        Undo it by `undo(deletion)`. After an error with `repeat_with` it is not known whether it was done: repeat it with
         `**error.repeat_with`.
         """
         of_region = {"box": box, "sphere": sphere, "oriented_box": oriented_box}

@@ -119,8 +119,8 @@ class ScanOperations(MapHandle):
         (shape (n,), seconds from `timestamp_ns`) undo the sensor's motion during its sweep. `guess_covariance` has shape (6, 6).
 
         Without `scan_id` the scan gets the next id of this process' session, and of a `scan_id` without `session` ids go on.
-        After `ConnectionLost`, `TimedOut` or Ctrl-C it is not known whether the scan is in the map: send it again with
-        `**error.repeat_with`.
+        After an error with `repeat_with` (`ConnectionLost`, `TimedOut`, ...) it is not known whether the scan is in the map: send
+        it again with `**error.repeat_with`. Nor is it after Ctrl-C: who ends programs so gives scans ids.
 
         Raises `FailedPrecondition` (`guess_required`: the robot has no pose in a map that is not empty), `Conflict`
         (`scan_id_taken`), `InvalidArgument`.
