@@ -7,8 +7,9 @@ use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
 
 fn main() {
-    println!("cargo::rustc-env=MROL_FEATURES={}", features());
-    println!("cargo::rustc-env=MROL_COMMIT={}", commit().as_deref().unwrap_or("unknown"));
+    // Cargo gives these to the programs that it runs, too. Named MROL_… they would be settings of a server.
+    println!("cargo::rustc-env=BUILT_FEATURES={}", features());
+    println!("cargo::rustc-env=BUILT_COMMIT={}", commit().as_deref().unwrap_or("unknown"));
     #[expect(clippy::expect_used, reason = "a build script has nobody else to tell")]
     if std::env::var_os("CARGO_FEATURE_CLIENT").is_some() {
         generate().expect("proto/mrol/v1 does not compile");
@@ -24,12 +25,12 @@ fn features() -> String {
     names.join(", ")
 }
 
-/// The commit that is built: what MROL_COMMIT says, and else git of a build for use.
+/// The commit that is built: what SOURCE_COMMIT says, and else git of a build for use.
 ///
 /// A developer's build names none. To be true it would be told anew after every commit, and the crate be built anew for it.
 fn commit() -> Option<String> {
-    println!("cargo::rerun-if-env-changed=MROL_COMMIT");
-    if let Some(commit) = std::env::var("MROL_COMMIT").ok().filter(|commit| !commit.is_empty()) {
+    println!("cargo::rerun-if-env-changed=SOURCE_COMMIT");
+    if let Some(commit) = std::env::var("SOURCE_COMMIT").ok().filter(|commit| !commit.is_empty()) {
         return Some(commit);
     }
     if std::env::var("PROFILE").ok()? != "release" {

@@ -4,16 +4,16 @@
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The commit that was built, `+changes` behind it where files differed from it; "unknown" where nobody said it.
-pub(crate) const COMMIT: &str = env!("MROL_COMMIT");
+pub(crate) const COMMIT: &str = env!("BUILT_COMMIT");
 
 /// The features of the crate that were built, in their order of the alphabet.
-pub(crate) const FEATURES: &str = env!("MROL_FEATURES");
+pub(crate) const FEATURES: &str = env!("BUILT_FEATURES");
 
 /// All three, a line each, as `mrol --version` says them.
 pub(crate) const DESCRIPTION: &str = concat!(
     env!("CARGO_PKG_VERSION"),
     "\ncommit: ",
-    env!("MROL_COMMIT"),
+    env!("BUILT_COMMIT"),
     "\nfeatures: ",
-    env!("MROL_FEATURES"),
+    env!("BUILT_FEATURES"),
 );
