@@ -11,7 +11,8 @@
 //     bool can_go = replica.is_free(ball, {mrol::pose(1, 2, 0.5), mrol::pose(1.5, 2, 0.5)});
 //
 // ERRORS are exceptions: mrol::error, with the code and the stable reason of mrol.h. Who wants codes calls mrol.h, which this
-// header includes, with the numbers that handle() returns.
+// header includes, with the numbers that handle() returns. Text with a NUL in it is refused by such an error, which names what it
+// was given as.
 //
 // UNITS, THREADS, FORK: as mrol.h says. Objects can be moved and not copied; they close what they opened. Everything that is passed
 // in is read during the call alone.
@@ -23,6 +24,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <initializer_list>
 #include <stdexcept>
 #include <string>
@@ -57,6 +59,21 @@ namespace detail {
 inline void check(mrol_code code, const mrol_error &failed) {
     if (code != MROL_OK) throw error(failed);
 }
+
+// Text without a NUL: mrol.h would take what is before one for all of it, and another map or robot for this one. The text itself
+// may be a key, and is not told.
+inline const std::string &checked(const std::string &text, const char *field) {
+    const std::size_t at = text.find('\0');
+    if (at != std::string::npos) {
+        mrol_error failed{};
+        failed.code = MROL_INVALID_ARGUMENT;
+        std::snprintf(failed.message, sizeof failed.message, "%s must be text without a NUL, got one at byte %zu of %zu", field, at,
+                      text.size());
+        throw error(failed);
+    }
+    return text;
+}
+inline const char *c_text(const std::string &text, const char *field) { return checked(text, field).c_str(); }
 
 // A number of the library, which is given back when its owner ends.
 template <class Handle, mrol_code (*Close)(Handle, mrol_error *)>
@@ -343,7 +360,7 @@ public:
 private:
     static replica_options options_for(const std::string &address, const std::string &map) {
         replica_options options = mrol_replica_options_default();
-        options.address = address.c_str(), options.map = map.c_str();
+        options.address = detail::c_text(address, "address"), options.map = detail::c_text(map, "map");
         return options;
     }
     static std::vector<float> floats_of(const std::vector<pose> &poses) {
@@ -367,7 +384,9 @@ private:
 class scan {
 public:
     scan(std::string robot, const points &in_sensor)
-        : robot_(std::move(robot)), xyz_(in_sensor.data(), in_sensor.data() + 3 * in_sensor.size()) {}
+        : robot_(std::move(robot)), xyz_(in_sensor.data(), in_sensor.data() + 3 * in_sensor.size()) {
+        detail::checked(robot_, "robot");
+    }
 
     // Where it is thought to have been taken. Without, at the robot's last accepted pose.
     scan &guess(const pose &map_from_sensor) {
@@ -381,6 +400,7 @@ public:
     }
     // The robot's own number of the scan in this run of its software: sent again under it, it is in the map once.
     scan &id(std::uint64_t number, std::string session = "") {
+        detail::checked(session, "session");
         id_ = number, has_id_ = true, session_ = std::move(session);
         return *this;
     }
@@ -476,7 +496,7 @@ public:
     // Makes a map, or finds it with these settings.
     void create_map(const std::string &map, double resolution_m, std::uint32_t levels = 0) const {
         mrol_error failed;
-        detail::check(mrol_client_create_map(handle_, map.c_str(), resolution_m, levels, &failed), failed);
+        detail::check(mrol_client_create_map(handle_, detail::c_text(map, "map"), resolution_m, levels, &failed), failed);
     }
     // Aligns a scan and, where it fits, adds it: then it is durable.
     scan_answer insert(const std::string &map, const scan &taken) const {
@@ -495,7 +515,7 @@ public:
         asked.gravity = gravity, asked.time_limit_ms = time_limit_ms;
         mrol_localization_answer answer;
         mrol_error failed;
-        detail::check(mrol_client_localize(handle_, map.c_str(), &asked, &answer, &failed), failed);
+        detail::check(mrol_client_localize(handle_, detail::c_text(map, "map"), &asked, &answer, &failed), failed);
         return localization(answer);
     }
     // Which points lie in occupied voxels of the server's map.
@@ -506,7 +526,8 @@ public:
         mrol_answer answer;
         mrol_error failed;
         detail::check(
-            mrol_client_query_points(handle_, map.c_str(), &query, bits.data(), bits.size(), &answer, &failed), failed);
+            mrol_client_query_points(handle_, detail::c_text(map, "map"), &query, bits.data(), bits.size(), &answer, &failed),
+            failed);
         return {std::move(bits), answer};
     }
 
@@ -516,12 +537,13 @@ private:
         const mrol_scan given = taken.c();
         mrol_scan_answer answer;
         mrol_error failed;
-        detail::check(call(handle_, map.c_str(), &given, &answer, &failed), failed);
+        detail::check(call(handle_, detail::c_text(map, "map"), &given, &answer, &failed), failed);
         return scan_answer(answer);
     }
     static mrol_client_options options_for(const std::string &address, const std::string &key) {
         mrol_client_options options = mrol_client_options_default();
-        options.address = address.c_str(), options.credentials.key = key.empty() ? nullptr : key.c_str();
+        options.address = detail::c_text(address, "address");
+        options.credentials.key = key.empty() ? nullptr : detail::c_text(key, "key");
         return options;
     }
 };

@@ -125,6 +125,31 @@ int main(int count, char **words) {
     EXPECT(thrown([&] { mrol::replica(address, map + "-none"); }) == "map_not_found");
     EXPECT(thrown([&] { mrol::client("http://127.0.0.1:9"); }) == "MROL_UNREACHABLE");
     EXPECT(thrown([&] { mrol::client("nonsense://"); }) == "MROL_INVALID_ARGUMENT");
+    // Text with a NUL would be another name. Nothing of it is told, since it may be a key.
+    const std::string cut = map + std::string("\0secret", 7), robot = std::string("r1\0secret", 9);
+    const auto refusal = [](auto act) {
+        try {
+            act();
+        } catch (const mrol::error &failed) {
+            return failed.code() == MROL_INVALID_ARGUMENT ? std::string(failed.what()) : "another code";
+        }
+        return std::string("nothing");
+    };
+    const auto names = [](const std::string &said, const char *field) {
+        return said.find(std::string(field) + " must be text without a NUL, got one at byte ") == 0 &&
+               said.find("secret") == std::string::npos;
+    };
+    EXPECT(names(refusal([&] { client.create_map(cut, 0.1, 4); }), "map"));
+    EXPECT(names(refusal([&] { client.insert(cut, mrol::scan("r1", wall)); }), "map"));
+    EXPECT(names(refusal([&] { client.align(cut, mrol::scan("r1", wall)); }), "map"));
+    EXPECT(names(refusal([&] { client.localize(cut, wall); }), "map"));
+    EXPECT(names(refusal([&] { client.query(cut, wall); }), "map"));
+    EXPECT(names(refusal([&] { mrol::replica(address, cut); }), "map"));
+    EXPECT(names(refusal([&] { mrol::replica(address + robot, map); }), "address"));
+    EXPECT(names(refusal([&] { mrol::client(address + robot); }), "address"));
+    EXPECT(names(refusal([&] { mrol::client(address, robot); }), "key"));
+    EXPECT(names(refusal([&] { mrol::scan(robot, wall); }), "robot"));
+    EXPECT(names(refusal([&] { mrol::scan("r1", wall).id(1, robot); }), "session"));
     mrol::replica taken = std::move(replica);
     EXPECT(taken.query(origin).size() == 1);
     EXPECT(thrown([&] { replica.query(origin); }) == "MROL_CLOSED");

@@ -52,6 +52,16 @@ impl Failure {
     }
 }
 
+/// An argument is none: `mrol.ArgumentError`, with its name, what was given, and what belongs there.
+pub(crate) fn argument(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
+    let made = value
+        .py()
+        .import("mrol_replica._failures")
+        .and_then(|module| module.getattr("argument"))
+        .and_then(|exception| exception.call1((name, value, expected)));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
 impl From<ServiceError> for Failure {
     fn from(error: ServiceError) -> Self {
         let code = error.code().as_str().to_owned();

@@ -11,15 +11,16 @@ use mrol::service::{
 };
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn,
-    PyUntypedArrayMethods,
+    PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use pyo3::types::PyBool;
 
 use crate::answers::{
     Bools, Checked, Indices, Version, checked, indices, names, of_bytes, of_words, ones, told,
 };
 use crate::body::{NativeBody, spheres_of};
-use crate::failure::Failure;
+use crate::failure::{Failure, argument};
 use crate::source::OpenSource;
 
 /// A pose, x y z and qx qy qz qw.
@@ -95,6 +96,34 @@ fn numbers_of(rows: &PyReadonlyArrayDyn<'_, f32>, name: &str) -> Result<Vec<f32>
     let not_so =
         || Failure::argument(format!("{name} must be contiguous: numpy.ascontiguousarray makes it so"));
     numbers.map(<[f32]>::to_vec).ok_or_else(not_so)
+}
+
+/// The array that an argument is. One with masked values is none: what its masks hide are numbers here.
+fn floats_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+    let expected = "an array of float32: numpy.asarray(..., numpy.float32) makes it so";
+    let array = value.extract::<PyReadonlyArrayDyn<'py, f32>>();
+    let array = array.map_err(|_| argument(name, value, expected))?;
+    if !value.is_exact_instance_of::<PyUntypedArray>() {
+        let masked = value.py().import("numpy.ma")?.call_method1("is_masked", (value,))?;
+        if masked.extract()? {
+            return Err(argument(
+                name,
+                value,
+                "an array without masked values: fill it first, .filled(numpy.nan)",
+            ));
+        }
+    }
+    Ok(array)
+}
+
+fn level_of(value: &Bound<'_, PyAny>) -> PyResult<u32> {
+    let level = value.extract::<u32>().ok().filter(|_| !value.is_instance_of::<PyBool>());
+    level.ok_or_else(|| argument("level", value, "a whole number of 0 to 4294967295"))
+}
+
+fn flag_of(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<bool> {
+    let Some(value) = value else { return Ok(false) };
+    value.extract().map_err(|_| argument(name, value, "True or False"))
 }
 
 #[pymethods]
@@ -231,17 +260,24 @@ impl Questions {
 
     /// Is one motion free? For the innermost loop of a planner: no array is made, and nothing is checked that the question does
     /// not check itself.
-    #[pyo3(signature = (body, configurations, *, level = 0, unknown_is_occupied = false, ignore_keep_outs = false))]
+    #[pyo3(
+        signature = (body, configurations, *, level = None, unknown_is_occupied = None, ignore_keep_outs = None),
+        text_signature = "(body, configurations, *, level=0, unknown_is_occupied=False, ignore_keep_outs=False)"
+    )]
     fn motion_is_free(
         &self,
         py: Python<'_>,
-        body: &NativeBody,
-        configurations: PyReadonlyArrayDyn<'_, f32>,
-        level: u32,
-        unknown_is_occupied: bool,
-        ignore_keep_outs: bool,
+        body: &Bound<'_, PyAny>,
+        configurations: &Bound<'_, PyAny>,
+        level: Option<&Bound<'_, PyAny>>,
+        unknown_is_occupied: Option<&Bound<'_, PyAny>>,
+        ignore_keep_outs: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<bool> {
-        let numbers = numbers_of(&configurations, "configurations")?;
+        let body = body.cast::<NativeBody>().map_err(|_| argument("body", body, "a PreparedBody"))?.get();
+        let level = level.map_or(Ok(0), level_of)?;
+        let unknown_is_occupied = flag_of("unknown_is_occupied", unknown_is_occupied)?;
+        let ignore_keep_outs = flag_of("ignore_keep_outs", ignore_keep_outs)?;
+        let numbers = numbers_of(&floats_of("configurations", configurations)?, "configurations")?;
         let each = body.numbers();
         if !numbers.len().is_multiple_of(each) || numbers.len() < 2 * each {
             let message = format!(

@@ -92,10 +92,12 @@ def test_the_way_for_planners_takes_what_it_says(replica: mrol_replica.Replica) 
     body = mrol_replica.PreparedBody([[0, 0, 0, 0.2]])
     edge = np.array([[0, 0, 0, 0, 0, 0, 1], [0.5, 0, 0, 0, 0, 0, 1]], np.float32)
     assert replica.motion_is_free(body, edge) is True
-    with pytest.raises(TypeError):
+    with pytest.raises(mrol.ArgumentError, match="configurations must be an array of float32"):
         replica.motion_is_free(body, edge.astype(np.float64))  # type: ignore[arg-type]
-    with pytest.raises(TypeError):
+    with pytest.raises(mrol.ArgumentError, match="body must be a PreparedBody"):
         replica.motion_is_free([[0, 0, 0, 0.2]], edge)  # type: ignore[arg-type]
+    with pytest.raises(mrol.ArgumentError, match="level must be a whole number"):
+        replica.motion_is_free(body, edge, level=-1)
     with pytest.raises(ValueError, match="contiguous"):
         replica.motion_is_free(body, np.repeat(edge, 2, axis=1)[:, ::2])
     with pytest.raises(ValueError, match="contiguous"):

@@ -1,5 +1,7 @@
 """A map without a server is the map that a server would have."""
 
+import os
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +102,30 @@ def test_what_makes_no_map() -> None:
         mrol_replica.LocalMap(float("nan"))
     with pytest.raises(mrol.InvalidArgument, match="levels"):
         mrol_replica.LocalMap(0.1, levels=0)
+
+
+def test_a_file_is_replaced_as_a_server_s_is(tmp_path: Path, mapped: mrol_replica.LocalMap) -> None:
+    file, link = tmp_path / "a.mrol", tmp_path / "link.mrol"
+    file.write_bytes(b"what was there")
+    file.chmod(0o640)
+    link.symlink_to("a.mrol")
+    mapped.save(link)
+    assert link.is_symlink()
+    assert stat.S_IMODE(file.stat().st_mode) == 0o640
+    former = os.umask(0o022)
+    try:
+        mapped.save(tmp_path / "new.mrol")
+    finally:
+        os.umask(former)
+    assert stat.S_IMODE((tmp_path / "new.mrol").stat().st_mode) == 0o644
+    assert (tmp_path / "new.mrol").read_bytes()[:4] == file.read_bytes()[:4]
+    for no_file in (5, True, tmp_path, b"a.mrol", ""):
+        with pytest.raises(mrol.ArgumentError, match="file must be"):
+            mapped.save(no_file)  # type: ignore[arg-type]
+    with (tmp_path / "new.mrol").open("rb") as opened:
+        with pytest.raises(mrol.ArgumentError, match="file must be a path"):
+            mrol_replica.LocalMap.load(opened.fileno())  # type: ignore[arg-type]
+        assert opened.read(1)
 
 
 def test_what_makes_no_file(tmp_path: Path, mapped: mrol_replica.LocalMap) -> None:

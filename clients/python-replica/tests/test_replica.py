@@ -139,8 +139,10 @@ def test_what_cannot_be_opened(server: Server, hall: mrol.Map) -> None:
         mrol_replica.Replica(server.address, hall.name, timeout_s=5)
     with pytest.raises(mrol.ArgumentError, match="timeout_s"):
         mrol_replica.Replica(server.grpc, hall.name, timeout_s=float("nan"))
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(mrol.ArgumentError, match="ca must be a file of certificates"):
         mrol_replica.Replica(server.grpc, hall.name, ca="/nowhere.pem")
+    with pytest.raises(mrol.ArgumentError, match="private_key must be given together with certificate"):
+        mrol_replica.Replica(server.grpc, hall.name, certificate="/nowhere.pem")
 
 
 def test_a_region_answers_what_it_knows(server: Server, hall: mrol.Map) -> None:

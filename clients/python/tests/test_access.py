@@ -2,7 +2,9 @@
 
 import pickle
 import subprocess
+import traceback
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -77,8 +79,58 @@ def test_a_key_is_shown_to_the_server_alone(tmp_path: Path) -> None:
         assert not bad or bad not in str(refused.value)
     with pytest.raises(mrol.ArgumentError, match="key must be one of the two"):
         mrol.connect(server.address, key=secret, key_file=tmp_path / "f")
-    with pytest.raises(mrol.ArgumentError, match="key_file must be a file with a secret"):
+    with pytest.raises(mrol.ArgumentError, match="key_file must be the path of a file with a secret"):
         mrol.connect(server.address, key_file=tmp_path / "nowhere")
+
+
+def shown_of(error: BaseException | None) -> str:
+    """All that anybody can print of an error: its message, its fields, its traceback, and those of the errors behind it."""
+    said = ""
+    while error is not None:
+        lines = traceback.format_exception(error)
+        said += "".join(line for line in lines if "tests/" not in line) + repr(error) + repr(error.args) + repr(vars(error))
+        error = error.__cause__ or error.__context__
+    return said
+
+
+def test_no_error_shows_a_key_or_a_password(tmp_path: Path) -> None:
+    secret = "mrol_0123456789abcdefghijklmnopqrstuvwxyz"  # noqa: S105
+    pem = f"-----BEGIN PRIVATE KEY-----\n{secret}\n-----END PRIVATE KEY-----\n"
+    files = {
+        "lines": f"{secret}\n{secret}\n",
+        "comment": f"# the key of r1\n{secret}",
+        "bytes": f"{secret}\0",
+        "umlaut": f"{secret}\u00fc",
+        "empty": "",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    no_paths: list[Any] = [secret, f"{secret}/...", f"{secret}\n", secret.encode(), [secret], {secret}, "\0" + secret, secret * 500]
+    refused: list[tuple[str, dict[str, Any]]] = [
+        *[("localhost:1", {"key_file": tmp_path / name}) for name in files],
+        *[("localhost:1", {"key_file": of}) for of in no_paths],
+        *[("localhost:1", {"key": of}) for of in (f"{secret}\n{secret}", secret.encode(), [secret], f"{secret}\u00fc")],
+        *[("https://localhost:1", {name: of}) for name in ("ca", "client_cert") for of in (pem, *no_paths)],
+        ("https://localhost:1", {"client_key": pem}),
+        ("https://localhost:1", {"client_cert": tmp_path / "lines", "client_key": pem}),
+        ("localhost:1", {"ca": pem, "client_cert": pem}),
+        ("http://localhost:1", {"ca": pem}),
+        (f"http://user:{secret}@host", {}),
+        (f"http://:{secret}@host", {}),
+        (f"https://user:{secret}@host:port", {}),
+        (f"user:{secret}@host", {}),
+        (f"http://user:{secret[:30]}/{secret}@host", {}),
+        (f"http://user:{secret}@host", {"ca": tmp_path / "lines"}),
+        (f"http://host?key={secret}", {}),
+        (f"ftp://{secret}@host", {}),
+        (f"http://user:{secret}@ho st", {}),
+    ]
+    for address, options in refused:
+        with pytest.raises(mrol.ArgumentError) as error:
+            mrol.connect(address, **options)
+        assert secret[:20] not in shown_of(error.value), (address, options)
+    with pytest.raises(mrol.ArgumentError, match=r"key_file must be the path of a file .*lines' with 2 lines in it"):
+        mrol.connect("localhost:1", key_file=tmp_path / "lines")
 
 
 def test_tls_is_checked_on_both_sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,14 +8,9 @@ import pytest
 
 import mrol
 
+from .support.odd import Malicious
+
 POINTS = np.random.default_rng(1).uniform(-5, 5, (1000, 3)).astype("<f4")
-
-
-class Malicious:
-    """An object whose conversion goes wrong."""
-
-    def __array__(self, *_: object, **__: object) -> Any:
-        raise RuntimeError("no array today")
 
 
 ODD: dict[str, Callable[[], Any]] = {
@@ -33,6 +28,7 @@ ODD: dict[str, Callable[[], Any]] = {
     "a matrix": lambda: np.asmatrix(POINTS),
     "three axes": lambda: POINTS.reshape(10, 100, 3),
     "a masked array without masks": lambda: np.ma.array(POINTS),
+    "a list of masked arrays without masks": lambda: [np.ma.array(point) for point in POINTS],
     "records": lambda: np.rec.fromarrays([POINTS[:, 2], POINTS[:, 1], POINTS[:, 0]], names="z,y,x"),
     "a memoryview": lambda: memoryview(POINTS),
     "a subclass": lambda: POINTS.view(type("Mine", (np.ndarray,), {})),
@@ -81,6 +77,11 @@ REFUSED: dict[str, Callable[[], Any]] = {
     "datetime64": lambda: np.zeros((1, 3), "M8[s]"),
     "|V3": lambda: np.zeros(3, "V3"),
     "masked values": lambda: np.ma.array(POINTS, mask=POINTS > 0),
+    "with masked values": lambda: [np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0])],
+    "array with masked values": lambda: ([[1, 2, 3]], [np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0])]),
+    "an array with masked values": lambda: np.ma.array(
+        [(1, 2, 3)], mask=[(0, 1, 0)], dtype=[("x", "f4"), ("y", "f4"), ("z", "f4")]
+    ),
     "list": lambda: [[1, 2, 3], [1, 2]],
     "no array today": Malicious,
     "1e+39": lambda: np.array([[0, 1e39, 0]]),
@@ -177,8 +178,8 @@ EYE = np.eye(4)
         ("change", lambda m: m.undo("it")),
         ("change", lambda m: m.undo(m.delete(POINTS), revision=1)),
         ("the shape", lambda m: m.keep_out("k")),
-        ("the shape", lambda m: m.keep_out("k", prism="wall")),
-        ("the shape.corners_m", lambda m: m.keep_out("k", prism=mrol.Prism([1, 2], 0, 1))),
+        ("prism", lambda m: m.keep_out("k", prism="wall")),
+        ("prism.corners_m", lambda m: m.keep_out("k", prism=mrol.Prism([1, 2], 0, 1))),
         ("name", lambda m: m.keep_out("..", sphere=([0, 0, 0], 1))),
         ("expires_at", lambda m: m.keep_out("k", sphere=([0, 0, 0], 1), expires_at="noon")),
         ("progress", lambda m: m.snapshot("/tmp/never", progress="yes")),
@@ -194,6 +195,39 @@ def test_arguments_that_cannot_be_sent_are_named(hall: mrol.Map, argument: str, 
     assert str(refused.value).startswith(f"{argument} must be ")
     if argument != "change":
         assert hall.describe().voxels.tolist() == before
+
+
+MASKED = np.ma.array([0.0, 0.0, 0.0], mask=[1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("argument", "call"),
+    [
+        ("configurations", lambda m: m.check_poses([[0, 0, 0, 1]], [MASKED])),
+        ("configurations", lambda m: m.check_motions([[0, 0, 0, 1]], [[0.0, 0.0, 0.0], MASKED])),
+        ("body.links[0].spheres", lambda m: m.check_poses([np.ma.array([0, 0, 0, 1.0], mask=[0, 0, 0, 1])], EYE)),
+        ("spheres", lambda m: m.check_spheres([np.ma.array([0, 0, 0, 1.0], mask=[0, 0, 0, 1])])),
+        ("sizes", lambda m: m.check_spheres([[0, 0, 0, 1]], sizes=np.ma.array([1], mask=[1]))),
+        ("origins", lambda m: m.cast_rays([MASKED], ends=POINTS[:1])),
+        ("ends", lambda m: m.cast_rays(POINTS[0], ends=[MASKED])),
+        ("guess", lambda m: m.insert(POINTS, guess=(MASKED, [0, 0, 0, 1]))),
+        ("point_times", lambda m: m.insert(POINTS[:3], point_times=MASKED)),
+        ("gravity_in_sensor", lambda m: m.insert(POINTS, gravity_in_sensor=MASKED)),
+        ("box", lambda m: m.voxels(box=[MASKED, [1.0, 1.0, 1.0]])),
+        ("box.min_m", lambda m: m.voxels(box=mrol.Box(MASKED, [1, 1, 1]))),
+        ("area", lambda m: m.grid([MASKED[:2], MASKED[:2] + 1])),
+        ("point", lambda m: m.observers(MASKED)),
+        ("sphere.center_m", lambda m: m.delete(sphere=(MASKED, 1))),
+        ("voxels", lambda m: m.delete(voxels=[np.ma.array([1, 2, 3], mask=[1, 0, 0])])),
+        ("prism.corners_m", lambda m: m.keep_out("k", prism=mrol.Prism([MASKED[:2], [1.0, 0.0], [0.0, 1.0]], 0, 1))),
+        ("translation_m", lambda _: mrol.Pose(MASKED, [0, 0, 0, 1])),
+        ("points", lambda _: mrol.Pose.identity().apply([MASKED])),
+    ],
+)
+def test_masked_values_are_refused_wherever_arrays_go(hall: mrol.Map, argument: str, call: Callable[[mrol.Map], Any]) -> None:
+    with pytest.raises(mrol.ArgumentError, match=r"\.filled\(numpy\.nan\)") as refused:
+        call(hall)
+    assert refused.value.argument == argument
 
 
 def test_names_with_every_character_stay_names(client: mrol.Client, hall: mrol.Map) -> None:

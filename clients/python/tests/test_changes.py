@@ -128,7 +128,7 @@ def test_files_that_are_none_are_refused(client: mrol.Client, cube: mrol.Map, tm
         with pytest.raises(mrol.InvalidArgument) as refused:
             client.restore("never", tmp_path / "bad")
         assert refused.value.reason == "bad_map_file"
-    with pytest.raises(mrol.ArgumentError, match="source must be a map file"):
+    with pytest.raises(mrol.ArgumentError, match="source must be the path of a map file"):
         client.restore("never", tmp_path / "nowhere")
     with pytest.raises(FileNotFoundError):
         cube.snapshot(tmp_path / "no-folder" / "x.mrol")

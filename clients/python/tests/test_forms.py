@@ -64,6 +64,22 @@ def test_what_is_no_pose_is_refused(bad: object) -> None:
         mrol.Pose.of(bad)
 
 
+def test_the_parts_of_a_pose_are_not_swapped_unseen() -> None:
+    turn, to = np.array([0, 0, 0, 1.0]), np.array([1, 2, 3.0])
+    with pytest.raises(mrol.ArgumentError, match=r"translation_m must be .*, got shape \(4,\)"):
+        mrol.Pose(turn, to)
+    with pytest.raises(mrol.ArgumentError, match=r"pose must be .*, got shapes \(4,\) and \(3,\)"):
+        mrol.Pose.of((turn, to))
+    with pytest.raises(mrol.ArgumentError, match="rotation_xyzw must be a unit quaternion"):
+        mrol.Pose(to, np.array([0, 0, 1, 1.0]))
+    pose = mrol.Pose(to, turn)
+    assert pose.seven() == [1, 2, 3, 0, 0, 0, 1]
+    with pytest.raises(ValueError, match="read-only"):
+        pose.translation_m[0] = 7
+    with pytest.raises(mrol.ArgumentError, match="one Link or more"):
+        mrol.Body([])
+
+
 def test_packed_keys_are_three_signed_numbers() -> None:
     rng = np.random.default_rng(1)
     indices = rng.integers(-(1 << 20), 1 << 20, (1000, 3))

@@ -37,6 +37,35 @@ def rays(m: mrol.Map) -> object:
     return m.cast_rays([0, 0, 0], [[1, 0, 0]])
 
 
+def told(*names: str, **counts: int) -> dict[str, object]:
+    """The head of an answer about five: bits, a byte for each name, and numbers of four bytes behind them."""
+    places = {name: {"at": at, "bytes": 1} for at, name in enumerate(names)}
+    return {"revision": 1, "map_uuid": "u", **counts, **places}
+
+
+FIVE = np.zeros((5, 3), np.float32)
+
+
+def five_points(m: mrol.Map) -> object:
+    """A query of five points."""
+    return m.query(FIVE)
+
+
+def five_states(m: mrol.Map) -> object:
+    """A classification of five points."""
+    return m.classify(FIVE)
+
+
+def five_poses(m: mrol.Map) -> object:
+    """A check of five poses."""
+    return m.check_poses([[0, 0, 0, 1]], FIVE)
+
+
+def five_motions(m: mrol.Map) -> object:
+    """A check of five motions."""
+    return m.check_motions([[0, 0, 0, 1]], np.zeros((5, 2, 3)))
+
+
 def watch(m: mrol.Map) -> object:
     """A call whose answer has no end."""
     return next(m.watch(silence_max_s=0.5))
@@ -61,6 +90,38 @@ def headed(head: object, arrays: bytes = b"") -> bytes:
 
 
 RAYS = {"rays": 1, "hits": 0, "revision": 1, "map_uuid": "u", "hit": {"at": 0, "bytes": 1}, "distances_m": {"at": 1, "bytes": 4}}
+
+MET: dict[str, object] = {
+    **told("hit", rays=1, hits=1),
+    "distances_m": {"at": 1, "bytes": 4},
+    "voxels": {"at": 5, "bytes": 8},
+}
+MET_BY = b"\x01" + bytes(12)
+
+FIELD = [*VERSION, b"mrol-level: 0", b"mrol-resolution-m: 1", b"mrol-cap: 4", b"mrol-origin: 0,0,0"]
+
+STANDS = {"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]}
+NUMBERS = ("overlap", "inliers", "fitness", "iterations", "align_ms", "new_voxels", "carved_voxels", "points_skipped")
+ALIGNED = {
+    **dict.fromkeys(NUMBERS, 0),
+    **dict.fromkeys(("accepted", "replayed", "stationary"), False),
+    "revision": 1,
+    "map_uuid": "u",
+    "verdict": "v",
+    "reason": "r",
+    "map_from_sensor": STANDS,
+    "level_overlaps": [0],
+    "undetermined": [],
+    "foreground": [-1],
+}
+MAPPED = {
+    **dict.fromkeys(("overlap", "new_voxels", "carved_voxels"), 0),
+    "robot": "r",
+    "session": "s",
+    "revision": 1,
+    "map_from_sensor": {"translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 1, 1]},
+}
+TRAJECTORY = {"revision": 1, "map_uuid": "u", "poses": [MAPPED]}
 
 GARBAGE: list[tuple[str, Call, bytes]] = [
     ("no HTTP", describe, b"hello, who is there?\r\n\r\n"),
@@ -95,6 +156,24 @@ GARBAGE: list[tuple[str, Call, bytes]] = [
     ("a bitmap that is too long", query, answer(b"\0\0", b"mrol-points: 1", b"mrol-points-occupied: 0", *VERSION)),
     ("a count that is none", query, answer(b"\0", b"mrol-points: 1", b"mrol-points-occupied: x", *VERSION)),
     ("a hash that is none", query, answer(b"\0", b"mrol-points: 1", b"mrol-points-occupied: 0", *VERSION, b"mrol-content-hash: z")),
+    ("bits behind the last point", five_points, answer(b"\x21", b"mrol-points: 5", b"mrol-points-occupied: 1", *VERSION)),
+    ("fewer bits than told", five_points, answer(b"\x01", b"mrol-points: 5", b"mrol-points-occupied: 2", *VERSION)),
+    ("more bits than told", five_points, answer(b"\x07", b"mrol-points: 5", b"mrol-points-occupied: 2", *VERSION)),
+    ("as many bits as a byte has", five_points, answer(b"\x01", b"mrol-points: 8", b"mrol-points-occupied: 1", *VERSION)),
+    ("states of more points", five_states, headed(told("occupied", "free", points=6), b"\0\0")),
+    ("states behind the last point", five_states, headed(told("occupied", "free", points=5), b"\0\x20")),
+    ("other poses than told", five_poses, headed(told("colliding", checked=5, colliding_count=2), b"\x01")),
+    ("poses behind the last", five_poses, headed(told("colliding", checked=5, colliding_count=1), b"\x20")),
+    (
+        "other motions than told",
+        five_motions,
+        headed({**told("free", motions=5, free_count=0), "first_hits": {"at": 1, "bytes": 20}}, b"\x01" + bytes(20)),
+    ),
+    ("a name that is not there", rays, headed({**MET, "keep_outs": {"at": 13, "bytes": 4, "names": ["k"]}}, MET_BY + b"\1\0\0\0")),
+    ("other hits than told", rays, headed({**MET, "hits": 0}, MET_BY)),
+    ("a size below zero", lambda m: m.distances([[0, 0, 0], [1, 1, 1]]), answer(bytes(4), *FIELD, b"mrol-size: -1,2,2")),
+    ("a foreground of no point", lambda m: m.align([[0, 0, 0]], foreground_level=0), answer(json.dumps(ALIGNED).encode())),
+    ("a pose that is none", lambda m: m.trajectory(), answer(json.dumps(TRAJECTORY).encode())),
     ("an empty head", rays, answer(b"")),
     ("a head that is too long", rays, answer(struct.pack("<I", 1 << 31) + b"{}")),
     ("no arrays", rays, headed({"rays": 1})),
@@ -118,6 +197,21 @@ GARBAGE: list[tuple[str, Call, bytes]] = [
 def test_garbage_is_told_as_such(call: Call, data: bytes) -> None:
     with ScriptedServer(answering(data)) as server, pytest.raises(mrol.BadAnswer):
         call(map_of(server))
+
+
+def test_these_answers_would_be_taken_if_they_fit() -> None:
+    for call, data in (
+        (five_points, answer(b"\x11", b"mrol-points: 5", b"mrol-points-occupied: 2", *VERSION)),
+        (five_states, headed(told("occupied", "free", points=5), b"\1\x10")),
+        (five_poses, headed(told("colliding", checked=5, colliding_count=2), b"\x11")),
+        (rays, headed({**MET, "keep_outs": {"at": 13, "bytes": 4, "names": ["k"]}}, MET_BY + bytes(4))),
+        (rays, headed(MET, MET_BY)),
+        (lambda m: m.distances([[0, 0, 0], [1, 1, 1]]), answer(bytes(4), *FIELD, b"mrol-size: 1,2,2")),
+        (lambda m: m.align([[0, 0, 0]], foreground_level=0), answer(json.dumps({**ALIGNED, "foreground": [0]}).encode())),
+        (lambda m: m.trajectory(), answer(json.dumps({**TRAJECTORY, "poses": [{**MAPPED, "map_from_sensor": STANDS}]}).encode())),
+    ):
+        with ScriptedServer(answering(data)) as server:
+            assert call(map_of(server)) is not None
 
 
 CUT = answer(b'{"map":"m","revision":', status=b"200 OK").replace(b"content-length: 22", b"content-length: 900")

@@ -2,6 +2,10 @@
 
 import copy
 import itertools
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +125,44 @@ def test_no_server_is_told_at_once_and_waited_for_on_request(tmp_path: Path) -> 
         mrol.connect(address, wait_s=0.3)
     with pytest.raises(mrol.ConnectFailed):
         mrol.connect(f"unix:{tmp_path}/nothing.sock")
+
+
+@contextmanager
+def taking_no_connection(host: str, port: int = 0) -> Iterator[int]:
+    """A port at which connections are neither taken nor refused: those that wait there are as many as it lets wait."""
+    with socket.socket() as listener, ExitStack() as waiting:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(0)
+        for _ in range(4):
+            one = waiting.enter_context(socket.socket())
+            one.setblocking(False)
+            one.connect_ex(listener.getsockname())
+        yield listener.getsockname()[1]
+
+
+def test_all_addresses_of_a_host_have_one_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[tuple[str, int]] = []
+
+    def places(*_: object, **__: object) -> list[object]:
+        return [(socket.AF_INET, socket.SOCK_STREAM, 0, "", place) for place in found]
+
+    monkeypatch.setattr(socket, "getaddrinfo", places)
+    with (
+        taking_no_connection("127.0.0.1") as port,
+        taking_no_connection("127.0.0.2", port),
+        taking_no_connection("127.0.0.3", port),
+    ):
+        found += [(f"127.0.0.{number}", port) for number in (1, 2, 3)]
+        began = time.monotonic()
+        with pytest.raises(mrol.ConnectFailed, match="no answer within 0.6 s"):
+            mrol.connect(f"robot-7:{port}", timeout_s=0.6)
+        assert 0.5 < time.monotonic() - began < 1.5
+        # The first of them leaves time for the one that answers.
+        with ScriptedServer(answering(answer(b"{}"))) as server:
+            host, answering_port = server.address.split(":")
+            found[1] = (host, int(answering_port))
+            assert mrol.connect(f"robot-7:{port}", timeout_s=3.0).address == f"http://robot-7:{port}"
 
 
 def test_what_may_have_been_done_can_be_repeated() -> None:

@@ -149,3 +149,25 @@ def test_an_undo_under_the_same_id_is_done_once(empty: mrol.Map) -> None:
     again = empty.undo(revision=1, request_id="u1")
     assert again.replayed
     assert again.revision == undone.revision
+
+
+def test_after_the_last_id_there_is_an_error_that_says_what_to_do(client: mrol.Client, empty: mrol.Map) -> None:
+    last = (1 << 64) - 1
+    with pytest.raises(mrol.ArgumentError, match="points"):
+        # What is refused here uses no id up.
+        empty.insert("no points", scan_id=last)
+    assert empty.insert([[1, 0, 0]], align=False).scan_id == 1
+    assert empty.insert([[2, 0, 0]], align=False, guess=np.eye(4), force=True, scan_id=last).accepted
+    for _ in range(2):
+        with pytest.raises(mrol.ArgumentError, match=r"scan_id must be given with a session of your own") as refused:
+            empty.insert([[3, 0, 0]], align=False, guess=np.eye(4), force=True)
+        assert refused.value.argument == "scan_id"
+    # What was sent under its id is known by it, and what the error says helps.
+    assert empty.insert([[2, 0, 0]], align=False, guess=np.eye(4), force=True, scan_id=last).replayed
+    own = {"session": "second", "scan_id": 1}
+    assert empty.insert([[3, 0, 0]], align=False, guess=np.eye(4), force=True, **own).scan_id == 1
+    anew = mrol.connect(client.address).map(empty.name)
+    assert anew.insert([[4, 0, 0]], align=False, guess=np.eye(4), force=True).scan_id == 1
+    # Other robots go on.
+    assert empty.insert([[5, 0, 0]], align=False, guess=np.eye(4), force=True, robot="other").scan_id == 1
+    assert len(empty.trajectory()) == 5

@@ -36,6 +36,11 @@ class Refused(errors.MrolError, ValueError):
     """An argument makes no sense; the message names it, with its value and its limit."""
 
 
+def argument(name: str, value: object, expected: str) -> errors.ArgumentError:
+    """The exception of an argument that the extension looks at itself."""
+    return errors.ArgumentError(name, errors.excerpt(value), expected)
+
+
 def exception(kind: str, code: str, reason: str, message: str) -> errors.MrolError:
     """The exception of a failure."""
     if kind == "refused":

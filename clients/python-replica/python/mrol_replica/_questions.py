@@ -11,7 +11,6 @@ from mrol import (
     Clearances,
     Collisions,
     FirstHits,
-    Link,
     Motions,
     Nearest,
     Occupancy,
@@ -25,7 +24,7 @@ from mrol._arrays import counts_of, number_of, rows_of, vector_of, whole_of
 from mrol._question import Names
 from mrol.body import BodyLike, ConfigurationsLike, configurations_of
 from mrol.errors import ArgumentError, excerpt
-from mrol.operations.checks import Told, Unknown
+from mrol.operations.checks import Told, Unknown, ignored_shapes
 from mrol.operations.handle import flag_of
 from mrol.operations.motions import lengths_of
 from mrol.operations.nearest import MeasuredTo
@@ -45,6 +44,7 @@ BYTES_MAX = 1 << 34
 _F32 = np.dtype("<f4")
 
 LEVEL_MAX = (1 << 32) - 1
+SECONDS_MAX = 1e9
 
 Words = dict[str, tuple[str, ...]]
 WORDS: Words = {
@@ -65,8 +65,6 @@ class PreparedBody(_native.NativeBody):
         links = []
         for number, link in enumerate(Body.of(body).links):
             name = f"body.links[{number}]"
-            if not isinstance(link, Link):
-                raise ArgumentError(name, excerpt(link), "a Link")
             spheres, _ = rows_of(link.spheres, 4, f"{name}.spheres", "spheres x y z r, shape (n, 4)", BYTES_MAX)
             points, _ = rows_of(link.points, 3, f"{name}.points", "points x y z, shape (n, 3)", BYTES_MAX)
             links.append((spheres, points, number_of(link.padding_m, f"{name}.padding_m")))
@@ -88,7 +86,7 @@ class Questions:
         self.motion_is_free = inside.motion_is_free
         """`motion_is_free(body, configurations, *, level=0, unknown_is_occupied=False, ignore_keep_outs=False)`: whether one
         motion is free, as a `bool`, for the innermost loop of a planner. `body` is a `PreparedBody`, `configurations` contiguous
-        float32 with two or more rows of x y z qx qy qz qw for each link: anything else is a `TypeError`."""
+        float32 with two or more rows of x y z qx qy qz qw for each link: nothing is converted, and anything else is refused."""
 
     def close(self) -> None:
         """Gives its memory back, once the last call that uses it returns. Every later call is an error."""
@@ -299,6 +297,14 @@ def region_of(shape: Shape, argument: str) -> tuple[str, list[float]]:
     raise ArgumentError(argument, excerpt(shape), "a Box or a Sphere or an OrientedBox")
 
 
+def seconds_of(value: float, argument: str) -> float:
+    """A time that the extension's clocks can count."""
+    seconds = number_of(value, argument)
+    if not 0 <= seconds <= SECONDS_MAX:
+        raise ArgumentError(argument, excerpt(value), f"seconds, 0 to {SECONDS_MAX:g}")
+    return seconds
+
+
 def version_of(version: "_native.Told") -> Version:
     """A version as `mrol` has it."""
     revision, uuid, content_hash = version
@@ -320,9 +326,7 @@ def _prepared(body: AnyBody) -> PreparedBody:
 
 
 def _regions(shapes: Sequence[Shape], argument: str) -> list[tuple[str, list[float]]]:
-    if isinstance(shapes, Box | Sphere | OrientedBox):
-        shapes = [shapes]
-    return [region_of(shape, f"{argument}[{number}]") for number, shape in enumerate(shapes)]
+    return [region_of(shape, f"{argument}[{number}]") for number, shape in enumerate(ignored_shapes(shapes))]
 
 
 def _level(level: int) -> int:
@@ -330,7 +334,7 @@ def _level(level: int) -> int:
 
 
 def _word(word: str, argument: str) -> str:
-    if word not in WORDS[argument]:
+    if not isinstance(word, str) or word not in WORDS[argument]:
         raise ArgumentError(argument, excerpt(word), " or ".join(map(repr, WORDS[argument])))
     return word
 

@@ -1,16 +1,15 @@
 """A map without a server."""
 
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 from mrol import Box, Candidate, Deletion, Localization, OpenDirection, Pose, ScanAnswer, Voxels
 from mrol._arrays import as_floats, as_numbers, number_of, rows_of, vector_of, whole_of
+from mrol._files import File, path_of_file, replacing
 from mrol.errors import ArgumentError, excerpt
-from mrol.operations.handle import flag_of
+from mrol.operations.handle import flag_of, text_of
 from mrol.operations.occupancy import POINTS
 from mrol.operations.scans import Method
 from mrol.pose import PoseLike
@@ -18,15 +17,13 @@ from mrol.shapes import BoxLike, OrientedBox, Shape
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._questions import BYTES_MAX, Questions, region_of, version_of
+from ._questions import BYTES_MAX, Questions, region_of, seconds_of, version_of
 
 ROBOT = "python"
 """The robot of scans whose robot is not given."""
 
 LEVELS = 6
 TIMES = "one time in seconds for each point, shape (n,)"
-
-File = Union[str, Path]
 
 
 class LocalMap(Questions):
@@ -45,31 +42,28 @@ class LocalMap(Questions):
 
     def __init__(self, resolution: float, *, levels: int = LEVELS, bloom: bool = True, moments: bool = True) -> None:
         side_m, count = number_of(resolution, "resolution"), whole_of(levels, "levels", 0, (1 << 32) - 1)
-        self._take(_native.NativeLocalMap(side_m, count, bool(bloom), bool(moments)))
+        self._take(_native.NativeLocalMap(side_m, count, flag_of(bloom, "bloom"), flag_of(moments, "moments")))
 
     @classmethod
     def load(cls, file: File) -> "LocalMap":
         """The map of a map file.
 
-        Raises `InvalidArgument` for what is none.
+        Raises `InvalidArgument` for what is none, and `OSError` where it cannot be read.
         """
         loaded = cls.__new__(cls)
-        loaded._take(_native.NativeLocalMap.of_file(Path(file).read_bytes()))  # noqa: SLF001
+        loaded._take(_native.NativeLocalMap.of_file(Path(path_of_file(file, "file")).read_bytes()))  # noqa: SLF001
         return loaded
 
     def save(self, file: File) -> None:
-        """Writes the map as a map file, whole or not at all; a file that is there is replaced."""
-        path = Path(file)
+        """Writes the map as a map file, which is on the disk when the call returns.
+
+        A file that is there is replaced, whole or not at all, and its mode and owner stay. Of a symbolic link that is replaced
+        which it leads to.
+        """
+        path = path_of_file(file, "file")
         whole = self._made.to_file()
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
-            try:
-                part.write(whole)
-                part.flush()
-                os.fsync(part.fileno())
-                Path(part.name).replace(path)
-            except BaseException:
-                Path(part.name).unlink(missing_ok=True)
-                raise
+        with replacing(path, "file") as written:
+            written.write(whole)
 
     def _take(self, made: _native.NativeLocalMap) -> None:
         Questions.__init__(self, made)
@@ -143,10 +137,10 @@ class LocalMap(Questions):
             raise ArgumentError("gravity_in_map", "no gravity_in_sensor", "given with gravity_in_sensor")
         found = self._made.localize(
             rows,
-            None if gravity_in_sensor is None else vector_of(gravity_in_sensor, 3, "gravity_in_sensor"),
-            None if gravity_in_map is None else vector_of(gravity_in_map, 3, "gravity_in_map"),
+            None if gravity_in_sensor is None else vector_of(gravity_in_sensor, 3, "gravity_in_sensor", is_finite=True),
+            None if gravity_in_map is None else vector_of(gravity_in_map, 3, "gravity_in_map", is_finite=True),
             None if search_box is None else Box.of(search_box, "search_box").corners("search_box"),
-            None if time_limit_s is None else number_of(time_limit_s, "time_limit_s"),
+            None if time_limit_s is None else seconds_of(time_limit_s, "time_limit_s"),
             0 if candidates is None else whole_of(candidates, "candidates", 1, (1 << 32) - 1),
             whole_of(seed, "seed"),
         )
@@ -200,16 +194,10 @@ def _fields(given: "dict[str, Any]", **fixed: Any) -> "dict[str, Any]":
     return {**given, "overlap_alone": None if method is None else method == "overlap"}
 
 
-def _text(value: object, argument: str) -> str:
-    if not isinstance(value, str):
-        raise ArgumentError(argument, excerpt(value), "text")
-    return value
-
-
 def _method(value: object, argument: str) -> str:
-    if value not in ("refined", "overlap"):
+    if not isinstance(value, str) or value not in ("refined", "overlap"):
         raise ArgumentError(argument, excerpt(value), "'refined' or 'overlap'")
-    return str(value)
+    return value
 
 
 def _times(value: ArrayLike, argument: str) -> "NDArray[np.float32]":
@@ -221,14 +209,14 @@ def _covariance(value: ArrayLike, argument: str) -> "list[float]":
     covariance = as_numbers(value, argument, expected)
     if covariance.shape not in ((6, 6), (36,)):
         raise ArgumentError(argument, f"shape {covariance.shape}", expected)
-    return vector_of(covariance.reshape(36), 36, argument)
+    return vector_of(covariance.reshape(36), 36, argument, is_finite=True)
 
 
 REQUIRED = {"robot", "constant_velocity", "align", "point_times_from_sweep_start", "force", "strict"}
 """What has no value that stands for none."""
 
 TAKEN_AS: "dict[str, Callable[[Any, str], Any]]" = {
-    "robot": _text,
+    "robot": text_of,
     "guess": lambda value, name: Pose.of(value, name).seven(),
     "motion": lambda value, name: Pose.of(value, name).seven(),
     "constant_velocity": flag_of,
@@ -236,7 +224,7 @@ TAKEN_AS: "dict[str, Callable[[Any, str], Any]]" = {
     "timestamp_ns": lambda value, name: whole_of(value, name, -(1 << 63), (1 << 63) - 1),
     "point_times": _times,
     "point_times_from_sweep_start": flag_of,
-    "gravity_in_sensor": lambda value, name: vector_of(value, 3, name),
+    "gravity_in_sensor": lambda value, name: vector_of(value, 3, name, is_finite=True),
     "guess_covariance": _covariance,
     "recover": flag_of,
     "carve": flag_of,

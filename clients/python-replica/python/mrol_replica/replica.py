@@ -1,21 +1,20 @@
 """A copy of a server's map, which follows it."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Union
 
 from mrol import Version
-from mrol._arrays import number_of, whole_of
-from mrol.errors import ArgumentError, excerpt
+from mrol._arrays import whole_of
+from mrol._files import File, read_secret_file
+from mrol._transport.address import shown_address
+from mrol.errors import ArgumentError
+from mrol.operations.handle import flag_of, text_of
 from mrol.shapes import Box, BoxLike
 
 from . import _native
-from ._questions import Questions, version_of
+from ._questions import Questions, seconds_of, version_of
 
 TIMEOUT_S = 60.0
 """How long the first copy may take."""
-
-File = Union[str, Path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,20 +61,23 @@ class Replica(Questions):
         bloom: bool = False,
         viewpoints: bool = True,
     ) -> None:
-        given = address if "://" in address or address.startswith("unix:") else f"http://{address}"
+        given = _address_of(address)
+        if (certificate is None) != (private_key is None):
+            missing = "private_key" if private_key is None else "certificate"
+            raise ArgumentError(missing, "nothing", "given together with certificate and private_key, or neither of them")
         opened = _native.NativeReplica(
             given,
-            map,
-            key=key,
-            ca=_bytes_of(ca),
-            certificate=_bytes_of(certificate),
-            private_key=_bytes_of(private_key),
-            timeout_s=_seconds(timeout_s, "timeout_s"),
-            silence_s=None if silence_s is None else _seconds(silence_s, "silence_s"),
+            text_of(map, "map"),
+            key=None if key is None else _secret_of(key),
+            ca=_bytes_of(ca, "ca", "a file of certificates (PEM)"),
+            certificate=_bytes_of(certificate, "certificate", "a file with a certificate (PEM)"),
+            private_key=_bytes_of(private_key, "private_key", "a file with a private key (PEM)"),
+            timeout_s=seconds_of(timeout_s, "timeout_s"),
+            silence_s=None if silence_s is None else seconds_of(silence_s, "silence_s"),
             region=None if region is None else Box.of(region, "region").corners("region"),
             blocks_max=None if blocks_max is None else whole_of(blocks_max, "blocks_max", 1),
-            bloom=bool(bloom),
-            viewpoints=bool(viewpoints),
+            bloom=flag_of(bloom, "bloom"),
+            viewpoints=flag_of(viewpoints, "viewpoints"),
         )
         super().__init__(opened)
         self._opened = opened
@@ -97,18 +99,26 @@ class Replica(Questions):
 
         Raises `DeadlineExceeded` (`revision_not_reached`) where it does not come in time.
         """
-        self._opened.wait_for_revision(whole_of(revision, "revision"), _seconds(timeout_s, "timeout_s"))
+        self._opened.wait_for_revision(whole_of(revision, "revision"), seconds_of(timeout_s, "timeout_s"))
 
     def __repr__(self) -> str:
         return f"<replica of mrol map {self._name}>"
 
 
-def _bytes_of(file: "File | None") -> "bytes | None":
-    return None if file is None else Path(file).read_bytes()
+def _address_of(address: object) -> str:
+    """An address with its scheme. One with a user or a password is none, and neither is shown."""
+    is_one = isinstance(address, str) and address.isprintable() and (address.startswith("unix:") or "@" not in address)
+    if not is_one:
+        raise ArgumentError("address", shown_address(address), "http://host:port, https://host:port or unix:/path")
+    text = str(address)
+    return text if "://" in text or text.startswith("unix:") else f"http://{text}"
 
 
-def _seconds(value: float, argument: str) -> float:
-    seconds = number_of(value, argument)
-    if not 0 <= seconds <= 1e9:
-        raise ArgumentError(argument, excerpt(value), "seconds, 0 to 1e9")
-    return seconds
+def _secret_of(key: object) -> str:
+    if not isinstance(key, str) or not key.isascii():
+        raise ArgumentError("key", "something else", "a secret as `mrol key new` prints it, in one line")
+    return key
+
+
+def _bytes_of(file: "File | None", argument: str, expected: str) -> "bytes | None":
+    return None if file is None else read_secret_file(file, argument, expected)

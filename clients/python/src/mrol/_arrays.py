@@ -1,5 +1,9 @@
 """Arrays as they are sent: little-endian and contiguous. What is that already is not copied."""
 
+import array as arrays_of_python
+import math
+from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,7 +17,13 @@ U32 = NDArray[np.uint32]
 Bools = NDArray[np.bool_]
 Shape = tuple[int, ...]
 
+WORD_MAX = (1 << 64) - 1
+"""The largest number of 64 bits."""
+
 AXES = ("x", "y", "z")
+
+NOT_OF_ARRAYS = (str, bytes, bytearray, memoryview, range, arrays_of_python.array)
+"""Sequences in which there is no array."""
 
 
 def as_numbers(value: ArrayLike, argument: str, expected: str) -> NDArray[Any]:
@@ -21,18 +31,33 @@ def as_numbers(value: ArrayLike, argument: str, expected: str) -> NDArray[Any]:
 
     Raises `ArgumentError` for everything else.
     """
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise ArgumentError(argument, "an array with masked values", f"{expected}; fill it first: .filled(numpy.nan)")
     try:
         array = np.asarray(value)
     except Exception as error:
         # Lists of unequal lengths, and whatever an object's own conversion raises.
         raise ArgumentError(argument, f"{excerpt(type(value))}: {excerpt(error)}", expected) from error
+    refuse_masked(value, array.ndim, argument, expected)
     if array.dtype.names is not None and set(AXES) <= set(array.dtype.names):
         array = _of_named_axes(array, argument, expected)
     if array.dtype.kind not in "fiu":
         raise ArgumentError(argument, f"an array of {array.dtype}", expected)
     return array
+
+
+def refuse_masked(value: object, axes: int, argument: str, expected: str) -> None:
+    """Refuses masked values, of an array or of those in a sequence of arrays: numpy takes the numbers behind the masks.
+
+    `axes` is how deep sequences lie in each other.
+    """
+    level: list[Any] = [value]
+    for _ in range(axes + 1):
+        kinds = set(map(type, level))
+        if any(issubclass(kind, np.ma.MaskedArray) for kind in kinds) and any(map(_is_masked, level)):
+            raise ArgumentError(argument, "an array with masked values", f"{expected}; fill it first: .filled(numpy.nan)")
+        nested = tuple(kind for kind in kinds if issubclass(kind, Sequence) and not issubclass(kind, NOT_OF_ARRAYS))
+        if not nested:
+            return
+        level = list(chain.from_iterable(level if len(nested) == len(kinds) else (of for of in level if type(of) in nested)))
 
 
 def rows_of(value: ArrayLike, columns: int, argument: str, expected: str, bytes_max: int) -> tuple[F32, Shape]:
@@ -72,31 +97,39 @@ def counts_of(value: ArrayLike, argument: str) -> U32:
     return np.ascontiguousarray(array, np.dtype("<u4"))
 
 
-def vector_of(value: ArrayLike, length: int, argument: str) -> list[float]:
-    """So many finite or infinite numbers, as a list; no NaN."""
-    expected = f"{length} numbers"
+def vector_of(value: ArrayLike, length: int, argument: str, is_finite: bool = False) -> list[float]:
+    """So many numbers, as a list; no NaN, and infinite ones where they need not be finite."""
+    expected = f"{length} finite numbers" if is_finite else f"{length} numbers"
     array = as_numbers(value, argument, expected)
-    if array.shape != (length,) or np.isnan(array).any():
+    with np.errstate(all="ignore"):
+        floats = array.astype(np.float64)
+    # What is beyond the range of a double would mean "without bound".
+    is_wrong = ~np.isfinite(floats) if is_finite else np.isnan(floats) | (np.isinf(floats) & np.isfinite(array))
+    if array.shape != (length,) or np.any(is_wrong):
         raise ArgumentError(argument, excerpt(value), expected)
-    return [float(number) for number in array]
+    return [float(number) for number in floats]
 
 
-def number_of(value: object, argument: str) -> float:
-    """A finite number."""
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise ArgumentError(argument, excerpt(value), "a finite number")
-    return float(value)
+def number_of(value: object, argument: str, expected: str = "a finite number", least: float = -math.inf) -> float:
+    """A finite number, not below the least."""
+    number = _float_of(value)
+    if number is None or not math.isfinite(number) or number < least:
+        raise ArgumentError(argument, excerpt(value), expected)
+    return number
 
 
-def whole_of(value: object, argument: str, least: int = 0, most: int = (1 << 64) - 1) -> int:
+def seconds_of(value: object, argument: str) -> float:
+    """A time in seconds, 0 or more."""
+    return number_of(value, argument, "a number of seconds, 0 or more", 0.0)
+
+
+def whole_of(value: object, argument: str, least: int = 0, most: int = WORD_MAX) -> int:
     """A whole number in a range."""
-    if isinstance(value, np.generic):
-        value = value.item()
+    if isinstance(value, np.integer) and not isinstance(value, np.timedelta64):
+        value = int(value)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise ArgumentError(argument, excerpt(value), f"a whole number of {least} to {most}")
-    return value
+    return int(value)
 
 
 def raw(array: NDArray[Any]) -> memoryview:
@@ -107,6 +140,26 @@ def raw(array: NDArray[Any]) -> memoryview:
 def numbers_text(numbers: list[float]) -> str:
     """Numbers as a parameter of an address."""
     return ",".join(map(repr, numbers))
+
+
+def _float_of(value: object) -> float | None:
+    """A real number as one of Python's; None of all else, text and times of numpy among it."""
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    if not is_number or isinstance(value, bool | np.timedelta64):
+        return None
+    try:
+        with np.errstate(all="ignore"):
+            return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return math.inf
+
+
+def _is_masked(value: object) -> bool:
+    if not isinstance(value, np.ma.MaskedArray):
+        return False
+    # Of records the mask has fields.
+    mask = np.ascontiguousarray(np.ma.getmaskarray(value))
+    return bool(mask.view(np.bool_).any())
 
 
 def _of_named_axes(array: NDArray[Any], argument: str, expected: str) -> NDArray[Any]:

@@ -18,11 +18,18 @@ BLOCK = np.dtype([("key", "<u8"), ("mask", "u1", (BLOCK_VOXELS // 8,))])
 """A block as it is sent: 72 bytes."""
 
 
-def unpacked(bitmap: memoryview, count: int) -> Bools:
-    """So many booleans of a bitmap, the lowest bit of each byte first."""
+def unpacked(bitmap: memoryview, count: int, set_bits: int | None = None) -> Bools:
+    """So many booleans of a bitmap, the lowest bit of each byte first; where it is told how many are set, so many are.
+
+    Raises `ValueError` for a bitmap of another number of them.
+    """
     if bitmap.nbytes != (count + 7) // 8:
         raise ValueError(f"{bitmap.nbytes} bytes are no {count} bits")
     bits = np.unpackbits(np.frombuffer(bitmap, np.uint8), count=count, bitorder="little").view(np.bool_)
+    if count % 8 and bitmap[-1] >> (count % 8):
+        raise ValueError(f"bits behind the last of {count}")
+    if set_bits is not None and np.count_nonzero(bits) != set_bits:
+        raise ValueError(f"{np.count_nonzero(bits)} bits are set, and {set_bits} are told")
     bits.setflags(write=False)
     return bits
 

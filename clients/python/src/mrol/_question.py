@@ -58,10 +58,10 @@ class QuestionAnswer:
             self.head: Fields = fields_of(body[4 : 4 + length])
             self._data = body[4 + length :]
 
-    def bits(self, name: str, count: int) -> Bools:
-        """An array of booleans."""
+    def bits(self, name: str, count: int, set_bits: int | None = None) -> Bools:
+        """An array of booleans; where the head tells how many are true, so many are."""
         with reading(name):
-            return unpacked(self._bytes(name, (count + 7) // 8), count)
+            return unpacked(self._bytes(name, (count + 7) // 8), count, set_bits)
 
     def floats(self, name: str, count: int, *columns: int) -> F32:
         """An array of floats of shape (count, *columns)."""
@@ -88,7 +88,10 @@ class QuestionAnswer:
             with reading(name):
                 of_array = self.head.object(name)
                 numbers = self._unsigned(name, count)
-                for number, text in enumerate(of_array.texts("names")):
+                texts = of_array.texts("names")
+                if not ((numbers < len(texts)) | (numbers == NONE)).all():
+                    raise ValueError(f"there are {len(texts)} names")
+                for number, text in enumerate(texts):
                     found[numbers == number] = text
         return _frozen(found)
 

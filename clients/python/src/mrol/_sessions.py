@@ -4,6 +4,9 @@ import os
 import uuid
 from threading import Lock
 
+from ._arrays import WORD_MAX
+from .errors import ArgumentError
+
 ID_FIRST = 1
 
 
@@ -17,9 +20,16 @@ class Session:
         self._next: dict[tuple[str, str], int] = {}
 
     def next_id(self, map_name: str, robot: str, given: int | None) -> int:
-        """The id of the next scan of a robot in a map: the one that is given, or the next after all before it."""
+        """The id of the next scan of a robot in a map: the one that is given, or the next after all before it.
+
+        Raises `ArgumentError` where there is none after the largest. It begins no other session by itself: under that a scan which
+        is sent again by its id would be another one.
+        """
         with self._lock:
             following = self._next.get((map_name, robot), ID_FIRST)
+            if given is None and following > WORD_MAX:
+                what_to_do = "given with a session of your own (session=...), or the server connected to anew, which begins one"
+                raise ArgumentError("scan_id", f"none, and {WORD_MAX} was given before, the last of this session", what_to_do)
             scan_id = following if given is None else given
             self._next[map_name, robot] = max(following, scan_id + 1)
             return scan_id

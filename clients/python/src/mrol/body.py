@@ -35,6 +35,19 @@ class Body:
 
     links: Sequence[Link]
 
+    def __post_init__(self) -> None:
+        try:
+            links = tuple(self.links)
+        except Exception as error:
+            # Whatever going through an object raises.
+            raise ArgumentError("body.links", excerpt(self.links), "a sequence of Link") from error
+        if not links:
+            raise ArgumentError("body.links", excerpt(self.links), "one Link or more")
+        for number, link in enumerate(links):
+            if not isinstance(link, Link):
+                raise ArgumentError(f"body.links[{number}]", excerpt(link), "a Link")
+        object.__setattr__(self, "links", links)
+
     @classmethod
     def of(cls, value: "BodyLike") -> "Body":
         """A `Body`, a `Link`, or the spheres of one link: an array of shape (n, 4)."""
@@ -47,8 +60,6 @@ class Body:
         links = []
         for number, link in enumerate(self.links):
             name = f"body.links[{number}]"
-            if not isinstance(link, Link):
-                raise ArgumentError(name, excerpt(link), "a Link")
             spheres, _ = rows_of(link.spheres, 4, f"{name}.spheres", "spheres x y z r, shape (n, 4)", bytes_max)
             points, _ = rows_of(link.points, 3, f"{name}.points", "points x y z, shape (n, 3)", bytes_max)
             of_link: dict[str, Any] = {"padding_m": number_of(link.padding_m, f"{name}.padding_m")}

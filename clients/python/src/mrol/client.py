@@ -4,12 +4,12 @@ import json
 import os
 import time
 from dataclasses import dataclass
-from os import PathLike
 from types import TracebackType
 from typing import Any, Literal
 
-from ._arrays import number_of, whole_of
+from ._arrays import number_of, seconds_of, whole_of
 from ._fields import Fields, fields_of
+from ._files import File
 from ._sessions import Sessions
 from ._transport.address import Address
 from ._transport.caller import Bounds, Caller
@@ -18,11 +18,11 @@ from ._transport.key import Key
 from ._transport.pool import Pool
 from ._transport.request import JSON, Request, path_of, target_of
 from ._transport.tls import tls_context
-from .errors import ArgumentError, ConnectFailed, MrolError, ServerError, excerpt
+from .errors import ArgumentError, ConnectFailed, MrolError, ServerError
 from .map import Map
 from .operations.description import FilterSettings, MapInfo, map_info
 from .operations.handle import flag_of, word_of
-from .operations.map_file import FILE_TIMEOUT_S, File, restore
+from .operations.map_file import FILE_TIMEOUT_S, restore
 from .progress import Progress
 
 TIMEOUT_S = 30.0
@@ -181,10 +181,10 @@ def connect(
     address: str = "localhost:7333",
     *,
     key: str | None = None,
-    key_file: str | PathLike[str] | None = None,
-    ca: str | PathLike[str] | None = None,
-    client_cert: str | PathLike[str] | None = None,
-    client_key: str | PathLike[str] | None = None,
+    key_file: File | None = None,
+    ca: File | None = None,
+    client_cert: File | None = None,
+    client_key: File | None = None,
     timeout_s: float = TIMEOUT_S,
     patience_s: float = PATIENCE_S,
     wait_s: float = 0.0,
@@ -198,11 +198,13 @@ def connect(
     the authorities that may sign the server's certificate (PEM), those of the system without it; with `ca`, an address without a
     scheme is https. `client_cert` and `client_key` are shown to a server that asks for them.
 
-    Each call takes `timeout_s` at most, tries and waits included. It is tried again for `patience_s` where the server cannot be
-    reached, starts, drains or is overloaded, and where a connection broke; all changes have ids by which the server knows what
-    it has done already. Here alone nothing is tried again unless `wait_s` says how long to wait for the server to be there.
+    Each call takes `timeout_s` at most, tries, waits and all addresses of the host's name included. It is tried again for
+    `patience_s` where the server cannot be reached, starts, drains or is overloaded, and where a connection broke; all changes
+    have ids by which the server knows what it has done already. Here alone nothing is tried again unless `wait_s` says how long
+    to wait for the server to be there.
 
-    Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate.
+    Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate. No error shows a key, a password in an
+    address, or a path that names nothing, since that may be a key in the wrong argument.
     """
     if key is None and key_file is None:
         key, key_file = _from_environment()
@@ -211,7 +213,7 @@ def connect(
     place = Address.parse(address, prefer_tls=ca is not None or client_cert is not None)
     bounds = Bounds(
         timeout_s=seconds(timeout_s, "timeout_s"),
-        patience_s=number_of(patience_s, "patience_s"),
+        patience_s=seconds_of(patience_s, "patience_s"),
         request_bytes_max=whole_of(request_bytes_max, "request_bytes_max"),
         answer_bytes_max=whole_of(answer_bytes_max, "answer_bytes_max"),
     )
@@ -219,11 +221,11 @@ def connect(
         for name, file in (("ca", own_ca), ("client_cert", client_cert), ("client_key", client_key)):
             if file is not None:
                 # A key would travel in the clear although its owner thinks that it does not.
-                raise ArgumentError(name, f"a file for {excerpt(address)}", "given with an https:// address alone")
+                raise ArgumentError(name, f"a file for {place}", "given with an https:// address alone")
     tls = tls_context(ca, client_cert, client_key) if place.is_tls else None
     pool, secret = Pool(place, tls), Key(key, key_file)
     impatient = Caller(pool, secret, Bounds(bounds.timeout_s, 0.0, bounds.request_bytes_max, bounds.answer_bytes_max))
-    _wait_for(impatient, number_of(wait_s, "wait_s"))
+    _wait_for(impatient, seconds_of(wait_s, "wait_s"))
     return Client(Caller(pool, secret, bounds))
 
 

@@ -12,17 +12,44 @@ MrolError
   BadAnswer               what came is no answer of an mrol server
 """
 
+import re
 from collections.abc import Mapping
+from reprlib import Repr
 from types import MappingProxyType
 from typing import Any
 
 EXCERPT_MAX = 200
 """Characters of a value that a message shows."""
 
+_ITEMS_MAX = 40
+_NESTING_MAX = 4
+
+
+class _Excerpt(Repr):
+    """Writes what is long in part: a list of a million numbers would take as long to write as to send."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel = _NESTING_MAX
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxfrozenset = self.maxdeque = self.maxarray = _ITEMS_MAX
+        self.maxstring = self.maxother = EXCERPT_MAX + 3
+
+    def repr1(self, x: Any, level: int) -> str:
+        if isinstance(x, int) and x.bit_length() > 4 * EXCERPT_MAX:
+            # Python refuses to write numbers of thousands of digits.
+            return f"a number of {x.bit_length()} bits"
+        if isinstance(x, bytes | bytearray):
+            return repr(x[: EXCERPT_MAX + 3])
+        return super().repr1(x, level)
+
 
 def excerpt(value: object) -> str:
     """A value as a message shows it: in one line, and cut where it is long."""
-    text = repr(value)
+    try:
+        text = re.sub(r"\s*\n\s*", " ", _Excerpt().repr(value))
+    except Exception:
+        # Whatever an object's own `__repr__` raises.
+        text = f"an object of {type(value).__name__}"
     return text if len(text) <= EXCERPT_MAX else f"{text[:EXCERPT_MAX]}..."
 
 

@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import F64, as_numbers
-from ._fields import Fields
+from ._fields import Fields, reading
 from .errors import ArgumentError, excerpt
 
 NORM_TOLERANCE = 1e-3
 """How far the norm of a quaternion may be from 1, and the columns of a rotation from unit vectors at right angles."""
+
+UNIT_QUATERNION = "a unit quaternion qx qy qz qw, finite numbers of shape (4,)"
 
 EXPECTED = "a Pose, a 4 x 4 matrix, (t, q) of x y z and qx qy qz qw, or seven numbers x y z qx qy qz qw"
 
@@ -27,6 +29,15 @@ class Pose:
     translation_m: F64
     rotation_xyzw: F64
 
+    def __post_init__(self) -> None:
+        translation = _part(self.translation_m, "translation_m", "x y z in meters, finite numbers of shape (3,)", 3)
+        rotation = _part(self.rotation_xyzw, "rotation_xyzw", UNIT_QUATERNION, 4)
+        if not abs(float(np.linalg.norm(rotation)) - 1) <= NORM_TOLERANCE:
+            raise ArgumentError("rotation_xyzw", excerpt(self.rotation_xyzw), UNIT_QUATERNION)
+        # Whoever changes the arrays afterwards changes no pose.
+        object.__setattr__(self, "translation_m", translation)
+        object.__setattr__(self, "rotation_xyzw", rotation)
+
     @classmethod
     def identity(cls) -> "Pose":
         """The pose of a frame in itself."""
@@ -41,7 +52,7 @@ class Pose:
         if isinstance(value, Pose):
             return value
         seven = _seven_of(value, argument)
-        return cls(_frozen(seven[:3]), _frozen(seven[3:]))
+        return cls(seven[:3], seven[3:])
 
     @property
     def matrix(self) -> F64:
@@ -53,8 +64,12 @@ class Pose:
 
     def apply(self, points: ArrayLike) -> F64:
         """Points of shape (..., 3), carried into the other frame."""
-        given = np.asarray(points, np.float64)
-        carried: F64 = given @ _rotation_of(self.rotation_xyzw).T + self.translation_m
+        expected = "points x y z, an array of numbers of shape (..., 3)"
+        array = as_numbers(points, "points", expected)
+        if array.ndim == 0 or array.shape[-1] != 3:
+            raise ArgumentError("points", f"shape {array.shape}", expected)
+        with np.errstate(all="ignore"):
+            carried: F64 = array.astype(np.float64) @ _rotation_of(self.rotation_xyzw).T + self.translation_m
         return carried
 
     def inverse(self) -> "Pose":
@@ -63,6 +78,8 @@ class Pose:
 
     def __matmul__(self, other: "Pose") -> "Pose":
         """`a_from_b @ b_from_c` is `a_from_c`."""
+        if not isinstance(other, Pose):
+            raise ArgumentError("the pose on the right", excerpt(other), "a Pose: Pose.of makes one")
         return Pose.of(self.matrix @ other.matrix)
 
     def seven(self) -> list[float]:
@@ -82,14 +99,15 @@ PoseLike = Union[Pose, ArrayLike, tuple[ArrayLike, ArrayLike]]
 def pose_in(fields: Fields, name: str) -> Pose:
     """A pose of an answer."""
     pose = fields.object(name)
-    return Pose(pose.numbers("translation_m", (3,)), pose.numbers("rotation_xyzw", (4,)))
+    with reading(name):
+        return Pose(pose.numbers("translation_m", (3,)), pose.numbers("rotation_xyzw", (4,)))
 
 
 def sevens_of(matrices: NDArray[Any], argument: str) -> F64:
     """Matrices of shape (..., 4, 4) as numbers x y z qx qy qz qw of shape (..., 7)."""
-    given = matrices.astype(np.float64)
-    rotations = given[..., :3, :3]
     with np.errstate(all="ignore"):
+        given = matrices.astype(np.float64)
+        rotations = given[..., :3, :3]
         squares = np.swapaxes(rotations, -1, -2) @ rotations
         is_rotation = (np.abs(squares - np.eye(3)) <= 2 * NORM_TOLERANCE).all(axis=(-1, -2))
         is_rotation &= np.linalg.det(rotations) > 0
@@ -103,8 +121,9 @@ def sevens_of(matrices: NDArray[Any], argument: str) -> F64:
 def _seven_of(value: Any, argument: str) -> F64:
     if isinstance(value, tuple | list) and len(value) == 2:
         parts = [as_numbers(part, argument, EXPECTED) for part in value]
-        if [part.shape for part in parts] != [(3,), (4,)]:
-            raise ArgumentError(argument, excerpt(value), EXPECTED)
+        shapes = [part.shape for part in parts]
+        if shapes != [(3,), (4,)]:
+            raise ArgumentError(argument, f"shapes {shapes[0]} and {shapes[1]}", EXPECTED)
         array = np.concatenate(parts)
     else:
         array = as_numbers(value, argument, EXPECTED)
@@ -112,8 +131,9 @@ def _seven_of(value: Any, argument: str) -> F64:
         return sevens_of(array, argument)
     if array.shape != (7,):
         raise ArgumentError(argument, f"shape {array.shape}", EXPECTED)
-    seven: F64 = array.astype(np.float64)
-    norm = float(np.linalg.norm(seven[3:]))
+    with np.errstate(all="ignore"):
+        seven: F64 = array.astype(np.float64)
+        norm = float(np.linalg.norm(seven[3:]))
     if not np.isfinite(seven).all() or abs(norm - 1) > NORM_TOLERANCE:
         raise ArgumentError(argument, excerpt(seven.tolist()), "finite, with a unit quaternion x y z w")
     seven[3:] /= norm
@@ -150,7 +170,13 @@ def _quaternions_of(rotations: F64) -> F64:
     return np.asarray(quaternions.reshape(*rotations.shape[:-2], 4), np.float64)
 
 
-def _frozen(numbers: F64) -> F64:
-    numbers = np.array(numbers)
-    numbers.setflags(write=False)
-    return numbers
+def _part(numbers: ArrayLike, argument: str, expected: str, length: int) -> F64:
+    array = as_numbers(numbers, argument, expected)
+    if array.shape != (length,):
+        raise ArgumentError(argument, f"shape {array.shape}", expected)
+    with np.errstate(all="ignore"):
+        part = array.astype(np.float64)
+    if not np.isfinite(part).all():
+        raise ArgumentError(argument, excerpt(numbers), expected)
+    part.setflags(write=False)
+    return part

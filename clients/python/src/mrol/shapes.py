@@ -55,7 +55,7 @@ class Sphere:
 
     def json(self, argument: str) -> dict[str, Any]:
         """The shape as the server's JSON has it."""
-        center_m = vector_of(self.center_m, 3, f"{argument}.center_m")
+        center_m = vector_of(self.center_m, 3, f"{argument}.center_m", is_finite=True)
         return {"center_m": center_m, "radius_m": number_of(self.radius_m, f"{argument}.radius_m")}
 
 
@@ -69,7 +69,7 @@ class OrientedBox:
     def json(self, argument: str) -> dict[str, Any]:
         """The shape as the server's JSON has it."""
         pose = Pose.of(self.map_from_box, f"{argument}.map_from_box")
-        return {"map_from_box": pose.json(), "size_m": vector_of(self.size_m, 3, f"{argument}.size_m")}
+        return {"map_from_box": pose.json(), "size_m": vector_of(self.size_m, 3, f"{argument}.size_m", is_finite=True)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,8 @@ class Prism:
     def json(self, argument: str) -> dict[str, Any]:
         """The shape as the server's JSON has it."""
         expected = "corners of shape (n, 2)"
-        corners: F64 = as_numbers(self.corners_m, f"{argument}.corners_m", expected).astype(np.float64)
+        with np.errstate(all="ignore"):
+            corners: F64 = as_numbers(self.corners_m, f"{argument}.corners_m", expected).astype(np.float64)
         if corners.ndim != 2 or corners.shape[1] != 2 or not np.isfinite(corners).all():
             raise ArgumentError(f"{argument}.corners_m", excerpt(self.corners_m), expected)
         z_from_m, z_to_m = number_of(self.z_from_m, f"{argument}.z_from_m"), number_of(self.z_to_m, f"{argument}.z_to_m")
@@ -94,6 +95,16 @@ BoxLike = Union[Box, ArrayLike]
 Shape = Union[Box, Sphere, OrientedBox, Prism]
 
 WORDS: dict[type, str] = {Box: "box", Sphere: "sphere", OrientedBox: "oriented_box", Prism: "prism"}
+KINDS = {word: kind for kind, word in WORDS.items()}
+
+
+def shape_of(value: Any, argument: str) -> Any:
+    """What an argument named by a kind of shape means: corners are a box, a center and a radius a sphere."""
+    if argument == "box":
+        return Box.of(value)
+    if argument == "sphere" and isinstance(value, tuple) and len(value) == 2:
+        return Sphere(*value)
+    return value
 
 
 def shape_json(shape: Shape, argument: str, kinds: tuple[type, ...]) -> dict[str, Any]:

@@ -23,29 +23,11 @@ class Address:
     @classmethod
     def parse(cls, text: str, prefer_tls: bool = False) -> "Address":
         """The address that a text names; without a scheme it is https where `prefer_tls` is true."""
-        if not isinstance(text, str):
-            raise ArgumentError("address", excerpt(text), EXPECTED)
-        if text.startswith("unix:"):
-            path = text.removeprefix("unix:")
-            path = path.removeprefix("//")
-            if not path or "\0" in path:
-                raise ArgumentError("address", excerpt(text), EXPECTED)
-            return cls("localhost", 0, False, path)
-        # Parsing an address drops ends of lines silently.
-        if not text.isprintable() or " " in text:
-            raise ArgumentError("address", excerpt(text), EXPECTED)
-        has_scheme = "://" in text
-        scheme = "https" if prefer_tls else "http"
-        try:
-            parts = urlsplit(text if has_scheme else f"{scheme}://{text}")
-            port = parts.port
-        except ValueError as error:
-            raise ArgumentError("address", excerpt(text), EXPECTED) from error
-        is_whole = parts.path in ("", "/") and not parts.query and not parts.fragment and not parts.username
-        host = parts.hostname
-        if parts.scheme not in ("http", "https") or not host or not is_whole:
-            raise ArgumentError("address", excerpt(text), EXPECTED)
-        return cls(host, PORT if port is None else port, parts.scheme == "https")
+        found = _parsed(text, prefer_tls) if isinstance(text, str) else None
+        if found is None:
+            # Here no exception has a part of the address in it any more.
+            raise ArgumentError("address", shown_address(text), EXPECTED)
+        return found
 
     @property
     def authority(self) -> str:
@@ -59,3 +41,31 @@ class Address:
         if self.socket_path is not None:
             return f"unix:{self.socket_path}"
         return f"{'https' if self.is_tls else 'http'}://{self.authority}"
+
+
+def shown_address(address: object) -> str:
+    """An address as a message shows it: without what stands before an `@` or behind a `?`, where passwords and keys are put."""
+    if not isinstance(address, str):
+        return f"an object of {type(address).__name__}"
+    _, at, host = address.rpartition("@")
+    place, question, _ = host.partition("?")
+    return excerpt(f"{'...@' if at else ''}{place}{'?...' if question else ''}")
+
+
+def _parsed(text: str, prefer_tls: bool) -> Address | None:
+    if text.startswith("unix:"):
+        path = text.removeprefix("unix:").removeprefix("//")
+        return Address("localhost", 0, False, path) if path and "\0" not in path else None
+    # Parsing an address drops ends of lines silently.
+    if not text.isprintable() or " " in text:
+        return None
+    scheme = "https" if prefer_tls else "http"
+    try:
+        parts = urlsplit(text if "://" in text else f"{scheme}://{text}")
+        port, host = parts.port, parts.hostname
+    except ValueError:
+        return None
+    is_whole = parts.path in ("", "/") and not parts.query and not parts.fragment and "@" not in parts.netloc
+    if parts.scheme not in ("http", "https") or not host or not is_whole:
+        return None
+    return Address(host, PORT if port is None else port, parts.scheme == "https")

@@ -203,7 +203,7 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
     try:
         if address.socket_path is not None:
             return _unix(address.socket_path, timeout_s)
-        sock = socket.create_connection((address.host, address.port), timeout_s)
+        sock = _tcp(address.host, address.port, deadline)
     except TimeoutError as error:
         raise ConnectFailed(f"cannot connect to {address}: no answer within {timeout_s:.3g} s") from error
     except (OSError, ValueError) as error:
@@ -218,6 +218,34 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
     except BaseException:
         sock.close()
         raise
+
+
+def _tcp(host: str, port: int, deadline: Deadline) -> socket.socket:
+    """A connection to the first address of a host that takes one, within one deadline for all of them.
+
+    Each has its share of the time that is left, since one that answers nothing would leave none for those behind it.
+    """
+    places = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    failed: OSError | None = None
+    for number, (family, kind, protocol, _, place) in enumerate(places):
+        try:
+            sock = socket.socket(family, kind, protocol)
+        except OSError as error:
+            # A family of addresses that the system has not.
+            failed = error
+            continue
+        try:
+            sock.settimeout(deadline.remaining_s() / (len(places) - number))
+            sock.connect(place)
+        except OSError as error:
+            sock.close()
+            failed = error
+        except BaseException:
+            sock.close()
+            raise
+        else:
+            return sock
+    raise failed or OSError(f"{host} has no address")
 
 
 def _unix(path: str, timeout_s: float) -> socket.socket:

@@ -3,6 +3,7 @@
 import math
 from time import monotonic
 
+from .._arrays import number_of
 from ..errors import ArgumentError, TimedOut, excerpt
 
 TIMEOUT_MAX_S = 10 * 365 * 86_400.0
@@ -10,10 +11,14 @@ TIMEOUT_MAX_S = 10 * 365 * 86_400.0
 
 
 def seconds(value: object, argument: str) -> float:
-    """A time in seconds that is a number above 0."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value) or value <= 0:
-        raise ArgumentError(argument, excerpt(value), "a number of seconds above 0")
-    return min(float(value), TIMEOUT_MAX_S)
+    """A time in seconds that is a number above 0; an infinite one is the longest there is."""
+    expected = "a number of seconds above 0"
+    if isinstance(value, float) and value == math.inf:
+        return TIMEOUT_MAX_S
+    number = number_of(value, argument, expected)
+    if number <= 0:
+        raise ArgumentError(argument, excerpt(value), expected)
+    return min(number, TIMEOUT_MAX_S)
 
 
 class Deadline:

@@ -2,24 +2,29 @@
 
 import os
 import ssl
-from threading import Lock
+from collections import deque
+from contextlib import suppress
+from weakref import WeakSet
 
 from .address import Address
 from .connection import Connection
 from .deadline import Deadline
 
 KEPT_MAX = 8
-"""Connections that are kept while nobody uses them."""
+"""Connections that are kept while nobody uses them; one more for each thread that gives one back at the same moment."""
 
 
 class _Connections:
-    """The connections of one process."""
+    """The connections of one process.
+
+    No lock is needed, each change being one of a container's own: so none is held when Ctrl-C comes or another thread forks.
+    """
 
     def __init__(self) -> None:
         self.process = os.getpid()
-        self.lock = Lock()
-        self.kept: list[Connection] = []
-        self.used: set[Connection] = set()
+        self.kept: deque[Connection] = deque()
+        # What nobody refers to any more ends by itself, wherever Ctrl-C may have come between taking it and giving it back.
+        self.used: WeakSet[Connection] = WeakSet()
 
 
 class Pool:
@@ -41,51 +46,41 @@ class Pool:
         """
         of_process = self._of_process()
         while may_be_kept:
-            with of_process.lock:
-                if not of_process.kept:
-                    break
+            try:
                 connection = of_process.kept.pop()
-                of_process.used.add(connection)
+            except IndexError:
+                break
+            of_process.used.add(connection)
             if connection.is_reusable:
                 return connection, True
-            self._drop(of_process, connection)
+            of_process.used.discard(connection)
+            connection.close()
         connection = Connection(self.address, self._tls, deadline)
-        with of_process.lock:
-            of_process.used.add(connection)
+        of_process.used.add(connection)
         return connection, False
 
     def give_back(self, connection: Connection) -> None:
         """Keeps a connection for the next request, or closes it where it is of no use."""
         of_process = self._of_process()
-        with of_process.lock:
-            of_process.used.discard(connection)
-            is_kept = len(of_process.kept) < KEPT_MAX and connection.is_reusable
-            if is_kept:
-                of_process.kept.append(connection)
-        if not is_kept:
+        of_process.used.discard(connection)
+        if connection.is_reusable and len(of_process.kept) < KEPT_MAX:
+            of_process.kept.append(connection)
+        else:
             connection.close()
 
     def close(self) -> None:
         """Closes the connections that nobody uses; others are closed when they are given back."""
         of_process = self._of_process()
-        with of_process.lock:
-            kept, of_process.kept = of_process.kept, []
-        for connection in kept:
-            connection.close()
+        with suppress(IndexError):
+            while True:
+                of_process.kept.pop().close()
 
     def _of_process(self) -> _Connections:
         found = self._connections
         if found.process != os.getpid():
-            # The lock may be held by a thread that this process has not. Should two threads come here at once, one makes
-            # connections that are used once and closed.
+            # Should two threads come here at once, one makes connections that are used once and closed.
             inherited, self._connections = found, _Connections()
             found = self._connections
             for connection in [*inherited.kept, *inherited.used]:
                 connection.close()
         return found
-
-    @staticmethod
-    def _drop(of_process: _Connections, connection: Connection) -> None:
-        with of_process.lock:
-            of_process.used.discard(connection)
-        connection.close()

@@ -1,31 +1,38 @@
 """How the server's certificate is checked, and which one is shown to it."""
 
 import ssl
-from os import PathLike, fspath
 
-from ..errors import ArgumentError, excerpt
-
-Path = str | PathLike[str]
+from .._files import File, path_of_secret, shown_path
+from ..errors import ArgumentError
 
 
-def tls_context(ca: Path | None, client_cert: Path | None, client_key: Path | None) -> ssl.SSLContext:
+def tls_context(ca: File | None, client_cert: File | None, client_key: File | None) -> ssl.SSLContext:
     """The settings of TLS: authorities that the system trusts, or those of the file `ca` alone (PEM)."""
     if client_key is not None and client_cert is None:
-        raise ArgumentError("client_key", excerpt(fspath(client_key)), "given with client_cert")
+        raise ArgumentError("client_key", shown_path(client_key), "given with client_cert")
     context = _with_authorities(ca)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
-    if client_cert is not None:
-        try:
-            context.load_cert_chain(client_cert, client_key)
-        except (OSError, ssl.SSLError) as error:
-            given = f"{excerpt(fspath(client_cert))}: {error}"
-            raise ArgumentError("client_cert", given, "a certificate (PEM) whose key is in it or in client_key") from error
-    return context
-
-
-def _with_authorities(ca: Path | None) -> ssl.SSLContext:
+    if client_cert is None:
+        return context
+    expected = "a certificate (PEM) whose key is in it or in client_key"
+    cert = path_of_secret(client_cert, "client_cert", expected)
+    key = None if client_key is None else path_of_secret(client_key, "client_key", "the key of client_cert (PEM)")
     try:
-        return ssl.create_default_context(cafile=ca)
+        context.load_cert_chain(cert, key)
+    except (OSError, ssl.SSLError) as error:
+        wrong = error.strerror or str(error)
+    else:
+        return context
+    # Here no exception has a path in it any more: one may be the key itself, in the place of its file's name.
+    raise ArgumentError("client_cert", f"{shown_path(cert)}: {wrong}", expected)
+
+
+def _with_authorities(ca: File | None) -> ssl.SSLContext:
+    expected = "a file of certificates (PEM)"
+    path = None if ca is None else path_of_secret(ca, "ca", expected)
+    try:
+        return ssl.create_default_context(cafile=path)
     except (OSError, ssl.SSLError) as error:
         assert ca is not None
-        raise ArgumentError("ca", f"{excerpt(fspath(ca))}: {error}", "a file of certificates (PEM)") from error
+        wrong = error.strerror or str(error)
+    raise ArgumentError("ca", f"{shown_path(ca)}: {wrong}", expected)

@@ -10,7 +10,7 @@ from .._arrays import F32, number_of
 from .._bits import blocks_of, voxels_of
 from .._fields import reading
 from .._transport.request import BYTES, Answer, Parameter, Request
-from ..shapes import BoxLike, OrientedBox
+from ..shapes import Box, BoxLike, OrientedBox
 from ..version import Version, Versioned, whole_header
 from .handle import MapHandle, level_of
 from .region import region_parameters
@@ -72,11 +72,13 @@ class BlockOperations(MapHandle):
 
         Raises `ResourceExhausted` (`block_too_large`), `InvalidArgument` (`bad_cap`, `bad_region`).
         """
+        # Without a box all of the map would be meant, whose field has no bounds.
+        checked = box if isinstance(box, OrientedBox) else Box.of(box)
         parameters: dict[str, Parameter] = {
             "form": "dense",
             "level": level_of(level),
             "cap_m": None if cap_m is None else number_of(cap_m, "cap_m"),
-            **region_parameters(box),
+            **region_parameters(checked),
         }
         answer = self._block(parameters)
         with reading("the block"):
@@ -99,6 +101,6 @@ class BlockOperations(MapHandle):
 
 def _three(answer: Answer, name: str) -> list[int]:
     numbers = [int(number) for number in (answer.header(name) or "").split(",")]
-    if len(numbers) != 3:
+    if len(numbers) != 3 or (name == "mrol-size" and min(numbers) < 0):
         raise ValueError(f"{name}: {numbers}")
     return numbers

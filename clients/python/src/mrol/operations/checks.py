@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import F32, Bools, counts_of, number_of, rows_of
 from .._question import I32, Arrays, Names, QuestionAnswer
 from ..body import Body, BodyLike, ConfigurationsLike, configurations_of
-from ..errors import ArgumentError, BadAnswer
+from ..errors import ArgumentError, BadAnswer, excerpt
 from ..shapes import Box, OrientedBox, Shape, Sphere, shape_json
 from ..version import Version, Versioned
 from .handle import MapHandle, asked, word_of
@@ -141,10 +141,19 @@ class CheckOperations(MapHandle):
 
 def obstacles_of(ignored: Sequence[Shape], unknown: str) -> dict[str, Any]:
     """What counts as an obstacle, as the head of a question has it."""
-    if isinstance(ignored, Box | Sphere | OrientedBox):
-        ignored = [ignored]
-    shapes = [shape_json(shape, f"ignored[{number}]", (Box, Sphere, OrientedBox)) for number, shape in enumerate(ignored)]
+    kinds = (Box, Sphere, OrientedBox)
+    kinds = (Box, Sphere, OrientedBox)
+    shapes = [shape_json(shape, f"ignored[{number}]", kinds) for number, shape in enumerate(ignored_shapes(ignored))]
     return {"ignored": shapes or None, "unknown": word_of(unknown, "unknown")}
+
+
+def ignored_shapes(ignored: object) -> Sequence[Any]:
+    """The shapes of the argument `ignored`: a sequence of them, or one alone."""
+    if isinstance(ignored, Box | Sphere | OrientedBox):
+        return [ignored]
+    if not isinstance(ignored, Sequence) or isinstance(ignored, str | bytes):
+        raise ArgumentError("ignored", excerpt(ignored), "a sequence of Box, Sphere and OrientedBox")
+    return ignored
 
 
 def _check_of(answer: str, clearance_max_m: float | None) -> dict[str, Any]:
@@ -173,5 +182,6 @@ def _collisions(answer: QuestionAnswer, told: str, shape: tuple[int, ...]) -> Co
         clearances = Clearances(
             answer.floats("clearances_m", count).reshape(shape), answer.numbers("nearest_links", count).reshape(shape)
         )
-    colliding = answer.bits("colliding", count).reshape(shape)
-    return Collisions(Version.of(head), colliding, head.whole("colliding_count"), hits, clearances)
+    colliding_count = head.whole("colliding_count")
+    colliding = answer.bits("colliding", count, colliding_count).reshape(shape)
+    return Collisions(Version.of(head), colliding, colliding_count, hits, clearances)

@@ -11,7 +11,7 @@ from .._fields import Fields, fields_of
 from .._sessions import new_request_id
 from .._transport.request import Parameter
 from ..errors import ArgumentError, MrolError, is_outcome_unknown
-from ..shapes import Box, BoxLike, OrientedBox, Sphere
+from ..shapes import KINDS, BoxLike, OrientedBox, Sphere, shape_json, shape_of
 from ..version import Version, Versioned
 from .handle import MapHandle, level_of, word_of
 from .occupancy import POINTS
@@ -66,7 +66,7 @@ class DeletionOperations(MapHandle):
         try:
             if points is not None:
                 return _deletion(self._delete_points(points, common))
-            target = {"voxels": _indices(voxels)} if voxels is not None else _region(box, sphere, oriented_box)
+            target = {"voxels": _indices(voxels)} if voxels is not None else _region(given[0], of_region[given[0]])
             return _deletion(self._send_json("POST", ("deletions",), {**target, **common}))
         except MrolError as error:
             if is_outcome_unknown(error):
@@ -78,20 +78,8 @@ class DeletionOperations(MapHandle):
         return fields_of(self._send_bytes("deletions", [raw(rows)], common).body)
 
 
-def _region(
-    box: BoxLike | None, sphere: Sphere | tuple[ArrayLike, float] | None, oriented_box: OrientedBox | None
-) -> dict[str, Any]:
-    if box is not None:
-        return {"box": Box.of(box).json("box")}
-    if sphere is not None:
-        if isinstance(sphere, tuple) and len(sphere) == 2:
-            sphere = Sphere(*sphere)
-        if not isinstance(sphere, Sphere):
-            raise ArgumentError("sphere", repr(sphere), "a Sphere, or a center and a radius")
-        return {"sphere": sphere.json("sphere")}
-    if not isinstance(oriented_box, OrientedBox):
-        raise ArgumentError("oriented_box", repr(oriented_box), "an OrientedBox")
-    return {"oriented_box": oriented_box.json("oriented_box")}
+def _region(argument: str, value: object) -> dict[str, Any]:
+    return shape_json(shape_of(value, argument), argument, (KINDS[argument],))
 
 
 def _indices(voxels: ArrayLike | None) -> list[list[int]]:

@@ -83,10 +83,18 @@ def flag_of(value: object, argument: str) -> bool:
 
 def word_of(value: object, argument: str) -> str:
     """A name; the server knows its rules. An empty one, or one that is a path, would name another resource."""
-    if not isinstance(value, str) or not value or value in (".", ".."):
+    word = text_of(value, argument, "a name")
+    if word in ("", ".", ".."):
         raise ArgumentError(argument, excerpt(value), "a name")
+    return word
+
+
+def text_of(value: object, argument: str, expected: str = "text") -> str:
+    """Text that can be sent."""
+    if not isinstance(value, str):
+        raise ArgumentError(argument, excerpt(value), expected)
     try:
         value.encode()
     except UnicodeEncodeError as error:
-        raise ArgumentError(argument, excerpt(value), "a name") from error
+        raise ArgumentError(argument, excerpt(value), expected) from error
     return value

@@ -1,7 +1,7 @@
 """Named parts of space where no robot may go."""
 
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timezone
 
 from numpy.typing import ArrayLike
 
@@ -10,9 +10,11 @@ from .._fields import Fields, fields_of
 from .._sessions import new_request_id
 from .._transport.request import Request
 from ..errors import ArgumentError, MrolError, excerpt, is_outcome_unknown
-from ..shapes import Box, BoxLike, OrientedBox, Prism, Shape, Sphere, shape_in, shape_json
+from ..shapes import KINDS, BoxLike, OrientedBox, Prism, Shape, Sphere, shape_in, shape_json, shape_of
 from ..version import Version, Versioned
 from .handle import MapHandle, word_of
+
+EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +65,12 @@ class KeepOutOperations(MapHandle):
 
         Raises `InvalidArgument` (`bad_keep_out`, `bad_expiry`), `ResourceExhausted` (`too_many_keep_outs`).
         """
-        if sphere is not None and isinstance(sphere, tuple) and len(sphere) == 2:
-            sphere = Sphere(*sphere)
-        shapes = [None if box is None else Box.of(box), sphere, oriented_box, prism]
-        given = [shape for shape in shapes if shape is not None]
+        shapes = {"box": box, "sphere": sphere, "oriented_box": oriented_box, "prism": prism}
+        given = {argument: shape for argument, shape in shapes.items() if shape is not None}
         if len(given) != 1:
-            raise ArgumentError("the shape", f"{len(given)} shapes", "exactly one of box, sphere, oriented_box and prism")
-        shape = shape_json(given[0], "the shape", (Box, Sphere, OrientedBox, Prism))
+            raise ArgumentError("the shape", " and ".join(given) or "nothing", "exactly one of box, sphere, oriented_box and prism")
+        ((argument, value),) = given.items()
+        shape = shape_json(shape_of(value, argument), argument, (KINDS[argument],))
         identity = {"request_id": new_request_id() if request_id is None else word_of(request_id, "request_id")}
         expiry = {"expires_at_ns": None if expires_at is None else _nanoseconds(expires_at)}
         try:
@@ -112,8 +113,13 @@ def _keep_out(fields: Fields) -> KeepOut:
 
 
 def _nanoseconds(moment: datetime | int) -> int:
-    if isinstance(moment, datetime):
-        if moment.tzinfo is None:
-            raise ArgumentError("expires_at", excerpt(moment), "a time with a zone: datetime.now(timezone.utc) + ...")
-        return int(moment.timestamp()) * 1_000_000_000 + moment.microsecond * 1000
-    return whole_of(moment, "expires_at", -(1 << 63), (1 << 63) - 1)
+    if not isinstance(moment, datetime):
+        return _in_range(moment)
+    if moment.tzinfo is None:
+        raise ArgumentError("expires_at", excerpt(moment), "a time with a zone: datetime.now(timezone.utc) + ...")
+    since = moment - EPOCH
+    return _in_range(((since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds) * 1000)
+
+
+def _in_range(nanoseconds: object) -> int:
+    return whole_of(nanoseconds, "expires_at", -(1 << 63), (1 << 63) - 1)

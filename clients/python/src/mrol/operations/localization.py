@@ -83,8 +83,8 @@ class LocalizationOperations(MapHandle):
             raise ArgumentError("gravity_in_map", "no gravity_in_sensor", "given with gravity_in_sensor")
         corners = None if search_box is None else Box.of(search_box, "search_box").corners("search_box")
         parameters: dict[str, Parameter] = {
-            "gravity": None if gravity_in_sensor is None else numbers_text(vector_of(gravity_in_sensor, 3, "gravity_in_sensor")),
-            "map_gravity": None if gravity_in_map is None else numbers_text(vector_of(gravity_in_map, 3, "gravity_in_map")),
+            "gravity": None if gravity_in_sensor is None else _direction(gravity_in_sensor, "gravity_in_sensor"),
+            "map_gravity": None if gravity_in_map is None else _direction(gravity_in_map, "gravity_in_map"),
             "search_box": None if corners is None else numbers_text([*corners[0], *corners[1]]),
             "time_limit_s": None if time_limit_s is None else number_of(time_limit_s, "time_limit_s"),
             "candidates": None if candidates is None else whole_of(candidates, "candidates", 1, (1 << 32) - 1),
@@ -102,6 +102,10 @@ class LocalizationOperations(MapHandle):
             search_ms=fields.number("search_ms"),
             points_skipped=fields.whole("points_skipped"),
         )
+
+
+def _direction(vector: ArrayLike, argument: str) -> str:
+    return numbers_text(vector_of(vector, 3, argument, is_finite=True))
 
 
 def _candidate(fields: Fields) -> Candidate:

@@ -4,16 +4,15 @@ import mmap
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from os import PathLike, fspath
-from tempfile import NamedTemporaryFile
-from typing import IO, Union
+from typing import IO
 
 from .._fields import fields_of
+from .._files import File, path_of_file, replacing
 from .._transport.caller import Body, Caller
-from .._transport.deadline import Deadline
+from .._transport.deadline import Deadline, seconds
 from .._transport.request import BYTES, Request
 from ..errors import ArgumentError, ConnectionLost, excerpt
-from ..progress import Progress, Told, progress_of
+from ..progress import Progress, Told, checked_progress, progress_of
 from ..version import Version
 from .description import MapInfo, map_info
 from .handle import MapHandle, flag_of
@@ -24,29 +23,24 @@ FILE_TIMEOUT_S = 600.0
 PIECE_BYTES = 1 << 20
 """Bytes that are read or sent at once."""
 
-File = Union[str, PathLike[str]]
+SOURCE = "the path of a map file, or the bytes of one"
 
 
 class MapFileOperations(MapHandle):
     """Snapshots and restores."""
 
     def snapshot(self, file: File | None = None, *, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S) -> Version:
-        """Writes the map, at one revision, to a map file. A file of that name is replaced once the new one is whole.
+        """Writes the map, at one revision, to a map file.
 
-        `progress` is told how many bytes of how many are there, or shows a bar (True, where tqdm is installed).
+        A file of that name is replaced once the new one is whole and on the disk: its mode and owner stay. A new one has the mode
+        that the umask leaves. Of a symbolic link that is replaced which it leads to.
+        `progress` is told how many bytes of how many are there, or shows a bar (True, where tqdm is installed). What it raises ends
+        the call, and leaves what was there.
         """
-        if file is None:
-            file = f"{self._name}.mrol"
-        folder, name = os.path.split(os.path.abspath(fspath(file)))
-        with NamedTemporaryFile(dir=folder, prefix=f".{name}.", delete=False) as written:
-            try:
-                version = self._write(written, progress, timeout_s)
-                written.flush()
-                os.replace(written.name, os.path.join(folder, name))
-            except BaseException:
-                os.unlink(written.name)
-                raise
-        return version
+        path = path_of_file(f"{self._name}.mrol" if file is None else file, "file")
+        checked, file_s = checked_progress(progress), seconds(timeout_s, "timeout_s")
+        with replacing(path, "file") as written:
+            return self._write(written, checked, file_s)
 
     def restore(
         self, source: File | bytes, *, replace: bool = True, progress: Progress = None, timeout_s: float = FILE_TIMEOUT_S
@@ -71,11 +65,12 @@ class MapFileOperations(MapHandle):
 
 def restore(caller: Caller, target: str, source: File | bytes, progress: Progress, timeout_s: float) -> MapInfo:
     """Sends a map file to where a map is made from it."""
+    of_file, checked = caller.with_timeout(timeout_s), checked_progress(progress)
     with _pieces(source) as pieces:
         total = sum(piece.nbytes for piece in pieces)
-        with progress_of(progress, "restore", total) as told:
+        with progress_of(checked, "restore", total) as told:
             request = Request("PUT", target, BYTES, pieces, is_repeatable=False, on_sent=lambda sent: told(sent, total))
-            answer = caller.with_timeout(timeout_s).call(request)
+            answer = of_file.call(request)
     return map_info(fields_of(answer.body))
 
 
@@ -93,12 +88,13 @@ def _copy(body: Body, written: IO[bytes], told: Told, timeout_s: float) -> None:
 @contextmanager
 def _pieces(source: File | bytes) -> Iterator[list[memoryview]]:
     if isinstance(source, bytes | bytearray | memoryview):
-        yield _cut(memoryview(source).cast("B"))
+        yield _cut(_bytes_of(source))
         return
+    path = path_of_file(source, "source", SOURCE)
     try:
-        opened = open(source, "rb")
+        opened = open(path, "rb")
     except OSError as error:
-        raise ArgumentError("source", f"{excerpt(source)}: {error}", "a map file, or the bytes of one") from error
+        raise ArgumentError("source", f"{excerpt(path)}: {error}", SOURCE) from error
     with opened:
         if os.fstat(opened.fileno()).st_size == 0:
             yield []
@@ -112,6 +108,13 @@ def _pieces(source: File | bytes) -> Iterator[list[memoryview]]:
                 # Memory that something still refers to cannot be unmapped.
                 for piece in (*pieces, whole):
                     piece.release()
+
+
+def _bytes_of(source: bytes | bytearray | memoryview) -> memoryview:
+    try:
+        return memoryview(source).cast("B")
+    except (TypeError, ValueError) as error:
+        raise ArgumentError("source", f"{excerpt(source)}: {error}", f"{SOURCE}, which lie together") from error
 
 
 def _cut(whole: memoryview) -> list[memoryview]:

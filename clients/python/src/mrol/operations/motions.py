@@ -75,10 +75,11 @@ class MotionOperations(MapHandle):
             raise BadAnswer(f"{answer.head.whole('motions')} motions were checked, not {count}")
         first_hits = answer.floats("first_hits", count)
         clearances = answer.floats("clearances_m", count) if answer.head.has("clearances_m") else None
+        free = answer.head.whole("free_count")
         return Motions(
             Version.of(answer.head),
-            answer.bits("free", count).reshape(shape),
-            answer.head.whole("free_count"),
+            answer.bits("free", count, free).reshape(shape),
+            free,
             np.where(np.isfinite(first_hits), first_hits, np.float32(np.nan)).reshape(shape),
             None if clearances is None else clearances.reshape(shape),
         )

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import numbers_text, vector_of
 from .._fields import Fields, reading
-from ..errors import ArgumentError
+from ..errors import ArgumentError, excerpt
 from ..pose import Pose, pose_in
 from ..version import Version, Versioned
 from .handle import MapHandle, level_of
@@ -46,14 +46,21 @@ class ObserverOperations(MapHandle):
             raise ArgumentError("point", "both or neither of point and voxel", "the only one of them")
         fields = self._get_fields(
             "observers",
-            point=None if point is None else numbers_text(vector_of(point, 3, "point")),
-            voxel=None if voxel is None else numbers_text(vector_of(voxel, 3, "voxel")),
+            point=None if point is None else numbers_text(vector_of(point, 3, "point", is_finite=True)),
+            voxel=None if voxel is None else numbers_text(_index(voxel)),
             level=level_of(level),
         )
         with reading("voxel"):
             i, j, k = (int(of) for of in fields.numbers("voxel", (3,)))
         scans = tuple(_scan(of) for of in fields.objects("scans"))
         return Observers(Version.of(fields), (i, j, k), scans, fields.flag("older_scans"))
+
+
+def _index(voxel: ArrayLike) -> list[float]:
+    numbers = vector_of(voxel, 3, "voxel", is_finite=True)
+    if any(number != int(number) for number in numbers):
+        raise ArgumentError("voxel", excerpt(voxel), "the index i j k of a voxel, whole numbers")
+    return numbers
 
 
 def _scan(fields: Fields) -> ObservingScan:

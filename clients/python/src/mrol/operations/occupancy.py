@@ -58,7 +58,7 @@ class OccupancyOperations(MapHandle):
             "pose": None if map_from_points is None else numbers_text(Pose.of(map_from_points, "map_from_points").seven()),
             # What stands at its default is not sent: a short query is mostly its address.
             "level": level_of(level) or None,
-            "lookup": word_of(lookup, "lookup") if lookup != "exact" else None,
+            "lookup": _unless(word_of(lookup, "lookup"), "exact"),
             "keep_out": flag_of(keep_out, "keep_out") or None,
             "min_revision": None if min_revision is None else whole_of(min_revision, "min_revision"),
             "map_uuid": None if map_uuid is None else word_of(map_uuid, "map_uuid"),
@@ -67,6 +67,10 @@ class OccupancyOperations(MapHandle):
         with reading("the answer"):
             if whole_header(answer, "mrol-points") != len(rows):
                 raise ValueError("it is of another number of points")
-            occupied = unpacked(answer.body, len(rows)).reshape(shape)
             count = whole_header(answer, "mrol-points-occupied")
+            occupied = unpacked(answer.body, len(rows), count).reshape(shape)
         return Occupancy(Version.of_headers(answer), occupied, count)
+
+
+def _unless(word: str, usual: str) -> str | None:
+    return None if word == usual else word

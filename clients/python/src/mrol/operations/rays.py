@@ -71,10 +71,11 @@ class RayOperations(MapHandle):
         count = len(rows)
         if answer.head.whole("rays") != count:
             raise BadAnswer(f"{answer.head.whole('rays')} rays were cast, not {count}")
+        hits = answer.head.whole("hits")
         return Rays(
             Version.of(answer.head),
-            answer.bits("hit", count).reshape(shape),
-            answer.head.whole("hits"),
+            answer.bits("hit", count, hits).reshape(shape),
+            hits,
             answer.floats("distances_m", count).reshape(shape),
             answer.voxels("voxels", count).reshape(*shape, 3),
             answer.names("keep_outs", count).reshape(shape),

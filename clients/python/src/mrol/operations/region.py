@@ -12,6 +12,7 @@ def region_parameters(box: BoxLike | OrientedBox | None) -> dict[str, Parameter]
         return {}
     if isinstance(box, OrientedBox):
         pose = Pose.of(box.map_from_box, "box.map_from_box")
-        return {"map_from_box": numbers_text(pose.seven()), "size": numbers_text(vector_of(box.size_m, 3, "box.size_m"))}
+        size_m = vector_of(box.size_m, 3, "box.size_m", is_finite=True)
+        return {"map_from_box": numbers_text(pose.seven()), "size": numbers_text(size_m)}
     min_m, max_m = Box.of(box).corners()
     return {"min": numbers_text(min_m), "max": numbers_text(max_m)}

@@ -13,7 +13,7 @@ from ..errors import ArgumentError, MrolError, is_outcome_unknown
 from ..pose import Pose, PoseLike, pose_in
 from ..shapes import Box, BoxLike
 from ..version import Version, Versioned
-from .handle import MapHandle, flag_of, level_of, word_of
+from .handle import MapHandle, flag_of, level_of, text_of, word_of
 from .occupancy import POINTS
 
 Method = Literal["refined", "overlap"]
@@ -123,14 +123,12 @@ class ScanOperations(MapHandle):
         it again with `**error.repeat_with`. Nor is it after Ctrl-C: who ends programs so gives scans ids.
 
         Raises `FailedPrecondition` (`guess_required`: the robot has no pose in a map that is not empty), `Conflict`
-        (`scan_id_taken`), `InvalidArgument`.
+        (`scan_id_taken`), `InvalidArgument`; `ArgumentError` for a scan without `scan_id` after 2**64 - 1 was given as one, since
+        this session has no id behind it: give `session` and `scan_id`, or connect anew.
         """
         of_robot = self._robot if robot is None else word_of(robot, "robot")
-        of_session, number = self._identity(of_robot, session, scan_id)
         parameters: dict[str, Parameter] = {
             "robot": of_robot,
-            "session": of_session,
-            "scan_id": number,
             "recover": None if recover is None else flag_of(recover, "recover"),
             "carve": None if carve is None else flag_of(carve, "carve"),
             "force": flag_of(force, "force"),
@@ -139,6 +137,9 @@ class ScanOperations(MapHandle):
             **_treatment(method, range_min_m, range_max_m, body_m, strict),
         }
         pieces, shape = self._scan(points, point_times, point_times_from_sweep_start, parameters)
+        # Last, so that a scan which is refused here uses no id up.
+        of_session, number = self._identity(of_robot, session, scan_id)
+        parameters |= {"session": of_session, "scan_id": number}
         try:
             answer = self._send_bytes("scans", pieces, parameters)
         except MrolError as error:
@@ -190,7 +191,7 @@ class ScanOperations(MapHandle):
             if scan_id is None:
                 raise ArgumentError("session", "a session without a scan_id", "given with the id of the scan in it")
             # The empty session is one, too.
-            return (word_of(session, "session") if session else ""), whole_of(scan_id, "scan_id")
+            return text_of(session, "session"), whole_of(scan_id, "scan_id")
         own = self._sessions.current()
         given = None if scan_id is None else whole_of(scan_id, "scan_id")
         return own.name, own.next_id(self._name, robot, given)
@@ -225,7 +226,7 @@ def _guesses(guess: PoseLike | None, motion: PoseLike | None, constant_velocity:
 def _knowledge(timestamp_ns: int | None, gravity: ArrayLike | None, covariance: ArrayLike | None) -> dict[str, Parameter]:
     return {
         "timestamp_ns": None if timestamp_ns is None else whole_of(timestamp_ns, "timestamp_ns", -(1 << 63), (1 << 63) - 1),
-        "gravity_in_sensor": None if gravity is None else numbers_text(vector_of(gravity, 3, "gravity_in_sensor")),
+        "gravity_in_sensor": None if gravity is None else numbers_text(vector_of(gravity, 3, "gravity_in_sensor", is_finite=True)),
         "guess_covariance": None if covariance is None else _covariance_text(covariance),
     }
 
@@ -235,7 +236,7 @@ def _covariance_text(covariance: ArrayLike) -> str:
     array = as_numbers(covariance, "guess_covariance", expected)
     if array.shape not in ((6, 6), (36,)):
         raise ArgumentError("guess_covariance", f"shape {array.shape}", expected)
-    return numbers_text(vector_of(array.reshape(36), 36, "guess_covariance"))
+    return numbers_text(vector_of(array.reshape(36), 36, "guess_covariance", is_finite=True))
 
 
 def _treatment(
@@ -295,6 +296,9 @@ def _foreground(fields: Fields, shape: tuple[int, ...]) -> Bools | None:
         return None
     mask: Bools = np.zeros(shape, np.bool_)
     with reading("foreground"):
-        mask.reshape(-1)[places.astype(np.int64)] = True
+        numbers = places.astype(np.int64)
+        if numbers.size and numbers.min() < 0:
+            raise ValueError(f"point {numbers.min()}")
+        mask.reshape(-1)[numbers] = True
     mask.setflags(write=False)
     return mask

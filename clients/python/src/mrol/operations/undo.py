@@ -8,7 +8,7 @@ from .._sessions import new_request_id
 from ..errors import ArgumentError, MrolError, excerpt, is_outcome_unknown
 from ..version import Version, Versioned
 from .deletions import Deletion
-from .handle import MapHandle, word_of
+from .handle import MapHandle, text_of, word_of
 from .scans import ScanAnswer
 
 
@@ -49,7 +49,7 @@ class UndoOperations(MapHandle):
         """
         target = {
             "robot": None if robot is None else word_of(robot, "robot"),
-            "session": session,
+            "session": None if session is None else text_of(session, "session"),
             "scan_id": None if scan_id is None else whole_of(scan_id, "scan_id"),
             "since_revision": None if since_revision is None else whole_of(since_revision, "since_revision"),
             "revision": None if revision is None else whole_of(revision, "revision"),

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import F64, numbers_text, vector_of
 from .._fields import Fields, reading
 from .._transport.request import Parameter
+from ..errors import ArgumentError, excerpt
 from ..pose import Pose, PoseLike
 from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
@@ -90,10 +91,12 @@ class VoxelOperations(MapHandle):
 def _listing(level: int, box: BoxLike | OrientedBox | None, view: View | None, keep_out: bool) -> dict[str, Parameter]:
     of_view: dict[str, Parameter] = {}
     if view is not None:
+        if not isinstance(view, View):
+            raise ArgumentError("view", excerpt(view), "a View")
         of_view = {
             "map_from_camera": numbers_text(Pose.of(view.map_from_camera, "view.map_from_camera").seven()),
-            "fov": numbers_text(vector_of(view.fov_rad, 2, "view.fov_rad")),
-            "range": numbers_text(vector_of(view.range_m, 2, "view.range_m")),
+            "fov": numbers_text(vector_of(view.fov_rad, 2, "view.fov_rad", is_finite=True)),
+            "range": numbers_text(vector_of(view.range_m, 2, "view.range_m", is_finite=True)),
         }
     return {"level": level_of(level), "keep_out": flag_of(keep_out, "keep_out"), **region_parameters(box), **of_view}
 

@@ -9,12 +9,12 @@ from .._protobuf import Message
 from .._transport.caller import Body, Caller
 from .._transport.deadline import Deadline, seconds
 from .._transport.request import Parameter, Request
-from ..errors import BadAnswer, ServerError, excerpt, server_error
-from ..progress import Progress, Told, progress_of
+from ..errors import ArgumentError, BadAnswer, ServerError, excerpt, server_error
+from ..progress import Progress, Told, checked_progress, progress_of
 from ..shapes import BoxLike, OrientedBox
 from ..version import Version, Versioned
 from .following import SILENCE_MAX_S, exactly, following
-from .handle import MapHandle, flag_of, level_of
+from .handle import MapHandle, flag_of, level_of, word_of
 from .region import region_parameters
 from .watched import ChangeParts, Heartbeat, StateParts, WatchedChange, WatchedState, WatchEvent
 
@@ -56,7 +56,7 @@ class WatchOperations(MapHandle):
         where that is not possible, or the map is another one, a `WatchedState` comes again. Without `delta_level` changes are
         the finest voxels as they were recorded; with it, voxels of that level that really appeared and went. `box` leaves other
         voxels out. With `heartbeats` it also tells that nothing has changed (`Heartbeat`). `progress` is told of the bytes of
-        the state.
+        the state; what it raises ends the watch.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
         does not come back within `patience_s`.
@@ -68,11 +68,14 @@ class WatchOperations(MapHandle):
         }
         version = since.version if isinstance(since, Versioned) else since
         if version is not None:
+            if not isinstance(version, Version):
+                raise ArgumentError("since", excerpt(since), "a Version, or an answer with one")
             whole_of(version.revision, "since.revision")
+            word_of(version.map_uuid, "since.map_uuid")
         wants_heartbeats = flag_of(heartbeats, "heartbeats")
         silent_s = seconds(silence_max_s, "silence_max_s")
         # What is wrong with the arguments is said here, and not when the first event is waited for.
-        return self._events(parameters, version, wants_heartbeats, progress, silent_s)
+        return self._events(parameters, version, wants_heartbeats, checked_progress(progress), silent_s)
 
     def _events(
         self,
