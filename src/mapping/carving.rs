@@ -9,7 +9,7 @@
 //! * only where each direction in which the voxel lies was seen to end behind it;
 //! * never at a rim: where a direction beside these was not seen, or ends in front of the voxel on another surface. A surface
 //!   that is seen at a grazing angle is one rim beside the other, so nothing is carved in front of it or from it;
-//! * only as far as the points lie as close to each other as voxels do, and within a range.
+//! * only as far as the points lie as close to each other as voxels do, or half as far again, and within a range.
 
 use super::MappingError;
 use crate::geometry::{Point, Pose};
@@ -30,6 +30,9 @@ pub const CARVING_GRAZING_MAX_DEG: f64 = 80.0;
 const BLOCKS_PER_LOOK: usize = 16;
 /// Samples of a surface are so much closer to each other than its margins are wide, since they lie askew to the voxels.
 const SAMPLE_SHARE: f64 = 0.7;
+
+/// How far from each other the points of a scan may lie, in voxels, where it carves: what is thicker than that was met by one.
+const GAP_MAX_VOXELS: f64 = 1.5;
 
 /// Which voxels a scan carves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,7 +114,7 @@ impl Carving {
 
 /// A scan that carves, where it was found.
 pub(super) struct CarvingScan<'a> {
-    /// Sensor frame, finite.
+    /// All that stood in the way of a ray, the robot itself too (sensor frame, finite).
     pub(super) points: &'a [Point],
     pub(super) record: &'a ScanRecord,
     /// How far the sensor moved while the points were measured, meters.
@@ -146,6 +149,7 @@ impl CarvingScan<'_> {
             lattice: map.lattice(),
             sensor_from_map: self.record.pose.map_from_sensor.inverse(),
             radius_m: (resolution_m * 3f64.sqrt() / 2.0 + self.moved_m) as f32,
+            gap_max_m: (GAP_MAX_VOXELS * resolution_m) as f32,
             settings,
         };
         let candidates = occupied.difference(&solid);
@@ -200,6 +204,8 @@ struct Sight<'a> {
     sensor_from_map: Pose,
     /// Of a ball around a voxel.
     radius_m: f32,
+    /// How far the scan's points may lie from each other there.
+    gap_max_m: f32,
     settings: &'a CarvingSettings,
 }
 
@@ -214,7 +220,7 @@ impl Sight<'_> {
         let offset = offset.coords.map(|c| c as f32).into();
         self.surface.sees_beyond(offset, self.radius_m)
             && !self.is_near_solid(voxel)
-            && self.surface.sees_through(offset, self.radius_m)
+            && self.surface.sees_through(offset, self.radius_m, self.gap_max_m)
     }
 
     /// True of a voxel within the margin of the scan's surface.

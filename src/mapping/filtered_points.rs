@@ -1,68 +1,98 @@
 //! Filtering of a scan's points.
 
-use super::MappingError;
+use super::{MappingError, RayEnds};
 use crate::geometry::Point;
 use crate::map::RobotName;
 use crate::scan::PointFilter;
 
-/// The points of a scan that show its robot's surroundings: finite, and kept by the robot's filter.
+/// The points of a scan, told apart by its robot's filter; those that are not finite are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilteredPoints {
-    /// The points, sensor frame.
-    pub points: Vec<Point>,
-    /// When each was measured, seconds from the scan's timestamp, where the scan tells.
-    pub times_s: Option<Vec<f32>>,
-    /// Up to where points tell that nothing was met, see [`PointFilter::no_return_m`]: none of `points`.
-    pub no_returns: Vec<Point>,
-    /// When each of these was measured, where the scan tells.
-    pub no_return_times_s: Option<Vec<f32>>,
-    /// How many points were left out.
+    /// Those that show the robot's surroundings.
+    surroundings: TimedPoints,
+    /// Up to where points tell that nothing was met, see [`PointFilter::no_return_m`].
+    no_returns: TimedPoints,
+    /// Those of the robot itself, or too near: what lies behind them was not seen.
+    of_robot: TimedPoints,
+    /// How many points do not show the surroundings.
     pub skipped: usize,
     filter: PointFilter,
 }
 
+/// Points, and when each was measured, where the scan tells.
+#[derive(Debug, Clone, PartialEq)]
+struct TimedPoints {
+    points: Vec<Point>,
+    times_s: Option<Vec<f32>>,
+}
+
+impl TimedPoints {
+    /// What `select` makes of the points.
+    fn of(all: RayEnds<'_>, select: impl Fn(Point) -> Option<Point>) -> Self {
+        let points = all.points.iter().filter_map(|&point| select(point)).collect();
+        let times_s = all.times_s.map(|times_s| {
+            let timed = all.points.iter().zip(times_s);
+            timed.filter(|&(&point, _)| select(point).is_some()).map(|(_, &time_s)| time_s).collect()
+        });
+        Self { points, times_s }
+    }
+
+    fn as_ends(&self) -> RayEnds<'_> {
+        RayEnds { points: &self.points, times_s: self.times_s.as_deref() }
+    }
+}
+
 impl FilteredPoints {
-    /// Filters the points of a scan (sensor frame). A point that is not finite means "no return" in every depth camera:
-    /// it is left out, or an error where the scan is `strict`. `times_s` are those of all points, as many as these are.
+    /// Filters the points of a scan. A point that is not finite means "no return" in every depth camera: it is left out, or an error
+    /// where the scan is `strict`.
     ///
     /// # Errors
     /// No point is left, a strict scan has a point that is not finite, or the filter is not valid.
     pub fn of(
-        all: &[Point],
-        times_s: Option<&[f32]>,
+        all: RayEnds<'_>,
         filter: PointFilter,
         robot: &RobotName,
         strict: bool,
     ) -> Result<Self, MappingError> {
-        let points: Vec<Point> = all.iter().copied().filter(|point| point.is_finite()).collect();
-        let not_finite = all.len() - points.len();
+        let points = all.points.len();
+        let not_finite = all.points.iter().filter(|point| !point.is_finite()).count();
         if strict && not_finite > 0 {
-            let index = all.iter().position(|point| !point.is_finite()).unwrap_or_default();
+            let index = all.points.iter().position(|point| !point.is_finite()).unwrap_or_default();
             return Err(MappingError::NotFinite { index, count: not_finite });
         }
-        if points.is_empty() {
-            return Err(MappingError::NoReturns { points: all.len() });
+        if not_finite == points {
+            return Err(MappingError::NoReturns { points });
         }
         let filter = filter.checked()?;
-        let points: Vec<Point> = points.into_iter().filter(|&point| filter.keeps(point)).collect();
-        if points.is_empty() {
+        let finite = |point: Point| point.is_finite().then_some(point);
+        let surroundings = TimedPoints::of(all, |point| finite(point).filter(|&point| filter.keeps(point)));
+        if surroundings.points.is_empty() {
             let filter = filter.to_string();
-            return Err(MappingError::AllFiltered { points: all.len(), filter, robot: robot.clone() });
+            return Err(MappingError::AllFiltered { points, filter, robot: robot.clone() });
         }
-        let of_points = times_s.map(|times_s| {
-            let timed = all.iter().zip(times_s);
-            timed
-                .filter(|&(&point, _)| point.is_finite() && filter.keeps(point))
-                .map(|(_, &time)| time)
-                .collect()
-        });
-        let no_returns = all.iter().filter_map(|&point| filter.no_return(point)).collect();
-        let no_return_times_s = times_s.map(|times_s| {
-            let timed = all.iter().zip(times_s);
-            timed.filter(|&(&point, _)| filter.no_return(point).is_some()).map(|(_, &time)| time).collect()
-        });
-        let skipped = all.len() - points.len();
-        Ok(Self { points, times_s: of_points, no_returns, no_return_times_s, skipped, filter })
+        let skipped = points - surroundings.points.len();
+        Ok(Self {
+            surroundings,
+            no_returns: TimedPoints::of(all, |point| filter.no_return(point)),
+            of_robot: TimedPoints::of(all, |point| finite(point).filter(|&point| filter.is_of_robot(point))),
+            skipped,
+            filter,
+        })
+    }
+
+    /// Those that show the robot's surroundings.
+    pub fn surroundings(&self) -> RayEnds<'_> {
+        self.surroundings.as_ends()
+    }
+
+    /// Up to where points tell that nothing was met.
+    pub fn no_returns(&self) -> RayEnds<'_> {
+        self.no_returns.as_ends()
+    }
+
+    /// Those of the robot itself, or too near.
+    pub fn of_robot(&self) -> RayEnds<'_> {
+        self.of_robot.as_ends()
     }
 
     /// True of a point (sensor frame) that passes the filter.

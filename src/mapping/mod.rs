@@ -10,6 +10,7 @@ mod deskew;
 mod error;
 mod filtered_points;
 mod guess;
+mod ray_ends;
 mod recovery;
 mod sightings;
 mod stationary;
@@ -23,6 +24,7 @@ pub use deskew::{DeskewSettings, deskewed};
 pub use error::MappingError;
 pub use filtered_points::FilteredPoints;
 pub use guess::Guess;
+pub use ray_ends::RayEnds;
 pub use recovery::{LOST_ROBOTS_MAX, LostRobots, Recovered, RecoverySettings, SearchTask};
 pub use sightings::{SIGHTINGS_MAX, Sighting, Sightings};
 pub use stationary::StationarySettings;
@@ -40,6 +42,7 @@ use crate::map::{Committed, MappedScan, MultiResolutionMap, RobotName, ScanRecor
 use crate::util::StopSignal;
 use carving::CarvingScan;
 use recovery::Recovery;
+use viewpoints::SeenScan;
 
 /// Maps scans: finds where each was taken, and adds those that fit to the map.
 ///
@@ -101,10 +104,10 @@ pub struct Scan<'a> {
     /// When each of the points was measured, seconds from `timestamp_ns` (negative before it), where the sensor moved
     /// meanwhile: the scan is deskewed. As many as points; none where they were measured at once.
     pub times_s: Option<&'a [f32]>,
-    /// Up to where nothing was met in other directions (sensor frame, finite): they are seen through, and no voxels.
-    pub no_returns: &'a [Point],
-    /// When each of these was measured, as `times_s`.
-    pub no_return_times_s: Option<&'a [f32]>,
+    /// Up to where nothing was met in other directions: they are seen through, and no voxels.
+    pub no_returns: RayEnds<'a>,
+    /// Where rays ended at the robot itself: no voxels, and what lies behind them was not seen.
+    pub of_robot: RayEnds<'a>,
     /// Points that were left out before, see [`FilteredPoints`].
     pub points_skipped: usize,
     /// Direction of gravity, as an accelerometer tells.
@@ -124,20 +127,25 @@ pub struct Scan<'a> {
 impl<'a> Scan<'a> {
     /// The points in the sensor frame at the scan's timestamp, where the sensor moved with `velocity`.
     fn points_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
-        points_at(self.points, self.times_s, velocity)
+        RayEnds { points: self.points, times_s: self.times_s }.at(velocity)
     }
 
-    /// [`Scan::points_at`] of the directions in which nothing was met.
-    fn no_returns_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
-        points_at(self.no_returns, self.no_return_times_s, velocity)
+    /// [`Scan::points_at`], and where rays ended at the robot itself: all that stood in the way of one.
+    fn met_at(&self, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
+        let mut met = self.points_at(velocity);
+        if !self.of_robot.points.is_empty() {
+            met.to_mut().extend_from_slice(&self.of_robot.at(velocity));
+        }
+        met
     }
 
-    /// How far the sensor moved with `velocity` between the scan's timestamp and the point that is farthest from it in time,
-    /// meters.
+    /// How far the sensor moved with `velocity`, at most, between the scan's timestamp and a ray, meters.
     fn moved_m(&self, velocity: Option<&Twist>) -> f64 {
-        let times_s = self.times_s.unwrap_or_default();
-        let longest_s = times_s.iter().fold(0.0, |longest: f32, time_s| longest.max(time_s.abs()));
-        velocity.map_or(0.0, |velocity| velocity.linear.norm() * f64::from(longest_s))
+        let points = RayEnds { points: self.points, times_s: self.times_s };
+        [points, self.no_returns, self.of_robot]
+            .map(|ends| ends.moved_m(velocity))
+            .into_iter()
+            .fold(0.0, f64::max)
     }
 
     /// What is known of its pose, where it is thought to have been taken at `guess` (map_from_sensor).
@@ -156,8 +164,8 @@ impl<'a> Scan<'a> {
             timestamp_ns: None,
             points,
             times_s: None,
-            no_returns: &[],
-            no_return_times_s: None,
+            no_returns: RayEnds::default(),
+            of_robot: RayEnds::default(),
             points_skipped: 0,
             gravity: None,
             guess: Guess::Last,
@@ -166,14 +174,6 @@ impl<'a> Scan<'a> {
             force: false,
             digest: 0,
         }
-    }
-}
-
-/// Points where they were at the scan's timestamp, where the sensor moved with `velocity`.
-fn points_at<'a>(points: &'a [Point], times_s: Option<&[f32]>, velocity: Option<&Twist>) -> Cow<'a, [Point]> {
-    match times_s.zip(velocity) {
-        Some((times_s, velocity)) => deskewed(points, times_s, velocity).into(),
-        None => points.into(),
     }
 }
 
@@ -346,7 +346,7 @@ impl<'a> ScanMapper<'a> {
         located: &LocatedScan,
         stop: StopSignal<'_>,
     ) -> Result<ScanRecord, MappingError> {
-        let alignment = &located.alignment;
+        let (alignment, velocity) = (&located.alignment, located.velocity.as_ref());
         let pose = MappedScan {
             robot: scan.robot.clone(),
             session: scan.session.clone(),
@@ -361,7 +361,7 @@ impl<'a> ScanMapper<'a> {
             carved_voxels: 0,
             digest: scan.digest,
         };
-        let points = scan.points_at(located.velocity.as_ref());
+        let points = scan.points_at(velocity);
         let mut record = match self.map.settings().moments {
             true => ScanRecord::of_points(pose, &points, self.map.lattice()),
             false => ScanRecord::without_moments(pose, &points, self.map.lattice()),
@@ -370,12 +370,13 @@ impl<'a> ScanMapper<'a> {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });
         }
-        let (viewpoints, settings) = (self.map.viewpoints(), &self.settings.viewpoints);
-        let mut seen = points;
-        if !scan.no_returns.is_empty() {
-            seen.to_mut().extend_from_slice(&scan.no_returns_at(located.velocity.as_ref()));
+        let mut ends = scan.met_at(velocity);
+        if !scan.no_returns.points.is_empty() {
+            ends.to_mut().extend_from_slice(&scan.no_returns.at(velocity));
         }
-        record.viewpoint = settings.viewpoint_of(&seen, &alignment.map_from_sensor, &viewpoints, stop);
+        let (map_from_sensor, moved_m) = (&alignment.map_from_sensor, scan.moved_m(velocity));
+        let seen = SeenScan { points: &ends, map_from_sensor, moved_m };
+        record.viewpoint = self.settings.viewpoints.viewpoint_of(seen, &self.map.viewpoints(), stop);
         if stop.is_stopped() {
             return Err(MappingError::Stopped);
         }
@@ -400,7 +401,7 @@ impl<'a> ScanMapper<'a> {
         let Some(settings) = self.settings.carving.filter(|_| located.is_accepted()) else {
             return Ok(Carving::default());
         };
-        let points = scan.points_at(located.velocity.as_ref());
+        let points = scan.met_at(located.velocity.as_ref());
         let moved_m = scan.moved_m(located.velocity.as_ref());
         CarvingScan { points: &points, record, moved_m }.carve(self.map, &settings, stop)
     }

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::geometry::{Point, Pose};
 use crate::map::ViewpointRecord;
 use crate::util::StopSignal;
-use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange, Viewpoint, ViewpointSet};
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep, Viewpoint, ViewpointSet};
 
 /// Bytes of memory of a map's viewpoints where nobody says: those of thousands.
 pub const VIEWPOINT_BYTES_MAX_DEFAULT: usize = 64 << 20;
@@ -29,8 +29,8 @@ pub struct ViewpointSettings {
     /// A scan from a known pose is new if this share of what it sees was unknown. 0.05: a door that was opened, a robot with
     /// another sensor, what the first rays missed.
     pub unknown_from_known_pose: f64,
-    /// Between which distances a scan is believed to see. 0 to 60 m.
-    pub range: SeenRange,
+    /// What is further away is seen up to here, meters. 60.
+    pub range_max_m: f32,
 }
 
 impl Default for ViewpointSettings {
@@ -41,7 +41,7 @@ impl Default for ViewpointSettings {
             rotation_deg: 15.0,
             unknown_from_new_pose: 0.002,
             unknown_from_known_pose: 0.05,
-            range: SeenRange { min_m: 0.0, max_m: 60.0 },
+            range_max_m: 60.0,
         }
     }
 }
@@ -53,26 +53,37 @@ const ALONG: [f64; 3] = [0.5, 0.75, 0.9];
 /// Viewpoints that are compared when one has to go.
 const COMPARED: usize = 24;
 
+/// What a scan saw, where it was found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SeenScan<'a> {
+    /// Where its rays ended, those at the robot itself and those that met nothing with them (sensor frame, finite).
+    pub(super) points: &'a [Point],
+    pub(super) map_from_sensor: &'a Pose,
+    /// How far the sensor was from there, at most, when a ray was taken, meters.
+    pub(super) moved_m: f64,
+}
+
 impl ViewpointSettings {
-    /// The viewpoint that a scan of `points` (sensor frame) from `map_from_sensor` leaves beside those that are there; none of a scan
-    /// that sees nothing new, and none once `stop` says so.
+    /// The viewpoint that a scan leaves beside those that are there; none of a scan that sees nothing new, and none once `stop` says
+    /// so.
     pub(super) fn viewpoint_of(
         &self,
-        points: &[Point],
-        map_from_sensor: &Pose,
+        scan: SeenScan<'_>,
         viewpoints: &ViewpointSet,
         stop: StopSignal<'_>,
     ) -> Option<ViewpointRecord> {
         if self.bytes_max == 0 {
             return None;
         }
+        let SeenScan { points, map_from_sensor, moved_m } = scan;
+        let sweep = Sweep { range_max_m: self.range_max_m, moved_m: moved_m as f32 };
         let is_known_pose = viewpoints.any_near(map_from_sensor, self.distance_m, self.rotation_deg);
         let least = if is_known_pose { self.unknown_from_known_pose } else { self.unknown_from_new_pose };
         // The image takes a while to make: most scans end here.
-        if self.unknown_to(viewpoints, map_from_sensor, spread(points)) < least {
+        if unknown_to(viewpoints, map_from_sensor, sweep, spread(points)) < least {
             return None;
         }
-        let image = RangeImage::of_points(points, self.range, IMAGE_BYTES_MAX)?;
+        let image = RangeImage::of_points(points, sweep, IMAGE_BYTES_MAX)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
         let unknown = share_unknown(&samples_of(&viewpoint), |point| viewpoints.sees_through(point));
         if unknown < least {
@@ -80,18 +91,6 @@ impl ViewpointSettings {
         }
         let displaced = self.displaced_by(&viewpoint, unknown, viewpoints, stop)?;
         Some(ViewpointRecord { image: viewpoint.image().clone(), displaced })
-    }
-
-    /// The share of what is before `points` that no viewpoint saw.
-    fn unknown_to<'p>(
-        &self,
-        viewpoints: &ViewpointSet,
-        map_from_sensor: &Pose,
-        points: impl Iterator<Item = &'p Point>,
-    ) -> f64 {
-        let seen = points.filter_map(|point| self.range.limited(point.xyz()));
-        let samples: Vec<_> = seen.flat_map(|offset| along(map_from_sensor, offset)).collect();
-        share_unknown(&samples, |point| viewpoints.sees_through(point))
     }
 
     /// The revisions of the viewpoints that go so that `viewpoint` has room, ascending: of some that are compared those that add least.
@@ -142,6 +141,18 @@ impl ViewpointSettings {
     }
 }
 
+/// The share of what is before `points` that no viewpoint saw.
+fn unknown_to<'p>(
+    viewpoints: &ViewpointSet,
+    map_from_sensor: &Pose,
+    sweep: Sweep,
+    points: impl Iterator<Item = &'p Point>,
+) -> f64 {
+    let seen = points.filter_map(|point| sweep.limited(point.xyz()));
+    let samples: Vec<_> = seen.flat_map(|offset| along(map_from_sensor, offset)).collect();
+    share_unknown(&samples, |point| viewpoints.sees_through(point))
+}
+
 /// Some of the points, from all over the scan.
 fn spread(points: &[Point]) -> impl Iterator<Item = &Point> {
     points.iter().step_by(points.len().div_ceil(RAYS).max(1))
@@ -159,7 +170,9 @@ fn along(map_from_sensor: &Pose, offset: [f32; 3]) -> impl Iterator<Item = [f64;
 fn samples_of(viewpoint: &Viewpoint) -> Vec<[f64; 3]> {
     let seen: Vec<_> = viewpoint.image().seen().collect();
     let rays = seen.iter().step_by(seen.len().div_ceil(RAYS).max(1));
-    rays.flat_map(|&offset| along(viewpoint.map_from_sensor(), offset)).collect()
+    let places = rays.flat_map(|&offset| along(viewpoint.map_from_sensor(), offset));
+    // Not all that lies before the end of a ray: from a moving sensor it has to be seen from where others were taken, too.
+    places.filter(|&place| viewpoint.sees_through(place)).collect()
 }
 
 /// The share of places that are not known.
@@ -187,6 +200,10 @@ mod tests {
         (0..720 * 40).map(point).collect()
     }
 
+    fn standing<'a>(points: &'a [Point], map_from_sensor: &'a Pose) -> SeenScan<'a> {
+        SeenScan { points, map_from_sensor, moved_m: 0.0 }
+    }
+
     /// Drives through the room and back; the viewpoints, and how many there were after each scan.
     fn drive(settings: &ViewpointSettings, rounds: usize) -> (ViewpointSet, Vec<usize>) {
         let (mut set, mut counts) = (ViewpointSet::default(), Vec::new());
@@ -195,7 +212,7 @@ mod tests {
         for (revision, x_m) in (0..rounds).flat_map(|_| there.clone().chain(back.clone())).enumerate() {
             let pose = Pose::translation(f64::from(x_m), 0.0, 0.0);
             if let Some(ViewpointRecord { image, displaced }) =
-                settings.viewpoint_of(&scan(x_m), &pose, &set, StopSignal::NEVER)
+                settings.viewpoint_of(standing(&scan(x_m), &pose), &set, StopSignal::NEVER)
             {
                 displaced.iter().for_each(|&gone| assert!(set.remove(gone).is_some()));
                 set.insert(revision as u64, Arc::new(Viewpoint::new(pose, image)));
@@ -233,12 +250,12 @@ mod tests {
     fn what_a_known_pose_sees_anew_leaves_a_viewpoint() {
         let settings = ViewpointSettings::default();
         let near: Vec<_> = scan(0.0).iter().map(|p| Point::from(p.xyz().map(|c| c * 0.4))).collect();
-        let mut set = ViewpointSet::default();
-        let first = settings.viewpoint_of(&near, &Pose::identity(), &set, StopSignal::NEVER).unwrap();
-        set.insert(1, Arc::new(Viewpoint::new(Pose::identity(), first.image)));
-        assert_eq!(settings.viewpoint_of(&near, &Pose::identity(), &set, StopSignal::NEVER), None);
+        let (mut set, at) = (ViewpointSet::default(), Pose::identity());
+        let first = settings.viewpoint_of(standing(&near, &at), &set, StopSignal::NEVER).unwrap();
+        set.insert(1, Arc::new(Viewpoint::new(at, first.image)));
+        assert_eq!(settings.viewpoint_of(standing(&near, &at), &set, StopSignal::NEVER), None);
         assert!(
-            settings.viewpoint_of(&scan(0.0), &Pose::identity(), &set, StopSignal::NEVER).is_some(),
+            settings.viewpoint_of(standing(&scan(0.0), &at), &set, StopSignal::NEVER).is_some(),
             "a curtain was drawn aside"
         );
     }

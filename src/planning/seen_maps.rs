@@ -14,7 +14,7 @@ use crate::map::{
     Change, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape, MapContents, MapSettings,
     MapView, MappedScan, MultiResolutionMap, RobotName, ScanRecord, UndoRecord, ViewpointRecord,
 };
-use crate::visibility::{RangeImage, SeenRange, Viewpoint};
+use crate::visibility::{RangeImage, Sweep, Viewpoint};
 use crate::voxel::{MomentSet, VoxelKey, VoxelSet};
 
 /// A map that is yet to be made: scans that saw something, of which some were taken back; voxels that were deleted; keep-outs.
@@ -68,7 +68,7 @@ impl SeenScan {
         let [roll, pitch, yaw] = self.turned;
         let rotation = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
         let map_from_sensor = Pose::from_parts(self.origin_m.into(), rotation);
-        let range = SeenRange { min_m: 0.05, max_m: 100.0 };
+        let range = Sweep::standing(100.0);
         let image = RangeImage::of_points(&points, range, 2000);
         let in_map: Vec<Point> = points
             .iter()

@@ -10,7 +10,7 @@ use crate::map::{
     MapContents, MapSettings, MappedScan, MultiResolutionMap, Region, RobotName, ScanRecord, ViewpointRecord,
 };
 use crate::util::StopSignal;
-use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 use crate::voxel::{VoxelKey, VoxelSet};
 
 const EVERYTHING: [f64; 3] = [1000.0; 3];
@@ -141,8 +141,7 @@ fn seen_from_afar() -> MultiResolutionMap {
     let map = MultiResolutionMap::new(MapSettings::new(0.001, 4)).unwrap();
     let points: Vec<Point> =
         (0..40_000).map(|i| Point::new(20.0, (i % 200) as f32 * 0.05, (i / 200) as f32 * 0.05)).collect();
-    let image =
-        RangeImage::of_points(&points, SeenRange { min_m: 0.0, max_m: 60.0 }, IMAGE_BYTES_MAX).unwrap();
+    let image = RangeImage::of_points(&points, Sweep::standing(60.0), IMAGE_BYTES_MAX).unwrap();
     let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
     let viewpoint = Some(ViewpointRecord { image, displaced: Vec::new() });
     map.committer().insert_scan(ScanRecord { viewpoint, ..ScanRecord::of_voxels(pose, VoxelSet::default()) });

@@ -93,14 +93,18 @@ impl PointFilter {
 
     /// True when the filter keeps a finite point (sensor frame).
     pub fn keeps(&self, point: Point) -> bool {
-        let point = point.to_f64().coords;
-        let range_m = point.norm();
-        let in_body =
-            self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])));
-        self.range_min_m.is_none_or(|min| range_m >= min)
-            && self.range_max_m.is_none_or(|max| range_m <= max)
+        let range_m = point.to_f64().coords.norm();
+        self.range_max_m.is_none_or(|max| range_m <= max)
             && self.no_return_m.is_none_or(|max| range_m < max * (1.0 - ROUNDING))
-            && !in_body
+            && !self.is_of_robot(point)
+    }
+
+    /// True of a finite point (sensor frame) that is skipped since it lies on the robot itself, or too near to be anything else. It hides
+    /// what lies behind it.
+    pub fn is_of_robot(&self, point: Point) -> bool {
+        let point = point.to_f64().coords;
+        self.range_min_m.is_some_and(|min| point.norm() < min)
+            || self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])))
     }
 
     /// Up to where a point (sensor frame) tells that nothing was met; none of one that was met itself, and of one without a
@@ -141,6 +145,9 @@ mod tests {
         let keeps = |x, y, z| filter.keeps(Point::new(x, y, z));
         assert!(keeps(1.0, 0.0, 0.0) && keeps(0.0, 10.0, 0.0));
         assert!(!keeps(0.1, 0.2, 0.3) && !keeps(0.0, 10.1, 0.0) && !keeps(-0.9, 0.3, -0.1));
+        let is_of_robot = |x, y, z| filter.is_of_robot(Point::new(x, y, z));
+        assert!(is_of_robot(0.1, 0.2, 0.3) && is_of_robot(-0.9, 0.3, -0.1));
+        assert!(!is_of_robot(0.0, 10.1, 0.0) && !is_of_robot(1.0, 0.0, 0.0));
         assert!(PointFilter::default().keeps(Point::new(0.0, 0.0, 0.0)));
     }
 

@@ -3,7 +3,7 @@
 use super::{PointTimes, Reason, ScanRequest, ServiceError, ServiceSettings};
 use crate::align::PoseCovarianceError;
 use crate::geometry::{Point, rotation_xyzw, translation_m};
-use crate::mapping::{FilteredPoints, Guess, MappingError, Scan};
+use crate::mapping::{FilteredPoints, Guess, MappingError, RayEnds, Scan};
 
 /// A scan request with the points of the robot's surroundings.
 pub(super) struct FilteredScan<'a> {
@@ -21,8 +21,10 @@ impl<'a> FilteredScan<'a> {
     pub(super) fn of(request: &'a ScanRequest, settings: &ServiceSettings) -> Result<Self, ServiceError> {
         let filter = request.filter.or(settings.of_robot(&request.robot).filter);
         let filtered = FilteredPoints::of(
-            request.points.as_slice(),
-            request.point_times.as_ref().map(PointTimes::as_slice),
+            RayEnds {
+                points: request.points.as_slice(),
+                times_s: request.point_times.as_ref().map(PointTimes::as_slice),
+            },
             filter,
             &request.robot,
             request.strict,
@@ -38,10 +40,10 @@ impl<'a> FilteredScan<'a> {
             session: session.clone(),
             scan_id: *scan_id,
             timestamp_ns: *timestamp_ns,
-            points: &self.filtered.points,
-            times_s: self.filtered.times_s.as_deref(),
-            no_returns: &self.filtered.no_returns,
-            no_return_times_s: self.filtered.no_return_times_s.as_deref(),
+            points: self.filtered.surroundings().points,
+            times_s: self.filtered.surroundings().times_s,
+            no_returns: self.filtered.no_returns(),
+            of_robot: self.filtered.of_robot(),
             points_skipped: self.filtered.skipped,
             gravity: self.request.gravity,
             guess: self.request.guess,

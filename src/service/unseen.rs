@@ -7,12 +7,13 @@ use super::{NotSeenSince, Reason, ServiceError, check_not_stopped, ended_early};
 use crate::map::{Change, MultiResolutionMap, WithdrawnChange};
 use crate::store::MapFolder;
 use crate::util::StopSignal;
+use crate::visibility::WellBeyond;
 use crate::voxel::{BlockMask, VoxelKey, VoxelSet};
 
 /// Whom memory is lent to, in refusals.
 const UNSEEN: &str = "a deletion of what was not seen";
 /// How far behind a voxel a scan has to have seen, in finest voxels: noise puts surfaces two voxels off.
-const MARGIN_VOXELS: f64 = 3.0;
+const MARGIN_VOXELS: f32 = 3.0;
 /// Blocks that are looked at between two looks at the stop signal.
 const BLOCKS_PER_LOOK: usize = 64;
 
@@ -64,12 +65,13 @@ impl HostedMap {
         drop(view);
         drop(long_read);
         let lattice = self.map.lattice();
-        let margin_m = (MARGIN_VOXELS * lattice.resolution_m(0)) as f32;
+        let voxel_m = lattice.resolution_m(0) as f32;
+        let least = WellBeyond { margin_m: MARGIN_VOXELS * voxel_m, gap_max_m: voxel_m };
         let seen_through = stop.paced(there.blocks(), BLOCKS_PER_LOOK).map(|(block, mask)| {
             let mut seen_through = BlockMask::EMPTY;
             for cell in mask.cells(0) {
                 let center_m = lattice.center_m(cell.voxel(*block), 0);
-                if viewpoints.since_saw_well_beyond(center_m, margin_m, target.revision) {
+                if viewpoints.since_saw_well_beyond(center_m, least, target.revision) {
                     seen_through.insert(cell);
                 }
             }

@@ -284,7 +284,7 @@ mod tests {
     use crate::store::codec::moments;
     use crate::store::pb;
     use crate::store::viewpoint_parts::section_of;
-    use crate::visibility::{RangeImage, SeenRange, Viewpoint};
+    use crate::visibility::{RangeImage, Sweep, Viewpoint};
     use crate::voxel::{MomentSet, Moments, VoxelKey};
 
     fn snapshot() -> Snapshot {
@@ -336,7 +336,7 @@ mod tests {
     /// Two, of which one was left by a scan whose pose is not kept.
     fn viewpoints() -> ViewpointSet {
         let points: Vec<_> = (0..400).map(|i| Point::new(2.0, (i % 20) as f32 / 9.0, 0.3)).collect();
-        let image = RangeImage::of_points(&points, SeenRange { min_m: 0.1, max_m: 9.0 }, 900).unwrap();
+        let image = RangeImage::of_points(&points, Sweep::standing(9.0), 900).unwrap();
         let pose = geometry::pose([1.0, -2.0, 0.5], [0.0, 0.6, 0.0, 0.8]).unwrap();
         let mut viewpoints = ViewpointSet::default();
         for revision in [3, 41] {

@@ -14,6 +14,9 @@ pub(super) struct CubeMap {
     tiles: usize,
 }
 
+/// A pixel: its face, and its column and row there.
+pub(super) type Pixel = (usize, [usize; 2]);
+
 /// A pixel of a cube map, and how deep a point lies in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Projection {
@@ -67,9 +70,39 @@ impl CubeMap {
         (tile, row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE)
     }
 
+    /// The pixels of all faces.
+    pub(super) fn all_pixels(self) -> impl Iterator<Item = Pixel> {
+        let side = self.pixels();
+        (0..FACES).flat_map(move |face| (0..side * side).map(move |i| (face, [i % side, i / side])))
+    }
+
+    /// The pixel so many columns and rows away, on whatever face.
+    #[inline(always)]
+    pub(super) fn beside(self, (face, [column, row]): Pixel, [right, up]: [isize; 2]) -> Option<Pixel> {
+        let side = self.pixels();
+        let moved = |at: usize, by: isize| at.checked_add_signed(by).filter(|&at| at < side);
+        match (moved(column, right), moved(row, up)) {
+            (Some(column), Some(row)) => Some((face, [column, row])),
+            _ => self.across_an_edge((face, [column, row]), [right, up]),
+        }
+    }
+
+    #[cold]
+    fn across_an_edge(self, (face, [column, row]): Pixel, [right, up]: [isize; 2]) -> Option<Pixel> {
+        let [u, v] =
+            [(column, right), (row, up)].map(|(at, by)| (at as f32 + by as f32 + 0.5) * self.pitch() - 1.0);
+        let Projection { face, pixel, .. } = self.project(self.on_face(face, [u, v]))?;
+        Some((face, pixel))
+    }
+
     /// The direction of the middle of a pixel, of depth 1.
     pub(super) fn direction(self, face: usize, pixel: [usize; 2]) -> [f32; 3] {
-        self.on_face(face, pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0))
+        self.on_face(face, self.middle(pixel))
+    }
+
+    /// Where on its face the middle of a pixel lies, -1 to 1 along each side.
+    pub(super) fn middle(self, pixel: [usize; 2]) -> [f32; 2] {
+        pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0)
     }
 
     /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on others).

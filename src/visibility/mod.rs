@@ -5,6 +5,8 @@
 //! saw in each direction. A voxel is free where a viewpoint saw through its center and nothing occupies it.
 
 mod cube_map;
+mod density;
+mod nearest_depths;
 mod range_image;
 mod reach;
 mod scan_surface;
@@ -14,7 +16,7 @@ mod tests;
 mod tile;
 mod viewpoint;
 
-pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, SeenRange};
+pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, Sweep, WellBeyond};
 pub use scan_surface::{ScanSurface, SurfaceSettings};
 pub use set::{Gaze, ViewpointSet};
 pub use viewpoint::{VIEWPOINT_MEMORY_MAX, Viewpoint};

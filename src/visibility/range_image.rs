@@ -1,20 +1,27 @@
 //! A range image: how far a scan saw in each direction.
 
-use super::cube_map::{CubeMap, FACES, Projection, TILE_SIDE};
-use super::tile::{TILE_BYTES, TILE_PIXELS, Tile};
+use super::cube_map::{CubeMap, Pixel, Projection};
+use super::density::PointDensity;
+use super::nearest_depths::{NearestDepths, SPACING_MAX};
+use super::tile::{TILE_BYTES, Tile};
 use crate::geometry::Point;
 
 /// Most bytes of a range image that is kept.
 pub const IMAGE_BYTES_MAX: usize = 8192;
 /// Tiles along the side of a face, finest first: pixels of 0.6 to 7 degrees.
 const TILES: [usize; 14] = [25, 22, 20, 18, 16, 14, 12, 10, 8, 6, 5, 4, 3, 2];
-/// Bytes of an image before its tiles: how many there are along a side, and the unit of depths.
-const HEAD_BYTES: usize = 1 + 4;
+/// Bytes of an image before its tiles: how many there are along a side, the unit of depths, and how the rays lay.
+const HEAD_BYTES: usize = 1 + 3 * 4;
+/// Says in an image's first byte that its head tells how the rays lay. The first images did not.
+const TELLS_RAYS: u8 = 0x80;
+/// Bytes of what their heads did not tell.
+const RAYS_BYTES: usize = 2 * 4;
 /// Depths in the image's unit are at most this.
 const DEPTH_MAX: f32 = u16::MAX as f32;
-/// How far from each other the points of a pixel may lie for it to count as seen, as the side of a pixel at depth 1: 1.4 degrees. What lies
-/// between them is not looked at.
-const SPACING_MAX: f32 = 0.025;
+/// Movements of the sensor up to this are taken for none, meters.
+const MOVED_MIN_M: f32 = 0.01;
+/// Pixels around one in which what is seen from a moving sensor is looked for, at most.
+const MOVED_PIXELS_MAX: f32 = 8.0;
 /// How much more coarser pixels have to tell, since they tell it less well.
 const WORTHWHILE: f32 = 1.03;
 
@@ -23,11 +30,15 @@ const WORTHWHILE: f32 = 1.03;
 ///
 /// A pixel tells the nearest of the points seen in it, so that a direction is never said to be seen further than the nearest
 /// surface there. Only tiles with something seen are kept: a camera spends its 8 kB on what it looks at.
+///
+/// Rays that a moving sensor took elsewhere count as taken from the image's place, up to [`Sweep::moved_m`] beside where they ran. So
+/// a place counts as seen through only where all that lies so near to it was.
 #[derive(Clone, PartialEq)]
 pub struct RangeImage {
     map: CubeMap,
     /// Meters of one unit of depth.
     unit_m: f32,
+    rays: Rays,
     /// For each tile of the cube its number among those that are kept.
     places: Vec<u16>,
     tiles: Vec<Tile>,
@@ -36,13 +47,31 @@ pub struct RangeImage {
 /// The place of a tile that is not kept.
 const NOT_SEEN: u16 = u16::MAX;
 
-/// Between which distances from the sensor a scan is believed to see.
+/// How a scan looked around.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenRange {
-    /// Points nearer than this say nothing: the robot itself, meters.
-    pub min_m: f32,
+pub struct Sweep {
     /// What is further away is seen up to here, meters.
-    pub max_m: f32,
+    pub range_max_m: f32,
+    /// How far the sensor was, at most, from the scan's pose when it took a ray, meters; 0 of one that stood.
+    pub moved_m: f32,
+}
+
+/// How the rays of an image lay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Rays {
+    /// [`Sweep::moved_m`].
+    moved_m: f32,
+    /// [`PointDensity::spacing`].
+    spacing: f32,
+}
+
+/// What it takes to have seen well beyond a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WellBeyond {
+    /// How far behind it everything has to be that was seen around it, meters.
+    pub margin_m: f32,
+    /// How far from each other rays may have passed it, meters: what is larger than that was met by one.
+    pub gap_max_m: f32,
 }
 
 /// Why bytes are not a range image.
@@ -62,24 +91,27 @@ pub enum RangeImageError {
     /// The unit of depths is not a positive number.
     #[error("a range image with {0} m as its unit of depth, a positive number expected")]
     Unit(f32),
+    /// What it tells of its rays cannot be.
+    #[error("a range image whose sensor moved by {0} m, its rays {1} apart: neither may be negative")]
+    Rays(f32, f32),
 }
 
 impl RangeImage {
-    /// The image of at most `bytes_max` bytes of a scan of `points` (sensor frame, finite); none where nothing is seen in `range`.
+    /// The image of at most `bytes_max` bytes of a scan whose rays ended at `points` (sensor frame, finite); none where nothing is seen.
     ///
-    /// Pixels are as fine as that allows and as the points lie. Those in which the points lie far from each other are not seen.
-    pub fn of_points(points: &[Point], range: SeenRange, bytes_max: usize) -> Option<Self> {
-        let offsets: Vec<_> = points.iter().filter_map(|point| range.limited(point.xyz())).collect();
-        if offsets.is_empty() {
-            return None;
-        }
+    /// Points of the robot itself belong to them: what lies behind it was not seen. Pixels are as fine as `bytes_max` allows and as
+    /// the points lie. Those in which the points lie far from each other are not seen.
+    pub fn of_points(points: &[Point], sweep: Sweep, bytes_max: usize) -> Option<Self> {
+        let offsets: Vec<_> = points.iter().filter_map(|point| sweep.limited(point.xyz())).collect();
+        let PointDensity { spacing, .. } = PointDensity::of(&offsets)?;
+        let rays = Rays { moved_m: sweep.told_moved_m(), spacing };
         let depths = TILES.iter().map(|&tiles| NearestDepths::of(CubeMap::new(tiles), &offsets));
-        let mut fitting = depths.filter(|depths| depths.touched_tiles() <= tiles_max(depths.map, bytes_max));
-        let first = Self::of_depths(&fitting.next()?);
+        let mut fitting =
+            depths.filter(|depths| depths.touched_tiles() <= tiles_max(depths.map(), bytes_max));
+        let first = Self::of_depths(&fitting.next()?, rays);
         // Coarser pixels tell more of a scan whose points lie further apart than the finest pixels.
-        let coarser =
-            fitting.take_while(|depths| depths.map.pitch() <= SPACING_MAX).map(|it| Self::of_depths(&it));
-        let best = coarser.fold(first, Self::that_tells_more);
+        let coarser = fitting.take_while(|depths| depths.map().pitch() <= SPACING_MAX);
+        let best = coarser.map(|depths| Self::of_depths(&depths, rays)).fold(first, Self::that_tells_more);
         (!best.tiles.is_empty()).then_some(best)
     }
 
@@ -94,19 +126,18 @@ impl RangeImage {
         seen as f32 * self.map.pitch() * self.map.pitch()
     }
 
-    fn of_depths(depths: &NearestDepths) -> Self {
-        let map = depths.map;
+    fn of_depths(depths: &NearestDepths, rays: Rays) -> Self {
+        let map = depths.map();
         let unit_m = (depths.max() / DEPTH_MAX).max(f32::MIN_POSITIVE);
         let (mut places, mut tiles) = (vec![NOT_SEEN; map.tiles_of_all_faces()], Vec::new());
-        for (tile, place) in places.iter_mut().enumerate() {
-            let depths =
-                depths.tile(tile).map(|depth| depth.map(|depth| (depth / unit_m).min(DEPTH_MAX) as u16));
+        for (place, depths) in places.iter_mut().zip(depths.seen_tiles(rays.spacing)) {
+            let depths = depths.map(|depth| depth.map(|depth_m| (depth_m / unit_m).min(DEPTH_MAX) as u16));
             if depths.iter().any(Option::is_some) {
                 *place = tiles.len() as u16;
                 tiles.push(Tile::new(&depths));
             }
         }
-        Self { map, unit_m, places, tiles }
+        Self { map, unit_m, rays, places, tiles }
     }
 
     /// True where the scan saw beyond the point at `offset` from the sensor, in its frame: the point was not hidden, and nothing
@@ -114,25 +145,47 @@ impl RangeImage {
     #[inline]
     pub fn sees_through(&self, offset: [f32; 3]) -> bool {
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
-            self.depth_m(face, pixel).is_some_and(|seen_m| depth_m < seen_m)
+            self.sees_beyond((face, pixel), depth_m)
+                && (self.rays.moved_m == 0.0 || self.sees_beyond_around((face, pixel), depth_m, depth_m, 0))
         })
     }
 
-    /// True where the scan saw further than `margin_m` beyond the point at `offset` in its own pixel and in all that lie around it: no
-    /// surface that is seen askew or in part is seen through so, nor what lies beside a rim.
-    pub fn sees_well_beyond(&self, offset: [f32; 3], margin_m: f32) -> bool {
-        let Some(Projection { face, pixel: [column, row], depth_m }) = self.map.project(offset) else {
-            return false;
-        };
-        let last = self.map.pixels() - 1;
-        // What lies across the edge of a face is not looked at: there nothing is seen well.
-        let is_inside = (1..last).contains(&column) && (1..last).contains(&row);
-        is_inside
-            && (row - 1..=row + 1).all(|row| {
-                (column - 1..=column + 1).all(|column| {
-                    self.depth_m(face, [column, row]).is_some_and(|seen_m| depth_m + margin_m < seen_m)
-                })
+    /// True where the scan saw well beyond the point at `offset`: in its own pixel and in all that lie around it, no surface that is
+    /// seen askew or in part is seen through so, nor what lies beside a rim, and nothing that fits between the rays.
+    pub fn sees_well_beyond(&self, offset: [f32; 3], least: WellBeyond) -> bool {
+        let WellBeyond { margin_m, gap_max_m } = least;
+        self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
+            depth_m * self.rays.spacing <= gap_max_m
+                && self.sees_beyond_around((face, pixel), depth_m, depth_m + margin_m, 1)
+        })
+    }
+
+    /// True where a pixel was seen beyond a depth.
+    #[inline(always)]
+    fn sees_beyond(&self, (face, pixel): Pixel, beyond_m: f32) -> bool {
+        self.depth_m(face, pixel).is_some_and(|seen_m| beyond_m < seen_m)
+    }
+
+    /// [`RangeImage::sees_beyond`] of all pixels in which what is so deep as `depth_m` can have been seen by a sensor that moved, and so many
+    /// more around them.
+    #[inline(never)]
+    fn sees_beyond_around(&self, pixel: Pixel, depth_m: f32, beyond_m: f32, more: isize) -> bool {
+        let Some(moved) = self.moved_pixels(depth_m) else { return false };
+        let around = || -(moved + more)..=moved + more;
+        // What lies on another face is less deep there than here, so that no less is asked of it.
+        around().all(|up| {
+            around().all(|right| {
+                self.map.beside(pixel, [right, up]).is_some_and(|pixel| self.sees_beyond(pixel, beyond_m))
             })
+        })
+    }
+
+    /// By how many pixels what is so deep may have been seen beside its own; none where these are too many to look at.
+    fn moved_pixels(&self, depth_m: f32) -> Option<isize> {
+        let moved_m = self.rays.moved_m;
+        // Towards the corners of a face a step aside is seen as up to a half more.
+        let pixels = (1.5 * moved_m / ((depth_m - moved_m) * self.map.pitch())).ceil();
+        (moved_m == 0.0 || depth_m > moved_m && pixels <= MOVED_PIXELS_MAX).then_some(pixels as isize)
     }
 
     /// How deep a pixel was seen, meters; none where it was not.
@@ -145,10 +198,7 @@ impl RangeImage {
 
     /// The directions that were seen, each as the point up to which: offsets from the sensor in its frame, meters.
     pub fn seen(&self) -> impl Iterator<Item = [f32; 3]> {
-        let side = self.map.pixels();
-        let pixels =
-            (0..FACES).flat_map(move |face| (0..side * side).map(move |i| (face, [i % side, i / side])));
-        pixels.filter_map(|(face, pixel)| {
+        self.map.all_pixels().filter_map(|(face, pixel)| {
             let depth_m = self.depth_m(face, pixel)?;
             Some(self.map.direction(face, pixel).map(|c| c * depth_m))
         })
@@ -169,12 +219,15 @@ impl RangeImage {
         self.places.len() * size_of::<u16>() + self.tiles.len() * size_of::<Tile>()
     }
 
-    /// The image as bytes: how many tiles there are along a side (1 byte), the unit of depths (f32), a bit for each tile of the
-    /// six faces that says whether it is kept, and the tiles that are. All little-endian.
+    /// The image as bytes: how many tiles there are along a side and 128 (1 byte), the unit of depths (f32), how far the sensor moved in
+    /// meters (f32) and how far apart the rays lay at depth 1 (f32), a bit for each tile of the six faces that says whether it is
+    /// kept, and the tiles that are. All little-endian. The first images, without the 128, told nothing of their rays.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.stored_bytes());
-        bytes.push(self.map.tiles() as u8);
-        bytes.extend_from_slice(&self.unit_m.to_le_bytes());
+        bytes.push(self.map.tiles() as u8 | TELLS_RAYS);
+        for number in [self.unit_m, self.rays.moved_m, self.rays.spacing] {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
         bytes.extend(self.places.chunks(8).map(|places| {
             let bit = |(i, place): (usize, &u16)| u8::from(*place != NOT_SEEN) << i;
             places.iter().enumerate().map(bit).sum::<u8>()
@@ -189,22 +242,28 @@ impl RangeImage {
     /// For bytes that are not an image.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RangeImageError> {
         let short = RangeImageError::Length { got: bytes.len(), expected: HEAD_BYTES };
-        let Some((&[tiles, ref unit_m @ ..], rest)) = bytes.split_first_chunk::<HEAD_BYTES>() else {
-            return Err(short);
-        };
-        let (tiles, unit_m) = (usize::from(tiles), f32::from_le_bytes(*unit_m));
+        let (&first, rest) = bytes.split_first().ok_or_else(|| short.clone())?;
+        let (unit_m, rest) = number_from(rest).ok_or_else(|| short.clone())?;
+        let tells_rays = first & TELLS_RAYS != 0;
+        let (rays, rest) =
+            if tells_rays { Rays::from_bytes(rest).ok_or(short)? } else { (Rays::NOT_TOLD, rest) };
+        let tiles = usize::from(first & !TELLS_RAYS);
         if tiles == 0 {
             return Err(RangeImageError::Tiles(tiles));
         }
         if !(unit_m > 0.0 && (unit_m * DEPTH_MAX).is_finite()) {
             return Err(RangeImageError::Unit(unit_m));
         }
+        let Rays { moved_m, spacing } = rays;
+        if !(moved_m >= 0.0 && moved_m.is_finite() && spacing >= 0.0 && spacing.is_finite()) {
+            return Err(RangeImageError::Rays(moved_m, spacing));
+        }
         let map = CubeMap::new(tiles);
         let count = map.tiles_of_all_faces();
         let bits = &rest[..count.div_ceil(8).min(rest.len())];
         let is_kept = |tile: usize| bits.get(tile / 8).is_some_and(|byte| byte >> (tile % 8) & 1 == 1);
         let kept = (0..count).filter(|&tile| is_kept(tile)).count();
-        let expected = stored_bytes(map, kept);
+        let expected = stored_bytes(map, kept) - if tells_rays { 0 } else { RAYS_BYTES };
         if bytes.len() != expected {
             return Err(RangeImageError::Length { got: bytes.len(), expected });
         }
@@ -213,7 +272,7 @@ impl RangeImage {
             places[tile] = place as u16;
         }
         let (tiles, _) = rest[bits.len()..].as_chunks::<TILE_BYTES>();
-        Ok(Self { map, unit_m, places, tiles: tiles.iter().map(Tile::read).collect() })
+        Ok(Self { map, unit_m, rays, places, tiles: tiles.iter().map(Tile::read).collect() })
     }
 }
 
@@ -224,17 +283,43 @@ impl std::fmt::Debug for RangeImage {
     }
 }
 
-impl SeenRange {
-    /// The point at `offset` from the sensor, as far as it is seen; none of the robot itself, and of what is not finite.
+impl Sweep {
+    /// The sweep of a sensor that stood.
+    pub const fn standing(range_max_m: f32) -> Self {
+        Self { range_max_m, moved_m: 0.0 }
+    }
+
+    /// The point at `offset` from the sensor, as far as it is seen; none of what has no direction.
     pub fn limited(self, offset: [f32; 3]) -> Option<[f32; 3]> {
         let squared = offset.iter().map(|c| c * c).sum::<f32>();
-        if !(squared > 0.0 && squared >= self.min_m * self.min_m && squared.is_finite()) {
+        if !(squared > 0.0 && squared.is_finite()) {
             return None;
         }
-        let distance_m = squared.sqrt();
-        let scale = (self.max_m / distance_m).min(1.0);
+        let scale = (self.range_max_m / squared.sqrt()).min(1.0);
         Some(offset.map(|c| c * scale))
     }
+
+    /// How far the sensor moved, where that is more than noise.
+    fn told_moved_m(self) -> f32 {
+        if self.moved_m > MOVED_MIN_M { self.moved_m } else { 0.0 }
+    }
+}
+
+impl Rays {
+    /// What is taken of the first images: a sensor that stood, and rays as far apart as they may lie in a pixel.
+    const NOT_TOLD: Self = Self { moved_m: 0.0, spacing: SPACING_MAX };
+
+    fn from_bytes(bytes: &[u8]) -> Option<(Self, &[u8])> {
+        let (moved_m, rest) = number_from(bytes)?;
+        let (spacing, rest) = number_from(rest)?;
+        Some((Self { moved_m, spacing }, rest))
+    }
+}
+
+/// A number at the beginning of some bytes, and the bytes behind it.
+fn number_from(bytes: &[u8]) -> Option<(f32, &[u8])> {
+    let (number, rest) = bytes.split_first_chunk()?;
+    Some((f32::from_le_bytes(*number), rest))
 }
 
 /// Bytes of an image with `kept` tiles where it is stored.
@@ -245,75 +330,4 @@ fn stored_bytes(map: CubeMap, kept: usize) -> usize {
 /// Tiles that an image of at most `bytes` bytes can keep.
 fn tiles_max(map: CubeMap, bytes: usize) -> usize {
     bytes.saturating_sub(stored_bytes(map, 0)) / TILE_BYTES
-}
-
-/// The depth of the nearest point in each pixel.
-struct NearestDepths {
-    map: CubeMap,
-    /// Tile by tile; infinite where no point is.
-    depths_m: Vec<f32>,
-    /// How many points lie in each, up to the largest number of the type.
-    points: Vec<u8>,
-}
-
-impl NearestDepths {
-    fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
-        let pixels = map.tiles_of_all_faces() * TILE_PIXELS;
-        let (mut depths_m, mut points) = (vec![f32::INFINITY; pixels], vec![0u8; pixels]);
-        for offset in offsets {
-            if let Some(Projection { face, pixel, depth_m }) = map.project(*offset) {
-                let (tile, pixel) = map.place(face, pixel);
-                let (nearest, points) =
-                    (&mut depths_m[tile * TILE_PIXELS + pixel], &mut points[tile * TILE_PIXELS + pixel]);
-                *nearest = nearest.min(depth_m);
-                *points = points.saturating_add(1);
-            }
-        }
-        Self { map, depths_m, points }
-    }
-
-    fn touched_tiles(&self) -> usize {
-        self.depths_m.chunks(TILE_PIXELS).filter(|tile| tile.iter().any(|depth| depth.is_finite())).count()
-    }
-
-    /// The largest depth, meters.
-    fn max(&self) -> f32 {
-        self.depths_m.iter().copied().filter(|depth| depth.is_finite()).fold(0.0, f32::max)
-    }
-
-    /// The depths of a tile's pixels. A pixel between two that were seen, beside or above each other, was seen as far as the nearer
-    /// of them, and no farther than points of its own: points are not where pixels are.
-    fn tile(&self, tile: usize) -> [Option<f32>; TILE_PIXELS] {
-        let side = self.map.tiles();
-        let (face, first) = (tile / (side * side), [tile % side * TILE_SIDE, tile / side % side * TILE_SIDE]);
-        std::array::from_fn(|i| {
-            let [column, row] = [first[0] + i % TILE_SIDE, first[1] + i / TILE_SIDE];
-            let between =
-                |a: [Option<usize>; 2], b: [Option<usize>; 2]| Some(self.at(face, a)?.min(self.at(face, b)?));
-            let [before, after] = [column.checked_sub(1), column.checked_add(1)];
-            let [below, above] = [row.checked_sub(1), row.checked_add(1)];
-            self.at(face, [Some(column), Some(row)]).or_else(|| {
-                let own_m = self.depths_m[tile * TILE_PIXELS + i];
-                let beside = between([before, Some(row)], [after, Some(row)]);
-                let over = between([Some(column), below], [Some(column), above]);
-                beside.into_iter().chain(over).reduce(f32::min).map(|seen_m| seen_m.min(own_m))
-            })
-        })
-    }
-
-    /// Points of which one more lies in a pixel that counts as seen.
-    fn points_before(&self) -> u8 {
-        ((self.map.pitch() / SPACING_MAX).powi(2).ceil() as u8).saturating_sub(1)
-    }
-
-    /// The depth of a pixel that enough points are in.
-    fn at(&self, face: usize, [column, row]: [Option<usize>; 2]) -> Option<f32> {
-        let pixel = [column?, row?];
-        if pixel.iter().any(|&i| i >= self.map.pixels()) {
-            return None;
-        }
-        let (tile, pixel) = self.map.place(face, pixel);
-        let pixel = tile * TILE_PIXELS + pixel;
-        (self.points[pixel] > self.points_before()).then(|| self.depths_m[pixel])
-    }
 }

@@ -1,17 +1,9 @@
 //! The surface that a scan shows: its points, and which of them lie on one surface.
 
-use super::cube_map::{CubeMap, FACES, Projection, TILE_SIDE};
+use super::cube_map::{CubeMap, FACES, Pixel, Projection};
+use super::density::PointDensity;
 use crate::geometry::Point;
 
-/// Tiles along the side of a face, finest first: pixels of 0.28 to 5.6 degrees.
-const TILES: [usize; 11] = [40, 32, 25, 20, 16, 13, 10, 8, 6, 4, 2];
-/// Tiles along the side of a face with which it is found out how densely a scan's points lie.
-const TILES_OF_DENSITY: usize = 10;
-/// Largest share of the seen pixels beside which two or more are not seen though others behind them are: a finer image would
-/// be a sieve.
-const GAPS_MAX: f64 = 0.05;
-/// Pixels over which a gap is looked for.
-const GAP_PIXELS_MAX: usize = 8;
 /// Points that are farther apart than so many samples say nothing of what is between them.
 const SAMPLES_MAX: f32 = 32.0;
 /// Balls nearer than so many of their radii are not seen through: they would be looked at in too many directions.
@@ -42,6 +34,8 @@ pub struct SurfaceSettings {
 #[derive(Debug, Clone)]
 pub struct ScanSurface {
     map: CubeMap,
+    /// How far from each other the points lie, as the side of a square at depth 1.
+    spacing: f32,
     settings: SurfaceSettings,
     /// For each pixel, face by face and row by row, the number of its hit.
     places: Vec<u32>,
@@ -60,33 +54,22 @@ struct Hit {
     is_filled: bool,
 }
 
-/// A pixel: its face, and its column and row there.
-type Pixel = (usize, [usize; 2]);
-
 impl ScanSurface {
     /// The surface of a scan of `points` (sensor frame, finite); none of a scan without points.
     pub fn of(points: &[Point], settings: SurfaceSettings) -> Option<Self> {
         let offsets: Vec<_> = points.iter().map(|point| point.xyz()).collect();
-        let densest = Self::of_points(&offsets, CubeMap::new(TILES_OF_DENSITY), settings);
-        if densest.hits.is_empty() {
-            return None;
-        }
-        let points_a_pixel = offsets.len() as f64 / densest.hits.len() as f64;
-        let tiles_max = (TILES_OF_DENSITY as f64 * points_a_pixel.sqrt()) as usize;
-        let coarsest = TILES[TILES.len() - 1];
-        let candidates = TILES.iter().filter(|&&tiles| tiles <= tiles_max.max(coarsest));
-        let mut surface = candidates
-            .map(|&tiles| Self::of_points(&offsets, CubeMap::new(tiles), settings))
-            .find(|surface| surface.map.tiles() == coarsest || surface.gaps() <= GAPS_MAX)?;
+        let density = PointDensity::of(&offsets)?;
+        let mut surface = Self::of_points(&offsets, density, settings);
         (0..FILLINGS).for_each(|_| surface.fill());
         surface.find_rims();
         Some(surface)
     }
 
     /// The nearest point in each pixel.
-    fn of_points(offsets: &[[f32; 3]], map: CubeMap, settings: SurfaceSettings) -> Self {
-        let pixels = FACES * map.pixels() * map.pixels();
-        let mut surface = Self { map, settings, places: vec![NOT_SEEN; pixels], hits: Vec::new() };
+    fn of_points(offsets: &[[f32; 3]], density: PointDensity, settings: SurfaceSettings) -> Self {
+        let PointDensity { map, spacing } = density;
+        let places = vec![NOT_SEEN; FACES * map.pixels() * map.pixels()];
+        let mut surface = Self { map, spacing, settings, places, hits: Vec::new() };
         for &offset in offsets {
             let Some(Projection { face, pixel, .. }) = map.project(offset) else { continue };
             let hit = Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: false };
@@ -105,27 +88,6 @@ impl ScanSurface {
         self.hits.push(hit);
     }
 
-    /// Pixels beside which two or more are not seen before the next that is, as a share of all that are seen.
-    fn gaps(&self) -> f64 {
-        let side = self.map.pixels();
-        let is_seen = |face, pixel| self.hit((face, pixel)).is_some();
-        let begins_gap = |face: usize, [column, row]: [usize; 2], [right, up]: [usize; 2]| {
-            let after = (1..=GAP_PIXELS_MAX)
-                .map(|i| [column + right * i, row + up * i])
-                .take_while(|pixel| pixel.iter().all(|&c| c < side));
-            let before_next = after.take_while(|&pixel| !is_seen(face, pixel)).count();
-            let next = [column + right * (before_next + 1), row + up * (before_next + 1)];
-            (2..GAP_PIXELS_MAX).contains(&before_next) && next.iter().all(|&c| c < side)
-        };
-        let seen = self.pixels().filter(|&(face, pixel)| is_seen(face, pixel));
-        let gaps: usize = seen
-            .map(|(face, pixel)| {
-                usize::from(begins_gap(face, pixel, [1, 0])) + usize::from(begins_gap(face, pixel, [0, 1]))
-            })
-            .sum();
-        gaps as f64 / self.hits.len().max(1) as f64
-    }
-
     /// Sees in a pixel between two that show one surface, beside or above each other, what lies halfway between them.
     fn fill(&mut self) {
         let between = |a: Option<&Hit>, b: Option<&Hit>| {
@@ -133,12 +95,12 @@ impl ScanSurface {
             self.are_joined(a, b).then(|| std::array::from_fn(|axis| (a.offset[axis] + b.offset[axis]) / 2.0))
         };
         let halfway = |pixel: Pixel| {
-            let at = |steps| self.hit(self.beside(pixel, steps)?);
+            let at = |steps| self.hit(self.map.beside(pixel, steps)?);
             let beside = between(at([-1, 0]), at([1, 0]));
             let above = between(at([0, -1]), at([0, 1]));
             beside.into_iter().chain(above).min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
         };
-        let unseen = self.pixels().filter(|&pixel| self.hit(pixel).is_none());
+        let unseen = self.map.all_pixels().filter(|&pixel| self.hit(pixel).is_none());
         let filled: Vec<(usize, [f32; 3])> =
             unseen.filter_map(|pixel| Some((self.place(pixel), halfway(pixel)?))).collect();
         for (place, offset) in filled {
@@ -149,13 +111,14 @@ impl ScanSurface {
     fn find_rims(&mut self) {
         let is_rim = |pixel: Pixel, hit: &Hit| {
             AROUND.iter().any(|&steps| {
-                let beside = self.beside(pixel, steps).and_then(|pixel| self.hit(pixel));
+                let beside = self.map.beside(pixel, steps).and_then(|pixel| self.hit(pixel));
                 beside
                     .is_none_or(|beside| beside.distance_m > hit.distance_m && !self.are_joined(hit, beside))
             })
         };
         let rims: Vec<usize> = self
-            .pixels()
+            .map
+            .all_pixels()
             .filter(|&pixel| self.hit(pixel).is_some_and(|hit| is_rim(pixel, hit)))
             .map(|pixel| self.places[self.place(pixel)] as usize)
             .collect();
@@ -186,13 +149,13 @@ impl ScanSurface {
     /// Calls `f` with samples of the surface (sensor frame, meters) within `range_m`, of which two beside each other are no
     /// farther apart than the settings say, but for the points of the scan itself.
     pub fn for_samples(&self, range_m: f32, mut f: impl FnMut([f32; 3])) {
-        for pixel in self.pixels() {
+        for pixel in self.map.all_pixels() {
             let Some(hit) = self.hit(pixel).filter(|hit| hit.distance_m <= range_m) else { continue };
             if hit.is_filled {
                 f(hit.offset);
             }
             let beside = |steps| {
-                let beside = self.beside(pixel, steps).and_then(|pixel| self.hit(pixel))?;
+                let beside = self.map.beside(pixel, steps).and_then(|pixel| self.hit(pixel))?;
                 self.are_joined(hit, beside).then_some(beside)
             };
             let (right, up) = (beside([1, 0]), beside([0, 1]));
@@ -246,11 +209,11 @@ impl ScanSurface {
     /// True where the scan saw through a ball of `radius_m` around `offset` (sensor frame): each direction in which the ball
     /// lies ends beyond it, and no direction within a pixel of these is unseen, or ends before that at a rim.
     ///
-    /// A ball that is smaller than the points are apart there is not seen through.
-    pub fn sees_through(&self, offset: [f32; 3], radius_m: f32) -> bool {
+    /// Nothing is seen through where the points lie farther apart than `gap_max_m`: what is larger than that was met by one.
+    pub fn sees_through(&self, offset: [f32; 3], radius_m: f32, gap_max_m: f32) -> bool {
         let Some(Projection { depth_m, .. }) = self.map.project(offset) else { return false };
         let (distance_m, pixel_m) = (norm(offset), depth_m * self.map.pitch());
-        if distance_m <= NEAREST * radius_m || pixel_m > 2.0 * radius_m {
+        if distance_m <= NEAREST * radius_m || depth_m * self.spacing > gap_max_m {
             return false;
         }
         let window_m = radius_m + pixel_m;
@@ -269,11 +232,6 @@ impl ScanSurface {
         })
     }
 
-    fn pixels(&self) -> impl Iterator<Item = Pixel> + use<> {
-        let side = self.map.pixels();
-        (0..FACES).flat_map(move |face| (0..side * side).map(move |i| (face, [i % side, i / side])))
-    }
-
     #[inline(always)]
     fn place(&self, (face, [column, row]): Pixel) -> usize {
         let side = self.map.pixels();
@@ -284,26 +242,10 @@ impl ScanSurface {
     fn hit(&self, pixel: Pixel) -> Option<&Hit> {
         self.hits.get(self.places[self.place(pixel)] as usize)
     }
-
-    /// The pixel so many columns and rows away, on whatever face.
-    fn beside(&self, (face, [column, row]): Pixel, [right, up]: [isize; 2]) -> Option<Pixel> {
-        let side = self.map.pixels();
-        let moved = |at: usize, by: isize| at.checked_add_signed(by).filter(|&at| at < side);
-        match (moved(column, right), moved(row, up)) {
-            (Some(column), Some(row)) => Some((face, [column, row])),
-            _ => {
-                let [u, v] = [(column, right), (row, up)]
-                    .map(|(at, by)| (at as f32 + by as f32 + 0.5) * self.map.pitch() - 1.0);
-                let Projection { face, pixel, .. } = self.map.project(self.map.on_face(face, [u, v]))?;
-                Some((face, pixel))
-            }
-        }
-    }
 }
 
 /// The pixels around one.
 const AROUND: [[isize; 2]; 8] = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
-const _: () = assert!(TILE_SIDE * TILES[0] < 1 << 12, "all pixels have a number");
 
 fn norm([x, y, z]: [f32; 3]) -> f32 {
     ((x * x + y * y) + z * z).sqrt()

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Viewpoint;
 use super::reach::{ReachIndex, Slot};
+use super::{Viewpoint, WellBeyond};
 use crate::geometry::{Pose, pose_difference};
 
 /// The viewpoints of a map, by the revisions of the scans that left them, with an index of who looked where.
@@ -125,12 +125,12 @@ impl ViewpointSet {
     /// True where a viewpoint of a scan after `revision` saw well beyond `point_m`, see [`RangeImage::sees_well_beyond`].
     ///
     /// [`RangeImage::sees_well_beyond`]: super::RangeImage::sees_well_beyond
-    pub fn since_saw_well_beyond(&self, point_m: [f64; 3], margin_m: f32, revision: u64) -> bool {
+    pub fn since_saw_well_beyond(&self, point_m: [f64; 3], least: WellBeyond, revision: u64) -> bool {
         let candidates =
             self.index.around(point_m).filter_map(|slot| self.slots.get(slot as usize)?.as_ref());
         candidates
             .filter(|(made, _)| *made > revision)
-            .any(|(_, viewpoint)| viewpoint.image().sees_well_beyond(viewpoint.offset(point_m), margin_m))
+            .any(|(_, viewpoint)| viewpoint.image().sees_well_beyond(viewpoint.offset(point_m), least))
     }
 
     /// True where a viewpoint is at most `distance_m` from `map_from_sensor` and turned by at most `rotation_deg` against it.

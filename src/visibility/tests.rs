@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::geometry::{Point, Pose};
 
-const RANGE: SeenRange = SeenRange { min_m: 0.1, max_m: 40.0 };
+const RANGE: Sweep = Sweep::standing(40.0);
 
 /// A scan from the middle of a room of 6 x 4 x 3 m, seen through a window of directions.
 fn room(random: &mut ChaCha8Rng, points: usize, around: f32) -> Vec<Point> {
@@ -100,7 +100,7 @@ const SURFACE: SurfaceSettings = SurfaceSettings { grazing_rad: 0.14, noise_m: 0
 fn a_ball_is_seen_through_only_where_all_of_it_is() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let surface = ScanSurface::of(&half_hidden(&mut random), SURFACE).unwrap();
-    let sees_through = |offset| surface.sees_through(offset, 0.05);
+    let sees_through = |offset| surface.sees_through(offset, 0.05, 0.1);
     assert!(sees_through([2.0, -0.5, 0.1]) && surface.sees_beyond([2.0, -0.5, 0.1], 0.05));
     assert!(
         !sees_through([2.0, 0.5, 0.1]) && !surface.sees_beyond([2.0, 0.5, 0.1], 0.05),
@@ -206,8 +206,15 @@ fn a_scan_of_points_far_from_each_other_says_little_and_nothing_far_from_its_ray
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let mut any = || random.random_range(-1.0f32..1.0);
     let sparse: Vec<_> = (0..1500).map(|_| Point::from([any(), any(), any()].map(|c| c * 10.0))).collect();
-    let seen = RangeImage::of_points(&sparse, RANGE, IMAGE_BYTES_MAX).map_or(0, |image| image.seen().count());
-    assert!(seen < 150, "{seen} pixels were seen by {} points", sparse.len());
+    let Some(image) = RangeImage::of_points(&sparse, RANGE, IMAGE_BYTES_MAX) else { return };
+    let angle_deg =
+        |a: [f32; 3], b: [f32; 3]| nalgebra::Vector3::from(a).angle(&nalgebra::Vector3::from(b)).to_degrees();
+    let far_from_rays = (0..2000).filter(|_| {
+        let place = [any(), any(), any()].map(|c| c * 0.2);
+        image.sees_through(place) && sparse.iter().all(|point| angle_deg(point.xyz(), place) > 3.0)
+    });
+    let count = far_from_rays.count();
+    assert!(count < 20, "{count} of 2000 places are more than 3 degrees from all rays and seen");
 }
 
 #[test]
@@ -246,5 +253,174 @@ fn nothing_is_seen_behind_points_that_are_too_few_to_tell_more() {
             image.sees_through([1.5, 0.0375, 0.0375]) && image.sees_through([4.0, 0.3, 0.1]),
             "{few} points"
         );
+    }
+}
+
+/// The ends of rays in all directions of a window (degrees to each side and up), as `range_m` says how far each goes.
+fn window(side_deg: f64, up_deg: f64, step_deg: f64, range_m: impl Fn([f64; 3]) -> f64) -> Vec<Point> {
+    let steps = |deg: f64| (2.0 * deg / step_deg).round() as usize;
+    let ray = |(i, j): (usize, usize)| {
+        let azimuth = (i as f64 * step_deg - side_deg).to_radians();
+        let elevation = (j as f64 * step_deg - up_deg).to_radians();
+        let direction = [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
+        Point::from(direction.map(|c| (c * range_m(direction)) as f32))
+    };
+    let rays = (0..=steps(side_deg)).flat_map(|i| (0..=steps(up_deg)).map(move |j| (i, j)));
+    rays.map(ray).collect()
+}
+
+/// How far a ray goes from `origin` to a wall across the x axis at 8 m, or to a plate before it at 3 m that lies between two places
+/// on the y axis.
+fn to_wall_or_plate(origin: [f64; 3], direction: [f64; 3], plate_m: std::ops::Range<f64>) -> f64 {
+    let (to_plate_m, to_wall_m) = ((3.0 - origin[0]) / direction[0], (8.0 - origin[0]) / direction[0]);
+    let at_plate_m = origin[1] + to_plate_m * direction[1];
+    if plate_m.contains(&at_plate_m) { to_plate_m } else { to_wall_m }
+}
+
+#[test]
+fn what_rays_of_a_moving_sensor_did_not_pass_is_not_seen_through() {
+    // It moves along the plane of a plate that hides what is behind it, by 0.3 m, a column of rays after the other; the pose is
+    // that of its last. By its last columns it sees past the plate's end.
+    for moved_m in [0.05f64, 0.1, 0.3] {
+        let plate_m = -0.2..0.2;
+        let columns = 601;
+        let points: Vec<Point> = (0..columns)
+            .flat_map(|column| {
+                let share = column as f64 / (columns - 1) as f64;
+                let azimuth = (share - 0.5) * 60f64.to_radians();
+                let origin = [0.0, -moved_m * (1.0 - share), 0.0];
+                let plate_m = plate_m.clone();
+                (-100..=100).map(move |row| {
+                    let elevation = (f64::from(row) * 0.15).to_radians();
+                    let direction =
+                        [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
+                    let range_m = to_wall_or_plate(origin, direction, plate_m.clone());
+                    // Where the sensor is at the end.
+                    Point::from(std::array::from_fn(|axis| (origin[axis] + direction[axis] * range_m) as f32))
+                })
+            })
+            .collect();
+        let sweep = Sweep { range_max_m: 40.0, moved_m: moved_m as f32 };
+        let image = RangeImage::of_points(&points, sweep, IMAGE_BYTES_MAX).unwrap();
+        let standing = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
+        // Each place as the ray saw it that ran through it: with its azimuth, from where the sensor was then.
+        let is_hidden = |x: f64, y: f64| {
+            let at = |share: f64| {
+                let azimuth = (share - 0.5) * 60f64.to_radians();
+                y - (-moved_m * (1.0 - share)) - x * azimuth.tan()
+            };
+            let share = (0..=2000)
+                .map(|i| f64::from(i) / 2000.0)
+                .min_by(|a, b| at(*a).abs().total_cmp(&at(*b).abs()));
+            let origin_y = -moved_m * (1.0 - share.unwrap());
+            let at_plate_m = origin_y + (y - origin_y) * 3.0 / x;
+            plate_m.contains(&at_plate_m)
+        };
+        let (mut wrong, mut wrong_if_standing, mut seen) = (0, 0, 0);
+        for (i, j) in (0..40).flat_map(|i| (0..81).map(move |j| (i, j))) {
+            let (x, y) = (3.1 + f64::from(i) * 0.1, f64::from(j) * 0.05 - 2.0);
+            let offset = [x as f32, y as f32, 0.0];
+            seen += usize::from(image.sees_through(offset));
+            if is_hidden(x, y) {
+                wrong += usize::from(image.sees_through(offset));
+                wrong_if_standing += usize::from(standing.sees_through(offset));
+            }
+        }
+        assert_eq!(wrong, 0, "{wrong} hidden places were seen by a sensor that moved {moved_m} m");
+        // More than half of the places are hidden, or beside what was looked at.
+        let least = if moved_m < 0.2 { 800 } else { 400 };
+        assert!(seen > least, "{seen} of 3240 places were seen by a sensor that moved {moved_m} m");
+        assert!(moved_m < 0.2 || wrong_if_standing > 0, "{wrong_if_standing}");
+    }
+}
+
+#[test]
+fn what_lies_behind_the_robots_own_parts_is_not_seen() {
+    // A strut of 4 cm at 0.5 m.
+    let strut = |direction: [f64; 3]| (0.5 * direction[1] / direction[0]).abs() < 0.02;
+    let range_m =
+        |direction: [f64; 3]| if strut(direction) { 0.5 / direction[0] } else { 8.0 / direction[0] };
+    let points = window(40.0, 15.0, 0.4, range_m);
+    let image = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
+    for i in 0..100 {
+        let (x, aside) = (0.6 + i as f32 * 0.07, (i % 9) as f32 / 8.0 - 0.5);
+        let behind = [x, aside * 0.06 * x, 0.02];
+        assert!(!image.sees_through(behind), "{behind:?}");
+    }
+    assert!(image.sees_through([0.4, 0.0, 0.0]) && image.sees_through([4.0, 1.0, 0.0]));
+}
+
+#[test]
+fn pixels_are_seen_where_points_lie_all_over_them_and_not_where_many_lie_together() {
+    // Rings of 6 degrees all around, a point every 0.2 degrees, each sent once and four times.
+    let rings: Vec<Point> = (-5..=5)
+        .flat_map(|ring| {
+            (0..1800).map(move |i| {
+                let ((sin, cos), (up, level)) =
+                    ((i as f32 * 0.2).to_radians().sin_cos(), (ring as f32 * 6.0).to_radians().sin_cos());
+                Point::new(9.0 * level * cos, 9.0 * level * sin, 9.0 * up)
+            })
+        })
+        .collect();
+    let four_times: Vec<Point> = (0..4).flat_map(|_| rings.iter().copied()).collect();
+    for points in [&rings, &four_times] {
+        let Some(image) = RangeImage::of_points(points, RANGE, IMAGE_BYTES_MAX) else { continue };
+        // Halfway between two rings, and a third of the way.
+        let far_from_rays = (0..720).map(|i| {
+            let up_deg = if i < 360 { 3.0f32 } else { 8.0 };
+            let ((sin, cos), (up, level)) =
+                ((i as f32).to_radians().sin_cos(), up_deg.to_radians().sin_cos());
+            [5.0 * level * cos, 5.0 * level * sin, 5.0 * up]
+        });
+        let seen = far_from_rays.filter(|&offset| image.sees_through(offset)).count();
+        assert_eq!(seen, 0, "of 720 places, with {} points", points.len());
+    }
+    // A hole of 7 degrees in what else is dense.
+    let dense = window(179.8, 40.0, 0.4, |_| 9.0);
+    let is_in_hole = |point: &&Point| {
+        let [x, y, z] = point.xyz();
+        !(x > 0.0 && y.atan2(x).to_degrees().abs() < 3.5 && (z / x).atan().to_degrees().abs() < 3.5)
+    };
+    let holed: Vec<Point> = dense.iter().filter(is_in_hole).copied().collect();
+    let image = RangeImage::of_points(&holed, RANGE, IMAGE_BYTES_MAX).unwrap();
+    let whole = RangeImage::of_points(&dense, RANGE, IMAGE_BYTES_MAX).unwrap();
+    for (y, z) in (-10..=10).flat_map(|y| (-10..=10).map(move |z| (y, z))) {
+        let offset = [5.0, y as f32 * 0.01, z as f32 * 0.01];
+        assert!(!image.sees_through(offset) && whole.sees_through(offset), "{offset:?}");
+    }
+}
+
+#[test]
+fn nothing_thinner_than_rays_are_apart_is_seen_well_beyond() {
+    let least = WellBeyond { margin_m: 0.3, gap_max_m: 0.1 };
+    for (step_deg, sees_m) in [(0.4f64, 8.0f32), (1.2, 3.0)] {
+        let image =
+            RangeImage::of_points(&window(40.0, 20.0, step_deg, |_| 20.0), RANGE, IMAGE_BYTES_MAX).unwrap();
+        let apart_m = (step_deg.to_radians() as f32) * sees_m;
+        assert!(image.sees_through([sees_m * 1.5, 0.1, 0.1]));
+        assert!(
+            image.sees_well_beyond([sees_m * 0.4, 0.1, 0.1], least),
+            "at {sees_m} m rays are {apart_m} m apart"
+        );
+        assert!(
+            !image.sees_well_beyond([sees_m * 2.0, 0.1, 0.1], least),
+            "at {sees_m} m rays are {apart_m} m apart"
+        );
+    }
+}
+
+#[test]
+fn images_of_before_are_read() {
+    let points = window(40.0, 20.0, 0.5, |_| 9.0);
+    let image = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
+    let bytes = image.to_bytes();
+    let before: Vec<u8> = [&[bytes[0] & 0x7f], &bytes[1..5], &bytes[13..]].concat();
+    let read = RangeImage::from_bytes(&before).unwrap();
+    assert!(read.seen().eq(image.seen()));
+    assert!(RangeImage::from_bytes(&before[..before.len() - 1]).is_err());
+    let moved = |number: f32| [&bytes[..5], &number.to_le_bytes()[..], &bytes[9..]].concat();
+    assert!(RangeImage::from_bytes(&moved(0.0)).is_ok());
+    for number in [-0.1, f32::NAN, f32::INFINITY] {
+        assert!(matches!(RangeImage::from_bytes(&moved(number)), Err(RangeImageError::Rays(..))));
     }
 }

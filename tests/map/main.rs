@@ -14,5 +14,6 @@ mod stationary_robots;
 #[path = "../support/mod.rs"]
 mod support;
 mod trajectory_growth;
+mod viewpoints;
 #[cfg(feature = "lab")]
 mod without_moments;

@@ -18,7 +18,7 @@ use crate::service::{
     MapService, ServiceSettings, Watch, WatchEvent, WatchForm, WatchMessage, WatchRequest, WatchedSince,
 };
 use crate::store::{OpeningProgress, StoreSettings};
-use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange, ViewpointSet};
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep, ViewpointSet};
 use crate::voxel::VoxelKey;
 use crate::wire::pb;
 
@@ -36,7 +36,7 @@ fn region() -> Region {
 /// What a scan saw of a wall ahead.
 fn image(distance_m: f32) -> RangeImage {
     let points: Vec<_> = (0..9).map(|i| Point::new(distance_m, 0.2 * i as f32, 0.1)).collect();
-    RangeImage::of_points(&points, SeenRange { min_m: 0.01, max_m: 90.0 }, 8192).unwrap()
+    RangeImage::of_points(&points, Sweep::standing(90.0), 8192).unwrap()
 }
 
 /// Somebody who has a copy, and comes back now and then.
@@ -221,8 +221,7 @@ async fn viewpoints_of_a_state_come_in_parts_that_are_bounded() {
             Point::new(5.0 * turn.cos(), 5.0 * turn.sin(), (i % 100) as f32 * 0.05)
         })
         .collect();
-    let image =
-        RangeImage::of_points(&points, SeenRange { min_m: 0.01, max_m: 90.0 }, IMAGE_BYTES_MAX).unwrap();
+    let image = RangeImage::of_points(&points, Sweep::standing(90.0), IMAGE_BYTES_MAX).unwrap();
     assert!(image.stored_bytes() > 2000, "{}", image.stored_bytes());
     let most = 300 * 1024 / image.stored_bytes();
     for _ in 0..2 * most {

@@ -11,7 +11,7 @@ const RESOLUTION_M: f64 = 0.1;
 /// Smallest and largest corner of the room.
 const ROOM_M: [[f64; 3]; 2] = [[0.0; 3], [5.0, 4.0, 2.5]];
 /// Directions of a scan.
-const RAYS: usize = 7000;
+const RAYS: usize = 30_000;
 
 /// Boxes in a room, by their smallest and largest corners.
 type Boxes = Vec<[[f64; 3]; 2]>;

@@ -103,7 +103,7 @@ mod tests {
     use crate::geometry::{Point, Pose};
     use crate::map::{DeletionRecord, MapSettings, MappedScan, RobotName};
     use crate::service::recent_changes::WatchedChange;
-    use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
+    use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
     use crate::voxel::VoxelKey;
 
     fn voxels(x: std::ops::Range<i32>) -> VoxelSet {
@@ -170,7 +170,7 @@ mod tests {
     fn seeing(displaced: Vec<u64>) -> ScanRecord {
         let points: Vec<Point> =
             (0..10_000).map(|i| Point::new(5.0, (i % 100) as f32 * 0.05, (i / 100) as f32 * 0.05)).collect();
-        let range = SeenRange { min_m: 0.0, max_m: 60.0 };
+        let range = Sweep::standing(60.0);
         let image = RangeImage::of_points(&points, range, IMAGE_BYTES_MAX).unwrap();
         let viewpoint = Some(ViewpointRecord { image, displaced });
         ScanRecord { viewpoint, ..scan_record(voxels(0..1), VoxelSet::default()) }

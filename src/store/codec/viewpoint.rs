@@ -77,11 +77,11 @@ pub(in crate::store) fn ascending_from(gaps: &[u64], field: &str) -> Result<Vec<
 mod tests {
     use super::*;
     use crate::geometry::{Point, Pose};
-    use crate::visibility::SeenRange;
+    use crate::visibility::Sweep;
 
     fn image() -> RangeImage {
         let points: Vec<_> = (0..900).map(|i| Point::new(3.0, (i % 30) as f32 * 0.1, 0.1)).collect();
-        let range = SeenRange { min_m: 0.1, max_m: 40.0 };
+        let range = Sweep::standing(40.0);
         RangeImage::of_points(&points, range, IMAGE_BYTES_MAX).unwrap()
     }
 

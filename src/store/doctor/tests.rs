@@ -7,7 +7,7 @@ use crate::map::{
     RobotName, ScanRecord, ViewpointRecord,
 };
 use crate::store::{Record, StoreSettings};
-use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
+use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
 use crate::voxel::VoxelSet;
 
 fn put(name: &str) -> Change {
@@ -89,7 +89,7 @@ fn a_snapshot_that_a_kill_left_behind_the_beginning_of_the_journal_is_no_problem
 /// A scan that leaves a viewpoint.
 fn seen(distance_m: f32) -> Change {
     let points: Vec<_> = (0..9).map(|i| Point::new(distance_m, 0.1 * i as f32, 0.1)).collect();
-    let range = SeenRange { min_m: 0.01, max_m: 90.0 };
+    let range = Sweep::standing(90.0);
     let image = RangeImage::of_points(&points, range, IMAGE_BYTES_MAX).unwrap();
     let pose = MappedScan::new(RobotName::new("r").unwrap(), Pose::identity());
     let viewpoint = Some(ViewpointRecord { image, displaced: Vec::new() });

@@ -71,7 +71,7 @@ mod tests {
         CallerName, DeletionRecord, KeepOutAct, KeepOutChange, KeepOutName, KeepOutRecord, KeepOutShape,
         MappedScan, Prism, Request, RequestId, RobotName, ScanRecord, UndoRecord, ViewpointRecord,
     };
-    use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, SeenRange};
+    use crate::visibility::{IMAGE_BYTES_MAX, RangeImage, Sweep};
     use crate::voxel::{Lattice, MomentSet, VoxelKey, VoxelSet};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -87,7 +87,7 @@ mod tests {
 
     fn image() -> RangeImage {
         let points: Vec<_> = (0..2000).map(|i| Point::new(2.0, (i % 50) as f32 / 20.0, 0.3)).collect();
-        RangeImage::of_points(&points, SeenRange { min_m: 0.1, max_m: 9.0 }, IMAGE_BYTES_MAX).unwrap()
+        RangeImage::of_points(&points, Sweep::standing(9.0), IMAGE_BYTES_MAX).unwrap()
     }
 
     fn moments() -> MomentSet {

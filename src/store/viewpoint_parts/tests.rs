@@ -8,14 +8,14 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::geometry::{Point, Pose};
 use crate::store::Disk;
-use crate::visibility::{RangeImage, SeenRange, Viewpoint};
+use crate::visibility::{RangeImage, Sweep, Viewpoint};
 
 const MAP: Uuid = Uuid::from_u128(7);
 
 /// A viewpoint of some hundred bytes.
 fn viewpoint(x: f64) -> Arc<Viewpoint> {
     let points: Vec<_> = (0..300).map(|i| Point::new(2.0, (i % 20) as f32 / 9.0, 0.3)).collect();
-    let image = RangeImage::of_points(&points, SeenRange { min_m: 0.1, max_m: 9.0 }, 700).unwrap();
+    let image = RangeImage::of_points(&points, Sweep::standing(9.0), 700).unwrap();
     Arc::new(Viewpoint::new(Pose::translation(x, 0.0, 0.0), image))
 }
 

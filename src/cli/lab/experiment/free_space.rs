@@ -15,7 +15,6 @@ use crate::lab::experiment::free_space::{PeerStates, States, map_at_poses, speed
 use crate::lab::workload::Scan;
 use crate::map::{MultiResolutionMap, RobotName};
 use crate::mapping::{MappingSettings, ViewpointSettings};
-use crate::visibility::SeenRange;
 use crate::voxel::VoxelKey;
 
 const EXAMPLES: &str = "\
@@ -83,8 +82,7 @@ impl FreeSpace {
     fn mapped(&self, scans: &[(&Scan, Pose)], output: &Output) -> Result<MultiResolutionMap, CliError> {
         let map = MultiResolutionMap::new(self.map.settings(self.resolution)?).map_err(CliError::usage)?;
         let robot = RobotName::new("experiment").map_err(CliError::failed)?;
-        let range = SeenRange { min_m: 0.0, max_m: self.range as f32 };
-        let viewpoints = ViewpointSettings { range, ..ViewpointSettings::default() };
+        let viewpoints = ViewpointSettings { range_max_m: self.range as f32, ..ViewpointSettings::default() };
         let settings = MappingSettings { viewpoints, ..MappingSettings::default() };
         let output = output.clone().with_bar_of(scans.len(), "scans");
         map_at_poses(&map, scans, settings, &robot, || output.step()).map_err(CliError::failed)?;

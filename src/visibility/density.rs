@@ -1,0 +1,138 @@
+//! Density: how far from each other the points of a scan lie, as they are seen from the sensor.
+
+use super::cube_map::{CubeMap, FACES, TILE_SIDE};
+
+/// Tiles along the side of a face, finest first: pixels of 0.28 to 5.6 degrees.
+const TILES: [usize; 11] = [40, 32, 25, 20, 16, 13, 10, 8, 6, 4, 2];
+/// Tiles along the side of a face with which it is found out how fine pixels can be.
+const TILES_AT_FIRST: usize = 10;
+/// Largest share of the seen pixels beside which others are not seen though some behind these are.
+const GAPS_MAX: f64 = 0.05;
+/// What is farther apart than this is no gap between points of one surface, as the side of a square at depth 1: 8 degrees.
+const GAP_MAX: f32 = 0.14;
+const _: () = assert!(TILE_SIDE * TILES[0] < 1 << 12, "all pixels have a number");
+
+/// How densely the points of a scan lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PointDensity {
+    /// The finest pixels that leave few gaps of two or more of them between the points: finer ones would be a sieve.
+    pub(super) map: CubeMap,
+    /// How far from each other the points lie as a rule, in the direction in which that is farther, as the side of a square at depth
+    /// 1: one pixel to two.
+    pub(super) spacing: f32,
+}
+
+impl PointDensity {
+    /// The density of points at `offsets` from the sensor; none where none has a direction.
+    pub(super) fn of(offsets: &[[f32; 3]]) -> Option<Self> {
+        let at_first = SeenPixels::of(CubeMap::new(TILES_AT_FIRST), offsets);
+        if at_first.count == 0 {
+            return None;
+        }
+        let points_a_pixel = offsets.len() as f64 / at_first.count as f64;
+        let tiles_max = (TILES_AT_FIRST as f64 * points_a_pixel.sqrt()) as usize;
+        let coarsest = TILES[TILES.len() - 1];
+        let candidates = TILES.iter().filter(|&&tiles| tiles <= tiles_max.max(coarsest));
+        let mut seen = candidates.map(|&tiles| SeenPixels::of(CubeMap::new(tiles), offsets));
+        seen.find_map(|seen| {
+            let Gaps { of_one, wider } = seen.gaps();
+            let is_fit = seen.map.tiles() == coarsest || wider <= GAPS_MAX;
+            // Rings one and a half pixels apart leave a gap of one in every second place.
+            is_fit.then(|| Self { map: seen.map, spacing: seen.map.pitch() * (1.0 + of_one as f32) })
+        })
+    }
+}
+
+/// Gaps between the pixels in which points lie, as shares of these.
+struct Gaps {
+    /// Beside or above, whichever has more: gaps of one pixel.
+    of_one: f64,
+    /// Gaps of two or more, beside and above.
+    wider: f64,
+}
+
+/// The pixels in which points lie.
+struct SeenPixels {
+    map: CubeMap,
+    is_seen: Vec<bool>,
+    count: usize,
+}
+
+impl SeenPixels {
+    fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
+        let mut seen = Self { map, is_seen: vec![false; FACES * map.pixels() * map.pixels()], count: 0 };
+        for projection in offsets.iter().filter_map(|&offset| map.project(offset)) {
+            let [column, row] = projection.pixel;
+            let at = (projection.face * map.pixels() + row) * map.pixels() + column;
+            seen.count += usize::from(!std::mem::replace(&mut seen.is_seen[at], true));
+        }
+        seen
+    }
+
+    fn gaps(&self) -> Gaps {
+        let side = self.map.pixels();
+        let most = (GAP_MAX / self.map.pitch()) as usize;
+        let (mut of_one, mut wider) = ([0usize; 2], 0);
+        let mut note = |direction: usize, before: Option<usize>, at: usize| {
+            let not_seen = before.map_or(0, |before| at - before - 1);
+            of_one[direction] += usize::from(not_seen == 1);
+            wider += usize::from((2..most).contains(&not_seen));
+        };
+        for face in self.is_seen.chunks(side * side) {
+            let mut below = vec![None; side];
+            for (row, pixels) in face.chunks(side).enumerate() {
+                let mut left = None;
+                for column in (0..side).filter(|&column| pixels[column]) {
+                    note(0, left.replace(column), column);
+                    note(1, below[column].replace(row), row);
+                }
+            }
+        }
+        let share = |count: usize| count as f64 / self.count.max(1) as f64;
+        Gaps { of_one: share(of_one[0].max(of_one[1])), wider: share(wider) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on `rings` rings of some degrees from each other, a point every tenth of a degree on a quarter of the way around.
+    fn rings(rings: usize, apart_deg: f32) -> Vec<[f32; 3]> {
+        let point = |i: usize| {
+            let elevation = ((i / 900) as f32 - (rings as f32 - 1.0) / 2.0) * apart_deg;
+            let azimuth = (i % 900) as f32 * 0.1 - 45.0;
+            let ([sin, cos], [up, level]) = (
+                [azimuth.to_radians().sin(), azimuth.to_radians().cos()],
+                [elevation.to_radians().sin(), elevation.to_radians().cos()],
+            );
+            [7.0 * level * cos, 7.0 * level * sin, 7.0 * up]
+        };
+        (0..rings * 900).map(point).collect()
+    }
+
+    #[test]
+    fn points_lie_as_far_apart_as_their_rings() {
+        for (count, apart_deg) in [(64, 0.4), (32, 1.0), (16, 2.0), (8, 4.0)] {
+            let density = PointDensity::of(&rings(count, apart_deg)).unwrap();
+            let spacing_deg = density.spacing.to_degrees();
+            assert!(
+                (0.9 * apart_deg..1.6 * apart_deg).contains(&spacing_deg),
+                "rings of {apart_deg} degrees lie {spacing_deg} apart"
+            );
+        }
+    }
+
+    #[test]
+    fn points_sent_several_times_lie_no_closer() {
+        let once = rings(16, 2.0);
+        let four_times: Vec<_> = (0..4).flat_map(|_| once.iter().copied()).collect();
+        assert_eq!(PointDensity::of(&once), PointDensity::of(&four_times));
+    }
+
+    #[test]
+    fn the_sensors_own_place_has_no_density() {
+        assert_eq!(PointDensity::of(&[]), None);
+        assert_eq!(PointDensity::of(&[[0.0; 3]]), None);
+    }
+}

@@ -1,0 +1,115 @@
+//! Nearest depths: how deep the nearest point lies in each pixel of a cube map, and which pixels points tell enough of.
+
+use super::cube_map::{CubeMap, Pixel, Projection};
+use super::tile::TILE_PIXELS;
+
+/// Widest part of a pixel of which a point tells, as the side of a square at depth 1: 1.4 degrees. What lies between points is not
+/// looked at.
+pub(super) const SPACING_MAX: f32 = 0.025;
+/// How far from each other two points may lie that tell of what is between them, beside or above each other: 2.9 degrees.
+const GAP_MAX: f32 = 2.0 * SPACING_MAX;
+
+/// Scans whose points lie farther from each other as a rule tell less: 5 degrees.
+const SPARSE: f32 = 0.09;
+/// What may be lost where a number of parts is computed.
+const ROUNDING: f32 = 0.01;
+
+/// The depth of the nearest point in each pixel, and in each of the parts into which wide pixels are divided.
+pub(super) struct NearestDepths {
+    map: CubeMap,
+    /// Columns, and rows, of parts in a pixel.
+    parts: usize,
+    /// The parts as pixels of their own.
+    map_of_parts: CubeMap,
+    /// Of each part, tile by tile; infinite where no point is.
+    depths_m: Vec<f32>,
+    touched_tiles: usize,
+}
+
+impl NearestDepths {
+    /// Of points at `offsets` from the sensor.
+    pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
+        let parts = (map.pitch() / SPACING_MAX).ceil().max(1.0) as usize;
+        let map_of_parts = CubeMap::new(map.tiles() * parts);
+        let depths_m = vec![f32::INFINITY; map_of_parts.tiles_of_all_faces() * TILE_PIXELS];
+        let mut depths = Self { map, parts, map_of_parts, depths_m, touched_tiles: 0 };
+        let mut is_touched = vec![false; map.tiles_of_all_faces()];
+        for Projection { face, pixel, depth_m } in offsets.iter().filter_map(|&it| map_of_parts.project(it)) {
+            let part = depths.at((face, pixel));
+            depths.depths_m[part] = depths.depths_m[part].min(depth_m);
+            is_touched[map.place(face, pixel.map(|i| i / parts)).0] = true;
+        }
+        depths.touched_tiles = is_touched.iter().filter(|is_touched| **is_touched).count();
+        depths
+    }
+
+    pub(super) fn map(&self) -> CubeMap {
+        self.map
+    }
+
+    /// How many tiles some point lies in.
+    pub(super) fn touched_tiles(&self) -> usize {
+        self.touched_tiles
+    }
+
+    /// The largest depth, meters.
+    pub(super) fn max(&self) -> f32 {
+        self.depths_m.iter().copied().filter(|depth| depth.is_finite()).fold(0.0, f32::max)
+    }
+
+    /// How far each pixel was seen, tile by tile: as far as the nearest of its parts, where half of these were seen or more. So what was
+    /// seen ends within half a pixel of where it does. Of a scan whose points lie `spacing` from each other as a rule, too far for that,
+    /// all parts have to be seen.
+    pub(super) fn seen_tiles(&self, spacing: f32) -> Vec<[Option<f32>; TILE_PIXELS]> {
+        let all = self.parts * self.parts;
+        let least = if spacing <= SPARSE { all.div_ceil(2) } else { all };
+        let mut tiles = vec![[None; TILE_PIXELS]; self.map.tiles_of_all_faces()];
+        for (face, pixel) in self.map.all_pixels() {
+            let (parts, depth_m) = self.seen_parts((face, pixel));
+            let (tile, pixel) = self.map.place(face, pixel);
+            tiles[tile][pixel] = (parts >= least).then_some(depth_m);
+        }
+        tiles
+    }
+
+    /// How many parts of a pixel were seen, and how far all of them.
+    fn seen_parts(&self, (face, pixel): Pixel) -> (usize, f32) {
+        let [column, row] = pixel.map(|i| i * self.parts);
+        let parts =
+            (0..self.parts * self.parts).map(|i| (face, [column + i % self.parts, row + i / self.parts]));
+        let seen = parts.filter_map(|part| self.seen_m(part));
+        seen.fold((0, f32::INFINITY), |(count, nearest_m), seen_m| (count + 1, nearest_m.min(seen_m)))
+    }
+
+    /// How far a part was seen: up to its own nearest point, or to the nearer of two that it lies between, since points are not where
+    /// parts are.
+    fn seen_m(&self, part: Pixel) -> Option<f32> {
+        let own = self.point_m(part);
+        own.or_else(|| {
+            let [beside, above] = [[1, 0], [0, 1]].map(|step| self.seen_between_m(part, step));
+            beside.into_iter().chain(above).reduce(f32::min)
+        })
+    }
+
+    fn seen_between_m(&self, part: Pixel, [right, up]: [isize; 2]) -> Option<f32> {
+        // Towards the edges of a face parts are narrower, as angles.
+        let [u, v] = self.map_of_parts.middle(part.1);
+        let along = if right != 0 { 1.0 + v * v } else { 1.0 + u * u };
+        let part_rad = self.map_of_parts.pitch() * along.sqrt() / (1.0 + u * u + v * v);
+        let steps = (GAP_MAX / part_rad + ROUNDING) as isize;
+        let point_m = |step: isize| self.point_m(self.map_of_parts.beside(part, [right * step, up * step])?);
+        let (before, before_m) = (1..steps).find_map(|step| Some((step, point_m(-step)?)))?;
+        let after_m = (1..=steps - before).find_map(point_m)?;
+        Some(before_m.min(after_m))
+    }
+
+    /// The depth of the nearest point in a part.
+    fn point_m(&self, part: Pixel) -> Option<f32> {
+        Some(self.depths_m[self.at(part)]).filter(|depth_m| depth_m.is_finite())
+    }
+
+    fn at(&self, (face, part): Pixel) -> usize {
+        let (tile, part) = self.map_of_parts.place(face, part);
+        tile * TILE_PIXELS + part
+    }
+}
