@@ -20,10 +20,13 @@ impl Body {
     /// A body of `links`.
     ///
     /// # Errors
-    /// Without a link, or when a number is not finite or out of range; the error names it.
+    /// Without a link, without a sphere or point in any of them, or when a number is not finite or out of range; the error names it.
     pub fn new(links: Vec<Link>) -> Result<Self, PlanningError> {
         if links.is_empty() {
             return Err(PlanningError::NoLinks);
+        }
+        if links.iter().all(|link| link.spheres.is_empty() && link.points.is_empty()) {
+            return Err(PlanningError::NoParts { links: links.len() });
         }
         links.iter().enumerate().try_for_each(|(number, link)| link.check(number))?;
         Ok(Self { links, prepared: Prepared::default() })
@@ -65,6 +68,8 @@ mod tests {
         assert!(body([0.0, -1e30, 2.0, 0.0], 1.0, 0.0).is_ok());
         assert!(body([0.0, 1.0, 2.0, 1000.0], 1.0, 1000.0).is_ok());
         assert_eq!(Body::new(Vec::new()), Err(PlanningError::NoLinks));
+        // It would fit everywhere.
+        assert_eq!(Body::new(vec![Link::default(); 2]), Err(PlanningError::NoParts { links: 2 }));
     }
 
     #[test]

@@ -77,6 +77,12 @@ pub enum PlanningError {
     /// A body without a link.
     #[error("a body has at least one link")]
     NoLinks,
+    /// A body that is nowhere: it would be free everywhere.
+    #[error("a body has at least one sphere or point, got {links} links without any")]
+    NoParts {
+        /// The body's links.
+        links: usize,
+    },
     /// Numbers that are not whole configurations.
     #[error(
         "a configuration of {links} links has {expected} numbers (x y z qx qy qz qw each), got {got} in all"
