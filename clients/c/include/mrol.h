@@ -137,7 +137,8 @@ typedef struct mrol_map_version {
 typedef struct mrol_replica_options {
     /* sizeof(mrol_replica_options) where the program was compiled. */
     size_t struct_size;
-    /* gRPC address of the server: "http://127.0.0.1:7334", "https://robot-7:7334" or "unix:/run/mrol/grpc.sock". */
+    /* gRPC address of the server: "http://127.0.0.1:7334", "https://robot-7:7334" or "unix:/run/mrol/grpc.sock". One with a
+     * user, a path or a query is refused: errors show the address, and a key in it would be in them. */
     const char *address;
     /* Name of the map. */
     const char *map;

@@ -160,6 +160,12 @@ impl From<ClientError> for Failure {
             ClientError::Foreign { .. } | ClientError::Answer(_) => Code::Damaged,
         };
         let message = match &error {
+            // The address is not told: where it is none, it may be a key.
+            ClientError::Url { problem, .. } => {
+                format!(
+                    "options.address is no server address: {problem}; it looks like http://127.0.0.1:7334"
+                )
+            }
             // The reason has a place of its own.
             ClientError::Refused { message, .. } => message.clone(),
             error => error.to_string(),

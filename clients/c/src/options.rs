@@ -33,7 +33,7 @@ impl Opening {
         let map = required(options.map, "options.map")?;
         let timeout = milliseconds(options.open_timeout_ms, OPEN_TIMEOUT_DEFAULT);
         Ok(Self {
-            address: required(options.address, "options.address")?,
+            address: address_of(options.address)?,
             map: MapName::new(&map).map_err(ServiceError::from)?,
             credentials: credentials_of(&CredentialFiles {
                 key: options.key,
@@ -120,6 +120,24 @@ pub(crate) fn required(pointer: *const std::ffi::c_char, name: &str) -> Result<S
     text(pointer, name)?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
 }
 
+/// The address of a server. Messages about a connection show it, so that no key or password may stand in it.
+pub(crate) fn address_of(pointer: *const std::ffi::c_char) -> Result<String, Failure> {
+    let address = required(pointer, "options.address")?;
+    if address.starts_with("unix:") {
+        return Ok(address);
+    }
+    let place = address.split_once("://").map_or(&*address, |(_, place)| place);
+    let place = place.strip_suffix('/').unwrap_or(place);
+    // What ends with a bracket is an address of IPv6 without a port.
+    let port = place.rsplit_once(':').filter(|_| !place.ends_with(']')).map_or("", |(_, port)| port);
+    if place.contains(['@', '/', '?', '#']) || !port.bytes().all(|byte| byte.is_ascii_digit()) {
+        let message = "options.address must be http://host:port, https://host:port or unix:/path, without a user, \
+            a path or a query; what was given is not shown";
+        return Err(Failure::argument(message));
+    }
+    Ok(address)
+}
+
 fn file(path: *const std::ffi::c_char, name: &str) -> Result<Option<Vec<u8>>, Failure> {
     let Some(path) = text(path, name)? else { return Ok(None) };
     let unreadable = |error| Failure::argument(format!("{name}: {path} cannot be read: {error}"));
@@ -128,4 +146,45 @@ fn file(path: *const std::ffi::c_char, name: &str) -> Result<Option<Vec<u8>>, Fa
 
 fn milliseconds(milliseconds: u64, usual: Duration) -> Duration {
     if milliseconds == 0 { usual } else { Duration::from_millis(milliseconds) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_a_host_and_a_port() {
+        let refusal = |text: &str| {
+            let text = std::ffi::CString::new(text).unwrap_or_default();
+            address_of(text.as_ptr()).err().map(|failure| failure.message)
+        };
+        for good in [
+            "localhost",
+            "localhost:7334",
+            "http://127.0.0.1:7334",
+            "https://robot-7:7334/",
+            "http://[::1]:7334",
+            "http://[::1]",
+            "unix:/run/a@b.sock",
+            "unix:///run/mrol.sock",
+        ] {
+            assert_eq!(refusal(good), None, "{good}");
+        }
+        for bad in [
+            "http://u:SECRET@127.0.0.1:1",
+            "SECRET@host",
+            "http://host/SECRET",
+            "host:1//SECRET",
+            "http://host:1/?key=SECRET",
+            "http://host?SECRET",
+            "http://host#SECRET",
+            "http://host:SECRET",
+        ] {
+            let message = refusal(bad).unwrap_or_default();
+            assert!(
+                message.contains("options.address must be") && !message.contains("SECRET"),
+                "{bad}: {message}"
+            );
+        }
+    }
 }

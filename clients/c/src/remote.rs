@@ -12,7 +12,7 @@ use crate::clients::{CLIENTS, ClientHandle, OpenClient};
 use crate::failure::Failure;
 use crate::guarded;
 use crate::memory::{self, Bitmap, Out};
-use crate::options::{ClientOptions, credentials_of, required};
+use crate::options::{ClientOptions, address_of, credentials_of, required};
 use crate::scans::{Localization, Localized, Scan, ScanOutcome, copied};
 
 /// Longest time that a call takes, where nobody says.
@@ -35,7 +35,7 @@ pub unsafe extern "C" fn mrol_client_open(
         out.write(ClientHandle::NONE);
         // SAFETY: as the caller promises.
         let options = unsafe { memory::read_question(options) }?;
-        let address = required(options.address, "options.address")?;
+        let address = address_of(options.address)?;
         let credentials = credentials_of(&options.credentials)?;
         let timeout = match options.timeout_ms {
             0 => TIMEOUT_DEFAULT,

@@ -72,6 +72,8 @@ static void bad_options(const char *address, const char *map) {
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.address is NULL");
     options = good, options.address = "nothing like it";
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "is no server address");
+    options = good, options.address = "http://u:secret@127.0.0.1:1";
+    OPENING_FAILS(MROL_INVALID_ARGUMENT, "without a user, a path or a query; what was given is not shown");
     options = good, options.address = far_too_long;
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.address has more than 4096 bytes");
     options = good, options.map = NULL;
@@ -446,6 +448,8 @@ static void bad_calls(const char *address, const char *map) {
     FAILS(mrol_client_open(&good, NULL, &error), MROL_INVALID_ARGUMENT, "client is NULL");
     options = good, options.address = NULL;
     FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "options.address is NULL");
+    options = good, options.address = "http://127.0.0.1:1/?key=secret";
+    FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "what was given is not shown");
     options = good, options.struct_size = 8;
     FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "struct_size must lie in");
     options = good, options.credentials.ca_file = "/nowhere";

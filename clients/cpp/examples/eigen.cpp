@@ -1,4 +1,4 @@
-// Points and poses of Eigen: columns of a matrix, and isometries.
+// Points and poses of Eigen: columns of a matrix or vectors, and isometries.
 #include <Eigen/Geometry>
 #include <mrol.hpp>
 
@@ -11,3 +11,5 @@ bool is_free(const mrol::replica &replica, const mrol::body &body, const Eigen::
 }
 
 Eigen::Isometry3d where(const mrol::scan_answer &answer) { return answer.map_from_sensor().isometry(); }
+
+mrol::answers occupied(const mrol::replica &replica, const std::vector<Eigen::Vector3f> &points) { return replica.query(points); }

@@ -129,11 +129,42 @@ constexpr bool is_eigen = std::is_base_of_v<Eigen::EigenBase<T>, T>;
 template <class T>
 constexpr bool is_eigen = false;
 #endif
+
+// Whether T has members x, y, z that are floats in this order and nothing else: numbers of another type would be read as the bits
+// of floats, which are other places.
+template <class T, class = void>
+struct has_float_xyz : std::false_type {};
+template <class T>
+struct has_float_xyz<T, std::void_t<decltype(&T::x), decltype(&T::y), decltype(&T::z)>> {
+    static constexpr bool is_in_order() {
+        if constexpr (std::is_standard_layout_v<T> && std::is_convertible_v<decltype(&T::x), const float T::*> &&
+                      std::is_convertible_v<decltype(&T::y), const float T::*> &&
+                      std::is_convertible_v<decltype(&T::z), const float T::*>) {
+            return offsetof(T, x) == 0 && offsetof(T, y) == sizeof(float) && offsetof(T, z) == 2 * sizeof(float);
+        } else {
+            return false;
+        }
+    }
+    static constexpr bool value = is_in_order();
+};
+
+// Whether the elements of T, in brackets, are floats: those of arrays and of Eigen's vectors.
+template <class T, class = void>
+struct has_float_elements : std::false_type {};
+template <class T>
+struct has_float_elements<T, std::void_t<decltype(std::declval<const T &>()[0])>>
+    : std::is_same<decltype(std::declval<const T &>()[0]), const float &> {};
+
+template <class T>
+constexpr bool is_three_floats = sizeof(T) == 3 * sizeof(float) && alignof(T) == alignof(float) &&
+                                 (std::is_trivially_copyable_v<T> || is_eigen<T>) &&
+                                 (has_float_xyz<T>::value || has_float_elements<T>::value);
 }  // namespace detail
 
 // Points of somebody else, x y z each, which stay where they are: of a pointer and their number, or of a container whose elements
-// are three floats (std::array<float, 3>, a point of another library), or of floats, three for each; or the columns of an Eigen
-// matrix (of blocks and other expressions: their .eval()).
+// are three floats (std::array<float, 3>, Eigen::Vector3f, a struct of another library with floats x, y, z and nothing else), or of
+// floats, three for each; or the columns of an Eigen matrix (of blocks and other expressions: their .eval()). What has doubles or
+// whole numbers does not compile: it would be read as the bits of floats.
 class points {
 public:
     points(const float *xyz, std::size_t count) noexcept : xyz_(xyz), count_(count) {}
@@ -143,9 +174,9 @@ public:
               class = std::enable_if_t<!detail::is_eigen<Container>>>
     points(const Container &container) : xyz_(reinterpret_cast<const float *>(container.data())) {
         constexpr bool is_float = std::is_same_v<std::remove_const_t<Element>, float>;
-        static_assert(is_float || (sizeof(Element) == 3 * sizeof(float) && alignof(Element) == alignof(float) &&
-                                   std::is_trivially_copyable_v<Element>),
-                      "points are containers of floats, or of elements that are three floats");
+        static_assert(is_float || detail::is_three_floats<std::remove_const_t<Element>>,
+                      "points are containers of float, or of elements that are three floats: std::array<float, 3>, "
+                      "Eigen::Vector3f, or a struct with float x, y, z; of others, mrol::points(pointer to floats, count)");
         const std::size_t floats = static_cast<std::size_t>(container.size()) * (is_float ? 1 : 3);
         if (floats % 3 != 0) {
             throw std::invalid_argument("points are three floats each, got " + std::to_string(floats) + " floats");

@@ -125,6 +125,8 @@ int main(int count, char **words) {
     EXPECT(thrown([&] { mrol::replica(address, map + "-none"); }) == "map_not_found");
     EXPECT(thrown([&] { mrol::client("http://127.0.0.1:9"); }) == "MROL_UNREACHABLE");
     EXPECT(thrown([&] { mrol::client("nonsense://"); }) == "MROL_INVALID_ARGUMENT");
+    EXPECT(thrown([&] { mrol::client("http://u:secret@127.0.0.1:9"); }) == "MROL_INVALID_ARGUMENT");
+    EXPECT(thrown([&] { mrol::replica("http://127.0.0.1:9/?k=secret", map); }) == "MROL_INVALID_ARGUMENT");
     // Text with a NUL would be another name. Nothing of it is told, since it may be a key.
     const std::string cut = map + std::string("\0secret", 7), robot = std::string("r1\0secret", 9);
     const auto refusal = [](auto act) {

@@ -1,5 +1,7 @@
 //! Failures, as exceptions of the package `mrol`.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use mrol::client::{ClientError, ReplicaError};
 use mrol::service::ServiceError;
 use pyo3::prelude::*;
@@ -52,6 +54,15 @@ impl Failure {
     }
 }
 
+/// What `work` comes to. A panic of it is a failure: PyO3 would raise what `except Exception` does not catch.
+pub(crate) fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        // What it carries may panic in turn when it is dropped.
+        std::mem::forget(panic);
+        Err(Failure::defect("a defect of mrol_replica: it panicked").into())
+    })
+}
+
 /// An argument is none: `mrol.ArgumentError`, with its name, what was given, and what belongs there.
 pub(crate) fn argument(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
     let made = value
@@ -71,7 +82,11 @@ impl From<ServiceError> for Failure {
 
 impl From<ClientError> for Failure {
     fn from(error: ClientError) -> Self {
-        let message = error.to_string();
+        let message = match &error {
+            // The address is not told: where it is none, it may be a key.
+            ClientError::Url { problem, .. } => format!("address is no server address: {problem}"),
+            error => error.to_string(),
+        };
         match error {
             ClientError::Url { .. } | ClientError::Credentials(_) => Self::argument(message),
             ClientError::Unreachable { .. } | ClientError::Untrusted { .. } => {

@@ -17,12 +17,12 @@ use mrol::service::{
 };
 use mrol::store::OpeningProgress;
 use mrol::util::Keyword;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::answers::{Indices, Version, indices, of_bytes, told};
-use crate::failure::Failure;
+use crate::arrays::{Rows, Times};
+use crate::failure::{Failure, guarded};
 use crate::questions::{Questions, Seven, points_of, pose_of, region_of};
 use crate::source::{OpenSource, Source};
 use crate::waiting::{threads, wait_for};
@@ -44,7 +44,7 @@ struct ScanFields<'py> {
     constant_velocity: bool,
     align: bool,
     timestamp_ns: Option<i64>,
-    point_times: Option<PyReadonlyArray1<'py, f32>>,
+    point_times: Option<Times<'py>>,
     point_times_from_sweep_start: bool,
     gravity_in_sensor: Option<[f64; 3]>,
     guess_covariance: Option<Vec<f64>>,
@@ -60,7 +60,7 @@ struct ScanFields<'py> {
 }
 
 impl ScanFields<'_> {
-    fn request(self, points: &PyReadonlyArray2<'_, f32>) -> Result<ScanRequest, Failure> {
+    fn request(self, points: &Rows<'_>) -> Result<ScanRequest, Failure> {
         let robot = RobotName::new(&self.robot).map_err(ServiceError::from)?;
         let reference = match self.point_times_from_sweep_start {
             true => TimeReference::SweepStart,
@@ -167,49 +167,57 @@ impl NativeLocalMap {
         has_filter: bool,
         has_moments: bool,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let settings = MapSettings {
-            filter: has_filter.then(FilterSettings::default),
-            moments: has_moments,
-            ..MapSettings::new(resolution_m, levels)
-        };
-        let service = service()?;
-        wait_for(py, service.create_map(name()?, settings))?;
-        made(service)
+        guarded(|| {
+            let settings = MapSettings {
+                filter: has_filter.then(FilterSettings::default),
+                moments: has_moments,
+                ..MapSettings::new(resolution_m, levels)
+            };
+            let service = service()?;
+            wait_for(py, service.create_map(name()?, settings))?;
+            made(service)
+        })
     }
 
     /// The map of a map file's bytes.
     #[staticmethod]
     fn of_file(py: Python<'_>, file: &[u8]) -> PyResult<Py<Self>> {
-        let service = service()?;
-        wait_for(py, service.restore_map(name()?, Bytes::copy_from_slice(file), false))?;
-        Py::new(py, made(service)?)
+        guarded(|| {
+            let service = service()?;
+            wait_for(py, service.restore_map(name()?, Bytes::copy_from_slice(file), false))?;
+            Py::new(py, made(service)?)
+        })
     }
 
     /// The map as the bytes of a map file.
     fn to_file<'py>(slf: PyRef<'py, Self>, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let source = slf.as_super().source.get()?;
-        let (service, name) = source.local()?;
-        let file = wait_for(py, service.snapshot_map(name))?;
-        Ok(PyBytes::new(py, &file.bytes))
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let (service, name) = source.local()?;
+            let file = wait_for(py, service.snapshot_map(name))?;
+            Ok(PyBytes::new(py, &file.bytes))
+        })
     }
 
     /// Aligns a scan of shape (n, 3) and adds it where it fits; or, not to be `inserted`, says what would become of it.
     fn map_scan<'py>(
         slf: PyRef<'py, Self>,
         py: Python<'py>,
-        points: PyReadonlyArray2<'py, f32>,
+        points: Rows<'py>,
         fields: ScanFields<'py>,
         is_inserted: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let source = slf.as_super().source.get()?;
-        let (service, name) = source.local()?;
-        let scan = fields.request(&points)?;
-        let count = scan.points.len();
-        let answer = match is_inserted {
-            true => wait_for(py, service.insert_scan(name, scan))?,
-            false => wait_for(py, service.align_scan(name, scan))?,
-        };
-        answer_of(py, &answer, count)
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let (service, name) = source.local()?;
+            let scan = fields.request(&points)?;
+            let count = scan.points.len();
+            let answer = match is_inserted {
+                true => wait_for(py, service.insert_scan(name, scan))?,
+                false => wait_for(py, service.align_scan(name, scan))?,
+            };
+            answer_of(py, &answer, count)
+        })
     }
 
     /// Where was a scan taken? By the names of the fields of `mrol.Localization`.
@@ -217,7 +225,7 @@ impl NativeLocalMap {
     fn localize<'py>(
         slf: PyRef<'py, Self>,
         py: Python<'py>,
-        points: PyReadonlyArray2<'py, f32>,
+        points: Rows<'py>,
         gravity_in_sensor: Option<[f64; 3]>,
         gravity_in_map: Option<[f64; 3]>,
         search_box: Option<([f64; 3], [f64; 3])>,
@@ -225,41 +233,43 @@ impl NativeLocalMap {
         candidates: usize,
         seed: u64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let source = slf.as_super().source.get()?;
-        let (service, name) = source.local()?;
-        let bad = |message: String| PyErr::from(Failure::argument(message));
-        let query = LocalizationQuery {
-            gravity: match gravity_in_sensor {
-                Some(down) => Some(gravity_of(down, gravity_in_map)?),
-                None => None,
-            },
-            search_box: match search_box {
-                Some((min_m, max_m)) => {
-                    Some(SearchBox::new(min_m, max_m).map_err(|error| bad(error.to_string()))?)
-                }
-                None => None,
-            },
-            candidates,
-            seed,
-        };
-        let time_limit = time_limit_s.map(Duration::try_from_secs_f64).transpose();
-        let time_limit = time_limit.map_err(|error| bad(format!("time_limit_s: {error}")))?;
-        let request = LocalizationRequest { points: points_of(&points), query, time_limit };
-        let found = wait_for(py, service.localize(name, request))?;
-        let version = wait_for(py, service.map_info(name))?.version;
-        let fields = PyDict::new(py);
-        fields.set_item("version", told(&version))?;
-        fields.set_item("verdict", found.verdict.as_str())?;
-        fields.set_item("reason", found.reason)?;
-        let of = |of: &mrol::service::CandidateAnswer| {
-            (seven_of(&of.map_from_sensor), of.overlap, of.inliers, of.blocked, of.fit, of.margin)
-        };
-        fields.set_item("candidates", found.candidates.iter().map(of).collect::<Vec<_>>())?;
-        fields.set_item("exhaustive", found.exhaustive)?;
-        fields.set_item("cut_short", found.cut_short)?;
-        fields.set_item("search_ms", found.search_time.as_secs_f64() * 1e3)?;
-        fields.set_item("points_skipped", found.points_skipped)?;
-        Ok(fields)
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let (service, name) = source.local()?;
+            let bad = |message: String| PyErr::from(Failure::argument(message));
+            let query = LocalizationQuery {
+                gravity: match gravity_in_sensor {
+                    Some(down) => Some(gravity_of(down, gravity_in_map)?),
+                    None => None,
+                },
+                search_box: match search_box {
+                    Some((min_m, max_m)) => {
+                        Some(SearchBox::new(min_m, max_m).map_err(|error| bad(error.to_string()))?)
+                    }
+                    None => None,
+                },
+                candidates,
+                seed,
+            };
+            let time_limit = time_limit_s.map(Duration::try_from_secs_f64).transpose();
+            let time_limit = time_limit.map_err(|error| bad(format!("time_limit_s: {error}")))?;
+            let request = LocalizationRequest { points: points_of(&points), query, time_limit };
+            let found = wait_for(py, service.localize(name, request))?;
+            let version = wait_for(py, service.map_info(name))?.version;
+            let fields = PyDict::new(py);
+            fields.set_item("version", told(&version))?;
+            fields.set_item("verdict", found.verdict.as_str())?;
+            fields.set_item("reason", found.reason)?;
+            let of = |of: &mrol::service::CandidateAnswer| {
+                (seven_of(&of.map_from_sensor), of.overlap, of.inliers, of.blocked, of.fit, of.margin)
+            };
+            fields.set_item("candidates", found.candidates.iter().map(of).collect::<Vec<_>>())?;
+            fields.set_item("exhaustive", found.exhaustive)?;
+            fields.set_item("cut_short", found.cut_short)?;
+            fields.set_item("search_ms", found.search_time.as_secs_f64() * 1e3)?;
+            fields.set_item("points_skipped", found.points_skipped)?;
+            Ok(fields)
+        })
     }
 
     /// The occupied voxels of a level, all or those in a region: indices, the side of a voxel, the version.
@@ -269,11 +279,13 @@ impl NativeLocalMap {
         level: u32,
         region: Option<(String, Vec<f64>)>,
     ) -> PyResult<(Indices<'py>, f64, Version)> {
-        let source = slf.as_super().source.get()?;
-        let (service, name) = source.local()?;
-        let region = region.as_ref().map(region_of).transpose()?;
-        let listing = wait_for(py, service.list_voxels(name, ListingRequest::of(level, region)))?;
-        Ok((indices(py, listing.keys.into_iter())?, listing.resolution_m, told(&listing.version)))
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let (service, name) = source.local()?;
+            let region = region.as_ref().map(region_of).transpose()?;
+            let listing = wait_for(py, service.list_voxels(name, ListingRequest::of(level, region)))?;
+            Ok((indices(py, listing.keys.into_iter())?, listing.resolution_m, told(&listing.version)))
+        })
     }
 
     /// Deletes the voxels whose centers lie in a region: how many finest ones went, and the version.
@@ -283,11 +295,13 @@ impl NativeLocalMap {
         region: (String, Vec<f64>),
         level: u32,
     ) -> PyResult<(usize, Version)> {
-        let source = slf.as_super().source.get()?;
-        let (service, name) = source.local()?;
-        let target = DeletionTarget::Region(region_of(&region)?);
-        let deletion = Deletion { target, level, request_id: None };
-        let deleted = wait_for(py, service.delete_voxels(name, deletion))?;
-        Ok((deleted.removed, told(&deleted.version)))
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let (service, name) = source.local()?;
+            let target = DeletionTarget::Region(region_of(&region)?);
+            let deletion = Deletion { target, level, request_id: None };
+            let deleted = wait_for(py, service.delete_voxels(name, deletion))?;
+            Ok((deleted.removed, told(&deleted.version)))
+        })
     }
 }

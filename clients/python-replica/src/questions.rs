@@ -7,20 +7,18 @@ use mrol::map::{Lookup, Region};
 use mrol::planning::{MeasuredTo, Surroundings, Unknown};
 use mrol::service::{
     Asked, CheckAs, ClassifyQuestion, MotionCheck, NearestQuestion, PointCloud, PointQuery, PoseCheck,
-    RayQuestion, RaysToward, ServiceError, SphereCheck,
+    RayQuestion, RaysToward, Reason, ServiceError, SphereCheck,
 };
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn,
-    PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
 use crate::answers::{
     Bools, Checked, Indices, Version, checked, indices, names, of_bytes, of_words, ones, told,
 };
+use crate::arrays::{Counts, Floats, Rows, is_aligned};
 use crate::body::{NativeBody, spheres_of};
-use crate::failure::{Failure, argument};
+use crate::failure::{Failure, argument, guarded};
 use crate::source::OpenSource;
 
 /// A pose, x y z and qx qy qz qw.
@@ -39,7 +37,7 @@ pub(crate) struct Questions {
 }
 
 /// The points of an array of shape (n, 3), copied: who changes the array meanwhile changes nothing of the question.
-pub(crate) fn points_of(rows: &PyReadonlyArray2<'_, f32>) -> PointCloud {
+pub(crate) fn points_of(rows: &Rows<'_>) -> PointCloud {
     // A slice there is of an array whose columns lie together, too.
     let points: Vec<Point> = match rows.as_slice().ok().filter(|_| rows.is_c_contiguous()) {
         Some(numbers) => bytemuck::cast_slice(numbers).to_vec(),
@@ -82,27 +80,38 @@ fn asked(level: u32, ignore_keep_outs: bool) -> Asked {
     Asked { level, ignore_keep_outs, ..Asked::default() }
 }
 
-fn check_as(answer: &str, most_m: Option<f32>) -> CheckAs {
+fn check_as(answer: &str, most_m: Option<f32>) -> Result<CheckAs, Failure> {
     match answer {
-        "first_hit" => CheckAs::FirstHit,
-        "clearance" => CheckAs::Clearance { most_m },
-        _ => CheckAs::Colliding,
+        "clearance" => Ok(CheckAs::Clearance { most_m }),
+        _ if most_m.is_some() => {
+            // As of a server, which would otherwise refuse what this answers.
+            let message = "clearance_max_m goes with the answer clearance";
+            Err(ServiceError::new(Reason::BadCheck, message).into())
+        }
+        "first_hit" => Ok(CheckAs::FirstHit),
+        _ => Ok(CheckAs::Colliding),
     }
 }
 
-/// The numbers of an array whose rows lie together, copied.
-fn numbers_of(rows: &PyReadonlyArrayDyn<'_, f32>, name: &str) -> Result<Vec<f32>, Failure> {
-    let numbers = rows.as_slice().ok().filter(|_| rows.is_c_contiguous());
-    let not_so =
-        || Failure::argument(format!("{name} must be contiguous: numpy.ascontiguousarray makes it so"));
-    numbers.map(<[f32]>::to_vec).ok_or_else(not_so)
+/// The numbers of an array, row by row, copied.
+fn numbers_of(rows: &Floats<'_>) -> Vec<f32> {
+    // A slice there is of an array whose columns lie together, too.
+    match rows.as_slice().ok().filter(|_| rows.is_c_contiguous()) {
+        Some(numbers) => numbers.to_vec(),
+        None => rows.as_array().iter().copied().collect(),
+    }
 }
 
-/// The array that an argument is. One with masked values is none: what its masks hide are numbers here.
-fn floats_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+/// The array that an argument is which is not copied. One with masked values is none: what its masks hide are numbers here.
+fn floats_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Floats<'py>> {
     let expected = "an array of float32: numpy.asarray(..., numpy.float32) makes it so";
-    let array = value.extract::<PyReadonlyArrayDyn<'py, f32>>();
-    let array = array.map_err(|_| argument(name, value, expected))?;
+    let array = value.cast::<PyArrayDyn<f32>>().map_err(|_| argument(name, value, expected))?;
+    if !(array.is_c_contiguous() && is_aligned(array)) {
+        let message = format!(
+            "{name} must be contiguous and aligned: numpy.require(..., numpy.float32, ['C', 'ALIGNED']) makes it so"
+        );
+        return Err(Failure::argument(message).into());
+    }
     if !value.is_exact_instance_of::<PyUntypedArray>() {
         let masked = value.py().import("numpy.ma")?.call_method1("is_masked", (value,))?;
         if masked.extract()? {
@@ -113,7 +122,7 @@ fn floats_of<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyA
             ));
         }
     }
-    Ok(array)
+    value.extract()
 }
 
 fn level_of(value: &Bound<'_, PyAny>) -> PyResult<u32> {
@@ -129,31 +138,36 @@ fn flag_of(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<bool> {
 #[pymethods]
 impl Questions {
     /// Frees its memory, once the last call that uses it returns.
-    fn close(&self, py: Python<'_>) {
-        py.detach(|| self.source.close());
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        guarded(|| {
+            py.detach(|| self.source.close());
+            Ok(())
+        })
     }
 
     /// Are points of shape (n, 3) in occupied voxels?
     fn query<'py>(
         &self,
         py: Python<'py>,
-        points: PyReadonlyArray2<'py, f32>,
+        points: Rows<'py>,
         map_from_points: Option<Seven>,
         level: u32,
         bloom: bool,
         keep_out: bool,
     ) -> PyResult<(Bools<'py>, usize, Version)> {
-        let query = PointQuery {
-            points: points_of(&points),
-            map_from_points: map_from_points.map(pose_of).transpose()?,
-            level,
-            lookup: if bloom { Lookup::Bloom } else { Lookup::Exact },
-            min_revision: None,
-            map_uuid: None,
-            keep_out,
-        };
-        let answer = self.source.get()?.query_points(py, query)?;
-        Ok((of_bytes(py, &answer.occupied, answer.points), answer.points_occupied, told(&answer.version)))
+        guarded(|| {
+            let query = PointQuery {
+                points: points_of(&points),
+                map_from_points: map_from_points.map(pose_of).transpose()?,
+                level,
+                lookup: if bloom { Lookup::Bloom } else { Lookup::Exact },
+                min_revision: None,
+                map_uuid: None,
+                keep_out,
+            };
+            let answer = self.source.get()?.query_points(py, query)?;
+            Ok((of_bytes(py, &answer.occupied, answer.points), answer.points_occupied, told(&answer.version)))
+        })
     }
 
     /// Does a body fit at configurations, an array of shape (n, 7 * links)?
@@ -162,7 +176,7 @@ impl Questions {
         &self,
         py: Python<'py>,
         body: &NativeBody,
-        configurations: PyReadonlyArrayDyn<'py, f32>,
+        configurations: Floats<'py>,
         answer: &str,
         clearance_max_m: Option<f32>,
         ignored: Regions,
@@ -170,15 +184,17 @@ impl Questions {
         level: u32,
         ignore_keep_outs: bool,
     ) -> PyResult<Checked<'py>> {
-        let check = PoseCheck {
-            asked: asked(level, ignore_keep_outs),
-            body: Arc::clone(&body.body),
-            configurations: numbers_of(&configurations, "configurations")?,
-            surroundings: surroundings(&ignored, unknown_is_occupied)?,
-            answer: check_as(answer, clearance_max_m),
-        };
-        let answered = self.source.get()?.ask(py, check)?;
-        checked(py, &answered.answer, &answered.version)
+        guarded(|| {
+            let check = PoseCheck {
+                asked: asked(level, ignore_keep_outs),
+                body: Arc::clone(&body.body),
+                configurations: numbers_of(&configurations),
+                surroundings: surroundings(&ignored, unknown_is_occupied)?,
+                answer: check_as(answer, clearance_max_m)?,
+            };
+            let answered = self.source.get()?.ask(py, check)?;
+            checked(py, &answered.answer, &answered.version)
+        })
     }
 
     /// Do spheres of shape (n, 4) meet anything, in groups of so many?
@@ -186,8 +202,8 @@ impl Questions {
     fn check_spheres<'py>(
         &self,
         py: Python<'py>,
-        spheres: PyReadonlyArray2<'py, f32>,
-        sizes: PyReadonlyArray1<'py, u32>,
+        spheres: Rows<'py>,
+        sizes: Counts<'py>,
         padding_m: f32,
         answer: &str,
         clearance_max_m: Option<f32>,
@@ -196,16 +212,18 @@ impl Questions {
         level: u32,
         ignore_keep_outs: bool,
     ) -> PyResult<Checked<'py>> {
-        let check = SphereCheck {
-            asked: asked(level, ignore_keep_outs),
-            spheres: spheres_of(&spheres),
-            sizes: sizes.as_array().to_vec(),
-            padding_m,
-            surroundings: surroundings(&ignored, unknown_is_occupied)?,
-            answer: check_as(answer, clearance_max_m),
-        };
-        let answered = self.source.get()?.ask(py, check)?;
-        checked(py, &answered.answer, &answered.version)
+        guarded(|| {
+            let check = SphereCheck {
+                asked: asked(level, ignore_keep_outs),
+                spheres: spheres_of(&spheres),
+                sizes: sizes.as_array().to_vec(),
+                padding_m,
+                surroundings: surroundings(&ignored, unknown_is_occupied)?,
+                answer: check_as(answer, clearance_max_m)?,
+            };
+            let answered = self.source.get()?.ask(py, check)?;
+            checked(py, &answered.answer, &answered.version)
+        })
     }
 
     /// Can a body move along configurations, so many of them a motion? The bits, the shares of first hits, and clearances.
@@ -218,8 +236,8 @@ impl Questions {
         &self,
         py: Python<'py>,
         body: &NativeBody,
-        configurations: PyReadonlyArrayDyn<'py, f32>,
-        lengths: PyReadonlyArray1<'py, u32>,
+        configurations: Floats<'py>,
+        lengths: Counts<'py>,
         step_m: Option<f32>,
         clearance_max_m: Option<f32>,
         ignored: Regions,
@@ -228,34 +246,36 @@ impl Questions {
         ignore_keep_outs: bool,
     ) -> PyResult<(Bools<'py>, usize, Bound<'py, PyArray1<f32>>, Option<Bound<'py, PyArray1<f32>>>, Version)>
     {
-        let check = MotionCheck {
-            asked: asked(level, ignore_keep_outs),
-            body: Arc::clone(&body.body),
-            configurations: numbers_of(&configurations, "configurations")?,
-            lengths: lengths.as_array().to_vec(),
-            step_m,
-            clearance_max_m,
-            surroundings: surroundings(&ignored, unknown_is_occupied)?,
-        };
-        let answered = self.source.get()?.ask(py, check)?;
-        let motions = &answered.answer;
-        let free: Vec<bool> = motions.iter().map(|motion| motion.is_free()).collect();
-        let count = free.iter().filter(|free| **free).count();
-        let hits = motions.iter().map(|motion| motion.first_hit.unwrap_or(f32::NAN)).collect();
-        let clearance = |_| {
-            PyArray1::from_vec(
-                py,
-                motions.iter().map(|motion| motion.clearance_m.unwrap_or(f32::NAN)).collect(),
-            )
-        };
-        let clearances_m = clearance_max_m.map(clearance);
-        Ok((
-            PyArray1::from_vec(py, free),
-            count,
-            PyArray1::from_vec(py, hits),
-            clearances_m,
-            told(&answered.version),
-        ))
+        guarded(|| {
+            let check = MotionCheck {
+                asked: asked(level, ignore_keep_outs),
+                body: Arc::clone(&body.body),
+                configurations: numbers_of(&configurations),
+                lengths: lengths.as_array().to_vec(),
+                step_m,
+                clearance_max_m,
+                surroundings: surroundings(&ignored, unknown_is_occupied)?,
+            };
+            let answered = self.source.get()?.ask(py, check)?;
+            let motions = &answered.answer;
+            let free: Vec<bool> = motions.iter().map(|motion| motion.is_free()).collect();
+            let count = free.iter().filter(|free| **free).count();
+            let hits = motions.iter().map(|motion| motion.first_hit.unwrap_or(f32::NAN)).collect();
+            let clearance = |_| {
+                PyArray1::from_vec(
+                    py,
+                    motions.iter().map(|motion| motion.clearance_m.unwrap_or(f32::NAN)).collect(),
+                )
+            };
+            let clearances_m = clearance_max_m.map(clearance);
+            Ok((
+                PyArray1::from_vec(py, free),
+                count,
+                PyArray1::from_vec(py, hits),
+                clearances_m,
+                told(&answered.version),
+            ))
+        })
     }
 
     /// Is one motion free? For the innermost loop of a planner: no array is made, and nothing is checked that the question does
@@ -273,30 +293,32 @@ impl Questions {
         unknown_is_occupied: Option<&Bound<'_, PyAny>>,
         ignore_keep_outs: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<bool> {
-        let body = body.cast::<NativeBody>().map_err(|_| argument("body", body, "a PreparedBody"))?.get();
-        let level = level.map_or(Ok(0), level_of)?;
-        let unknown_is_occupied = flag_of("unknown_is_occupied", unknown_is_occupied)?;
-        let ignore_keep_outs = flag_of("ignore_keep_outs", ignore_keep_outs)?;
-        let numbers = numbers_of(&floats_of("configurations", configurations)?, "configurations")?;
-        let each = body.numbers();
-        if !numbers.len().is_multiple_of(each) || numbers.len() < 2 * each {
-            let message = format!(
-                "configurations must be two or more of {each} numbers each, x y z qx qy qz qw of every link, got {} numbers",
-                numbers.len()
-            );
-            return Err(Failure::argument(message).into());
-        }
-        let check = MotionCheck {
-            asked: asked(level, ignore_keep_outs),
-            body: Arc::clone(&body.body),
-            lengths: vec![(numbers.len() / each) as u32],
-            configurations: numbers,
-            step_m: None,
-            clearance_max_m: None,
-            surroundings: surroundings(&Regions::new(), unknown_is_occupied)?,
-        };
-        let answered = self.source.get()?.ask(py, check)?;
-        Ok(answered.answer.iter().all(|motion| motion.is_free()))
+        guarded(|| {
+            let body = body.cast::<NativeBody>().map_err(|_| argument("body", body, "a PreparedBody"))?.get();
+            let level = level.map_or(Ok(0), level_of)?;
+            let unknown_is_occupied = flag_of("unknown_is_occupied", unknown_is_occupied)?;
+            let ignore_keep_outs = flag_of("ignore_keep_outs", ignore_keep_outs)?;
+            let numbers = numbers_of(&floats_of("configurations", configurations)?);
+            let each = body.numbers();
+            if !numbers.len().is_multiple_of(each) || numbers.len() < 2 * each {
+                let message = format!(
+                    "configurations must be two or more of {each} numbers each, x y z qx qy qz qw of every link, got {} numbers",
+                    numbers.len()
+                );
+                return Err(Failure::argument(message).into());
+            }
+            let check = MotionCheck {
+                asked: asked(level, ignore_keep_outs),
+                body: Arc::clone(&body.body),
+                lengths: vec![(numbers.len() / each) as u32],
+                configurations: numbers,
+                step_m: None,
+                clearance_max_m: None,
+                surroundings: surroundings(&Regions::new(), unknown_is_occupied)?,
+            };
+            let answered = self.source.get()?.ask(py, check)?;
+            Ok(answered.answer.iter().all(|motion| motion.is_free()))
+        })
     }
 
     /// What do rays meet first? From origins (one, or one each) along directions up to a range, or to ends.
@@ -308,33 +330,36 @@ impl Questions {
     fn cast_rays<'py>(
         &self,
         py: Python<'py>,
-        origins: PyReadonlyArray2<'py, f32>,
-        toward: PyReadonlyArray2<'py, f32>,
+        origins: Rows<'py>,
+        toward: Rows<'py>,
         are_ends: bool,
         range_m: Option<f64>,
         unknown_is_occupied: bool,
         level: u32,
         ignore_keep_outs: bool,
     ) -> PyResult<(Bools<'py>, usize, Bound<'py, PyArray1<f32>>, Indices<'py>, Names, Version)> {
-        let points = points_of(&toward);
-        let question = RayQuestion {
-            asked: asked(level, ignore_keep_outs),
-            origins: points_of(&origins),
-            toward: match are_ends {
-                true => RaysToward::Ends(points),
-                false => {
-                    RaysToward::Directions { directions: points, range_m: range_m.unwrap_or(f64::INFINITY) }
-                }
-            },
-            unknown: unknown(unknown_is_occupied),
-        };
-        let answered = self.source.get()?.ask(py, question)?;
-        let hits = answered.answer;
-        let count = hits.distances_m.len();
-        let hit = (of_words(py, &hits.hit, count), ones(&hits.hit));
-        let voxels = indices(py, hits.voxels.iter().copied())?;
-        let distances_m = PyArray1::from_vec(py, hits.distances_m);
-        Ok((hit.0, hit.1, distances_m, voxels, names(&hits.keep_outs), told(&answered.version)))
+        guarded(|| {
+            let points = points_of(&toward);
+            let question = RayQuestion {
+                asked: asked(level, ignore_keep_outs),
+                origins: points_of(&origins),
+                toward: match are_ends {
+                    true => RaysToward::Ends(points),
+                    false => RaysToward::Directions {
+                        directions: points,
+                        range_m: range_m.unwrap_or(f64::INFINITY),
+                    },
+                },
+                unknown: unknown(unknown_is_occupied),
+            };
+            let answered = self.source.get()?.ask(py, question)?;
+            let hits = answered.answer;
+            let count = hits.distances_m.len();
+            let hit = (of_words(py, &hits.hit, count), ones(&hits.hit));
+            let voxels = indices(py, hits.voxels.iter().copied())?;
+            let distances_m = PyArray1::from_vec(py, hits.distances_m);
+            Ok((hit.0, hit.1, distances_m, voxels, names(&hits.keep_outs), told(&answered.version)))
+        })
     }
 
     /// What is nearest to points, within a radius?
@@ -342,7 +367,7 @@ impl Questions {
     fn nearest<'py>(
         &self,
         py: Python<'py>,
-        points: PyReadonlyArray2<'py, f32>,
+        points: Rows<'py>,
         radius_m: f64,
         to_centers: bool,
         level: u32,
@@ -355,35 +380,40 @@ impl Questions {
         Names,
         Version,
     )> {
-        let question = NearestQuestion {
-            asked: asked(level, ignore_keep_outs),
-            points: points_of(&points),
-            radius_m,
-            to: if to_centers { MeasuredTo::Centers } else { MeasuredTo::Cubes },
-        };
-        let answered = self.source.get()?.ask(py, question)?;
-        let nearest = answered.answer;
-        let count = nearest.distances_m.len();
-        let voxels = indices(py, nearest.voxels.iter().copied())?;
-        let away =
-            PyArray1::from_vec(py, nearest.away.into_iter().flatten().collect()).reshape([count, 3])?;
-        let distances_m = PyArray1::from_vec(py, nearest.distances_m);
-        let found = of_words(py, &nearest.found, count);
-        Ok((found, distances_m, voxels, away, names(&nearest.keep_outs), told(&answered.version)))
+        guarded(|| {
+            let question = NearestQuestion {
+                asked: asked(level, ignore_keep_outs),
+                points: points_of(&points),
+                radius_m,
+                to: if to_centers { MeasuredTo::Centers } else { MeasuredTo::Cubes },
+            };
+            let answered = self.source.get()?.ask(py, question)?;
+            let nearest = answered.answer;
+            let count = nearest.distances_m.len();
+            let voxels = indices(py, nearest.voxels.iter().copied())?;
+            let away =
+                PyArray1::from_vec(py, nearest.away.into_iter().flatten().collect()).reshape([count, 3])?;
+            let distances_m = PyArray1::from_vec(py, nearest.distances_m);
+            let found = of_words(py, &nearest.found, count);
+            Ok((found, distances_m, voxels, away, names(&nearest.keep_outs), told(&answered.version)))
+        })
     }
 
     /// Are points occupied, free, or unknown? The bits of the first two.
     fn classify<'py>(
         &self,
         py: Python<'py>,
-        points: PyReadonlyArray2<'py, f32>,
+        points: Rows<'py>,
         level: u32,
         ignore_keep_outs: bool,
     ) -> PyResult<(Bools<'py>, Bools<'py>, Version)> {
-        let question = ClassifyQuestion { asked: asked(level, ignore_keep_outs), points: points_of(&points) };
-        let answered = self.source.get()?.ask(py, question)?;
-        let states = answered.answer;
-        let bits = |words: &[u64]| of_words(py, words, states.points);
-        Ok((bits(&states.occupied), bits(&states.free), told(&answered.version)))
+        guarded(|| {
+            let question =
+                ClassifyQuestion { asked: asked(level, ignore_keep_outs), points: points_of(&points) };
+            let answered = self.source.get()?.ask(py, question)?;
+            let states = answered.answer;
+            let bits = |words: &[u64]| of_words(py, words, states.points);
+            Ok((bits(&states.occupied), bits(&states.free), told(&answered.version)))
+        })
     }
 }

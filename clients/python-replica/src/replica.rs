@@ -9,7 +9,7 @@ use mrol::service::{MapVersion, ServiceError};
 use pyo3::prelude::*;
 
 use crate::answers::{Version, told};
-use crate::failure::Failure;
+use crate::failure::{Failure, guarded};
 use crate::questions::Questions;
 use crate::source::{OpenSource, Source};
 use crate::waiting::wait_for;
@@ -46,53 +46,58 @@ impl NativeReplica {
         bloom: bool,
         viewpoints: bool,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let mut credentials = Credentials::default();
-        let of = |made: Result<Credentials, _>| made.map_err(Failure::from);
-        if let Some(key) = key {
-            credentials = of(credentials.with_key(key))?;
-        }
-        if let Some(ca) = ca {
-            credentials = of(credentials.with_server_ca(ca))?;
-        }
-        credentials = match (certificate, private_key) {
-            (None, None) => credentials,
-            (Some(certificate), Some(key)) => of(credentials.with_identity(certificate, key))?,
-            _ => return Err(Failure::argument("one of certificate and private_key, not both").into()),
-        };
-        let usual = ReplicaOptions::default();
-        let region = region.map(|(min_m, max_m)| Region::cuboid(min_m, max_m)).transpose();
-        let options = ReplicaOptions {
-            region: region.map_err(ServiceError::from).map_err(Failure::from)?,
-            blocks_max: blocks_max.unwrap_or(usual.blocks_max),
-            filter: bloom.then(FilterSettings::default),
-            viewpoint_bytes_max: if viewpoints { usual.viewpoint_bytes_max } else { 0 },
-            silence_max: silence_s.map_or(usual.silence_max, Duration::from_secs_f64),
-            ..usual
-        };
-        let map = MapName::new(map).map_err(ServiceError::from).map_err(Failure::from)?;
-        let timeout = Duration::from_secs_f64(timeout_s);
-        let replica = wait_for(py, async {
-            let copying = async {
-                let client = Client::connect_with(address, &credentials).await?;
-                Replica::open(client, map, options).await.map_err(Failure::from)
+        guarded(|| {
+            let mut credentials = Credentials::default();
+            let of = |made: Result<Credentials, _>| made.map_err(Failure::from);
+            if let Some(key) = key {
+                credentials = of(credentials.with_key(key))?;
+            }
+            if let Some(ca) = ca {
+                credentials = of(credentials.with_server_ca(ca))?;
+            }
+            credentials = match (certificate, private_key) {
+                (None, None) => credentials,
+                (Some(certificate), Some(key)) => of(credentials.with_identity(certificate, key))?,
+                _ => return Err(Failure::argument("one of certificate and private_key, not both").into()),
             };
-            let too_slow =
-                |_| Failure::timed_out(format!("the copy was not complete within {timeout_s} s (timeout_s)"));
-            tokio::time::timeout(timeout, copying).await.map_err(too_slow)?
-        })?;
-        let source = OpenSource::new(Source::Replica(replica));
-        let replica = Self { is_whole: options.region.is_none() };
-        Ok(PyClassInitializer::from(Questions { source }).add_subclass(replica))
+            let usual = ReplicaOptions::default();
+            let region = region.map(|(min_m, max_m)| Region::cuboid(min_m, max_m)).transpose();
+            let options = ReplicaOptions {
+                region: region.map_err(ServiceError::from).map_err(Failure::from)?,
+                blocks_max: blocks_max.unwrap_or(usual.blocks_max),
+                filter: bloom.then(FilterSettings::default),
+                viewpoint_bytes_max: if viewpoints { usual.viewpoint_bytes_max } else { 0 },
+                silence_max: silence_s.map_or(usual.silence_max, Duration::from_secs_f64),
+                ..usual
+            };
+            let map = MapName::new(map).map_err(ServiceError::from).map_err(Failure::from)?;
+            let timeout = Duration::from_secs_f64(timeout_s);
+            let replica = wait_for(py, async {
+                let copying = async {
+                    let client = Client::connect_with(address, &credentials).await?;
+                    Replica::open(client, map, options).await.map_err(Failure::from)
+                };
+                let too_slow = |_| {
+                    Failure::timed_out(format!("the copy was not complete within {timeout_s} s (timeout_s)"))
+                };
+                tokio::time::timeout(timeout, copying).await.map_err(too_slow)?
+            })?;
+            let source = OpenSource::new(Source::Replica(replica));
+            let replica = Self { is_whole: options.region.is_none() };
+            Ok(PyClassInitializer::from(Questions { source }).add_subclass(replica))
+        })
     }
 
     /// How far it is.
     fn status(slf: PyRef<'_, Self>) -> PyResult<Status> {
-        let source = slf.as_super().source.get()?;
-        let status = source.replica()?.status();
-        let content_hash = slf.is_whole.then_some(status.version.hash);
-        let version =
-            MapVersion { revision: status.version.revision, map_uuid: status.map_uuid, content_hash };
-        Ok((told(&version), status.head_revision, status.is_connected, status.resets, status.last_error))
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let status = source.replica()?.status();
+            let content_hash = slf.is_whole.then_some(status.version.hash);
+            let version =
+                MapVersion { revision: status.version.revision, map_uuid: status.map_uuid, content_hash };
+            Ok((told(&version), status.head_revision, status.is_connected, status.resets, status.last_error))
+        })
     }
 
     /// Waits until it has a revision.
@@ -102,8 +107,10 @@ impl NativeReplica {
         revision: u64,
         timeout_s: f64,
     ) -> PyResult<()> {
-        let source = slf.as_super().source.get()?;
-        let replica = source.replica()?;
-        wait_for(py, replica.wait_for_revision(revision, Duration::from_secs_f64(timeout_s)))
+        guarded(|| {
+            let source = slf.as_super().source.get()?;
+            let replica = source.replica()?;
+            wait_for(py, replica.wait_for_revision(revision, Duration::from_secs_f64(timeout_s)))
+        })
     }
 }

@@ -62,6 +62,76 @@ def test_every_question_takes_columns_that_lie_together(replica: mrol_replica.Re
         np.testing.assert_array_equal(ask(columns, np.asfortranarray(spheres)), ask(POINTS, spheres))
 
 
+def behind_a_header(array: Any) -> Any:
+    """The same numbers as they lie in a message behind an odd byte."""
+    array = np.asarray(array)
+    bytes_of_message = np.frombuffer(b"\0" + array.tobytes(), np.uint8)
+    moved = bytes_of_message[1:].view(array.dtype).reshape(array.shape)
+    assert not moved.flags.aligned
+    return moved
+
+
+def in_records(array: Any, ring: str, *, is_last: bool) -> Any:
+    """The same rows as a field of packed records."""
+    array = np.asarray(array)
+    fields: list[Any] = [("row", array.dtype, array.shape[1:]), ("ring", ring)]
+    records = np.zeros(len(array), fields if is_last else fields[::-1])
+    records["row"] = array
+    records["ring"] = 77
+    return records["row"]
+
+
+PLACED: dict[str, Callable[[Any], Any]] = {
+    "behind a header": behind_a_header,
+    **{
+        f"records with {ring} {'behind' if is_last else 'before'} the row": lambda array, ring=ring, is_last=is_last: in_records(
+            array, ring, is_last=is_last
+        )
+        for ring in ("u1", "u2", "u4", "f8")
+        for is_last in (True, False)
+    },
+}
+
+
+@pytest.mark.parametrize("placed", PLACED)
+def test_arrays_that_lie_anywhere_are_read_as_numpy_reads_them(replica: mrol_replica.Replica, placed: str) -> None:
+    place = PLACED[placed]
+    body = mrol_replica.PreparedBody([[0, 0, 0, 0.2]])
+    spheres = np.concatenate([POINTS, np.full((len(POINTS), 1), 0.2, np.float32)], axis=1)
+    sizes = np.full(len(POINTS) // 4, 4, np.uint32)
+    edges = np.concatenate([POINTS, np.tile(np.float32([0, 0, 0, 1]), (len(POINTS), 1))], axis=1)
+    lengths = np.full(len(POINTS) // 4, 4, np.uint32)
+    local = mrol_replica.LocalMap(0.1, levels=2)
+    local.insert(POINTS, align=False)
+    scan, times = POINTS[:500], np.linspace(0, 0.1, 500, dtype=np.float32)
+
+    def inserted(points: Any, point_times: Any) -> Any:
+        another = mrol_replica.LocalMap(0.1, levels=2)
+        another.insert(points, point_times=point_times, timestamp_ns=1, align=False)
+        return another.query(POINTS).occupied
+
+    asked: list[tuple[Callable[..., Any], list[Any]]] = [
+        (lambda points: replica.query(points).occupied, [POINTS]),
+        (lambda points: replica.classify(points).free, [POINTS]),
+        (lambda points: replica.nearest(points, 1.0).distances_m, [POINTS]),
+        (lambda points: replica.cast_rays([0, 0, 0], ends=points).distances_m, [POINTS]),
+        (lambda origins, ends: replica.cast_rays(origins, ends=ends).distances_m, [POINTS, POINTS[::-1]]),
+        (lambda points: replica.check_poses(body, points).colliding, [POINTS]),
+        (lambda sevens: replica.check_poses(body, sevens).colliding, [edges]),
+        (lambda sevens: replica.check_motions(body, sevens.reshape(-1, 2, 7)).free, [edges]),
+        (lambda sevens, counts: replica.check_motions(body, sevens, lengths=counts).free, [edges, lengths]),
+        (lambda balls: replica.check_spheres(balls).colliding, [spheres]),
+        (lambda balls, counts: replica.check_spheres(balls, sizes=counts).colliding, [spheres, sizes]),
+        (lambda balls: replica.check_poses(mrol_replica.PreparedBody(balls), POINTS).colliding, [spheres[:3]]),
+        (lambda points: replica.check_poses(mrol.Link(points=points, padding_m=0.1), POINTS).colliding, [POINTS[:3]]),
+        (inserted, [scan, times]),
+        (lambda points: local.align(points, guess=np.eye(4)).overlap, [scan]),
+        (lambda points: local.localize(points, candidates=1, seed=1, time_limit_s=0).points_skipped, [scan]),
+    ]
+    for ask, arrays in asked:
+        np.testing.assert_array_equal(ask(*map(place, arrays)), ask(*arrays))
+
+
 def test_arguments_are_named(replica: mrol_replica.Replica) -> None:
     body = [[0, 0, 0, 0.2]]
     asked: list[tuple[str, Callable[[], object]]] = [
@@ -102,6 +172,11 @@ def test_the_way_for_planners_takes_what_it_says(replica: mrol_replica.Replica) 
         replica.motion_is_free(body, np.repeat(edge, 2, axis=1)[:, ::2])
     with pytest.raises(ValueError, match="contiguous"):
         replica.motion_is_free(body, np.asfortranarray(edge))
+    moved = behind_a_header(edge)
+    with pytest.raises(ValueError, match="aligned: numpy.require") as refused:
+        replica.motion_is_free(body, moved)
+    assert isinstance(refused.value, mrol.MrolError)
+    assert replica.motion_is_free(body, np.require(moved, np.float32, ["C", "ALIGNED"])) is True
     with pytest.raises(ValueError, match="configurations"):
         replica.motion_is_free(body, edge[:1])
     with pytest.raises(mrol.InvalidArgument):
@@ -128,6 +203,19 @@ def test_an_array_that_changes_meanwhile_changes_nothing_of_the_question(replica
     finally:
         over.set()
         thread.join()
+
+
+def test_a_panic_of_the_extension_is_an_error(replica: mrol_replica.Replica) -> None:
+    # The package refuses such times before they come there.
+    native = replica._opened  # noqa: SLF001
+    options: dict[str, Any] = dict.fromkeys(["key", "ca", "certificate", "private_key", "silence_s", "region", "blocks_max"], None)
+    for panics in (
+        lambda: native.wait_for_revision(0, float("nan")),
+        lambda: type(native)("http://127.0.0.1:9", "m", timeout_s=-1.0, bloom=False, viewpoints=False, **options),
+    ):
+        with pytest.raises(mrol.MrolError, match="a defect of mrol_replica: it panicked"):
+            panics()
+    assert replica.query(POINTS).count > 0
 
 
 def resident_bytes() -> int:

@@ -2,6 +2,7 @@
 
 import os
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +139,24 @@ def test_what_makes_no_file(tmp_path: Path, mapped: mrol_replica.LocalMap) -> No
             mrol_replica.LocalMap.load(file)
     with pytest.raises(FileNotFoundError):
         mapped.save(tmp_path / "nowhere" / "a.mrol")
+
+
+def test_what_has_no_end_is_no_file(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    link = tmp_path / "link"
+    link.symlink_to("/dev/zero")
+    with ThreadPoolExecutor(1) as one:
+        try:
+            for endless in (pipe, link, "/dev/zero", "/dev/full", "/dev/null"):
+                loading = one.submit(mrol_replica.LocalMap.load, endless)
+                with pytest.raises(OSError, match="it is no regular file"):
+                    loading.result(timeout=30)
+        finally:
+            # Lets go whoever waits for it.
+            os.close(os.open(pipe, os.O_RDWR))
+    with pytest.raises(IsADirectoryError):
+        mrol_replica.LocalMap.load(tmp_path)
 
 
 def test_guesses_exclude_each_other(mapped: mrol_replica.LocalMap) -> None:

@@ -169,6 +169,8 @@ def test_no_error_shows_a_key_or_a_password(tmp_path: Path) -> None:
         (f"http://user:{secret}@host", {}),
         (f"user:{secret}@host:1", {}),
         (f"https://:{secret}@host", {}),
+        *[(f"http://127.0.0.1:9{of}", {}) for of in (f"/{secret}", f"?k={secret}", f"/?k={secret}", f"#{secret}", f":{secret}")],
+        *[(of, {}) for of in (f"host:{secret}", f"u:{secret}%40h", f"host/{secret}", f"{secret}://host", f"http://h h{secret}")],
         *[("127.0.0.1:9", {"key": of}) for of in (f"{secret}\n{secret}", [secret], secret.encode(), f"{secret}\u00fc")],
         *[("127.0.0.1:9", {"ca": of}) for of in (secret, secret.encode(), tmp_path / "file")],
         *[("127.0.0.1:9", {"certificate": of, "private_key": of}) for of in (secret, tmp_path / "file")],

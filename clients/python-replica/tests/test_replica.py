@@ -79,6 +79,23 @@ def test_bodies(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
     equal(replica.check_spheres(spheres, sizes=sizes), hall.check_spheres(spheres, sizes=sizes))
 
 
+def test_a_limit_of_clearances_that_are_not_asked_for_is_refused_as_a_server_does(
+    hall: mrol.Map, replica: mrol_replica.Replica
+) -> None:
+    told: list[tuple[str, str]] = []
+    for asked in (hall, replica, mrol_replica.LocalMap(0.1, levels=4)):
+        for answer in ("colliding", "first_hit"):
+            limit: dict[str, Any] = {"answer": answer, "clearance_max_m": 0.5}
+            for ask in (
+                lambda asked=asked, limit=limit: asked.check_poses(BODY, TWO, **limit),
+                lambda asked=asked, limit=limit: asked.check_spheres([[0, 0, 0, 0.2]], **limit),
+            ):
+                with pytest.raises(mrol.InvalidArgument, match="clearance_max_m goes with the answer clearance") as refused:
+                    ask()
+                told.append((refused.value.reason, str(refused.value)))
+    assert len(set(told)) == 1, set(told)
+
+
 def test_motions(hall: mrol.Map, replica: mrol_replica.Replica) -> None:
     ball = [[0.0, 0.0, 0.0, 0.25]]
     edges = POSES.reshape(250, 2, 7)

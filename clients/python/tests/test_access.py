@@ -1,8 +1,15 @@
 """Keys, TLS and Unix sockets."""
 
+import json
 import pickle
+import socket
 import subprocess
+import threading
+import time
 import traceback
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +17,10 @@ import pytest
 
 import mrol
 
+from .support.odd import error_of
+from .support.scripted import LIVE, ScriptedServer, answer, answering
 from .support.server import run, serving
+from .test_hostile_servers import map_of
 
 
 def certificate(folder: Path, name: str) -> tuple[Path, Path]:
@@ -71,15 +81,16 @@ def test_a_key_is_shown_to_the_server_alone(tmp_path: Path) -> None:
         m = client.map("m", resolution=0.1)
         for shown in (repr(client), repr(m), str(vars(client)), repr(client._caller._key)):  # noqa: SLF001
             assert secret not in shown
-        with pytest.raises(mrol.ArgumentError):
-            pickle.dumps(m)
+        for kept, message in ((m, "the map must be made anew"), (client, "the client must be connected anew in each process")):
+            with pytest.raises(mrol.ArgumentError, match=message):
+                pickle.dumps(kept)
     for bad in ("", "two\r\nlines", "ü", "tab\t"):
         with pytest.raises(mrol.ArgumentError, match="key must be a secret") as refused:
             mrol.connect(server.address, key=bad)
         assert not bad or bad not in str(refused.value)
     with pytest.raises(mrol.ArgumentError, match="key must be one of the two"):
         mrol.connect(server.address, key=secret, key_file=tmp_path / "f")
-    with pytest.raises(mrol.ArgumentError, match="key_file must be the path of a file with a secret"):
+    with pytest.raises(mrol.ArgumentError, match="key_file must be the path of a regular file with a secret"):
         mrol.connect(server.address, key_file=tmp_path / "nowhere")
 
 
@@ -124,13 +135,139 @@ def test_no_error_shows_a_key_or_a_password(tmp_path: Path) -> None:
         (f"http://host?key={secret}", {}),
         (f"ftp://{secret}@host", {}),
         (f"http://user:{secret}@ho st", {}),
+        (f"http://host/{secret}", {}),
+        (f"http://host#{secret}", {}),
+        (f"host:{secret}", {}),
+        (f"host;key={secret}", {}),
+        (f"user:{secret}%40host", {}),
+        (f"http://user%3A{secret}%40host", {}),
+        (f"unix:{secret}", {"ca": tmp_path / "lines"}),
+        (f"unix:{secret}\0", {}),
     ]
     for address, options in refused:
         with pytest.raises(mrol.ArgumentError) as error:
             mrol.connect(address, **options)
         assert secret[:20] not in shown_of(error.value), (address, options)
-    with pytest.raises(mrol.ArgumentError, match=r"key_file must be the path of a file .*lines' with 2 lines in it"):
+    with pytest.raises(mrol.ArgumentError, match=r"key_file must be the path of a regular file .*lines' with 2 lines in it"):
         mrol.connect("localhost:1", key_file=tmp_path / "lines")
+
+
+def test_an_address_that_nobody_answers_at_is_shown_without_a_path(tmp_path: Path) -> None:
+    secret = "mrol_0123456789abcdefghijklmnopqrstuvwxyz"  # noqa: S105
+    with pytest.raises(mrol.ConnectFailed, match="cannot connect to unix:no file that is there") as failed:
+        mrol.connect(f"unix:{secret}")
+    assert secret[:20] not in shown_of(failed.value)
+    (tmp_path / "file").touch()
+    with pytest.raises(mrol.ConnectFailed, match=f"cannot connect to unix:'{tmp_path}/file'"):
+        mrol.connect(f"unix:{tmp_path}/file")
+
+
+Echo = Callable[[bytes, bytes], bytes]
+"""Makes an answer of a request's head and of the secret in it."""
+
+ECHOES: dict[str, Echo] = {
+    "a body that is no refusal": lambda head, _: answer(head * 3, status=b"400 Bad"),
+    "a refusal": lambda head, _: answer(
+        json.dumps({"code": head.decode(), "reason": head.decode(), "detail": head.decode()}).encode(), status=b"400 Bad"
+    ),
+    "a status": lambda _, secret: b"Bearer " + secret + b"\r\n\r\n",
+    "a header that is none": lambda _, secret: b"HTTP/1.1 200 OK\r\n" + b"x" * 80 + secret + b"\r\n\r\n",
+    "a length": lambda _, secret: b"HTTP/1.1 200 OK\r\ncontent-length: " + secret + b"\r\n\r\n",
+    "a chunk": lambda _, secret: b"HTTP/1.1 200 OK\r\ntransfer-encoding: chunked\r\n\r\n" + secret + b"\r\n",
+    "a header of an answer": lambda _, secret: answer(
+        b"\0",
+        b"mrol-points: 1",
+        b"mrol-points-occupied: 0",
+        b"mrol-map-uuid: u",
+        b"mrol-revision: 1",
+        b"mrol-content-hash: " + secret,
+    ),
+    "a count": lambda _, secret: answer(b"\0", b"mrol-points: " + secret),
+    "another kind of JSON": lambda _, secret: answer(b'["%s"]' % secret),
+    "a long text": lambda _, secret: answer(b'["%s%s"]' % (b"x" * 90, secret * 9)),
+}
+
+
+@pytest.mark.parametrize("name", ECHOES)
+def test_a_peer_that_says_a_key_again_brings_it_into_no_error(name: str) -> None:
+    secret = "mrol_0123456789abcdefghijklmnopqrstuvwxyz"  # noqa: S105
+    with ScriptedServer(lambda sock, _: sock.sendall(ECHOES[name](server.head, secret.encode()))) as server:
+        m = map_of(server, key=secret)
+        for call in (m.describe, lambda: m.query([[0, 0, 0]]), lambda: next(m.watch()), lambda: next(m.watch_events())):
+            error = error_of(call)
+            assert error is not None or name in {"a header of an answer", "a count"}
+            again = pickle.loads(pickle.dumps(error))  # noqa: S301
+            assert str(again) == str(error)
+            shown = "".join(traceback.format_exception(error)) + repr(error)
+            shown += repr(again) + repr(getattr(again, "__dict__", ""))
+            # A part of it would do as well.
+            assert secret[5:15] not in shown
+            assert secret[-10:] not in shown
+
+
+def test_a_short_key_leaves_messages_readable() -> None:
+    said = answer(b"{}", status=b"400 Bad")
+    with ScriptedServer(answering(said)) as server, pytest.raises(mrol.BadAnswer, match="the server answers 400, and says"):
+        map_of(server, key="s").describe()
+
+
+class KeyServer(ScriptedServer):
+    """Takes one secret; who shows another one is answered when so many have come with another."""
+
+    def __init__(self, secret: str, together: int) -> None:
+        self.secret = secret
+        self._refused = threading.Barrier(together)
+        super().__init__(lambda *_: None)
+
+    def __enter__(self) -> "KeyServer":
+        return self
+
+    def _serve(self, client: socket.socket) -> None:
+        with client, suppress(OSError):
+            while (head := self._request(client)) is not None:
+                if b"/livez" in head:
+                    client.sendall(LIVE)
+                elif f"authorization: Bearer {self.secret}\r\n".encode() in head + b"\r\n":
+                    client.sendall(answer(b'{"maps":[]}'))
+                else:
+                    self._refused.wait(10)
+                    said = b'{"code":"unauthenticated","reason":"key_unknown","detail":"no"}'
+                    client.sendall(answer(said, status=b"401 Unauthorized"))
+
+
+def test_threads_that_are_refused_together_all_take_the_new_key(tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    file.write_text("the-former")
+    with KeyServer("the-new-one", 8) as server:
+        client = mrol.connect(server.address, key_file=file)
+        file.write_text("the-new-one")
+        with ThreadPoolExecutor(8) as threads:
+            assert [found.maps for found in threads.map(lambda _: client.maps(), range(8))] == [()] * 8
+        server.secret = "another"  # noqa: S105
+        with ThreadPoolExecutor(8) as threads:
+            for refused in [threads.submit(client.maps) for _ in range(8)]:
+                with pytest.raises(mrol.Unauthenticated):
+                    refused.result()
+
+
+def test_snapshots_and_watches_take_the_new_key(tmp_path: Path) -> None:
+    keys, file = tmp_path / "keys.toml", tmp_path / "admin.key"
+    of_key = ["--name", "admin", "--file", str(keys)]
+    file.write_text(run("key", "new", "--scope", "admin", *of_key))
+    with serving(tmp_path, "--keys-file", str(keys)) as server:
+        m = mrol.connect(server.address, key_file=file).map("m", resolution=0.1)
+        m.insert([[1, 0, 0]], align=False)
+        events = m.watch(heartbeats=True)
+        next(events)
+        secret = run("key", "rotate", "--end-former", *of_key).strip().splitlines()[-1]
+        # The server looks at its keys now and then.
+        while error_of(lambda: m.snapshot(tmp_path / "a.mrol")) is None:
+            time.sleep(0.05)
+        file.write_text(secret)
+        m.snapshot(tmp_path / "a.mrol")
+        revision = m.insert([[2, 0, 0]], align=False, guess=[0, 0, 0, 0, 0, 0, 1], force=True).revision
+        while next(events).revision < revision:
+            pass
 
 
 def test_tls_is_checked_on_both_sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from socket import socket
 from threading import Event
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,16 +72,18 @@ def watch(m: mrol.Map) -> object:
     return next(m.watch(silence_max_s=0.5))
 
 
-def map_of(server: ScriptedServer, **options: float) -> mrol.Map:
+def map_of(server: ScriptedServer, **options: Any) -> mrol.Map:
     """A map that nobody has asked the server for."""
     client = mrol.connect(server.address, **{"timeout_s": 2.0, "patience_s": 0.1, **options})
     return mrol.Map(client._caller, "m", "r", client._sessions)  # noqa: SLF001
 
 
+CHUNKED = b"HTTP/1.1 200 OK\r\ntransfer-encoding: chunked\r\n\r\n"
+
+
 def chunked(*chunks: bytes) -> bytes:
     """An answer in chunks."""
-    head = b"HTTP/1.1 200 OK\r\ntransfer-encoding: chunked\r\n\r\n"
-    return head + b"".join(b"%x\r\n%s\r\n" % (len(chunk), chunk) for chunk in chunks) + b"0\r\n\r\n"
+    return CHUNKED + b"".join(b"%x\r\n%s\r\n" % (len(chunk), chunk) for chunk in chunks) + b"0\r\n\r\n"
 
 
 def headed(head: object, arrays: bytes = b"") -> bytes:
@@ -225,8 +228,9 @@ CUT = answer(b'{"map":"m","revision":', status=b"200 OK").replace(b"content-leng
         (describe, b"HTTP/1.1 200 OK\r\ncontent-le"),
         (describe, CUT),
         (describe, chunked(b"{" * 100)[:-30]),
-        # To http.client a length that is none is the end of what was sent.
-        (describe, b"HTTP/1.1 200 OK\r\ntransfer-encoding: chunked\r\n\r\nzz\r\n"),
+        # Cut at the end of the last chunk's size, and between the last two ends of lines.
+        (describe, chunked(b"{}")[:-4]),
+        (describe, chunked(b"{}")[:-2]),
         (query, answer(b"\0", *VERSION)[:-1]),
         (watch, chunked(struct.pack("<I", 100) + b"abc")[:-10]),
         (watch, chunked(b"")),
@@ -333,6 +337,62 @@ def test_what_nobody_asked_for_is_not_taken_as_the_next_answer() -> None:
         client = mrol.connect(server.address)
         assert client.maps().maps == ()
         assert client.maps().maps == ()
+
+
+NO_SIZES = [b"-1", b"+2", b"0x2", b"0_2", b" 2", b"", b"zz", b"0" * 16, b"2;" + b"x" * 5000]
+
+
+@pytest.mark.parametrize("size", NO_SIZES, ids=lambda size: repr(size[:10]))
+def test_a_chunk_whose_size_is_none_ends_the_answer(size: bytes, tmp_path: Path) -> None:
+    calls: list[Call] = [describe, watch, lambda m: m.snapshot(tmp_path / "a.mrol"), lambda m: next(m.watch_events())]
+    with ScriptedServer(answering(CHUNKED + size + b"\r\n{}\r\n0\r\n\r\n")) as server:
+        for call in calls:
+            with pytest.raises(mrol.BadAnswer, match="between chunks|whose size"):
+                call(map_of(server))
+    assert not list(tmp_path.iterdir())
+
+
+def test_chunks_end_where_they_say() -> None:
+    with (
+        ScriptedServer(answering(CHUNKED + b"2\r\n{}XX0\r\n\r\n")) as server,
+        pytest.raises(mrol.BadAnswer, match="behind its end"),
+    ):
+        describe(map_of(server))
+    whole = CHUNKED + b'000c;by=proxy\r\n{"maps":[]}\n\r\n0\r\nx: y\r\n\r\n'
+    with ScriptedServer(answering(whole)) as server:
+        assert mrol.connect(server.address).maps().maps == ()
+
+
+def test_a_chunk_below_zero_takes_no_memory(tmp_path: Path) -> None:
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for call in (describe, watch, lambda m: m.snapshot(tmp_path / "a.mrol")):
+        with ScriptedServer(flood(CHUNKED + b"-1\r\n", bytes(1 << 20))) as server, pytest.raises(mrol.BadAnswer):
+            call(map_of(server, answer_bytes_max=1_000_000, timeout_s=1.0))
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 40_000
+
+
+def test_what_is_said_before_an_answer_is_passed_over() -> None:
+    maps = answer(b'{"maps":[]}')
+    early = b"HTTP/1.1 103 Early Hints\r\nlink: x\r\n\r\nHTTP/1.1 102 Processing\r\n\r\n"
+    with ScriptedServer(answering(early + maps)) as server:
+        assert mrol.connect(server.address).maps().maps == ()
+    with ScriptedServer(answering(b"HTTP/1.1 101 Switching Protocols\r\n\r\n" + maps)) as server, pytest.raises(mrol.BadAnswer):
+        mrol.connect(server.address).maps()
+
+
+@pytest.mark.parametrize("page", [b"<html>hello</html>", b"\xff\xfe", b"7", b"[" * 200_000])
+def test_the_page_of_a_web_server_is_no_health(page: bytes) -> None:
+    with ScriptedServer(answering(answer(page))) as server, pytest.raises(mrol.BadAnswer):
+        mrol.connect(server.address).health()
+
+
+def test_a_map_file_without_a_byte_replaces_none(tmp_path: Path) -> None:
+    file = tmp_path / "map.mrol"
+    file.write_bytes(b"GOOD")
+    for data in (answer(b"", *VERSION), chunked().replace(b"\r\n\r\n", b"\r\n" + b"\r\n".join(VERSION) + b"\r\n\r\n", 1)):
+        with ScriptedServer(answering(data)) as server, pytest.raises(mrol.BadAnswer, match="no map file"):
+            map_of(server).snapshot(file)
+    assert file.read_bytes() == b"GOOD"
 
 
 def test_a_file_whose_length_nobody_told_replaces_none(tmp_path: Path) -> None:

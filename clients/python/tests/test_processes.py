@@ -12,14 +12,13 @@ import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import FrameType
-from typing import Any
 
 import numpy as np
 import pytest
 
 import mrol
 
+from .support.interrupts import is_interrupted_at
 from .support.scripted import ScriptedServer
 from .support.server import scan_ids
 
@@ -160,49 +159,20 @@ def test_ctrl_c_ends_a_call_to_a_server_that_hangs() -> None:
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_ctrl_c_at_any_line_of_a_call_leaves_no_connection_in_use(hall: mrol.Map) -> None:
     """Each line that is run for a query is interrupted once, before its first instruction."""
-    package = str(Path(mrol.__file__).parent)
     pool = hall._caller._pool  # noqa: SLF001
-    lines = 0
-
-    def is_interrupted_at(line: int) -> bool:
-        """Whether the query comes to so many lines."""
-        nonlocal lines
-        lines = 0
-
-        def trace(frame: FrameType, event: str, _: object) -> Any:
-            nonlocal lines
-            if not frame.f_code.co_filename.startswith(package):
-                return None
-            if event == "line":
-                lines += 1
-                if lines == line:
-                    sys.settrace(None)
-                    raise KeyboardInterrupt
-            return trace
-
-        former = sys.gettrace()
-        sys.settrace(trace)
-        try:
-            hall.query([[0, 0, 0]])
-        except KeyboardInterrupt:
-            return True
-        finally:
-            sys.settrace(former)
-        return False
-
     pool.close()
     for is_kept in (True, False):
         for line in itertools.count(1):
             hall.query([[0, 0, 0]])
             if not is_kept:
                 pool.close()
-            if not is_interrupted_at(line):
+            if not is_interrupted_at(line, lambda: hall.query([[0, 0, 0]])):
                 break
             gc.collect()
             of_process = pool._connections  # noqa: SLF001
             assert len(of_process.used) == 0, line
             assert len(of_process.kept) <= 1, line
-        assert lines > 100
+        assert line > 100
     open_files = len(os.listdir("/proc/self/fd"))
     hall.query([[0, 0, 0]])
     assert len(os.listdir("/proc/self/fd")) <= open_files + 1

@@ -127,6 +127,14 @@ def test_no_server_is_told_at_once_and_waited_for_on_request(tmp_path: Path) -> 
         mrol.connect(f"unix:{tmp_path}/nothing.sock")
 
 
+def test_a_server_that_hangs_is_not_waited_for_longer_than_told() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as hanging:
+        began = time.monotonic()
+        with pytest.raises(mrol.TimedOut):
+            mrol.connect(f"127.0.0.1:{hanging.getsockname()[1]}", wait_s=0.5, timeout_s=20)
+        assert 0.5 < time.monotonic() - began < 5
+
+
 @contextmanager
 def taking_no_connection(host: str, port: int = 0) -> Iterator[int]:
     """A port at which connections are neither taken nor refused: those that wait there are as many as it lets wait."""

@@ -1,6 +1,7 @@
 """Watches: every kind of change, levels and boxes, and what ends them."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,6 +105,26 @@ def test_a_watch_ends_when_its_map_is_deleted(client: mrol.Client) -> None:
     assert gone.value.reason == "map_not_found"
     with pytest.raises(mrol.NotFound):
         next(m.watch())
+
+
+def test_a_watch_goes_on_with_a_map_that_takes_the_place(client: mrol.Client, empty: mrol.Map, tmp_path: Path) -> None:
+    empty.insert([[1, 0, 0]], align=False)
+    empty.snapshot(tmp_path / "a.mrol")
+    empty.insert([[2, 0, 0]], align=False, guess=np.eye(4), force=True)
+    events, answers = empty.watch(), empty.watch_events()
+    before = next(events)
+    assert before.revision == 2
+    assert [next(answers).scan_id for _ in range(2)] == [1, 2]
+    replaced = empty.restore(tmp_path / "a.mrol")
+    state = next(events)
+    assert isinstance(state, mrol.WatchedState)
+    assert state.version == replaced.version
+    assert state.map_uuid != before.map_uuid
+    assert state.indices().tolist() == [[10, 0, 0]]
+    empty.insert([[3, 0, 0]], align=False, guess=np.eye(4), force=True)
+    assert following(empty, events).added().tolist() == [[30, 0, 0]]
+    assert next(answers).scan_id == 3
+    client.delete_map(f"{empty.name}-replaced-2")
 
 
 def test_arguments_of_a_watch_are_refused_at_once(empty: mrol.Map) -> None:

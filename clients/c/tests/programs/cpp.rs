@@ -26,6 +26,49 @@ fn all_of_the_header_does_what_it_says_under_the_address_sanitizer() {
 }
 
 #[test]
+fn points_that_are_no_floats_do_not_compile() {
+    let folder = folder("cpp-points");
+    let compiles = |container: &str| {
+        let source = folder.join("points.cpp");
+        let text = format!(
+            "#include <mrol.hpp>\nstruct floats {{ float x, y, z; }};\nstruct ints {{ int x, y, z; }};\n\
+             struct turned {{ float z, y, x; }};\nmrol::points of(const {container} &given) {{ return given; }}\n"
+        );
+        std::fs::write(&source, text).unwrap();
+        let mut compiler = Command::new("c++");
+        compiler.args(["-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-pedantic"]);
+        compiler.args(["-Iinclude", "-I../cpp/include"]).arg(&source);
+        let output = compiler.current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("a compiler");
+        match String::from_utf8_lossy(&output.stderr) {
+            _ if output.status.success() => true,
+            said if said.contains("points are containers of float") => false,
+            said => panic!("{container}: {said}"),
+        }
+    };
+    for good in [
+        "std::vector<float>",
+        "std::vector<floats>",
+        "std::vector<std::array<float, 3>>",
+        "std::array<float[3], 2>",
+    ] {
+        assert!(compiles(good), "{good}");
+    }
+    for bad in [
+        "std::vector<ints>",
+        "std::vector<turned>",
+        "std::vector<std::array<int, 3>>",
+        "std::vector<std::array<std::uint32_t, 3>>",
+        "std::array<int[3], 2>",
+        "std::vector<std::array<double, 3>>",
+        "std::vector<int>",
+        "std::vector<double>",
+    ] {
+        assert!(!compiles(bad), "{bad}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn the_robot_of_the_example_finds_its_way() {
     let program = compile_cpp("examples/robot.cpp");
     let server = Server::start("cpp-robot");

@@ -86,7 +86,8 @@ class Questions:
         self.motion_is_free = inside.motion_is_free
         """`motion_is_free(body, configurations, *, level=0, unknown_is_occupied=False, ignore_keep_outs=False)`: whether one
         motion is free, as a `bool`, for the innermost loop of a planner. `body` is a `PreparedBody`, `configurations` contiguous
-        float32 with two or more rows of x y z qx qy qz qw for each link: nothing is converted, and anything else is refused."""
+        and aligned float32 with two or more rows of x y z qx qy qz qw for each link: nothing is converted, and anything else is
+        refused."""
 
     def close(self) -> None:
         """Gives its memory back, once the last call that uses it returns. Every later call is an error."""
@@ -314,7 +315,8 @@ def version_of(version: "_native.Told") -> Version:
 def _points_of(points: ArrayLike) -> tuple[NDArray[np.float32], tuple[int, ...]]:
     """Points as rows, and the shape in which they were given.
 
-    What is that already goes a short way: `rows_of` takes as long as some hundred look-ups.
+    What is that already goes a short way: `rows_of` takes as long as some hundred look-ups. Of fields of packed records, and of
+    what begins at an odd byte, the extension makes a copy.
     """
     if type(points) is np.ndarray and points.dtype == _F32 and points.ndim == 2 and points.shape[1] == 3:
         return points, points.shape[:1]

@@ -1,13 +1,12 @@
 """A map without a server."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mrol import Box, Candidate, Deletion, Localization, OpenDirection, Pose, ScanAnswer, Voxels
 from mrol._arrays import as_floats, as_numbers, number_of, rows_of, vector_of, whole_of
-from mrol._files import File, path_of_file, replacing
+from mrol._files import File, open_regular, path_of_file, replacing
 from mrol.errors import ArgumentError, excerpt
 from mrol.operations.handle import flag_of, text_of
 from mrol.operations.occupancy import POINTS
@@ -48,10 +47,13 @@ class LocalMap(Questions):
     def load(cls, file: File) -> "LocalMap":
         """The map of a map file.
 
-        Raises `InvalidArgument` for what is none, and `OSError` where it cannot be read.
+        Raises `InvalidArgument` for what is none, and `OSError` where it cannot be read: of pipes and devices too, which may have
+        no end.
         """
+        with open_regular(path_of_file(file, "file")) as opened:
+            whole = opened.read() or b""
         loaded = cls.__new__(cls)
-        loaded._take(_native.NativeLocalMap.of_file(Path(path_of_file(file, "file")).read_bytes()))  # noqa: SLF001
+        loaded._take(_native.NativeLocalMap.of_file(whole))  # noqa: SLF001
         return loaded
 
     def save(self, file: File) -> None:

@@ -1,11 +1,12 @@
 """A copy of a server's map, which follows it."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from mrol import Version
 from mrol._arrays import whole_of
 from mrol._files import File, read_secret_file
-from mrol._transport.address import shown_address
+from mrol._transport.address import EXPECTED, Address
 from mrol.errors import ArgumentError
 from mrol.operations.handle import flag_of, text_of
 from mrol.shapes import Box, BoxLike
@@ -37,10 +38,11 @@ class Replica(Questions):
     """A copy of a map in this process: it follows the server's and answers without a call, at the revision that each answer names.
 
     `address` is the server's gRPC address, `http://127.0.0.1:7334` or `unix:/run/mrol/grpc.sock`; `https://` with `ca`, the path of
-    the PEM file of the authority, where it is not one that the system trusts. `key` is the caller's secret. `region` copies the
-    voxels of a box alone, and then questions are refused that what lies outside could change. `blocks_max` bounds the copy
-    (72 bytes and what levels take for each block of 8 x 8 x 8 voxels). With `bloom` it has filters, without `viewpoints` it does
-    not know what is free. Where the connection breaks it comes back by itself; `status` tells.
+    the PEM file of the authority, where it is not one that the system trusts. An address with a user, a path or a query is refused,
+    and not shown: `key` is the caller's secret. `region` copies the voxels of a box alone, and then questions are refused that what
+    lies outside could change. `blocks_max` bounds the copy (72 bytes and what levels take for each block of 8 x 8 x 8 voxels). With
+    `bloom` it has filters, without `viewpoints` it does not know what is free. Where the connection breaks it comes back by itself;
+    `status` tells.
 
     Raises `ConnectFailed`, `NotFound` (`map_not_found`), `Unauthenticated`, `PermissionDenied`, `TimedOut`.
     """
@@ -106,12 +108,15 @@ class Replica(Questions):
 
 
 def _address_of(address: object) -> str:
-    """An address with its scheme. One with a user or a password is none, and neither is shown."""
-    is_one = isinstance(address, str) and address.isprintable() and (address.startswith("unix:") or "@" not in address)
-    if not is_one:
-        raise ArgumentError("address", shown_address(address), "http://host:port, https://host:port or unix:/path")
-    text = str(address)
-    return text if "://" in text or text.startswith("unix:") else f"http://{text}"
+    """An address with its scheme: a host and a port, without a user, a path or a query.
+
+    What is none is not shown: it may have a key in it, or be one.
+    """
+    if isinstance(address, str) and address.isprintable():
+        with suppress(ArgumentError):
+            Address.parse(address)
+            return address if "://" in address or address.startswith("unix:") else f"http://{address}"
+    raise ArgumentError("address", f"an object of {type(address).__name__} that is none (it is not shown)", EXPECTED)
 
 
 def _secret_of(key: object) -> str:

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ._secrets import masked
 from .errors import BadAnswer, excerpt
 
 Read = TypeVar("Read")
@@ -34,7 +35,9 @@ def reading(what: str) -> Iterator[None]:
     try:
         yield
     except READING_FAILS as error:
-        raise BadAnswer(f"{what} cannot be read: {excerpt(error)}") from error
+        # A part of the answer may be in the error, and a secret in that.
+        cause = error if masked(said := str(error)) == said else None
+        raise BadAnswer(f"{what} cannot be read: {excerpt(error)}") from cause
 
 
 def fields_of(body: bytes | bytearray | memoryview) -> "Fields":

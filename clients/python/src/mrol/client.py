@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, Literal
 
 from ._arrays import number_of, seconds_of, whole_of
-from ._fields import Fields, fields_of
+from ._fields import Fields, fields_of, reading
 from ._files import File
 from ._sessions import Sessions
 from ._transport.address import Address
@@ -18,7 +18,7 @@ from ._transport.key import Key
 from ._transport.pool import Pool
 from ._transport.request import JSON, Request, path_of, target_of
 from ._transport.tls import tls_context
-from .errors import ArgumentError, ConnectFailed, MrolError, ServerError
+from .errors import ArgumentError, ConnectFailed, MrolError, ServerError, excerpt
 from .map import Map
 from .operations.description import FilterSettings, MapInfo, map_info
 from .operations.handle import flag_of, word_of
@@ -32,6 +32,8 @@ ANSWER_BYTES_MAX = 1 << 30
 ROBOT = "python"
 
 FIRST_PAUSE_S = 0.1
+TRY_MIN_S = 1.0
+"""How long one try of several may take at least: less than that a server that is there may need as well."""
 
 
 @dataclass(frozen=True)
@@ -146,11 +148,13 @@ class Client:
     def health(self) -> Health:
         """Whether the server takes requests. It takes no key."""
         try:
-            details = json.loads(bytes(self._caller.call(Request("GET", "/readyz")).body))
+            body = self._caller.call(Request("GET", "/readyz")).body
         except ServerError as error:
             if error.status != 503:
                 raise
             return Health(False, error.reason, {"detail": error.message})
+        with reading("the answer's JSON"):
+            details = json.loads(bytes(body))
         return Health(Fields(details).flag("ready"), None, details)
 
     def metrics(self) -> str:
@@ -172,6 +176,9 @@ class Client:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        raise ArgumentError("the client", excerpt(self), "connected anew in each process: a key is not to be written down with it")
 
     def __repr__(self) -> str:
         return f"<mrol server {self.address}>"
@@ -201,10 +208,13 @@ def connect(
     Each call takes `timeout_s` at most, tries, waits and all addresses of the host's name included. It is tried again for
     `patience_s` where the server cannot be reached, starts, drains or is overloaded, and where a connection broke; all changes
     have ids by which the server knows what it has done already. Here alone nothing is tried again unless `wait_s` says how long
-    to wait for the server to be there.
+    to wait for the server to be there; the last try may take a second more.
 
-    Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate. No error shows a key, a password in an
-    address, or a path that names nothing, since that may be a key in the wrong argument.
+    Files of keys and certificates are regular ones: pipes and devices are refused.
+
+    Raises `ConnectFailed`, and `ArgumentError` for what is no address, key or certificate. No error shows a key of 8 characters or
+    more, also where a peer says it again; nor an address that is refused, nor a path that names nothing, since those may be a key
+    in the wrong argument.
     """
     if key is None and key_file is None:
         key, key_file = _from_environment()
@@ -221,7 +231,7 @@ def connect(
         for name, file in (("ca", own_ca), ("client_cert", client_cert), ("client_key", client_key)):
             if file is not None:
                 # A key would travel in the clear although its owner thinks that it does not.
-                raise ArgumentError(name, f"a file for {place}", "given with an https:// address alone")
+                raise ArgumentError(name, f"a file for {place.shown}", "given with an https:// address alone")
     tls = tls_context(ca, client_cert, client_key) if place.is_tls else None
     pool, secret = Pool(place, tls), Key(key, key_file)
     impatient = Caller(pool, secret, Bounds(bounds.timeout_s, 0.0, bounds.request_bytes_max, bounds.answer_bytes_max))
@@ -238,8 +248,10 @@ def _from_environment() -> tuple[str | None, str | None]:
 def _wait_for(caller: Caller, wait_s: float) -> None:
     end = time.monotonic() + wait_s
     while True:
+        left_s = end - time.monotonic()
+        of_try = caller if wait_s == 0 else caller.with_timeout(min(caller.bounds.timeout_s, max(left_s, TRY_MIN_S)))
         try:
-            caller.call(Request("GET", "/livez"))
+            of_try.call(Request("GET", "/livez"))
         except (MrolError, ConnectionError) as error:
             if time.monotonic() + FIRST_PAUSE_S > end:
                 if isinstance(error, ConnectFailed):

@@ -1,6 +1,6 @@
 """What goes wrong, as exceptions: all of them are `MrolError`.
 
-MrolError
+MrolError                 itself: a map file that changed, or could not be read, while it was sent
   ArgumentError           an argument was refused before anything was sent (a ValueError)
   ServerError             the server refused; it changed nothing, but for the reason `outcome_unknown`
     InvalidArgument, Unauthenticated, PermissionDenied, NotFound, Conflict, FailedPrecondition,
@@ -17,6 +17,8 @@ from collections.abc import Mapping
 from reprlib import Repr
 from types import MappingProxyType
 from typing import Any
+
+from ._secrets import masked, masked_bytes
 
 EXCERPT_MAX = 200
 """Characters of a value that a message shows."""
@@ -38,15 +40,16 @@ class _Excerpt(Repr):
         if isinstance(x, int) and x.bit_length() > 4 * EXCERPT_MAX:
             # Python refuses to write numbers of thousands of digits.
             return f"a number of {x.bit_length()} bits"
+        # Before it is cut: of a secret in the middle of the cut a part would be left.
         if isinstance(x, bytes | bytearray):
-            return repr(x[: EXCERPT_MAX + 3])
-        return super().repr1(x, level)
+            return repr(masked_bytes(x)[: EXCERPT_MAX + 3])
+        return super().repr1(masked(x) if isinstance(x, str) else x, level)
 
 
 def excerpt(value: object) -> str:
-    """A value as a message shows it: in one line, and cut where it is long."""
+    """A value as a message shows it: in one line, without secrets, and cut where it is long."""
     try:
-        text = re.sub(r"\s*\n\s*", " ", _Excerpt().repr(value))
+        text = re.sub(r"\s*\n\s*", " ", masked(_Excerpt().repr(value)))
     except Exception:
         # Whatever an object's own `__repr__` raises.
         text = f"an object of {type(value).__name__}"
@@ -58,9 +61,14 @@ class MrolError(Exception):
 
     Of a change whose outcome is not known, `repeat_with` has the arguments (`session` and `scan_id`, or `request_id`) with which
     the same call does it once; it is empty of everything else.
+
+    What it says is without the secrets of this process, also where a peer has said them.
     """
 
     repeat_with: Mapping[str, Any] = MappingProxyType({})
+
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*(masked(given) if isinstance(given, str) else given for given in arguments))
 
 
 OUTCOME_UNKNOWN = ("outcome_unknown", "deadline_exceeded")
@@ -83,7 +91,7 @@ class ArgumentError(MrolError, ValueError):
     def __init__(self, argument: str, value: str, expected: str) -> None:
         super().__init__(f"{argument} must be {expected}, got {value}")
         self.argument = argument
-        self.value = value
+        self.value = masked(value)
         self.expected = expected
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -100,9 +108,9 @@ class ServerError(MrolError):
     def __init__(self, status: int, code: str, reason: str, message: str, retry_after_s: float | None = None) -> None:
         super().__init__(f"{message} ({reason})")
         self.status = status
-        self.code = code
-        self.reason = reason
-        self.message = message
+        self.code = masked(code)
+        self.reason = masked(reason)
+        self.message = masked(message)
         self.retry_after_s = retry_after_s
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -20,6 +20,8 @@ class ScriptedServer:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
         self.requests = 0
+        self.head = b""
+        """The last request, without its body."""
         self._threads: list[Thread] = []
         self._accepting = Thread(target=self._accept, daemon=True)
         self._accepting.start()
@@ -49,6 +51,7 @@ class ScriptedServer:
                     client.sendall(LIVE)
                     continue
                 self.requests += 1
+                self.head = head
                 self._script(client, self._over)
                 return
 

@@ -1,12 +1,17 @@
 """Where a server is."""
 
+import re
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from ..errors import ArgumentError, excerpt
+from .._files import shown_path
+from ..errors import ArgumentError
 
 PORT = 7333
 """Where mrol serves HTTP unless it is told otherwise."""
+
+_HOST = re.compile(r"[\w.-]+|[\da-f:.]+(%[\w.-]+)?")
+"""A name, or a number of IPv6, which may have a zone."""
 
 EXPECTED = "host:port, http://host:port, https://host:port or unix:/path"
 
@@ -25,8 +30,8 @@ class Address:
         """The address that a text names; without a scheme it is https where `prefer_tls` is true."""
         found = _parsed(text, prefer_tls) if isinstance(text, str) else None
         if found is None:
-            # Here no exception has a part of the address in it any more.
-            raise ArgumentError("address", shown_address(text), EXPECTED)
+            # Here no exception has a part of the address in it any more, which may be a key or have a password in it.
+            raise ArgumentError("address", _kind_of(text), EXPECTED)
         return found
 
     @property
@@ -37,19 +42,19 @@ class Address:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{host}:{self.port}"
 
+    @property
+    def shown(self) -> str:
+        """The address as a message shows it: without a path that names nothing, which may be a key in the wrong place."""
+        return str(self) if self.socket_path is None else f"unix:{shown_path(self.socket_path)}"
+
     def __str__(self) -> str:
         if self.socket_path is not None:
             return f"unix:{self.socket_path}"
         return f"{'https' if self.is_tls else 'http'}://{self.authority}"
 
 
-def shown_address(address: object) -> str:
-    """An address as a message shows it: without what stands before an `@` or behind a `?`, where passwords and keys are put."""
-    if not isinstance(address, str):
-        return f"an object of {type(address).__name__}"
-    _, at, host = address.rpartition("@")
-    place, question, _ = host.partition("?")
-    return excerpt(f"{'...@' if at else ''}{place}{'?...' if question else ''}")
+def _kind_of(address: object) -> str:
+    return "something else" if isinstance(address, str) else f"an object of {type(address).__name__}"
 
 
 def _parsed(text: str, prefer_tls: bool) -> Address | None:
@@ -66,6 +71,6 @@ def _parsed(text: str, prefer_tls: bool) -> Address | None:
     except ValueError:
         return None
     is_whole = parts.path in ("", "/") and not parts.query and not parts.fragment and "@" not in parts.netloc
-    if parts.scheme not in ("http", "https") or not host or not is_whole:
+    if parts.scheme not in ("http", "https") or not host or not is_whole or not _HOST.fullmatch(host):
         return None
     return Address(host, PORT if port is None else port, parts.scheme == "https")

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from ..errors import BadAnswer, ConnectionLost, ServerError, TransportError, Unauthenticated, server_error
+from ..errors import BadAnswer, ConnectionLost, ServerError, TransportError, Unauthenticated, excerpt, server_error
 from .attempts import Attempts
 from .connection import Connection
 from .deadline import Deadline, seconds
-from .key import Key
+from .key import Key, Secret
 from .pool import Pool
 from .request import Answer, Request
 from .response import Response
@@ -59,16 +59,16 @@ class Caller:
         attempts = Attempts(self.bounds.patience_s, deadline)
         may_renew = True
         while True:
-            was_kept = False
+            was_kept, secret = False, self._key.secret()
             try:
                 connection, was_kept = self._pool.take(deadline, may_be_kept=request.is_repeatable)
                 try:
-                    answer = connection.ask(request, self._key.headers(), deadline, self.bounds.answer_bytes_max)
+                    answer = connection.ask(request, secret, deadline, self.bounds.answer_bytes_max)
                 finally:
                     self._pool.give_back(connection)
                 raise_for(answer)
             except Unauthenticated:
-                if not (may_renew and self._key.renew()):
+                if not (may_renew and self._key.renew(secret)):
                     raise
                 may_renew = False
             except (ServerError, TransportError) as error:
@@ -80,26 +80,47 @@ class Caller:
     def stream(self, request: Request) -> Iterator["Body"]:
         """An answer that is read piece by piece, over a connection of its own, which is closed at the end.
 
-        Nothing is tried again: who reads it knows where to go on.
+        Nothing is tried again, but the beginning with another secret: who reads it knows where to go on.
+
+        Raises `ConnectionLost` where the server ends it for the sake of its secret, and there is another one now.
         """
         deadline = Deadline(self.bounds.timeout_s)
-        connection, _ = self._pool.take(deadline)
+        may_renew = True
+        while True:
+            secret = self._key.secret()
+            try:
+                connection, response = self._begun(request, secret, deadline)
+            except Unauthenticated:
+                if not (may_renew and self._key.renew(secret)):
+                    raise
+                may_renew = False
+            else:
+                break
         try:
-            response = connection.open(request, self._key.headers(), deadline, None)
-            if response.status >= 300:
-                with_bound = min(response.length or ERROR_BYTES_MAX, ERROR_BYTES_MAX)
-                said = memoryview(connection.read(response, with_bound, deadline))
-                raise_for(Answer(response.status, response.plain_headers, said))
-            if response.length is None and not response.chunked:
-                raise BadAnswer("the answer's length is not told, so one that was cut off would look whole")
             yield Body(connection, response)
+        except Unauthenticated as refused:
+            if not self._key.renew(secret):
+                raise
+            raise ConnectionLost("the key was refused, and there is another one now") from refused
         finally:
             connection.close()
             self._pool.give_back(connection)
 
-    def renew_key(self) -> bool:
-        """Reads the file of the key again; whether it has another secret now."""
-        return self._key.renew()
+    def _begun(self, request: Request, secret: Secret, deadline: Deadline) -> tuple[Connection, Response]:
+        """An answer up to its body, over a connection of its own."""
+        connection, _ = self._pool.take(deadline)
+        try:
+            response = connection.open(request, secret, deadline, None)
+            if response.status >= 300:
+                with_bound = min(response.length or ERROR_BYTES_MAX, ERROR_BYTES_MAX)
+                said = memoryview(connection.read(response, with_bound, deadline))
+                raise_for(Answer(response.status, response.plain_headers, said))
+            _check_has_end(response)
+        except BaseException:
+            connection.close()
+            self._pool.give_back(connection)
+            raise
+        return connection, response
 
 
 class Body:
@@ -136,6 +157,11 @@ class Body:
             raise ConnectionLost("the connection belongs to the process that forked this one")
 
 
+def _check_has_end(response: Response) -> None:
+    if response.length is None and not response.chunked:
+        raise BadAnswer("the answer's length is not told, so one that was cut off would look whole")
+
+
 def raise_for(answer: Answer) -> None:
     """Raises the error that an answer is, where it is one."""
     if 200 <= answer.status < 300:
@@ -143,9 +169,11 @@ def raise_for(answer: Answer) -> None:
     try:
         problem = json.loads(bytes(answer.body))
         words = [problem[name] for name in ("code", "reason", "detail")]
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        said = bytes(answer.body[:200])
-        raise BadAnswer(f"the server answers {answer.status}, and says {said!r}") from error
+    except (ValueError, TypeError, KeyError, RecursionError):
+        words = []
+    if not words:
+        # Here no exception has the answer in it any more, which may be what was sent, with the key.
+        raise BadAnswer(f"the server answers {answer.status}, and says {excerpt(bytes(answer.body))}")
     code, reason, detail = (str(word) for word in words)
     raise server_error(answer.status, code, reason, detail, _seconds(answer.header("retry-after")))
 

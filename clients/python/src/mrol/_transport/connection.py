@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import BadAnswer, ConnectFailed, ConnectionLost, MrolError, TimedOut, excerpt
 from .address import Address
 from .deadline import Deadline
+from .key import Secret
 from .request import Answer, Request
 from .response import Response
 from .stream import BoundedStream
@@ -67,26 +68,26 @@ class Connection:
             return self._socket.fileno() >= 0
         return not is_readable
 
-    def ask(self, request: Request, headers: dict[str, str], deadline: Deadline, answer_bytes_max: int) -> Answer:
+    def ask(self, request: Request, secret: Secret, deadline: Deadline, answer_bytes_max: int) -> Answer:
         """Sends a request and reads its whole answer.
 
         Raises `ConnectionLost`, `TimedOut` or `BadAnswer`; the connection is of no use then.
         """
-        response = self.open(request, headers, deadline, answer_bytes_max + HEADER_BYTES)
+        response = self.open(request, secret, deadline, answer_bytes_max + HEADER_BYTES)
         with _Failures(self):
             body = _whole_body(response, answer_bytes_max)
             response.close()
             self._is_broken = response.will_close or self._is_lost
             return Answer(response.status, response.plain_headers, body)
 
-    def open(self, request: Request, headers: dict[str, str], deadline: Deadline, bytes_max: int | None) -> Response:
+    def open(self, request: Request, secret: Secret, deadline: Deadline, bytes_max: int | None) -> Response:
         """Sends a request, and reads its answer up to the body."""
         # Until an answer was read to its end, wherever Ctrl-C may come.
         self._is_broken = True
         with _Failures(self):
             self._stream.begin(deadline, bytes_max)
             try:
-                self._send(request, headers)
+                self._send(request, secret)
             except (BrokenPipeError, ConnectionResetError) as lost:
                 # A server that refuses a body by its length answers before it has read it.
                 return self._answer_in_spite_of(lost)
@@ -108,12 +109,14 @@ class Connection:
             self._stream.renew(deadline)
             return response.read1(most)
 
-    def _send(self, request: Request, headers: dict[str, str]) -> None:
+    def _send(self, request: Request, secret: Secret) -> None:
         client = self._client
         client.putrequest(request.method, request.target, skip_host=True, skip_accept_encoding=True)
         client.putheader("host", self._address.authority)
-        for name, value in headers.items():
-            client.putheader(name, value)
+        if (shown := secret.header()) is not None:
+            client.putheader("authorization", shown)
+        # A traceback may be shown with what its frames hold.
+        del shown
         if request.accept is not None:
             client.putheader("accept", request.accept)
         if request.content_type is not None:
@@ -205,16 +208,16 @@ def _connected(address: Address, tls: ssl.SSLContext | None, deadline: Deadline)
             return _unix(address.socket_path, timeout_s)
         sock = _tcp(address.host, address.port, deadline)
     except TimeoutError as error:
-        raise ConnectFailed(f"cannot connect to {address}: no answer within {timeout_s:.3g} s") from error
+        raise ConnectFailed(f"cannot connect to {address.shown}: no answer within {timeout_s:.3g} s") from error
     except (OSError, ValueError) as error:
-        raise ConnectFailed(f"cannot connect to {address}: {error}") from error
+        raise ConnectFailed(f"cannot connect to {address.shown}: {error}") from error
     try:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.settimeout(deadline.remaining_s())
         return sock if tls is None else tls.wrap_socket(sock, server_hostname=address.host)
     except (OSError, ValueError) as error:
         sock.close()
-        raise ConnectFailed(f"cannot connect to {address} over TLS: {error}") from error
+        raise ConnectFailed(f"cannot connect to {address.shown} over TLS: {error}") from error
     except BaseException:
         sock.close()
         raise

@@ -1,10 +1,35 @@
 """The secret that a caller shows."""
 
+from contextlib import suppress
+
 from .._files import File, read_secret_file, shown_path
+from .._secrets import remember
 from ..errors import ArgumentError
 
 EXPECTED = "a secret as `mrol key new` prints it, in one line"
-IN_FILE = "the path of a file with a secret as `mrol key new` prints it, in one line"
+IN_FILE = "the path of a regular file with a secret as `mrol key new` prints it, in one line"
+
+
+class Secret:
+    """What a request shows: a secret, or nothing. It can be told from others, and shows itself nowhere else."""
+
+    __slots__ = ("_text",)
+
+    def __init__(self, text: str | None) -> None:
+        self._text = text
+        if text is not None:
+            remember(text)
+
+    def header(self) -> str | None:
+        """The value of the header that shows it."""
+        return None if self._text is None else f"Bearer {self._text}"
+
+    def is_same(self, other: "Secret") -> bool:
+        """Whether a request with the other one shows the same."""
+        return self.header() == other.header()
+
+    def __repr__(self) -> str:
+        return "Secret(none)" if self._text is None else "Secret(...)"
 
 
 class Key:
@@ -14,26 +39,26 @@ class Key:
         if secret is not None and file is not None:
             raise ArgumentError("key", "a key and a key_file", "one of the two")
         self._file = file
-        self._secret = _of_file(file) if file is not None else _given(secret)
+        self._secret = Secret(_of_file(file) if file is not None else _given(secret))
 
-    def headers(self) -> dict[str, str]:
-        """The header that shows it."""
-        return {} if self._secret is None else {"authorization": f"Bearer {self._secret}"}
+    def secret(self) -> Secret:
+        """What a request shows now."""
+        return self._secret
 
-    def renew(self) -> bool:
-        """Reads the file again; whether it has another secret now."""
+    def renew(self, refused: Secret) -> bool:
+        """Reads the file again; whether there is another secret now than the one that was refused.
+
+        Other threads may have been refused as well, and one of them may have read the new one already.
+        """
         if self._file is None:
             return False
-        try:
-            secret = _of_file(self._file)
-        except ArgumentError:
-            # It is about to be replaced: the server's own word says what is wrong.
-            return False
-        former, self._secret = self._secret, secret
-        return former != secret
+        # Where it cannot be read it is about to be replaced: the server's own word says what is wrong.
+        with suppress(ArgumentError):
+            self._secret = Secret(_of_file(self._file))
+        return not self._secret.is_same(refused)
 
     def __repr__(self) -> str:
-        return "Key(none)" if self._secret is None else "Key(...)"
+        return "Key(none)" if self._secret.header() is None else "Key(...)"
 
 
 def _given(secret: object) -> str | None:

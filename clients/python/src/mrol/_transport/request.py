@@ -1,13 +1,25 @@
 """A request, and what is answered to it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 from urllib.parse import quote, urlencode
 
 JSON = "application/json"
 BYTES = "application/octet-stream"
 
 Parameter = str | int | float | bool | None
+
+
+class Pieces(Protocol):
+    """A body that is made while it is sent. It can be sent again, and each piece counts until the next one is asked for."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all pieces."""
+
+    def __iter__(self) -> Iterator[bytes | memoryview]:
+        """The pieces, from the first one."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +33,7 @@ class Request:
     method: str
     target: str
     content_type: str | None = None
-    body: Sequence[bytes | memoryview] = ()
+    body: Sequence[bytes | memoryview] | Pieces = ()
     accept: str | None = None
     is_repeatable: bool = True
     on_sent: Callable[[int], None] | None = None
@@ -29,7 +41,9 @@ class Request:
     @property
     def body_bytes(self) -> int:
         """Bytes of the body."""
-        return sum(memoryview(piece).nbytes for piece in self.body)
+        if isinstance(self.body, Sequence):
+            return sum(memoryview(piece).nbytes for piece in self.body)
+        return self.body.nbytes
 
 
 @dataclass(frozen=True)

@@ -79,15 +79,16 @@ class BoundedStream:
         """Sends what was kept and a piece behind it, by one call of the system."""
         assert self._deadline is not None
         self._sock.settimeout(self._deadline.remaining_s())
-        head = bytes(self._unsent)
+        # A view, since bytes show themselves in a traceback with what its frames hold, and there is a key in them.
+        head = memoryview(bytes(self._unsent))
         self._unsent.clear()
         try:
             sent = self._sock.sendmsg([head, data])
         except TimeoutError as error:
             raise self._deadline.passed() from error
-        if sent < len(head):
-            self._send(memoryview(head)[sent:])
-        self._send(data.cast("B")[max(0, sent - len(head)) :])
+        if sent < head.nbytes:
+            self._send(head[sent:])
+        self._send(data.cast("B")[max(0, sent - head.nbytes) :])
 
     def receive_into(self, buffer: "Buffer") -> int:
         """Reads what is there, or waits for it."""

@@ -2,7 +2,7 @@
 
 import ssl
 
-from .._files import File, path_of_secret, shown_path
+from .._files import File, check_regular, path_of_secret, shown_path
 from ..errors import ArgumentError
 
 
@@ -18,6 +18,9 @@ def tls_context(ca: File | None, client_cert: File | None, client_key: File | No
     cert = path_of_secret(client_cert, "client_cert", expected)
     key = None if client_key is None else path_of_secret(client_key, "client_key", "the key of client_cert (PEM)")
     try:
+        for path in (cert, key):
+            if path is not None:
+                check_regular(path)
         context.load_cert_chain(cert, key)
     except (OSError, ssl.SSLError) as error:
         wrong = error.strerror or str(error)
@@ -31,6 +34,8 @@ def _with_authorities(ca: File | None) -> ssl.SSLContext:
     expected = "a file of certificates (PEM)"
     path = None if ca is None else path_of_secret(ca, "ca", expected)
     try:
+        if path is not None:
+            check_regular(path)
         return ssl.create_default_context(cafile=path)
     except (OSError, ssl.SSLError) as error:
         assert ca is not None

@@ -81,7 +81,9 @@ class EventOperations(MapHandle):
     def watch_events(
         self, *, robot: str | None = None, since_number: int = 0, silence_max_s: float = SILENCE_MAX_S
     ) -> Iterator[ScanEvent]:
-        """The same, then each as it comes, for as long as it is iterated. It comes back after a lost connection.
+        """The same, then each as it comes, for as long as it is iterated.
+
+        It comes back after a lost connection, and where a restored map takes the place of this one.
 
         Raises what ends it for good: `NotFound` (the map was deleted), `Unauthenticated`, and `TransportError` where the server
         does not come back within `patience_s`.

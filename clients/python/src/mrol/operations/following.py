@@ -8,7 +8,7 @@ from typing import TypeVar
 from .._transport.attempts import PASSING
 from .._transport.caller import Body, Caller
 from .._transport.deadline import Deadline
-from ..errors import BadAnswer, ConnectionLost, MrolError, ServerError, TransportError, Unauthenticated
+from ..errors import BadAnswer, ConnectionLost, MrolError, ServerError, TransportError
 
 PAUSE_S = 0.2
 """How long a stream waits before it comes back."""
@@ -18,7 +18,8 @@ SILENCE_MAX_S = 60.0
 
 PIECE_BYTES = 1 << 16
 
-COMES_BACK = PASSING | {"watch_stalled"}
+COMES_BACK = PASSING | {"watch_stalled", "map_replaced"}
+"""Reasons after which a stream comes back. Of the map that has the name now a server tells all, whatever was told of another."""
 
 Item = TypeVar("Item")
 
@@ -29,17 +30,12 @@ def following(caller: Caller, connect: Callable[[], Generator[Item, None, None]]
     It ends by what ends a stream for good, and where the server does not come back within `patience_s`.
     """
     failing_since: float | None = None
-    may_renew = True
     while True:
         try:
             with closing(connect()) as items:
                 for item in items:
-                    failing_since, may_renew = None, True
+                    failing_since = None
                     yield item
-        except Unauthenticated:
-            if not (may_renew and caller.renew_key()):
-                raise
-            may_renew = False
         except (ServerError, TransportError) as error:
             now = time.monotonic()
             failing_since = now if failing_since is None else failing_since
