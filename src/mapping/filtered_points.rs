@@ -10,7 +10,7 @@ use crate::scan::PointFilter;
 pub struct FilteredPoints {
     /// Those that show the robot's surroundings.
     surroundings: TimedPoints,
-    /// Up to where points tell that nothing was met, see [`PointFilter::no_return_m`].
+    /// Up to where points that are too far tell that nothing was met, see [`PointFilter::passed_to`].
     no_returns: TimedPoints,
     /// Those of the robot itself, or too near: what lies behind them was not seen.
     of_robot: TimedPoints,
@@ -73,7 +73,7 @@ impl FilteredPoints {
         let skipped = points - surroundings.points.len();
         Ok(Self {
             surroundings,
-            no_returns: TimedPoints::of(all, |point| filter.no_return(point)),
+            no_returns: TimedPoints::of(all, |point| filter.passed_to(point)),
             of_robot: TimedPoints::of(all, |point| finite(point).filter(|&point| filter.is_of_robot(point))),
             skipped,
             filter,

@@ -107,16 +107,20 @@ impl PointFilter {
             || self.body_m.is_some_and(|(min, max)| (0..3).all(|i| (min[i]..=max[i]).contains(&point[i])))
     }
 
-    /// Up to where a point (sensor frame) tells that nothing was met; none of one that was met itself, and of one without a
-    /// direction.
-    pub fn no_return(&self, point: Point) -> Option<Point> {
+    /// Up to where a point (sensor frame) that is skipped as too far tells that nothing was met: to `no_return_m` where nothing was met
+    /// at all, and to itself where it is nearer than that. None of a point that is kept, and of one without a direction; none at all
+    /// where nobody says from where on nothing was met, since a driver may say that by any distance.
+    pub fn passed_to(&self, point: Point) -> Option<Point> {
         let no_return_m = self.no_return_m.filter(|_| point.is_finite())?;
+        let itself = point;
         let point = point.to_f64().coords;
         let range_m = point.norm();
+        if range_m < no_return_m * (1.0 - ROUNDING) {
+            return self.range_max_m.filter(|max| range_m > *max).map(|_| itself);
+        }
         // Points at the limit itself were rounded to f32, some of them to nearer than it.
-        let is_no_return = range_m >= no_return_m * (1.0 - ROUNDING);
         let to: [f64; 3] = (point * (no_return_m / range_m)).into();
-        is_no_return.then(|| Point::from(to.map(|c| c as f32)))
+        Some(Point::from(to.map(|c| c as f32)))
     }
 }
 
@@ -157,14 +161,20 @@ mod tests {
         for turn in 0..1000 {
             let (sin, cos) = (f64::from(turn) * 0.01).sin_cos();
             let at_limit = Point::new((30.0 * cos) as f32, (30.0 * sin) as f32, 0.0);
-            assert!(!filter.keeps(at_limit) && filter.no_return(at_limit).is_some(), "{at_limit:?}");
+            assert!(!filter.keeps(at_limit) && filter.passed_to(at_limit).is_some(), "{at_limit:?}");
         }
         let (met, far) = (Point::new(0.0, 29.9, 0.0), Point::new(0.0, -60.0, 80.0));
-        assert!(filter.keeps(met) && filter.no_return(met).is_none());
+        assert!(filter.keeps(met) && filter.passed_to(met).is_none());
         assert!(!filter.keeps(far));
-        assert_eq!(filter.no_return(far), Some(Point::new(0.0, -18.0, 24.0)));
-        assert_eq!(filter.no_return(Point::new(f32::INFINITY, 0.0, 0.0)), None);
-        assert_eq!(PointFilter::default().no_return(far), None);
+        assert_eq!(filter.passed_to(far), Some(Point::new(0.0, -18.0, 24.0)));
+        assert_eq!(filter.passed_to(Point::new(f32::INFINITY, 0.0, 0.0)), None);
+        let near = PointFilter { range_max_m: Some(20.0), ..filter };
+        assert!(!near.keeps(met) && near.passed_to(met) == Some(met), "it was met, and makes no voxel");
+        assert_eq!(near.passed_to(Point::new(0.0, 19.0, 0.0)), None);
+        assert_eq!(near.passed_to(far), filter.passed_to(far));
+        let unknown = PointFilter { range_max_m: Some(20.0), ..PointFilter::default() };
+        assert_eq!(unknown.passed_to(met), None);
+        assert_eq!(PointFilter::default().passed_to(far), None);
     }
 
     #[test]

@@ -130,11 +130,12 @@ impl RangeImage {
         let map = depths.map();
         let unit_m = (depths.max() / DEPTH_MAX).max(f32::MIN_POSITIVE);
         let (mut places, mut tiles) = (vec![NOT_SEEN; map.tiles_of_all_faces()], Vec::new());
-        for (place, depths) in places.iter_mut().zip(depths.seen_tiles(rays.spacing)) {
-            let depths = depths.map(|depth| depth.map(|depth_m| (depth_m / unit_m).min(DEPTH_MAX) as u16));
+        for (place, seen) in places.iter_mut().zip(depths.seen_tiles(rays.spacing)) {
+            let depths =
+                seen.depths_m.map(|depth| depth.map(|depth_m| (depth_m / unit_m).min(DEPTH_MAX) as u16));
             if depths.iter().any(Option::is_some) {
                 *place = tiles.len() as u16;
-                tiles.push(Tile::new(&depths));
+                tiles.push(Tile::new(&depths, seen.gap));
             }
         }
         Self { map, unit_m, rays, places, tiles }
@@ -155,9 +156,19 @@ impl RangeImage {
     pub fn sees_well_beyond(&self, offset: [f32; 3], least: WellBeyond) -> bool {
         let WellBeyond { margin_m, gap_max_m } = least;
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
-            depth_m * self.rays.spacing <= gap_max_m
+            depth_m * self.gap_at((face, pixel)) <= gap_max_m
                 && self.sees_beyond_around((face, pixel), depth_m, depth_m + margin_m, 1)
         })
+    }
+
+    /// How far apart rays passed around a pixel, as a rule and at most where no point tells, as the side of a square at depth 1.
+    fn gap_at(&self, pixel: Pixel) -> f32 {
+        let around = [[-1, -1], [1, -1], [-1, 1], [1, 1]].into_iter();
+        let pixels = around.filter_map(|steps| self.map.beside(pixel, steps));
+        let tiles = pixels.filter_map(|(face, pixel)| {
+            self.tiles.get(usize::from(self.places[self.map.place(face, pixel).0]))
+        });
+        tiles.map(Tile::gap).fold(self.rays.spacing, f32::max)
     }
 
     /// True where a pixel was seen beyond a depth.

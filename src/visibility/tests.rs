@@ -424,3 +424,54 @@ fn images_of_before_are_read() {
         assert!(matches!(RangeImage::from_bytes(&moved(number)), Err(RangeImageError::Rays(..))));
     }
 }
+
+#[test]
+fn what_stands_where_rays_were_missing_is_not_seen_well_beyond() {
+    let least = WellBeyond { margin_m: 0.3, gap_max_m: 0.1 };
+    // Rays 0.35 degrees apart all around, but for a band of dead rings.
+    for gap_deg in [1.4f64, 2.1, 2.8, 3.5] {
+        let lies_in_gap = |point: &&Point| {
+            let [x, y, z] = point.xyz();
+            !(0.2..0.2 + gap_deg).contains(&f64::from((z / x.hypot(y)).atan().to_degrees()))
+        };
+        for side_deg in [40.0, 179.8] {
+            let rays = window(side_deg, 25.0, 0.35, |_| 20.0);
+            let image = |points: &[Point]| RangeImage::of_points(points, RANGE, IMAGE_BYTES_MAX).unwrap();
+            let whole = image(&rays);
+            let gaping = image(&rays.iter().filter(lies_in_gap).copied().collect::<Vec<_>>());
+            let (mut kept, mut asked) = (0, 0);
+            for azimuth_deg in -20..=20 {
+                let up_deg = 0.2 + gap_deg / 2.0;
+                let ((sin, cos), up) =
+                    (f64::from(azimuth_deg).to_radians().sin_cos(), up_deg.to_radians().tan());
+                let place = [7.0 * cos, 7.0 * sin, 7.0 * up].map(|c| c as f32);
+                assert!(!gaping.sees_well_beyond(place, least), "{place:?} in a gap of {gap_deg} degrees");
+                asked += 1;
+                kept += usize::from(whole.sees_well_beyond(place, least));
+            }
+            assert!(kept * 10 >= asked * 9, "{kept} of {asked} where no ring is dead");
+        }
+    }
+}
+
+#[test]
+fn a_ball_between_rings_far_apart_is_not_seen_through_though_others_are_dense() {
+    // Rings 0.3 degrees apart below the horizon, and 2 degrees above it.
+    let below = window(60.0, 12.5, 0.3, |_| 20.0).into_iter().filter(|point| point.xyz()[2] < 0.0);
+    let above = (0..8).flat_map(|ring| {
+        (-200..=200).map(move |i| {
+            let ((sin, cos), (up, level)) =
+                ((i as f32 * 0.3).to_radians().sin_cos(), (ring as f32 * 2.0).to_radians().sin_cos());
+            Point::from([level * cos, level * sin, up].map(|c| c * 20.0))
+        })
+    });
+    let surface = ScanSurface::of(&below.chain(above).collect::<Vec<_>>(), SURFACE).unwrap();
+    let sees_through = |distance_m: f32, up_deg: f32| {
+        let (up, level) = up_deg.to_radians().sin_cos();
+        surface.sees_through([distance_m * level, 0.0, distance_m * up], 0.087, 0.15)
+    };
+    assert!(sees_through(6.0, -5.0), "rings are 3 cm apart");
+    for (distance_m, up_deg) in [(4.6, 3.0), (5.0, 5.0), (6.0, 7.0), (8.0, 3.0)] {
+        assert!(!sees_through(distance_m, up_deg), "at {distance_m} m rings are 16 cm apart and more");
+    }
+}

@@ -11,6 +11,13 @@ const PIXEL_BITS: usize = 6;
 pub(super) const TILE_BYTES: usize = 4 + TILE_PIXELS * PIXEL_BITS / 8;
 /// Steps that a pixel's bits tell apart: 0 says that it was not seen.
 const STEPS: u32 = (1 << PIXEL_BITS) - 2;
+/// Bits that a tile's step takes when it is stored; the others of its two bytes are the tile's gap.
+const STEP_BITS: u32 = 11;
+const _: () = assert!((u16::MAX as u32).div_ceil(STEPS) < 1 << STEP_BITS, "every step has its bits");
+/// Largest gap that is told, in [`GAP_UNIT`].
+const GAPS: u8 = (1 << (16 - STEP_BITS)) - 1;
+/// Steps of gaps, as the side of a square at depth 1: a quarter of a degree, up to 8 degrees.
+const GAP_UNIT: f32 = 0.0045;
 /// Pixels whose bits make up whole bytes, and how many bytes.
 const PACKED_PIXELS: usize = 4;
 const PACKED_BYTES: usize = PACKED_PIXELS * PIXEL_BITS / 8;
@@ -23,17 +30,22 @@ const PACKED_BYTES: usize = PACKED_PIXELS * PIXEL_BITS / 8;
 pub(super) struct Tile {
     base: u16,
     step: u16,
+    /// How far apart rays passed at most through what was seen of it, in [`GAP_UNIT`].
+    gap: u8,
     seen: [u8; TILE_PIXELS],
 }
 
 impl Tile {
     /// A tile of depths in the image's unit; none of pixels that were not seen.
-    pub(super) fn new(depths: &[Option<u16>; TILE_PIXELS]) -> Self {
+    ///
+    /// `gap` is how far apart rays passed at most through what was seen of it, as the side of a square at depth 1.
+    pub(super) fn new(depths: &[Option<u16>; TILE_PIXELS], gap: f32) -> Self {
         let seen = || depths.iter().flatten().copied();
         let base = seen().min().unwrap_or(0);
         let step = u32::from(seen().max().unwrap_or(0) - base).div_ceil(STEPS).max(1) as u16;
         let byte = |depth: Option<u16>| depth.map_or(0, |depth| 1 + ((depth - base) / step) as u8);
-        Self { base, step, seen: depths.map(byte) }
+        let gap = ((gap / GAP_UNIT).ceil() as u8).min(GAPS);
+        Self { base, step, gap, seen: depths.map(byte) }
     }
 
     /// How deep a pixel was seen, in the image's unit; none where it was not.
@@ -43,6 +55,11 @@ impl Tile {
         (seen > 0).then(|| u32::from(self.base) + u32::from(self.step) * (seen - 1))
     }
 
+    /// How far apart rays passed at most through what was seen of it, as the side of a square at depth 1.
+    pub(super) fn gap(&self) -> f32 {
+        f32::from(self.gap) * GAP_UNIT
+    }
+
     /// How many pixels were seen.
     pub(super) fn seen_pixels(&self) -> usize {
         self.seen.iter().filter(|seen| **seen > 0).count()
@@ -50,7 +67,7 @@ impl Tile {
 
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
         bytes.extend_from_slice(&self.base.to_le_bytes());
-        bytes.extend_from_slice(&self.step.to_le_bytes());
+        bytes.extend_from_slice(&(u16::from(self.gap) << STEP_BITS | self.step).to_le_bytes());
         for pixels in self.seen.as_chunks::<PACKED_PIXELS>().0 {
             let packed = pixels.iter().rev().fold(0, |packed, &seen| packed << PIXEL_BITS | u32::from(seen));
             bytes.extend_from_slice(&packed.to_le_bytes()[..PACKED_BYTES]);
@@ -65,7 +82,9 @@ impl Tile {
             let word = u32::from_le_bytes([b0, b1, b2, 0]);
             (word >> (pixel % PACKED_PIXELS * PIXEL_BITS)) as u8 & ((1 << PIXEL_BITS) - 1)
         });
-        Self { base: u16::from_le_bytes([*b0, *b1]), step: u16::from_le_bytes([*s0, *s1]), seen }
+        let gap_and_step = u16::from_le_bytes([*s0, *s1]);
+        let (gap, step) = ((gap_and_step >> STEP_BITS) as u8, gap_and_step & ((1 << STEP_BITS) - 1));
+        Self { base: u16::from_le_bytes([*b0, *b1]), step, gap, seen }
     }
 }
 
@@ -76,7 +95,7 @@ mod tests {
     #[test]
     fn depths_that_are_alike_are_told_to_the_unit() {
         let depths = std::array::from_fn(|i| (i % 5 != 0).then_some(7000 + i as u16));
-        let tile = Tile::new(&depths);
+        let tile = Tile::new(&depths, 0.0);
         for (pixel, depth) in depths.iter().enumerate() {
             assert_eq!(tile.depth(pixel), depth.map(u32::from));
         }
@@ -86,7 +105,7 @@ mod tests {
     fn depths_far_from_each_other_are_rounded_down_by_less_than_a_step() {
         let depths =
             std::array::from_fn(|i| Some(if i % 2 == 0 { i as u16 } else { u16::MAX - i as u16 * 31 }));
-        let tile = Tile::new(&depths);
+        let tile = Tile::new(&depths, 0.0);
         for (pixel, depth) in depths.iter().flatten().enumerate() {
             let told = tile.depth(pixel).unwrap();
             let lost = u32::from(*depth) - told;
@@ -96,9 +115,17 @@ mod tests {
 
     #[test]
     fn a_tile_comes_back_from_its_bytes() {
-        let tile = Tile::new(&std::array::from_fn(|i| (i % 3 == 0).then_some(i as u16 * 900)));
-        let mut bytes = Vec::new();
-        tile.write(&mut bytes);
-        assert_eq!(Tile::read(bytes.as_slice().try_into().unwrap()), tile);
+        for gap in [0.0, 0.004, 0.05, 9.0] {
+            let tile = Tile::new(&std::array::from_fn(|i| (i % 3 == 0).then_some(i as u16 * 900)), gap);
+            let mut bytes = Vec::new();
+            tile.write(&mut bytes);
+            assert_eq!(Tile::read(bytes.as_slice().try_into().unwrap()), tile);
+            // No narrower than it is, but for those wider than what is told.
+            assert!(
+                tile.gap() >= gap.min(0.139) && tile.gap() < gap + 0.0046,
+                "{gap} was told as {}",
+                tile.gap()
+            );
+        }
     }
 }
