@@ -25,7 +25,7 @@ impl Body {
         if links.is_empty() {
             return Err(PlanningError::NoLinks);
         }
-        if links.iter().all(|link| link.spheres.is_empty() && link.points.is_empty()) {
+        if !links.iter().any(Link::has_parts) {
             return Err(PlanningError::NoParts { links: links.len() });
         }
         links.iter().enumerate().try_for_each(|(number, link)| link.check(number))?;

@@ -34,7 +34,9 @@ fn pose() -> impl Strategy<Value = [f32; 7]> {
 }
 
 fn body_and_poses() -> impl Strategy<Value = (Body, Vec<f32>)> {
-    prop::collection::vec(link(), 1..3).prop_flat_map(|links| {
+    let links = prop::collection::vec(link(), 1..3)
+        .prop_filter("a body has a part", |links| links.iter().any(Link::has_parts));
+    links.prop_flat_map(|links| {
         let poses = prop::collection::vec(pose(), links.len() * 4);
         (Just(Body::new(links).unwrap()), poses.prop_map(|poses| poses.concat()))
     })

@@ -51,6 +51,11 @@ impl Sphere {
 }
 
 impl Link {
+    /// True of a link with a sphere or a point.
+    pub(super) fn has_parts(&self) -> bool {
+        !(self.spheres.is_empty() && self.points.is_empty())
+    }
+
     /// Centers and radii of all parts with padding, meters: spheres in their order, points after them.
     pub(super) fn padded(&self) -> impl Iterator<Item = PaddedPart> {
         let spheres = self.spheres.iter().map(|sphere| sphere.padded(self.padding_m));

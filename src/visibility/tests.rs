@@ -302,7 +302,6 @@ fn what_rays_of_a_moving_sensor_did_not_pass_is_not_seen_through() {
             .collect();
         let sweep = Sweep { range_max_m: 40.0, moved_m: moved_m as f32 };
         let image = RangeImage::of_points(&points, sweep, IMAGE_BYTES_MAX).unwrap();
-        let standing = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
         // Each place as the ray saw it that ran through it: with its azimuth, from where the sensor was then.
         let is_hidden = |x: f64, y: f64| {
             let at = |share: f64| {
@@ -316,21 +315,19 @@ fn what_rays_of_a_moving_sensor_did_not_pass_is_not_seen_through() {
             let at_plate_m = origin_y + (y - origin_y) * 3.0 / x;
             plate_m.contains(&at_plate_m)
         };
-        let (mut wrong, mut wrong_if_standing, mut seen) = (0, 0, 0);
+        let (mut wrong, mut seen) = (0, 0);
         for (i, j) in (0..40).flat_map(|i| (0..81).map(move |j| (i, j))) {
             let (x, y) = (3.1 + f64::from(i) * 0.1, f64::from(j) * 0.05 - 2.0);
             let offset = [x as f32, y as f32, 0.0];
             seen += usize::from(image.sees_through(offset));
             if is_hidden(x, y) {
                 wrong += usize::from(image.sees_through(offset));
-                wrong_if_standing += usize::from(standing.sees_through(offset));
             }
         }
         assert_eq!(wrong, 0, "{wrong} hidden places were seen by a sensor that moved {moved_m} m");
         // More than half of the places are hidden, or beside what was looked at.
         let least = if moved_m < 0.2 { 800 } else { 400 };
         assert!(seen > least, "{seen} of 3240 places were seen by a sensor that moved {moved_m} m");
-        assert!(moved_m < 0.2 || wrong_if_standing > 0, "{wrong_if_standing}");
     }
 }
 

@@ -63,7 +63,9 @@ fn pose() -> impl Strategy<Value = [f32; 7]> {
 
 /// A body of two links, and an even number of configurations.
 pub(super) fn body_and_poses() -> impl Strategy<Value = (Body, Vec<f32>)> {
-    (prop::collection::vec(link(), 2), prop::collection::vec(pose(), 2 * 6))
+    let links = prop::collection::vec(link(), 2)
+        .prop_filter("a body has a part", |links| links.iter().any(Link::has_parts));
+    (links, prop::collection::vec(pose(), 2 * 6))
         .prop_map(|(links, poses)| (Body::new(links).unwrap(), poses.concat()))
 }
 
@@ -178,6 +180,7 @@ proptest! {
         let sizes = [spheres.len() as u32];
         let groups = SphereGroups::new(&spheres, &sizes).unwrap();
         let question = SphereQuestion { groups, padding_m: 0.2, level: 0, surroundings: &Surroundings::ALL_VOXELS };
+        prop_assume!(!spheres.is_empty());
         let one = Body::new(vec![Link { spheres: spheres.clone(), padding_m: 0.2, ..Link::default() }]).unwrap();
         let numbers = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
         let configurations = Configurations::new(&numbers, 1).unwrap();

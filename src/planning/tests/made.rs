@@ -86,7 +86,9 @@ pub(super) fn near_pose() -> impl Strategy<Value = [f32; 7]> {
 }
 
 pub(super) fn body_and_poses(poses: std::ops::Range<usize>) -> impl Strategy<Value = (Body, Vec<f32>)> {
-    (prop::collection::vec(link(), 1..4), poses).prop_flat_map(|(links, count)| {
+    let links = prop::collection::vec(link(), 1..4)
+        .prop_filter("a body has a part", |links| links.iter().any(Link::has_parts));
+    (links, poses).prop_flat_map(|(links, count)| {
         let pose = prop_oneof![pose(), near_pose()];
         let poses = prop::collection::vec(pose, links.len() * count);
         (Just(Body::new(links).unwrap()), poses.prop_map(|poses| poses.concat()))

@@ -114,13 +114,16 @@ impl Question for MotionCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point;
     use crate::planning::Link;
 
     #[test]
     fn what_is_made_of_motions_counts_before_it_is_made() {
         let check = |motions: usize| MotionCheck {
             asked: Asked::default(),
-            body: Arc::new(Body::new(vec![Link::default()]).unwrap()),
+            body: Arc::new(
+                Body::new(vec![Link { points: vec![Point::new(0.0, 0.0, 0.0)], ..Link::default() }]).unwrap(),
+            ),
             configurations: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].repeat(2 * motions),
             lengths: vec![2; motions],
             step_m: None,

@@ -91,12 +91,17 @@ async fn what_is_no_question_is_refused_by_name() {
 #[tokio::test]
 async fn links_count_as_parts_of_a_body_and_groups_are_bounded_in_every_form() {
     use mrol::wire::pb;
-    let daemon = Daemon::start_with(|config| config.limits.body_parts_max = 3).await;
+    let daemon = Daemon::start_with(|config| config.limits.body_parts_max = 4).await;
     daemon.make_map("a").await;
-    let words = "body has 4 links, spheres and points, body_parts_max is 3";
+    let words = "body has 5 links, spheres and points, body_parts_max is 4";
     for (links, is_taken) in [(3, true), (4, false)] {
         let pose: Vec<u8> = at(0.0, 0.0, 0.0).repeat(links).iter().flat_map(|c| c.to_le_bytes()).collect();
-        let body = json!({"links": vec![json!({}); links]});
+        // One sphere, so that it is somewhere.
+        let mut json_links = vec![json!({}); links];
+        json_links[0] = json!({"spheres": [[0, 0, 0, 0.1]]});
+        let body = json!({"links": json_links});
+        let mut pb_links = vec![pb::Link::default(); links];
+        pb_links[0].spheres_f32le = [0f32, 0.0, 0.0, 0.1].map(f32::to_le_bytes).concat().into();
         for (route, rest) in [("poses", json!({})), ("motions", json!({"lengths": [2]}))] {
             let configurations = if route == "motions" { pose.repeat(2) } else { pose.clone() };
             let mut head = json!({"body": body, "configurations": {"at": 0, "bytes": configurations.len()}});
@@ -111,7 +116,7 @@ async fn links_count_as_parts_of_a_body_and_groups_are_bounded_in_every_form() {
         }
         let request = pb::CheckPosesRequest {
             asked: Some(pb::Asked { map: "a".into(), ..Default::default() }),
-            body: Some(pb::Body { links: vec![pb::Link::default(); links] }),
+            body: Some(pb::Body { links: pb_links }),
             configurations_f32le: pose.into(),
             ..Default::default()
         };
@@ -128,8 +133,8 @@ async fn links_count_as_parts_of_a_body_and_groups_are_bounded_in_every_form() {
     }
     let spheres = |sizes: Value| json!({"spheres": vec![[0, 0, 0, 1]; 5], "sizes": sizes});
     assert!(daemon.post("/v1/maps/a/spheres", spheres(json!([3, 2]))).await.status().is_success());
-    let said = json_of(daemon.post("/v1/maps/a/spheres", spheres(json!([1, 4]))).await).await;
-    assert_eq!(said["detail"], json!("sizes[1] has 4 spheres, body_parts_max is 3"));
+    let said = json_of(daemon.post("/v1/maps/a/spheres", spheres(json!([0, 5]))).await).await;
+    assert_eq!(said["detail"], json!("sizes[1] has 5 spheres, body_parts_max is 4"));
 }
 
 #[tokio::test]
