@@ -105,6 +105,14 @@ impl CubeMap {
         pixel.map(|i| (i as f32 + 0.5) * self.pitch() - 1.0)
     }
 
+    /// The angle, radians, of a small step to the right or up from the middle of a pixel, for a length of 1 on the face: towards its
+    /// edges less.
+    pub(super) fn angle_of_step(self, pixel: [usize; 2], [right, _]: [isize; 2]) -> f32 {
+        let [u, v] = self.middle(pixel);
+        let along = if right != 0 { 1.0 + v * v } else { 1.0 + u * u };
+        along.sqrt() / (1.0 + u * u + v * v)
+    }
+
     /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on others).
     pub(super) fn on_face(self, face: usize, [u, v]: [f32; 2]) -> [f32; 3] {
         let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };

@@ -23,7 +23,8 @@ pub(super) struct NearestDepths {
     map_of_parts: CubeMap,
     /// Of each part, tile by tile; infinite where no point is.
     depths_m: Vec<f32>,
-    touched_tiles: usize,
+    /// Of each tile of the map: whether some point lies in it.
+    is_touched: Vec<bool>,
 }
 
 /// How far something was seen.
@@ -60,14 +61,13 @@ impl NearestDepths {
         let parts = (map.pitch() / SPACING_MAX).ceil().max(1.0) as usize;
         let map_of_parts = CubeMap::new(map.tiles() * parts);
         let depths_m = vec![f32::INFINITY; map_of_parts.tiles_of_all_faces() * TILE_PIXELS];
-        let mut depths = Self { map, parts, map_of_parts, depths_m, touched_tiles: 0 };
-        let mut is_touched = vec![false; map.tiles_of_all_faces()];
+        let is_touched = vec![false; map.tiles_of_all_faces()];
+        let mut depths = Self { map, parts, map_of_parts, depths_m, is_touched };
         for Projection { face, pixel, depth_m } in offsets.iter().filter_map(|&it| map_of_parts.project(it)) {
             let part = depths.at((face, pixel));
             depths.depths_m[part] = depths.depths_m[part].min(depth_m);
-            is_touched[map.place(face, pixel.map(|i| i / parts)).0] = true;
+            depths.is_touched[map.place(face, pixel.map(|i| i / parts)).0] = true;
         }
-        depths.touched_tiles = is_touched.iter().filter(|is_touched| **is_touched).count();
         depths
     }
 
@@ -77,7 +77,7 @@ impl NearestDepths {
 
     /// How many tiles some point lies in.
     pub(super) fn touched_tiles(&self) -> usize {
-        self.touched_tiles
+        self.is_touched.iter().filter(|is_touched| **is_touched).count()
     }
 
     /// The largest depth, meters.
@@ -93,11 +93,15 @@ impl NearestDepths {
         let least = if spacing <= SPARSE { all.div_ceil(2) } else { all };
         let mut tiles = vec![SeenTile::NOTHING; self.map.tiles_of_all_faces()];
         for (face, pixel) in self.map.all_pixels() {
+            let (tile, place) = self.map.place(face, pixel);
+            // What no point is in is looked at by none: most of it.
+            if !self.is_touched[tile] {
+                continue;
+            }
             let (parts, seen) = self.seen_parts((face, pixel));
             if parts < least {
                 continue;
             }
-            let (tile, place) = self.map.place(face, pixel);
             // Next to a part that was not seen rays may be as far away as the next pixel.
             let beside = if parts < all { self.map.pitch() + GAP_MAX } else { 0.0 };
             tiles[tile].depths_m[place] = Some(seen.depth_m);
@@ -131,10 +135,7 @@ impl NearestDepths {
     }
 
     fn seen_between(&self, part: Pixel, [right, up]: [isize; 2]) -> Option<Seen> {
-        // Towards the edges of a face parts are narrower, as angles.
-        let [u, v] = self.map_of_parts.middle(part.1);
-        let along = if right != 0 { 1.0 + v * v } else { 1.0 + u * u };
-        let part_rad = self.map_of_parts.pitch() * along.sqrt() / (1.0 + u * u + v * v);
+        let part_rad = self.map_of_parts.pitch() * self.map_of_parts.angle_of_step(part.1, [right, up]);
         let steps = (GAP_MAX / part_rad + ROUNDING) as isize;
         let point_m = |step: isize| self.point_m(self.map_of_parts.beside(part, [right * step, up * step])?);
         let (before, before_m) = (1..steps).find_map(|step| Some((step, point_m(-step)?)))?;

@@ -50,8 +50,8 @@ struct Hit {
     distance_m: f32,
     /// Something beside it lies behind it, or was not seen.
     is_rim: bool,
-    /// Between two others that lie so far apart, as the side of a square at depth 1; 0 of a point of the scan.
-    gap: f32,
+    /// Between two others, and no point of the scan.
+    is_filled: bool,
 }
 
 impl ScanSurface {
@@ -72,7 +72,7 @@ impl ScanSurface {
         let mut surface = Self { map, spacing, settings, places, hits: Vec::new() };
         for &offset in offsets {
             let Some(Projection { face, pixel, .. }) = map.project(offset) else { continue };
-            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, gap: 0.0 };
+            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: false };
             let place = surface.place((face, pixel));
             match surface.hits.get_mut(surface.places[place] as usize) {
                 Some(nearest) if nearest.distance_m <= hit.distance_m => {}
@@ -92,23 +92,20 @@ impl ScanSurface {
     fn fill(&mut self) {
         let between = |a: Option<&Hit>, b: Option<&Hit>| {
             let (a, b) = (a?, b?);
-            self.are_joined(a, b).then(|| {
-                let offset: [f32; 3] = between(a.offset, b.offset, 0.5);
-                let [towards_a, towards_b] = [a, b].map(|hit| hit.offset.map(|c| c / hit.distance_m));
-                let gap = distance(towards_a, towards_b).max(a.gap).max(b.gap);
-                Hit { offset, distance_m: norm(offset), is_rim: false, gap }
-            })
+            self.are_joined(a, b).then(|| std::array::from_fn(|axis| (a.offset[axis] + b.offset[axis]) / 2.0))
         };
         let halfway = |pixel: Pixel| {
             let at = |steps| self.hit(self.map.beside(pixel, steps)?);
             let beside = between(at([-1, 0]), at([1, 0]));
             let above = between(at([0, -1]), at([0, 1]));
-            beside.into_iter().chain(above).min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+            beside.into_iter().chain(above).min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
         };
         let unseen = self.map.all_pixels().filter(|&pixel| self.hit(pixel).is_none());
-        let filled: Vec<(usize, Hit)> =
+        let filled: Vec<(usize, [f32; 3])> =
             unseen.filter_map(|pixel| Some((self.place(pixel), halfway(pixel)?))).collect();
-        filled.into_iter().for_each(|(place, hit)| self.put(place, hit));
+        for (place, offset) in filled {
+            self.put(place, Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: true });
+        }
     }
 
     fn find_rims(&mut self) {
@@ -154,7 +151,7 @@ impl ScanSurface {
     pub fn for_samples(&self, range_m: f32, mut f: impl FnMut([f32; 3])) {
         for pixel in self.map.all_pixels() {
             let Some(hit) = self.hit(pixel).filter(|hit| hit.distance_m <= range_m) else { continue };
-            if hit.gap > 0.0 {
+            if hit.is_filled {
                 f(hit.offset);
             }
             let beside = |steps| {
@@ -230,10 +227,7 @@ impl ScanSurface {
                 let around = std::array::from_fn(|axis| offset[axis] + right[axis] * a + up[axis] * b);
                 let seen = self.map.project(around).and_then(|seen| self.hit((seen.face, seen.pixel)));
                 let is_within = a * a + b * b <= radius_m * radius_m;
-                seen.is_some_and(|hit| {
-                    let is_beyond = hit.distance_m > distance_m + radius_m;
-                    hit.gap * distance_m <= gap_max_m && (is_beyond || !(is_within || hit.is_rim))
-                })
+                seen.is_some_and(|hit| hit.distance_m > distance_m + radius_m || !(is_within || hit.is_rim))
             })
         })
     }

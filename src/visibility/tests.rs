@@ -450,25 +450,3 @@ fn what_stands_where_rays_were_missing_is_not_seen_well_beyond() {
         }
     }
 }
-
-#[test]
-fn a_ball_between_rings_far_apart_is_not_seen_through_though_others_are_dense() {
-    // Rings 0.3 degrees apart below the horizon, and 2 degrees above it.
-    let below = window(60.0, 12.5, 0.3, |_| 20.0).into_iter().filter(|point| point.xyz()[2] < 0.0);
-    let above = (0..8).flat_map(|ring| {
-        (-200..=200).map(move |i| {
-            let ((sin, cos), (up, level)) =
-                ((i as f32 * 0.3).to_radians().sin_cos(), (ring as f32 * 2.0).to_radians().sin_cos());
-            Point::from([level * cos, level * sin, up].map(|c| c * 20.0))
-        })
-    });
-    let surface = ScanSurface::of(&below.chain(above).collect::<Vec<_>>(), SURFACE).unwrap();
-    let sees_through = |distance_m: f32, up_deg: f32| {
-        let (up, level) = up_deg.to_radians().sin_cos();
-        surface.sees_through([distance_m * level, 0.0, distance_m * up], 0.087, 0.15)
-    };
-    assert!(sees_through(6.0, -5.0), "rings are 3 cm apart");
-    for (distance_m, up_deg) in [(4.6, 3.0), (5.0, 5.0), (6.0, 7.0), (8.0, 3.0)] {
-        assert!(!sees_through(distance_m, up_deg), "at {distance_m} m rings are 16 cm apart and more");
-    }
-}
