@@ -113,6 +113,16 @@ impl CubeMap {
         along.sqrt() / (1.0 + u * u + v * v)
     }
 
+    /// Where on a face's plane the direction of `offset` lies (-1 to 1 along each side, and beyond it on others).
+    pub(super) fn on_plane(self, face: usize, [x, y, z]: [f32; 3]) -> [f32; 2] {
+        let (depth, u, v) = match face / 2 {
+            0 => (x, y, z),
+            1 => (y, z, x),
+            _ => (z, x, y),
+        };
+        [u, v].map(|along| along / depth.abs())
+    }
+
     /// The direction of depth 1 that lies at `u`, `v` of a face's plane (-1 to 1 along each side, and beyond it on others).
     pub(super) fn on_face(self, face: usize, [u, v]: [f32; 2]) -> [f32; 3] {
         let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };

@@ -11,6 +11,9 @@ const NEAREST: f32 = 4.0;
 /// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both meet, and
 /// for where pixels are smallest, at the corners of the cube.
 const FILLINGS: usize = 3;
+/// Largest share of the directions around a ball in which gaps may be too wide: rays are lost here and there, and rings that lie
+/// too far apart leave half of them.
+const GAPS_MAX: f32 = 0.25;
 /// Number of a pixel in which nothing was seen.
 const NOT_SEEN: u32 = u32::MAX;
 
@@ -50,8 +53,8 @@ struct Hit {
     distance_m: f32,
     /// Something beside it lies behind it, or was not seen.
     is_rim: bool,
-    /// Between two others, and no point of the scan.
-    is_filled: bool,
+    /// How far apart the points lie between which it was filled in, as the side of a square at depth 1; 0 of a point of the scan.
+    gap: f32,
 }
 
 impl ScanSurface {
@@ -72,7 +75,7 @@ impl ScanSurface {
         let mut surface = Self { map, spacing, settings, places, hits: Vec::new() };
         for &offset in offsets {
             let Some(Projection { face, pixel, .. }) = map.project(offset) else { continue };
-            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: false };
+            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, gap: 0.0 };
             let place = surface.place((face, pixel));
             match surface.hits.get_mut(surface.places[place] as usize) {
                 Some(nearest) if nearest.distance_m <= hit.distance_m => {}
@@ -90,22 +93,35 @@ impl ScanSurface {
 
     /// Sees in a pixel between two that show one surface, beside or above each other, what lies halfway between them.
     fn fill(&mut self) {
-        let between = |a: Option<&Hit>, b: Option<&Hit>| {
-            let (a, b) = (a?, b?);
-            self.are_joined(a, b).then(|| std::array::from_fn(|axis| (a.offset[axis] + b.offset[axis]) / 2.0))
-        };
-        let halfway = |pixel: Pixel| {
-            let at = |steps| self.hit(self.map.beside(pixel, steps)?);
-            let beside = between(at([-1, 0]), at([1, 0]));
-            let above = between(at([0, -1]), at([0, 1]));
-            beside.into_iter().chain(above).min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
-        };
         let unseen = self.map.all_pixels().filter(|&pixel| self.hit(pixel).is_none());
-        let filled: Vec<(usize, [f32; 3])> =
+        let halfway = |pixel| match (self.between(pixel, [1, 0]), self.between(pixel, [0, 1])) {
+            // A ray that was lost in a row of many leaves a gap as wide as theirs, however far the next row is.
+            (Some(beside), Some(above)) => {
+                let nearest = if beside.distance_m <= above.distance_m { beside } else { above };
+                Some(Hit { gap: beside.gap.min(above.gap), ..nearest })
+            }
+            (beside, above) => beside.or(above),
+        };
+        let filled: Vec<(usize, Hit)> =
             unseen.filter_map(|pixel| Some((self.place(pixel), halfway(pixel)?))).collect();
-        for (place, offset) in filled {
-            self.put(place, Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: true });
-        }
+        filled.into_iter().for_each(|(place, hit)| self.put(place, hit));
+    }
+
+    /// What lies halfway between the pixels so many steps before and behind one, if these show one surface.
+    fn between(&self, pixel: Pixel, [right, up]: [isize; 2]) -> Option<Hit> {
+        let before = self.hit(self.map.beside(pixel, [-right, -up])?)?;
+        let behind = self.hit(self.map.beside(pixel, [right, up])?)?;
+        self.are_joined(before, behind).then(|| {
+            let offset = between(before.offset, behind.offset, 0.5);
+            let [from, to] = [before, behind].map(|hit| self.map.on_plane(pixel.0, hit.offset));
+            let apart = if right != 0 { (to[0] - from[0]).abs() } else { (to[1] - from[1]).abs() };
+            Hit {
+                offset,
+                distance_m: norm(offset),
+                is_rim: false,
+                gap: apart.max(before.gap).max(behind.gap),
+            }
+        })
     }
 
     fn find_rims(&mut self) {
@@ -151,7 +167,7 @@ impl ScanSurface {
     pub fn for_samples(&self, range_m: f32, mut f: impl FnMut([f32; 3])) {
         for pixel in self.map.all_pixels() {
             let Some(hit) = self.hit(pixel).filter(|hit| hit.distance_m <= range_m) else { continue };
-            if hit.is_filled {
+            if hit.gap > 0.0 {
                 f(hit.offset);
             }
             let beside = |steps| {
@@ -209,7 +225,8 @@ impl ScanSurface {
     /// True where the scan saw through a ball of `radius_m` around `offset` (sensor frame): each direction in which the ball
     /// lies ends beyond it, and no direction within a pixel of these is unseen, or ends before that at a rim.
     ///
-    /// Nothing is seen through where the points lie farther apart than `gap_max_m`: what is larger than that was met by one.
+    /// Nothing is seen through where the points lie farther apart than `gap_max_m`, in general or there: what is larger than that was
+    /// met by one.
     pub fn sees_through(&self, offset: [f32; 3], radius_m: f32, gap_max_m: f32) -> bool {
         let Some(Projection { depth_m, .. }) = self.map.project(offset) else { return false };
         let (distance_m, pixel_m) = (norm(offset), depth_m * self.map.pitch());
@@ -221,15 +238,21 @@ impl ScanSurface {
         let steps = (2.0 * window_m / (0.5 * pixel_m)).ceil();
         let [right, up] = across(offset);
         let along = |i: usize| i as f32 / steps * 2.0 * window_m - window_m;
+        let looks = (steps as usize + 1).pow(2);
+        let mut looks_at_gaps = 0;
         (0..=steps as usize).all(|row| {
             (0..=steps as usize).all(|column| {
                 let (a, b) = (along(column), along(row));
                 let around = std::array::from_fn(|axis| offset[axis] + right[axis] * a + up[axis] * b);
                 let seen = self.map.project(around).and_then(|seen| self.hit((seen.face, seen.pixel)));
                 let is_within = a * a + b * b <= radius_m * radius_m;
-                seen.is_some_and(|hit| hit.distance_m > distance_m + radius_m || !(is_within || hit.is_rim))
+                seen.is_some_and(|hit| {
+                    let is_beyond = hit.distance_m > distance_m + radius_m;
+                    looks_at_gaps += usize::from(hit.gap * depth_m > gap_max_m);
+                    is_beyond || !(is_within || hit.is_rim)
+                })
             })
-        })
+        }) && looks_at_gaps as f32 <= GAPS_MAX * looks as f32
     }
 
     #[inline(always)]

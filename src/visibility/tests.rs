@@ -388,3 +388,44 @@ fn what_stands_where_rays_were_missing_is_not_seen_well_beyond() {
         }
     }
 }
+
+#[test]
+fn a_ball_between_rings_far_apart_is_not_seen_through_though_others_are_dense() {
+    let at = |distance_m: f32, azimuth_deg: f32, elevation_deg: f32| {
+        let ((sin, cos), (up, level)) =
+            (azimuth_deg.to_radians().sin_cos(), elevation_deg.to_radians().sin_cos());
+        [level * cos, level * sin, up].map(|c| c * distance_m)
+    };
+    let ring =
+        |elevation_deg: f32| (-270..=270).map(move |i| Point::from(at(20.0, i as f32 * 0.3, elevation_deg)));
+    // One ray in fifty is lost.
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    for apart_deg in [1.6, 2.0, 3.0] {
+        let below = (1..=40).map(|i| i as f32 * -0.3).flat_map(ring);
+        let above = (0..8).map(|i| i as f32 * apart_deg).flat_map(ring);
+        let points: Vec<_> = below.chain(above).filter(|_| random.random_range(0..50) > 0).collect();
+        let surface = ScanSurface::of(&points, SURFACE).unwrap();
+        let gap_max_m = 0.15;
+        let sees_through = |place| surface.sees_through(place, 0.087, gap_max_m);
+        let (mut asked, mut seen) = (0, 0);
+        for azimuth_deg in (-60..=60).step_by(4).map(|i| i as f32) {
+            for elevation_deg in [-4.0, -6.0, -8.0] {
+                asked += 1;
+                seen += usize::from(sees_through(at(5.0, azimuth_deg, elevation_deg)));
+            }
+            for (gap, wide) in (1..6).flat_map(|gap| [1.1, 1.3, 1.6, 2.2].map(|wide| (gap, wide))) {
+                let distance_m = wide * gap_max_m / apart_deg.to_radians();
+                let place = at(distance_m, azimuth_deg, (gap as f32 + 0.5) * apart_deg);
+                assert!(
+                    distance_m > 15.0 || !sees_through(place),
+                    "{place:?} between rings {apart_deg} degrees apart, {wide} times as far as is seen through"
+                );
+            }
+        }
+        // Rings that lie farther apart make all pixels wide, and nothing is seen through so far away.
+        assert!(
+            apart_deg > 2.0 || seen * 10 >= asked * 9,
+            "{seen} of {asked} where rings are dense, {apart_deg} degrees above"
+        );
+    }
+}
