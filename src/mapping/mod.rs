@@ -370,7 +370,7 @@ impl<'a> ScanMapper<'a> {
             let (min_m, end_m) = self.map.lattice().range_m();
             return Err(MappingError::OutOfRange { min_m, end_m });
         }
-        let mut ends = scan.met_at(velocity);
+        let mut ends = self.met(scan, &record, velocity);
         if !scan.no_returns.points.is_empty() {
             ends.to_mut().extend_from_slice(&scan.no_returns.at(velocity));
         }
@@ -381,6 +381,18 @@ impl<'a> ScanMapper<'a> {
             return Err(MappingError::Stopped);
         }
         Ok(record)
+    }
+
+    /// Where rays of a scan ended, the robot itself too, where the scan is as its record says.
+    ///
+    /// Points outside the map's range are none: drivers write a huge number where nothing returned, which says nothing.
+    fn met<'s>(&self, scan: &Scan<'s>, record: &ScanRecord, velocity: Option<&Twist>) -> Cow<'s, [Point]> {
+        let mut met = scan.met_at(velocity);
+        if record.pose.points_skipped > scan.points_skipped {
+            let from_points = self.map.lattice().from_points(&record.pose.map_from_sensor);
+            met.to_mut().retain(|&point| from_points.index(point).is_some());
+        }
+        met
     }
 
     /// The voxels of the map that a scan saw through from where it was found; none where this mapper does not carve, or the
@@ -401,7 +413,7 @@ impl<'a> ScanMapper<'a> {
         let Some(settings) = self.settings.carving.filter(|_| located.is_accepted()) else {
             return Ok(Carving::default());
         };
-        let points = scan.met_at(located.velocity.as_ref());
+        let points = self.met(scan, record, located.velocity.as_ref());
         let moved_m = scan.moved_m(located.velocity.as_ref());
         CarvingScan { points: &points, record, moved_m }.carve(self.map, &settings, stop)
     }

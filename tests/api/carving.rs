@@ -83,6 +83,35 @@ async fn a_box_that_was_taken_away_goes_where_the_request_or_the_settings_say_so
 }
 
 #[tokio::test]
+async fn points_outside_the_maps_range_see_through_nothing() {
+    // As drivers write a direction in which nothing returned.
+    for nowhere_m in [1e6, 1e20, f32::MAX] {
+        let daemon = Daemon::start_with(carves).await;
+        daemon.make_map("a").await;
+        insert(&daemon, 1, true, "").await;
+        let before = box_voxels(&daemon).await;
+        let at_box = room(true).into_iter().zip(room(false)).map(|(met, beyond)| (met != beyond, beyond));
+        let points: Vec<_> = at_box
+            .map(|(is_of_box, point)| match is_of_box {
+                true => point.map(|c| if c.abs() > 1.0 { c.signum() * nowhere_m } else { c }),
+                false => point,
+            })
+            .collect();
+        let route = "/v1/maps/a/scans?robot=r&scan_id=2&guess=0,0,0,0,0,0,1&align=false";
+        let answer = json_of(daemon.post_bytes(route, bytes_of(&points)).await).await;
+        assert!(answer["points_skipped"].as_u64().unwrap() > 400, "{answer}");
+        assert_eq!(box_voxels(&daemon).await, before, "{nowhere_m}");
+        let asked = json!({"points": [[1.5, 0.0, 0.0], [1.5, 0.2, 0.1], [2.5, 0.0, 0.0], [0.8, 0.0, 0.0]]});
+        let told = json_of(daemon.post("/v1/maps/a/classification", asked).await).await;
+        assert_eq!(
+            told["free"],
+            json!([false, false, false, true]),
+            "only what lies before the box, {nowhere_m}: {told}"
+        );
+    }
+}
+
+#[tokio::test]
 async fn what_was_carved_is_told_undone_with_its_scan_and_the_same_after_a_restart() {
     let daemon = Daemon::start_with(carves).await;
     daemon.make_map("a").await;
