@@ -86,9 +86,11 @@ static void bad_options(const char *address, const char *map) {
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "the key must be");
     options = good, options.ca_file = "/nowhere/ca.pem";
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.ca_file: /nowhere/ca.pem cannot be read");
-    options = good, options.ca_file = "/dev/null";
+    options = good, options.ca_file = "/proc/self/status";
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "must be PEM");
-    options = good, options.certificate_file = "/dev/null";
+    options = good, options.ca_file = "/dev/zero";
+    OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.ca_file: /dev/zero is no regular file");
+    options = good, options.certificate_file = "/proc/self/status";
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "one of certificate_file and private_key_file");
     options = good, options.has_region = 2;
     OPENING_FAILS(MROL_INVALID_ARGUMENT, "options.has_region must be 0 or 1, got 2");
@@ -454,7 +456,7 @@ static void bad_calls(const char *address, const char *map) {
     FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "struct_size must lie in");
     options = good, options.credentials.ca_file = "/nowhere";
     FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "options.ca_file");
-    options = good, options.credentials.private_key_file = "/dev/null";
+    options = good, options.credentials.private_key_file = "/proc/self/status";
     FAILS(mrol_client_open(&options, &client, &error), MROL_INVALID_ARGUMENT, "not both");
     MUST(mrol_client_open(&good, &client, NULL) == MROL_OK);
 
