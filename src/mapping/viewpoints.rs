@@ -23,7 +23,7 @@ pub struct ViewpointSettings {
     pub distance_m: f64,
     /// Or that is turned by more than this against those that are nearer, degrees. 15.
     pub rotation_deg: f64,
-    /// A scan from a new pose is new if this share of what it sees was unknown. 0.002: who passes between two viewpoints that saw
+    /// A scan from a new pose is new if this share of what it sees was unknown. 0.003: who passes between two viewpoints that saw
     /// all of it already leaves none.
     pub unknown_from_new_pose: f64,
     /// A scan from a known pose is new if this share of what it sees was unknown. 0.05: a door that was opened, a robot with
@@ -39,7 +39,7 @@ impl Default for ViewpointSettings {
             bytes_max: VIEWPOINT_BYTES_MAX_DEFAULT,
             distance_m: 0.5,
             rotation_deg: 15.0,
-            unknown_from_new_pose: 0.002,
+            unknown_from_new_pose: 0.003,
             unknown_from_known_pose: 0.05,
             range_max_m: 60.0,
         }

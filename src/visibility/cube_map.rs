@@ -2,6 +2,8 @@
 
 /// Faces of the cube.
 pub(super) const FACES: usize = 6;
+/// Tiles along the side of a face of pixels that are as fine as points lie: 0.28 degrees.
+const TILES_MAX: usize = 40;
 /// Pixels along the side of a tile.
 pub(super) const TILE_SIDE: usize = 8;
 
@@ -31,6 +33,11 @@ pub(super) struct Projection {
 impl CubeMap {
     pub(super) fn new(tiles: usize) -> Self {
         Self { tiles }
+    }
+
+    /// The map of pixels half as wide, or as wide as the finest that are of use.
+    pub(super) fn finer(self) -> Self {
+        Self { tiles: (2 * self.tiles).min(TILES_MAX.max(self.tiles)) }
     }
 
     /// Tiles along the side of a face.

@@ -8,12 +8,15 @@ mod cube_map;
 mod density;
 mod nearest_depths;
 mod range_image;
+mod ray_gaps;
+mod ray_index;
 mod reach;
 mod scan_surface;
 mod set;
 #[cfg(test)]
 mod tests;
 mod tile;
+mod vectors;
 mod viewpoint;
 
 pub use range_image::{IMAGE_BYTES_MAX, RangeImage, RangeImageError, Sweep, WellBeyond};

@@ -3,6 +3,7 @@
 use super::cube_map::{CubeMap, Pixel, Projection};
 use super::density::PointDensity;
 use super::nearest_depths::{NearestDepths, SPACING_MAX};
+use super::ray_gaps::RayGaps;
 use super::tile::{TILE_BYTES, Tile};
 use crate::geometry::Point;
 
@@ -103,7 +104,7 @@ impl RangeImage {
     /// the points lie. Those in which the points lie far from each other are not seen.
     pub fn of_points(points: &[Point], sweep: Sweep, bytes_max: usize) -> Option<Self> {
         let offsets: Vec<_> = points.iter().filter_map(|point| sweep.limited(point.xyz())).collect();
-        let PointDensity { spacing, .. } = PointDensity::of(&offsets)?;
+        let PointDensity { map, spacing } = PointDensity::of(&offsets)?;
         let rays = Rays { moved_m: sweep.told_moved_m(), spacing };
         let depths = TILES.iter().map(|&tiles| NearestDepths::of(CubeMap::new(tiles), &offsets));
         let mut fitting =
@@ -111,8 +112,22 @@ impl RangeImage {
         let first = Self::of_depths(&fitting.next()?, rays);
         // Coarser pixels tell more of a scan whose points lie further apart than the finest pixels.
         let coarser = fitting.take_while(|depths| depths.map().pitch() <= SPACING_MAX);
-        let best = coarser.map(|depths| Self::of_depths(&depths, rays)).fold(first, Self::that_tells_more);
+        let mut best =
+            coarser.map(|depths| Self::of_depths(&depths, rays)).fold(first, Self::that_tells_more);
+        best.note_gaps(&RayGaps::of(map.finer(), &offsets));
         (!best.tiles.is_empty()).then_some(best)
+    }
+
+    /// Tells the gaps between rays in the tiles that were seen there: pixels and their parts are too wide to tell of them.
+    fn note_gaps(&mut self, gaps: &RayGaps) {
+        for (direction, gap) in gaps.iter() {
+            let Some(Projection { face, pixel, .. }) = self.map.project(direction) else { continue };
+            let (tile, pixel) = self.map.place(face, pixel);
+            let kept = self.tiles.get_mut(usize::from(self.places[tile]));
+            if let Some(tile) = kept.filter(|tile| tile.depth(pixel).is_some()) {
+                tile.note_gap(gap);
+            }
+        }
     }
 
     /// The coarser image where it tells so much more that this is worth it.

@@ -2,6 +2,8 @@
 
 use super::cube_map::{CubeMap, FACES, Pixel, Projection};
 use super::density::PointDensity;
+use super::ray_index::{Ball, RayIndex};
+use super::vectors::{across, between, distance, norm};
 use crate::geometry::Point;
 
 /// Points that are farther apart than so many samples say nothing of what is between them.
@@ -11,9 +13,6 @@ const NEAREST: f32 = 4.0;
 /// How often pixels between two that are seen are filled: for rows or columns between those with points, for where both meet, and
 /// for where pixels are smallest, at the corners of the cube.
 const FILLINGS: usize = 3;
-/// Largest share of the directions around a ball in which gaps may be too wide: rays are lost here and there, and rings that lie
-/// too far apart leave half of them.
-const GAPS_MAX: f32 = 0.25;
 /// Number of a pixel in which nothing was seen.
 const NOT_SEEN: u32 = u32::MAX;
 
@@ -37,12 +36,12 @@ pub struct SurfaceSettings {
 #[derive(Debug, Clone)]
 pub struct ScanSurface {
     map: CubeMap,
-    /// How far from each other the points lie, as the side of a square at depth 1.
-    spacing: f32,
     settings: SurfaceSettings,
     /// For each pixel, face by face and row by row, the number of its hit.
     places: Vec<u32>,
     hits: Vec<Hit>,
+    /// All of the scan's rays.
+    rays: RayIndex,
 }
 
 /// Where a direction was seen to end.
@@ -53,29 +52,29 @@ struct Hit {
     distance_m: f32,
     /// Something beside it lies behind it, or was not seen.
     is_rim: bool,
-    /// How far apart the points lie between which it was filled in, as the side of a square at depth 1; 0 of a point of the scan.
-    gap: f32,
+    /// Between two others, and no point of the scan.
+    is_filled: bool,
 }
 
 impl ScanSurface {
     /// The surface of a scan of `points` (sensor frame, finite); none of a scan without points.
     pub fn of(points: &[Point], settings: SurfaceSettings) -> Option<Self> {
         let offsets: Vec<_> = points.iter().map(|point| point.xyz()).collect();
-        let density = PointDensity::of(&offsets)?;
-        let mut surface = Self::of_points(&offsets, density, settings);
+        let PointDensity { map, .. } = PointDensity::of(&offsets)?;
+        let mut surface = Self::of_points(&offsets, map, settings);
         (0..FILLINGS).for_each(|_| surface.fill());
         surface.find_rims();
         Some(surface)
     }
 
     /// The nearest point in each pixel.
-    fn of_points(offsets: &[[f32; 3]], density: PointDensity, settings: SurfaceSettings) -> Self {
-        let PointDensity { map, spacing } = density;
+    fn of_points(offsets: &[[f32; 3]], map: CubeMap, settings: SurfaceSettings) -> Self {
         let places = vec![NOT_SEEN; FACES * map.pixels() * map.pixels()];
-        let mut surface = Self { map, spacing, settings, places, hits: Vec::new() };
+        let rays = RayIndex::of(map, offsets);
+        let mut surface = Self { map, settings, places, hits: Vec::new(), rays };
         for &offset in offsets {
             let Some(Projection { face, pixel, .. }) = map.project(offset) else { continue };
-            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, gap: 0.0 };
+            let hit = Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: false };
             let place = surface.place((face, pixel));
             match surface.hits.get_mut(surface.places[place] as usize) {
                 Some(nearest) if nearest.distance_m <= hit.distance_m => {}
@@ -93,35 +92,22 @@ impl ScanSurface {
 
     /// Sees in a pixel between two that show one surface, beside or above each other, what lies halfway between them.
     fn fill(&mut self) {
-        let unseen = self.map.all_pixels().filter(|&pixel| self.hit(pixel).is_none());
-        let halfway = |pixel| match (self.between(pixel, [1, 0]), self.between(pixel, [0, 1])) {
-            // A ray that was lost in a row of many leaves a gap as wide as theirs, however far the next row is.
-            (Some(beside), Some(above)) => {
-                let nearest = if beside.distance_m <= above.distance_m { beside } else { above };
-                Some(Hit { gap: beside.gap.min(above.gap), ..nearest })
-            }
-            (beside, above) => beside.or(above),
+        let between = |a: Option<&Hit>, b: Option<&Hit>| {
+            let (a, b) = (a?, b?);
+            self.are_joined(a, b).then(|| std::array::from_fn(|axis| (a.offset[axis] + b.offset[axis]) / 2.0))
         };
-        let filled: Vec<(usize, Hit)> =
+        let halfway = |pixel: Pixel| {
+            let at = |steps| self.hit(self.map.beside(pixel, steps)?);
+            let beside = between(at([-1, 0]), at([1, 0]));
+            let above = between(at([0, -1]), at([0, 1]));
+            beside.into_iter().chain(above).min_by(|a, b| norm(*a).total_cmp(&norm(*b)))
+        };
+        let unseen = self.map.all_pixels().filter(|&pixel| self.hit(pixel).is_none());
+        let filled: Vec<(usize, [f32; 3])> =
             unseen.filter_map(|pixel| Some((self.place(pixel), halfway(pixel)?))).collect();
-        filled.into_iter().for_each(|(place, hit)| self.put(place, hit));
-    }
-
-    /// What lies halfway between the pixels so many steps before and behind one, if these show one surface.
-    fn between(&self, pixel: Pixel, [right, up]: [isize; 2]) -> Option<Hit> {
-        let before = self.hit(self.map.beside(pixel, [-right, -up])?)?;
-        let behind = self.hit(self.map.beside(pixel, [right, up])?)?;
-        self.are_joined(before, behind).then(|| {
-            let offset = between(before.offset, behind.offset, 0.5);
-            let [from, to] = [before, behind].map(|hit| self.map.on_plane(pixel.0, hit.offset));
-            let apart = if right != 0 { (to[0] - from[0]).abs() } else { (to[1] - from[1]).abs() };
-            Hit {
-                offset,
-                distance_m: norm(offset),
-                is_rim: false,
-                gap: apart.max(before.gap).max(behind.gap),
-            }
-        })
+        for (place, offset) in filled {
+            self.put(place, Hit { offset, distance_m: norm(offset), is_rim: false, is_filled: true });
+        }
     }
 
     fn find_rims(&mut self) {
@@ -167,7 +153,7 @@ impl ScanSurface {
     pub fn for_samples(&self, range_m: f32, mut f: impl FnMut([f32; 3])) {
         for pixel in self.map.all_pixels() {
             let Some(hit) = self.hit(pixel).filter(|hit| hit.distance_m <= range_m) else { continue };
-            if hit.gap > 0.0 {
+            if hit.is_filled {
                 f(hit.offset);
             }
             let beside = |steps| {
@@ -225,12 +211,11 @@ impl ScanSurface {
     /// True where the scan saw through a ball of `radius_m` around `offset` (sensor frame): each direction in which the ball
     /// lies ends beyond it, and no direction within a pixel of these is unseen, or ends before that at a rim.
     ///
-    /// Nothing is seen through where the points lie farther apart than `gap_max_m`, in general or there: what is larger than that was
-    /// met by one.
+    /// Nothing is seen through where rays ran farther from each other than `gap_max_m`: what is larger than that was met by one.
     pub fn sees_through(&self, offset: [f32; 3], radius_m: f32, gap_max_m: f32) -> bool {
         let Some(Projection { depth_m, .. }) = self.map.project(offset) else { return false };
         let (distance_m, pixel_m) = (norm(offset), depth_m * self.map.pitch());
-        if distance_m <= NEAREST * radius_m || depth_m * self.spacing > gap_max_m {
+        if distance_m <= NEAREST * radius_m {
             return false;
         }
         let window_m = radius_m + pixel_m;
@@ -238,21 +223,16 @@ impl ScanSurface {
         let steps = (2.0 * window_m / (0.5 * pixel_m)).ceil();
         let [right, up] = across(offset);
         let along = |i: usize| i as f32 / steps * 2.0 * window_m - window_m;
-        let looks = (steps as usize + 1).pow(2);
-        let mut looks_at_gaps = 0;
-        (0..=steps as usize).all(|row| {
+        let ends_beyond = (0..=steps as usize).all(|row| {
             (0..=steps as usize).all(|column| {
                 let (a, b) = (along(column), along(row));
                 let around = std::array::from_fn(|axis| offset[axis] + right[axis] * a + up[axis] * b);
                 let seen = self.map.project(around).and_then(|seen| self.hit((seen.face, seen.pixel)));
                 let is_within = a * a + b * b <= radius_m * radius_m;
-                seen.is_some_and(|hit| {
-                    let is_beyond = hit.distance_m > distance_m + radius_m;
-                    looks_at_gaps += usize::from(hit.gap * depth_m > gap_max_m);
-                    is_beyond || !(is_within || hit.is_rim)
-                })
+                seen.is_some_and(|hit| hit.distance_m > distance_m + radius_m || !(is_within || hit.is_rim))
             })
-        }) && looks_at_gaps as f32 <= GAPS_MAX * looks as f32
+        });
+        ends_beyond && self.rays.pass(Ball { offset, radius_m }, gap_max_m / 2.0)
     }
 
     #[inline(always)]
@@ -269,23 +249,3 @@ impl ScanSurface {
 
 /// The pixels around one.
 const AROUND: [[isize; 2]; 8] = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
-
-fn norm([x, y, z]: [f32; 3]) -> f32 {
-    ((x * x + y * y) + z * z).sqrt()
-}
-
-fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    norm(std::array::from_fn(|axis| a[axis] - b[axis]))
-}
-
-fn between(a: [f32; 3], b: [f32; 3], share: f32) -> [f32; 3] {
-    std::array::from_fn(|axis| a[axis] + (b[axis] - a[axis]) * share)
-}
-
-/// Two directions at right angles to each other and to `offset`, of length 1.
-fn across(offset: [f32; 3]) -> [[f32; 3]; 2] {
-    let offset = nalgebra::Vector3::from(offset);
-    let other = nalgebra::Vector3::ith(offset.iamin(), 1.0);
-    let right = offset.cross(&other).normalize();
-    [right.into(), offset.cross(&right).normalize().into()]
-}

@@ -429,3 +429,78 @@ fn a_ball_between_rings_far_apart_is_not_seen_through_though_others_are_dense() 
         );
     }
 }
+
+/// A sensor with a hole in it, and where it was turned to.
+struct Holed {
+    /// Degrees between its rays, to the side and up.
+    step_deg: [f32; 2],
+    /// Degrees from one ray to the next one on the other side of the hole, to the side and up; without end where rings are dead.
+    hole_deg: [f32; 2],
+    yaw_deg: f32,
+}
+
+impl Holed {
+    /// The direction so many degrees to the side and up of the hole, of length 1.
+    fn direction(&self, [side_deg, up_deg]: [f32; 2]) -> [f32; 3] {
+        let (sin, cos) = (side_deg + self.yaw_deg).to_radians().sin_cos();
+        let (up, level) = up_deg.to_radians().sin_cos();
+        [level * cos, level * sin, up]
+    }
+
+    /// What it sees of a wall 20 m away all around; one ray in `lost` is.
+    fn scan(&self, lost: u32, random: &mut ChaCha8Rng) -> Vec<Point> {
+        let [columns, rows] = [30.0 / self.step_deg[0], 15.0 / self.step_deg[1]].map(|rays| rays as i32);
+        let rays = (-columns..=columns).flat_map(|column| (-rows..=rows).map(move |row| [column, row]));
+        let turned = rays.map(|ray| [0, 1].map(|axis| ray[axis] as f32 * self.step_deg[axis]));
+        let left = turned.filter(|ray_deg| {
+            let is_in_hole =
+                [0, 1].iter().all(|&axis| ray_deg[axis].abs() < self.hole_deg[axis] / 2.0 - 1e-3);
+            !is_in_hole && random.random_range(0..lost) > 0
+        });
+        left.map(|ray_deg| Point::from(self.direction(ray_deg).map(|c| c * 20.0))).collect()
+    }
+}
+
+#[test]
+fn what_no_ray_met_for_a_hole_in_the_sensor_is_not_seen_through() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let voxel_m = 0.1;
+    let well_beyond = WellBeyond { margin_m: 3.0 * voxel_m, gap_max_m: voxel_m };
+    let (mut asked, mut seen, mut well_seen) = (0, 0, 0);
+    let sensors = [
+        ([0.2, 1.0], [f32::INFINITY, 2.0], "a dead ring"),
+        ([0.2, 0.5], [f32::INFINITY, 1.5], "two dead rings"),
+        ([0.1, 0.1], [0.8, 0.8], "a hole between fine rays"),
+        ([0.14, 0.14], [1.2, 1.2], "masked pixels of a camera"),
+    ];
+    for (step_deg, hole_deg, name) in sensors {
+        for (yaw_deg, lost) in [0.0, 20.0, 40.0].into_iter().flat_map(|yaw| [(yaw, u32::MAX), (yaw, 50)]) {
+            let sensor = Holed { step_deg, hole_deg, yaw_deg };
+            let points = sensor.scan(lost, &mut random);
+            let surface = ScanSurface::of(&points, SURFACE).unwrap();
+            let image = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
+            let sees_through = |place| surface.sees_through(place, 0.87 * voxel_m, 1.5 * voxel_m);
+            for voxels_wide in [1.2, 1.65, 2.0, 2.3, 2.8, 3.3] {
+                let distance_m = voxels_wide * voxel_m / hole_deg[1].to_radians();
+                if distance_m > 15.0 {
+                    continue;
+                }
+                for _ in 0..20 {
+                    // Of what fills four fifths of the hole.
+                    let [side, up]: [f32; 2] = std::array::from_fn(|_| random.random_range(-0.4..0.4));
+                    let side_deg = if hole_deg[0].is_finite() { side * hole_deg[0] } else { side * 8.0 };
+                    let at = |up_deg: f32| sensor.direction([side_deg, up_deg]).map(|c| c * distance_m);
+                    let place = at(up * hole_deg[1]);
+                    let what = format!("{place:?} in {name} {voxels_wide} voxels wide, turned by {yaw_deg}");
+                    assert!(voxels_wide < 2.0 || !sees_through(place), "{what}");
+                    assert!(!image.sees_well_beyond(place, well_beyond), "{what}");
+                    asked += 1;
+                    seen += usize::from(sees_through(at(7.0)));
+                    well_seen += usize::from(image.sees_well_beyond(at(7.0), well_beyond));
+                }
+            }
+        }
+    }
+    assert!(seen * 10 >= asked * 9, "{seen} of {asked} beside the holes");
+    assert!(well_seen * 8 >= asked, "{well_seen} of {asked} beside the holes");
+}

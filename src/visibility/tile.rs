@@ -44,8 +44,12 @@ impl Tile {
         let base = seen().min().unwrap_or(0);
         let step = u32::from(seen().max().unwrap_or(0) - base).div_ceil(STEPS).max(1) as u16;
         let byte = |depth: Option<u16>| depth.map_or(0, |depth| 1 + ((depth - base) / step) as u8);
-        let gap = ((gap / GAP_UNIT).ceil() as u8).min(GAPS);
-        Self { base, step, gap, seen: depths.map(byte) }
+        Self { base, step, gap: gap_steps(gap), seen: depths.map(byte) }
+    }
+
+    /// Tells of a gap that is in it, as the side of a square at depth 1.
+    pub(super) fn note_gap(&mut self, gap: f32) {
+        self.gap = self.gap.max(gap_steps(gap));
     }
 
     /// How deep a pixel was seen, in the image's unit; none where it was not.
@@ -86,6 +90,10 @@ impl Tile {
         let (gap, step) = ((gap_and_step >> STEP_BITS) as u8, gap_and_step & ((1 << STEP_BITS) - 1));
         Self { base: u16::from_le_bytes([*b0, *b1]), step, gap, seen }
     }
+}
+
+fn gap_steps(gap: f32) -> u8 {
+    ((gap / GAP_UNIT).ceil() as u8).min(GAPS)
 }
 
 #[cfg(test)]
