@@ -46,8 +46,11 @@ impl Default for ViewpointSettings {
     }
 }
 
-/// Rays that are looked along for what is unknown.
+/// Rays that are looked along for what is unknown, where little hangs on it.
 const RAYS: usize = 300;
+/// Rays of an image that are looked along before it is kept. Of few rays chance lets some of a thousand scans see something new that a
+/// robot has seen in each of its rounds.
+const RAYS_OF_IMAGE: usize = 3000;
 /// Where along each: before its middle others saw most, and at its end it grazes what it meets.
 const ALONG: [f64; 3] = [0.5, 0.75, 0.9];
 /// Viewpoints that are compared when one has to go.
@@ -85,7 +88,8 @@ impl ViewpointSettings {
         }
         let image = RangeImage::of_points(points, sweep, IMAGE_BYTES_MAX)?;
         let viewpoint = Viewpoint::new(*map_from_sensor, image);
-        let unknown = share_unknown(&samples_of(&viewpoint), |point| viewpoints.sees_through(point));
+        let unknown =
+            share_unknown(&samples_of(&viewpoint, RAYS_OF_IMAGE), |point| viewpoints.sees_through(point));
         if unknown < least {
             return None;
         }
@@ -113,7 +117,11 @@ impl ViewpointSettings {
                 let kept = viewpoints.get(revision)?;
                 let by_others =
                     |point| viewpoint.sees_through(point) || viewpoints.others_see_through(point, revision);
-                compared.push((share_unknown(&samples_of(kept), by_others), revision, kept.memory_bytes()));
+                compared.push((
+                    share_unknown(&samples_of(kept, RAYS), by_others),
+                    revision,
+                    kept.memory_bytes(),
+                ));
                 if stop.is_stopped() {
                     return None;
                 }
@@ -166,11 +174,11 @@ fn along(map_from_sensor: &Pose, offset: [f32; 3]) -> impl Iterator<Item = [f64;
     })
 }
 
-/// Places that a viewpoint saw through, from all over its image.
-fn samples_of(viewpoint: &Viewpoint) -> Vec<[f64; 3]> {
+/// Places that a viewpoint saw through, along so many rays from all over its image.
+fn samples_of(viewpoint: &Viewpoint, rays: usize) -> Vec<[f64; 3]> {
     let seen: Vec<_> = viewpoint.image().seen().collect();
-    let rays = seen.iter().step_by(seen.len().div_ceil(RAYS).max(1));
-    let places = rays.flat_map(|&offset| along(viewpoint.map_from_sensor(), offset));
+    let some = seen.iter().step_by(seen.len().div_ceil(rays).max(1));
+    let places = some.flat_map(|&offset| along(viewpoint.map_from_sensor(), offset));
     // Not all that lies before the end of a ray: from a moving sensor it has to be seen from where others were taken, too.
     places.filter(|&place| viewpoint.sees_through(place)).collect()
 }

@@ -5,6 +5,9 @@ use super::vectors::{across, dot, norm};
 
 /// Largest share of a ball's disc that no ray ran near to: rays are lost here and there.
 const GAPS_MAX: f32 = 0.1;
+/// Columns, and rows, of parts of a pixel, of each of which one ray is kept: more would tell little, and a scan may send all it has in one
+/// direction.
+const PARTS: usize = 8;
 /// Places of a ball's disc at which is looked, along its radius.
 const PLACES: i32 = 4;
 
@@ -28,28 +31,40 @@ pub(super) struct Ball {
 impl RayIndex {
     /// The index of rays that ended at `offsets` from the sensor.
     pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
-        let side = map.pixels();
-        let place = |offset: [f32; 3]| map.project(offset).map(|seen| place(side, seen));
-        let mut begins = vec![0u32; FACES * side * side + 1];
-        offsets.iter().filter_map(|&offset| place(offset)).for_each(|pixel| begins[pixel + 1] += 1);
-        (1..begins.len()).for_each(|i| begins[i] += begins[i - 1]);
+        let parts = CubeMap::new(map.tiles() * PARTS);
+        // The pixel of a ray, and which of its parts it ran in.
+        let place = |offset: [f32; 3]| {
+            let Projection { face, pixel, depth_m } = parts.project(offset)?;
+            let part = pixel[1] % PARTS * PARTS + pixel[0] % PARTS;
+            let pixel = place(map.pixels(), Projection { face, pixel: pixel.map(|i| i / PARTS), depth_m });
+            Some((pixel, 1u64 << part))
+        };
+        let mut taken = vec![0u64; FACES * map.pixels() * map.pixels()];
+        offsets.iter().filter_map(|&offset| place(offset)).for_each(|(pixel, part)| taken[pixel] |= part);
+        let mut begins = vec![0u32];
+        begins.extend(taken.iter().scan(0, |end, parts| {
+            *end += parts.count_ones();
+            Some(*end)
+        }));
         let mut ends = vec![[0.0; 3]; begins[begins.len() - 1] as usize];
-        let mut next = begins.clone();
         for &offset in offsets {
-            let Some(pixel) = place(offset) else { continue };
-            ends[next[pixel] as usize] = offset;
-            next[pixel] += 1;
+            let Some((pixel, part)) = place(offset).filter(|&(pixel, part)| taken[pixel] & part != 0) else {
+                continue;
+            };
+            // Those that are left say where the next one goes.
+            taken[pixel] ^= part;
+            ends[(begins[pixel] + taken[pixel].count_ones()) as usize] = offset;
         }
         Self { map, begins, ends }
     }
 
     /// True where rays ran past a ball everywhere, as it is seen from the sensor, and ended beyond it: no place of its disc, but for one
-    /// in ten, lies farther than `reach_m` from such a ray. So what is wider than two reaches, and in the ball, was met by one.
-    pub(super) fn pass(&self, ball: Ball, reach_m: f32) -> bool {
+    /// in ten, lies farther than `near_m` from such a ray. So what is wider than twice that, and in the ball, was met by one.
+    pub(super) fn pass(&self, ball: Ball, near_m: f32) -> bool {
         let Ball { radius_m, .. } = ball;
-        let rays = self.rays_past(ball, radius_m + reach_m, reach_m);
+        let rays = self.rays_past(ball, radius_m + near_m, near_m);
         let is_near = |[a, b]: [f32; 2]| {
-            rays.iter().any(|ray| (ray[0] - a).powi(2) + (ray[1] - b).powi(2) <= reach_m * reach_m)
+            rays.iter().any(|ray| (ray[0] - a).powi(2) + (ray[1] - b).powi(2) <= near_m * near_m)
         };
         let along = || -PLACES..=PLACES;
         let disc = along().flat_map(|i| along().map(move |j| [i, j]));
@@ -64,11 +79,11 @@ impl RayIndex {
 
     /// Where rays crossed the plane through a ball's middle, at right angles to the way there, and ended beyond the ball: those in pixels
     /// within `window_m` of the middle.
-    fn rays_past(&self, Ball { offset, radius_m }: Ball, window_m: f32, reach_m: f32) -> Vec<[f32; 2]> {
+    fn rays_past(&self, Ball { offset, radius_m }: Ball, window_m: f32, near_m: f32) -> Vec<[f32; 2]> {
         let distance_m = norm(offset);
         let [right, up] = across(offset);
         // A quarter of a pixel, in the middle of a face, is less than one at its corners. Where pixels are small some of them will do.
-        let step_m = (0.25 * distance_m * self.map.pitch()).max(reach_m / 4.0);
+        let step_m = (0.25 * distance_m * self.map.pitch()).max(near_m / 4.0);
         let steps = (window_m / step_m).ceil() as i32;
         let mut pixels = Vec::new();
         for (i, j) in (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))) {
@@ -93,4 +108,43 @@ impl RayIndex {
 
 fn place(side: usize, Projection { face, pixel: [column, row], .. }: Projection) -> usize {
     (face * side + row) * side + column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays to a wall 10 m away, `step_m` from each other there.
+    fn wall(step_m: f32) -> Vec<[f32; 3]> {
+        let steps = (2.0 / step_m) as i32;
+        let places = (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| [i, j]));
+        places.map(|place| [10.0, place[0] as f32 * step_m, place[1] as f32 * step_m]).collect()
+    }
+
+    #[test]
+    fn rays_pass_a_ball_where_they_are_near_to_each_other_and_end_beyond_it() {
+        let map = CubeMap::new(20);
+        let index = RayIndex::of(map, &wall(0.1));
+        let at = |x: f32, y: f32| Ball { offset: [x, y, 0.03], radius_m: 0.05 };
+        // At 5 m they are 5 cm apart, and no place lies farther than 3.6 cm from one.
+        assert!(index.pass(at(5.0, 0.2), 0.036) && !index.pass(at(5.0, 0.2), 0.02));
+        assert!(!index.pass(at(5.0, 1.5), 0.036), "beside all rays");
+        assert!(!index.pass(at(9.98, 0.2), 0.1), "they end in it");
+        let holed: Vec<_> =
+            wall(0.1).into_iter().filter(|end| end[1].abs() > 0.2 || end[2].abs() > 0.2).collect();
+        let index = RayIndex::of(map, &holed);
+        assert!(index.pass(at(5.0, 0.3), 0.04) && !index.pass(at(5.0, 0.0), 0.04));
+    }
+
+    #[test]
+    fn of_many_rays_in_one_direction_one_is_kept_and_of_a_dense_scan_some_everywhere() {
+        let crowd = (0..100_000).map(|i| [10.0, 0.3 + i as f32 * 1e-7, 0.3]);
+        let rays: Vec<_> = wall(0.1).into_iter().chain(crowd).collect();
+        let index = RayIndex::of(CubeMap::new(20), &rays);
+        assert!(index.ends.len() <= wall(0.1).len() + 2 * PARTS);
+        assert!(index.pass(Ball { offset: [5.0, 0.5, 0.03], radius_m: 0.05 }, 0.036));
+        let fine = RayIndex::of(CubeMap::new(8), &wall(0.01));
+        assert!(fine.ends.len() < wall(0.01).len() / 2);
+        assert!(fine.pass(Ball { offset: [5.0, 0.5, 0.03], radius_m: 0.05 }, 0.036), "some are enough");
+    }
 }
