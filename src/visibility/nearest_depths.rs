@@ -27,33 +27,8 @@ pub(super) struct NearestDepths {
     is_touched: Vec<bool>,
 }
 
-/// How far something was seen.
-#[derive(Debug, Clone, Copy)]
-struct Seen {
-    depth_m: f32,
-    /// How far apart the points lie that tell so, as the side of a square at depth 1; 0 of a point in it.
-    gap: f32,
-}
-
-impl Seen {
-    /// Both.
-    fn and(self, other: Self) -> Self {
-        Self { depth_m: self.depth_m.min(other.depth_m), gap: self.gap.max(other.gap) }
-    }
-}
-
-/// How far the pixels of a tile were seen.
-#[derive(Debug, Clone)]
-pub(super) struct SeenTile {
-    /// None of pixels that were not.
-    pub(super) depths_m: [Option<f32>; TILE_PIXELS],
-    /// How far apart rays passed at most, where no point tells, as the side of a square at depth 1.
-    pub(super) gap: f32,
-}
-
-impl SeenTile {
-    const NOTHING: Self = Self { depths_m: [None; TILE_PIXELS], gap: 0.0 };
-}
+/// How deep the pixels of a tile were seen, meters; none of those that were not.
+pub(super) type SeenTile = [Option<f32>; TILE_PIXELS];
 
 impl NearestDepths {
     /// Of points at `offsets` from the sensor.
@@ -91,58 +66,43 @@ impl NearestDepths {
     pub(super) fn seen_tiles(&self, spacing: f32) -> Vec<SeenTile> {
         let all = self.parts * self.parts;
         let least = if spacing <= SPARSE { all.div_ceil(2) } else { all };
-        let mut tiles = vec![SeenTile::NOTHING; self.map.tiles_of_all_faces()];
+        let mut tiles = vec![[None; TILE_PIXELS]; self.map.tiles_of_all_faces()];
         for (face, pixel) in self.map.all_pixels() {
             let (tile, place) = self.map.place(face, pixel);
             // What no point is in is looked at by none: most of it.
-            if !self.is_touched[tile] {
-                continue;
+            if self.is_touched[tile] {
+                tiles[tile][place] = self.seen_parts((face, pixel), least);
             }
-            let (parts, seen) = self.seen_parts((face, pixel));
-            if parts < least {
-                continue;
-            }
-            // Next to a part that was not seen rays may be as far away as the next pixel.
-            let beside = if parts < all { self.map.pitch() + GAP_MAX } else { 0.0 };
-            tiles[tile].depths_m[place] = Some(seen.depth_m);
-            tiles[tile].gap = tiles[tile].gap.max(seen.gap).max(beside);
         }
         tiles
     }
 
-    /// How many parts of a pixel were seen, and how far all of them.
-    fn seen_parts(&self, (face, pixel): Pixel) -> (usize, Seen) {
+    /// How deep a pixel was seen, where `least` of its parts were.
+    fn seen_parts(&self, (face, pixel): Pixel, least: usize) -> Option<f32> {
         let [column, row] = pixel.map(|i| i * self.parts);
         let parts =
             (0..self.parts * self.parts).map(|i| (face, [column + i % self.parts, row + i / self.parts]));
-        let seen = parts.filter_map(|part| self.seen(part));
-        let nothing = Seen { depth_m: f32::INFINITY, gap: 0.0 };
-        seen.fold((0, nothing), |(count, all), part| (count + 1, all.and(part)))
+        let seen = parts.filter_map(|part| self.seen_m(part));
+        let (count, depth_m) = seen.fold((0, f32::INFINITY), |(count, all), part| (count + 1, all.min(part)));
+        (count >= least).then_some(depth_m)
     }
 
-    /// How far a part was seen: up to its own nearest point, or to the nearer of two that it lies between, since points are not where
+    /// How deep a part was seen: up to its own nearest point, or to the nearer of two that it lies between, since points are not where
     /// parts are.
-    fn seen(&self, part: Pixel) -> Option<Seen> {
-        if let Some(depth_m) = self.point_m(part) {
-            return Some(Seen { depth_m, gap: 0.0 });
-        }
-        let [beside, above] = [[1, 0], [0, 1]].map(|step| self.seen_between(part, step));
-        match (beside, above) {
-            // The nearer pair of points tells how far apart rays passed; the nearest point, how far.
-            (Some(a), Some(b)) => Some(Seen { depth_m: a.depth_m.min(b.depth_m), gap: a.gap.min(b.gap) }),
-            (one, other) => one.or(other),
-        }
+    fn seen_m(&self, part: Pixel) -> Option<f32> {
+        self.point_m(part).or_else(|| {
+            let [beside, above] = [[1, 0], [0, 1]].map(|step| self.seen_between_m(part, step));
+            beside.into_iter().chain(above).reduce(f32::min)
+        })
     }
 
-    fn seen_between(&self, part: Pixel, [right, up]: [isize; 2]) -> Option<Seen> {
+    fn seen_between_m(&self, part: Pixel, [right, up]: [isize; 2]) -> Option<f32> {
         let part_rad = self.map_of_parts.pitch() * self.map_of_parts.angle_of_step(part.1, [right, up]);
         let steps = (GAP_MAX / part_rad + ROUNDING) as isize;
         let point_m = |step: isize| self.point_m(self.map_of_parts.beside(part, [right * step, up * step])?);
         let (before, before_m) = (1..steps).find_map(|step| Some((step, point_m(-step)?)))?;
-        let (after, after_m) = (1..=steps - before).find_map(|step| Some((step, point_m(step)?)))?;
-        // Points may lie at the far ends of their parts.
-        let gap = (before + after + 1) as f32 * part_rad;
-        Some(Seen { depth_m: before_m.min(after_m), gap })
+        let after_m = (1..=steps - before).find_map(point_m)?;
+        Some(before_m.min(after_m))
     }
 
     /// The depth of the nearest point in a part.

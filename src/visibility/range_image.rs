@@ -5,6 +5,7 @@ use super::density::PointDensity;
 use super::nearest_depths::{NearestDepths, SPACING_MAX};
 use super::ray_gaps::RayGaps;
 use super::tile::{TILE_BYTES, Tile};
+use super::vectors::norm;
 use crate::geometry::Point;
 
 /// Most bytes of a range image that is kept.
@@ -114,7 +115,7 @@ impl RangeImage {
         let coarser = fitting.take_while(|depths| depths.map().pitch() <= SPACING_MAX);
         let mut best =
             coarser.map(|depths| Self::of_depths(&depths, rays)).fold(first, Self::that_tells_more);
-        best.note_gaps(&RayGaps::of(map.finer(), &offsets));
+        best.note_gaps(&RayGaps::of(map.finer(), spacing, &offsets));
         (!best.tiles.is_empty()).then_some(best)
     }
 
@@ -146,11 +147,10 @@ impl RangeImage {
         let unit_m = (depths.max() / DEPTH_MAX).max(f32::MIN_POSITIVE);
         let (mut places, mut tiles) = (vec![NOT_SEEN; map.tiles_of_all_faces()], Vec::new());
         for (place, seen) in places.iter_mut().zip(depths.seen_tiles(rays.spacing)) {
-            let depths =
-                seen.depths_m.map(|depth| depth.map(|depth_m| (depth_m / unit_m).min(DEPTH_MAX) as u16));
+            let depths = seen.map(|depth| depth.map(|depth_m| (depth_m / unit_m).min(DEPTH_MAX) as u16));
             if depths.iter().any(Option::is_some) {
                 *place = tiles.len() as u16;
-                tiles.push(Tile::new(&depths, seen.gap));
+                tiles.push(Tile::new(&depths));
             }
         }
         Self { map, unit_m, rays, places, tiles }
@@ -171,12 +171,13 @@ impl RangeImage {
     pub fn sees_well_beyond(&self, offset: [f32; 3], least: WellBeyond) -> bool {
         let WellBeyond { margin_m, gap_max_m } = least;
         self.map.project(offset).is_some_and(|Projection { face, pixel, depth_m }| {
-            depth_m * self.gap_at((face, pixel)) <= gap_max_m
+            let distance_m = norm(offset);
+            distance_m * self.gap_at((face, pixel)) <= gap_max_m
                 && self.sees_beyond_around((face, pixel), depth_m, depth_m + margin_m, 1)
         })
     }
 
-    /// How far apart rays passed around a pixel, as a rule and at most where no point tells, as the side of a square at depth 1.
+    /// How far apart rays passed around a pixel, as a rule and at most in the gaps between them, radians.
     fn gap_at(&self, pixel: Pixel) -> f32 {
         let around = [[-1, -1], [1, -1], [-1, 1], [1, 1]].into_iter();
         let pixels = around.filter_map(|steps| self.map.beside(pixel, steps));

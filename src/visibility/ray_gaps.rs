@@ -2,23 +2,29 @@
 
 use super::cube_map::{CubeMap, FACES, Pixel, Projection};
 
+/// Holes of a few lost rays are up to so many spacings of the rays wide, and long.
+const LOST_WIDTH: f32 = 2.2;
+const LOST_LENGTH: f32 = 5.0;
+/// How much of their width counts: a ray lost from a square grid leaves a hole two spacings wide, and one in a hundred is.
+const LOST_SHARE: f32 = 0.6;
+
 /// How far from each other rays ran on either side of the pixels in which none did.
 pub(super) struct RayGaps {
     map: CubeMap,
-    /// Of each pixel, face by face and row by row, as the side of a square at depth 1; 0 where a ray ran, infinite where none ran on a
-    /// side.
-    gaps: Vec<f32>,
+    /// How far from each other rays run as a rule, as the side of a square at depth 1.
+    spacing: f32,
+    /// Of each pixel, face by face and row by row, to the side and up, as the side of a square at depth 1; 0 where a ray ran, infinite
+    /// where none ran on a side.
+    gaps: Vec<[f32; 2]>,
 }
-
-/// The pixels beside one.
-const BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 
 /// Where the rays in a pixel ran on its face: the smallest and the largest coordinate, to the right and up.
 type Bounds = [[f32; 2]; 2];
 
 impl RayGaps {
-    /// Those of rays that ended at `offsets` from the sensor, as the pixels of `map` tell them: gaps of two of them and more.
-    pub(super) fn of(map: CubeMap, offsets: &[[f32; 3]]) -> Self {
+    /// Those of rays that ended at `offsets` from the sensor, `spacing` from each other as a rule, as the pixels of `map` tell them: gaps
+    /// of two of them and more.
+    pub(super) fn of(map: CubeMap, spacing: f32, offsets: &[[f32; 3]]) -> Self {
         let side = map.pixels();
         let mut numbers = vec![0u32; FACES * side * side];
         let mut bounds: Vec<Bounds> = Vec::new();
@@ -35,61 +41,61 @@ impl RayGaps {
             *of_v = [of_v[0].min(v), of_v[1].max(v)];
         }
         let bounds_at = |at: usize| (numbers[at] > 0).then(|| bounds[numbers[at] as usize - 1]);
-        let mut gaps: Vec<f32> = numbers.iter().map(|&n| if n > 0 { 0.0 } else { f32::INFINITY }).collect();
+        let gap = |&number: &u32| if number > 0 { [0.0; 2] } else { [f32::INFINITY; 2] };
+        let mut gaps: Vec<[f32; 2]> = numbers.iter().map(gap).collect();
         for face in (0..FACES).map(|face| face * side * side) {
             for i in 0..side {
-                narrow(
-                    &mut gaps,
-                    side,
-                    |column| face + i * side + column,
-                    |at| bounds_at(at).map(|it| it[0]),
-                );
-                narrow(&mut gaps, side, |row| face + row * side + i, |at| bounds_at(at).map(|it| it[1]));
+                measure(&mut gaps, 0, (0..side).map(|column| face + i * side + column), bounds_at);
+                measure(&mut gaps, 1, (0..side).map(|row| face + row * side + i), bounds_at);
             }
         }
-        Self { map, gaps }
+        Self { map, spacing, gaps }
     }
 
-    /// The pixels in which no ray ran, each as the direction of its middle and the gap in which it lies.
-    ///
-    /// A ray that was lost leaves a gap twice as high as others in its column alone: gaps are as wide as the narrowest beside them.
+    /// The pixels between rays in which none ran, each as the direction of its middle and how wide the gap is in which it lies, radians.
     pub(super) fn iter(&self) -> impl Iterator<Item = ([f32; 3], f32)> {
-        let pixels = self.map.all_pixels().zip(&self.gaps).filter(|(_, gap)| **gap > 0.0);
-        pixels.map(|((face, pixel), &gap): (Pixel, &f32)| {
-            let beside = BESIDE.into_iter().filter_map(|steps| self.map.beside((face, pixel), steps));
-            let gaps = beside.map(|pixel| self.gap(pixel)).filter(|gap| *gap > 0.0);
-            (self.map.direction(face, pixel), gaps.fold(gap, f32::min))
+        let pixels = self.map.all_pixels().zip(&self.gaps).filter(|(_, gap)| gap[0] > 0.0);
+        pixels.filter_map(|((face, pixel), &[to_side, up])| {
+            // Rows between those of the sensor's own rays have none: their neighbors tell.
+            let narrowest = |gap: f32, axis: usize, steps: [[isize; 2]; 2]| {
+                let beside = steps.into_iter().filter_map(|steps| self.map.beside((face, pixel), steps));
+                beside.map(|pixel| self.gap(pixel)[axis]).filter(|gap| *gap > 0.0).fold(gap, f32::min)
+            };
+            let angle = |steps| self.map.angle_of_step(pixel, steps);
+            let to_side = narrowest(to_side, 0, [[0, -1], [0, 1]]) * angle([1, 0]);
+            let up = narrowest(up, 1, [[-1, 0], [1, 0]]) * angle([0, 1]);
+            let (width, length) = (to_side.min(up), to_side.max(up));
+            let is_of_lost_rays = width <= LOST_WIDTH * self.spacing && length <= LOST_LENGTH * self.spacing;
+            let counts = if is_of_lost_rays { LOST_SHARE * width } else { width };
+            // What has no rays on both sides is the edge of what was seen.
+            width.is_finite().then(|| (self.map.direction(face, pixel), counts))
         })
     }
 
-    fn gap(&self, (face, [column, row]): Pixel) -> f32 {
+    fn gap(&self, (face, [column, row]): Pixel) -> [f32; 2] {
         let side = self.map.pixels();
         self.gaps[(face * side + row) * side + column]
     }
 }
 
-/// Takes the gaps along one line of a face for those of its pixels, where they are narrower than what is known.
-fn narrow(
-    gaps: &mut [f32],
-    side: usize,
-    place: impl Fn(usize) -> usize,
-    bounds: impl Fn(usize) -> Option<[f32; 2]>,
+/// Measures the gaps along one line of a face, to the side or up, from ray to ray.
+fn measure(
+    gaps: &mut [[f32; 2]],
+    axis: usize,
+    line: impl Iterator<Item = usize>,
+    bounds: impl Fn(usize) -> Option<Bounds>,
 ) {
-    // A gap at the edge of a face goes on behind it: as far, for all that is known here.
-    let (mut from, mut last, mut twice) = (0, -1.0, 2.0);
-    let mut close = |pixels: std::ops::Range<usize>, gap: f32| {
-        for at in pixels.map(&place) {
-            gaps[at] = gaps[at].min(gap);
+    let (mut last, mut between) = (None, Vec::new());
+    for at in line {
+        let Some(bounds) = bounds(at) else {
+            between.push(at);
+            continue;
+        };
+        let [first, end] = bounds[axis];
+        if let Some(last) = last.replace(end) {
+            between.iter().for_each(|&at| gaps[at][axis] = first - last);
         }
-    };
-    for i in 0..side {
-        let Some([first, end]) = bounds(place(i)) else { continue };
-        close(from..i, twice * (first - last));
-        (from, last, twice) = (i + 1, end, 1.0);
-    }
-    // None of a line without any ray.
-    if twice == 1.0 {
-        close(from..side, 2.0 * (1.0 - last));
+        between.clear();
     }
 }
 
@@ -111,7 +117,7 @@ mod tests {
 
     fn widest_deg(rays: &[[f32; 3]], within_deg: f32) -> f32 {
         let within = within_deg.to_radians().tan();
-        let gaps = RayGaps::of(CubeMap::new(32), rays);
+        let gaps = RayGaps::of(CubeMap::new(32), 0.5f32.to_radians(), rays);
         let near = gaps.iter().filter(|([x, y, z], _)| *x > 0.0 && y.abs() < within && z.abs() < within);
         near.map(|(_, gap)| gap).fold(0.0, f32::max).to_degrees()
     }

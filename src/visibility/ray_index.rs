@@ -3,13 +3,32 @@
 use super::cube_map::{CubeMap, FACES, Projection};
 use super::vectors::{across, dot, norm};
 
-/// Largest share of a ball's disc that no ray ran near to: rays are lost here and there.
-const GAPS_MAX: f32 = 0.1;
 /// Columns, and rows, of parts of a pixel, of each of which one ray is kept: more would tell little, and a scan may send all it has in one
 /// direction.
 const PARTS: usize = 8;
-/// Places of a ball's disc at which is looked, along its radius.
-const PLACES: i32 = 4;
+/// Distance of the places of a ball's disc at which is looked, for a near ray that is 1 away.
+const STEP: f32 = 0.3;
+/// Most places of a disc without a ray near to them: a tenth of a disc a little wider than what is near.
+const PLACES_MISSED_MAX: usize = 4;
+/// Where rays are looked for around a place, for a near ray that is 1 away.
+const AROUND: [[f32; 2]; 16] = [
+    [-0.5, 0.0],
+    [0.5, 0.0],
+    [0.0, -0.5],
+    [0.0, 0.5],
+    [-0.35, -0.35],
+    [0.35, -0.35],
+    [-0.35, 0.35],
+    [0.35, 0.35],
+    [-1.0, 0.0],
+    [1.0, 0.0],
+    [0.0, -1.0],
+    [0.0, 1.0],
+    [-0.7, -0.7],
+    [0.7, -0.7],
+    [-0.7, 0.7],
+    [0.7, 0.7],
+];
 
 /// The rays of a scan, by the pixel of a cube map in which they ran.
 #[derive(Debug, Clone)]
@@ -36,7 +55,7 @@ impl RayIndex {
         let place = |offset: [f32; 3]| {
             let Projection { face, pixel, depth_m } = parts.project(offset)?;
             let part = pixel[1] % PARTS * PARTS + pixel[0] % PARTS;
-            let pixel = place(map.pixels(), Projection { face, pixel: pixel.map(|i| i / PARTS), depth_m });
+            let pixel = pixel_number(map, Projection { face, pixel: pixel.map(|i| i / PARTS), depth_m });
             Some((pixel, 1u64 << part))
         };
         let mut taken = vec![0u64; FACES * map.pixels() * map.pixels()];
@@ -58,56 +77,63 @@ impl RayIndex {
         Self { map, begins, ends }
     }
 
-    /// True where rays ran past a ball everywhere, as it is seen from the sensor, and ended beyond it: no place of its disc, but for one
-    /// in ten, lies farther than `near_m` from such a ray. So what is wider than twice that, and in the ball, was met by one.
+    /// True where rays ran past a ball everywhere, as it is seen from the sensor, and ended beyond it: no place of its disc lies farther
+    /// than `near_m` from such a ray, but for a few beside each other, since rays are lost here and there. So what is wider than twice
+    /// that, and in the ball, was met by one.
     pub(super) fn pass(&self, ball: Ball, near_m: f32) -> bool {
-        let Ball { radius_m, .. } = ball;
-        let rays = self.rays_past(ball, radius_m + near_m, near_m);
-        let is_near = |[a, b]: [f32; 2]| {
-            rays.iter().any(|ray| (ray[0] - a).powi(2) + (ray[1] - b).powi(2) <= near_m * near_m)
-        };
-        let along = || -PLACES..=PLACES;
-        let disc = along().flat_map(|i| along().map(move |j| [i, j]));
-        let places = disc.filter(|[i, j]| i * i + j * j <= PLACES * PLACES);
-        let (mut looks, mut gaps) = (0, 0);
-        for place in places {
-            looks += 1;
-            gaps += usize::from(!is_near(place.map(|i| i as f32 / PLACES as f32 * radius_m)));
-        }
-        gaps as f32 <= GAPS_MAX * looks as f32
+        let view = View { ball, distance_m: norm(ball.offset), across: across(ball.offset), near_m };
+        let step_m = STEP * near_m;
+        let steps = (ball.radius_m / step_m).ceil() as i32;
+        let along = || (-steps..=steps).map(|i| i as f32 * step_m);
+        let disc = along().flat_map(|a| along().map(move |b| [a, b]));
+        let places = disc.filter(|[a, b]| a * a + b * b <= ball.radius_m * ball.radius_m);
+        // As soon as there is one too many nothing more is looked at.
+        places.filter(|&place| !self.runs_near(place, &view)).nth(PLACES_MISSED_MAX).is_none()
     }
 
-    /// Where rays crossed the plane through a ball's middle, at right angles to the way there, and ended beyond the ball: those in pixels
-    /// within `window_m` of the middle.
-    fn rays_past(&self, Ball { offset, radius_m }: Ball, window_m: f32, near_m: f32) -> Vec<[f32; 2]> {
-        let distance_m = norm(offset);
-        let [right, up] = across(offset);
-        // A quarter of a pixel, in the middle of a face, is less than one at its corners. Where pixels are small some of them will do.
-        let step_m = (0.25 * distance_m * self.map.pitch()).max(near_m / 4.0);
-        let steps = (window_m / step_m).ceil() as i32;
-        let mut pixels = Vec::new();
-        for (i, j) in (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))) {
-            let [a, b] = [i, j].map(|i| i as f32 * step_m);
-            let around = std::array::from_fn(|axis| offset[axis] + right[axis] * a + up[axis] * b);
-            pixels.extend(self.map.project(around).map(|seen| place(self.map.pixels(), seen)));
-        }
-        pixels.sort_unstable();
-        pixels.dedup();
-        let crossing = |end: &[f32; 3]| {
-            let along = dot(*end, offset) / distance_m;
-            let is_past = along > 0.0 && norm(*end) > distance_m + radius_m;
-            let scale = distance_m / along;
-            is_past.then(|| [dot(*end, right) * scale, dot(*end, up) * scale])
+    /// True where a ray that ended beyond the ball ran near to a place of its disc.
+    fn runs_near(&self, place: [f32; 2], view: &View) -> bool {
+        // The nearest rays are mostly in the pixel of the place, or else in those around it.
+        let in_pixel_at = |around: [f32; 2]| {
+            let [a, b] = [0, 1].map(|axis| place[axis] + around[axis] * view.near_m);
+            let pixel = self.map.project(view.point([a, b])).map(|seen| pixel_number(self.map, seen));
+            let rays = pixel.map_or(&[][..], |pixel| {
+                &self.ends[self.begins[pixel] as usize..self.begins[pixel + 1] as usize]
+            });
+            rays.iter().any(|&end| view.runs_near(end, place))
         };
-        let ends = pixels
-            .into_iter()
-            .flat_map(|pixel| &self.ends[self.begins[pixel] as usize..self.begins[pixel + 1] as usize]);
-        ends.filter_map(crossing).collect()
+        in_pixel_at([0.0, 0.0]) || AROUND.iter().any(|&around| in_pixel_at(around))
     }
 }
 
-fn place(side: usize, Projection { face, pixel: [column, row], .. }: Projection) -> usize {
-    (face * side + row) * side + column
+/// A ball as it is seen from the sensor.
+struct View {
+    ball: Ball,
+    distance_m: f32,
+    /// To the right and up from it.
+    across: [[f32; 3]; 2],
+    near_m: f32,
+}
+
+impl View {
+    /// The place of the plane through the ball's middle that lies so far to the right and up.
+    fn point(&self, [a, b]: [f32; 2]) -> [f32; 3] {
+        let [right, up] = self.across;
+        std::array::from_fn(|axis| self.ball.offset[axis] + right[axis] * a + up[axis] * b)
+    }
+
+    /// True where the ray with this end ran near to a place of that plane, and ended beyond the ball.
+    fn runs_near(&self, end: [f32; 3], place: [f32; 2]) -> bool {
+        let along = dot(end, self.ball.offset) / self.distance_m;
+        let beyond_m = self.distance_m + self.ball.radius_m;
+        let scale = self.distance_m / along;
+        let [a, b] = [0, 1].map(|axis| dot(end, self.across[axis]) * scale - place[axis]);
+        along > 0.0 && dot(end, end) > beyond_m * beyond_m && a * a + b * b <= self.near_m * self.near_m
+    }
+}
+
+fn pixel_number(map: CubeMap, Projection { face, pixel: [column, row], .. }: Projection) -> usize {
+    (face * map.pixels() + row) * map.pixels() + column
 }
 
 #[cfg(test)]

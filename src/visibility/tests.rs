@@ -504,3 +504,41 @@ fn what_no_ray_met_for_a_hole_in_the_sensor_is_not_seen_through() {
     assert!(seen * 10 >= asked * 9, "{seen} of {asked} beside the holes");
     assert!(well_seen * 8 >= asked, "{well_seen} of {asked} beside the holes");
 }
+
+#[test]
+fn what_is_gone_is_seen_well_beyond_though_rays_are_lost() {
+    let mut random = ChaCha8Rng::seed_from_u64(6);
+    let voxel_m = 0.1f32;
+    let well_beyond = WellBeyond { margin_m: 0.3, gap_max_m: voxel_m };
+    for (step_deg, lost) in [(0.4, u32::MAX), (0.4, 500), (0.4, 100), (0.7, 100)] {
+        let sensor = Holed { step_deg: [step_deg; 2], hole_deg: [0.0; 2], yaw_deg: 0.0 };
+        let points = sensor.scan(lost, &mut random);
+        let image = RangeImage::of_points(&points, RANGE, IMAGE_BYTES_MAX).unwrap();
+        // Rays are six tenths of a voxel apart there; the view ends 30 degrees to the side, and 15 up.
+        let distance_m = 0.6 * voxel_m / step_deg.to_radians();
+        let mut seen = 0;
+        for _ in 0..500 {
+            let at_deg = [22.0f32, 7.0].map(|most| random.random_range(-most..most));
+            let place = sensor.direction(at_deg).map(|c| c * distance_m);
+            seen += usize::from(image.sees_well_beyond(place, well_beyond));
+        }
+        assert!(seen >= 400, "{seen} of 500 places, rays {step_deg} degrees apart, one in {lost} lost");
+    }
+}
+
+#[test]
+fn what_no_ray_met_is_not_seen_through_by_a_sensor_that_moved() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let sensor = Holed { step_deg: [0.2, 1.0], hole_deg: [f32::INFINITY, 2.0], yaw_deg: 0.0 };
+    let surface = ScanSurface::of(&sensor.scan(u32::MAX, &mut random), SURFACE).unwrap();
+    let voxel_m = 0.1f32;
+    let distance_m = 2.2 * voxel_m / 2f32.to_radians();
+    for moved_m in [0.0, 0.05, 0.2, 0.5] {
+        for _ in 0..20 {
+            let at_deg = [random.random_range(-5.0..5.0), random.random_range(-0.5..0.5)];
+            let place = sensor.direction(at_deg).map(|c| c * distance_m);
+            let radius_m = 0.87 * voxel_m + moved_m;
+            assert!(!surface.sees_through(place, radius_m, 1.5 * voxel_m), "{place:?}, moved by {moved_m} m");
+        }
+    }
+}

@@ -16,7 +16,7 @@ const STEP_BITS: u32 = 11;
 const _: () = assert!((u16::MAX as u32).div_ceil(STEPS) < 1 << STEP_BITS, "every step has its bits");
 /// Largest gap that is told, in [`GAP_UNIT`].
 const GAPS: u8 = (1 << (16 - STEP_BITS)) - 1;
-/// Steps of gaps, as the side of a square at depth 1: a quarter of a degree, up to 8 degrees.
+/// Steps of gaps, radians: a quarter of a degree, up to 8 degrees.
 const GAP_UNIT: f32 = 0.0045;
 /// Pixels whose bits make up whole bytes, and how many bytes.
 const PACKED_PIXELS: usize = 4;
@@ -36,20 +36,18 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    /// A tile of depths in the image's unit; none of pixels that were not seen.
-    ///
-    /// `gap` is how far apart rays passed at most through what was seen of it, as the side of a square at depth 1.
-    pub(super) fn new(depths: &[Option<u16>; TILE_PIXELS], gap: f32) -> Self {
+    /// A tile of depths in the image's unit, without gaps; none of pixels that were not seen.
+    pub(super) fn new(depths: &[Option<u16>; TILE_PIXELS]) -> Self {
         let seen = || depths.iter().flatten().copied();
         let base = seen().min().unwrap_or(0);
         let step = u32::from(seen().max().unwrap_or(0) - base).div_ceil(STEPS).max(1) as u16;
         let byte = |depth: Option<u16>| depth.map_or(0, |depth| 1 + ((depth - base) / step) as u8);
-        Self { base, step, gap: gap_steps(gap), seen: depths.map(byte) }
+        Self { base, step, gap: 0, seen: depths.map(byte) }
     }
 
-    /// Tells of a gap that is in it, as the side of a square at depth 1.
+    /// Tells of a gap between rays through what was seen of it, radians.
     pub(super) fn note_gap(&mut self, gap: f32) {
-        self.gap = self.gap.max(gap_steps(gap));
+        self.gap = self.gap.max(((gap / GAP_UNIT).ceil() as u8).min(GAPS));
     }
 
     /// How deep a pixel was seen, in the image's unit; none where it was not.
@@ -59,7 +57,7 @@ impl Tile {
         (seen > 0).then(|| u32::from(self.base) + u32::from(self.step) * (seen - 1))
     }
 
-    /// How far apart rays passed at most through what was seen of it, as the side of a square at depth 1.
+    /// How far apart rays passed at most through what was seen of it, radians.
     pub(super) fn gap(&self) -> f32 {
         f32::from(self.gap) * GAP_UNIT
     }
@@ -92,10 +90,6 @@ impl Tile {
     }
 }
 
-fn gap_steps(gap: f32) -> u8 {
-    ((gap / GAP_UNIT).ceil() as u8).min(GAPS)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,7 +97,7 @@ mod tests {
     #[test]
     fn depths_that_are_alike_are_told_to_the_unit() {
         let depths = std::array::from_fn(|i| (i % 5 != 0).then_some(7000 + i as u16));
-        let tile = Tile::new(&depths, 0.0);
+        let tile = Tile::new(&depths);
         for (pixel, depth) in depths.iter().enumerate() {
             assert_eq!(tile.depth(pixel), depth.map(u32::from));
         }
@@ -113,7 +107,7 @@ mod tests {
     fn depths_far_from_each_other_are_rounded_down_by_less_than_a_step() {
         let depths =
             std::array::from_fn(|i| Some(if i % 2 == 0 { i as u16 } else { u16::MAX - i as u16 * 31 }));
-        let tile = Tile::new(&depths, 0.0);
+        let tile = Tile::new(&depths);
         for (pixel, depth) in depths.iter().flatten().enumerate() {
             let told = tile.depth(pixel).unwrap();
             let lost = u32::from(*depth) - told;
@@ -124,7 +118,8 @@ mod tests {
     #[test]
     fn a_tile_comes_back_from_its_bytes() {
         for gap in [0.0, 0.004, 0.05, 9.0] {
-            let tile = Tile::new(&std::array::from_fn(|i| (i % 3 == 0).then_some(i as u16 * 900)), gap);
+            let mut tile = Tile::new(&std::array::from_fn(|i| (i % 3 == 0).then_some(i as u16 * 900)));
+            tile.note_gap(gap);
             let mut bytes = Vec::new();
             tile.write(&mut bytes);
             assert_eq!(Tile::read(bytes.as_slice().try_into().unwrap()), tile);
