@@ -115,20 +115,20 @@ impl RangeImage {
         let coarser = fitting.take_while(|depths| depths.map().pitch() <= SPACING_MAX);
         let mut best =
             coarser.map(|depths| Self::of_depths(&depths, rays)).fold(first, Self::that_tells_more);
-        best.note_gaps(&RayGaps::of(map.finer(), spacing, &offsets));
+        best.note_gaps(&RayGaps { map: map.finer(), spacing, offsets: &offsets });
         (!best.tiles.is_empty()).then_some(best)
     }
 
     /// Tells the gaps between rays in the tiles that were seen there: pixels and their parts are too wide to tell of them.
-    fn note_gaps(&mut self, gaps: &RayGaps) {
-        for (direction, gap) in gaps.iter() {
-            let Some(Projection { face, pixel, .. }) = self.map.project(direction) else { continue };
+    fn note_gaps(&mut self, gaps: &RayGaps<'_>) {
+        gaps.for_each(|direction, gap| {
+            let Some(Projection { face, pixel, .. }) = self.map.project(direction) else { return };
             let (tile, pixel) = self.map.place(face, pixel);
             let kept = self.tiles.get_mut(usize::from(self.places[tile]));
             if let Some(tile) = kept.filter(|tile| tile.depth(pixel).is_some()) {
                 tile.note_gap(gap);
             }
-        }
+        });
     }
 
     /// The coarser image where it tells so much more that this is worth it.

@@ -1,6 +1,6 @@
 //! Gaps between the rays of a scan: how wide they are where.
 
-use super::cube_map::{CubeMap, FACES, Pixel, Projection};
+use super::cube_map::{CubeMap, FACES, Projection};
 
 /// Holes of a few lost rays are up to so many spacings of the rays wide, and long.
 const LOST_WIDTH: f32 = 2.2;
@@ -8,30 +8,35 @@ const LOST_LENGTH: f32 = 5.0;
 /// How much of their width counts: a ray lost from a square grid leaves a hole two spacings wide, and one in a hundred is.
 const LOST_SHARE: f32 = 0.6;
 
-/// How far from each other rays ran on either side of the pixels in which none did.
-pub(super) struct RayGaps {
-    map: CubeMap,
+/// The gaps between the rays of a scan.
+pub(super) struct RayGaps<'a> {
+    /// Whose pixels tell of gaps: of two of them and more.
+    pub(super) map: CubeMap,
     /// How far from each other rays run as a rule, as the side of a square at depth 1.
-    spacing: f32,
-    /// Of each pixel, face by face and row by row, to the side and up, as the side of a square at depth 1; 0 where a ray ran, infinite
-    /// where none ran on a side.
-    gaps: Vec<[f32; 2]>,
+    pub(super) spacing: f32,
+    /// Where rays ended: offsets from the sensor.
+    pub(super) offsets: &'a [[f32; 3]],
 }
 
 /// Where the rays in a pixel ran on its face: the smallest and the largest coordinate, to the right and up.
 type Bounds = [[f32; 2]; 2];
 
-impl RayGaps {
-    /// Those of rays that ended at `offsets` from the sensor, `spacing` from each other as a rule, as the pixels of `map` tell them: gaps
-    /// of two of them and more.
-    pub(super) fn of(map: CubeMap, spacing: f32, offsets: &[[f32; 3]]) -> Self {
-        let side = map.pixels();
-        let mut numbers = vec![0u32; FACES * side * side];
-        let mut bounds: Vec<Bounds> = Vec::new();
-        for &offset in offsets {
-            let Some(Projection { face, pixel: [column, row], .. }) = map.project(offset) else { continue };
-            let [u, v] = map.on_plane(face, offset);
-            let number = &mut numbers[(face * side + row) * side + column];
+impl RayGaps<'_> {
+    /// Calls `f` for the pixels between rays in which none ran, with the direction of the pixel's middle and how wide the gap is in which
+    /// it lies, radians.
+    pub(super) fn for_each(&self, mut f: impl FnMut([f32; 3], f32)) {
+        // Face by face: all of them would take some memory.
+        (0..FACES).for_each(|face| self.for_each_on(face, &mut f));
+    }
+
+    fn for_each_on(&self, face: usize, f: &mut impl FnMut([f32; 3], f32)) {
+        let side = self.map.pixels();
+        let (mut numbers, mut bounds) = (vec![0u32; side * side], Vec::<Bounds>::new());
+        for &offset in self.offsets {
+            let seen = self.map.project(offset).filter(|seen| seen.face == face);
+            let Some(Projection { pixel: [column, row], .. }) = seen else { continue };
+            let [u, v] = self.map.on_plane(face, offset);
+            let number = &mut numbers[row * side + column];
             if *number == 0 {
                 bounds.push([[u, u], [v, v]]);
                 *number = bounds.len() as u32;
@@ -40,41 +45,40 @@ impl RayGaps {
             *of_u = [of_u[0].min(u), of_u[1].max(u)];
             *of_v = [of_v[0].min(v), of_v[1].max(v)];
         }
+        if bounds.is_empty() {
+            return;
+        }
         let bounds_at = |at: usize| (numbers[at] > 0).then(|| bounds[numbers[at] as usize - 1]);
+        // To the side and up; 0 where a ray ran, infinite where none ran on a side.
         let gap = |&number: &u32| if number > 0 { [0.0; 2] } else { [f32::INFINITY; 2] };
         let mut gaps: Vec<[f32; 2]> = numbers.iter().map(gap).collect();
-        for face in (0..FACES).map(|face| face * side * side) {
-            for i in 0..side {
-                measure(&mut gaps, 0, (0..side).map(|column| face + i * side + column), bounds_at);
-                measure(&mut gaps, 1, (0..side).map(|row| face + row * side + i), bounds_at);
+        for i in 0..side {
+            measure(&mut gaps, 0, (0..side).map(|column| i * side + column), bounds_at);
+            measure(&mut gaps, 1, (0..side).map(|row| row * side + i), bounds_at);
+        }
+        for at in (0..side * side).filter(|&at| gaps[at][0] > 0.0) {
+            let pixel = [at % side, at / side];
+            if let Some(gap) = self.width(&gaps, pixel) {
+                f(self.map.direction(face, pixel), gap);
             }
         }
-        Self { map, spacing, gaps }
     }
 
-    /// The pixels between rays in which none ran, each as the direction of its middle and how wide the gap is in which it lies, radians.
-    pub(super) fn iter(&self) -> impl Iterator<Item = ([f32; 3], f32)> {
-        let pixels = self.map.all_pixels().zip(&self.gaps).filter(|(_, gap)| gap[0] > 0.0);
-        pixels.filter_map(|((face, pixel), &[to_side, up])| {
-            // Rows between those of the sensor's own rays have none: their neighbors tell.
-            let narrowest = |gap: f32, axis: usize, steps: [[isize; 2]; 2]| {
-                let beside = steps.into_iter().filter_map(|steps| self.map.beside((face, pixel), steps));
-                beside.map(|pixel| self.gap(pixel)[axis]).filter(|gap| *gap > 0.0).fold(gap, f32::min)
-            };
-            let angle = |steps| self.map.angle_of_step(pixel, steps);
-            let to_side = narrowest(to_side, 0, [[0, -1], [0, 1]]) * angle([1, 0]);
-            let up = narrowest(up, 1, [[-1, 0], [1, 0]]) * angle([0, 1]);
-            let (width, length) = (to_side.min(up), to_side.max(up));
-            let is_of_lost_rays = width <= LOST_WIDTH * self.spacing && length <= LOST_LENGTH * self.spacing;
-            let counts = if is_of_lost_rays { LOST_SHARE * width } else { width };
-            // What has no rays on both sides is the edge of what was seen.
-            width.is_finite().then(|| (self.map.direction(face, pixel), counts))
-        })
-    }
-
-    fn gap(&self, (face, [column, row]): Pixel) -> [f32; 2] {
+    /// How wide the gap is in which a pixel lies, radians; none of one at the edge of what was seen, without rays on both sides.
+    fn width(&self, gaps: &[[f32; 2]], pixel: [usize; 2]) -> Option<f32> {
         let side = self.map.pixels();
-        self.gaps[(face * side + row) * side + column]
+        let at = pixel[1] * side + pixel[0];
+        // Rows between those of the sensor's own rays have none: their neighbors tell.
+        let narrowest = |axis: usize, place: usize, step: usize| {
+            let before = (place > 0).then(|| gaps[at - step][axis]);
+            let behind = (place + 1 < side).then(|| gaps[at + step][axis]);
+            before.into_iter().chain(behind).filter(|gap| *gap > 0.0).fold(gaps[at][axis], f32::min)
+        };
+        let to_side = narrowest(0, pixel[1], side) * self.map.angle_of_step(pixel, [1, 0]);
+        let up = narrowest(1, pixel[0], 1) * self.map.angle_of_step(pixel, [0, 1]);
+        let (width, length) = (to_side.min(up), to_side.max(up));
+        let is_of_lost_rays = width <= LOST_WIDTH * self.spacing && length <= LOST_LENGTH * self.spacing;
+        width.is_finite().then_some(if is_of_lost_rays { LOST_SHARE * width } else { width })
     }
 }
 
@@ -117,9 +121,14 @@ mod tests {
 
     fn widest_deg(rays: &[[f32; 3]], within_deg: f32) -> f32 {
         let within = within_deg.to_radians().tan();
-        let gaps = RayGaps::of(CubeMap::new(32), 0.5f32.to_radians(), rays);
-        let near = gaps.iter().filter(|([x, y, z], _)| *x > 0.0 && y.abs() < within && z.abs() < within);
-        near.map(|(_, gap)| gap).fold(0.0, f32::max).to_degrees()
+        let gaps = RayGaps { map: CubeMap::new(32), spacing: 0.5f32.to_radians(), offsets: rays };
+        let mut widest = 0f32;
+        gaps.for_each(|[x, y, z], gap| {
+            if x > 0.0 && y.abs() < within && z.abs() < within {
+                widest = widest.max(gap);
+            }
+        });
+        widest.to_degrees()
     }
 
     #[test]
