@@ -1,28 +1,21 @@
-//! Compiles `proto/` without protoc (protox parses, prost and tonic generate), and tells the program what was built.
+//! Generates the server's side of the API, and tells the program what was built.
 
-use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::error::Error;
 
-use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
-
-fn main() {
+fn main() -> Result<(), Box<dyn Error>> {
     // Cargo gives these to the programs that it runs, too. Named MROL_… they would be settings of a server.
     println!("cargo::rustc-env=BUILT_FEATURES={}", features());
     println!("cargo::rustc-env=BUILT_COMMIT={}", commit().as_deref().unwrap_or("unknown"));
-    #[expect(clippy::expect_used, reason = "a build script has nobody else to tell")]
-    if std::env::var_os("CARGO_FEATURE_CLIENT").is_some() {
-        generate().expect("proto/mrol/v1 does not compile");
-    }
+    generate()
 }
 
-/// The features of the crate that are built, in their order of the alphabet.
+/// The features of the crate that are built, in their order of the alphabet; "none" as a rule.
 fn features() -> String {
     let names =
         std::env::vars().filter_map(|(name, _)| Some(name.strip_prefix("CARGO_FEATURE_")?.to_lowercase()));
     let mut names: Vec<String> = names.filter(|name| name != "default").collect();
     names.sort();
-    names.join(", ")
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// The commit that is built: what SOURCE_COMMIT says, and else git of a build for use.
@@ -47,7 +40,7 @@ fn commit() -> Option<String> {
     }
     // The journal of HEAD grows with every commit and checkout; what else is named here makes a clean tree one with changes.
     let journal = git(&["rev-parse", "--git-path", "logs/HEAD"])?;
-    for path in [&journal, "src", "Cargo.toml", "Cargo.lock", "build.rs"] {
+    for path in [&journal, "src", "crates", "Cargo.toml", "Cargo.lock", "build.rs"] {
         if std::path::Path::new(path).exists() {
             println!("cargo::rerun-if-changed={path}");
         }
@@ -55,68 +48,14 @@ fn commit() -> Option<String> {
     git(&["describe", "--always", "--abbrev=12", "--dirty=+changes", "--exclude=*"])
 }
 
-fn generate() -> Result<(), Box<dyn std::error::Error>> {
-    let protos = ["v1/occupancy", "v1/mapping", "v1/maps", "store/v1/records", "store/v1/snapshot"];
-    let protos = protos.map(|name| format!("proto/mrol/{name}.proto"));
-    println!("cargo::rerun-if-changed=proto");
-    let descriptors = protox::compile(&protos, ["proto"])?;
-    let out = std::path::PathBuf::from(std::env::var("OUT_DIR")?);
-    // What reflection shows: the API, not the map files.
-    let mut api = descriptors.clone();
-    api.file.retain(|file| file.package() == "mrol.v1");
-    std::fs::write(out.join("mrol.v1.bin"), prost::Message::encode_to_vec(&api))?;
-    std::fs::write(out.join("elements.rs"), table_of_elements(&api)?)?;
-    let mut config = tonic_prost_build::Config::new();
-    // By its name a message is found in the table of elements.
-    config.enable_type_names();
+/// Traits and routers of the services in `proto/mrol/v1`; their messages are those of the client's crate.
+fn generate() -> Result<(), Box<dyn Error>> {
+    println!("cargo::rerun-if-changed=proto/mrol/v1");
+    let services = ["occupancy", "mapping", "maps"].map(|name| format!("proto/mrol/v1/{name}.proto"));
     tonic_prost_build::configure()
-        .bytes(".")
-        .codec_path("crate::wire::codec::Codec")
-        .build_server(std::env::var_os("CARGO_FEATURE_SERVER").is_some())
-        .compile_fds_with_config(descriptors, config)?;
+        .extern_path(".mrol.v1", "::mrol_client::wire::pb")
+        .codec_path("mrol_client::wire::codec::Codec")
+        .build_client(false)
+        .compile_fds(protox::compile(services, ["proto"])?)?;
     Ok(())
-}
-
-/// The messages of the API in which elements are counted before they are decoded (`src/wire/codec`), as source text: of
-/// each the fields that have such elements, or messages with some.
-fn table_of_elements(api: &FileDescriptorSet) -> Result<String, std::fmt::Error> {
-    let messages = api.file.iter().flat_map(|file| &file.message_type);
-    let messages: BTreeMap<String, &DescriptorProto> =
-        messages.map(|message| (format!(".mrol.v1.{}", message.name()), message)).collect();
-    let is_in_table = |name: &str| {
-        messages
-            .get(name)
-            .is_some_and(|message| message.field.iter().any(|field| has_elements(field, &messages)))
-    };
-    let mut table = String::from("&[\n");
-    for (name, message) in &messages {
-        let fields = message.field.iter().filter(|field| has_elements(field, &messages));
-        let fields: Vec<&FieldDescriptorProto> = fields.collect();
-        if fields.is_empty() {
-            continue;
-        }
-        writeln!(table, "    Elements {{ message: {:?}, fields: &[", &name[1..])?;
-        for field in fields {
-            let (number, name, is_counted) = (field.number(), field.name(), is_counted(field));
-            let of = Some(field.type_name()).filter(|of| is_in_table(of)).map_or("", |of| &of[1..]);
-            writeln!(
-                table,
-                "        Field {{ number: {number}, name: {name:?}, is_counted: {is_counted}, of: {of:?} }},"
-            )?;
-        }
-        writeln!(table, "    ] }},")?;
-    }
-    table.push_str("]\n");
-    Ok(table)
-}
-
-/// True of a list whose elements take more memory than their bytes on the wire, which may be none.
-fn is_counted(field: &FieldDescriptorProto) -> bool {
-    field.label() == Label::Repeated && matches!(field.r#type(), Type::Message | Type::String | Type::Bytes)
-}
-
-/// True where a field is such a list, or a message that has one. No message of the API holds itself.
-fn has_elements(field: &FieldDescriptorProto, messages: &BTreeMap<String, &DescriptorProto>) -> bool {
-    let inner = messages.get(field.type_name()).map_or(&[][..], |message| &message.field);
-    is_counted(field) || inner.iter().any(|field| has_elements(field, messages))
 }

@@ -10,10 +10,10 @@ use std::path::PathBuf;
 
 use mrol::client::{Client, Credentials, NewMap, new_session};
 use mrol::geometry::{Point, translation_m};
-use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{MapName, RobotName};
 use mrol::scan::{read_points, scan_files};
 use mrol::service::ScanRequest;
+use mrol_simulate::{Scene, tours};
 use rand::SeedableRng;
 
 #[tokio::main]

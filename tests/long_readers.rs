@@ -6,7 +6,6 @@
 //!
 //!     MROL_LONG_READERS_SECONDS=120 cargo test --release --test long_readers -- --nocapture
 
-#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod support;

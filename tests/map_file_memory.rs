@@ -1,6 +1,6 @@
 //! Reading a map file, or a record of a journal for one voxel, takes no more memory than is asked for, whatever they hold.
 
-#![cfg(all(feature = "server", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod support;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use governor::clock::{Clock, DefaultClock};
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 
-use crate::service::ServiceError;
+use mrol_service::ServiceError;
 
 /// Bounds of a key's own, each in place of the server's for one caller; none = the server's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

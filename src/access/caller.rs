@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Allowance, Key};
-use crate::service::{AllowedMaps, AllowedScans, ServiceError};
+use mrol_service::{AllowedMaps, AllowedScans, ServiceError};
 
 /// Who asks for something: the holder of a key, or anybody.
 #[derive(Debug, Clone)]

@@ -4,8 +4,8 @@ use axum::http::header::AUTHORIZATION;
 use axum::http::{Extensions, HeaderMap, Request};
 
 use super::{Access, Caller, Operation, Peer, Secret, asker_of};
-use crate::map::CallerName;
-use crate::service::{MapService, Reason, ServiceError};
+use mrol_map::map::CallerName;
+use mrol_service::{MapService, Reason, ServiceError};
 
 /// The only holder of a service that reaches every map. Handlers get theirs of [`Gate::authorize`], so that none can
 /// reach more than its caller may.

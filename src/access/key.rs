@@ -7,8 +7,8 @@ use std::time::SystemTime;
 use tokio_util::sync::CancellationToken;
 
 use super::{Allowance, Digest, Expiry, KeyLimits, Scope};
-use crate::map::RobotName;
-use crate::service::{AllowedMaps, AllowedScans, Reason, ServiceError};
+use mrol_map::map::RobotName;
+use mrol_service::{AllowedMaps, AllowedScans, Reason, ServiceError};
 
 /// Characters of a key's name, at most.
 const NAME_LENGTH_MAX: usize = 64;

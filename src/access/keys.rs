@@ -83,7 +83,7 @@ fn continued(key: Key, former: &[Arc<Key>]) -> Key {
 mod tests {
     use super::*;
     use crate::access::{KeyName, Scope};
-    use crate::service::{AllowedMaps, Reason};
+    use mrol_service::{AllowedMaps, Reason};
 
     fn key(name: &str, secret: &str, scope: Scope) -> Key {
         let name = KeyName::new(name).unwrap();

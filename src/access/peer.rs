@@ -2,7 +2,7 @@
 
 use std::net::IpAddr;
 
-use crate::service::Asker;
+use mrol_service::Asker;
 
 /// Where a request came from; whom it counts for where there is no key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

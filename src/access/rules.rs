@@ -9,7 +9,7 @@ use axum::http::Request;
 use super::reload::ReloadableFile;
 use super::site::{Hosts, check_origin};
 use super::{Caller, Expiry, Key, KeyFileError, KeyName, Keys, Operation, Scope, Secret};
-use crate::service::{AllowedMaps, Reason, ServiceError};
+use mrol_service::{AllowedMaps, Reason, ServiceError};
 
 /// The rules of a server. A clone is another handle on the same ones.
 #[derive(Debug, Clone)]

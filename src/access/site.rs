@@ -13,8 +13,8 @@ use axum::http::header::{HOST, ORIGIN};
 use axum::http::uri::Authority;
 use axum::http::{Extensions, HeaderMap, Request, Uri};
 
-use crate::service::{Reason, ServiceError};
-use crate::util::excerpt;
+use mrol_map::util::excerpt;
+use mrol_service::{Reason, ServiceError};
 
 /// Where a request came in; to be found among its extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

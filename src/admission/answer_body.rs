@@ -9,7 +9,7 @@ use axum::http::HeaderMap;
 use hyper::body::{Frame, SizeHint};
 
 use super::inbound_body::InboundBody;
-use crate::service::ServiceError;
+use mrol_service::ServiceError;
 
 /// Resolves when an answer must end, with the reason: its caller's key was withdrawn, its deadline is reached.
 pub type Ending = Pin<Box<dyn Future<Output = ServiceError> + Send>>;
@@ -151,8 +151,8 @@ impl<H: Send + Sync + 'static> HttpBody for AnswerBody<H> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::Reason;
     use http_body_util::BodyExt;
+    use mrol_service::Reason;
     use tokio_stream::StreamExt;
 
     #[tokio::test]

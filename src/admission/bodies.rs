@@ -9,8 +9,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::body_state::{Body, CloseConnection};
 use super::quota::Quota;
-use crate::service::{Limits, Reason, ServiceError};
 use crate::telemetry::InUse;
+use mrol_service::{Limits, Reason, ServiceError};
 
 /// A body of a request that was silent for less than this gives way to nobody: it may be on a slow path.
 const GRACE: Duration = Duration::from_secs(1);

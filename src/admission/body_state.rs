@@ -6,7 +6,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
 use super::quota::{Quota, QuotaSlot};
-use crate::service::ServiceError;
+use mrol_service::ServiceError;
 
 /// What is known of a body.
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::bodies::{Bodies, MemoryPermit};
 use super::body_state::CloseConnection;
-use crate::service::{Reason, ServiceError};
+use mrol_service::{Reason, ServiceError};
 
 /// A handle on a body, which is forgotten with the last of them.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tokio_util::task::task_tracker::TaskTrackerToken;
 
-use crate::service::{Reason, ServiceError};
+use mrol_service::{Reason, ServiceError};
 
 /// The state of a server's life, shared by its listeners. A clone is another handle on the same state.
 ///

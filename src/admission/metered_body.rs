@@ -8,7 +8,7 @@ use hyper::body::{Frame, SizeHint};
 use tokio_util::sync::WaitForCancellationFutureOwned;
 
 use super::inbound_body::InboundBody;
-use crate::service::ServiceError;
+use mrol_service::ServiceError;
 
 /// A request's body: each piece is counted when it has come, and the end is noted.
 pub(super) struct MeteredBody {

@@ -44,11 +44,11 @@ use axum::http::Method;
 use axum::response::Response;
 
 use crate::access::{Authorized, Operation};
-use crate::service::{Limits, ServiceError};
 use crate::telemetry::InUse;
 use answer_body::AnswerBody;
 use bodies::Bodies;
 use metered_body::MeteredBody;
+use mrol_service::{Limits, ServiceError};
 use probes::Probes;
 use quota::Quota;
 use rate::Rates;

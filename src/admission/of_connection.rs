@@ -6,7 +6,7 @@ use parking_lot::Mutex;
 use tokio::time::Instant;
 
 use super::quota::{Quota, QuotaSlot};
-use crate::service::ServiceError;
+use mrol_service::ServiceError;
 
 /// What the requests of one connection share; to be found among their extensions. A clone is another handle on it.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! What is made of large requests and answers, away from the threads that serve connections.
 
-use crate::service::{Reason, ServiceError};
+use mrol_service::{Reason, ServiceError};
 
 /// Requests and answers of more bytes than this are read and written away from the threads that serve connections.
 const INLINE_BYTES_MAX: usize = 64 << 10;

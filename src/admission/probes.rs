@@ -14,7 +14,7 @@ use super::inbound_body::InboundBody;
 use super::of_connection::OfConnection;
 use super::quota::{Quota, QuotaSlot};
 use crate::access::{Authorized, Operation};
-use crate::service::{Limits, Reason, ServiceError};
+use mrol_service::{Limits, Reason, ServiceError};
 
 /// What is asked without a key, or whatever else is done: each kind has places of its own.
 #[derive(Debug)]

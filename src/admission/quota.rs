@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::service::ServiceError;
+use mrol_service::ServiceError;
 
 /// As many as a limit allows. A clone counts the same.
 #[derive(Debug, Clone)]

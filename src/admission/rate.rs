@@ -10,7 +10,7 @@ use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 
 use crate::access::{Allowance, Authorized, InWork, asker_of};
-use crate::service::{Asker, Limits, ServiceError};
+use mrol_service::{Asker, Limits, ServiceError};
 
 /// Whom a request counts for: the name of its key, or where there is none the place that it came from.
 #[derive(Debug, Clone)]

@@ -2,10 +2,10 @@
 
 use clap::ValueEnum;
 
-use super::parse;
-use crate::align::Method;
-use crate::mapping::Guess;
-use crate::scan::{PointFilter, PointFilterError};
+use crate::console::parse;
+use mrol_map::align::Method;
+use mrol_map::mapping::Guess;
+use mrol_map::scan::{PointFilter, PointFilterError};
 
 /// Options of the alignment.
 #[derive(Debug, Clone, Default, clap::Args)]

@@ -1,6 +1,6 @@
 //! What planners' questions have in common.
 
-use crate::service::Asked;
+use mrol_service::Asked;
 
 /// Options of every question.
 #[derive(Debug, clap::Args)]

@@ -7,13 +7,13 @@ use std::path::PathBuf;
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::map::{DistanceBlock, Region};
-use crate::service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::map::{DistanceBlock, Region};
+use mrol_service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -8,17 +8,17 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::asked::AskedOptions;
-use super::error::CliError;
 use super::met::met;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::client::Client;
-use crate::geometry::{Point, Pose, rotation_xyzw, translation_m};
-use crate::map::MapName;
-use crate::planning::{Body, Link, Sphere, Surroundings, Unknown};
-use crate::service::{CheckAs, Collisions, MotionCheck, PoseCheck};
-use crate::voxel::VoxelKey;
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_client::Client;
+use mrol_map::geometry::{Point, Pose, rotation_xyzw, translation_m};
+use mrol_map::map::MapName;
+use mrol_map::planning::{Body, Link, Sphere, Surroundings, Unknown};
+use mrol_map::voxel::VoxelKey;
+use mrol_service::{CheckAs, Collisions, MotionCheck, PoseCheck};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::asked::AskedOptions;
-use super::error::CliError;
-use super::output::Output;
-use super::parse;
 use super::query::points_of;
 use super::remote::MapOptions;
-use crate::geometry::Point;
-use crate::service::ClassifyQuestion;
-use crate::util::Keyword;
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::geometry::Point;
+use mrol_map::util::Keyword;
+use mrol_service::ClassifyQuestion;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -7,8 +7,8 @@ use clap_complete::Shell;
 use serde::Serialize;
 
 use super::CommandLine;
-use super::error::CliError;
-use super::output::Output;
+use crate::console::error::CliError;
+use crate::console::output::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

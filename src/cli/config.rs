@@ -2,9 +2,9 @@
 
 use clap::Subcommand;
 
-use super::error::CliError;
-use super::output::Output;
 use super::serve::ServeOptions;
+use crate::console::error::CliError;
+use crate::console::output::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

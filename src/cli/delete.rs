@@ -5,15 +5,15 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
-use super::parse;
 use super::query::points_of;
 use super::remote::MapOptions;
-use crate::geometry::Point;
-use crate::map::{Region, RequestId};
-use crate::service::{Deletion, DeletionAnswer, DeletionTarget};
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::geometry::Point;
+use mrol_map::map::{Region, RequestId};
+use mrol_service::{Deletion, DeletionAnswer, DeletionTarget};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

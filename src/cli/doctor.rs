@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::{bytes, count};
-use super::output::Output;
-use super::parse;
-use crate::map::MapName;
-use crate::store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, set_aside};
-use crate::store::{DataDir, StoreSettings};
+use crate::console::error::CliError;
+use crate::console::map_report::{bytes, count};
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::map::MapName;
+use mrol_store::doctor::{AsideFile, Diagnosis, SetAside, diagnose, set_aside};
+use mrol_store::{DataDir, StoreSettings};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

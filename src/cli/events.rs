@@ -6,14 +6,14 @@ use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description;
 
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
 use super::remote::MapOptions;
-use crate::align::Verdict;
-use crate::map::RobotName;
-use crate::service::{EventMessage, EventsQuery, ScanEvent};
-use crate::wire::json::{JsonEvent, JsonScan};
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::json::{JsonEvent, JsonScan};
+use mrol_map::align::Verdict;
+use mrol_map::map::RobotName;
+use mrol_service::{EventMessage, EventsQuery, ScanEvent};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

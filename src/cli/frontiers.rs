@@ -5,14 +5,14 @@ use std::fmt::{self, Display};
 use serde::Serialize;
 
 use super::asked::AskedOptions;
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::planning::Frontier;
-use crate::service::FrontierQuestion;
-use crate::wire::json::JsonPose;
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use crate::json::JsonPose;
+use mrol_map::planning::Frontier;
+use mrol_service::FrontierQuestion;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::asked::AskedOptions;
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::planning::{Grid, GridArea};
-use crate::service::{GridQuestion, GridScope};
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::planning::{Grid, GridArea};
+use mrol_service::{GridQuestion, GridScope};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -8,9 +8,9 @@ use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
-use super::error::CliError;
-use super::output::Output;
 use super::remote::ServerOptions;
+use crate::console::error::CliError;
+use crate::console::output::Output;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -8,22 +8,22 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::alignment_options::{AlignmentOptions, GuessName, PointOptions};
-use super::error::CliError;
-use super::map_report::count;
 use super::maps::OptionalSettings;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
 use super::scan_report::{PLACE_HEAD, name_of, name_width, place};
-use super::truth::true_poses;
-use crate::align::Method;
-use crate::client::{Client, ClientError, new_session};
-use crate::geometry::Pose;
-use crate::map::{RobotName, SessionName};
-use crate::mapping::Guess;
-use crate::scan::{PointFilter, read_points, scan_files};
-use crate::service::{ScanAnswer, ScanRequest};
-use crate::wire::json::JsonScan;
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use crate::console::truth::true_poses;
+use crate::json::JsonScan;
+use mrol_client::{Client, ClientError, new_session};
+use mrol_map::align::Method;
+use mrol_map::geometry::Pose;
+use mrol_map::map::{RobotName, SessionName};
+use mrol_map::mapping::Guess;
+use mrol_map::scan::{PointFilter, read_points, scan_files};
+use mrol_service::{ScanAnswer, ScanRequest};
 
 /// Scans read ahead of the one that is being sent.
 const SCANS_AHEAD: usize = 2;

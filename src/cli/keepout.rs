@@ -6,14 +6,14 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use clap::Subcommand;
 use serde::Serialize;
 
-use super::error::CliError;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
 use crate::access::Expiry;
-use crate::map::{KeepOutName, KeepOutShape, Prism, Region, RequestId};
-use crate::service::{DeleteKeepOut, KeepOutAnswer, PutKeepOut};
-use crate::wire::json::{JsonKeepOut, JsonShape};
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use crate::json::{JsonKeepOut, JsonShape};
+use mrol_map::map::{KeepOutName, KeepOutShape, Prism, Region, RequestId};
+use mrol_service::{DeleteKeepOut, KeepOutAnswer, PutKeepOut};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

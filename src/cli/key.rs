@@ -10,12 +10,12 @@ use std::path::PathBuf;
 use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
-use super::error::CliError;
-use super::output::Output;
-use super::parse;
 use crate::access::{Expiry, Key, KeyLimits, KeyName, Scope, Secret, add_to_file, to_toml};
-use crate::map::{MapName, RobotName};
-use crate::service::AllowedMaps;
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::map::{MapName, RobotName};
+use mrol_service::AllowedMaps;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -5,14 +5,14 @@ use std::fmt::{self, Display};
 use clap::Subcommand;
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::MapReport;
-use super::output::Output;
-use super::parse;
 use super::remote::ServerOptions;
-use crate::client::{NewFilter, NewMap};
-use crate::map::MapName;
-use crate::service::{MapList, UnavailableMap};
+use crate::console::error::CliError;
+use crate::console::map_report::MapReport;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_client::{NewFilter, NewMap};
+use mrol_map::map::MapName;
+use mrol_service::{MapList, UnavailableMap};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

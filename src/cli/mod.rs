@@ -13,7 +13,6 @@ mod completions;
 mod config;
 mod delete;
 mod doctor;
-mod error;
 mod events;
 mod frontiers;
 mod grid;
@@ -21,29 +20,19 @@ mod health;
 mod insert;
 mod keepout;
 mod key;
-#[cfg(feature = "lab")]
-mod lab;
-#[cfg(not(feature = "lab"))]
-#[path = "without_lab.rs"]
 mod lab;
 mod localize;
-mod map;
-mod map_report;
+pub mod map;
 mod maps;
 mod met;
 mod nearest;
 mod observers;
-mod output;
-mod parse;
-mod query;
+pub mod query;
 mod rays;
-mod remote;
-mod runtime;
+pub mod remote;
 mod scan_report;
-mod serve;
+pub mod serve;
 mod snapshot;
-mod statistics;
-mod truth;
 mod undo;
 mod watch;
 
@@ -51,10 +40,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use error::CliError;
-use output::Output;
-
-use crate::util::build;
+use crate::build_info;
+use crate::console::{CliError, Output, runtime};
+use crate::demo::Demo;
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -75,7 +63,7 @@ EXIT CODES:
 
 /// A networked multi-resolution voxel map: robots send scans, planners ask about points
 #[derive(Debug, Parser)]
-#[command(name = "mrol", version, long_version = build::DESCRIPTION, after_help = EXAMPLES)]
+#[command(name = "mrol", version, long_version = build_info::DESCRIPTION, after_help = EXAMPLES)]
 struct CommandLine {
     /// Print results as JSON, an object a line, for programs
     #[arg(long, global = true)]
@@ -87,8 +75,7 @@ struct CommandLine {
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Serve),
-    #[command(flatten)]
-    Lab(lab::Lab),
+    Demo(Demo),
     Map(map::Map),
     Insert(insert::Insert),
     Localize(localize::Localize),
@@ -114,6 +101,8 @@ enum Command {
     Doctor(doctor::Doctor),
     Config(config::Settings),
     Completions(completions::Completions),
+    #[command(flatten)]
+    Lab(lab::Lab),
 }
 
 /// Runs the command line of this process and returns its exit code.
@@ -136,7 +125,7 @@ impl Command {
     fn run(self, output: Output) -> Result<(), CliError> {
         match self {
             Self::Serve(serve) => runtime::block_on(serve.run(output)),
-            Self::Lab(lab) => lab.run(output),
+            Self::Demo(demo) => runtime::block_on(demo.run(output)),
             Self::Map(map) => map.run(output),
             Self::Insert(insert) => runtime::block_on(insert.run(output)),
             Self::Localize(localize) => runtime::block_on(localize.run(output)),
@@ -162,6 +151,7 @@ impl Command {
             Self::Doctor(doctor) => doctor.run(output),
             Self::Config(config) => config.run(&output),
             Self::Completions(completions) => completions.run(&output),
+            Self::Lab(lab) => lab.run(),
         }
     }
 }

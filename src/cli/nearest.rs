@@ -6,15 +6,15 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::asked::AskedOptions;
-use super::error::CliError;
 use super::met::met;
-use super::output::Output;
-use super::parse;
 use super::query::points_of;
 use super::remote::MapOptions;
-use crate::geometry::Point;
-use crate::planning::MeasuredTo;
-use crate::service::NearestQuestion;
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::geometry::Point;
+use mrol_map::planning::MeasuredTo;
+use mrol_service::NearestQuestion;
 
 const EXAMPLES: &str = "\
 EXAMPLES:

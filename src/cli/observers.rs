@@ -4,13 +4,13 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::geometry::Point;
-use crate::service::{ObservedVoxel, ObserversAnswer, ObserversRequest};
-use crate::wire::json::{JsonObservers, JsonObservingScan};
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use crate::json::{JsonObservers, JsonObservingScan};
+use mrol_map::geometry::Point;
+use mrol_service::{ObservedVoxel, ObserversAnswer, ObserversRequest};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -7,15 +7,15 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::{count, percent};
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::geometry::{Point, Pose};
-use crate::map::Lookup;
-use crate::scan::read_points;
-use crate::service::{MapVersion, PointAnswer, PointQuery};
+use crate::console::error::CliError;
+use crate::console::map_report::{count, percent};
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::Lookup;
+use mrol_map::scan::read_points;
+use mrol_service::{MapVersion, PointAnswer, PointQuery};
 
 /// Number of points of one message: a multiple of 8, so that the bitmaps of messages can be concatenated.
 const BATCH_POINTS: usize = 1_000_000;
@@ -106,7 +106,7 @@ impl Query {
 }
 
 /// Reads the points of a file, which must have at least one.
-pub(super) fn points_of(path: &Path) -> Result<Vec<Point>, CliError> {
+pub fn points_of(path: &Path) -> Result<Vec<Point>, CliError> {
     let points = read_points(path)?;
     if points.is_empty() {
         return Err(CliError::failed(format!("{}: no point in this file", path.display())));

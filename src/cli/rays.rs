@@ -5,14 +5,14 @@ use std::fmt::{self, Display};
 use serde::Serialize;
 
 use super::asked::AskedOptions;
-use super::error::CliError;
 use super::met::met;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::geometry::Point;
-use crate::planning::Unknown;
-use crate::service::{RayQuestion, RaysToward};
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::geometry::Point;
+use mrol_map::planning::Unknown;
+use mrol_service::{RayQuestion, RaysToward};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::client::{Client, Credentials};
-use crate::map::MapName;
+use mrol_client::{Client, Credentials};
+use mrol_map::map::MapName;
 
-use super::error::CliError;
-use super::parse;
+use crate::console::error::CliError;
+use crate::console::parse;
 
 /// Heading of these options in a command's help.
 const HEADING: &str = "Access";
@@ -23,7 +23,7 @@ pub(super) struct ServerOptions {
 
 /// Options of the credentials: what is shown to a server, and which server is trusted.
 #[derive(Debug, Clone, Default, clap::Args)]
-pub(super) struct CredentialOptions {
+pub struct CredentialOptions {
     /// The secret of a key. Other users of this machine can see options: prefer the variable or a file
     #[arg(long, help_heading = HEADING, env = "MROL_KEY", value_name = "SECRET", hide_env_values = true)]
     key: Option<Hidden>,
@@ -54,7 +54,7 @@ impl ServerOptions {
 
 impl CredentialOptions {
     /// Reads the credentials that the options name.
-    pub(super) fn read(&self) -> Result<Credentials, CliError> {
+    pub fn read(&self) -> Result<Credentials, CliError> {
         let mut credentials = Credentials::default();
         if let Some(secret) = self.secret()? {
             credentials = credentials.with_key(&secret)?;
@@ -69,7 +69,7 @@ impl CredentialOptions {
     }
 
     /// The secret of the key, if one is given.
-    pub(super) fn secret(&self) -> Result<Option<String>, CliError> {
+    pub fn secret(&self) -> Result<Option<String>, CliError> {
         match (&self.key, &self.key_file) {
             (Some(Hidden(secret)), _) => Ok(Some(secret.clone())),
             (None, Some(file)) => Ok(Some(String::from_utf8_lossy(&read(file)?).trim().to_owned())),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::wire::json::JsonPose;
+use crate::json::JsonPose;
 
 /// A scan file's name, for a column.
 pub(super) fn name_of(file: &Path) -> String {

@@ -1,16 +1,15 @@
 //! `mrol serve`: runs the daemon.
 
-use std::fmt::{self, Display};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::pin::pin;
 
-use serde::Serialize;
 use serde_json::json;
 
-use super::error::CliError;
-use super::output::Output;
 use crate::config::{Config, ConfigError, unknown_variables};
+use crate::console::Serving;
+use crate::console::error::CliError;
+use crate::console::output::Output;
 use crate::server::{Hangups, Server, exit_after, exit_when_told, shutdown_signal};
 use crate::telemetry::start_logging;
 
@@ -39,7 +38,7 @@ takes the changes of the last interval.";
 /// Run the daemon: hold maps, take scans and answer queries over HTTP and gRPC
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-pub(super) struct Serve {
+pub struct Serve {
     #[command(flatten)]
     options: ServeOptions,
 }
@@ -106,7 +105,11 @@ pub(super) struct ServeOptions {
 }
 
 impl Serve {
-    pub(super) async fn run(self, output: Output) -> Result<(), CliError> {
+    /// Serves until it is told to end.
+    ///
+    /// # Errors
+    /// When settings are wrong, or the server cannot start or ends by an error.
+    pub async fn run(self, output: Output) -> Result<(), CliError> {
         let config = self.options.config().map_err(CliError::usage)?;
         let _logging =
             start_logging(config.log.format, &config.log.level, config.log.audit).map_err(CliError::usage)?;
@@ -159,27 +162,5 @@ impl ServeOptions {
             "drain_delay_s": self.drain_delay_s,
         });
         Config::load(self.config.as_deref(), options)
-    }
-}
-
-/// Addresses of a running server.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Serving {
-    pub(super) http: SocketAddr,
-    pub(super) grpc: SocketAddr,
-    /// True when clients must use TLS.
-    pub(super) tls: bool,
-}
-
-impl Serving {
-    pub(super) fn of(server: &Server) -> Self {
-        Self { http: server.http_address(), grpc: server.grpc_address(), tls: server.is_secured() }
-    }
-}
-
-impl Display for Serving {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let scheme = if self.tls { "https" } else { "http" };
-        write!(f, "mrol serves {scheme}://{} (HTTP) and {scheme}://{} (gRPC)", self.http, self.grpc)
     }
 }

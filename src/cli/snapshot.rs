@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::{bytes, count};
-use super::output::Output;
-use super::parse;
 use super::remote::ServerOptions;
-use crate::client::Client;
-use crate::map::MapName;
-use crate::service::{MapList, UnavailableMap};
-use crate::store::{Disk, Snapshot};
+use crate::console::error::CliError;
+use crate::console::map_report::{bytes, count};
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_client::Client;
+use mrol_map::map::MapName;
+use mrol_service::{MapList, UnavailableMap};
+use mrol_store::{Disk, Snapshot};
 
 const SNAPSHOT_EXAMPLES: &str = "\
 EXAMPLES:

@@ -4,13 +4,13 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::map::{RequestId, RobotName, SessionName};
-use crate::service::{self, UndoAnswer, UndoTarget};
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::map::{RequestId, RobotName, SessionName};
+use mrol_service::{UndoAnswer, UndoTarget};
 
 const EXAMPLES: &str = "\
 EXAMPLES:
@@ -62,7 +62,7 @@ impl Undo {
                 ));
             }
         };
-        let undo = service::Undo { target, request_id: self.request_id };
+        let undo = mrol_service::Undo { target, request_id: self.request_id };
         let client = self.map.server.connect().await?;
         let answer = client.undo(&self.map.name, undo).await?;
         output.print(&Undone::from(answer))

@@ -4,14 +4,14 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
-use super::error::CliError;
-use super::map_report::count;
-use super::output::Output;
-use super::parse;
 use super::remote::MapOptions;
-use crate::geometry::translation_m;
-use crate::map::{ContentHash, KeepOutAct, Region};
-use crate::service::{Cause, ChangePart, StatePart, WatchEvent, WatchForm, WatchMessage, WatchRequest};
+use crate::console::error::CliError;
+use crate::console::map_report::count;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_map::geometry::translation_m;
+use mrol_map::map::{ContentHash, KeepOutAct, Region};
+use mrol_service::{Cause, ChangePart, StatePart, WatchEvent, WatchForm, WatchMessage, WatchRequest};
 
 const EXAMPLES: &str = "\
 EXAMPLES:

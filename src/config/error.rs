@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::mapping::CarvingSettingsError;
-use crate::scan::PointFilterError;
+use mrol_map::mapping::CarvingSettingsError;
+use mrol_map::scan::PointFilterError;
 
 /// Why the settings are not valid.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::bloom::FilterSettings;
+use mrol_map::bloom::FilterSettings;
 
 /// Settings of the counting Bloom filters of new maps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

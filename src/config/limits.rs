@@ -1,8 +1,8 @@
 //! Checks of the section `limits`. The limits themselves are [`Limits`].
 
 use super::ConfigError;
-use crate::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
-use crate::service::{EVENTS_MAX, Limits};
+use mrol_map::map::{KEEP_OUTS_MAX, PRISM_CORNERS_MAX};
+use mrol_service::{EVENTS_MAX, Limits};
 
 /// Refuses limits that would keep the server from working at all.
 pub(super) fn check(limits: &Limits) -> Result<(), ConfigError> {

@@ -34,10 +34,10 @@ use figment::Figment;
 use figment::providers::{Env, Format, Serialized, Toml};
 use serde::{Deserialize, Serialize};
 
-use crate::align::AlignmentSettings;
-use crate::bloom::FilterSettings;
-use crate::mapping::StationarySettings;
-use crate::service::{Limits, ServiceSettings};
+use mrol_map::align::AlignmentSettings;
+use mrol_map::bloom::FilterSettings;
+use mrol_map::mapping::StationarySettings;
+use mrol_service::{Limits, ServiceSettings};
 
 /// The longest [`Config::drain_delay_s`]: longer, and the server would seem not to hear its signal.
 const DRAIN_DELAY_MAX_S: u64 = 3600;

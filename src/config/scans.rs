@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::align::Method;
-use crate::mapping::CarvingSettings;
-use crate::scan::PointFilter;
-use crate::service::RobotSettings;
-use crate::wire::json::ByKeyword;
+use crate::json::ByKeyword;
+use mrol_map::align::Method;
+use mrol_map::mapping::CarvingSettings;
+use mrol_map::scan::PointFilter;
+use mrol_service::RobotSettings;
 
 /// Settings of alignment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

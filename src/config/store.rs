@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use crate::map::TrajectorySpacing;
-use crate::store::{Durability, StoreMode, StoreSettings};
+use mrol_map::map::TrajectorySpacing;
+use mrol_store::{Durability, StoreMode, StoreSettings};
 
 /// Settings of the store; see [`StoreSettings`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

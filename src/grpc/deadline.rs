@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use axum::http::HeaderMap;
 
-use crate::service::{Reason, ServiceError};
+use mrol_service::{Reason, ServiceError};
 
 const HEADER: &str = "grpc-timeout";
 /// How much earlier than the caller's deadline it is answered, at most, and at most this part of it.

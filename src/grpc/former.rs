@@ -1,8 +1,8 @@
 //! What requests of a stream leave out, as those before them said it.
 
 use crate::admission::{Admission, MemoryPermit};
-use crate::service::{Limits, ServiceError};
-use crate::wire::{check_body, pb};
+use mrol_client::wire::{check_body, pb};
+use mrol_service::{Limits, ServiceError};
 
 /// Within which bounds a stream keeps what requests said.
 #[derive(Debug, Clone, Copy)]

@@ -6,11 +6,11 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::former::{Keeping, same_map};
 use super::stream::{Answers, Message};
+use super::stubs::mapping_server::Mapping;
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
-use crate::service::{MapService, ServiceError};
-use crate::wire::pb;
-use pb::mapping_server::Mapping;
+use mrol_client::wire::{pb, status_of};
+use mrol_service::{MapService, ServiceError};
 
 #[tonic::async_trait]
 impl Mapping for Adapter {
@@ -22,9 +22,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::InsertScanRequest>,
     ) -> Result<Response<pb::InsertScanResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, scan) = request.into_inner().try_into()?;
-        let answer = service.insert_scan(&map, scan).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, scan) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.insert_scan(&map, scan).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -46,9 +46,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::AlignScanRequest>,
     ) -> Result<Response<pb::AlignScanResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, scan) = request.into_inner().try_into()?;
-        let answer = service.align_scan(&map, scan).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, scan) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.align_scan(&map, scan).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -56,9 +56,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::LocalizeRequest>,
     ) -> Result<Response<pb::LocalizeResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, scan) = request.into_inner().try_into()?;
-        let answer = service.localize(&map, scan).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, scan) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.localize(&map, scan).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -66,16 +66,16 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::DeleteVoxelsRequest>,
     ) -> Result<Response<pb::DeleteVoxelsResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, deletion) = request.into_inner().try_into()?;
-        let answer = service.delete_voxels(&map, deletion).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, deletion) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.delete_voxels(&map, deletion).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
     async fn undo(&self, request: Request<pb::UndoRequest>) -> Result<Response<pb::UndoResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, undo) = request.into_inner().try_into()?;
-        let answer = service.undo(&map, undo).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, undo) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.undo(&map, undo).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -83,9 +83,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::PutKeepOutRequest>,
     ) -> Result<Response<pb::PutKeepOutResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, put) = request.into_inner().try_into()?;
-        let answer = service.put_keep_out(&map, put).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, put) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.put_keep_out(&map, put).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -93,9 +93,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::DeleteKeepOutRequest>,
     ) -> Result<Response<pb::DeleteKeepOutResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, deletion) = request.into_inner().try_into()?;
-        let answer = service.delete_keep_out(&map, deletion).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, deletion) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.delete_keep_out(&map, deletion).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -103,9 +103,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::GetTrajectoryRequest>,
     ) -> Result<Response<pb::GetTrajectoryResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, query) = request.into_inner().try_into()?;
-        let answer = service.trajectory(&map, query).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, query) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.trajectory(&map, query).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -113,13 +113,13 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::StreamTrajectoryRequest>,
     ) -> Result<Response<Self::StreamTrajectoryStream>, Status> {
-        let service = service_of(&request)?;
-        let (map, query) = request.into_inner().try_into()?;
-        let pieces = service.trajectory_pieces(&map, query).await?;
-        let kept = self.admission.keep(pieces.memory_bytes())?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, query) = request.into_inner().try_into().map_err(status_of)?;
+        let pieces = service.trajectory_pieces(&map, query).await.map_err(status_of)?;
+        let kept = self.admission.keep(pieces.memory_bytes()).map_err(status_of)?;
         Ok(Response::new(Box::pin(pieces.into_stream().map(move |piece| {
             let _until_sent = &kept;
-            Ok(piece?.into())
+            Ok(piece.map_err(status_of)?.into())
         }))))
     }
 
@@ -127,9 +127,9 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::ListEventsRequest>,
     ) -> Result<Response<pb::ListEventsResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, query) = request.into_inner().try_into()?;
-        let events = service.list_events(&map, query).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, query) = request.into_inner().try_into().map_err(status_of)?;
+        let events = service.list_events(&map, query).await.map_err(status_of)?;
         Ok(answered(pb::ListEventsResponse {
             events: events.iter().map(|event| (&**event).into()).collect(),
         }))
@@ -139,11 +139,11 @@ impl Mapping for Adapter {
         &self,
         request: Request<pb::WatchEventsRequest>,
     ) -> Result<Response<Self::WatchEventsStream>, Status> {
-        let service = service_of(&request)?;
-        let (map, query) = request.into_inner().try_into()?;
-        let watch = service.watch_events(&map, query).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, query) = request.into_inner().try_into().map_err(status_of)?;
+        let watch = service.watch_events(&map, query).await.map_err(status_of)?;
         let messages = watch.into_stream(self.admission.told_to_drain());
-        Ok(Response::new(Box::pin(messages.map(|message| Ok(message?.into())))))
+        Ok(Response::new(Box::pin(messages.map(|message| Ok(message.map_err(status_of)?.into())))))
     }
 }
 

@@ -4,13 +4,13 @@ use bytes::{Bytes, BytesMut};
 use tonic::codegen::BoxStream;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::stubs::maps_server::Maps;
 use super::{Adapter, answered, service_of};
 use crate::access::Authorized;
 use crate::admission::InboundBody;
-use crate::map::MapName;
-use crate::service::{AllowedMaps, MapList, Reason, ServiceError};
-use crate::wire::{self, pb, snapshot_bytes, snapshot_pieces};
-use pb::maps_server::Maps;
+use mrol_client::wire::{self, pb, snapshot_bytes, snapshot_pieces, status_of};
+use mrol_map::map::MapName;
+use mrol_service::{AllowedMaps, MapList, Reason, ServiceError};
 
 #[tonic::async_trait]
 impl Maps for Adapter {
@@ -20,9 +20,10 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::CreateMapRequest>,
     ) -> Result<Response<pb::CreateMapResponse>, Status> {
-        let service = service_of(&request)?;
-        let (name, settings) = wire::create_map(request.into_inner(), service.default_filter())?;
-        let answer = service.create_map(name, settings).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (name, settings) =
+            wire::create_map(request.into_inner(), service.default_filter()).map_err(status_of)?;
+        let answer = service.create_map(name, settings).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -30,9 +31,9 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::GetMapRequest>,
     ) -> Result<Response<pb::GetMapResponse>, Status> {
-        let service = service_of(&request)?;
-        let name = map_name(&request.get_ref().map)?;
-        let info = service.map_info(&name).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let name = map_name(&request.get_ref().map).map_err(status_of)?;
+        let info = service.map_info(&name).await.map_err(status_of)?;
         Ok(answered(info.into()))
     }
 
@@ -40,8 +41,8 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::ListMapsRequest>,
     ) -> Result<Response<pb::ListMapsResponse>, Status> {
-        let service = service_of(&request)?;
-        let (maps, unavailable) = (service.list_maps().await?, service.unavailable_maps());
+        let service = service_of(&request).map_err(status_of)?;
+        let (maps, unavailable) = (service.list_maps().await.map_err(status_of)?, service.unavailable_maps());
         Ok(answered(MapList { maps, unavailable }.into()))
     }
 
@@ -49,9 +50,9 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::DeleteMapRequest>,
     ) -> Result<Response<pb::DeleteMapResponse>, Status> {
-        let service = service_of(&request)?;
-        let name = map_name(&request.get_ref().map)?;
-        service.delete_map(&name).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let name = map_name(&request.get_ref().map).map_err(status_of)?;
+        service.delete_map(&name).await.map_err(status_of)?;
         Ok(Response::new(pb::DeleteMapResponse {}))
     }
 
@@ -59,10 +60,10 @@ impl Maps for Adapter {
         &self,
         request: Request<pb::SnapshotMapRequest>,
     ) -> Result<Response<Self::SnapshotMapStream>, Status> {
-        let service = service_of(&request)?;
-        let name = map_name(&request.get_ref().map)?;
-        let file = service.snapshot_map(&name).await?;
-        let kept = self.admission.keep(snapshot_bytes(file.bytes.len()))?;
+        let service = service_of(&request).map_err(status_of)?;
+        let name = map_name(&request.get_ref().map).map_err(status_of)?;
+        let file = service.snapshot_map(&name).await.map_err(status_of)?;
+        let kept = self.admission.keep(snapshot_bytes(file.bytes.len())).map_err(status_of)?;
         let pieces = snapshot_pieces(file).map(move |piece| {
             let _until_sent = &kept;
             Ok(piece)
@@ -74,12 +75,12 @@ impl Maps for Adapter {
         &self,
         pieces: Request<Streaming<pb::RestoreMapRequest>>,
     ) -> Result<Response<pb::RestoreMapResponse>, Status> {
-        let Authorized { caller, service } = Authorized::of(pieces.extensions())?.clone();
+        let Authorized { caller, service } = Authorized::of(pieces.extensions()).map_err(status_of)?.clone();
         let most = service.limits().map_file_bytes_max;
-        let arrival = InboundBody::of(pieces.extensions())?.clone();
+        let arrival = InboundBody::of(pieces.extensions()).map_err(status_of)?.clone();
         let (name, replace, file) =
             gather(pieces.into_inner(), &arrival, caller.allowed_maps(), most).await?;
-        let info = service.restore_map(name, file, replace).await?;
+        let info = service.restore_map(name, file, replace).await.map_err(status_of)?;
         Ok(answered(pb::RestoreMapResponse { map: Some(info.into()) }))
     }
 }
@@ -93,16 +94,16 @@ async fn gather(
     most: usize,
 ) -> Result<(MapName, bool, Bytes), Status> {
     let mut piece = pieces.message().await?.unwrap_or_default();
-    let (name, replace) = (map_name(&piece.map)?, piece.replace);
-    allowed_maps.permit(&name)?;
+    let (name, replace) = (map_name(&piece.map).map_err(status_of)?, piece.replace);
+    allowed_maps.permit(&name).map_err(status_of)?;
     let mut file = BytesMut::new();
     loop {
         if file.len() + piece.data.len() > most {
             let message = format!("map_file_bytes_max is {most}: the map file is larger");
-            return Err(ServiceError::new(Reason::MapFileTooLarge, message).into());
+            return Err(status_of(ServiceError::new(Reason::MapFileTooLarge, message)));
         }
         // Compressed, it came as less.
-        arrival.at_least(file.len() + piece.data.len())?;
+        arrival.at_least(file.len() + piece.data.len()).map_err(status_of)?;
         file.extend_from_slice(&piece.data);
         match pieces.message().await? {
             Some(next) => piece = next,

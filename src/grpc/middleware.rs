@@ -16,10 +16,10 @@ use super::{deadline, not_grpc, status};
 use crate::access::Operation;
 use crate::admission::{Ending, Endings};
 use crate::middleware::Protocol;
-use crate::service::ServiceError;
 use crate::telemetry::RequestOutcome;
-use crate::util::excerpt;
-use crate::wire::REASON;
+use mrol_client::wire::{REASON, status_of};
+use mrol_map::util::excerpt;
+use mrol_service::ServiceError;
 
 /// gRPC, whose messages may have `message_bytes_max` bytes.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Protocol for Grpc {
     }
 
     fn refusal(&self, error: ServiceError) -> Response {
-        Status::from(error).into_http()
+        status_of(error).into_http()
     }
 
     fn endings(&self, request: &Request, begin: Instant) -> Endings {
@@ -84,6 +84,6 @@ impl Protocol for Grpc {
 fn trailers(error: ServiceError) -> Option<HeaderMap> {
     let mut trailers = HeaderMap::new();
     // Without a status the client takes the call for cut, which it is.
-    let _ = Status::from(error).add_header(&mut trailers);
+    let _ = status_of(error).add_header(&mut trailers);
     Some(trailers)
 }

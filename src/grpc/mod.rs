@@ -12,6 +12,7 @@ mod occupancy;
 mod question;
 mod status;
 mod stream;
+mod stubs;
 
 use prost::Message;
 use tonic::codec::CompressionEncoding;
@@ -23,14 +24,14 @@ use tonic_health::server::HealthReporter;
 use crate::access::Authorized;
 use crate::admission::{Admission, AnswerBytes, InboundBody};
 use crate::middleware::Middleware;
-use crate::service::{MapService, ServiceError};
 use crate::telemetry::RequestRecorder;
-use crate::wire::pb;
 use decompression::Inflation;
 use middleware::Grpc;
-use pb::mapping_server::{self, MappingServer};
-use pb::maps_server::{self, MapsServer};
-use pb::occupancy_server::{self, OccupancyServer};
+use mrol_client::wire::pb;
+use mrol_service::{MapService, ServiceError};
+use stubs::mapping_server::{self, MappingServer};
+use stubs::maps_server::{self, MapsServer};
+use stubs::occupancy_server::{self, OccupancyServer};
 
 /// What every handler has at hand, besides the service that its caller may use.
 #[derive(Debug, Clone)]

@@ -6,15 +6,15 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::former::{Keeping, same_map};
 use super::stream::{Answers, Message};
+use super::stubs::occupancy_server::Occupancy;
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
-use crate::map::MapName;
-use crate::service::{
+use mrol_client::wire::{listing_bytes, pb, status_of, voxel_chunks};
+use mrol_map::map::MapName;
+use mrol_service::{
     ClassifyQuestion, FrontierQuestion, GridQuestion, MotionCheck, NearestQuestion, PoseCheck, RayQuestion,
     ServiceError, SphereCheck,
 };
-use crate::wire::{listing_bytes, pb, voxel_chunks};
-use pb::occupancy_server::Occupancy;
 
 #[tonic::async_trait]
 impl Occupancy for Adapter {
@@ -32,9 +32,9 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::QueryPointsRequest>,
     ) -> Result<Response<pb::QueryPointsResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, query) = request.into_inner().try_into()?;
-        let answer = service.query_points(&map, query).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, query) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.query_points(&map, query).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -59,10 +59,10 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::ListVoxelsRequest>,
     ) -> Result<Response<Self::ListVoxelsStream>, Status> {
-        let service = service_of(&request)?;
-        let (map, request) = request.into_inner().try_into()?;
-        let listing = service.list_voxels(&map, request).await?;
-        let kept = self.admission.keep(listing_bytes(listing.keys.len()))?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, request) = request.into_inner().try_into().map_err(status_of)?;
+        let listing = service.list_voxels(&map, request).await.map_err(status_of)?;
+        let kept = self.admission.keep(listing_bytes(listing.keys.len())).map_err(status_of)?;
         let chunks = voxel_chunks(listing).map(move |chunk| {
             let _until_sent = &kept;
             Ok(chunk)
@@ -74,9 +74,9 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::ListKeepOutsRequest>,
     ) -> Result<Response<pb::ListKeepOutsResponse>, Status> {
-        let service = service_of(&request)?;
-        let map = MapName::new(&request.into_inner().map).map_err(ServiceError::from)?;
-        let listing = service.list_keep_outs(&map).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let map = MapName::new(&request.into_inner().map).map_err(ServiceError::from).map_err(status_of)?;
+        let listing = service.list_keep_outs(&map).await.map_err(status_of)?;
         Ok(answered(listing.into()))
     }
 
@@ -84,9 +84,9 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::GetBlockRequest>,
     ) -> Result<Response<pb::GetBlockResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, request) = request.into_inner().try_into()?;
-        let answer = service.get_block(&map, request).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, request) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.get_block(&map, request).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
@@ -94,17 +94,21 @@ impl Occupancy for Adapter {
         &self,
         request: Request<pb::ListObserversRequest>,
     ) -> Result<Response<pb::ListObserversResponse>, Status> {
-        let service = service_of(&request)?;
-        let (map, request) = request.into_inner().try_into()?;
-        let answer = service.list_observers(&map, request).await?;
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, request) = request.into_inner().try_into().map_err(status_of)?;
+        let answer = service.list_observers(&map, request).await.map_err(status_of)?;
         Ok(answered(answer.into()))
     }
 
     async fn watch(&self, request: Request<pb::WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {
-        let service = service_of(&request)?;
-        let (map, request) = request.into_inner().try_into()?;
-        let messages = service.watch(&map, request).await?.into_stream(self.admission.told_to_drain());
-        Ok(Response::new(Box::pin(messages.map(|message| Ok(message?.into())))))
+        let service = service_of(&request).map_err(status_of)?;
+        let (map, request) = request.into_inner().try_into().map_err(status_of)?;
+        let messages = service
+            .watch(&map, request)
+            .await
+            .map_err(status_of)?
+            .into_stream(self.admission.told_to_drain());
+        Ok(Response::new(Box::pin(messages.map(|message| Ok(message.map_err(status_of)?.into())))))
     }
 
     async fn check_poses(

@@ -8,9 +8,9 @@ use super::stream::{self, Answers, Counted};
 use super::{Adapter, answered, service_of};
 use crate::access::Operation;
 use crate::admission::{InboundBody, off_runtime};
-use crate::map::MapName;
-use crate::service::{Answered, MapService, Question, ServiceError};
-use crate::wire::{QuestionMessage, pb, question_of};
+use mrol_client::wire::{QuestionMessage, pb, question_of, status_of};
+use mrol_map::map::MapName;
+use mrol_service::{Answered, MapService, Question, ServiceError};
 
 impl Adapter {
     /// Answers one question.
@@ -21,11 +21,12 @@ impl Adapter {
         (MapName, Q): TryFrom<M, Error = ServiceError>,
         A: Message + From<Answered<Q::Answer>>,
     {
-        let service = service_of(&request)?;
-        let arrival = InboundBody::of(request.extensions())?.clone();
-        arrival.at_least(request.get_ref().memory_bytes())?;
-        let (map, question) = question::<Q, _, _>(&service, request.into_inner(), arrival).await?;
-        Ok(answered(service.ask(&map, question).await?.into()))
+        let service = service_of(&request).map_err(status_of)?;
+        let arrival = InboundBody::of(request.extensions()).map_err(status_of)?.clone();
+        arrival.at_least(request.get_ref().memory_bytes()).map_err(status_of)?;
+        let (map, question) =
+            question::<Q, _, _>(&service, request.into_inner(), arrival).await.map_err(status_of)?;
+        Ok(answered(service.ask(&map, question).await.map_err(status_of)?.into()))
     }
 
     /// Answers questions in order, each at one revision of its own; one that fails ends the stream.

@@ -2,9 +2,9 @@
 
 use tonic::{Code, Status};
 
-use crate::service::{ErrorCode, Reason, ServiceError};
 use crate::telemetry::RequestOutcome;
-use crate::wire::REASON;
+use mrol_client::wire::{REASON, status_of};
+use mrol_service::{ErrorCode, Reason, ServiceError};
 
 /// True of a failure that concerns the stream and not one of its requests.
 pub(super) fn ends_stream(error: &ServiceError) -> bool {
@@ -19,11 +19,11 @@ pub(super) fn of_request(status: Status, message_bytes_max: usize) -> Status {
     match status.code() {
         Code::OutOfRange | Code::ResourceExhausted if of_tonic => {
             let message = format!("message_bytes_max is {message_bytes_max}: {}", status.message());
-            ServiceError::new(Reason::MessageTooLarge, message).into()
+            status_of(ServiceError::new(Reason::MessageTooLarge, message))
         }
         Code::Internal if of_tonic => {
             let message = format!("the message cannot be read: {}", status.message());
-            ServiceError::new(Reason::BadMessage, message).into()
+            status_of(ServiceError::new(Reason::BadMessage, message))
         }
         _ => status,
     }
@@ -66,7 +66,7 @@ mod tests {
     #[test]
     fn a_failure_keeps_its_message_and_its_word() {
         let error = ServiceError::new(Reason::GuessRequired, "no guess");
-        let status = Status::from(error);
+        let status = status_of(error);
         assert_eq!((status.code(), status.message()), (Code::FailedPrecondition, "no guess"));
         assert_eq!(status.metadata().get(REASON).unwrap(), "guess_required");
     }
@@ -77,7 +77,7 @@ mod tests {
         assert_eq!(unreadable.code(), Code::InvalidArgument);
         assert_eq!(unreadable.metadata().get(REASON).unwrap(), "bad_message");
         let defect = ServiceError::new(Reason::JobPanicked, "a defect");
-        assert_eq!(of_request(defect.into(), 1).code(), Code::Internal);
+        assert_eq!(of_request(status_of(defect), 1).code(), Code::Internal);
         let large = of_request(Status::out_of_range("too large"), 7);
         assert_eq!(
             (large.code(), large.message()),

@@ -17,10 +17,10 @@ use super::{Adapter, status};
 use crate::access::{Authorized, Operation};
 use crate::admission::{Admission, InboundBody, MemoryPermit, RateLimitKey, draining};
 use crate::middleware::Protocol;
-use crate::service::{MapService, ServiceError};
-use crate::sync::polled_by_runtime;
 use crate::telemetry::RequestRecorder;
-use crate::wire::{REASON, pb};
+use mrol_client::wire::{REASON, pb, status_of};
+use mrol_map::sync::polled_by_runtime;
+use mrol_service::{MapService, ServiceError};
 
 /// Requests read ahead of the one in hand, and answers kept for a client that reads slowly, at most.
 const MESSAGES_AHEAD_MAX: usize = 4;
@@ -95,9 +95,10 @@ impl Adapter {
         let (inbox, read) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let (outbox, answers) = mpsc::channel(MESSAGES_AHEAD_MAX);
         let extensions = requests.extensions();
-        let (arrival, asking) = (InboundBody::of(extensions)?.clone(), RateLimitKey::of(extensions));
+        let (arrival, asking) =
+            (InboundBody::of(extensions).map_err(status_of)?.clone(), RateLimitKey::of(extensions));
         let (admission, recorder) = (self.admission.clone(), self.recorder.clone());
-        let authorized = Authorized::of(extensions)?.clone();
+        let authorized = Authorized::of(extensions).map_err(status_of)?.clone();
         let former = M::Former::default();
         let worker = Worker { admission, recorder, asking, authorized, operation, failed, handle, former };
         let compressed = extensions.get().copied().unwrap_or(Compressed(true));
@@ -156,12 +157,12 @@ impl<M: Message> Reader<M> {
             // Compressed, it came as less.
             Ok(message) => match self.arrival.take().at_least(message.memory_bytes()) {
                 Ok(charge) => Ok((message, charge)),
-                Err(refusal) => Err(refusal.into()),
+                Err(refusal) => Err(status_of(refusal)),
             },
             Err(unreadable) => Err(self
                 .arrival
                 .refusal()
-                .map_or_else(|| status::of_request(unreadable, self.message_bytes_max), Status::from)),
+                .map_or_else(|| status::of_request(unreadable, self.message_bytes_max), status_of)),
         })
     }
 }
@@ -188,8 +189,8 @@ impl<A: prost::Message, H, P> Worker<A, H, P> {
         loop {
             let answer = tokio::select! {
                 biased;
-                () = self.admission.lifecycle().draining() => Err(draining().into()),
-                withdrawn = self.authorized.caller.withdrawn() => Err(withdrawn.into()),
+                () = self.admission.lifecycle().draining() => Err(status_of(draining())),
+                withdrawn = self.authorized.caller.withdrawn() => Err(status_of(withdrawn)),
                 request = inbox.recv() => match request {
                     Some(request) => self.answer(request).await,
                     None => return,
@@ -217,7 +218,7 @@ impl<A: prost::Message, H, P> Worker<A, H, P> {
                     .failed
                     .filter(|_| !status::ends_stream(&error))
                     .map(|failed| failed(error.clone().into()));
-                Status::from(error)
+                status_of(error)
             }),
             Err(unreadable) => Err(unreadable),
         };
@@ -264,7 +265,7 @@ mod tests {
 
     use super::*;
     use crate::admission::Lifecycle;
-    use crate::service::Limits;
+    use mrol_service::Limits;
 
     const BYTES: usize = 100_000;
 

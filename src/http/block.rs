@@ -17,12 +17,12 @@ use super::middleware::Service;
 use super::octets::BlockBytes;
 use super::params::{Map, Numbers3, Numbers7, Params, RegionParams};
 use super::pieces::{self, Pieces};
-use crate::map::DistanceBlock;
-use crate::service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels, Reason, ServiceError};
-use crate::util::Keyword;
-use crate::voxel::{BlockMask, VoxelKey};
-use crate::wire::json::{ByKeyword, JsonVersion, VoxelIndex, described_by_words};
-use crate::wire::required;
+use crate::json::{ByKeyword, JsonVersion, VoxelIndex, described_by_words};
+use mrol_client::wire::required;
+use mrol_map::map::DistanceBlock;
+use mrol_map::util::Keyword;
+use mrol_map::voxel::{BlockMask, VoxelKey};
+use mrol_service::{BlockAnswer, BlockForm, BlockRequest, BlockVoxels, Reason, ServiceError};
 
 /// Which part of the map, in which form.
 #[derive(Deserialize, IntoParams)]
@@ -254,7 +254,7 @@ fn as_bytes(answer: BlockAnswer) -> Response {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::Cell;
+    use mrol_map::voxel::Cell;
 
     #[test]
     fn a_block_is_written_as_its_indices_and_its_bytes() {

@@ -9,9 +9,9 @@ use super::error::HttpError;
 use super::object::Object;
 use super::{Adapter, params, unreadable};
 use crate::admission::{InboundBody, off_runtime};
-use crate::service::{PointCloud, Reason, ServiceError};
-use crate::util::excerpt;
-use crate::wire::InField;
+use mrol_client::wire::InField;
+use mrol_map::util::excerpt;
+use mrol_service::{PointCloud, Reason, ServiceError};
 
 const JSON: &str = "application/json";
 const OCTET_STREAM: &str = "application/octet-stream";

@@ -12,10 +12,10 @@ use super::object::Object;
 use super::octets::PointBytes;
 use super::params::{Map, request_id_of};
 use super::shapes::{BoxBody, OrientedBoxBody, SphereBody};
-use crate::map::RequestId;
-use crate::service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
-use crate::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
-use crate::wire::json::{JsonVersion, VoxelIndex};
+use crate::json::described;
+use crate::json::{JsonVersion, VoxelIndex};
+use mrol_map::voxel::{INDEX_MAX, INDEX_MIN, VoxelKey};
+use mrol_service::{Deletion, DeletionAnswer, DeletionTarget, Reason, ServiceError};
 
 /// What is deleted: exactly one target.
 #[derive(Deserialize, ToSchema)]
@@ -41,7 +41,7 @@ pub(super) struct DeletionBody {
     #[serde(default)]
     level: u32,
     /// The caller's own id of this change: sent again, it changes nothing.
-    #[schema(value_type = Option<RequestId>)]
+    #[schema(value_type = Option<described::RequestId>)]
     request_id: Option<String>,
     /// Of a region, only what no scan after this revision touched although one saw well beyond.
     not_seen_since: Option<u64>,
@@ -56,7 +56,7 @@ pub(super) struct DeletionParams {
     #[serde(default)]
     level: u32,
     /// The caller's own id of this change.
-    #[param(value_type = Option<RequestId>, inline)]
+    #[param(value_type = Option<described::RequestId>, inline)]
     request_id: Option<String>,
 }
 

@@ -11,8 +11,8 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::access::Operation;
-use crate::service::{ErrorCode, Reason, ServiceError};
-use crate::util::excerpt;
+use mrol_map::util::excerpt;
+use mrol_service::{ErrorCode, Reason, ServiceError};
 
 /// A failed request.
 #[derive(Debug)]

@@ -17,9 +17,10 @@ use super::Adapter;
 use super::error::{HttpError, Problem};
 use super::middleware::Service;
 use super::params::{Map, Params};
-use crate::map::RobotName;
-use crate::service::{EventMessage, EventsQuery, ServiceError};
-use crate::wire::json::JsonEvent;
+use crate::json::JsonEvent;
+use crate::json::described;
+use mrol_map::map::RobotName;
+use mrol_service::{EventMessage, EventsQuery, ServiceError};
 
 /// Which events.
 #[derive(Deserialize, IntoParams)]
@@ -31,7 +32,7 @@ pub(super) struct EventsParams {
     #[serde(default)]
     since_number: u64,
     /// The robot; all of them without.
-    #[param(value_type = Option<RobotName>, inline)]
+    #[param(value_type = Option<described::RobotName>, inline)]
     robot: Option<String>,
 }
 

@@ -9,8 +9,8 @@ use utoipa::openapi::schema::OneOfBuilder;
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::bloom::FilterSettings;
-use crate::wire::json::{NO_FILTER, schema_of_words};
+use crate::json::{NO_FILTER, schema_of_words};
+use mrol_map::bloom::FilterSettings;
 
 /// An object with settings of filters, in which the server's default stands for what is left out; or `"none"`.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 
-use crate::service::MapVersion;
+use mrol_service::MapVersion;
 
 /// At which state of a map something was: its `mrol-revision`, `mrol-map-uuid` and `mrol-content-hash`.
 pub(super) fn of_version(version: &MapVersion) -> HeaderMap {

@@ -8,8 +8,8 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::geometry::Point;
-use crate::service::PointCloud;
+use mrol_map::geometry::Point;
+use mrol_service::PointCloud;
 
 /// `[[x, y, z], ...]`; a coordinate may be `null`, which stands for "no return" (JSON has no NaN).
 #[derive(Debug)]

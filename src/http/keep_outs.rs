@@ -10,9 +10,10 @@ use super::middleware::Service;
 use super::object::Object;
 use super::params::{KeepOutOfMap, Map, NoParams, Params, request_id_of};
 use super::shapes::{BoxBody, OrientedBoxBody, PrismBody, SphereBody};
-use crate::map::{KeepOutName, KeepOutShape, Region, RequestId};
-use crate::service::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut, Reason, ServiceError};
-use crate::wire::json::{JsonKeepOut, JsonVersion};
+use crate::json::described;
+use crate::json::{JsonKeepOut, JsonVersion};
+use mrol_map::map::{KeepOutName, KeepOutShape, Region};
+use mrol_service::{DeleteKeepOut, KeepOutAnswer, KeepOutList, PutKeepOut, Reason, ServiceError};
 
 /// A keep-out: exactly one of its shapes.
 #[derive(Deserialize, ToSchema)]
@@ -34,7 +35,7 @@ pub(super) struct KeepOutBody {
     /// When the server ends it, nanoseconds since the Unix epoch; never without.
     expires_at_ns: Option<i64>,
     /// The caller's own id of this change: sent again, it changes nothing.
-    #[schema(value_type = Option<RequestId>)]
+    #[schema(value_type = Option<described::RequestId>)]
     request_id: Option<String>,
 }
 
@@ -44,7 +45,7 @@ pub(super) struct KeepOutBody {
 #[into_params(parameter_in = Query)]
 pub(super) struct RemovalParams {
     /// The caller's own id of this change: sent again, it changes nothing.
-    #[param(value_type = Option<RequestId>, inline)]
+    #[param(value_type = Option<described::RequestId>, inline)]
     request_id: Option<String>,
 }
 

@@ -11,9 +11,9 @@ use super::middleware::Service;
 use super::object::Object;
 use super::octets::PointBytes;
 use super::params::{self, Map, Numbers3, Numbers6};
-use crate::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
-use crate::service::{LocalizationRequest, PointCloud, Reason, ServiceError};
-use crate::wire::json::{JsonLocalization, Vector3};
+use crate::json::{JsonLocalization, Vector3};
+use mrol_map::align::localize::{Gravity, LocalizationQuery, MAP_DOWN, SearchBox};
+use mrol_service::{LocalizationRequest, PointCloud, Reason, ServiceError};
 
 /// A scan, and what is known of where it was taken.
 #[derive(Deserialize, ToSchema)]

@@ -14,8 +14,8 @@ use super::middleware::Service;
 use super::octets::MapFileBytes;
 use super::params::{Map, NoParams, Params};
 use super::{Adapter, body, headers};
-use crate::wire::json::JsonMap;
-use crate::wire::snapshot_pieces;
+use crate::json::JsonMap;
+use mrol_client::wire::snapshot_pieces;
 
 /// Gives out a map at one revision as a map file.
 #[utoipa::path(

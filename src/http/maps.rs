@@ -10,10 +10,10 @@ use super::error::HttpError;
 use super::filter_choice::FilterChoice;
 use super::middleware::Service;
 use super::params::{Map, NoParams};
-use crate::bloom::FilterSettings;
-use crate::map::{LEVELS_DEFAULT, MapName, MapSettings};
-use crate::service::UnavailableMap;
-use crate::wire::json::JsonMap;
+use crate::json::JsonMap;
+use mrol_map::bloom::FilterSettings;
+use mrol_map::map::{LEVELS_DEFAULT, MapName, MapSettings};
+use mrol_service::UnavailableMap;
 
 /// The settings of a new map.
 #[derive(Deserialize, ToSchema)]

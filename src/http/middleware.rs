@@ -11,8 +11,8 @@ use super::error::{self, HttpError};
 use crate::access::{Authorized, Operation};
 use crate::admission::Endings;
 use crate::middleware::Protocol;
-use crate::service::{MapService, ServiceError};
 use crate::telemetry::RequestOutcome;
+use mrol_service::{MapService, ServiceError};
 
 /// HTTP/1 and HTTP/2.
 #[derive(Debug, Clone, Copy)]

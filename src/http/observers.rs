@@ -7,10 +7,10 @@ use utoipa::IntoParams;
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, Numbers3, Params, numbers};
-use crate::geometry::Point;
-use crate::service::{ObservedVoxel, ObserversRequest, Reason, ServiceError};
-use crate::voxel::VoxelKey;
-use crate::wire::json::JsonObservers;
+use crate::json::JsonObservers;
+use mrol_map::geometry::Point;
+use mrol_map::voxel::VoxelKey;
+use mrol_service::{ObservedVoxel, ObserversRequest, Reason, ServiceError};
 
 /// Which voxel: exactly one of `point` and `voxel`.
 #[derive(Deserialize, IntoParams)]

@@ -13,11 +13,12 @@ use super::middleware::Service;
 use super::object::Object;
 use super::octets::{BitmapBytes, PointBytes};
 use super::params::{self, Map, Numbers7};
-use crate::geometry::Pose;
-use crate::map::Lookup;
-use crate::service::{PointAnswer, PointCloud, PointQuery, ServiceError};
-use crate::wire::json::{ByKeyword, JsonPose, JsonVersion};
-use crate::wire::{InField, uuid_from};
+use crate::json::described;
+use crate::json::{ByKeyword, JsonPose, JsonVersion};
+use mrol_client::wire::{InField, uuid_from};
+use mrol_map::geometry::Pose;
+use mrol_map::map::Lookup;
+use mrol_service::{PointAnswer, PointCloud, PointQuery, ServiceError};
 
 /// Points, and where they are.
 #[derive(Deserialize, ToSchema)]
@@ -33,7 +34,7 @@ pub(super) struct QueryBody {
     #[serde(default)]
     level: u32,
     /// What is asked: the exact set, or the Bloom filter; `exact` without.
-    #[schema(value_type = Lookup, required = false)]
+    #[schema(value_type = described::Lookup, required = false)]
     #[serde(default)]
     lookup: ByKeyword<Lookup>,
     /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.
@@ -58,7 +59,7 @@ pub(super) struct QueryParams {
     #[serde(default)]
     level: u32,
     /// What is asked: the exact set, or the Bloom filter; `exact` without.
-    #[param(value_type = Lookup, inline, required = false)]
+    #[param(value_type = described::Lookup, inline, required = false)]
     #[serde(default)]
     lookup: ByKeyword<Lookup>,
     /// The answer waits until the map has reached this revision, at most `limits.min_revision_wait_max_s`.

@@ -14,11 +14,11 @@ use super::Adapter;
 use super::error::HttpError;
 use super::unreadable;
 use crate::access::Authorized;
-use crate::geometry::{self, Pose};
-use crate::map::{KeepOutName, MapName, Region, RequestId};
-use crate::service::{Reason, ServiceError};
-use crate::util::excerpt;
-use crate::wire::InField;
+use mrol_client::wire::InField;
+use mrol_map::geometry::{self, Pose};
+use mrol_map::map::{KeepOutName, MapName, Region, RequestId};
+use mrol_map::util::excerpt;
+use mrol_service::{Reason, ServiceError};
 
 /// The `{map}` of a route, which the caller may name: who may not is told so before a body is read.
 pub(super) struct Map(pub(super) MapName);

@@ -8,7 +8,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
 use crate::admission::MemoryPermit;
-use crate::service::{Reason, ServiceError};
+use mrol_service::{Reason, ServiceError};
 
 /// How an array is written.
 #[derive(Debug, Clone, Copy)]

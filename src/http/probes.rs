@@ -13,8 +13,8 @@ use super::maps::UnavailableResponse;
 use super::middleware::Service;
 use super::params::NoParams;
 use crate::access::Authorized;
-use crate::service::MapService;
 use crate::telemetry::Metrics;
+use mrol_service::MapService;
 
 /// Whether requests are taken.
 #[derive(Debug, Default, Serialize, ToSchema)]

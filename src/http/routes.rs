@@ -87,12 +87,12 @@ mod tests {
     use crate::admission::{Admission, Lifecycle};
     use crate::http::middleware::Http;
     use crate::middleware::Middleware;
-    use crate::service::{Limits, MapService, ServiceSettings};
-    use crate::store::OpeningProgress;
     use crate::telemetry::{Audit, Metrics, RequestRecorder};
     use axum::body::{Body, to_bytes};
     use axum::http::{Request, StatusCode};
     use axum::routing::get;
+    use mrol_service::{Limits, MapService, ServiceSettings};
+    use mrol_store::OpeningProgress;
     use tower::ServiceExt;
 
     #[tokio::test]

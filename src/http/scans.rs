@@ -13,14 +13,15 @@ use super::middleware::Service;
 use super::object::Object;
 use super::octets::ScanBytes;
 use super::params::{self, Map, Numbers3, Numbers6, Numbers7, Numbers36};
-use crate::align::{Method, PoseCovariance};
-use crate::geometry::{Point, Pose};
-use crate::map::{RobotName, SessionName};
-use crate::mapping::Guess;
-use crate::scan::PointFilter;
-use crate::service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference};
-use crate::wire::json::{ByKeyword, Corners3, JsonPose, JsonScan, Vector3};
-use crate::wire::{InField, gravity_in_sensor};
+use crate::json::described;
+use crate::json::{ByKeyword, Corners3, JsonPose, JsonScan, Vector3};
+use mrol_client::wire::{InField, gravity_in_sensor};
+use mrol_map::align::{Method, PoseCovariance};
+use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::{RobotName, SessionName};
+use mrol_map::mapping::Guess;
+use mrol_map::scan::PointFilter;
+use mrol_service::{PointTimes, Reason, ScanRequest, ServiceError, TimeReference};
 
 /// Numbers of a covariance of a pose.
 const COVARIANCE_NUMBERS: usize = 36;
@@ -34,10 +35,10 @@ const COVARIANCE_NUMBERS: usize = 36;
 }))]
 pub(super) struct ScanBody {
     /// The robot that sends it.
-    #[schema(value_type = RobotName)]
+    #[schema(value_type = described::RobotName)]
     robot: String,
     /// The run of the robot's program; empty without.
-    #[schema(value_type = SessionName, required = false)]
+    #[schema(value_type = described::SessionName, required = false)]
     #[serde(default)]
     session: String,
     /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
@@ -83,7 +84,7 @@ pub(super) struct ScanBody {
     /// alone.
     carve: Option<bool>,
     /// How it is aligned; the server's setting without.
-    #[schema(value_type = Option<Method>)]
+    #[schema(value_type = Option<described::Method>)]
     method: Option<ByKeyword<Method>>,
     /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
     foreground_level: Option<u32>,
@@ -106,10 +107,10 @@ pub(super) struct ScanBody {
 #[into_params(parameter_in = Query)]
 pub(super) struct ScanParams {
     /// The robot that sends it.
-    #[param(value_type = RobotName, inline)]
+    #[param(value_type = described::RobotName, inline)]
     robot: String,
     /// The run of the robot's program; empty without.
-    #[param(value_type = SessionName, inline, required = false)]
+    #[param(value_type = described::SessionName, inline, required = false)]
     #[serde(default)]
     session: String,
     /// The robot's own number of the scan, ascending and unique in its session: sent again, it changes
@@ -154,7 +155,7 @@ pub(super) struct ScanParams {
     /// alone.
     carve: Option<bool>,
     /// How it is aligned; the server's setting without.
-    #[param(value_type = Option<Method>, inline)]
+    #[param(value_type = Option<described::Method>, inline)]
     method: Option<ByKeyword<Method>>,
     /// Tell the points that fall in no occupied voxel of this level. For `/alignment` alone.
     foreground_level: Option<u32>,

@@ -7,7 +7,7 @@ use axum::body::Bytes;
 use tokio::sync::Mutex;
 use tokio::time::Instant;
 
-use crate::service::{AllowedMaps, ServiceError};
+use mrol_service::{AllowedMaps, ServiceError};
 
 /// Texts that are in memory at once, those among them that somebody still reads. Where there are as many, the newest
 /// answers however old it is.
@@ -100,8 +100,8 @@ fn shared(text: &Arc<String>) -> Bytes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::MapName;
-    use crate::service::Reason;
+    use mrol_map::map::MapName;
+    use mrol_service::Reason;
 
     const KEPT: Duration = Duration::from_secs(1);
 

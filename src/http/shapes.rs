@@ -4,11 +4,11 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::object::Object;
-use crate::geometry::Pose;
-use crate::map::{Prism, PrismError, Region, RegionError};
-use crate::service::ServiceError;
-use crate::wire::InField;
-use crate::wire::json::{JsonPose, Vector2, Vector3};
+use crate::json::{JsonPose, Vector2, Vector3};
+use mrol_client::wire::InField;
+use mrol_map::geometry::Pose;
+use mrol_map::map::{Prism, PrismError, Region, RegionError};
+use mrol_service::ServiceError;
 
 /// A box along the map's axes, meters.
 #[derive(Deserialize, ToSchema)]

@@ -15,8 +15,8 @@ use super::params::NoParams;
 use super::probes::{self, OpeningResponse, ReadyResponse};
 use super::viewer;
 use crate::access::Access;
-use crate::service::{Reason, ServiceError};
-use crate::store::{Opened, OpeningProgress};
+use mrol_service::{Reason, ServiceError};
+use mrol_store::{Opened, OpeningProgress};
 
 /// The routes of a server that is starting.
 pub fn starting(progress: Arc<OpeningProgress>, access: Access) -> Router {

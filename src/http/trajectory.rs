@@ -16,9 +16,10 @@ use super::Adapter;
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, Params};
-use crate::map::{MappedScan, RobotName};
-use crate::service::{Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
-use crate::wire::json::{JsonPose, JsonVersion};
+use crate::json::described;
+use crate::json::{JsonPose, JsonVersion};
+use mrol_map::map::{MappedScan, RobotName};
+use mrol_service::{Reason, ServiceError, TrajectoryAnswer, TrajectoryPieces, TrajectoryQuery};
 
 /// Which poses.
 #[derive(Deserialize, IntoParams)]
@@ -26,7 +27,7 @@ use crate::wire::json::{JsonPose, JsonVersion};
 #[into_params(parameter_in = Query)]
 pub(super) struct TrajectoryParams {
     /// The robot; all of them without.
-    #[param(value_type = Option<RobotName>, inline)]
+    #[param(value_type = Option<described::RobotName>, inline)]
     robot: Option<String>,
     /// Scans that made a revision after this one; 0 without.
     #[param(required = false)]

@@ -8,9 +8,10 @@ use super::body;
 use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, request_id_of};
-use crate::map::{RequestId, RobotName, SessionName};
-use crate::service::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget};
-use crate::wire::json::JsonVersion;
+use crate::json::JsonVersion;
+use crate::json::described;
+use mrol_map::map::{RobotName, SessionName};
+use mrol_service::{Reason, ServiceError, Undo, UndoAnswer, UndoTarget};
 
 /// What is taken back: `robot` and `scan_id` (and `session`), `robot` and `since_revision`, or `revision`.
 #[derive(Deserialize, ToSchema)]
@@ -18,10 +19,10 @@ use crate::wire::json::JsonVersion;
 #[schema(example = json!({"robot": "example", "scan_id": 1}))]
 pub(super) struct UndoBody {
     /// The robot whose scans are meant.
-    #[schema(value_type = Option<RobotName>)]
+    #[schema(value_type = Option<described::RobotName>)]
     robot: Option<String>,
     /// The run of the robot's program; the empty one without.
-    #[schema(value_type = Option<SessionName>)]
+    #[schema(value_type = Option<described::SessionName>)]
     session: Option<String>,
     /// One scan of the robot.
     scan_id: Option<u64>,
@@ -30,7 +31,7 @@ pub(super) struct UndoBody {
     /// The scan or the deletion that made this revision.
     revision: Option<u64>,
     /// The caller's own id of this change: sent again, it changes nothing.
-    #[schema(value_type = Option<RequestId>)]
+    #[schema(value_type = Option<described::RequestId>)]
     request_id: Option<String>,
 }
 

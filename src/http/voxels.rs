@@ -13,10 +13,10 @@ use super::error::HttpError;
 use super::middleware::Service;
 use super::params::{Map, Numbers2, Numbers3, Numbers7, Params, RegionParams, numbers, pose};
 use super::pieces::{self, Pieces};
-use crate::map::{Frustum, VoxelSelection};
-use crate::service::{ListingRequest, Reason, ServiceError};
-use crate::voxel::VoxelKey;
-use crate::wire::json::{JsonVersion, VoxelIndex};
+use crate::json::{JsonVersion, VoxelIndex};
+use mrol_map::map::{Frustum, VoxelSelection};
+use mrol_map::voxel::VoxelKey;
+use mrol_service::{ListingRequest, Reason, ServiceError};
 
 /// Voxels that are written to JSON at once, about half a MiB, and the bytes of one at most: three numbers of eight characters,
 /// and what stands between them.
@@ -148,7 +148,7 @@ impl TryFrom<VoxelsParams> for ListingRequest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel::{INDEX_MAX, INDEX_MIN};
+    use mrol_map::voxel::{INDEX_MAX, INDEX_MIN};
 
     #[test]
     fn a_voxel_takes_no_more_text_than_is_kept_for_it() {

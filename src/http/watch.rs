@@ -19,9 +19,9 @@ use super::error::HttpError;
 use super::middleware::Service;
 use super::octets::WatchBytes;
 use super::params::{Map, Numbers3, Numbers7, Params, RegionParams};
-use crate::map::MapName;
-use crate::service::{ServiceError, WatchRequest};
-use crate::wire::{framed, pb};
+use mrol_client::wire::{framed, pb};
+use mrol_map::map::MapName;
+use mrol_service::{ServiceError, WatchRequest};
 
 /// From where on, and of which part.
 #[derive(Deserialize, IntoParams)]

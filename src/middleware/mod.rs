@@ -22,8 +22,8 @@ use tracing::{Instrument, Span, info_span};
 
 use crate::access::{Gate, Operation, Peer};
 use crate::admission::Admission;
-use crate::service::ServiceError;
 use crate::telemetry::{REQUEST, RequestRecorder};
+use mrol_service::ServiceError;
 
 /// The name of what is no operation, in metrics and the log: whatever a client sends, it is one of few.
 const UNKNOWN: &str = "unknown";

@@ -8,8 +8,8 @@ use axum::response::Response;
 
 use crate::access::Operation;
 use crate::admission::Endings;
-use crate::service::ServiceError;
 use crate::telemetry::RequestOutcome;
+use mrol_service::ServiceError;
 
 /// A protocol by which requests come: how it names operations, and how it tells failures.
 pub trait Protocol: Clone + Send + Sync + 'static {

@@ -5,9 +5,9 @@ use std::time::Duration;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
 use crate::admission::Lifecycle;
-use crate::service::MapService;
 use crate::telemetry::Metrics;
-use crate::util::unix_time_ns;
+use mrol_map::util::unix_time_ns;
+use mrol_service::MapService;
 
 /// How often it is asked whether a snapshot is due.
 const SNAPSHOTS_DUE_INTERVAL: Duration = Duration::from_millis(250);

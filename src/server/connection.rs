@@ -23,7 +23,7 @@ use super::stream::{Count, Counted, secure};
 use super::tracked_body::TrackedBody;
 use crate::access::Peer;
 use crate::admission::CloseConnection;
-use crate::sync::polled_by_runtime;
+use mrol_map::sync::polled_by_runtime;
 
 /// How long a client may leave unread what it asked for.
 const UNREAD_MAX: Duration = Duration::from_secs(30);

@@ -15,8 +15,8 @@ use super::connection_slots::ConnectionSlots;
 use super::listener::Accepting;
 use super::protocol::{Protocol, RuntimeExecutor};
 use super::tls::Tls;
-use crate::service::Limits;
 use crate::telemetry::Metrics;
+use mrol_service::Limits;
 
 /// A protocol with its connections, whatever sockets they come from. A clone is another handle on the same ones.
 ///

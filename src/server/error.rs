@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use super::TlsError;
 use crate::access::KeyFileError;
-use crate::service::ServiceError;
 use crate::telemetry::TelemetryError;
+use mrol_service::ServiceError;
 
 /// Why the server could not start, or stopped.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +54,9 @@ pub enum ServerError {
     /// Connections cannot be secured.
     #[error(transparent)]
     Tls(#[from] TlsError),
+    /// Its threads cannot be started, or one panicked.
+    #[error("{0}")]
+    Runtime(String),
     /// Log or metrics.
     #[error(transparent)]
     Telemetry(#[from] TelemetryError),

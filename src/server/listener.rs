@@ -14,7 +14,7 @@ use super::protocol::Protocol;
 use super::socket::UnixSocket;
 use super::stream::Stream;
 use crate::access::{Peer, ReachedAt};
-use crate::wire::transport::KEEPALIVE_INTERVAL;
+use mrol_client::wire::transport::KEEPALIVE_INTERVAL;
 
 /// How long to wait after an error that the next connection would meet as well: too many open files.
 const PAUSE: Duration = Duration::from_millis(100);

@@ -6,9 +6,9 @@ use hyper::rt::Executor;
 use hyper_util::rt::TokioTimer;
 use hyper_util::server::conn::auto::Builder;
 
-use crate::service::Limits;
-use crate::sync::polled_by_runtime;
-use crate::wire::transport;
+use mrol_client::wire::transport;
+use mrol_map::sync::polled_by_runtime;
+use mrol_service::Limits;
 
 /// Streams of one HTTP/2 connection at once.
 const STREAMS_PER_CONNECTION_MAX: u32 = 128;
@@ -24,7 +24,7 @@ const ERROR_RESETS_MAX: usize = 128;
 /// Bytes by which a gRPC client shows that it is one: HTTP/2's preface.
 const PREFACE_BYTES: usize = 24;
 
-/// Spawns the tasks of connections on the runtime, known as its tasks to the checks of [`crate::sync`].
+/// Spawns the tasks of connections on the runtime, known as its tasks to the checks of [`mrol_map::sync`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RuntimeExecutor;
 

@@ -2,7 +2,7 @@
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use crate::service::Limits;
+use mrol_service::Limits;
 
 /// For maps, the log, threads and whatever else is no connection; half of what there is where that is less.
 const BESIDES_CONNECTIONS: usize = 512;

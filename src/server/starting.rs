@@ -11,8 +11,8 @@ use super::endpoint::Endpoint;
 use super::listener::{Accepting, TcpSocket};
 use super::protocol::Protocol;
 use super::tls::Tls;
-use crate::service::Limits;
 use crate::telemetry::Metrics;
+use mrol_service::Limits;
 
 /// Answers until the maps are open.
 pub(super) struct Starting {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::statvfs;
 
-use crate::service::{Gauges, MemoryReading};
+use mrol_service::{Gauges, MemoryReading};
 
 /// Where control groups are told.
 const CONTROL_GROUPS: &str = "/sys/fs/cgroup";

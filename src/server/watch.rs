@@ -5,8 +5,8 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::admission::Admission;
-use crate::service::MapService;
 use crate::telemetry::Metrics;
+use mrol_service::MapService;
 
 /// How often.
 const INTERVAL: Duration = Duration::from_secs(1);

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 
-use crate::service::{Change, End, Ended, MapVersion, Observer, Outcome, Reason};
+use mrol_service::{Change, End, Ended, MapVersion, Observer, Outcome, Reason};
 
 /// The target of the audit's lines.
 pub const AUDIT: &str = "mrol::audit";

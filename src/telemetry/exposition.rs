@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::fmt::{Display, Write};
 
 use super::map_counters::{self, Series};
-use crate::map::{FilterInfo, LevelInfo, MapName};
-use crate::service::{MapInfo, MapStorage, PoolUse, UnavailableMap};
-use crate::util::Durations;
+use mrol_map::map::{FilterInfo, LevelInfo, MapName};
+use mrol_map::util::Durations;
+use mrol_service::{MapInfo, MapStorage, PoolUse, UnavailableMap};
 
 /// Appends what was counted by map.
 pub(super) fn write_counters(text: &mut String, maps: &[(MapName, BTreeMap<Series, u64>)]) {

@@ -1,15 +1,15 @@
 //! What is counted by map. It is kept here and not by the recorder, which forgets no series: a map that is gone leaves
 //! none behind.
 
-use crate::util::Keyword;
+use mrol_map::util::Keyword;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use crate::align::Verdict;
-use crate::map::{Lookup, MapName};
-use crate::mapping::Recovered;
+use mrol_map::align::Verdict;
+use mrol_map::map::{Lookup, MapName};
+use mrol_map::mapping::Recovered;
 
 /// A counter with the map as its first label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -18,11 +18,11 @@ use super::families::{
 use super::log::TelemetryError;
 use super::map_counters::{Family, MapCounters};
 use super::{exposition, families};
-use crate::map::{MapName, RobotName};
-use crate::service::{
+use crate::build_info;
+use mrol_map::map::{MapName, RobotName};
+use mrol_service::{
     End, Ended, JudgedScan, MapInfo, Observer, Outcome, PoolUse, Readings, Reason, Shortage, UnavailableMap,
 };
-use crate::util::build;
 
 /// Upper bounds of the latency histogram, seconds: a small query takes 0.1 ms, an alignment up to seconds, and a change
 /// beside a disk that hangs as long as that.
@@ -98,7 +98,7 @@ impl Metrics {
         let metrics = Self(Arc::new(kept));
         metrics.record(families::describe);
         metrics.record(|| {
-            gauge!(BUILD_INFO, "version" => build::VERSION, "commit" => build::COMMIT, "features" => build::FEATURES)
+            gauge!(BUILD_INFO, "version" => build_info::VERSION, "commit" => build_info::COMMIT, "features" => build_info::FEATURES)
                 .set(1.0);
         });
         Ok(metrics)

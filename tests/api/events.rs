@@ -60,7 +60,7 @@ async fn accepted_refused_and_failed_scans_are_told_with_what_the_robot_was_answ
     }
     // The client tells the same.
     let told = client_of(&daemon).await.list_events(&map_a(), EventsQuery::default()).await.unwrap();
-    let as_json = |event: &ScanEvent| json!(mrol::wire::json::JsonEvent::from(event));
+    let as_json = |event: &ScanEvent| json!(mrol::json::JsonEvent::from(event));
     for (over_grpc, over_http) in told.iter().map(as_json).zip(&events) {
         for part in ["number", "robot", "scan_id", "points", "guess", "error"] {
             assert_eq!(over_grpc.get(part), over_http.get(part), "{part}");

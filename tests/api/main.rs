@@ -1,6 +1,5 @@
 //! What a running server promises: both protocols, bad input, its beginning, its limits and its end.
 
-#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod bad_input;
@@ -14,13 +13,11 @@ mod grpc;
 mod http;
 mod keep_outs;
 mod lifecycle;
-#[cfg(feature = "lab")]
 mod localize;
 mod memory_returns;
 mod observers;
 mod query_only;
 mod questions;
-#[cfg(feature = "lab")]
 mod recovery;
 mod regions;
 mod scan_requests;

@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use mrol::config::RobotConfig;
 use mrol::geometry::{Pose, pose_difference};
-use mrol::lab::simulate::{Scene, SpinningLidar, tours};
 use mrol::wire::pb;
+use mrol_simulate::{Scene, SpinningLidar, tours};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;

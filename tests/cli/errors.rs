@@ -123,3 +123,10 @@ fn an_address_that_is_taken_is_named_with_what_to_do() {
     let complaint = String::from_utf8(output.stderr).unwrap();
     assert!(complaint.contains(&address) && complaint.contains("--http-listen"), "{complaint}");
 }
+
+#[test]
+fn commands_that_moved_say_where_they_went() {
+    let said = complaint(&["bench", "lookup", "--structures", "exact"], 2);
+    assert!(said.ends_with("cargo run --release -p mrol-lab -- bench lookup --structures exact\n"), "{said}");
+    assert!(complaint(&["experiment"], 2).ends_with("-p mrol-lab -- experiment\n"));
+}

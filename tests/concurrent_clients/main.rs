@@ -4,7 +4,6 @@
 //! Runs for `MROL_STRESS_SECONDS` (3 where not set; CI takes 60). With the feature `deadlock_detection` it fails as soon as
 //! threads wait for each other in a circle; without, once nothing has moved for a while.
 
-#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod newcomers;

@@ -5,7 +5,6 @@
 //!
 //! Twenty rounds; `MROL_CRASH_ROUNDS=200 cargo test --test crash -- --nocapture` is the long form.
 
-#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod remaker;

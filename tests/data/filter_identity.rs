@@ -6,8 +6,8 @@
 use mrol::align::{AlignmentSettings, Method, MultiStartSettings, align};
 use mrol::bloom::FilterSettings;
 use mrol::geometry::{Point, Pose, pose_difference};
-use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{Lookup, MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol_simulate::{Scene, tours};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

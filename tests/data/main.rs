@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-#[cfg(feature = "server")]
 mod alignment;
-#[cfg(feature = "lab")]
 mod filter_identity;
 mod localization;
 mod maps;

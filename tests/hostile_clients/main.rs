@@ -4,7 +4,7 @@
 //! What is bounded by the clock here is generous, since tests run on busy machines. The strict form:
 //! `MROL_LIVEZ_MS=100 cargo test --release --test hostile_clients -- --nocapture`.
 
-#![cfg(all(feature = "server", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod bombs;

@@ -6,9 +6,9 @@ use mrol::align::localize::{
 };
 use mrol::align::{AlignmentSettings, Verdict};
 use mrol::geometry::{Point, Pose, pose_difference, translation_m};
-use mrol::lab::simulate::{Scene, Tour, tours};
 use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::util::StopSignal;
+use mrol_simulate::{Scene, Tour, tours};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

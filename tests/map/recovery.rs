@@ -2,12 +2,12 @@
 
 use mrol::align::PoseCovariance;
 use mrol::geometry::{Point, Pose, pose_difference};
-use mrol::lab::simulate::{Scene, SpinningLidar, tours};
 use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
 use mrol::mapping::{
     Guess, LocatedScan, LostRobots, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper, Sightings,
 };
 use mrol::util::StopSignal;
+use mrol_simulate::{Scene, SpinningLidar, tours};
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -2,8 +2,8 @@
 
 use mrol::align::{Alignment, AlignmentSettings, Verdict, align};
 use mrol::geometry::{Point, Pose, pose_difference};
-use mrol::lab::simulate::{Scene, tours};
 use mrol::map::{MapSettings, MappedScan, MultiResolutionMap, RobotName, ScanRecord};
+use mrol_simulate::{Scene, tours};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,5 @@
-//! Modules form layers without circles: a module names only modules of its own layer or below, no two modules beside each
-//! other name each other, and the core names no runtime, no protocol and no serialization.
+//! Within a crate no two modules beside each other name each other, and code that may be unsafe stays in the kernels. What
+//! crates may name is in their manifests.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,52 +8,26 @@ use std::path::{Path, PathBuf};
 use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
-/// Modules and their layers, bottom first.
-const LAYERS: [&[&str]; 16] = [
-    &["util", "geometry", "sync"],
-    &["voxel", "bloom"],
-    &["scan", "visibility"],
-    &["map"],
-    &["align", "planning"],
-    &["mapping"],
-    &["store"],
-    &["service"],
-    &["wire"],
-    &["access", "client"],
-    &["telemetry"],
-    &["admission"],
-    &["config", "middleware"],
-    &["grpc", "http"],
-    &["server"],
-    &["lab", "cli", "main"],
-];
-
-/// The last layer of the core.
-const CORE: usize = 5;
-
-/// Crates that the core must not know.
-const NOT_IN_THE_CORE: [&str; 8] = ["tokio", "tonic", "axum", "prost", "serde", "hyper", "tower", "utoipa"];
-
 /// What has SIMD variants: quantization, look-ups, filling a filter, taking a block apart, planners' questions, rays;
 /// and the prefetch.
 const KERNELS: [&str; 9] = [
-    "voxel/quantize",
-    "voxel/new_keys",
-    "bloom/fill",
-    "map/bounds.rs",
-    "map/lookup",
-    "planning/simd.rs",
-    "planning/rays/turns.rs",
-    "lab/rivals/dense/offsets",
-    "util/prefetch.rs",
+    "crates/map/src/voxel/quantize",
+    "crates/map/src/voxel/new_keys",
+    "crates/map/src/bloom/fill",
+    "crates/map/src/map/bounds.rs",
+    "crates/map/src/map/lookup",
+    "crates/map/src/planning/simd.rs",
+    "crates/map/src/planning/rays/turns.rs",
+    "crates/map/src/util/prefetch.rs",
+    "crates/lab/src/rivals/dense/offsets",
 ];
 
 /// A path in the crate, from its root: `["map", "lookup", "Lookup"]`.
 type CratePath = Vec<String>;
 
-/// A source file.
+/// A source file of one of the crates.
 struct Source {
-    /// From `src`.
+    /// From the root.
     file: PathBuf,
     /// Its module, from the crate's root.
     module: CratePath,
@@ -68,8 +42,6 @@ struct Named {
     module: CratePath,
     /// Paths in this crate.
     own: BTreeSet<CratePath>,
-    /// First segments of paths that begin with neither `crate`, `self` nor `super`: other crates among them.
-    others: BTreeSet<String>,
     /// Names that the module hands on from its children, with the child's name: `pub use child::Name`.
     handed_on: BTreeMap<String, String>,
 }
@@ -88,11 +60,7 @@ impl Named {
                     rest = &rest[1..];
                 }
             }
-            Some(other) => {
-                self.others.insert(other.to_owned());
-                return;
-            }
-            None => return,
+            _ => return,
         }
         from.extend_from_slice(rest);
         self.own.insert(from);
@@ -175,19 +143,29 @@ fn names_tests(meta: &syn::Meta) -> bool {
     }
 }
 
-fn sources() -> Vec<Source> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+/// The folders of sources, one for each crate.
+fn crates() -> Vec<PathBuf> {
+    let members = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path().join("src"));
+    [root().join("src")].into_iter().chain(members).collect()
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The sources of the crate in a folder.
+fn sources(src: &Path) -> Vec<Source> {
     let mut files = Vec::new();
-    rust_files(&src, &mut files);
+    rust_files(src, &mut files);
     let source = |path: PathBuf| {
-        let file = path.strip_prefix(&src).unwrap().to_owned();
+        let file = path.strip_prefix(src).unwrap().to_owned();
         let mut module: CratePath =
             file.with_extension("").iter().map(|name| name.to_str().unwrap().to_owned()).collect();
-        module.pop_if(|last| last == "mod" || last == "lib");
+        module.pop_if(|last| ["mod", "lib", "main"].contains(&last.as_str()));
         let text = fs::read_to_string(&path).unwrap();
         let mut named = Named { module: module.clone(), ..Named::default() };
         named.visit_file(&syn::parse_file(&text).unwrap());
-        Source { file, module, text, named }
+        Source { file: path.strip_prefix(root()).unwrap().to_owned(), module, text, named }
     };
     files.into_iter().map(source).collect()
 }
@@ -201,28 +179,6 @@ fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
             files.push(path);
         }
     }
-}
-
-fn layer_of(module: &str) -> Option<usize> {
-    LAYERS.iter().position(|modules| modules.contains(&module))
-}
-
-#[test]
-fn every_module_has_a_layer_and_names_none_above_it() {
-    let mut wrong = Vec::new();
-    for Source { file, module, named, .. } in sources() {
-        let Some(first) = module.first() else { continue };
-        let Some(layer) = layer_of(first) else {
-            wrong.push(format!("{}: module {first} has no layer", file.display()));
-            continue;
-        };
-        for other in named.own.iter().filter_map(|path| path.first()) {
-            if layer_of(other).is_some_and(|other| other > layer) {
-                wrong.push(format!("{}: {first} (layer {layer}) names {other}", file.display()));
-            }
-        }
-    }
-    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
 /// Which modules beside each other name each other: by the module that they are in, from the one that names to the named,
@@ -255,7 +211,7 @@ fn edges(sources: &[Source]) -> BTreeMap<CratePath, BTreeMap<(String, String), P
 #[test]
 fn no_modules_beside_each_other_name_each_other() {
     let mut circles = Vec::new();
-    for (parent, among) in edges(&sources()) {
+    for (parent, among) in crates().iter().flat_map(|src| edges(&sources(src))) {
         let mut reached: BTreeSet<(String, String)> = among.keys().cloned().collect();
         loop {
             let further: Vec<_> = reached
@@ -283,19 +239,8 @@ fn no_modules_beside_each_other_name_each_other() {
 }
 
 #[test]
-fn the_core_knows_no_runtime_and_no_protocol() {
-    for Source { file, module, named, .. } in sources() {
-        if module.first().and_then(|first| layer_of(first)).is_some_and(|layer| layer <= CORE) {
-            for name in NOT_IN_THE_CORE {
-                assert!(!named.others.contains(name), "{} names {name}", file.display());
-            }
-        }
-    }
-}
-
-#[test]
 fn unsafe_code_stays_in_the_kernels() {
-    for Source { file, text, .. } in sources() {
+    for Source { file, text, .. } in crates().iter().flat_map(|src| sources(src)) {
         let kernel = KERNELS.iter().any(|kernel| file.starts_with(kernel));
         let has_unsafe = text.contains("unsafe {") || text.contains("unsafe fn");
         assert!(kernel || !has_unsafe, "{} has unsafe code", file.display());

@@ -2,10 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-#[cfg(feature = "server")]
+mod crates;
 mod documents;
 mod layering;
-#[cfg(feature = "client")]
 mod proto_compatibility;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,6 +1,5 @@
 //! Who is let in, and what is let in: keys, certificates, limits, and inputs that fuzzing found.
 
-#![cfg(feature = "server")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod admission;

@@ -7,7 +7,7 @@
 //!     cargo build --release && MROL_BIN=target/release/mrol MROL_STUCK_DISK_SECONDS=600 \
 //!         cargo test --release --test stuck_disk -- --nocapture
 
-#![cfg(all(feature = "server", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod calls;

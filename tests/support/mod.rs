@@ -4,9 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 #![allow(unreachable_pub, reason = "a test has no crate to reach it from")]
 
-#[cfg(feature = "server")]
 pub mod daemon;
-#[cfg(feature = "server")]
 pub mod description;
 pub mod disk;
 pub mod hall;
@@ -15,11 +13,11 @@ pub mod map_folders;
 #[cfg(target_os = "linux")]
 pub mod memory;
 pub mod plain_set;
-#[cfg(feature = "server")]
 pub mod process;
+pub mod program;
 pub mod range_images;
+pub mod sequence;
 pub mod shared_scans;
-#[cfg(feature = "client")]
 pub mod simulated_disk;
 pub mod skipped;
 pub mod watchdog;

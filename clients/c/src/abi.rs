@@ -2,10 +2,10 @@
 
 use std::ffi::c_char;
 
-use mrol::client::ReplicaStatus;
-use mrol::geometry::pose;
-use mrol::map::Lookup;
-use mrol::service::{PointAnswer, ServiceError};
+use mrol_client::ReplicaStatus;
+use mrol_client::geometry::pose;
+use mrol_client::map::Lookup;
+use mrol_client::service::{PointAnswer, ServiceError};
 
 use crate::failure::Failure;
 use crate::memory::{self, Question};
@@ -66,8 +66,8 @@ pub struct MapVersion {
     reserved: [u8; 7],
 }
 
-impl From<mrol::service::MapVersion> for MapVersion {
-    fn from(version: mrol::service::MapVersion) -> Self {
+impl From<mrol_client::service::MapVersion> for MapVersion {
+    fn from(version: mrol_client::service::MapVersion) -> Self {
         Self {
             map_uuid: version.map_uuid.into_bytes(),
             revision: version.revision,
@@ -131,7 +131,7 @@ impl PointQuery {
     ///
     /// # Safety
     /// The points and the pose are there, and nobody writes them before the question is dropped.
-    pub(crate) unsafe fn parse(self) -> Result<mrol::service::PointQuery, Failure> {
+    pub(crate) unsafe fn parse(self) -> Result<mrol_client::service::PointQuery, Failure> {
         let lookup = match self.lookup {
             0 => Lookup::Exact,
             1 => Lookup::Bloom,
@@ -146,7 +146,7 @@ impl PointQuery {
         if self.reserved != [0; 7] {
             return Err(Failure::argument("query.reserved must be zero"));
         }
-        Ok(mrol::service::PointQuery {
+        Ok(mrol_client::service::PointQuery {
             points,
             map_from_points,
             level: self.level,
@@ -170,7 +170,7 @@ pub struct Answer {
 
 impl Answer {
     /// The answer about so many, without its arrays.
-    pub(crate) fn of(version: mrol::service::MapVersion, asked: usize, positive: u64) -> Self {
+    pub(crate) fn of(version: mrol_client::service::MapVersion, asked: usize, positive: u64) -> Self {
         Self { version: version.into(), asked: asked as u64, positive, reserved: [0; 4] }
     }
 
@@ -195,7 +195,7 @@ pub struct Status {
 impl Status {
     /// The status of a replica; of one that `is_whole` with the map's content hash.
     pub(crate) fn of(status: &ReplicaStatus, is_whole: bool) -> Self {
-        let version = mrol::service::MapVersion {
+        let version = mrol_client::service::MapVersion {
             revision: status.version.revision,
             map_uuid: status.map_uuid,
             content_hash: is_whole.then_some(status.version.hash),

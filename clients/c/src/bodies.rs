@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use mrol::planning::{Body, Link, Sphere};
+use mrol_client::planning::{Body, Link, Sphere};
 use parking_lot::RwLock;
 
 use crate::failure::Failure;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use mrol::client::{Client, ClientError, Credentials};
+use mrol_client::{Client, ClientError, Credentials};
 use parking_lot::RwLock;
 use tokio::runtime::Runtime;
 

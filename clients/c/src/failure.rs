@@ -2,8 +2,8 @@
 
 use std::ffi::CStr;
 
-use mrol::client::{ClientError, ReplicaError};
-use mrol::service::{ErrorCode, ServiceError};
+use mrol_client::service::{ErrorCode, ServiceError};
+use mrol_client::{ClientError, ReplicaError};
 
 /// What became of a call: `mrol_code`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

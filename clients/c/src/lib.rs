@@ -1,4 +1,4 @@
-//! The C interface of [`mrol::client::Replica`]: what `include/mrol.h` declares and documents.
+//! The C interface of [`mrol_client::Replica`]: what `include/mrol.h` declares and documents.
 //!
 //! ```text
 //! lib.rs       the functions: read the arguments, ask, write the answer

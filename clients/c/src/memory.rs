@@ -9,8 +9,8 @@ use std::mem::MaybeUninit;
 use std::ptr;
 
 use bytes::Bytes;
-use mrol::geometry::Point;
-use mrol::service::PointCloud;
+use mrol_client::geometry::Point;
+use mrol_client::service::PointCloud;
 
 use crate::failure::Failure;
 

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use mrol::bloom::FilterSettings;
-use mrol::client::{BLOCKS_MAX_DEFAULT, Credentials, ReplicaOptions};
-use mrol::map::{MapName, Region};
-use mrol::service::ServiceError;
+use mrol_client::bloom::FilterSettings;
+use mrol_client::map::{MapName, Region};
+use mrol_client::service::ServiceError;
+use mrol_client::{BLOCKS_MAX_DEFAULT, Credentials, ReplicaOptions};
 
 use crate::abi::Options;
 use crate::failure::Failure;

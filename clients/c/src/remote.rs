@@ -3,9 +3,9 @@
 use std::ffi::c_char;
 use std::time::Duration;
 
-use mrol::client::NewMap;
-use mrol::map::MapName;
-use mrol::service::ServiceError;
+use mrol_client::NewMap;
+use mrol_client::map::MapName;
+use mrol_client::service::ServiceError;
 
 use crate::abi::{Answer, Error, PointQuery};
 use crate::clients::{CLIENTS, ClientHandle, OpenClient};
@@ -106,7 +106,7 @@ pub unsafe extern "C" fn mrol_client_query_points(
             unsafe { Bitmap::of(occupied, occupied_bytes, "occupied") }.for_answers_about(&query.points)?;
         // SAFETY: as the caller promises. What is sent may outlive a call that runs out of time.
         let points = unsafe { copied(given.xyz, given.count, "query.xyz") }?;
-        let query = mrol::service::PointQuery { points, ..query };
+        let query = mrol_client::service::PointQuery { points, ..query };
         let asked = client.call(|client| client.query_points(&map, query))?;
         bitmap.write(&asked.occupied);
         if let Some(out) = out {

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
-use mrol::client::{Client, Replica};
-use mrol::planning::clearance_max_m;
-use mrol::service::{Answered, PointAnswer, PointQuery, Question};
+use mrol_client::planning::clearance_max_m;
+use mrol_client::service::{Answered, PointAnswer, PointQuery, Question};
+use mrol_client::{Client, Replica};
 use parking_lot::{Mutex, RwLock};
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;

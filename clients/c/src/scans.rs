@@ -3,12 +3,12 @@
 use std::ffi::c_char;
 use std::time::Duration;
 
-use mrol::align::Verdict;
-use mrol::align::localize::{Gravity, LocalizationQuery};
-use mrol::geometry::{Pose, pose, rotation_xyzw};
-use mrol::map::{RobotName, SessionName};
-use mrol::mapping::Guess;
-use mrol::service::{
+use mrol_client::align::Verdict;
+use mrol_client::align::localize::{Gravity, LocalizationQuery};
+use mrol_client::geometry::{Pose, pose, rotation_xyzw};
+use mrol_client::map::{RobotName, SessionName};
+use mrol_client::mapping::Guess;
+use mrol_client::service::{
     LocalizationAnswer, LocalizationRequest, PointCloud, PointTimes, ScanAnswer, ScanRequest, ServiceError,
     TimeReference,
 };

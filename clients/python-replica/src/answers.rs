@@ -1,9 +1,9 @@
 //! Arrays of answers.
 
-use mrol::map::KeepOutName;
-use mrol::planning::{Clearance, Hit};
-use mrol::service::{Collisions, MapVersion};
-use mrol::voxel::VoxelKey;
+use mrol_client::map::KeepOutName;
+use mrol_client::planning::{Clearance, Hit};
+use mrol_client::service::{Collisions, MapVersion};
+use mrol_client::voxel::VoxelKey;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mrol::planning::{Body, Link, NUMBERS_PER_POSE, Sphere};
+use mrol_client::planning::{Body, Link, NUMBERS_PER_POSE, Sphere};
 use pyo3::prelude::*;
 
 use crate::arrays::Rows;

@@ -2,8 +2,8 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use mrol::client::{ClientError, ReplicaError};
-use mrol::service::ServiceError;
+use mrol_client::service::ServiceError;
+use mrol_client::{ClientError, ReplicaError};
 use pyo3::prelude::*;
 
 /// Why a call fails. `kind` is a word of `mrol_replica/_failures.py`, which makes the exception.

@@ -3,20 +3,20 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use mrol::align::Method;
-use mrol::align::PoseCovariance;
-use mrol::align::localize::{Gravity, LocalizationQuery, SearchBox};
-use mrol::bloom::FilterSettings;
-use mrol::geometry::Pose;
-use mrol::map::{MapName, MapSettings, RobotName};
-use mrol::mapping::Guess;
-use mrol::scan::PointFilter;
-use mrol::service::{
+use mrol_client::align::Method;
+use mrol_client::align::PoseCovariance;
+use mrol_client::align::localize::{Gravity, LocalizationQuery, SearchBox};
+use mrol_client::bloom::FilterSettings;
+use mrol_client::geometry::Pose;
+use mrol_client::map::{MapName, MapSettings, RobotName};
+use mrol_client::mapping::Guess;
+use mrol_client::scan::PointFilter;
+use mrol_client::service::{
     Deletion, DeletionTarget, ListingRequest, LocalizationRequest, MapService, PointTimes, ScanAnswer,
     ScanRequest, ServiceError, ServiceSettings, TimeReference,
 };
-use mrol::store::OpeningProgress;
-use mrol::util::Keyword;
+use mrol_client::util::Keyword;
+use mrol_store::OpeningProgress;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
@@ -260,7 +260,7 @@ impl NativeLocalMap {
             fields.set_item("version", told(&version))?;
             fields.set_item("verdict", found.verdict.as_str())?;
             fields.set_item("reason", found.reason)?;
-            let of = |of: &mrol::service::CandidateAnswer| {
+            let of = |of: &mrol_client::service::CandidateAnswer| {
                 (seven_of(&of.map_from_sensor), of.overlap, of.inliers, of.blocked, of.fit, of.margin)
             };
             fields.set_item("candidates", found.candidates.iter().map(of).collect::<Vec<_>>())?;

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use mrol::geometry::{Point, Pose, pose};
-use mrol::map::{Lookup, Region};
-use mrol::planning::{MeasuredTo, Surroundings, Unknown};
-use mrol::service::{
+use mrol_client::geometry::{Point, Pose, pose};
+use mrol_client::map::{Lookup, Region};
+use mrol_client::planning::{MeasuredTo, Surroundings, Unknown};
+use mrol_client::service::{
     Asked, CheckAs, ClassifyQuestion, MotionCheck, NearestQuestion, PointCloud, PointQuery, PoseCheck,
     RayQuestion, RaysToward, Reason, ServiceError, SphereCheck,
 };

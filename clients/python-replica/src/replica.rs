@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use mrol::bloom::FilterSettings;
-use mrol::client::{Client, Credentials, Replica, ReplicaOptions};
-use mrol::map::{MapName, Region};
-use mrol::service::{MapVersion, ServiceError};
+use mrol_client::bloom::FilterSettings;
+use mrol_client::map::{MapName, Region};
+use mrol_client::service::{MapVersion, ServiceError};
+use mrol_client::{Client, Credentials, Replica, ReplicaOptions};
 use pyo3::prelude::*;
 
 use crate::answers::{Version, told};

@@ -3,9 +3,9 @@
 use std::process;
 use std::sync::{Arc, RwLock};
 
-use mrol::client::Replica;
-use mrol::map::MapName;
-use mrol::service::{Answered, MapService, PointAnswer, PointQuery, Question};
+use mrol_client::Replica;
+use mrol_client::map::MapName;
+use mrol_client::service::{Answered, MapService, PointAnswer, PointQuery, Question};
 use pyo3::prelude::*;
 
 use crate::failure::Failure;

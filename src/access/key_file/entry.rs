@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use toml::value::Datetime;
 
 use crate::access::{Digest, Expiry, Key, KeyLimits, KeyName, Scope};
-use crate::map::{MapName, RobotName};
-use crate::service::AllowedMaps;
+use mrol_map::map::{MapName, RobotName};
+use mrol_service::AllowedMaps;
 
 /// A key as its file holds it; the fields are described at the module's head.
 #[derive(Debug, Clone, Serialize, Deserialize)]

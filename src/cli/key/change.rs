@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::name;
 use crate::access::{Expiry, KeyName, Secret, revoke_in_file, rotate_in_file};
-use crate::cli::error::CliError;
-use crate::cli::output::Output;
+use crate::console::error::CliError;
+use crate::console::output::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct RevokeKey {

@@ -7,8 +7,8 @@ use std::time::SystemTime;
 use serde::Serialize;
 
 use crate::access::{Expiry, KeyEntry, list_file};
-use crate::cli::error::CliError;
-use crate::cli::output::Output;
+use crate::console::error::CliError;
+use crate::console::output::Output;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ListKeys {

@@ -5,23 +5,23 @@ mod report;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::error::CliError;
-use super::output::Output;
-use super::parse;
 use super::remote::ServerOptions;
 use super::scan_report::name_of;
-use crate::align::AlignmentSettings;
-use crate::align::localize::{
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use mrol_client::Client;
+use mrol_map::align::AlignmentSettings;
+use mrol_map::align::localize::{
     Gravity, LocalizationQuery, LocalizationSettings, SearchBox, SearchProgress, Supervision,
     localize_supervised,
 };
-use crate::client::Client;
-use crate::geometry::Point;
-use crate::map::{MapName, MultiResolutionMap};
-use crate::scan::{read_points, scan_files};
-use crate::service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
-use crate::store::{Disk, Snapshot};
-use crate::util::StopSignal;
+use mrol_map::geometry::Point;
+use mrol_map::map::{MapName, MultiResolutionMap};
+use mrol_map::scan::{read_points, scan_files};
+use mrol_map::util::StopSignal;
+use mrol_service::{CANDIDATES_DEFAULT, LocalizationAnswer, LocalizationRequest, MapVersion, SEARCH_SHARE};
+use mrol_store::{Disk, Snapshot};
 use report::Localized;
 
 const EXAMPLES: &str = "\

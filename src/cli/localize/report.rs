@@ -5,8 +5,8 @@ use std::fmt::{self, Display};
 use serde::Serialize;
 
 use super::super::scan_report::{PLACE_HEAD, place};
-use crate::service::LocalizationAnswer;
-use crate::wire::json::JsonLocalization;
+use crate::json::JsonLocalization;
+use mrol_service::LocalizationAnswer;
 
 #[derive(Serialize)]
 pub(super) struct Localized {

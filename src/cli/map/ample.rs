@@ -7,20 +7,20 @@ use serde::Serialize;
 /// Every look-up is counted as one of an absent voxel, at the rate of the worst level: an upper bound. Below
 /// one, the filters are ample, and the poses are those of the exact sets (paper IV-B).
 #[derive(Debug, Default)]
-pub(in crate::cli) struct FalsePositives {
+pub struct FalsePositives {
     lookups: u64,
     expected: f64,
 }
 
 impl FalsePositives {
     /// Adds the look-ups of one alignment, made at the false positive rate `rate`.
-    pub(in crate::cli) fn add(&mut self, lookups: u64, rate: f64) {
+    pub fn add(&mut self, lookups: u64, rate: f64) {
         self.lookups += lookups;
         self.expected += lookups as f64 * rate;
     }
 
     /// The summary of the run; `rate` is the false positive rate at its end.
-    pub(in crate::cli) fn summary(&self, rate: f64) -> FilterSummary {
+    pub fn summary(&self, rate: f64) -> FilterSummary {
         FilterSummary {
             lookups: self.lookups,
             expected_false_positive_rate: rate,
@@ -32,11 +32,15 @@ impl FalsePositives {
 
 /// Summary of the false positives of a run; see [`FalsePositives`].
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(in crate::cli) struct FilterSummary {
-    pub(in crate::cli) lookups: u64,
-    pub(in crate::cli) expected_false_positive_rate: f64,
-    pub(in crate::cli) expected_false_positives: f64,
-    pub(in crate::cli) ample: bool,
+pub struct FilterSummary {
+    /// Look-ups of all scans.
+    pub lookups: u64,
+    /// The false positive rate at the end of the run.
+    pub expected_false_positive_rate: f64,
+    /// Wrong answers of the run, at most.
+    pub expected_false_positives: f64,
+    /// Fewer than one wrong answer is expected.
+    pub ample: bool,
 }
 
 #[cfg(test)]

@@ -2,21 +2,21 @@
 
 use std::time::Duration;
 
-use crate::align::{Alignment, AlignmentSettings, Verdict};
-use crate::cli::error::CliError;
-use crate::geometry::{Point, Pose};
-use crate::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
-use crate::mapping::{
+use crate::console::error::CliError;
+use mrol_map::align::{Alignment, AlignmentSettings, Verdict};
+use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::{Lookup, MapSettings, MultiResolutionMap, RobotName};
+use mrol_map::mapping::{
     Guess, LostRobots, MappingError, MappingSettings, Recovered, RecoverySettings, Scan, ScanMapper,
     Sightings,
 };
-use crate::util::StopSignal;
+use mrol_map::util::StopSignal;
 
 /// Name of the robot in the map's trajectory.
 const ROBOT: &str = "mrol";
 
 /// A map that grows scan by scan.
-pub(in crate::cli) struct Mapper {
+pub struct Mapper {
     map: MultiResolutionMap,
     settings: MappingSettings,
     robot: RobotName,
@@ -27,32 +27,36 @@ pub(in crate::cli) struct Mapper {
 }
 
 /// Result of mapping a scan.
-pub(in crate::cli) struct Mapped {
-    pub(in crate::cli) alignment: Alignment,
+pub struct Mapped {
+    /// The scan's pose, with its verdict.
+    pub alignment: Alignment,
     /// Number of finest voxels that the scan added.
-    pub(in crate::cli) new_voxels: usize,
+    pub new_voxels: usize,
     /// Number of finest voxels after the scan.
-    pub(in crate::cli) voxels: usize,
+    pub voxels: usize,
     /// False positive rate of the filters while the scan was aligned.
-    pub(in crate::cli) false_positive_rate: f64,
-    pub(in crate::cli) align_time: Duration,
-    pub(in crate::cli) insert_time: Duration,
+    pub false_positive_rate: f64,
+    /// Time of the alignment.
+    pub align_time: Duration,
+    /// Time of the insertion.
+    pub insert_time: Duration,
     /// How the robot, which was lost, was found again.
-    pub(in crate::cli) recovered: Option<Recovered>,
+    pub recovered: Option<Recovered>,
 }
 
 impl Mapped {
-    pub(in crate::cli) fn accepted(&self) -> bool {
+    /// True of a scan that went into the map.
+    pub fn accepted(&self) -> bool {
         self.alignment.verdict == Verdict::Accepted
     }
 }
 
 impl Mapper {
-    pub(in crate::cli) fn new(
-        map: MapSettings,
-        alignment: AlignmentSettings,
-        guess: Guess,
-    ) -> Result<Self, CliError> {
+    /// A mapper of an empty map.
+    ///
+    /// # Errors
+    /// When settings of the map are out of range.
+    pub fn new(map: MapSettings, alignment: AlignmentSettings, guess: Guess) -> Result<Self, CliError> {
         Ok(Self {
             map: MultiResolutionMap::new(map).map_err(CliError::usage)?,
             // Every scan that fits is wanted in the map's trajectory.
@@ -67,16 +71,17 @@ impl Mapper {
 
     /// This mapper, which looks for the robot after a scan was refused if `recovers`.
     #[must_use]
-    pub(in crate::cli) fn recovering(self, recovers: bool) -> Self {
+    pub fn recovering(self, recovers: bool) -> Self {
         Self { recovers, ..self }
     }
 
-    pub(in crate::cli) fn map(&self) -> &MultiResolutionMap {
+    /// The map so far.
+    pub fn map(&self) -> &MultiResolutionMap {
         &self.map
     }
 
     /// True when the alignment asks the filters alone.
-    pub(in crate::cli) fn asks_filters(&self) -> bool {
+    pub fn asks_filters(&self) -> bool {
         self.settings.alignment.lookup == Lookup::Bloom && self.map.settings().filter.is_some()
     }
 
@@ -84,12 +89,7 @@ impl Mapper {
     ///
     /// # Errors
     /// When no point of it lies within the map's range.
-    pub(in crate::cli) fn add(
-        &mut self,
-        k: usize,
-        points: &[Point],
-        known: Option<Pose>,
-    ) -> Result<Mapped, MappingError> {
+    pub fn add(&mut self, k: usize, points: &[Point], known: Option<Pose>) -> Result<Mapped, MappingError> {
         let false_positive_rate = if self.asks_filters() { self.false_positive_rate() } else { 0.0 };
         let scan = Scan {
             scan_id: Some(k as u64),
@@ -114,7 +114,7 @@ impl Mapper {
     }
 
     /// The largest of the levels' expected false positive rates, as the filters are filled now.
-    pub(in crate::cli) fn false_positive_rate(&self) -> f64 {
+    pub fn false_positive_rate(&self) -> f64 {
         let view = self.map.view();
         let of_level = |level| {
             let (mut voxels, mut expected) = (0.0, 0.0);

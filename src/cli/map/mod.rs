@@ -1,9 +1,9 @@
 //! `mrol map`: builds a map of scans in this process, without a server.
 
-pub(super) mod ample;
-pub(super) mod mapper;
+pub mod ample;
+pub mod mapper;
 mod report;
-pub(super) mod truth_errors;
+pub mod truth_errors;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -11,19 +11,19 @@ use std::time::Instant;
 use uuid::Uuid;
 
 use super::alignment_options::{AlignmentOptions, GuessName, PointOptions};
-use super::error::CliError;
-use super::output::Output;
-use super::parse;
 use super::scan_report::name_of;
-use super::truth::true_poses;
-use crate::align::AlignmentSettings;
-use crate::bloom::FilterSettings;
-use crate::geometry::{Point, Pose};
-use crate::map::{LEVELS_DEFAULT, Lookup, MapSettings};
-use crate::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
-use crate::store::{Disk, Snapshot};
+use crate::console::error::CliError;
+use crate::console::output::Output;
+use crate::console::parse;
+use crate::console::truth::true_poses;
 use ample::FalsePositives;
 use mapper::{Mapped, Mapper};
+use mrol_map::align::AlignmentSettings;
+use mrol_map::bloom::FilterSettings;
+use mrol_map::geometry::{Point, Pose};
+use mrol_map::map::{LEVELS_DEFAULT, Lookup, MapSettings};
+use mrol_map::scan::{PointFilter, StampedPose, read_points, scan_files, write_trajectory};
+use mrol_store::{Disk, Snapshot};
 use report::{ScanLine, Summary};
 use truth_errors::TruthErrors;
 

@@ -7,10 +7,10 @@ use serde::{Serialize, Serializer};
 use super::ample::FilterSummary;
 use super::mapper::Mapped;
 use super::truth_errors::ErrorSummary;
-use crate::cli::map_report::count;
 use crate::cli::scan_report::{PLACE_HEAD, place};
-use crate::util::Keyword;
-use crate::wire::json::JsonPose;
+use crate::console::map_report::count;
+use crate::json::JsonPose;
+use mrol_map::util::Keyword;
 
 /// The line of a scan.
 #[derive(Serialize)]

@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-use crate::cli::statistics::Statistics;
-use crate::geometry::{Pose, pose_difference};
+use crate::console::statistics::Statistics;
+use mrol_map::geometry::{Pose, pose_difference};
 
 /// True poses, and the errors against them so far.
 ///
 /// The error of scan k is that of inv(E_0) E_k against inv(T_0) T_k, where 0 is the first scan that was
 /// accepted: it does not matter where the map's origin lies.
-pub(in crate::cli) struct TruthErrors {
+pub struct TruthErrors {
     truth: Vec<Pose>,
     /// E_0 and T_0: estimated and true pose of the first accepted scan.
     first: Option<(Pose, Pose)>,
@@ -19,23 +19,26 @@ pub(in crate::cli) struct TruthErrors {
 
 /// Summary of the errors.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(in crate::cli) struct ErrorSummary {
-    pub(in crate::cli) meters: Statistics,
-    pub(in crate::cli) degrees: Statistics,
+pub struct ErrorSummary {
+    /// Of translations, meters.
+    pub meters: Statistics,
+    /// Of rotations, degrees.
+    pub degrees: Statistics,
 }
 
 impl TruthErrors {
-    pub(in crate::cli) fn new(truth: Vec<Pose>) -> Self {
+    /// No errors yet, against the poses of `truth`.
+    pub fn new(truth: Vec<Pose>) -> Self {
         Self { truth, first: None, meters: Vec::new(), degrees: Vec::new() }
     }
 
     /// True pose of scan `k`, T_k.
-    pub(in crate::cli) fn pose(&self, k: usize) -> Pose {
+    pub fn pose(&self, k: usize) -> Pose {
         self.truth[k]
     }
 
     /// Adds the estimated pose of scan `k`; returns its error, meters and degrees.
-    pub(in crate::cli) fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
+    pub fn add(&mut self, k: usize, map_from_sensor: &Pose) -> (f64, f64) {
         let (found_first, true_first) = *self.first.get_or_insert((*map_from_sensor, self.truth[k]));
         let found = found_first.inv_mul(map_from_sensor);
         let error = pose_difference(&true_first.inv_mul(&self.truth[k]), &found);
@@ -45,7 +48,7 @@ impl TruthErrors {
     }
 
     /// Returns the summary; none before the first scan.
-    pub(in crate::cli) fn summary(&self) -> Option<ErrorSummary> {
+    pub fn summary(&self) -> Option<ErrorSummary> {
         let meters = Statistics::of(self.meters.clone())?;
         Some(ErrorSummary { meters, degrees: Statistics::of(self.degrees.clone())? })
     }

@@ -12,8 +12,8 @@ use utoipa::openapi::{ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
 use super::request_id::request_id;
 use crate::access::Operation;
 use crate::http::error::{PROBLEM_JSON, Problem, status_of};
-use crate::service::{Reason, ToldBy};
-use crate::wire::json::schema_of_words;
+use crate::json::schema_of_words;
+use mrol_service::{Reason, ToldBy};
 
 /// The statuses of failures that an operation may have.
 pub(super) fn of(operation: Operation) -> BTreeSet<StatusCode> {

@@ -13,8 +13,8 @@ use super::request_id::request_id;
 use super::{KEY, failures};
 use crate::access::Operation;
 use crate::http::{reader, viewer};
-use crate::map::{KeepOutName, MapName};
-use crate::wire::json::schema_of_words;
+use crate::json::described;
+use crate::json::schema_of_words;
 
 /// Fills in what the attributes of handlers do not say.
 pub(super) fn fill_in(paths: &mut Paths) {
@@ -88,8 +88,8 @@ fn path_parameters(operation: Operation, path: &str) -> impl Iterator<Item = Par
     path.split('/').filter_map(move |segment| {
         let name = segment.strip_prefix('{')?.strip_suffix('}')?;
         let (schema, about, example) = match name {
-            "map" => (MapName::schema(), "The name of the map", example_map(operation)),
-            "name" => (KeepOutName::schema(), "The name of the keep-out", "dock"),
+            "map" => (described::MapName::schema(), "The name of the map", example_map(operation)),
+            "name" => (described::KeepOutName::schema(), "The name of the keep-out", "dock"),
             "file" => (schema_of_words(viewer::files()), "The name of the file", "main.js"),
             _ => (schema_of_words(reader::FILES), "The name of the file", reader::FILES[0]),
         };

@@ -23,7 +23,7 @@ use super::{
     block, deletions, events, keep_outs, localization, map_file, maps, observers, occupancy, probes,
     question, reader, scans, trajectory, undo, viewer, voxels, watch,
 };
-use crate::service::{Reason, ServiceError};
+use mrol_service::{Reason, ServiceError};
 
 /// What the attributes of the handlers say.
 #[derive(OpenApi)]

@@ -9,10 +9,10 @@ use serde::{Serialize, Serializer};
 use super::form::Form;
 use crate::admission::off_runtime;
 use crate::http::error::HttpError;
-use crate::service::{MapVersion, Reason, ServiceError};
-use crate::voxel::VoxelKey;
-use crate::wire::json::JsonVersion;
-use crate::wire::pb;
+use crate::json::JsonVersion;
+use mrol_client::wire::pb;
+use mrol_map::voxel::VoxelKey;
+use mrol_service::{MapVersion, Reason, ServiceError};
 
 /// An array of an answer, as bytes.
 pub(super) enum Array {
@@ -192,7 +192,7 @@ fn index(key: &[u8]) -> Option<[i32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{bitmap_of, bytes_of};
+    use mrol_client::wire::{bitmap_of, bytes_of};
     use serde_json::{Value, json};
 
     fn answer() -> Answer<Value> {

@@ -10,11 +10,11 @@ use crate::http::json::JsonPoints;
 use crate::http::list::List;
 use crate::http::object::Object;
 use crate::http::shapes::{BoxBody, OrientedBoxBody, SphereBody};
-use crate::map::Region;
-use crate::service::{CheckAs, ServiceError};
-use crate::util::Keyword;
-use crate::wire::json::{JsonVersion, Sphere, VoxelIndex, described_by_words};
-use crate::wire::{IGNORED_MAX, InField, LINKS_MAX, pb};
+use crate::json::{JsonVersion, Sphere, VoxelIndex, described_by_words};
+use mrol_client::wire::{IGNORED_MAX, InField, LINKS_MAX, pb};
+use mrol_map::map::Region;
+use mrol_map::util::Keyword;
+use mrol_service::{CheckAs, ServiceError};
 
 /// A body: its links.
 #[derive(Deserialize, ToSchema)]

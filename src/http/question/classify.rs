@@ -13,9 +13,9 @@ use crate::http::json::JsonPoints;
 use crate::http::middleware::Service;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::service::ClassifyQuestion;
-use crate::wire::json::JsonVersion;
-use crate::wire::pb;
+use crate::json::JsonVersion;
+use mrol_client::wire::pb;
+use mrol_service::ClassifyQuestion;
 
 /// Points of which it is asked what is known.
 #[derive(Deserialize, ToSchema)]

@@ -24,9 +24,9 @@ use crate::http::Adapter;
 use crate::http::body::{self, Sent};
 use crate::http::error::HttpError;
 use crate::http::json::JsonPoints;
-use crate::map::MapName;
-use crate::service::{MapService, PointCloud, Question, Reason, ServiceError};
-use crate::wire::{QuestionMessage, bytes_of, pb, question_of};
+use mrol_client::wire::{QuestionMessage, bytes_of, pb, question_of};
+use mrol_map::map::MapName;
+use mrol_service::{MapService, PointCloud, Question, Reason, ServiceError};
 
 /// In which form something is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

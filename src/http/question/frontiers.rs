@@ -13,10 +13,10 @@ use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::planning::{Frontier, FrontierView};
-use crate::service::FrontierQuestion;
-use crate::wire::json::{JsonPose, JsonVersion, Vector3};
-use crate::wire::pb;
+use crate::json::{JsonPose, JsonVersion, Vector3};
+use mrol_client::wire::pb;
+use mrol_map::planning::{Frontier, FrontierView};
+use mrol_service::FrontierQuestion;
 
 /// Where frontiers are looked for.
 #[derive(Deserialize, ToSchema)]

@@ -13,9 +13,9 @@ use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::service::GridQuestion;
-use crate::wire::json::{JsonVersion, Sizes2, Vector2};
-use crate::wire::pb;
+use crate::json::{JsonVersion, Sizes2, Vector2};
+use mrol_client::wire::pb;
+use mrol_service::GridQuestion;
 
 /// Which part of the map is seen from above.
 #[derive(Deserialize, ToSchema)]

@@ -12,8 +12,8 @@ pub(super) mod poses;
 pub(super) mod rays;
 pub(super) mod spheres;
 
-use crate::map::MapName;
-use crate::wire::pb;
+use mrol_client::wire::pb;
+use mrol_map::map::MapName;
 
 /// What questions have in common, as a message has it.
 fn asked(

@@ -14,10 +14,11 @@ use crate::http::middleware::Service;
 use crate::http::object::Object;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::planning::Unknown;
-use crate::service::MotionCheck;
-use crate::wire::json::{ByKeyword, JsonVersion, PoseNumbers};
-use crate::wire::pb;
+use crate::json::described;
+use crate::json::{ByKeyword, JsonVersion, PoseNumbers};
+use mrol_client::wire::pb;
+use mrol_map::planning::Unknown;
+use mrol_service::MotionCheck;
 
 /// A body and its motions.
 #[derive(Deserialize, ToSchema)]
@@ -46,7 +47,7 @@ pub(in crate::http) struct MotionsBody {
     #[serde(default)]
     ignored: IgnoredList,
     /// What voxels are that no scan saw through: free or occupied; `free` without.
-    #[schema(value_type = Unknown, required = false)]
+    #[schema(value_type = described::Unknown, required = false)]
     #[serde(default)]
     unknown: ByKeyword<Unknown>,
     /// The level, 0 the finest; 0 without.

@@ -13,10 +13,11 @@ use crate::http::json::JsonPoints;
 use crate::http::middleware::Service;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::planning::MeasuredTo;
-use crate::service::NearestQuestion;
-use crate::wire::json::{ByKeyword, JsonVersion, Vector3, VoxelIndex};
-use crate::wire::pb;
+use crate::json::described;
+use crate::json::{ByKeyword, JsonVersion, Vector3, VoxelIndex};
+use mrol_client::wire::pb;
+use mrol_map::planning::MeasuredTo;
+use mrol_service::NearestQuestion;
 
 /// Points, and how far to look.
 #[derive(Deserialize, ToSchema)]
@@ -29,7 +30,7 @@ pub(in crate::http) struct NearestBody {
     /// How far a voxel may be, meters: more than 0, at most 64 voxels of the level.
     radius_m: f64,
     /// Whether distances are to cubes or to their centers; `cubes` without.
-    #[schema(value_type = MeasuredTo, required = false)]
+    #[schema(value_type = described::MeasuredTo, required = false)]
     #[serde(default)]
     to: ByKeyword<MeasuredTo>,
     /// The level, 0 the finest; 0 without.

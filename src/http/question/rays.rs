@@ -13,10 +13,11 @@ use crate::http::json::JsonPoints;
 use crate::http::middleware::Service;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::planning::Unknown;
-use crate::service::RayQuestion;
-use crate::wire::json::{ByKeyword, JsonVersion, VoxelIndex};
-use crate::wire::pb;
+use crate::json::described;
+use crate::json::{ByKeyword, JsonVersion, VoxelIndex};
+use mrol_client::wire::pb;
+use mrol_map::planning::Unknown;
+use mrol_service::RayQuestion;
 
 /// Rays: their origins, and directions or ends.
 #[derive(Deserialize, ToSchema)]
@@ -35,7 +36,7 @@ pub(in crate::http) struct RaysBody {
     /// How far the rays reach, meters.
     range_m: Option<f64>,
     /// What voxels are that no scan saw through: free or occupied; `free` without.
-    #[schema(value_type = Unknown, required = false)]
+    #[schema(value_type = described::Unknown, required = false)]
     #[serde(default)]
     unknown: ByKeyword<Unknown>,
     /// The level, 0 the finest; 0 without.

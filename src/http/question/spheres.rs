@@ -14,10 +14,11 @@ use crate::http::error::HttpError;
 use crate::http::middleware::Service;
 use crate::http::octets::{AnswerBytes, QuestionBytes};
 use crate::http::params::Map;
-use crate::planning::Unknown;
-use crate::service::SphereCheck;
-use crate::wire::json::{ByKeyword, Sphere};
-use crate::wire::pb;
+use crate::json::described;
+use crate::json::{ByKeyword, Sphere};
+use mrol_client::wire::pb;
+use mrol_map::planning::Unknown;
+use mrol_service::SphereCheck;
 
 /// Spheres of the map frame.
 #[derive(Deserialize, ToSchema)]
@@ -38,7 +39,7 @@ pub(in crate::http) struct SpheresBody {
     #[serde(default)]
     ignored: IgnoredList,
     /// What voxels are that no scan saw through: free or occupied; `free` without.
-    #[schema(value_type = Unknown, required = false)]
+    #[schema(value_type = described::Unknown, required = false)]
     #[serde(default)]
     unknown: ByKeyword<Unknown>,
     /// What is told: whether there is a collision, the first one, or how far away the nearest voxel is;

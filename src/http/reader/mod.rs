@@ -13,8 +13,8 @@ use utoipa_swagger_ui::{Config, SwaggerFile};
 
 use super::error::HttpError;
 use super::params::NoParams;
-use crate::service::{Reason, ServiceError};
-use crate::util::excerpt;
+use mrol_map::util::excerpt;
+use mrol_service::{Reason, ServiceError};
 
 /// The files of the page.
 pub(super) const FILES: [&str; 3] = ["swagger-ui.css", "swagger-ui-bundle.js", START];

@@ -27,12 +27,13 @@ impl File {
 /// Makes the table of files from their names.
 macro_rules! files {
     ($($name:literal,)+) => {
-        &[$(File { name: $name, text: include_str!(concat!("page/", $name)) },)+]
+        &[$(File { name: $name, text: include_str!(concat!("../../../clients/viewer/page/", $name)) },)+]
     };
 }
 
 /// The page.
-pub(super) const INDEX: File = File { name: "index.html", text: include_str!("page/index.html") };
+pub(super) const INDEX: File =
+    File { name: "index.html", text: include_str!("../../../clients/viewer/page/index.html") };
 
 /// What the page loads.
 pub(super) const FILES: &[File] = files! {
@@ -109,7 +110,7 @@ mod tests {
 
     #[test]
     fn every_file_of_the_folder_is_served() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/http/viewer/page");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("clients/viewer/page");
         let there: BTreeSet<String> = fs::read_dir(folder)
             .unwrap()
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())

@@ -11,9 +11,9 @@ use axum::response::{IntoResponse, Response};
 
 use super::error::HttpError;
 use super::params::NoParams;
-use crate::service::{Reason, ServiceError};
-use crate::util::excerpt;
 use files::{File, INDEX};
+use mrol_map::util::excerpt;
+use mrol_service::{Reason, ServiceError};
 
 /// What the page may load and do: scripts, styles, pictures and requests of this server alone, no inline script, no form
 /// that leaves it, no frame around it.

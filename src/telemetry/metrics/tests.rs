@@ -1,9 +1,9 @@
 //! What is counted, and what of it a scrape gets.
 
 use super::*;
-use crate::align::Verdict;
-use crate::map::Lookup;
-use crate::service::Change;
+use mrol_map::align::Verdict;
+use mrol_map::map::Lookup;
+use mrol_service::Change;
 
 /// A scan that was judged.
 fn judged(robot: &str, verdict: Verdict) -> JudgedScan {

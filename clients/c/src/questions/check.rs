@@ -1,8 +1,8 @@
 //! Does a body fit at these configurations? Do these spheres meet anything?
 
-use mrol::planning::{Clearance, Hit, NUMBERS_PER_POSE};
-use mrol::service::{Answered, CheckAs, Collisions};
-use mrol::voxel::VoxelKey;
+use mrol_client::planning::{Clearance, Hit, NUMBERS_PER_POSE};
+use mrol_client::service::{Answered, CheckAs, Collisions};
+use mrol_client::voxel::VoxelKey;
 
 use super::regions::{RegionNumbers, surroundings_but};
 use super::{Form, Name, asked, check_reserved, ones, unless_zero};
@@ -191,7 +191,7 @@ impl Form for PoseCheck {
                 places.arrays(room)?,
             )
         };
-        let question = mrol::service::PoseCheck {
+        let question = mrol_client::service::PoseCheck {
             asked: asked(self.level, self.ignore_keep_outs)?,
             body,
             configurations: numbers.to_vec(),
@@ -231,7 +231,7 @@ impl Form for SphereCheck {
                 places.arrays(room)?,
             )
         };
-        let question = mrol::service::SphereCheck {
+        let question = mrol_client::service::SphereCheck {
             asked: asked(self.level, self.ignore_keep_outs)?,
             spheres: spheres_of(spheres),
             sizes,

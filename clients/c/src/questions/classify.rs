@@ -56,7 +56,7 @@ impl Form for ClassifyQuestion {
             )
         };
         let asked = asked(self.level, self.ignore_keep_outs)?;
-        let answered = replica.ask(&mrol::service::ClassifyQuestion { asked, points })?;
+        let answered = replica.ask(&mrol_client::service::ClassifyQuestion { asked, points })?;
         let states = &answered.answer;
         if let Some(to) = is_occupied {
             to.write_bits(&states.occupied);

@@ -1,7 +1,7 @@
 //! Frontiers: where free space ends and nothing is known beyond.
 
-use mrol::geometry::{rotation_xyzw, translation_m};
-use mrol::planning::Frontier;
+use mrol_client::geometry::{rotation_xyzw, translation_m};
+use mrol_client::planning::Frontier;
 
 use super::{Form, asked, check_reserved, unless_zero};
 use crate::abi::Answer;
@@ -91,7 +91,7 @@ impl Form for FrontierQuestion {
 
     unsafe fn ask(&self, places: &FrontierPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
         check_reserved(&self.reserved, "question")?;
-        let question = mrol::service::FrontierQuestion {
+        let question = mrol_client::service::FrontierQuestion {
             asked: asked(self.level, self.ignore_keep_outs)?,
             min_m: self.min_m,
             max_m: self.max_m,

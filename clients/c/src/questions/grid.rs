@@ -1,7 +1,7 @@
 //! The map from above, as a 2-D grid.
 
-use mrol::planning::{Grid, GridArea};
-use mrol::service::GridScope;
+use mrol_client::planning::{Grid, GridArea};
+use mrol_client::service::GridScope;
 
 use super::{Form, asked, check_reserved, ones, unless_zero};
 use crate::abi::Answer;
@@ -121,7 +121,7 @@ impl Form for GridQuestion {
     unsafe fn ask(&self, places: &GridPlaces, replica: &OpenReplica) -> Result<Answer, Failure> {
         // SAFETY: as the caller promises.
         let shape = unsafe { Out::of(places.shape, "answers.shape") }.required()?;
-        let question = mrol::service::GridQuestion {
+        let question = mrol_client::service::GridQuestion {
             asked: asked(self.level, self.ignore_keep_outs)?,
             scope: self.scope()?,
         };

@@ -17,9 +17,9 @@ pub(crate) use motions::{MotionCheck, MotionPlaces};
 pub(crate) use nearest::{NearestPlaces, NearestQuestion};
 pub(crate) use rays::{RayPlaces, RayQuestion};
 
-use mrol::map::{KeepOutName, NAME_LENGTH_MAX};
-use mrol::planning::Unknown;
-use mrol::service::Asked;
+use mrol_client::map::{KeepOutName, NAME_LENGTH_MAX};
+use mrol_client::planning::Unknown;
+use mrol_client::service::Asked;
 
 use crate::abi::{Answer, Error, ReplicaHandle};
 use crate::failure::Failure;

@@ -1,6 +1,6 @@
 //! Can a body move along these configurations?
 
-use mrol::planning::{MotionAnswer, NUMBERS_PER_POSE};
+use mrol_client::planning::{MotionAnswer, NUMBERS_PER_POSE};
 
 use super::regions::{RegionNumbers, surroundings_but};
 use super::{Form, asked, check_reserved, unless_zero};
@@ -136,7 +136,7 @@ impl Form for MotionCheck {
             Some(most_m) => most_m,
             None => replica.clearance_max_m(self.level),
         });
-        let question = mrol::service::MotionCheck {
+        let question = mrol_client::service::MotionCheck {
             asked: asked(self.level, self.ignore_keep_outs)?,
             body,
             configurations: numbers.to_vec(),

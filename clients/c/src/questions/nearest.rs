@@ -1,6 +1,6 @@
 //! The nearest voxel of points.
 
-use mrol::planning::MeasuredTo;
+use mrol_client::planning::MeasuredTo;
 
 use super::{Form, Name, asked, check_reserved, write_names};
 use crate::abi::Answer;
@@ -70,7 +70,7 @@ impl Form for NearestQuestion {
                 room.array(places.keep_outs, "answers.keep_outs")?,
             )
         };
-        let question = mrol::service::NearestQuestion {
+        let question = mrol_client::service::NearestQuestion {
             asked: asked(self.level, self.ignore_keep_outs)?,
             points,
             radius_m: self.radius_m,

@@ -1,6 +1,6 @@
 //! Rays: what each meets first.
 
-use mrol::service::{PointCloud, RaysToward};
+use mrol_client::service::{PointCloud, RaysToward};
 
 use super::{Form, Name, asked, check_reserved, unknown, unless_zero, write_names};
 use crate::abi::Answer;
@@ -101,7 +101,7 @@ impl Form for RayQuestion {
                 room.array(places.keep_outs, "answers.keep_outs")?,
             )
         };
-        let answered = replica.ask(&mrol::service::RayQuestion {
+        let answered = replica.ask(&mrol_client::service::RayQuestion {
             asked: asked(self.level, self.ignore_keep_outs)?,
             origins,
             toward,

@@ -1,9 +1,9 @@
 //! Regions as a program names them.
 
-use mrol::geometry::pose;
-use mrol::map::Region;
-use mrol::planning::Surroundings;
-use mrol::service::ServiceError;
+use mrol_client::geometry::pose;
+use mrol_client::map::Region;
+use mrol_client::planning::Surroundings;
+use mrol_client::service::ServiceError;
 
 use crate::failure::Failure;
 use crate::memory::{self, Plain};

@@ -12,11 +12,11 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use mrol::client::{Client, NewMap};
-use mrol::geometry::{Point, Pose};
-use mrol::map::{KeepOutName, KeepOutShape, Lookup, MapName, Region, RobotName};
-use mrol::mapping::Guess;
-use mrol::service::{PointQuery, PutKeepOut, ScanRequest};
+use mrol_client::geometry::{Point, Pose};
+use mrol_client::map::{KeepOutName, KeepOutShape, Lookup, MapName, Region, RobotName};
+use mrol_client::mapping::Guess;
+use mrol_client::service::{PointQuery, PutKeepOut, ScanRequest};
+use mrol_client::{Client, NewMap};
 
 /// How long anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -235,7 +235,7 @@ async fn question(client: &Client, query: PointQuery) -> (String, String) {
 
 /// Compares answers at every level, by both look-ups, with and without keep-outs and a pose.
 async fn compare(driver: &mut Driver, client: &Client) {
-    let turned = mrol::geometry::pose([0.31, -0.07, 0.02], [0.0, 0.0, 0.6, 0.8]).unwrap();
+    let turned = mrol_client::geometry::pose([0.31, -0.07, 0.02], [0.0, 0.0, 0.6, 0.8]).unwrap();
     let points: Vec<Point> =
         (0..203).map(|i| Point::new((i % 29) as f32 * 0.07, (i / 29) as f32 * 0.05, 0.05)).collect();
     for level in 0..4 {

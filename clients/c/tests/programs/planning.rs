@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use mrol::client::Client;
-use mrol::map::{KeepOutName, KeepOutShape, Region};
-use mrol::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
-use mrol::service::{
+use mrol_client::Client;
+use mrol_client::map::{KeepOutName, KeepOutShape, Region};
+use mrol_client::planning::{Body, GridArea, Link, MeasuredTo, Sphere, Surroundings, Unknown};
+use mrol_client::service::{
     Answered, Asked, CheckAs, Collisions, GridQuestion, GridScope, MapVersion, MotionCheck, NearestQuestion,
     PoseCheck, PutKeepOut, RayQuestion, RaysToward, SphereCheck,
 };

@@ -1,0 +1,152 @@
+//! The client's connection: address, limits and flow-control windows.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio_stream::StreamExt;
+use tonic::service::interceptor::InterceptedService;
+use tonic::transport::{Channel, Endpoint};
+use tonic::{Response, Status, Streaming};
+
+use super::credentials::ShownKey;
+use super::error::root_cause;
+use super::{Answers, ClientError, Credentials};
+use crate::wire::{pb, transport};
+use mrol_service::ServiceError;
+use pb::mapping_client::MappingClient;
+use pb::maps_client::MapsClient;
+use pb::occupancy_client::OccupancyClient;
+
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// A channel to a server, with the key that calls show and the address that error messages name.
+#[derive(Debug, Clone)]
+pub(super) struct Connection {
+    channel: Channel,
+    key: ShownKey,
+    url: Arc<str>,
+}
+
+/// A channel that adds the key to every call.
+type Keyed = InterceptedService<Channel, ShownKey>;
+
+impl Connection {
+    pub(super) async fn open(url: &str, credentials: &Credentials) -> Result<Self, ClientError> {
+        let (url, endpoint) = endpoint(url, credentials)?;
+        match endpoint.connect().await {
+            Ok(channel) => Ok(Self { channel, key: credentials.key(), url: url.into() }),
+            Err(error) => Err(ClientError::unreachable(url, &error)),
+        }
+    }
+
+    pub(super) fn channel(&self) -> Channel {
+        self.channel.clone()
+    }
+
+    pub(super) fn occupancy(&self) -> OccupancyClient<Keyed> {
+        OccupancyClient::with_interceptor(self.channel(), self.key.clone())
+            .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
+            .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
+    }
+
+    pub(super) fn mapping(&self) -> MappingClient<Keyed> {
+        MappingClient::with_interceptor(self.channel(), self.key.clone())
+            .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
+            .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
+    }
+
+    pub(super) fn maps(&self) -> MapsClient<Keyed> {
+        MapsClient::with_interceptor(self.channel(), self.key.clone())
+            .max_decoding_message_size(transport::MESSAGE_BYTES_MAX)
+            .max_encoding_message_size(transport::MESSAGE_BYTES_MAX)
+    }
+
+    pub(super) fn failure(&self, status: &Status) -> ClientError {
+        ClientError::of(&self.url, status)
+    }
+
+    /// Converts the messages of a stream to domain types.
+    pub(super) fn answers<M, T>(
+        &self,
+        answers: Result<Response<Streaming<M>>, Status>,
+    ) -> Result<Answers<T>, ClientError>
+    where
+        M: TryInto<T, Error = ServiceError> + Send + 'static,
+        T: 'static,
+    {
+        let answers = answers.map_err(|status| self.failure(&status))?.into_inner();
+        let connection = self.clone();
+        Ok(Answers::new(answers.map(move |answer| {
+            let answer = answer.map_err(|status| connection.failure(&status))?;
+            answer.try_into().map_err(ClientError::Answer)
+        })))
+    }
+}
+
+/// Parses `url`; returns it in full, with the endpoint to connect to.
+fn endpoint(url: &str, credentials: &Credentials) -> Result<(String, Endpoint), ClientError> {
+    let refused = |problem: &str| ClientError::Url { url: url.to_owned(), problem: problem.to_owned() };
+    let full = match url.starts_with("unix:") || url.contains("://") {
+        true => url.to_owned(),
+        false if credentials.want_tls() => format!("https://{url}"),
+        false => format!("http://{url}"),
+    };
+    let is_secure = full.starts_with("https://");
+    if !is_secure && !full.starts_with("http://") && !full.starts_with("unix:") {
+        return Err(refused("only http://, https:// and unix: are spoken"));
+    }
+    if !is_secure && credentials.want_tls() {
+        return Err(refused("certificates are of no use but with https://"));
+    }
+    let endpoint = Endpoint::from_shared(full.clone()).map_err(|error| refused(&error.to_string()))?;
+    let endpoint = if is_secure { secured(endpoint, credentials)? } else { endpoint };
+    let endpoint = endpoint
+        .connect_timeout(CONNECT_TIMEOUT)
+        .tcp_nodelay(true)
+        .http2_keep_alive_interval(transport::KEEPALIVE_INTERVAL)
+        .keep_alive_timeout(transport::KEEPALIVE_TIMEOUT)
+        .initial_stream_window_size(transport::STREAM_WINDOW_BYTES)
+        .initial_connection_window_size(transport::CONNECTION_WINDOW_BYTES)
+        .max_frame_size(transport::FRAME_BYTES_MAX);
+    Ok((full, endpoint))
+}
+
+fn secured(endpoint: Endpoint, credentials: &Credentials) -> Result<Endpoint, ClientError> {
+    let unusable = |error| ClientError::Credentials(format!("TLS cannot be spoken: {}", root_cause(&error)));
+    endpoint.tls_config(credentials.tls()).map_err(unusable)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_may_come_without_its_scheme() {
+        let none = Credentials::default();
+        let full = |url, credentials| endpoint(url, credentials).map(|(full, _)| full).unwrap();
+        assert_eq!(full("localhost:7334", &none), "http://localhost:7334");
+        assert_eq!(full("http://[::1]:7334", &none), "http://[::1]:7334");
+        assert_eq!(full("unix:/run/mrol.sock", &none), "unix:/run/mrol.sock");
+        let ca = b"-----BEGIN CERTIFICATE-----\nAA==\n-----END CERTIFICATE-----\n";
+        let trusting = Credentials::default().with_server_ca(ca).unwrap();
+        assert_eq!(full("localhost:7334", &trusting), "https://localhost:7334");
+        let in_the_clear = endpoint("http://localhost:7334", &trusting).unwrap_err().to_string();
+        assert!(in_the_clear.contains("certificates are of no use"), "{in_the_clear}");
+    }
+
+    #[test]
+    fn an_address_that_is_none_is_repeated_in_the_error() {
+        for bad in ["", "http://a b", "ftp://x"] {
+            let error = endpoint(bad, &Credentials::default()).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("{bad:?} is no server address")), "{error}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_server_that_is_not_there_is_named_with_what_to_do() {
+        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let error =
+            Connection::open(&free.to_string(), &Credentials::default()).await.unwrap_err().to_string();
+        assert!(error.contains(&format!("http://{free}")) && error.contains("mrol serve"), "{error}");
+    }
+}

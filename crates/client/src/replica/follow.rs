@@ -1,0 +1,170 @@
+//! How a replica follows its map.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use parking_lot::RwLock;
+use rand::RngExt;
+use tokio::sync::watch;
+
+use super::copy::{Applied, Builder, Copied};
+use super::{ReplicaError, ReplicaOptions, ReplicaStatus, Shared};
+use crate::{Answers, Client, ClientError};
+use mrol_map::map::MapName;
+use mrol_service::{WatchForm, WatchMessage, WatchRequest, WatchedSince};
+
+/// Shortest and longest pause before the server is asked again, less a random part of up to a half.
+const PAUSE: Duration = Duration::from_millis(100);
+const PAUSE_MAX: Duration = Duration::from_secs(5);
+
+/// Follows a map.
+#[derive(Debug)]
+pub(super) struct Follower {
+    client: Client,
+    map: MapName,
+    options: ReplicaOptions,
+    /// Away while a thread applies a message.
+    builder: Option<Builder>,
+    pause: Duration,
+}
+
+impl Follower {
+    pub(super) fn new(client: Client, map: MapName, options: ReplicaOptions) -> Self {
+        let builder = Some(Builder::new(&options));
+        Self { client, map, options, builder, pause: PAUSE }
+    }
+
+    /// Watches the map from the last revision of the copy on.
+    async fn watch(&mut self) -> Result<Answers<WatchMessage>, ClientError> {
+        let builder = self.builder.as_mut();
+        let since = builder.and_then(|builder| {
+            builder.begin();
+            let copied = builder.copied()?;
+            Some(WatchedSince { revision: copied.map.revision(), map_uuid: copied.map_uuid })
+        });
+        let request = WatchRequest {
+            since,
+            region: self.options.region,
+            form: WatchForm::Changes,
+            viewpoints: self.options.viewpoint_bytes_max > 0,
+        };
+        self.client.watch(&self.map, request).await
+    }
+
+    /// Applies a message, on a thread that may wait for who reads the copy.
+    async fn apply(&mut self, message: WatchMessage) -> Result<Applied, ReplicaError> {
+        if matches!(message.event, mrol_service::WatchEvent::Heartbeat) {
+            return Ok(Applied::Nothing);
+        }
+        let lost = || ReplicaError::Damaged("the thread that copies has panicked".into());
+        let Some(mut builder) = self.builder.take() else { return Err(lost()) };
+        let applying = tokio::task::spawn_blocking(move || {
+            let applied = builder.apply(message);
+            (builder, applied)
+        });
+        let (builder, applied) = applying.await.map_err(|_| lost())?;
+        self.builder = Some(builder);
+        applied
+    }
+
+    /// Copies the map for the first time; what is shared with readers, and the watch that goes on.
+    pub(super) async fn copy_first(&mut self) -> Result<(Arc<Shared>, Answers<WatchMessage>), ReplicaError> {
+        let mut watched = self.watch().await?;
+        loop {
+            let silence_max = self.options.silence_max;
+            let message = tokio::time::timeout(silence_max, watched.next()).await;
+            let message = message.map_err(|_| ReplicaError::Silent(silence_max))?;
+            let Some(message) = message else {
+                return Err(ReplicaError::Damaged("the watch ended before the state was complete".into()));
+            };
+            let message = message?;
+            let (head_revision, map_uuid) = (message.head_revision, message.map_uuid);
+            if let Applied::Replaced(copied) = self.apply(message).await? {
+                let version = copied.map.content_version();
+                let status = ReplicaStatus {
+                    map_uuid,
+                    version,
+                    head_revision: head_revision.max(version.revision),
+                    is_connected: true,
+                    resets: 1,
+                    last_error: None,
+                };
+                let (copied, status) = (RwLock::new(copied), watch::Sender::new(status));
+                return Ok((Arc::new(Shared { copied, status }), watched));
+            }
+        }
+    }
+
+    /// Follows the map for as long as it is not aborted.
+    pub(super) async fn run(mut self, shared: Arc<Shared>, mut watched: Answers<WatchMessage>) {
+        loop {
+            let error = self.follow(&shared, &mut watched).await;
+            watched = loop {
+                shared.tell(|status| status.is_connected = false);
+                shared.tell(|status| status.last_error.clone_from(&error));
+                self.take_a_break().await;
+                match self.watch().await {
+                    Ok(watched) => break watched,
+                    Err(error) => shared.tell(|status| status.last_error = Some(error.to_string())),
+                }
+            };
+        }
+    }
+
+    /// Applies what a watch tells until it ends; why it ended.
+    async fn follow(&mut self, shared: &Shared, watched: &mut Answers<WatchMessage>) -> Option<String> {
+        loop {
+            let silence_max = self.options.silence_max;
+            let message = match tokio::time::timeout(silence_max, watched.next()).await {
+                Err(_) => return Some(ReplicaError::Silent(silence_max).to_string()),
+                Ok(None) => return None,
+                Ok(Some(Err(error))) => return Some(error.to_string()),
+                Ok(Some(Ok(message))) => message,
+            };
+            let head_revision = message.head_revision;
+            match self.apply(message).await {
+                Ok(applied) => {
+                    self.pause = PAUSE;
+                    shared.take(applied, head_revision);
+                }
+                Err(error) => {
+                    // Whatever went wrong with it, the copy is made anew.
+                    match &mut self.builder {
+                        Some(builder) => builder.forget(),
+                        lost => *lost = Some(Builder::new(&self.options)),
+                    }
+                    return Some(error.to_string());
+                }
+            }
+        }
+    }
+
+    /// Waits before the server is asked again, longer each time.
+    async fn take_a_break(&mut self) {
+        let share = rand::rng().random_range(0.5..=1.0);
+        tokio::time::sleep(self.pause.mul_f64(share)).await;
+        self.pause = (2 * self.pause).min(PAUSE_MAX);
+    }
+}
+
+impl Shared {
+    fn tell(&self, change: impl FnOnce(&mut ReplicaStatus)) {
+        self.status.send_modify(change);
+    }
+
+    /// Shows readers what a message did.
+    fn take(&self, applied: Applied, head_revision: u64) {
+        let is_reset = matches!(applied, Applied::Replaced(_));
+        if let Applied::Replaced(copied) = applied {
+            *self.copied.write() = copied;
+        }
+        let Copied { map, map_uuid, .. } = self.copied.read().clone();
+        let version = map.content_version();
+        self.tell(|status| {
+            status.resets += u64::from(is_reset);
+            (status.map_uuid, status.version) = (map_uuid, version);
+            status.head_revision = head_revision.max(version.revision);
+            (status.is_connected, status.last_error) = (true, None);
+        });
+    }
+}

@@ -1,0 +1,59 @@
+//! Streams of requests on one call, answered in order.
+
+use tokio_stream::{Stream, StreamExt};
+
+use super::{Answers, Client, ClientError};
+use crate::wire::pb;
+use mrol_map::map::MapName;
+use mrol_service::{PointAnswer, PointQuery, ScanAnswer, ScanRequest, ServiceError};
+
+impl Client {
+    /// Inserts scans one after the other, with one answer for each: [`Client::insert_scan`] without a round trip
+    /// between two scans. `scans` is polled as fast as the server accepts scans. A scan that the
+    /// server refuses is an error among the answers, [`ClientError::Refused`], and the next answer is that of the
+    /// next scan.
+    ///
+    /// # Errors
+    /// When the server cannot be reached.
+    pub async fn insert_scans(
+        &self,
+        map: &MapName,
+        scans: impl Stream<Item = ScanRequest> + Send + 'static,
+    ) -> Result<Answers<ScanAnswer>, ClientError> {
+        let map = map.clone();
+        let requests = scans.map(move |scan| pb::InsertScanRequest::from((&map, scan)));
+        let answers = self.connection.mapping().insert_scan_stream(requests).await;
+        let answers: Answers<Inserted> = self.connection.answers(answers)?;
+        Ok(Answers::new(answers.map(|inserted| inserted?.0)))
+    }
+
+    /// Queries batch after batch, with one answer for each: [`Client::query_points`] without a round trip between two
+    /// batches. Each batch is answered at one revision of its own.
+    ///
+    /// # Errors
+    /// When the server cannot be reached; a refused request ends the answers.
+    pub async fn query_stream(
+        &self,
+        map: &MapName,
+        queries: impl Stream<Item = PointQuery> + Send + 'static,
+    ) -> Result<Answers<PointAnswer>, ClientError> {
+        let map = map.clone();
+        let requests = queries.map(move |query| pb::QueryPointsRequest::from((&map, query)));
+        let answers = self.connection.occupancy().query_points_stream(requests).await;
+        self.connection.answers(answers)
+    }
+}
+
+/// An answer of a stream of scans: what became of the scan, or why it failed.
+struct Inserted(Result<ScanAnswer, ClientError>);
+
+impl TryFrom<pb::InsertScanResponse> for Inserted {
+    type Error = ServiceError;
+
+    fn try_from(mut answer: pb::InsertScanResponse) -> Result<Self, ServiceError> {
+        Ok(Self(match answer.error.take() {
+            Some(failure) => Err(failure.into()),
+            None => Ok(answer.try_into()?),
+        }))
+    }
+}

@@ -1,0 +1,54 @@
+//! Points as what is known of them.
+
+use super::{Of, answered, asked_of};
+use crate::wire::array::{bitmap_of, words_of};
+use crate::wire::types::count_from;
+use crate::wire::{InField, pb, required};
+use mrol_map::map::MapName;
+use mrol_map::planning::PointStates;
+use mrol_service::{Answered, ClassifyQuestion, ServiceError};
+
+impl TryFrom<pb::ClassifyPointsRequest> for Of<ClassifyQuestion> {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::ClassifyPointsRequest) -> Result<Self, ServiceError> {
+        let (map, asked) = asked_of(request.asked)?;
+        let points = required(request.points, "points")?.try_into().in_field("points")?;
+        Ok((map, ClassifyQuestion { asked, points }))
+    }
+}
+
+impl From<(&MapName, ClassifyQuestion)> for pb::ClassifyPointsRequest {
+    fn from((map, ClassifyQuestion { asked, points }): (&MapName, ClassifyQuestion)) -> Self {
+        Self { asked: Some((map, asked).into()), points: Some(points.into()) }
+    }
+}
+
+impl From<Answered<PointStates>> for pb::ClassifyPointsResponse {
+    fn from(Answered { answer, version }: Answered<PointStates>) -> Self {
+        let (points_occupied, points_free) = (answer.points_occupied() as u64, answer.points_free() as u64);
+        let PointStates { points, occupied, free } = answer;
+        Self {
+            occupied: bitmap_of(occupied, points),
+            free: bitmap_of(free, points),
+            points: points as u64,
+            points_occupied,
+            points_free,
+            version: Some(version.into()),
+        }
+    }
+}
+
+impl TryFrom<pb::ClassifyPointsResponse> for Answered<PointStates> {
+    type Error = ServiceError;
+
+    fn try_from(response: pb::ClassifyPointsResponse) -> Result<Self, ServiceError> {
+        let points = count_from(response.points);
+        let states = PointStates {
+            points,
+            occupied: words_of(&response.occupied, points, "occupied")?,
+            free: words_of(&response.free, points, "free")?,
+        };
+        answered(states, response.version)
+    }
+}

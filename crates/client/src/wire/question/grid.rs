@@ -1,0 +1,85 @@
+//! The map from above.
+
+use super::{Of, answered, asked_of};
+use crate::wire::array::{bitmap_of, bytes_of, numbers_of, words_of};
+use crate::wire::pb;
+use crate::wire::types::count_from;
+use mrol_map::map::MapName;
+use mrol_map::planning::{Grid, GridArea};
+use mrol_service::{Answered, GridQuestion, GridScope, ServiceError};
+
+impl TryFrom<pb::ProjectGridRequest> for Of<GridQuestion> {
+    type Error = ServiceError;
+
+    fn try_from(request: pb::ProjectGridRequest) -> Result<Self, ServiceError> {
+        let (map, asked) = asked_of(request.asked)?;
+        let area = request.area.map_or(GridArea::Occupied, |area| GridArea::Rectangle {
+            min_m: [area.min_x_m, area.min_y_m],
+            max_m: [area.max_x_m, area.max_y_m],
+        });
+        let low_m = request.min_z_m.unwrap_or(f64::NEG_INFINITY);
+        let high_m = request.max_z_m.unwrap_or(f64::INFINITY);
+        let scope = GridScope {
+            area,
+            band_m: [low_m, high_m],
+            cell_m: request.cell_m,
+            tells_unknown: request.tell_unknown,
+        };
+        Ok((map, GridQuestion { asked, scope }))
+    }
+}
+
+impl From<(&MapName, GridQuestion)> for pb::ProjectGridRequest {
+    fn from((map, GridQuestion { asked, scope }): (&MapName, GridQuestion)) -> Self {
+        let GridScope { area, band_m: [low_m, high_m], cell_m, tells_unknown: tell_unknown } = scope;
+        let area = match area {
+            GridArea::Occupied => None,
+            GridArea::Rectangle { min_m: [min_x_m, min_y_m], max_m: [max_x_m, max_y_m] } => {
+                Some(pb::GridArea { min_x_m, min_y_m, max_x_m, max_y_m })
+            }
+        };
+        let asked = Some((map, asked).into());
+        Self { asked, area, min_z_m: Some(low_m), max_z_m: Some(high_m), cell_m, tell_unknown }
+    }
+}
+
+impl From<Answered<Grid>> for pb::ProjectGridResponse {
+    fn from(Answered { answer, version }: Answered<Grid>) -> Self {
+        let cells = answer.cells();
+        let Grid { cell_m, origin_m: [origin_x_m, origin_y_m], size: [x, y], occupied, tops_m, free } =
+            answer;
+        let ones = |words: &[u64]| words.iter().map(|word| u64::from(word.count_ones())).sum();
+        let (cells_occupied, cells_free) = (ones(&occupied), free.as_deref().map_or(0, ones));
+        Self {
+            cell_m,
+            origin_x_m,
+            origin_y_m,
+            cells_x: x as u64,
+            cells_y: y as u64,
+            occupied: bitmap_of(occupied, cells),
+            cells_occupied,
+            tops_m_f32le: bytes_of(tops_m),
+            version: Some(version.into()),
+            free: free.map(|free| bitmap_of(free, cells)),
+            cells_free,
+        }
+    }
+}
+
+impl TryFrom<pb::ProjectGridResponse> for Answered<Grid> {
+    type Error = ServiceError;
+
+    fn try_from(response: pb::ProjectGridResponse) -> Result<Self, ServiceError> {
+        let size = [response.cells_x, response.cells_y].map(count_from);
+        let cells = size[0].saturating_mul(size[1]);
+        let grid = Grid {
+            cell_m: response.cell_m,
+            origin_m: [response.origin_x_m, response.origin_y_m],
+            size,
+            occupied: words_of(&response.occupied, cells, "occupied")?,
+            tops_m: numbers_of(&response.tops_m_f32le, cells, "tops_m_f32le")?,
+            free: response.free.map(|free| words_of(&free, cells, "free")).transpose()?,
+        };
+        answered(grid, response.version)
+    }
+}

@@ -1,0 +1,272 @@
+//! Experiment on carving: what a map loses of what is taken away and of who walks by, and what it keeps of what stands.
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use mrol_map::geometry::{Point, Pose, pose_difference};
+use mrol_map::map::{MapSettings, MapSettingsError, MultiResolutionMap, RobotName};
+use mrol_map::mapping::{CarvingSettings, Guess, MappingError, MappingSettings, Scan, ScanMapper, Sightings};
+use mrol_map::util::StopSignal;
+use mrol_map::voxel::VoxelKey;
+use mrol_simulate::{Mover, Scene, SpinningLidar};
+
+/// Radius of the circle that the robot drives, meters, and where its middle is.
+const CIRCLE_M: f64 = 3.0;
+const MIDDLE_M: [f64; 2] = [10.0, 7.0];
+/// Height of the sensor above the floor, meters.
+const HEIGHT_M: f64 = 1.0;
+/// After which share of the scans the box is taken away: the robot is 4 m from it then.
+const GONE_AFTER: f64 = 0.55;
+/// Steps of the walker that are no trail yet: he stands beside them.
+const FRESH_STEPS: usize = 3;
+
+/// What is simulated: a hall with a box that is taken away halfway, and a person who walks to and fro.
+#[derive(Debug, Clone)]
+pub struct CarvingTrial {
+    /// Scans of the robot.
+    pub scans: usize,
+    /// Scans of one of the robot's rounds.
+    pub scans_a_round: usize,
+    /// Side of a finest voxel, meters.
+    pub resolution_m: f64,
+    /// The robot's sensor.
+    pub lidar: SpinningLidar,
+    /// What the scans carve.
+    pub carving: CarvingSettings,
+    /// Take the scans at their true poses, without aligning them.
+    pub at_true_poses: bool,
+    /// Seed of the hall and of the noise.
+    pub seed: u64,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CarvingFigures {
+    /// Voxels of the box in the map when it was taken away, and how many of them the next scan left there.
+    pub box_voxels: (usize, usize),
+    /// Voxels of the walker's trail in a map that does not carve, and how many of them are left in the one that does.
+    pub trail_voxels: (usize, usize),
+    /// Voxels of walls, floor, ceiling and furniture in a map that does not carve, and how many of them are left in the one
+    /// that does.
+    pub still_voxels: (usize, usize),
+    /// Scans that carved and were accepted, and those that did not carve.
+    pub accepted: (usize, usize),
+    /// Errors of the poses of both, meters, ascending.
+    pub errors_m: (Vec<f64>, Vec<f64>),
+    /// Times of one scan's carving, ascending.
+    pub carve_times: Vec<Duration>,
+}
+
+impl CarvingTrial {
+    /// What is in the hall beside what stands there.
+    fn movers(&self) -> [Mover; 2] {
+        let gone_at = self.gone_at();
+        [
+            Mover::Crate { bottom_m: [13.0, 10.0, 0.0], size_m: [1.2, 1.0, 1.6], gone_at },
+            Mover::Walker { from_m: [9.0, 8.0], to_m: [11.5, 8.0], step_m: 0.13 },
+        ]
+    }
+
+    /// The first step without the box.
+    fn gone_at(&self) -> usize {
+        (self.scans as f64 * GONE_AFTER) as usize
+    }
+
+    /// Where the sensor is at `step`: map_from_sensor.
+    fn pose(&self, step: usize) -> Pose {
+        let angle = step as f64 / self.scans_a_round as f64 * std::f64::consts::TAU;
+        let [x, y] = [MIDDLE_M[0] + CIRCLE_M * angle.sin(), MIDDLE_M[1] - CIRCLE_M * angle.cos()];
+        Pose::new(Vector3::new(x, y, HEIGHT_M), Vector3::new(0.0, 0.0, angle))
+    }
+
+    /// Runs it, and calls `done` after each scan.
+    ///
+    /// # Errors
+    /// When a setting is out of range, or a scan cannot be mapped.
+    pub fn run(&self, mut done: impl FnMut()) -> Result<CarvingFigures, CarvingTrialError> {
+        let hall = Scene::hall(self.seed);
+        let movers = self.movers();
+        let (mut with, mut without) = (self.map(Some(self.carving))?, self.map(None)?);
+        let (mut random, mut other_random) =
+            (ChaCha8Rng::seed_from_u64(self.seed), ChaCha8Rng::seed_from_u64(self.seed + 1));
+        let mut still = CarvingMapper { at_true_poses: true, ..self.map(None)? };
+        let mut box_voxels = None;
+        for step in 0..self.scans {
+            let truth = self.pose(step);
+            let look = |scene: &Scene, random: &mut ChaCha8Rng| {
+                let points = self.lidar.scan(scene, &truth, random);
+                points.into_iter().filter(|point| point.is_finite()).collect::<Vec<Point>>()
+            };
+            let points = look(&hall.with_movers(&movers, step), &mut random);
+            still.add(step, &look(&hall, &mut other_random), &truth)?;
+            let before = (step == self.gone_at()).then(|| with.voxels());
+            with.add(step, &points, &truth)?;
+            without.add(step, &points, &truth)?;
+            if let Some(before) = before {
+                box_voxels = Some((self.within(&movers[0], [step - 1], &before), with.voxels()));
+            }
+            done();
+        }
+        let (stands, kept, all) = (still.voxels(), with.voxels(), without.voxels());
+        let ghosts: BTreeSet<_> = all.difference(&stands).copied().collect();
+        let last = self.within(&movers[1], self.scans.saturating_sub(FRESH_STEPS)..self.scans, &ghosts);
+        let trail = self.within(&movers[1], 0..self.scans, &ghosts);
+        let trail: BTreeSet<_> = trail.difference(&last).copied().collect();
+        let standing: BTreeSet<_> = stands.intersection(&all).copied().collect();
+        let left = |of: &BTreeSet<VoxelKey>| (of.len(), of.intersection(&kept).count());
+        let ascending = |mut errors: Vec<f64>| {
+            errors.sort_unstable_by(f64::total_cmp);
+            errors
+        };
+        // What stands beside the box is no part of it.
+        let (of_box, after) = box_voxels.unwrap_or_default();
+        let of_box: BTreeSet<_> = of_box.difference(&stands).copied().collect();
+        with.carve_times.sort_unstable();
+        Ok(CarvingFigures {
+            box_voxels: (of_box.len(), of_box.intersection(&after).count()),
+            trail_voxels: left(&trail),
+            still_voxels: left(&standing),
+            accepted: (with.errors_m.len(), without.errors_m.len()),
+            errors_m: (ascending(with.errors_m), ascending(without.errors_m)),
+            carve_times: with.carve_times,
+        })
+    }
+
+    /// The voxels within a voxel of where `mover` is at one of `steps`.
+    fn within(
+        &self,
+        mover: &Mover,
+        steps: impl IntoIterator<Item = usize>,
+        voxels: &BTreeSet<VoxelKey>,
+    ) -> BTreeSet<VoxelKey> {
+        let boxes: Vec<_> = steps.into_iter().filter_map(|step| mover.bounds_m(step)).collect();
+        let is_within = |voxel: &&VoxelKey| {
+            let center_m = voxel.index().map(|i| (f64::from(i) + 0.5) * self.resolution_m);
+            let slack_m = 1.5 * self.resolution_m;
+            boxes.iter().any(|[min_m, max_m]| {
+                (0..3).all(|axis| (min_m[axis] - slack_m..=max_m[axis] + slack_m).contains(&center_m[axis]))
+            })
+        };
+        voxels.iter().filter(is_within).copied().collect()
+    }
+
+    fn map(&self, carving: Option<CarvingSettings>) -> Result<CarvingMapper, CarvingTrialError> {
+        CarvingMapper::new(MapSettings::new(self.resolution_m, LEVELS), carving, self.at_true_poses)
+    }
+}
+
+const LEVELS: u32 = 6;
+
+/// Why a trial cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum CarvingTrialError {
+    /// A setting of the map is out of range.
+    #[error(transparent)]
+    Settings(#[from] MapSettingsError),
+    /// The robot has no valid name.
+    #[error(transparent)]
+    Name(#[from] mrol_map::map::NameError),
+    /// A scan cannot be mapped.
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+}
+
+/// A map of one robot, whose scans carve it or not.
+#[derive(Debug)]
+pub struct CarvingMapper {
+    /// The map.
+    pub map: MultiResolutionMap,
+    robot: RobotName,
+    sightings: Sightings,
+    settings: MappingSettings,
+    at_true_poses: bool,
+    /// Errors of the accepted scans' poses, meters.
+    pub errors_m: Vec<f64>,
+    /// How long each scan's carving took.
+    pub carve_times: Vec<Duration>,
+    /// All voxels that were carved.
+    pub carved: BTreeSet<VoxelKey>,
+}
+
+impl CarvingMapper {
+    /// An empty map of these settings, whose scans carve it as `carving` says.
+    ///
+    /// # Errors
+    /// When a setting is out of range.
+    pub fn new(
+        settings: MapSettings,
+        carving: Option<CarvingSettings>,
+        at_true_poses: bool,
+    ) -> Result<Self, CarvingTrialError> {
+        Ok(Self {
+            map: MultiResolutionMap::new(settings)?,
+            robot: RobotName::new("lidar")?,
+            sightings: Sightings::default(),
+            settings: MappingSettings { carving, ..MappingSettings::default() },
+            at_true_poses,
+            errors_m: Vec::new(),
+            carve_times: Vec::new(),
+            carved: BTreeSet::new(),
+        })
+    }
+
+    /// Maps scan `step` (sensor frame, finite), which was taken at `truth`; the guess is the last motion, but for the first.
+    /// True of one that fits.
+    ///
+    /// # Errors
+    /// When it cannot be mapped.
+    pub fn add(&mut self, step: usize, points: &[Point], truth: &Pose) -> Result<bool, CarvingTrialError> {
+        let is_given = self.at_true_poses || step == 0;
+        let scan = Scan {
+            guess: if is_given { Guess::Pose(*truth) } else { Guess::ConstantVelocity },
+            at_guess: is_given,
+            ..Scan::new(&self.robot, points)
+        };
+        let mapper = ScanMapper::new(&self.map, &self.sightings, self.settings);
+        let located = mapper.locate(&scan, StopSignal::NEVER)?;
+        if !located.is_accepted() {
+            return Ok(false);
+        }
+        let mut record = mapper.record(&scan, &located, StopSignal::NEVER)?;
+        let start = Instant::now();
+        record.carved = mapper.carve(&scan, &located, &record, StopSignal::NEVER)?.voxels;
+        self.carve_times.push(start.elapsed());
+        self.carved.extend(record.carved.iter());
+        self.errors_m.push(pose_difference(truth, &located.alignment.map_from_sensor).0);
+        self.map.committer().insert_scan(record);
+        Ok(true)
+    }
+
+    /// All finest voxels of the map.
+    pub fn voxels(&self) -> BTreeSet<VoxelKey> {
+        self.map.view().voxels().iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_goes_is_lost_and_what_stands_is_kept() {
+        let lidar = SpinningLidar { rings: 64, azimuths: 1024, ..SpinningLidar::default() };
+        let trial = CarvingTrial {
+            scans: 12,
+            scans_a_round: 50,
+            resolution_m: 0.1,
+            lidar,
+            carving: CarvingSettings::default(),
+            at_true_poses: true,
+            seed: 1,
+        };
+        let CarvingFigures { box_voxels, trail_voxels, still_voxels, .. } = trial.run(|| ()).unwrap();
+        // Of voxels of 10 cm more lies within the margin of the floor than of those of 5 cm, which the experiment has.
+        assert!(box_voxels.0 > 100 && box_voxels.1 * 4 <= box_voxels.0, "{box_voxels:?}");
+        assert!(trail_voxels.0 > 100 && trail_voxels.1 * 5 <= trail_voxels.0, "{trail_voxels:?}");
+        assert!(still_voxels.1 as f64 >= 0.999 * still_voxels.0 as f64, "{still_voxels:?}");
+    }
+}

@@ -1,0 +1,70 @@
+//! Fleets: a server, in this process or another, under the load of planners that query, robots that map, and
+//! whoever watches.
+
+mod address;
+mod c_client;
+mod cpu;
+mod http;
+mod ledger;
+mod load;
+mod member;
+mod memory;
+mod pace;
+mod planner;
+mod process;
+pub(crate) mod questions;
+mod relay;
+mod robot;
+mod spectator;
+mod stalled;
+mod surveyor;
+mod tally;
+mod target;
+
+use std::fmt::Display;
+
+use mrol::server::ServerError;
+use mrol_client::ClientError;
+
+pub(crate) use address::{GrpcAddress, HttpAddress};
+pub(crate) use c_client::CClient;
+pub(crate) use ledger::Ledger;
+pub(crate) use load::{Answered, Load, Question};
+pub(crate) use member::{Fleet, Working};
+pub(crate) use memory::{Trend, resident_bytes};
+pub(crate) use planner::Planner;
+pub(crate) use process::{ANY_PORT, ServerProcess};
+pub(crate) use relay::Relay;
+pub(crate) use robot::{Robot, Seen, TURN_POINTS};
+pub(crate) use spectator::Spectator;
+pub(crate) use stalled::StalledWatch;
+pub(crate) use surveyor::Surveyor;
+pub(crate) use tally::Tally;
+pub(crate) use target::Target;
+
+/// Errors of a fleet.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum FleetError {
+    /// The server refused a request, or cannot be reached.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// The daemon cannot serve.
+    #[error(transparent)]
+    Server(#[from] ServerError),
+    /// The options are not valid.
+    #[error("{0}")]
+    Usage(String),
+    /// Anything else.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl FleetError {
+    fn usage(message: impl Display) -> Self {
+        Self::Usage(message.to_string())
+    }
+
+    fn failed(message: impl Display) -> Self {
+        Self::Failed(message.to_string())
+    }
+}

@@ -1,0 +1,383 @@
+//! How a map is read: all the locks it takes, at once, and so one revision.
+
+use std::sync::Arc;
+
+use super::lookup::{self, LevelView, Lookup};
+use super::occupied_voxel_list::tier_of;
+use super::shard::Shard;
+use super::sharding::{SHARDS, ShardsTouched};
+use super::tier_view::TierView;
+use super::{
+    ContentVersion, KeepOuts, MomentsView, MultiResolutionMap, OccupiedVoxelList, Region, VoxelSelection,
+};
+use crate::geometry::Point;
+use crate::sync::RwLockReadGuard;
+use crate::util::StopSignal;
+use crate::visibility::ViewpointSet;
+use crate::voxel::{
+    BLOCK_LEVELS, BLOCK_SIDE, BLOCKS_PER_LOOK, BlockMask, Cell, INDEX_MAX, INDEX_MIN, Lattice,
+    LatticeFromPoints, VoxelKey, VoxelSet,
+};
+
+/// Read locks on some or all shards of a map. While it lives, what it covers does not change.
+#[derive(Debug)]
+pub struct MapView<'a> {
+    map: &'a MultiResolutionMap,
+    shards: [Option<RwLockReadGuard<'a, Shard>>; SHARDS],
+    version: ContentVersion,
+    /// Where they were asked for.
+    keep_outs: Option<Arc<KeepOuts>>,
+    viewpoints: Option<Arc<ViewpointSet>>,
+}
+
+/// A read that takes long, see [`MultiResolutionMap::long_read`].
+#[derive(Debug)]
+pub struct LongRead<'a> {
+    pub(super) map: &'a MultiResolutionMap,
+    pub(super) _changes_wait: RwLockReadGuard<'a, ()>,
+}
+
+impl LongRead<'_> {
+    /// Locks the whole map for reading.
+    pub fn view(&self) -> MapView<'_> {
+        self.map.view()
+    }
+
+    /// Locks the moments of the map's points for reading; before a view, where both are needed. None of a map that keeps
+    /// no moments.
+    pub fn moments(&self) -> Option<MomentsView<'_>> {
+        self.map.moments()
+    }
+}
+
+impl<'a> MapView<'a> {
+    /// Takes the locks in ascending order, as committers do, so that nobody waits in a circle. The revision is
+    /// read once they are held: a change that is published later touches none of these shards.
+    pub(super) fn lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Self {
+        let shards = std::array::from_fn(|i| touched.contains(i).then(|| map.shards[i].read()));
+        Self { map, shards, version: map.content_version(), keep_outs: None, viewpoints: None }
+    }
+
+    /// A view where no lock has to be waited for; none elsewhere.
+    pub(super) fn try_lock(map: &'a MultiResolutionMap, touched: ShardsTouched) -> Option<Self> {
+        let mut shards = [const { None }; SHARDS];
+        for i in (0..SHARDS).filter(|&i| touched.contains(i)) {
+            shards[i] = Some(map.shards[i].try_read()?);
+        }
+        Some(Self { map, shards, version: map.content_version(), keep_outs: None, viewpoints: None })
+    }
+
+    /// This view with the keep-outs of the map, all at one revision, which may be a later one: what the view covers has not
+    /// changed since.
+    #[must_use]
+    pub fn with_keep_outs(self) -> Self {
+        // Nobody publishes a change of what is locked: of the shards before, of the keep-outs now.
+        let keep_outs = self.map.keep_outs.read();
+        let (keep_outs, version) = (Some(Arc::clone(&keep_outs)), self.map.content_version());
+        Self { keep_outs, version, ..self }
+    }
+
+    /// [`MapView::with_keep_outs`] where no lock has to be waited for; none elsewhere.
+    pub fn try_with_keep_outs(self) -> Option<Self> {
+        let keep_outs = self.map.keep_outs.try_read()?;
+        let (keep_outs, version) = (Some(Arc::clone(&keep_outs)), self.map.content_version());
+        Some(Self { keep_outs, version, ..self })
+    }
+
+    /// The keep-outs, where the view was asked for them.
+    pub fn keep_outs(&self) -> Option<&Arc<KeepOuts>> {
+        self.keep_outs.as_ref()
+    }
+
+    /// This view with where scans saw through, all at one revision, which may be a later one: what the view covers has not
+    /// changed since.
+    #[must_use]
+    pub fn with_viewpoints(self) -> Self {
+        // Keep-outs may have changed since they were asked for: both are taken anew, at once.
+        let keep_outs = self.keep_outs.is_some().then(|| self.map.keep_outs.read());
+        let viewpoints = self.map.viewpoints.read();
+        let version = self.map.content_version();
+        let keep_outs = keep_outs.as_deref().map(Arc::clone);
+        let viewpoints = Some(Arc::clone(&viewpoints));
+        Self { keep_outs, viewpoints, version, ..self }
+    }
+
+    /// [`MapView::with_viewpoints`] where no lock has to be waited for; none elsewhere.
+    pub fn try_with_viewpoints(self) -> Option<Self> {
+        let keep_outs = match &self.keep_outs {
+            Some(_) => Some(self.map.keep_outs.try_read()?),
+            None => None,
+        };
+        let viewpoints = self.map.viewpoints.try_read()?;
+        let version = self.map.content_version();
+        let keep_outs = keep_outs.as_deref().map(Arc::clone);
+        let viewpoints = Some(Arc::clone(&viewpoints));
+        Some(Self { keep_outs, viewpoints, version, ..self })
+    }
+
+    /// Where scans saw through, where the view was asked for that.
+    pub fn viewpoints(&self) -> Option<&Arc<ViewpointSet>> {
+        self.viewpoints.as_ref()
+    }
+
+    /// The lattices of the map's levels.
+    pub fn lattice(&self) -> &Lattice {
+        &self.map.lattice
+    }
+
+    /// The revision that everything read through this view belongs to.
+    pub fn revision(&self) -> u64 {
+        self.version.revision
+    }
+
+    /// That revision, with the hash of what the whole map holds then.
+    pub fn version(&self) -> ContentVersion {
+        self.version
+    }
+
+    /// Says of each point whether its voxel of `level` is occupied: point i is bit i % 64 of `occupied[i / 64]`.
+    /// Points in no voxel are not occupied; true when there were none of them.
+    ///
+    /// The view must cover the points.
+    pub fn query(
+        &self,
+        points: &[Point],
+        lattice_from_points: &LatticeFromPoints,
+        level: u32,
+        lookup: Lookup,
+        occupied: &mut [u64],
+    ) -> bool {
+        lookup::occupied(points, lattice_from_points, &self.level_view(level), lookup, occupied)
+    }
+
+    /// Number of points whose voxel of `level` is occupied. The view must cover the points.
+    pub fn count(
+        &self,
+        points: &[Point],
+        lattice_from_points: &LatticeFromPoints,
+        level: u32,
+        lookup: Lookup,
+    ) -> usize {
+        lookup::count(points, lattice_from_points, &self.level_view(level), lookup)
+    }
+
+    /// The shards that the view covers.
+    pub(super) fn shards(&self) -> impl Iterator<Item = &Shard> {
+        self.shards.iter().flatten().map(|shard| &**shard)
+    }
+
+    /// The shards, of those that the view covers, that the voxel at `index` of `level`, however coarse, lies in.
+    pub(super) fn shards_of(&self, index: [i32; 3], level: u32) -> impl Iterator<Item = &Shard> {
+        let one = self.map.sharding.shard_of_node(index, level);
+        let range = one.map_or(0..SHARDS, |one| one..one + 1);
+        self.shards[range].iter().flatten().map(|shard| &**shard)
+    }
+
+    /// The map that is read.
+    pub fn map(&self) -> &'a MultiResolutionMap {
+        self.map
+    }
+
+    /// What the look-up kernels read of `level`.
+    pub fn level_view(&self, level: u32) -> LevelView<'_> {
+        let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
+        let (_, up) = tier_of(level);
+        let hashes = self.map.settings.filter.map(|filter| filter.hashes);
+        LevelView::new(level, up, self.map.sharding.shift_at(level), hashes, list)
+    }
+
+    /// The clusters that serve `level`; where the view does not cover a shard they are absent.
+    pub(crate) fn tier_view(&self, level: u32) -> TierView<'_> {
+        let list = |shard: usize| self.shards[shard].as_deref().map(|shard| shard.level(level));
+        let (_, up) = tier_of(level);
+        let (region_shift, cell_m) =
+            (self.map.sharding.shift_at(level - up), self.map.lattice.resolution_m(level - up));
+        TierView::new(level, region_shift, cell_m, list)
+    }
+
+    /// The lists of `level`, one a shard that the view covers.
+    pub fn lists(&self, level: u32) -> impl Iterator<Item = OccupiedVoxelList<'_>> {
+        self.shards.iter().flatten().map(move |shard| shard.level(level))
+    }
+
+    /// True when `voxel` of `level` is occupied, exactly. False where the view does not cover it.
+    pub fn contains(&self, voxel: VoxelKey, level: u32) -> bool {
+        let shard = self.map.sharding.shard_of(voxel.index(), level);
+        self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).contains(voxel))
+    }
+
+    /// True when the filter lets `voxel` of `level` through, or where there is no filter, when it is occupied.
+    pub fn may_contain(&self, voxel: VoxelKey, level: u32) -> bool {
+        let shard = self.map.sharding.shard_of(voxel.index(), level);
+        self.shards[shard].as_deref().is_some_and(|shard| shard.level(level).may_contain(voxel))
+    }
+
+    /// How many of `voxels` are not in the map. The view must cover them.
+    pub fn absent(&self, voxels: &VoxelSet) -> usize {
+        let absent = |&(block, mask): &(VoxelKey, BlockMask)| {
+            let finest = block.index().map(|i| i << BLOCK_LEVELS);
+            let shard = self.shards[self.map.sharding.shard_of(finest, 0)].as_deref();
+            let present = shard.map_or(&BlockMask::EMPTY, |shard| shard.level(0).blocks().get(block));
+            mask.difference(present).count(0)
+        };
+        voxels.blocks().iter().map(absent).sum()
+    }
+
+    /// All finest voxels that the view covers.
+    pub fn voxels(&self) -> VoxelSet {
+        self.voxels_until(StopSignal::NEVER)
+    }
+
+    /// All finest voxels that the view covers; once stopped, some of them.
+    pub(super) fn voxels_until(&self, stop: StopSignal<'_>) -> VoxelSet {
+        let mut all = Vec::with_capacity(self.lists(0).map(|list| list.blocks().len()).sum());
+        all.extend(
+            stop.paced(self.shards.iter().flatten().flat_map(|shard| shard.blocks()), BLOCKS_PER_LOOK),
+        );
+        VoxelSet::of_blocks_until(all, stop)
+    }
+
+    /// The finest voxels at and below the voxels `keys` of `level`, of those that are there.
+    pub fn descendants_of(&self, keys: impl IntoIterator<Item = VoxelKey>, level: u32) -> VoxelSet {
+        let (tier, up) = tier_of(level);
+        let mut by_shard: [Vec<(VoxelKey, BlockMask)>; SHARDS] = Default::default();
+        for key in keys {
+            let (block, cell) = Cell::of(key.index().map(|i| i << up));
+            let blocks = &mut by_shard[self.map.sharding.shard_of(key.index(), level)];
+            // Keys come row by row: the last block is met again more often than not.
+            match blocks.last_mut() {
+                Some((last, mask)) if *last == block => mask.fill(cell, up),
+                _ => {
+                    let mut mask = BlockMask::EMPTY;
+                    mask.fill(cell, up);
+                    blocks.push((block, mask));
+                }
+            }
+        }
+        let mut found = Vec::new();
+        for (shard, blocks) in self.shards.iter().zip(by_shard) {
+            if let Some(shard) = shard {
+                let wanted: VoxelSet = blocks.into_iter().collect();
+                found.extend_from_slice(shard.descendants(tier, wanted.blocks()).blocks());
+            }
+        }
+        found.into_iter().collect()
+    }
+
+    /// The finest voxels at and below the voxels of `level` whose centers lie in `region`.
+    ///
+    /// Takes some 72 bytes a block of finest voxels, and no more for a voxel.
+    pub fn finest_in(&self, region: &Region, level: u32) -> VoxelSet {
+        self.finest_in_until(region, level, StopSignal::NEVER)
+    }
+
+    /// [`MapView::finest_in`] under a stop signal; once stopped, some of the voxels.
+    pub fn finest_in_until(&self, region: &Region, level: u32, stop: StopSignal<'_>) -> VoxelSet {
+        let (tier, _) = tier_of(level);
+        let selection = VoxelSelection::from(Some(*region));
+        let mut found = Vec::new();
+        for shard in self.shards() {
+            let mut blocks = Vec::new();
+            self.for_each_block(&shard.level(level), &selection, stop, |block, mask| {
+                let wanted = self.part_in(&selection, level, block, mask);
+                if !wanted.is_empty() {
+                    blocks.push((block, wanted));
+                }
+            });
+            if stop.is_stopped() {
+                break;
+            }
+            found.extend_from_slice(shard.descendants(tier, &blocks).blocks());
+        }
+        VoxelSet::of_blocks_until(found, stop)
+    }
+
+    /// The voxels of `level` whose centers lie in `region`.
+    pub fn voxels_in(&self, region: &Region, level: u32) -> Vec<VoxelKey> {
+        let mut voxels = Vec::new();
+        let selection = VoxelSelection::from(Some(*region));
+        let copy = self.level_voxels(level, &selection, usize::MAX, StopSignal::NEVER);
+        copy.for_some(StopSignal::NEVER, |some| voxels.extend_from_slice(some));
+        voxels
+    }
+
+    /// The part of a block whose voxels of `level` are among the selected ones, each of them filled.
+    pub(super) fn part_in(
+        &self,
+        selection: &VoxelSelection,
+        level: u32,
+        block: VoxelKey,
+        mask: &BlockMask,
+    ) -> BlockMask {
+        if selection.is_everything() {
+            return *mask;
+        }
+        let (_, up) = tier_of(level);
+        let mut part = BlockMask::EMPTY;
+        for cell in mask.cells(up) {
+            if selection.contains(self.map.lattice.center_m(cell.voxel(block).ancestor(up), level)) {
+                part.fill(cell, up);
+            }
+        }
+        part
+    }
+
+    /// Calls `f` with each block of a list that can hold a selected voxel.
+    ///
+    /// Walks the blocks that the selection's bounds meet, or all that are stored where those are fewer; some of them once
+    /// stopped.
+    pub(crate) fn for_each_block(
+        &self,
+        list: &OccupiedVoxelList<'_>,
+        selection: &VoxelSelection,
+        stop: StopSignal<'_>,
+        mut f: impl FnMut(VoxelKey, &BlockMask),
+    ) {
+        let blocks = list.blocks();
+        let block_m = self.block_m(list.level());
+        let radius_m = block_m * 3f64.sqrt() / 2.0;
+        let may_meet = |block: &VoxelKey| {
+            let center_m = block.index().map(|i| (f64::from(i) + 0.5) * block_m);
+            selection.may_meet(center_m, radius_m)
+        };
+        let candidates = block_bounds(selection, block_m);
+        if volume(&candidates) < blocks.len() as f64 {
+            let candidates = stop.paced(grid(candidates), BLOCKS_PER_LOOK).filter(may_meet);
+            candidates.for_each(|block| f(block, blocks.get(block)));
+        } else {
+            let stored = stop.paced(blocks.iter(), BLOCKS_PER_LOOK).filter(|(block, _)| may_meet(block));
+            stored.for_each(|(block, mask)| f(block, mask));
+        }
+    }
+
+    /// Most stored blocks that can hold a selected voxel of `level`: known without a look at any of them.
+    pub(super) fn blocks_max(&self, level: u32, selection: &VoxelSelection) -> usize {
+        let candidates = volume(&block_bounds(selection, self.block_m(level)));
+        let stored: usize = self.lists(level).map(|list| list.blocks().len()).sum();
+        if candidates < stored as f64 { candidates as usize } else { stored }
+    }
+
+    /// Side of the stored blocks that hold the voxels of `level`, meters.
+    fn block_m(&self, level: u32) -> f64 {
+        let (_, up) = tier_of(level);
+        self.map.lattice.resolution_m(level - up) * f64::from(BLOCK_SIDE)
+    }
+}
+
+/// The inclusive ranges of block indices that a selection's bounds meet, for blocks of `block_m` meters.
+fn block_bounds(selection: &VoxelSelection, block_m: f64) -> [(i32, i32); 3] {
+    let (min_m, max_m) = selection.bounds_m();
+    let clamp = |c: f64| (c / block_m).floor().clamp(f64::from(INDEX_MIN), f64::from(INDEX_MAX)) as i32;
+    std::array::from_fn(|axis| (clamp(min_m[axis]), clamp(max_m[axis])))
+}
+
+/// Number of blocks in ranges of their indices.
+fn volume(ranges: &[(i32, i32); 3]) -> f64 {
+    ranges.iter().map(|(low, high)| (f64::from(*high) - f64::from(*low) + 1.0).max(0.0)).product()
+}
+
+fn grid([x, y, z]: [(i32, i32); 3]) -> impl Iterator<Item = VoxelKey> {
+    let span = |(low, high): (i32, i32)| low..=high;
+    span(z)
+        .flat_map(move |z| span(y).flat_map(move |y| span(x).filter_map(move |x| VoxelKey::new([x, y, z]))))
+}

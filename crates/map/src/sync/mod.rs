@@ -1,0 +1,70 @@
+//! The locks of maps and of their folders: their order, and what may be done while one is held.
+//!
+//! Every lock has a [`Rank`]. A thread takes locks in ascending order of their ranks, so that no two threads wait for
+//! each other. Three rules follow from what the locks protect:
+//!
+//! * A thread that polls async tasks never waits for a lock that somebody may hold for long: it would keep every other
+//!   connection waiting with it, health checks among them. It may `try_` such a lock, and hand the work to a pool
+//!   where that fails. [`Rank::Brief`] locks are exempt: they are held for a few instructions.
+//! * No file operation starts while a lock of a map's content is held: a slow disk would stop its readers.
+//! * While a [`Rank::Brief`] lock is held no other lock is taken and no file operation starts.
+//!
+//! With `debug_assertions`, so in every test, a breach panics at the line that commits it (`checks`). Without, the
+//! locks are `parking_lot`'s and cost nothing more. With the feature `shuttle`, which is for one test alone
+//! (`tests/commit_protocol.rs`), they are those of a model checker: it runs a test's threads one at a time, and at
+//! every lock chooses who goes on.
+
+mod checks;
+mod locks;
+#[cfg(feature = "shuttle")]
+mod modeled;
+
+pub use checks::before_file_operation;
+pub use locks::{Mutex, MutexGuard, RwLock, RwLockReadGuard, RwLockWriteGuard};
+#[cfg(feature = "shuttle")]
+pub use shuttle::sync::atomic::AtomicU64;
+#[cfg(feature = "shuttle")]
+pub use shuttle::{sync::mpsc, thread};
+#[cfg(not(feature = "shuttle"))]
+pub use std::sync::atomic::AtomicU64;
+#[cfg(not(feature = "shuttle"))]
+pub use std::{sync::mpsc, thread};
+
+pub use checks::polled_by_runtime;
+
+/// Where a lock stands in the order in which locks are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rank {
+    /// The snapshots of a map's folder, held while one is written.
+    Snapshots,
+    /// A map's journal, held while it is written and synced.
+    Journal,
+    /// The turn to change a map.
+    Commit,
+    /// Held by who reads a map for long; a change waits for it where no short reader queues behind.
+    LongRead,
+    /// The moments of shard i. Several are taken in ascending order.
+    Moments(u8),
+    /// The voxels of shard i. Several are taken in ascending order.
+    Shard(u8),
+    /// The keep-outs of a map.
+    KeepOuts,
+    /// The viewpoints of a map.
+    Viewpoints,
+    /// The trajectory of a map.
+    Trajectory,
+    /// The answers to requests that a map remembers.
+    Requests,
+    /// The distance fields that a planner keeps beside a map.
+    Fields,
+    /// Anything that is held for a few instructions.
+    Brief,
+}
+
+#[cfg(debug_assertions)]
+impl Rank {
+    /// True of a lock of a map's content: nobody who holds it may wait for a disk.
+    fn forbids_file_operations(self) -> bool {
+        self >= Self::Commit
+    }
+}

@@ -1,0 +1,21 @@
+//! Small tools that know nothing of maps: bits of a word, a prefetch, how long things take, the
+//! stop signal of long work.
+
+pub mod bits;
+mod clock;
+#[cfg(target_arch = "x86_64")]
+pub mod cpu;
+mod durations;
+mod excerpt;
+mod keyword;
+mod prefetch;
+mod sorting;
+mod stop_signal;
+
+pub use clock::unix_time_ns;
+pub use durations::{Durations, SharedDurations};
+pub use excerpt::excerpt;
+pub use keyword::{Keyword, words};
+pub use prefetch::prefetch;
+pub use sorting::sort_by_key_until;
+pub use stop_signal::StopSignal;

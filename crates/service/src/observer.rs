@@ -1,0 +1,172 @@
+//! Observers of a service: who is told of each operation when it is over, for metrics and for the audit.
+
+use std::fmt::Debug;
+use std::time::Duration;
+
+use super::{DeletionAnswer, KeepOutAnswer, MapService, MapVersion, ServiceError, UndoAnswer};
+use mrol_map::align::Verdict;
+use mrol_map::map::{CallerName, Lookup, MapName, RobotName};
+use mrol_map::mapping::Recovered;
+
+/// Told of each operation of a service when it is over.
+///
+/// It is called on the task that answers the caller, so it must not block.
+pub trait Observer: Debug + Send + Sync {
+    /// An operation is over: answered, refused, or left by its caller.
+    fn operation_ended(&self, ended: &Ended<'_>);
+}
+
+/// An operation that is over.
+#[derive(Debug)]
+pub struct Ended<'a> {
+    /// Which operation.
+    pub operation: &'static str,
+    /// The name of the caller's key, where there is one.
+    pub caller: Option<&'a CallerName>,
+    /// The map that it was asked of; none of an operation on all maps.
+    pub map: Option<&'a MapName>,
+    /// What came of it.
+    pub end: End<'a>,
+}
+
+/// How an operation ended.
+#[derive(Debug)]
+pub enum End<'a> {
+    /// The operation was done.
+    Done(Outcome),
+    /// The operation was refused, or failed.
+    Failed(&'a ServiceError),
+    /// The caller went away first. A change that was decided on by then is made all the same.
+    CallerGone,
+}
+
+/// What an operation did.
+#[derive(Debug)]
+pub enum Outcome {
+    /// The operation read, and nothing of it is counted.
+    Read,
+    /// Points were looked up.
+    Points {
+        /// How.
+        lookup: Lookup,
+        /// How many points.
+        points: usize,
+    },
+    /// A scan was judged, and inserted where the verdict or its sender said so.
+    Scan(JudgedScan),
+    /// The map, or which maps there are, was changed.
+    Changed(Change),
+}
+
+/// A scan that was judged for insertion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedScan {
+    /// The robot that sent the scan.
+    pub robot: RobotName,
+    /// How it fits.
+    pub verdict: Verdict,
+    /// Fraction of its points in occupied voxels of level 0, before it was added.
+    pub overlap: f64,
+    /// Time that the alignment took.
+    pub align_time: Duration,
+    /// An answer that was given before.
+    pub replayed: bool,
+    /// How its robot, which was lost, was found again.
+    pub recovered: Option<Recovered>,
+}
+
+/// What a change by an operator did.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Change {
+    /// The map's version before: another uuid where another map was replaced; none of a map that was not there.
+    pub before: Option<MapVersion>,
+    /// The map's version after it; none of a map that was deleted.
+    pub after: Option<MapVersion>,
+    /// Voxels of level 0 that were removed.
+    pub voxels_removed: usize,
+    /// Voxels of level 0 that were put back.
+    pub voxels_restored: usize,
+    /// Scans that were taken back.
+    pub scans_undone: usize,
+    /// Deletions that were taken back.
+    pub deletions_undone: usize,
+    /// True of a change that was done before under its request id, or had nothing to do.
+    pub replayed: bool,
+}
+
+impl Change {
+    /// A deletion that led to `after`.
+    pub(super) fn of_deletion(&DeletionAnswer { version, removed, replayed }: &DeletionAnswer) -> Self {
+        Self { voxels_removed: removed, ..Self::of_revision(version, !replayed && removed > 0) }
+    }
+
+    /// An undo that led to `after`.
+    pub(super) fn of_undo(answer: &UndoAnswer) -> Self {
+        let &UndoAnswer { scans, deletions, removed, restored, version, replayed } = answer;
+        Self {
+            voxels_removed: removed,
+            voxels_restored: restored,
+            scans_undone: scans,
+            deletions_undone: deletions,
+            ..Self::of_revision(version, !replayed && scans + deletions > 0)
+        }
+    }
+
+    /// A keep-out that was put or removed.
+    pub(super) fn of_keep_out(&KeepOutAnswer { version, replayed }: &KeepOutAnswer) -> Self {
+        Self::of_revision(version, !replayed)
+    }
+
+    /// What led to `after`, by a revision of its own unless it was replayed or had nothing to do.
+    fn of_revision(after: MapVersion, made_revision: bool) -> Self {
+        let before =
+            MapVersion { revision: after.revision - u64::from(made_revision), content_hash: None, ..after };
+        Self { replayed: !made_revision, ..Self::of_map(Some(before), Some(after)) }
+    }
+
+    /// A map was made, deleted or replaced.
+    pub(super) fn of_map(before: Option<MapVersion>, after: Option<MapVersion>) -> Self {
+        Self { before, after, replayed: before == after, ..Self::default() }
+    }
+}
+
+impl MapService {
+    /// Does `work`, and tells the observers how the operation ended, with what `outcome` makes of the answer. They are
+    /// told where the caller goes away as well.
+    pub(super) async fn observed<A>(
+        &self,
+        operation: &'static str,
+        map: Option<&MapName>,
+        work: impl Future<Output = Result<A, ServiceError>>,
+        outcome: impl FnOnce(&A) -> Outcome,
+    ) -> Result<A, ServiceError> {
+        let pending = Pending { service: self, operation, map };
+        let answer = work.await;
+        std::mem::forget(pending);
+        let end = match &answer {
+            Ok(answer) => End::Done(outcome(answer)),
+            Err(error) => End::Failed(error),
+        };
+        self.tell(&Ended { operation, caller: self.caller.as_ref(), map, end });
+        answer
+    }
+
+    fn tell(&self, ended: &Ended<'_>) {
+        self.inner.settings.observers.iter().for_each(|observer| observer.operation_ended(ended));
+    }
+}
+
+/// An operation that is not over: dropped, its caller has gone.
+struct Pending<'a> {
+    service: &'a MapService,
+    operation: &'static str,
+    map: Option<&'a MapName>,
+}
+
+impl Drop for Pending<'_> {
+    fn drop(&mut self) {
+        let Self { service, operation, map } = *self;
+        let caller = service.caller.as_ref();
+        service.tell(&Ended { operation, caller, map, end: End::CallerGone });
+    }
+}

@@ -1,0 +1,108 @@
+//! The map from above, as a 2-D grid.
+
+use super::{Asked, KnownPart, Question, QuestionedMap};
+use crate::{Limits, Reason, ServiceError};
+use mrol_map::map::ContentVersion;
+use mrol_map::planning::{Grid, GridArea, GridError, GridRequest, project_grid};
+use mrol_map::util::StopSignal;
+
+/// What is the map from above?
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridQuestion {
+    /// What it has in common with other questions.
+    pub asked: Asked,
+    /// What the grid covers, and how finely.
+    pub scope: GridScope,
+}
+
+/// What a grid covers, and how finely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridScope {
+    /// Which part of the map, seen from above.
+    pub area: GridArea,
+    /// Lowest and highest height of voxels' centers, meters; infinite ones are fine.
+    pub band_m: [f64; 2],
+    /// Side of a cell, meters: a whole number of the level's voxels. One voxel without.
+    pub cell_m: Option<f64>,
+    /// True where cells without a voxel are told apart: free ones and unknown ones.
+    pub tells_unknown: bool,
+}
+
+/// Bytes of a cell in an answer: a height and two bits.
+const BYTES_EACH: usize = 5;
+/// Bytes of a cell that is told to be free or unknown while that is found: how many of its columns are free.
+const WORK_BYTES_EACH: usize = 4;
+
+impl GridQuestion {
+    /// Most cells of an answer.
+    fn cells_max(limits: &Limits) -> usize {
+        limits.grid_cells_max.min(limits.message_bytes_max / BYTES_EACH)
+    }
+}
+
+impl Question for GridQuestion {
+    type Answer = Grid;
+
+    const OPERATION: &'static str = "ProjectGrid";
+
+    fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    fn answer_bytes(&self, limits: &Limits) -> usize {
+        let work = if self.scope.tells_unknown { WORK_BYTES_EACH } else { 0 };
+        Self::cells_max(limits) * (BYTES_EACH + work)
+    }
+
+    /// It walks all voxels of the area: never a short question.
+    fn work_ns(&self) -> usize {
+        usize::MAX
+    }
+
+    fn check(&self, _: &Limits) -> Result<(), ServiceError> {
+        Ok(())
+    }
+
+    fn answer_from(
+        &self,
+        map: &QuestionedMap<'_>,
+        limits: &Limits,
+        stop: StopSignal<'_>,
+    ) -> Result<(Grid, ContentVersion), ServiceError> {
+        let GridScope { area, band_m, cell_m, tells_unknown } = self.scope;
+        let level = self.asked.level;
+        map.in_view(&self.asked, usize::MAX, stop, |view| {
+            let cell_m = cell_m.unwrap_or_else(|| view.lattice().resolution_m(level));
+            let cells_max = Self::cells_max(limits);
+            let request = GridRequest { level, area, band_m, cell_m, tells_unknown, cells_max };
+            Ok(project_grid(view, &request, stop)?)
+        })
+    }
+
+    fn check_known(&self, answer: &Grid, known: &KnownPart) -> Result<(), ServiceError> {
+        let GridScope { area, band_m, .. } = self.scope;
+        if area == GridArea::Occupied {
+            let message =
+                "area must be given where a replica copies a region: what is occupied elsewhere is not known";
+            return Err(ServiceError::new(Reason::PointOutOfRange, message));
+        }
+        let end_m = |axis: usize| answer.origin_m[axis] + answer.size[axis] as f64 * answer.cell_m;
+        let [xs, ys] = [0, 1].map(|axis| [answer.origin_m[axis], end_m(axis)]);
+        (0..8usize).try_for_each(|corner| {
+            let corner_m = [xs[corner & 1], ys[corner >> 1 & 1], known.within(band_m[corner >> 2])];
+            known.check_ball(|| "a corner of the area between min_z_m and max_z_m".to_owned(), corner_m, 0.0)
+        })
+    }
+}
+
+impl From<GridError> for ServiceError {
+    fn from(error: GridError) -> Self {
+        match error {
+            GridError::Cells { .. } => {
+                let message = format!("grid_cells_max: {error}: ask for a smaller area or larger cells");
+                Self::new(Reason::GridTooLarge, message)
+            }
+            _ => Self::new(Reason::BadGrid, error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What a service is opened with.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::{Gauges, Limits, Observer, ScanRequest};
+use mrol_map::align::AlignmentSettings;
+use mrol_map::bloom::FilterSettings;
+use mrol_map::map::RobotName;
+use mrol_map::mapping::{CarvingSettings, StationarySettings};
+use mrol_map::scan::PointFilter;
+use mrol_store::StoreSettings;
+
+/// Settings of a [`super::MapService`].
+#[derive(Debug, Clone, Default)]
+pub struct ServiceSettings {
+    /// Where maps are kept across restarts; nowhere without.
+    pub data_dir: Option<PathBuf>,
+    /// How they are kept there.
+    pub store: StoreSettings,
+    /// Bounds on what callers may ask.
+    pub limits: Limits,
+    /// What disk and memory are measured with; without, nothing is refused for want of them.
+    pub gauges: Option<Arc<dyn Gauges>>,
+    /// Observers, which are told of every operation when it is over.
+    pub observers: Vec<Arc<dyn Observer>>,
+    /// Threads for queries; 0 = one a core.
+    pub query_threads: usize,
+    /// Threads for insertions and deletions; 0 = one a core.
+    pub mapping_threads: usize,
+    /// Threads for alignments of scans that are not inserted; 0 = one a core.
+    pub alignment_threads: usize,
+    /// Threads for searches with no guess; 0 = one a core.
+    pub localization_threads: usize,
+    /// Settings of every alignment.
+    pub alignment: AlignmentSettings,
+    /// When a robot counts as standing still.
+    pub stationary: StationarySettings,
+    /// Settings of robots by name; the name `*` stands for every other robot.
+    pub robots: BTreeMap<String, RobotSettings>,
+    /// Filter settings of maps whose makers do not say.
+    pub filter: FilterSettings,
+}
+
+/// Settings of a robot, where its requests do not say.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RobotSettings {
+    /// Which points of its scans count.
+    pub filter: PointFilter,
+    /// Look for it where its scans are refused: from other guesses, then by a search with no guess around its last good
+    /// pose, which two scans have to confirm.
+    pub recover: bool,
+    /// Take out of the map what its scans saw through.
+    pub carve: bool,
+    /// How much is believed of what they saw through.
+    pub carving: CarvingSettings,
+}
+
+/// The key of [`ServiceSettings::robots`] that stands for every robot without an entry.
+pub const EVERY_ROBOT: &str = "*";
+
+impl ServiceSettings {
+    /// The settings of a robot.
+    pub(super) fn of_robot(&self, robot: &RobotName) -> RobotSettings {
+        let settings = self.robots.get(robot.as_str()).or_else(|| self.robots.get(EVERY_ROBOT));
+        settings.copied().unwrap_or_default()
+    }
+
+    /// True where the robot of a scan is to be looked for if the scan is refused.
+    pub(super) fn recovers(&self, scan: &ScanRequest) -> bool {
+        scan.recover.unwrap_or_else(|| self.of_robot(&scan.robot).recover)
+    }
+
+    /// What a scan carves; none where it does not.
+    pub(super) fn carving(&self, scan: &ScanRequest) -> Option<CarvingSettings> {
+        let RobotSettings { carve, carving, .. } = self.of_robot(&scan.robot);
+        scan.carve.unwrap_or(carve).then_some(carving)
+    }
+}
