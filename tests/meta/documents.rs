@@ -100,3 +100,42 @@ fn commands_of_the_documents_run_as_they_stand() {
     }
     assert!(found >= 15, "{found} blocks");
 }
+
+/// Folders of the repository that pages name files of.
+const FOLDERS: [&str; 8] = [".ci", "clients", "crates", "docker", "examples", "proto", "src", "tests"];
+
+/// The files and folders of the repository that a page names, from its root: `src/lib.rs`, `crates/map/src/align/`.
+fn named_paths(text: &str) -> Vec<&str> {
+    let is_of_path = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+    let words = text.split(|c: char| !is_of_path(c)).map(|word| word.trim_end_matches(['.', '/']));
+    let is_named = |word: &&str| {
+        word.split_once('/').is_some_and(|(first, rest)| FOLDERS.contains(&first) && !rest.is_empty())
+    };
+    words.filter(is_named).collect()
+}
+
+#[test]
+fn paths_are_found_in_sentences() {
+    let text = "In `src/lib.rs` and ([it](../../tests/a-b/main.rs)), crates/map/src/align/. Not in src/, a/src/b or x.";
+    assert_eq!(named_paths(text), ["src/lib.rs", "crates/map/src/align"]);
+}
+
+#[test]
+fn every_path_that_a_page_names_is_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut missing = Vec::new();
+    let mut found = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for (number, line) in text.lines().enumerate() {
+            for path in named_paths(line) {
+                found += 1;
+                if !root.join(path).exists() {
+                    missing.push(format!("{}:{}: {path}", page.display(), number + 1));
+                }
+            }
+        }
+    }
+    assert!(missing.is_empty(), "named, and not there:\n{}", missing.join("\n"));
+    assert!(found >= 100, "{found} paths");
+}

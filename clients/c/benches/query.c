@@ -1,4 +1,4 @@
-/* Times queries of points through this library, when it is told to: the C half of `mrol bench replica --c-client`.
+/* Times queries of points through this library, when it is told to: the C half of `mrol-lab bench replica --c-client`.
  *
  *     query ADDRESS MAP POINTS_FILE X Y Z QX QY QZ QW
  *

@@ -1,4 +1,4 @@
-"""Times queries of points through a replica: `mrol bench replica --c-client bench/query.py` tells it when.
+"""Times queries of points through a replica: `mrol-lab bench replica --c-client bench/query.py` tells it when.
 
 It says and is told what clients/c/benches/query.c does: a line "LOOKUP POINTS" asks about all points of the file, so many at a
 time, twice; printed are the nanoseconds of the second time and how many points are occupied.

@@ -1,6 +1,6 @@
 """Queries of this package against those of the Rust client, over one server: bench/queries.py PROGRAM.
 
-`mrol bench serve` (HTTP and gRPC by the Rust client) and this package ask the same server in turn, so that what else the machine
+`mrol-lab bench serve` (HTTP and gRPC by the Rust client) and this package ask the same server in turn, so that what else the machine
 does meets all of them. Of each the least median of all rounds counts.
 """
 
@@ -22,7 +22,7 @@ LIMITS = {10_000: 2.0, 1_000_000: 1.2}
 """Points of a query, and how many times as long as the faster of HTTP and gRPC it may take."""
 
 ROOM_M = np.array([14.0, 9.0, 3.0])
-"""The room of `mrol bench serve`: 155 thousand voxels of 5 cm on its walls."""
+"""The room of `mrol-lab bench serve`: 155 thousand voxels of 5 cm on its walls."""
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 
     pip install coal numpy
     mrol-lab bench planning --scans 0 --peer-file target/arms.bin
-    benches/peers/coal_octree.py target/arms.bin
+    crates/lab/benches/peers/coal_octree.py target/arms.bin
 
 The layout of the file is in crates/lab/src/measure/peer_file.rs. Voxels are the leaves of an octree, cubes as those of mrol are. An
 arm is asked sphere by sphere until one collides. Prints microseconds a pose with the calls from Python, of which an arm that

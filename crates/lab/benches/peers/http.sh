@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Batch queries over HTTP by clients that nobody here wrote, wrk and h2load (Debian: wrk, nghttp2-client):
-# benches/peers/http.sh [SERVER]. Server and clients share the machine; server and points are the same each time.
+# crates/lab/benches/peers/http.sh [SERVER]. Server and clients share the machine; server and points are the same each time.
 set -euo pipefail
 server=$(realpath "${1:-target/release/mrol}")
 work=$(mktemp -d)

@@ -3,8 +3,8 @@
 
     pip install small_gicp kiss-icp numpy
     mrol-lab experiment convergence SCANS/0000.ply SCANS/0001.ply --truth poses.txt --resolution 0.1 --out results/
-    benches/peers/icp.py convergence SCANS/0000.ply SCANS/0001.ply results/ --truth poses.txt --resolution 0.1
-    benches/peers/icp.py timing SCANS/ --resolution 0.1
+    crates/lab/benches/peers/icp.py convergence SCANS/0000.ply SCANS/0001.ply results/ --truth poses.txt --resolution 0.1
+    crates/lab/benches/peers/icp.py timing SCANS/ --resolution 0.1
 
 `convergence` starts VGICP and GICP at every guess of results/guesses.csv, with several reaches each; results/peers.md is
 a table like convergence.md. `timing` aligns each scan to the one before it, of whose pose nothing is known, and reports

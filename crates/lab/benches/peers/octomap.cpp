@@ -1,7 +1,7 @@
 // OctoMap's castRay on the voxels and rays of `mrol-lab bench rays --peer-file`, one thread.
 //
 //     apt install liboctomap-dev g++
-//     g++ -O3 -march=native -o target/octomap benches/peers/octomap.cpp -loctomap -loctomath
+//     g++ -O3 -march=native -o target/octomap crates/lab/benches/peers/octomap.cpp -loctomap -loctomath
 //     mrol-lab bench rays --peer-file target/rays.bin && target/octomap target/rays.bin
 //
 // The layout of the file is in crates/lab/src/measure/peer_file.rs. Prints nanoseconds a ray of processor time, the median of some

@@ -1,7 +1,7 @@
 // OctoMap's free and occupied voxels from the scans of `mrol-lab experiment free-space --peer-scans`.
 //
 //     apt install liboctomap-dev g++
-//     g++ -O3 -march=native -o target/octomap_free_space benches/peers/octomap_free_space.cpp -loctomap -loctomath
+//     g++ -O3 -march=native -o target/octomap_free_space crates/lab/benches/peers/octomap_free_space.cpp -loctomap -loctomath
 //     target/octomap_free_space scans.bin states.bin
 //
 // The layouts of both files are in crates/lab/src/experiment/free_space.rs. Every scan goes in by insertPointCloud with OctoMap's own

@@ -18,7 +18,7 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol-lab bench nearest --queries 100000 --to centers
   mrol-lab bench nearest --workload site --queries 100000 --to centers --peer-file points.bin
-  cargo run --release --manifest-path benches/peers/kiddo/Cargo.toml -- points.bin
+  cargo run --release --manifest-path crates/lab/benches/peers/kiddo/Cargo.toml -- points.bin
 
 One core, through the map's locks, from points to distances, voxels and directions; ns_per_point is the median of
 --repeats passes after one that is not timed. --peer-file writes voxels, points and distances for other libraries.";

@@ -19,7 +19,7 @@ EXAMPLES:
   mrol-lab bench planning                                 an arm, a body of points and motions in a room
   mrol-lab bench planning --workload site                 the same on ten million voxels
   mrol-lab bench planning --scans 0 --json                without the part in which the map changes
-  mrol-lab bench planning --peer-file arms.bin && benches/peers/coal_octree.py arms.bin
+  mrol-lab bench planning --peer-file arms.bin && crates/lab/benches/peers/coal_octree.py arms.bin
 
 On one core, in this process. An arm of 59 spheres stands at random places within 1 m of a surface, with random joint
 angles: its hand and fingers are links, and then parts of the last link. The body of points is asked where it meets nothing.

@@ -17,7 +17,7 @@ const EXAMPLES: &str = "\
 EXAMPLES:
   mrol-lab bench rays                                                  a panorama of 2000 x 500 rays in the room
   mrol-lab bench rays --workload site --places 64 --azimuths 80 --rings 20
-  mrol-lab bench rays --peer-file rays.bin && benches/peers/octomap rays.bin
+  mrol-lab bench rays --peer-file rays.bin && crates/lab/benches/peers/octomap rays.bin
 
 Rays go from places on the sensor's path: in the room in all directions, on the site in those that its sensor looks in.
 One core, through the map's locks, from origins and directions to distances and voxels; ns_per_ray is the median of

@@ -30,7 +30,7 @@ a uniform axis, by up to 2 m and 40 degrees, both uniform. A trial converged tha
 truth. Line k of the truth belongs to the k-th scan of the folder that a scan lies in. Writes guesses.csv (poses of the
 source in the target's frame), convergence.csv (every trial) and convergence.md (a row for each 0.5 m and 10 degrees of
 offset). 200 trials take some minutes.
-benches/peers/icp.py takes guesses.csv and adds others to the comparison.";
+crates/lab/benches/peers/icp.py takes guesses.csv and adds others to the comparison.";
 
 const METHODS: [Method; 2] = [Method::Refined, Method::Overlap];
 /// Width of the bins by which trials are counted, meters.

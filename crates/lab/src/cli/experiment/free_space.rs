@@ -23,7 +23,7 @@ EXAMPLES:
   octomap_free_space scans.bin states.bin
   mrol-lab experiment free-space hall/ --truth hall/poses.txt --resolution 0.1 --peer-states states.bin
 
-The scans are mapped at their true poses; those that see something new leave viewpoints. The peer, benches/peers/octomap_free_space.cpp,
+The scans are mapped at their true poses; those that see something new leave viewpoints. The peer, crates/lab/benches/peers/octomap_free_space.cpp,
 takes the same scans, poses and range. Of the voxels that it calls free, those in which a point of a scan fell are left out; what
 is unknown here counts as wrong.";
 

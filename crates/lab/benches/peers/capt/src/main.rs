@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! mrol-lab bench planning --scans 0 --peer-file target/arms.bin
-//! cargo run --release --manifest-path benches/peers/capt/Cargo.toml -- target/arms.bin
+//! cargo run --release --manifest-path crates/lab/benches/peers/capt/Cargo.toml -- target/arms.bin
 //! ```
 //!
 //! The layout of the file is in `crates/lab/src/measure/peer_file.rs`. The tree holds the centers of voxels, as balls of half a

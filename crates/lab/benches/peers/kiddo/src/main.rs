@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! mrol-lab bench nearest --queries 100000 --to centers --peer-file target/points.bin
-//! cargo run --release --manifest-path benches/peers/kiddo/Cargo.toml -- target/points.bin
+//! cargo run --release --manifest-path crates/lab/benches/peers/kiddo/Cargo.toml -- target/points.bin
 //! ```
 //!
 //! The layout of the file is in `crates/lab/src/measure/peer_file.rs`. Prints nanoseconds a point, the median of some passes after
