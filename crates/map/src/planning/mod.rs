@@ -6,6 +6,7 @@
 //! [`MapView`](crate::map::MapView) and a request of plain slices, and answers with plain arrays.
 
 mod aim;
+mod answers;
 mod body;
 mod classify;
 mod clearance;
@@ -41,6 +42,7 @@ mod rays;
 mod reach;
 mod remembered;
 mod rigid;
+mod rounds;
 #[cfg(test)]
 mod seen_maps;
 mod simd;
@@ -54,6 +56,7 @@ mod test_maps;
 #[cfg(test)]
 mod tests;
 
+pub use answers::{CLEARANCE_CELLS_MAX, Clearance, Hit, Met, clearance_max_m};
 pub use body::Body;
 pub use classify::{OutOfRange, PointState, PointStates, classify_points};
 pub use clearance::FIELD_BYTES_MAX_DEFAULT;
@@ -65,7 +68,6 @@ pub use frontiers::{
     STANDOFF_VOXELS, STANDOFF_VOXELS_MAX, list_frontiers,
 };
 pub use grid::{Grid, GridArea, GridError, GridRequest, project_grid};
-pub use kind::{CLEARANCE_CELLS_MAX, Clearance, Hit, Met, clearance_max_m};
 pub use motions::{MotionAnswer, MotionQuestion, prepared_bytes};
 pub use nearest::{MeasuredTo, NearestError, NearestRequest, NearestVoxels, RADIUS_VOXELS_MAX, find_nearest};
 pub use parts::{Link, Sphere};

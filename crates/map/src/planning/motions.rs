@@ -18,7 +18,8 @@ use super::link::{self, LinkState};
 use super::look::Look;
 use super::path::LinkMotion;
 use super::placement::{CellsFromLink, LinkPose};
-use super::planner::{Answerer, PlanningView};
+use super::planner::PlanningView;
+use super::rounds::Answerer;
 use super::surroundings::Surroundings;
 use crate::util::StopSignal;
 

@@ -3,16 +3,18 @@
 use std::borrow::Cow;
 
 use super::PlanningError;
+use super::answers::{Clearance, Hit};
 use super::body::Body;
 use super::configurations::Configurations;
 use super::eight::LANES;
 use super::in_cells::BodyInCells;
 use super::keep_outs::{Figure, Posed, Shapes};
-use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind};
+use super::kind::{Clearances, FirstHits, Kind};
 use super::look::Look;
 use super::one::{Configuration, InTurn};
-use super::planner::{Answerer, PlanningView};
+use super::planner::PlanningView;
 use super::rigid::EightPlaces;
+use super::rounds::Answerer;
 use super::steps::{Unanswered, answer_in_steps};
 use super::surroundings::Surroundings;
 use crate::util::StopSignal;

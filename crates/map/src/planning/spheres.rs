@@ -1,14 +1,16 @@
 //! Do these spheres of the map frame meet voxels?
 
+use super::answers::{Clearance, Hit};
 use super::configurations::MAP_FRAME;
 use super::in_cells::{BodyInCells, LinkInCells};
 use super::keep_outs::{Posed, Shapes, Solid};
-use super::kind::{Clearance, Clearances, FirstHits, Hit, Kind, Meets};
+use super::kind::{Clearances, FirstHits, Kind, Meets};
 use super::look::Look;
 use super::one::Configuration;
 use super::parts::{RADIUS_MAX_M, Sphere};
-use super::planner::{Answerer, PlanningView};
+use super::planner::PlanningView;
 use super::poses::words;
+use super::rounds::Answerer;
 use super::surroundings::Surroundings;
 use super::{PlanningError, SpherePlace};
 use crate::util::StopSignal;

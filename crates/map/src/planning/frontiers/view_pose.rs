@@ -1,6 +1,6 @@
 //! From where a frontier can be seen.
 
-use super::FrontierView;
+use super::frontier::FrontierView;
 use crate::geometry::Pose;
 use crate::map::{MapView, ShapeRay};
 use crate::planning::free_space::FreeSpace;

@@ -1,7 +1,7 @@
 //! The voxels of a box as bits, with those around it: which are free, and which unknown.
 
-use super::Frontier;
 use super::clusters::{Bits, Cluster, FrontierBits};
+use super::frontier::Frontier;
 use super::view_pose::Lookout;
 use crate::map::{KeepOut, MapView};
 use crate::planning::free_space::{ALL, FreeSpace};

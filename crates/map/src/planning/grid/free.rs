@@ -2,7 +2,9 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Cells, Grid, Projection};
+use super::cells::Cells;
+use super::occupancy_grid::Grid;
+use super::projection::Projection;
 use crate::planning::free_space::{CELLS, FreeSpace};
 use crate::util::StopSignal;
 use crate::voxel::{BLOCK_LEVELS, BLOCK_SIDE, Cell, VoxelKey};

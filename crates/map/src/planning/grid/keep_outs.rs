@@ -1,6 +1,7 @@
 //! Keep-outs from above: a cell that has a point of one in the band is occupied.
 
-use super::{Cells, Grid, WHOLE_WITHIN};
+use super::cells::{Cells, WHOLE_WITHIN};
+use super::occupancy_grid::Grid;
 use crate::map::Outline;
 use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;

@@ -1,6 +1,6 @@
 //! A grid as the two files that the `map_server` of ROS and Nav2 reads: an image and its description.
 
-use super::Grid;
+use super::occupancy_grid::Grid;
 
 /// Gray values, as `map_server` writes them: p is occupied with probability (255 - p) / 255.
 const OCCUPIED: u8 = 0;

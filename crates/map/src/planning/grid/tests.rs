@@ -5,7 +5,8 @@ use super::*;
 use crate::map::{MapContents, MapSettings, MultiResolutionMap};
 use crate::planning::seen_maps::seen_history_and_level;
 use crate::planning::test_maps::{RESOLUTION_M, history_and_level};
-use crate::voxel::VoxelSet;
+use crate::util::StopSignal;
+use crate::voxel::{VoxelKey, VoxelSet};
 
 fn map_of(indices: &[[i32; 3]], resolution_m: f64) -> MultiResolutionMap {
     let voxels: VoxelSet = indices.iter().filter_map(|&index| VoxelKey::new(index)).collect();

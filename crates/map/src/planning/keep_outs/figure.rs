@@ -1,6 +1,6 @@
 //! Bodies in meters, as shapes are asked about them.
 
-use super::Shapes;
+use super::shapes::Shapes;
 use crate::map::KeepOut;
 use crate::planning::effort::Effort;
 use crate::planning::parts::{Link, Sphere};

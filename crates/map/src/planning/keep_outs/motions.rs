@@ -6,7 +6,8 @@
 //! center gets nearer to a shape than its radius less half of that stride. Parts that are smaller than this could go through
 //! a shape between them, so their ways from the one place to the other are tested as lines.
 
-use super::{Shapes, Solid};
+use super::figure::Solid;
+use super::shapes::Shapes;
 use crate::planning::effort::Effort;
 use crate::planning::path::LinkMotion;
 use crate::planning::placement::CellsFromLink;

@@ -1,9 +1,10 @@
 //! Bodies at poses among shapes.
 
-use super::{Figure, Shapes, Solid};
+use super::figure::{Figure, Solid};
+use super::shapes::Shapes;
+use crate::planning::answers::{Clearance, Hit, Met};
 use crate::planning::configurations::{Configurations, MAP_FRAME};
 use crate::planning::effort::Effort;
-use crate::planning::kind::{Clearance, Hit, Met};
 use crate::planning::placement::{CellsFromLink, LinkPose};
 use crate::util::StopSignal;
 

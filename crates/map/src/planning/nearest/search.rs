@@ -1,8 +1,9 @@
 //! The search around one point: clusters near first, then blocks near first, as far as they can hold something nearer.
 
 use super::block::nearest_in_block;
+use super::nearest_voxels::Nearest;
+use super::request::MeasuredTo;
 use super::seeker::Seeker;
-use super::{MeasuredTo, Nearest};
 use crate::geometry::Point;
 use crate::map::TierView;
 use crate::planning::remembered::Remembered;

@@ -1,6 +1,7 @@
 //! Rays among keep-outs: each ends where it enters the first one, where that is before it meets a voxel.
 
-use super::{RayError, RayHits, Rays};
+use super::hits::RayHits;
+use super::request::{RayError, Rays};
 use crate::map::ShapeRay;
 use crate::planning::keep_outs::Shapes;
 use crate::util::StopSignal;

@@ -1,8 +1,10 @@
 //! Rays that take turns: while one waits for memory or for a sum, others go on.
 #![expect(unsafe_code, reason = "instructions that not every machine has")]
 
+use super::hits::RayHits;
+use super::rays_in_cells::Request;
+use super::request::RayError;
 use super::space::{Space, Step, Walk};
-use super::{RayError, RayHits, Request};
 use crate::util::StopSignal;
 #[cfg(target_arch = "x86_64")]
 use crate::util::cpu::Avx2;
